@@ -1,0 +1,3 @@
+//! The command `medial`.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Generated solids with known medial axes, and declared noise.

@@ -1,0 +1,1 @@
+//! The published simplifiers of the medial axis, one module each.

@@ -1,0 +1,1 @@
+//! Result records, and what is made of them: tables, plots, the page.

@@ -1,0 +1,266 @@
+//! The medial mesh as plain arrays: what methods take and return, what files hold, what metrics read.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Vec3;
+
+/// A medial sphere `m = (c, r)`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sphere {
+    /// Centre `c`.
+    pub centre: Vec3,
+    /// Radius `r`, non-negative.
+    pub radius: f64,
+}
+
+impl Sphere {
+    /// A sphere from its centre and radius.
+    pub const fn new(centre: Vec3, radius: f64) -> Self {
+        Self { centre, radius }
+    }
+
+    /// The point `(1 - t) self + t other` of the edge between two spheres, in `R^4`.
+    pub fn lerp(self, other: Self, t: f64) -> Self {
+        Self::new(self.centre.lerp(other.centre, t), self.radius + t * (other.radius - self.radius))
+    }
+}
+
+/// The boundary samples that each sphere touches, as known from the triangulation it came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contacts {
+    /// The boundary samples, in the unit of the spheres.
+    pub samples: Arc<[Vec3]>,
+    /// For each sphere the four samples of its Delaunay tetrahedron.
+    pub of_sphere: Vec<[u32; 4]>,
+}
+
+/// A simplicial complex of dimension at most two on medial spheres.
+///
+/// Generally non-manifold and possibly disconnected. Spheres without edges and edges without
+/// faces are ordinary members: a sampled ball simplifies to one sphere, a tube to a chain of edges.
+///
+/// Canonical form, held by every mesh that [`MedialMesh::check`] accepts: the indices of an edge
+/// and of a face ascend, edges and faces are sorted lexicographically without repetition, and the
+/// three edges of every face are listed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MedialMesh {
+    /// Medial spheres, the vertices of the complex.
+    pub spheres: Vec<Sphere>,
+    /// Pairs of sphere indices.
+    pub edges: Vec<[u32; 2]>,
+    /// Triples of sphere indices.
+    pub faces: Vec<[u32; 3]>,
+    /// Contact points, where the mesh came with them.
+    pub contacts: Option<Contacts>,
+}
+
+/// The first violation that [`MedialMesh::check`] met.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ComplexError {
+    /// A centre or radius is not a number, or the radius is negative.
+    #[error("sphere {sphere} is not valid: centre {centre}, radius {radius}")]
+    Sphere {
+        /// Index of the sphere.
+        sphere: usize,
+        /// Its centre.
+        centre: Vec3,
+        /// Its radius.
+        radius: f64,
+    },
+    /// An edge names a sphere that does not exist, or its indices do not ascend.
+    #[error("edge {edge} {ends:?} is not an ascending pair of the {spheres} spheres")]
+    Edge {
+        /// Index of the edge.
+        edge: usize,
+        /// Its ends.
+        ends: [u32; 2],
+        /// Number of spheres.
+        spheres: usize,
+    },
+    /// A face names a sphere that does not exist, or its indices do not ascend.
+    #[error("face {face} {corners:?} is not an ascending triple of the {spheres} spheres")]
+    Face {
+        /// Index of the face.
+        face: usize,
+        /// Its corners.
+        corners: [u32; 3],
+        /// Number of spheres.
+        spheres: usize,
+    },
+    /// Edges or faces are repeated or out of order.
+    #[error("{what} {index} is not larger than its predecessor: repeated or unsorted")]
+    Order {
+        /// `"edge"` or `"face"`.
+        what: &'static str,
+        /// Index of the later one.
+        index: usize,
+    },
+    /// A face lacks one of its edges.
+    #[error("face {face} has the side {side:?}, which is not listed as an edge")]
+    MissingEdge {
+        /// Index of the face.
+        face: usize,
+        /// The missing pair.
+        side: [u32; 2],
+    },
+    /// The contacts do not fit the spheres.
+    #[error("contacts: {0}")]
+    Contacts(String),
+}
+
+impl MedialMesh {
+    /// A complex from spheres, edges and faces in any order and orientation: indices are sorted,
+    /// repetitions dropped, and the sides of every face added as edges.
+    ///
+    /// # Errors
+    /// When an index is out of range, an edge or face repeats a sphere, or a sphere is not valid.
+    pub fn from_simplices(
+        spheres: Vec<Sphere>,
+        mut edges: Vec<[u32; 2]>,
+        mut faces: Vec<[u32; 3]>,
+    ) -> Result<Self, ComplexError> {
+        for edge in &mut edges {
+            edge.sort_unstable();
+        }
+        for face in &mut faces {
+            face.sort_unstable();
+        }
+        faces.sort_unstable();
+        faces.dedup();
+        edges.extend(faces.iter().flat_map(sides));
+        edges.sort_unstable();
+        edges.dedup();
+        let mesh = Self { spheres, edges, faces, contacts: None };
+        mesh.check()?;
+        Ok(mesh)
+    }
+
+    /// Verifies the canonical form and the validity of every sphere.
+    ///
+    /// # Errors
+    /// The first violation found. Cost `O(n log n)`.
+    pub fn check(&self) -> Result<(), ComplexError> {
+        let spheres = self.spheres.len();
+        for (sphere, s) in self.spheres.iter().enumerate() {
+            if !(s.centre.is_finite() && s.radius.is_finite() && s.radius >= 0.0) {
+                return Err(ComplexError::Sphere { sphere, centre: s.centre, radius: s.radius });
+            }
+        }
+        for (edge, &ends) in self.edges.iter().enumerate() {
+            if ends[0] >= ends[1] || ends[1] as usize >= spheres {
+                return Err(ComplexError::Edge { edge, ends, spheres });
+            }
+        }
+        for (face, &corners) in self.faces.iter().enumerate() {
+            let ascending = corners[0] < corners[1] && corners[1] < corners[2];
+            if !ascending || corners[2] as usize >= spheres {
+                return Err(ComplexError::Face { face, corners, spheres });
+            }
+        }
+        check_order("edge", &self.edges)?;
+        check_order("face", &self.faces)?;
+        for (face, corners) in self.faces.iter().enumerate() {
+            for side in sides(corners) {
+                if self.edges.binary_search(&side).is_err() {
+                    return Err(ComplexError::MissingEdge { face, side });
+                }
+            }
+        }
+        self.check_contacts()
+    }
+
+    fn check_contacts(&self) -> Result<(), ComplexError> {
+        let Some(contacts) = &self.contacts else {
+            return Ok(());
+        };
+        if contacts.of_sphere.len() != self.spheres.len() {
+            return Err(ComplexError::Contacts(format!(
+                "{} entries for {} spheres",
+                contacts.of_sphere.len(),
+                self.spheres.len()
+            )));
+        }
+        let samples = contacts.samples.len();
+        let stray =
+            contacts.of_sphere.iter().position(|ids| ids.iter().any(|&id| id as usize >= samples));
+        match stray {
+            Some(sphere) => Err(ComplexError::Contacts(format!(
+                "sphere {sphere} touches {:?} of {samples} samples",
+                contacts.of_sphere[sphere]
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// The subcomplex induced by the spheres with `keep[i]`: they, and the edges and faces all of
+    /// whose spheres are kept. Contacts follow. The order of the spheres is unchanged.
+    ///
+    /// # Panics
+    /// If `keep` is not as long as the list of spheres.
+    pub fn induced(&self, keep: &[bool]) -> Self {
+        assert_eq!(keep.len(), self.spheres.len(), "one flag for each sphere");
+        let mut renumbered = vec![u32::MAX; keep.len()];
+        let mut count = 0;
+        for (sphere, _) in keep.iter().enumerate().filter(|&(_, &kept)| kept) {
+            renumbered[sphere] = count;
+            count += 1;
+        }
+        let kept = |sphere: u32| keep[sphere as usize];
+        let new = |sphere: u32| renumbered[sphere as usize];
+        let select = |indices: &[[u32; 4]]| {
+            indices.iter().zip(keep).filter(|&(_, &k)| k).map(|(&ids, _)| ids).collect()
+        };
+        Self {
+            spheres: self.spheres.iter().zip(keep).filter(|&(_, &k)| k).map(|(&s, _)| s).collect(),
+            edges: self
+                .edges
+                .iter()
+                .filter(|e| e.iter().all(|&v| kept(v)))
+                .map(|e| e.map(new))
+                .collect(),
+            faces: self
+                .faces
+                .iter()
+                .filter(|f| f.iter().all(|&v| kept(v)))
+                .map(|f| f.map(new))
+                .collect(),
+            contacts: self.contacts.as_ref().map(|c| Contacts {
+                samples: Arc::clone(&c.samples),
+                of_sphere: select(&c.of_sphere),
+            }),
+        }
+    }
+
+    /// The mesh with every sphere (and contact sample) carried through `map`, a similarity that
+    /// multiplies lengths by `scale`.
+    pub fn transformed(&self, scale: f64, map: impl Fn(Vec3) -> Vec3) -> Self {
+        Self {
+            spheres: self
+                .spheres
+                .iter()
+                .map(|s| Sphere::new(map(s.centre), s.radius * scale))
+                .collect(),
+            edges: self.edges.clone(),
+            faces: self.faces.clone(),
+            contacts: self.contacts.as_ref().map(|c| Contacts {
+                samples: c.samples.iter().map(|&p| map(p)).collect(),
+                of_sphere: c.of_sphere.clone(),
+            }),
+        }
+    }
+}
+
+/// The sides of an ascending face, as ascending pairs.
+fn sides(face: &[u32; 3]) -> [[u32; 2]; 3] {
+    let [a, b, c] = *face;
+    [[a, b], [a, c], [b, c]]
+}
+
+fn check_order<T: Ord>(what: &'static str, simplices: &[T]) -> Result<(), ComplexError> {
+    match simplices.windows(2).position(|pair| pair[0] >= pair[1]) {
+        Some(index) => Err(ComplexError::Order { what, index: index + 1 }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,1 @@
+//! Exact predicates, Delaunay triangulation, bounding-volume trees, distances to medial primitives.

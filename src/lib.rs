@@ -1,0 +1,25 @@
+//! Substrates, metrics and the simplifier trait for the 3D **medial axis transform** (MAT).
+//!
+//! Everything that a simplifier of the medial axis needs, and nothing about any one method:
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`surface`] | triangle meshes: reading, repairing, checking, sampling, the inside test |
+//! | [`geometry`] | exact predicates, Delaunay triangulation, bounding-volume trees, distances to sphere, cone and slab |
+//! | [`complex`] | the medial mesh, its formats, its topology, the edge-collapse engine |
+//! | [`metrics`] | Hausdorff distances, triangle quality, spikes, topology against the solid's own |
+//! | [`shape`] | one normalised input with its substrates, each built once, on demand, and timed |
+//! | [`simplifier`] | the trait [`simplifier::MedialSimplifier`] and what goes in and out of it |
+//!
+//! Lengths are in units of the input's bounding-box diagonal wherever a [`shape::Shape`] is
+//! involved, and in the unit of the arguments everywhere else.
+
+pub mod complex;
+pub mod geometry;
+pub mod metrics;
+pub mod shape;
+pub mod simplifier;
+pub mod surface;
+
+/// A point or a vector in space, double precision.
+pub type Vec3 = glam::DVec3;

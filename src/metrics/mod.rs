@@ -1,0 +1,1 @@
+//! What a medial mesh is judged by: Hausdorff distances, triangle quality, spikes, topology.

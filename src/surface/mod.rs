@@ -1,0 +1,5 @@
+//! Triangle meshes: reading, repairing, checking, sampling, the inside test.
+
+mod mesh;
+
+pub use mesh::{Normalisation, TriMesh};
