@@ -202,10 +202,8 @@ impl MedialMesh {
     pub fn induced(&self, keep: &[bool]) -> Self {
         assert_eq!(keep.len(), self.spheres.len(), "one flag for each sphere");
         let mut renumbered = vec![u32::MAX; keep.len()];
-        let mut count = 0;
-        for (sphere, _) in keep.iter().enumerate().filter(|&(_, &kept)| kept) {
-            renumbered[sphere] = count;
-            count += 1;
+        for (new, old) in (0..keep.len()).filter(|&sphere| keep[sphere]).enumerate() {
+            renumbered[old] = new as u32;
         }
         let kept = |sphere: u32| keep[sphere as usize];
         let new = |sphere: u32| renumbered[sphere as usize];

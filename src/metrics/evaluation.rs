@@ -1,0 +1,144 @@
+//! The record of everything measured on one medial mesh: the `evaluate` object of the command.
+//!
+//! All lengths are fractions of the input's bounding-box diagonal. METHODOLOGY.md defines each
+//! number; the modules beside this one compute them.
+
+use serde::{Deserialize, Serialize};
+
+/// Everything measured on one medial mesh against one surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Distances between the surface and the union of spheres, cones and slabs.
+    #[serde(flatten)]
+    pub distances: Distances,
+    /// Volume of the symmetric difference of solid and union, over the solid's volume.
+    pub volume_error: Option<f64>,
+    /// Angles of the medial triangles.
+    pub quality: TriangleQuality,
+    /// Spike measures.
+    pub spikes: Spikes,
+    /// Betti numbers `[b0, b1, b2]` of the medial mesh over Z2.
+    pub betti: [u64; 3],
+    /// Euler number of the medial mesh, vertices - edges + faces.
+    pub euler: i64,
+    /// What the solid's own topology demands: components, total genus, cavities.
+    pub expected_betti: Option<[u64; 3]>,
+    /// Sizes of the complex.
+    pub counts: Counts,
+    /// Distances to the exactly known medial axis, where the shape carries one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<AxisDistances>,
+    /// Bounding-box diagonal of the input, in the input's units.
+    pub diagonal: f64,
+    /// Seed of every random sample.
+    pub seed: u64,
+    /// Remarks for the reader, such as radii that do not fit the mesh.
+    pub warnings: Vec<String>,
+}
+
+/// Distances between the surface S and the boundary of the union U of the medial primitives.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Distances {
+    /// Largest distance from a surface sample to the nearest primitive's surface, buried or not:
+    /// the reading of the Q-MAT paper.
+    pub epsilon: f64,
+    /// Largest absolute signed distance from a surface sample to the union.
+    pub epsilon_union: f64,
+    /// Largest distance from a sample of the union's boundary to the surface.
+    pub reverse: f64,
+    /// `max(epsilon_union, reverse)`.
+    pub hausdorff: f64,
+    /// Mean over the area-uniform surface samples of the absolute signed distance to the union.
+    pub mean: f64,
+    /// Root mean square of the same.
+    pub rms: f64,
+    /// 95th percentile of the same.
+    pub p95: f64,
+    /// 99th percentile of the same.
+    pub p99: f64,
+    /// Mean distance from the boundary of the union to the surface, by area.
+    pub reverse_mean: f64,
+    /// `epsilon_union` with the spheres alone, without cones and slabs.
+    pub spheres_only: f64,
+    /// Number of surface samples, the mesh vertices included.
+    pub samples: usize,
+    /// Number of samples on the boundary of the union.
+    pub reverse_samples: usize,
+}
+
+/// Angles of the medial triangles, in degrees; Table I of the Q-MAT paper and two shares more.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TriangleQuality {
+    /// Mean over the triangles of the smallest angle.
+    pub min_angle_mean: Option<f64>,
+    /// Mean over the triangles of the largest angle.
+    pub max_angle_mean: Option<f64>,
+    /// Share of the triangles with a smallest angle below 30 degrees.
+    pub below_30: Option<f64>,
+    /// The same below 10 degrees.
+    pub below_10: Option<f64>,
+    /// The same below 1 degree.
+    pub below_1: Option<f64>,
+    /// Triangles of zero area, counted here and in no mean or share.
+    pub zero_area: u64,
+}
+
+/// Spike measures; none is defined in a paper, METHODOLOGY.md gives each definition.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spikes {
+    /// For each threshold on the stability ratio: shares and counts.
+    pub by_ratio: Vec<RatioSpikes>,
+    /// Edges without a face that end in a sphere with no other edge.
+    pub dangling_edges: u64,
+    /// Faces with two boundary edges and a smallest angle below 10 degrees.
+    pub fins: u64,
+    /// Boundary spheres whose ball sticks out of a larger neighbour's by less than 0.001.
+    pub idle_spheres: u64,
+    /// Spheres with a separation angle below 20 degrees, where contact points are known.
+    pub angle_spikes: Option<u64>,
+}
+
+/// Spike measures for one threshold on the stability ratio.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RatioSpikes {
+    /// The threshold on the stability ratio of an edge.
+    pub threshold: f64,
+    /// Share of the edges below the threshold.
+    pub edge_share: f64,
+    /// Share of the total edge length below the threshold.
+    pub length_share: f64,
+    /// Connected components of the edges below the threshold that reach the boundary of the mesh.
+    pub spikes: u64,
+    /// Dangling edges below the threshold.
+    pub dangling_edges: u64,
+}
+
+/// Sizes of a medial mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Spheres.
+    pub spheres: u64,
+    /// Edges.
+    pub edges: u64,
+    /// Faces.
+    pub faces: u64,
+    /// Edges without a face.
+    pub lone_edges: u64,
+    /// Spheres without an edge.
+    pub isolated: u64,
+    /// Edges with three faces or more.
+    pub nonmanifold_edges: u64,
+}
+
+/// Distances between a computed medial axis and the true one, in space.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisDistances {
+    /// Largest distance from the computed axis to the true one.
+    pub computed_to_true_max: f64,
+    /// Mean of the same.
+    pub computed_to_true_mean: f64,
+    /// Largest distance from the true axis to the computed one.
+    pub true_to_computed_max: f64,
+    /// Mean of the same.
+    pub true_to_computed_mean: f64,
+}
