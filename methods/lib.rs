@@ -7,11 +7,16 @@ use medial::simplifier::MedialSimplifier;
 
 pub mod angle;
 pub mod lambda;
+pub mod qmat;
 mod ranked;
 
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
-    vec![Box::new(angle::AngleFilter::new()), Box::new(lambda::LambdaMedialAxis::new())]
+    vec![
+        Box::new(angle::AngleFilter::new()),
+        Box::new(lambda::LambdaMedialAxis::new()),
+        Box::new(qmat::Qmat::new()),
+    ]
 }
 
 /// The method with an id, or `None`.

@@ -1,5 +1,6 @@
 //! The medial mesh: a simplicial complex of dimension at most two on medial spheres.
 
+pub mod collapse;
 mod disjoint;
 mod formats;
 mod incidence;
