@@ -13,7 +13,8 @@ use cpu_time::ProcessTime;
 
 use crate::Vec3;
 use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, voronoi_medial_mesh};
-use crate::geometry::{Delaunay, TriangleBvh, TriangulationError};
+use crate::geometry::{BvhError, Delaunay, TriangleBvh, TriangulationError};
+use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::simplifier::Diagnostics;
 use crate::surface::{InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, sample};
 
@@ -219,7 +220,7 @@ impl Shape {
     /// When the samples do not span space.
     pub fn cells(&self) -> Result<Arc<CellSpheres>, ShapeError> {
         let delaunay = self.delaunay()?;
-        let tree = self.surface_tree();
+        let tree = self.surface_tree()?;
         let built = self.store.cells.get(self.store.options.sampling, || {
             let inside = InsideTest::new(&self.store.mesh);
             Ok(Arc::new(CellSpheres::classify(&delaunay, &self.samples(), &inside, &tree)))
@@ -282,9 +283,31 @@ impl Shape {
     }
 
     /// The bounding-volume tree of the surface.
-    pub fn surface_tree(&self) -> Arc<TriangleBvh> {
-        let built = self.store.tree.get((), || Ok(Arc::new(TriangleBvh::new(&self.store.mesh))));
-        self.take(Substrate::SurfaceTree, built).expect("the tree cannot fail")
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn surface_tree(&self) -> Result<Arc<TriangleBvh>, ShapeError> {
+        let built = self.store.tree.get((), || Ok(Arc::new(TriangleBvh::new(&self.store.mesh)?)));
+        self.take(Substrate::SurfaceTree, built)
+    }
+
+    /// A judge of medial meshes of this shape. `axis` is its exactly known medial axis, in input
+    /// units. What the judge needs counts as nobody's use.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn judge(
+        &self,
+        axis: Option<&MedialMesh>,
+        options: JudgeOptions,
+    ) -> Result<Judge, ShapeError> {
+        let normal = self.store.normalisation;
+        let truth = Truth {
+            betti: self.store.report.expected_betti,
+            axis: axis.map(|a| a.transformed(1.0 / normal.diagonal, |p| normal.forward(p))),
+            diagonal: normal.diagonal,
+        };
+        Ok(Judge::new(self.store.mesh.clone(), self.view().surface_tree()?, truth, options))
     }
 
     fn take<T>(
@@ -352,6 +375,9 @@ pub enum ShapeError {
     /// The samples cannot be triangulated.
     #[error("triangulating the boundary samples: {0}")]
     Triangulation(#[from] TriangulationError),
+    /// The surface has no bounding-volume tree.
+    #[error("the surface: {0}")]
+    Tree(#[from] BvhError),
     /// The inside of the shape holds no Voronoi vertex.
     #[error(
         "the initial medial mesh is empty: no circumcentre of the samples lies inside the surface; \

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use medial::complex;
-use medial::complex::topology;
 use medial::metrics;
 use serde_json::json;
 
@@ -35,7 +34,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let input = input.map_err(Failure::input)?;
     let shape = input.shape(options).map_err(Failure::input)?;
     let mesh = shape.voronoi().map_err(Failure::input)?;
-    let (betti, _) = Stopwatch::time(|| topology::betti(&mesh));
+    let (betti, _) = Stopwatch::time(|| complex::betti(&mesh));
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
@@ -68,7 +67,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     if global.json {
         let object = json!({
             "spheres": counts.spheres, "edges": counts.edges, "faces": counts.faces,
-            "isolated": counts.isolated, "euler": topology::euler(&mesh), "betti": betti,
+            "isolated": counts.isolated, "euler": complex::euler(&mesh), "betti": betti,
             "expected_betti": expected, "samples": shape.samples().len(),
             "sampling": shape.options().sampling.to_string(), "seed": arguments.substrate.seed,
             "in_guard_band": shape.cells().map_or(0, |cells| cells.in_guard_band),

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use medial::metrics::Judge;
 use medial::simplifier::{Level, MedialSimplifier, Params};
 use medial_reports::{Header, Initial, Journal, Record, Status, write_report};
 use serde_json::json;
@@ -96,8 +95,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         };
         progress.at(&format!("{}: initial medial mesh", input.name));
         let judge_options = judge_options(&arguments.measure, arguments.substrate.seed);
-        let judge = Judge::of_shape(&shape, input.axis.as_ref(), judge_options);
-        let initial = shape.view().initial().ok().map(|mesh| Initial::of(&mesh, judge.expected_betti()));
+        let judge = shape.judge(input.axis.as_ref(), judge_options).map_err(Failure::input)?;
+        let initial = shape.view().initial().ok().map(|mesh| Initial::of(&mesh, judge.truth().betti));
         let measure = Measure { input: &input, shape: &shape, judge: &judge, initial };
         for (method, item) in methods.iter().zip(&items) {
             progress.at(&format!("{}: {}", input.name, item.method));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use medial::complex;
-use medial::metrics::{Evaluation, Judge};
+use medial::metrics::Evaluation;
 use medial::shape::ShapeOptions;
 
 use super::{Exit, Failure, judge_options, percent, print_json, print_line};
@@ -35,13 +35,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let loaded = complex::read(&arguments.axis).map_err(Failure::input)?;
     let shape = input.shape(ShapeOptions::default()).map_err(Failure::input)?;
     let options = judge_options(&arguments.measure, arguments.seed);
-    let judge = Judge::of_shape(&shape, input.axis.as_ref(), options);
+    let judge = shape.judge(input.axis.as_ref(), options).map_err(Failure::input)?;
     let to_normal = shape.normalisation();
     let mesh = loaded.mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
     if mesh.spheres.is_empty() {
         return Err(Failure::input(format!("{}: no sphere", arguments.axis.display())));
     }
-    let evaluation = judge.evaluate(&mesh);
+    let evaluation = judge.evaluate(&mesh).map_err(Failure::input)?;
     let mut warnings = loaded.notes;
     warnings.extend(input.report.warnings);
     if global.json {

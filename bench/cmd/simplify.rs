@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use medial::complex;
-use medial::metrics::Judge;
 use medial::simplifier::{
     Level, MedialSimplifier, RunContext, Simplified, SimplifyError, Work,
 };
@@ -102,7 +101,7 @@ fn simplify(
         if bound.is_nan() || bound <= 0.0 {
             return Err(Failure::usage(format!("--max-error {bound}: a positive fraction of the diagonal")));
         }
-        let judge = Judge::of_shape(shape, input.axis.as_ref(), judge_options(&arguments.measure, seed));
+        let judge = shape.judge(input.axis.as_ref(), judge_options(&arguments.measure, seed)).map_err(Failure::input)?;
         let initial = shape.initial().map_err(Failure::input)?.spheres.len();
         let found = search_error(simplification.as_mut(), &judge, initial, bound).map_err(failure)?;
         notes.push(format!(

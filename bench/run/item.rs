@@ -300,8 +300,11 @@ fn fill(
     simplify.warnings = simplified.diagnostics.warnings;
     simplify.diagnostics = simplified.diagnostics.counts.into_iter().collect();
     let (evaluation, lap) = Stopwatch::time(|| measure.judge.evaluate(&simplified.mesh));
-    record.evaluate = Some(evaluation);
     record.evaluate_seconds = Some(lap.seconds);
+    match evaluation {
+        Ok(evaluation) => record.evaluate = Some(evaluation),
+        Err(error) => record.simplify.warnings.push(format!("not measured: {error}")),
+    }
     if let Some(out) = &options.out {
         match save(&simplified.mesh, record, measure, out) {
             Ok(artifact) => record.artifact = Some(artifact),

@@ -31,7 +31,8 @@ pub fn search_error(
     let mut probe = |count: usize| -> Result<(Simplified, f64), SimplifyError> {
         tried += 1;
         let simplified = simplification.at(Level::Spheres(count))?;
-        let hausdorff = judge.distances(&simplified.mesh).hausdorff;
+        let distances = judge.distances(&simplified.mesh);
+        let hausdorff = distances.map_err(|e| SimplifyError::Level(e.to_string()))?.hausdorff;
         Ok((simplified, hausdorff))
     };
     let mut best = probe(initial)?;
