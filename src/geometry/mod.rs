@@ -1,1 +1,5 @@
 //! Exact predicates, Delaunay triangulation, bounding-volume trees, distances to medial primitives.
+
+pub mod delaunay;
+pub mod predicates;
+pub mod triangulation;
