@@ -223,7 +223,7 @@ impl Shape {
         let tree = self.surface_tree()?;
         let built = self.store.cells.get(self.store.options.sampling, || {
             let inside = InsideTest::new(&self.store.mesh);
-            Ok(Arc::new(CellSpheres::classify(&delaunay, &self.samples(), &inside, &tree)))
+            Ok(Arc::new(CellSpheres::classify(&delaunay, &inside, &tree)))
         });
         self.take(Substrate::Inside, built)
     }

@@ -16,11 +16,12 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use spade::{DelaunayTriangulation, Point2, Triangulation};
+use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
 use crate::Vec3;
 use crate::complex::{Contacts, MedialMesh, Sphere};
-use crate::geometry::{CellId, Delaunay, TriangleBvh, circumsphere};
+use crate::geometry::triangulation::Triangulation;
+use crate::geometry::{CellId, Delaunay, TriangleBvh};
 use crate::surface::InsideTest;
 
 /// Circumcentres closer to the surface than this count as outside, in units of the diagonal.
@@ -37,9 +38,9 @@ pub enum DualTriangulation {
     Delaunay,
 }
 
-/// The circumspheres of the finite Delaunay cells and which of them are centred inside.
+/// The circumspheres of the finite Delaunay cells that are centred inside the surface.
 pub struct CellSpheres {
-    /// Circumsphere of each cell; `None` for infinite cells and those centred outside.
+    /// Circumsphere of each cell, finite cells first; `None` for the others.
     inside: Vec<Option<Sphere>>,
     /// Circumcentres inside the surface but within the guard band of it, counted as outside.
     pub in_guard_band: usize,
@@ -47,24 +48,25 @@ pub struct CellSpheres {
 
 impl CellSpheres {
     /// Computes and classifies the circumcentre of every finite cell, in parallel.
-    pub fn classify(
-        delaunay: &Delaunay,
-        samples: &[Vec3],
-        inside: &InsideTest,
-        surface: &TriangleBvh,
-    ) -> Self {
-        let cells = (0..delaunay.cell_count()).into_par_iter().map(|cell| {
-            let vertices = delaunay.finite_cell(CellId(cell as u32))?;
-            let sphere = circumsphere(vertices.map(|v| samples[v as usize]));
-            if !sphere.centre.is_finite() || !inside.contains(sphere.centre) {
-                return None;
-            }
-            let near = surface.any_within(sphere.centre, GUARD_BAND);
-            Some((!near).then_some(sphere))
-        });
-        let classified: Vec<Option<Option<Sphere>>> = cells.collect();
-        let in_guard_band = classified.iter().filter(|c| matches!(c, Some(None))).count();
-        Self { inside: classified.into_iter().map(Option::flatten).collect(), in_guard_band }
+    pub fn classify(delaunay: &Delaunay, inside: &InsideTest, surface: &TriangleBvh) -> Self {
+        let cells = delaunay.triangulation();
+        let classified: Vec<(Option<Sphere>, bool)> = (0..cells.cell_count() as u32)
+            .into_par_iter()
+            .map(|cell| {
+                let Some((centre, radius)) = delaunay.circumsphere(CellId(cell)) else {
+                    return (None, false);
+                };
+                if !centre.is_finite() || !radius.is_finite() || !inside.contains(centre) {
+                    return (None, false);
+                }
+                let near = surface.any_within(centre, GUARD_BAND);
+                ((!near).then_some(Sphere::new(centre, radius)), near)
+            })
+            .collect();
+        Self {
+            in_guard_band: classified.iter().filter(|(_, near)| *near).count(),
+            inside: classified.into_iter().map(|(sphere, _)| sphere).collect(),
+        }
     }
 
     /// Number of cells centred inside.
@@ -73,7 +75,7 @@ impl CellSpheres {
     }
 
     fn is_inside(&self, cell: CellId) -> bool {
-        self.inside[cell.0 as usize].is_some()
+        self.inside[cell.index()].is_some()
     }
 }
 
@@ -85,36 +87,34 @@ pub fn voronoi_medial_mesh(
     samples: &Arc<[Vec3]>,
     dual: DualTriangulation,
 ) -> MedialMesh {
-    let kept: Vec<CellId> =
-        (0..delaunay.cell_count() as u32).map(CellId).filter(|&c| cells.is_inside(c)).collect();
-    let mut sphere_of_cell = vec![u32::MAX; delaunay.cell_count()];
+    let triangulation = delaunay.triangulation();
+    let kept: Vec<CellId> = triangulation.finite_cells().filter(|&c| cells.is_inside(c)).collect();
+    let mut sphere_of_cell = vec![u32::MAX; triangulation.cell_count()];
     for (sphere, cell) in kept.iter().enumerate() {
-        sphere_of_cell[cell.0 as usize] = sphere as u32;
+        sphere_of_cell[cell.index()] = sphere as u32;
     }
     let spheres: Vec<Sphere> = cells.inside.iter().flatten().copied().collect();
-    let sphere = |cell: CellId| sphere_of_cell[cell.0 as usize];
+    let sphere = |cell: CellId| sphere_of_cell[cell.index()];
 
     let edges = kept.par_iter().flat_map_iter(|&cell| {
-        let neighbours = delaunay.neighbours(cell).into_iter();
+        let neighbours = triangulation.neighbours(cell).into_iter();
         neighbours
             .filter(move |&other| other > cell && cells.is_inside(other))
             .map(move |other| [sphere(cell), sphere(other)])
     });
     let faces = kept.par_iter().flat_map_iter(|&cell| {
         let polygons = EDGES_OF_CELL.into_iter().filter_map(move |(i, j)| {
-            let ring = dual_polygon(delaunay, cells, cell, i, j)?;
+            let ring = dual_polygon(triangulation, cells, cell, i, j)?;
             Some(ring.into_iter().map(sphere).collect::<Vec<u32>>())
         });
         polygons.flat_map(|polygon| triangulate(&polygon, &spheres, dual))
     });
-    let mut mesh = MedialMesh::from_simplices(spheres.clone(), edges.collect(), faces.collect())
+    let (edges, faces) = (edges.collect(), faces.collect());
+    let mut mesh = MedialMesh::from_simplices(spheres, edges, faces)
         .expect("circumspheres are finite and ids in range");
     mesh.contacts = Some(Contacts {
         samples: Arc::clone(samples),
-        of_sphere: kept
-            .iter()
-            .map(|&c| delaunay.finite_cell(c).expect("kept cells are finite"))
-            .collect(),
+        of_sphere: kept.iter().map(|&c| triangulation.vertices(c).map(|v| v.0)).collect(),
     });
     mesh
 }
@@ -125,14 +125,14 @@ const EDGES_OF_CELL: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 
 /// The cells around edge `(i, j)` of `cell` in rotational order, starting with `cell`, if `cell` is
 /// the smallest of them (each edge is dualised once) and all are finite and inside.
 fn dual_polygon(
-    delaunay: &Delaunay,
+    triangulation: &Triangulation,
     cells: &CellSpheres,
     cell: CellId,
     i: usize,
     j: usize,
 ) -> Option<Vec<CellId>> {
     let mut ring = Vec::with_capacity(8);
-    for other in delaunay.cells_around_edge(cell, i, j) {
+    for other in triangulation.edge_ring(cell, i, j) {
         if other < cell || !cells.is_inside(other) {
             return None;
         }
