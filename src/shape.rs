@@ -5,7 +5,8 @@
 //! substrates that the method used, and a filter does not look free beside a method that starts
 //! from the mesh. [`Shape::view`] opens a fresh view on the same store.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::Hash;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
@@ -170,6 +171,11 @@ impl Shape {
         &self.store.report
     }
 
+    /// Betti numbers that the solid's topology demands of its medial axis.
+    pub fn expected_betti(&self) -> Option<[u64; 3]> {
+        self.store.report.expected_betti.map(|betti| betti.map(|number| number as u64))
+    }
+
     /// How the substrates are built.
     pub fn options(&self) -> &ShapeOptions {
         &self.store.options
@@ -303,7 +309,7 @@ impl Shape {
     ) -> Result<Judge, ShapeError> {
         let normal = self.store.normalisation;
         let truth = Truth {
-            betti: self.store.report.expected_betti,
+            betti: self.expected_betti(),
             axis: axis.map(|a| a.transformed(1.0 / normal.diagonal, |p| normal.forward(p))),
             diagonal: normal.diagonal,
         };
@@ -328,7 +334,8 @@ impl Shape {
 
 /// Values that are built once for each key, with what building them cost.
 struct Cache<K, T> {
-    slots: Mutex<BTreeMap<K, Arc<Slot<T>>>>,
+    /// Looked up by key only, never iterated.
+    slots: Mutex<HashMap<K, Arc<Slot<T>>>>,
 }
 
 type Slot<T> = OnceLock<(Result<T, ShapeError>, Cost)>;
@@ -339,7 +346,7 @@ impl<K, T> Default for Cache<K, T> {
     }
 }
 
-impl<K: Ord, T: Clone> Cache<K, T> {
+impl<K: Eq + Hash, T: Clone> Cache<K, T> {
     /// The value for a key; a second asker waits for the first.
     fn get(
         &self,

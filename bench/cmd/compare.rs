@@ -112,10 +112,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     drop(progress);
     let header = Header {
+        title: "Medial axis simplification: a comparison".into(),
         command: provenance.command.clone(),
         version: provenance.version.clone(),
-        machine: provenance.machine.clone(),
-        date: super::report::today(),
+        date: Some(super::report::today()),
+        machine: Some(provenance.machine.clone()),
+        methods: methods.iter().map(|method| method.info().into()).collect(),
+        notes: vec![],
     };
     let files = write_report(&arguments.out, &records, &header).map_err(Failure::input)?;
     finish(&records, &arguments.out, &files, global)

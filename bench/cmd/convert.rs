@@ -1,5 +1,7 @@
 //! `medial convert A B`: between surface formats, or between medial mesh formats.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -8,6 +10,9 @@ use serde_json::json;
 
 use super::{Exit, Failure, extension, print_json, print_line};
 use crate::cli::Global;
+
+/// No header of a PLY file is longer, in bytes.
+const HEADER_LIMIT: u64 = 1 << 20;
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
@@ -56,7 +61,22 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
         "ma" => Ok(true),
-        "ply" => complex::ply_has_radius(path).map_err(Failure::input),
+        "ply" => ply_has_radius(path),
         _ => Ok(false),
     }
+}
+
+fn ply_has_radius(path: &Path) -> Result<bool, Failure> {
+    let fail = |error| Failure::input(format!("{}: {error}", path.display()));
+    let mut reader = BufReader::new(File::open(path).map_err(fail)?).take(HEADER_LIMIT);
+    let mut line = Vec::new();
+    while reader.read_until(b'\n', &mut line).map_err(fail)? > 0 {
+        let words: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
+        match words.as_slice() {
+            [b"end_header"] => break,
+            [b"property", _, b"radius"] => return Ok(true),
+            _ => line.clear(),
+        }
+    }
+    Ok(false)
 }

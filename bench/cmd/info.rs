@@ -23,7 +23,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (report, refusal) = match &source {
         Source::File(path) => {
             let inspection = surface::inspect(path).map_err(Failure::input)?;
-            (inspection.report, inspection.refusal)
+            (inspection.report, inspection.refused)
         }
         Source::BuiltIn { .. } => match Input::load(&source) {
             Ok(input) => (input.report, None),
@@ -49,9 +49,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 
 fn print_report(source: &Source, report: &SurfaceReport) {
     let yes = |flag: bool| if flag { "yes" } else { "no" };
-    let intersecting = match report.self_intersecting {
+    let intersecting = match report.intersecting_pairs {
         0 => "none".to_owned(),
-        pairs => format!("{pairs} pairs of faces"),
+        pairs if report.intersecting_pairs_complete => format!("{pairs} pairs of faces"),
+        pairs => format!("more than {pairs} pairs of faces"),
     };
     print_line(&source.to_string());
     let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use medial::metrics::JudgeOptions;
 use medial::shape::ShapeOptions;
 use medial::simplifier::Params;
+use medial::surface::Sampling;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -119,8 +120,12 @@ pub fn print_json(object: &impl Serialize, warnings: &[String]) {
 /// # Errors
 /// When the sampling is not understood.
 pub fn shape_options(arguments: &SubstrateArguments) -> Result<ShapeOptions, Failure> {
-    let sampling = medial::surface::Sampling::parse(&arguments.sampling, arguments.seed)
-        .map_err(|error| Failure::usage(format!("--sampling {}: {error}", arguments.sampling)))?;
+    let text = &arguments.sampling;
+    let sampling: Sampling =
+        text.parse().map_err(|error| Failure::usage(format!("--sampling: {error}")))?;
+    // A seed within the sampling wins over the run's.
+    let seeded = text.split(':').count() > 2;
+    let sampling = if seeded { sampling } else { sampling.with_seed(arguments.seed) };
     let dual = match arguments.dual {
         Dual::Fan => medial::complex::DualTriangulation::Fan,
         Dual::Delaunay => medial::complex::DualTriangulation::Delaunay,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
-use medial_reports::{Header, read_records, write_report};
+use medial_reports::{Header, Record, read_header, read_records, write_report};
 use serde_json::json;
 
 use super::compare::RESULTS;
@@ -25,18 +25,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let journaled = read_records(&arguments.dir.join(RESULTS)).map_err(Failure::input)?;
     let warnings: Vec<String> = journaled.bad_lines.iter().map(ToString::to_string).collect();
-    let Some(last) = journaled.records.last() else {
+    if journaled.records.is_empty() {
         return Err(Failure {
             code: Exit::NothingMeasured,
             message: format!("{}: no record in {RESULTS}", arguments.dir.display()),
         });
-    };
-    let header = Header {
-        command: last.command.clone(),
-        version: last.version.clone(),
-        machine: last.machine.clone(),
-        date: today(),
-    };
+    }
+    let mut header = read_header(&arguments.dir).unwrap_or_else(|_| header_of(&journaled.records));
+    header.notes.clone_from(&warnings);
     let files = write_report(&arguments.dir, &journaled.records, &header).map_err(Failure::input)?;
     if global.json {
         let object = json!({ "records": journaled.records.len(), "files": files });
@@ -48,6 +44,20 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         print_line(&format!("{} records; page: {}", journaled.records.len(), arguments.dir.join("index.html").display()));
     }
     Ok(Exit::Done)
+}
+
+/// A header from the records alone, for a run that was interrupted before its report.
+fn header_of(records: &[Record]) -> Header {
+    let last = records.last();
+    Header {
+        title: "Medial axis simplification: a comparison".into(),
+        command: last.map(|r| r.command.clone()).unwrap_or_default(),
+        version: last.map(|r| r.version.clone()).unwrap_or_default(),
+        date: None,
+        machine: last.map(|r| r.machine.clone()),
+        methods: medial_methods::registry().iter().map(|method| method.info().into()).collect(),
+        notes: vec![],
+    }
 }
 
 /// Today's date in UTC, as `YYYY-MM-DD`.

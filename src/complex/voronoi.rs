@@ -22,7 +22,7 @@ use crate::Vec3;
 use crate::complex::{Contacts, MedialMesh, Sphere};
 use crate::geometry::triangulation::Triangulation;
 use crate::geometry::{CellId, Delaunay, TriangleBvh};
-use crate::surface::InsideTest;
+use crate::surface::{InsideTest, Side};
 
 /// Circumcentres closer to the surface than this count as outside, in units of the diagonal.
 const GUARD_BAND: f64 = 1e-9;
@@ -50,22 +50,29 @@ impl CellSpheres {
     /// Computes and classifies the circumcentre of every finite cell, in parallel.
     pub fn classify(delaunay: &Delaunay, inside: &InsideTest, surface: &TriangleBvh) -> Self {
         let cells = delaunay.triangulation();
-        let classified: Vec<(Option<Sphere>, bool)> = (0..cells.cell_count() as u32)
+        let spheres: Vec<Option<Sphere>> = (0..cells.cell_count() as u32)
             .into_par_iter()
             .map(|cell| {
-                let Some((centre, radius)) = delaunay.circumsphere(CellId(cell)) else {
-                    return (None, false);
-                };
-                if !centre.is_finite() || !radius.is_finite() || !inside.contains(centre) {
-                    return (None, false);
-                }
-                let near = surface.any_within(centre, GUARD_BAND);
-                ((!near).then_some(Sphere::new(centre, radius)), near)
+                let (centre, radius) = delaunay.circumsphere(CellId(cell))?;
+                (centre.is_finite() && radius.is_finite()).then_some(Sphere::new(centre, radius))
             })
             .collect();
+        let centres: Vec<Vec3> = spheres.iter().flatten().map(|s| s.centre).collect();
+        let sides = inside.sides(&centres);
+        let near: Vec<bool> = centres
+            .par_iter()
+            .zip(&sides)
+            .map(|(&c, &side)| side == Side::Inside && surface.any_within(c, GUARD_BAND))
+            .collect();
+        let mut verdicts = sides.iter().zip(&near);
+        let inside = spheres.into_iter().map(|sphere| {
+            let sphere = sphere?;
+            let (&side, &near) = verdicts.next()?;
+            (side == Side::Inside && !near).then_some(sphere)
+        });
         Self {
-            in_guard_band: classified.iter().filter(|(_, near)| *near).count(),
-            inside: classified.into_iter().map(|(sphere, _)| sphere).collect(),
+            inside: inside.collect(),
+            in_guard_band: near.iter().filter(|&&near| near).count(),
         }
     }
 

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::complex::{MedialMesh, MedialUnion, betti, euler};
 use crate::geometry::TriangleBvh;
-use crate::surface::{InsideTest, TriMesh};
+use crate::surface::{InsideTest, Side, TriMesh};
 
 /// How results are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +115,7 @@ impl Judge {
             return Ok(None);
         }
         let options = VolumeOptions { depth: self.options.volume_depth, seed: self.options.seed };
-        let inside = |p| self.inside.contains(p);
+        let inside = |p| self.inside.side(p) == Side::Inside;
         volume_error(&self.surface, &self.tree, inside, union, &options).map(Some)
     }
 
