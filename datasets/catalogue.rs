@@ -53,6 +53,11 @@ impl BuiltIn {
         (self.generate)(self.diagonal / f64::from(resolution))
     }
 
+    /// The resolutions that [`BuiltIn::mesh`] takes as they are.
+    pub fn resolutions(&self) -> std::ops::RangeInclusive<u32> {
+        self.min_resolution..=MAX_RESOLUTION
+    }
+
     /// The medial axis where it is known in closed form.
     pub fn axis(&self) -> Option<KnownAxis> {
         self.known_axis.map(|axis| axis())

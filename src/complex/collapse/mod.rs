@@ -43,7 +43,8 @@ pub use record::{Collapse, replay};
 
 use pool::{List, Pool};
 
-use super::mesh::{MedialMesh, Sphere};
+use super::MedialMesh;
+use crate::geometry::Sphere;
 
 /// Centres closer than this fraction of the bounding-box diagonal are one point.
 ///

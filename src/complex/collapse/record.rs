@@ -1,6 +1,7 @@
 //! The record of collapses, and any level of it made from the initial mesh.
 
-use super::super::mesh::{MedialMesh, Sphere};
+use super::super::MedialMesh;
+use crate::geometry::Sphere;
 
 /// One collapse, in the ids of the initial mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
