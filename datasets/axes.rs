@@ -16,7 +16,7 @@ use crate::shapes::{
 };
 
 /// Rings of a triangulated disc, and vertices that each has more than the one inside it.
-const DISC_RINGS: u32 = 24;
+const DISC_RINGS: u32 = 32;
 const DISC_SECTORS: u32 = 6;
 /// Edges of a triangulated circle.
 const CIRCLE_EDGES: u32 = 360;
@@ -162,19 +162,22 @@ pub(crate) fn rod() -> KnownAxis {
     for side in [-1.0, 1.0] {
         let first = spheres.len() as u32;
         spheres.extend(vertices.iter().map(|&[s, t]| {
+            // Rings at squares: an inner ring has fewer vertices, so it must be smaller in
+            // proportion for its chords to stay as close to the cone as those of the crease.
             let rho = s.hypot(t);
-            let z = side * (fork + (ROD_HALF - fork) * rho);
-            Sphere::new(
-                Vec3::new(ROD_RADIUS * s, ROD_RADIUS * t, z),
-                ROD_RADIUS * (1.0 - rho).max(0.0),
-            )
+            let centre = Vec3::new(
+                ROD_RADIUS * s * rho,
+                ROD_RADIUS * t * rho,
+                side * (fork + (ROD_HALF - fork) * rho * rho),
+            );
+            Sphere::new(centre, ROD_RADIUS * (1.0 - rho * rho).max(0.0))
         }));
         faces.extend(disc_faces.iter().map(|face| face.map(|v| v + first)));
         edges.push([first, spheres.len() as u32]);
         spheres.push(Sphere::new(Vec3::new(0.0, 0.0, side * ROD_APEX), 0.0));
     }
     edges.push([0, spheres.len() as u32 / 2]);
-    known(spheres, edges, faces, sagitta(ROD_RADIUS, DISC_SECTORS * DISC_RINGS))
+    known(spheres, edges, faces, 1.5 * sagitta(ROD_RADIUS, DISC_SECTORS * DISC_RINGS))
 }
 
 /// The circle of the tube's centres.
