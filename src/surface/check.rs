@@ -1,6 +1,6 @@
 //! Measures a mesh and decides whether it may be used: closed, manifold, two-sided, with volume.
 
-use super::error::{Fault, VertexName};
+use super::error::{Fault, VertexName, counted};
 use super::intersect::{Intersections, intersections};
 use super::mesh::{Normalisation, TriMesh};
 use super::orient::{self, Shell, Sum};
@@ -38,7 +38,9 @@ pub(super) fn orient_and_examine(repaired: Repaired) -> Examined {
     if fault.is_none() {
         shells = evidence.shells();
         fault = evidence.flat_shell(&shells);
-        evidence.add_solid(&mut report, &shells);
+        if fault.is_none() {
+            evidence.add_solid(&mut report, &shells);
+        }
     }
     let wrong: Vec<bool> = shells.iter().map(|s| fault.is_none() && !s.is_right()).collect();
     repairs.extend(orient::repairs(&turned, &wrong, &shells, &topology.component));
@@ -216,23 +218,17 @@ impl Evidence<'_> {
         };
         let mut warnings = Vec::new();
         if let Some(face) = found.first_degenerate {
-            let (n, near) = (found.degenerate_faces, near(face));
-            warnings.push(format!("{n} faces have no area, the first is {near}"));
+            let (n, near) = (counted(found.degenerate_faces, "face"), near(face));
+            warnings.push(format!("{n} without area, the first is {near}"));
         }
         if let Some([face, _]) = found.first {
             let least = if found.complete { "" } else { "at least " };
-            let (n, near) = (found.pairs, near(face));
-            warnings.push(format!("{least}{n} pairs of faces intersect, the first is {near}"));
+            let (n, near) = (counted(found.pairs, "pair"), near(face));
+            warnings.push(format!("{least}{n} of intersecting faces, the first is {near}"));
         }
         if !found.complete {
             let why = "too many faces overlap in space to test them all for intersections";
             warnings.push(why.into());
-        }
-        if !found.components.is_empty() {
-            let n = found.components.len();
-            warnings.push(format!(
-                "{n} pairs of components meet; the expected Betti numbers count each by itself"
-            ));
         }
         warnings
     }
@@ -250,6 +246,12 @@ impl Evidence<'_> {
             volume.add(if shell.is_cavity() { -size } else { size });
         }
         report.volume = self.unit.backward(volume.value(), 3);
+        if !self.found.components.is_empty() {
+            let n = counted(self.found.components.len(), "pair");
+            report.warnings.push(format!(
+                "{n} of components that meet; the expected Betti numbers count each by itself"
+            ));
+        }
         if shells.len() > orient::MOST_SHELLS {
             let n = shells.len();
             report.warnings.push(format!("{n} components are too many to look for cavities"));

@@ -31,6 +31,15 @@ impl From<Fault> for SurfaceError {
     }
 }
 
+/// A number with its noun, such as `1 vertex` or `3 faces`.
+pub(super) fn counted(number: usize, noun: &str) -> String {
+    match (number, noun) {
+        (1, _) => format!("1 {noun}"),
+        (_, "vertex") => format!("{number} vertices"),
+        _ => format!("{number} {noun}s"),
+    }
+}
+
 /// Where in a file something is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -114,7 +123,7 @@ pub enum Fault {
         value: f64,
     },
     /// A face names a vertex that does not exist.
-    #[error("{at}: face {face} names the vertex {index}, but there are {vertices} vertices")]
+    #[error("{at}: face {face} names the vertex {index} of {}", counted(*.vertices, "vertex"))]
     Index {
         /// Where.
         at: Place,
@@ -126,7 +135,7 @@ pub enum Fault {
         vertices: usize,
     },
     /// A face with fewer than three corners.
-    #[error("{at}: face {face} has {corners} corners; three are the least")]
+    #[error("{at}: face {face} has {}; three are the least", counted(*.corners, "corner"))]
     TooFewCorners {
         /// Where.
         at: Place,
@@ -157,7 +166,7 @@ pub enum Fault {
         count: u64,
     },
     /// Points without a surface.
-    #[error("no face among {vertices} vertices; a closed surface is needed, not a point set")]
+    #[error("no face among {}; a closed surface is needed, not a point set", counted(*.vertices, "vertex"))]
     NoFaces {
         /// Number of vertices.
         vertices: usize,
@@ -170,8 +179,8 @@ pub enum Fault {
     },
     /// Edges with one face only.
     #[error(
-        "the surface is open: {edges} boundary edges, the first from {} to {}; fill its holes",
-        .first[0], .first[1]
+        "the surface is open: {} with one face only, the first from {} to {}; fill its holes",
+        counted(*.edges, "edge"), .first[0], .first[1]
     )]
     Open {
         /// Number of boundary edges.
@@ -181,9 +190,9 @@ pub enum Fault {
     },
     /// Edges with more than two faces.
     #[error(
-        "{edges} edges have more than two faces, the first ({faces} faces) from {} to {}; \
-         remove inner walls and doubled parts",
-        .first[0], .first[1]
+        "the surface is not manifold: {} with more than two faces, the first ({faces} faces) \
+         from {} to {}; remove inner walls and doubled parts",
+        counted(*.edges, "edge"), .first[0], .first[1]
     )]
     NonManifoldEdge {
         /// Number of such edges.
@@ -195,8 +204,9 @@ pub enum Fault {
     },
     /// Vertices whose faces form more than one fan.
     #[error(
-        "{vertices} vertices join parts that touch only there, the first is {first}; \
-         separate the parts"
+        "the surface is not manifold: {} where parts touch in a point, the first is {first}; \
+         separate the parts",
+        counted(*.vertices, "vertex")
     )]
     NonManifoldVertex {
         /// Number of such vertices.
@@ -212,8 +222,9 @@ pub enum Fault {
     },
     /// A component whose two sides coincide.
     #[error(
-        "the component of face {face} ({faces} faces) encloses no volume; \
-         remove it or give it thickness"
+        "the component of face {face} ({}) encloses no volume; \
+         remove it or give it thickness",
+        counted(*.faces, "face")
     )]
     ZeroVolume {
         /// Its first face.

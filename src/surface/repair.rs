@@ -11,9 +11,8 @@
 //! 5. Triangulate polygons.
 //! 6. Drop vertices without faces.
 //!
-//! Where welding makes a surface non-manifold that was closed and manifold as the file has it
-//! (two bodies that touch in a vertex or along an edge, each with vertices of its own), the
-//! vertices are left apart, with a warning.
+//! A surface is a set of points: two bodies that touch in a vertex or along an edge are not
+//! manifold there, even if the file gives each its own vertices. Welding brings that to light.
 
 use std::collections::HashMap;
 
@@ -48,23 +47,10 @@ pub(super) fn repair(mut soup: PolygonSoup) -> Result<Repaired, Fault> {
     let welds = weld(&soup.vertices);
     let merged = welds.iter().enumerate().filter(|&(i, &w)| i != w as usize).count();
     let mut repaired = build(&soup, unit, &welds)?;
-    let mut welded = merged;
-    if merged > 0 && !repaired.topology.is_closed_manifold() {
-        let apart: Vec<u32> = (0..soup.vertices.len() as u32).collect();
-        let unwelded = build(&soup, unit, &apart)?;
-        if unwelded.topology.is_closed_manifold() {
-            repaired = unwelded;
-            welded = 0;
-            repaired.warnings.push(format!(
-                "{merged} vertices share their position with another and are left apart, \
-                 since merging them would make the closed surface non-manifold"
-            ));
-        }
-    }
-    let unreferenced = soup.vertices.len() - repaired.vertices.len() - welded;
+    let unreferenced = soup.vertices.len() - repaired.vertices.len() - merged;
     let first = [
         Repair::FlushedCoordinates { coordinates: flushed },
-        Repair::WeldedVertices { vertices: welded },
+        Repair::WeldedVertices { vertices: merged },
     ];
     let last = Repair::DroppedUnreferencedVertices { vertices: unreferenced };
     let all = first.into_iter().chain(repaired.repairs).chain([last]);

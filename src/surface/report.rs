@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::error::counted;
+
 /// Everything worth knowing of a surface: the answer of `medial info`.
 ///
 /// Numbers describe the mesh after the listed repairs.
@@ -128,33 +130,39 @@ impl Repair {
 
 impl fmt::Display for Repair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let noun = match self {
+            Self::FlushedCoordinates { .. } => "coordinate",
+            Self::WeldedVertices { .. } | Self::DroppedUnreferencedVertices { .. } => "vertex",
+            Self::TriangulatedPolygons { .. } => "polygon",
+            Self::TurnedOutward { .. } | Self::TurnedInward { .. } => "component",
+            _ => "face",
+        };
+        let what = counted(self.count(), noun);
         match *self {
-            Self::FlushedCoordinates { coordinates } => {
-                write!(f, "set {coordinates} coordinates below 2^-150 of the largest to zero")
+            Self::FlushedCoordinates { .. } => {
+                write!(f, "set {what} below 2^-150 of the largest to zero")
             }
-            Self::WeldedVertices { vertices } => {
-                write!(f, "merged {vertices} vertices into others at exactly the same position")
+            Self::WeldedVertices { .. } => {
+                write!(f, "merged {what} with another at exactly the same position")
             }
-            Self::DroppedDegenerateFaces { faces } => {
-                write!(f, "dropped {faces} faces with fewer than three distinct corners")
+            Self::DroppedDegenerateFaces { .. } => {
+                write!(f, "dropped {what} with fewer than three distinct corners")
             }
-            Self::DroppedDuplicateFaces { faces } => {
-                write!(f, "dropped {faces} faces that repeat an earlier one")
+            Self::DroppedDuplicateFaces { .. } => {
+                write!(f, "dropped {what} with the corners of an earlier one")
             }
-            Self::TriangulatedPolygons { polygons, triangles } => {
-                write!(f, "cut {polygons} polygons into {triangles} triangles")
+            Self::TriangulatedPolygons { triangles, .. } => {
+                write!(f, "cut {what} into {}", counted(triangles, "triangle"))
             }
-            Self::DroppedUnreferencedVertices { vertices } => {
-                write!(f, "dropped {vertices} vertices that belong to no face")
+            Self::DroppedUnreferencedVertices { .. } => {
+                write!(f, "dropped {what} without a face")
             }
-            Self::ReorientedFaces { faces } => {
-                write!(f, "turned over {faces} faces that disagreed with their neighbours")
+            Self::ReorientedFaces { .. } => {
+                write!(f, "turned over {what} against the orientation of the neighbours")
             }
-            Self::TurnedOutward { components } => {
-                write!(f, "turned {components} components outward that pointed inward")
-            }
-            Self::TurnedInward { components } => {
-                write!(f, "turned {components} shells of cavities inward that pointed outward")
+            Self::TurnedOutward { .. } => write!(f, "turned {what} outward"),
+            Self::TurnedInward { .. } => {
+                write!(f, "turned {what} inward that lies in a solid, as the wall of a cavity")
             }
         }
     }

@@ -54,11 +54,6 @@ impl Topology {
         topology
     }
 
-    /// Whether every edge has two faces, and every vertex one fan of them.
-    pub fn is_closed_manifold(&self) -> bool {
-        self.boundary_edges == 0 && self.is_manifold()
-    }
-
     /// Whether no edge has more than two faces, and every vertex has one fan of them.
     pub fn is_manifold(&self) -> bool {
         self.nonmanifold_edges == 0 && self.nonmanifold_vertices == 0
@@ -214,7 +209,8 @@ mod tests {
     #[test]
     fn closed_open_and_doubled() {
         let closed = Topology::new(4, &TETRAHEDRON);
-        assert!(closed.is_closed_manifold() && closed.first_inconsistent.is_none());
+        assert!(closed.is_manifold() && closed.first_inconsistent.is_none());
+        assert_eq!(closed.boundary_edges, 0);
         assert_eq!((closed.edges, closed.first_face.len()), (6, 1));
         let open = Topology::new(4, &TETRAHEDRON[..3]);
         assert_eq!((open.boundary_edges, open.first_boundary), (3, Some([1, 2])));
@@ -257,7 +253,7 @@ mod tests {
             [5, 1, 3],
         ];
         let topology = Topology::new(6, &plane);
-        assert!(topology.is_closed_manifold());
+        assert!(topology.is_manifold() && topology.boundary_edges == 0);
         assert_eq!(6 - topology.edges as i64 + 10, 1);
         assert!(topology.turns(&plane).is_err());
     }

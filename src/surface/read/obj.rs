@@ -14,7 +14,7 @@ use crate::surface::error::{Fault, Place};
 use crate::surface::soup::PolygonSoup;
 
 /// Keywords of the format that have no bearing on the surface. Sorted.
-const PASSED_OVER: [&str; 39] = [
+const PASSED_OVER: [&str; 40] = [
     "bevel",
     "bmat",
     "bsp",
@@ -45,12 +45,13 @@ const PASSED_OVER: [&str; 39] = [
     "scrv",
     "shadow_obj",
     "sp",
-    "step",
     "stech",
+    "step",
     "trace_obj",
     "trim",
     "usemap",
     "usemtl",
+    "vc",
     "vn",
     "vp",
     "vt",
@@ -172,15 +173,12 @@ mod tests {
             ("v 0 0 nan\n", "line 1: vertex 0 has the coordinate NaN, which is not finite"),
             ("v 0 0 0\nf 1 1 x\n", "line 2: expected v, v/vt, v//vn or v/vt/vn, found \"x\""),
             ("v 0 0 0\nf 1 1 1/a\n", "line 2: expected v, v/vt, v//vn or v/vt/vn, found \"1/a\""),
-            ("v 0 0 0\n\nf 1 0 1\n", "line 3: face 0 names the vertex 0, but there are 1 vertices"),
-            ("v 0 0 0\nf 1 -2 1\n", "line 2: face 0 names the vertex -2, but there are 1 vertices"),
-            (
-                "v 0 0 0\nf 1 1 1\nf 1 2 1\n",
-                "line 3: face 1 names the vertex 2, but there are 1 vertices",
-            ),
+            ("v 0 0 0\n\nf 1 0 1\n", "line 3: face 0 names the vertex 0 of 1 vertex"),
+            ("v 0 0 0\nf 1 -2 1\n", "line 2: face 0 names the vertex -2 of 1 vertex"),
+            ("v 0 0 0\nf 1 1 1\nf 1 2 1\n", "line 3: face 1 names the vertex 2 of 1 vertex"),
             (
                 "v 0 0 0\nf 1 -9223372036854775808 1\n",
-                "line 2: face 0 names the vertex -9223372036854775808, but there are 1 vertices",
+                "line 2: face 0 names the vertex -9223372036854775808 of 1 vertex",
             ),
             ("v 0 0 0\nf 1 1\n", "line 2: face 0 has 2 corners; three are the least"),
         ] {

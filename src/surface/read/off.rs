@@ -282,7 +282,7 @@ mod tests {
             ),
             (
                 "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n",
-                "line 6: face 0 names the vertex 3, but there are 3 vertices",
+                "line 6: face 0 names the vertex 3 of 3 vertices",
             ),
             (
                 "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n",
