@@ -96,7 +96,8 @@ impl Cone {
     /// nearest, one of its points is returned.
     pub fn foot(&self, p: Vec3) -> HullFoot<2> {
         let (tau, _) = self.best_centre(p);
-        let sphere = Sphere::new(self.start + tau * self.axis, self.radius + tau * self.slope);
+        let radius = (self.radius + tau * self.slope).max(0.0);
+        let sphere = Sphere::new(self.start + tau * self.axis, radius);
         let weights = match self.larger {
             Some(0) => [1.0, 0.0],
             Some(_) => [0.0, 1.0],
@@ -105,9 +106,15 @@ impl Cone {
                 [1.0 - t, t]
             }
         };
-        HullFoot::towards(sphere, weights, p, || {
-            self.frame().map_or(Vec3::X, |frame| frame.normal(frame.v))
-        })
+        let Some(frame) = self.frame() else {
+            return HullFoot::towards(sphere, weights, p, || Vec3::X);
+        };
+        if tau <= 0.0 || tau >= self.length {
+            return HullFoot::towards(sphere, weights, p, || frame.normal(frame.v));
+        }
+        // On the lateral the direction follows from the axis: near it the arm is mere rounding.
+        let across = frame.across(p - self.start).unwrap_or(frame.v);
+        HullFoot::along(sphere, weights, p, frame.normal(across))
     }
 
     /// The axis frame from which the tangent planes follow, or `None` when one ball holds the
