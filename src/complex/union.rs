@@ -158,7 +158,8 @@ impl MedialUnion {
     }
 
     /// `sigma(p)`: the least signed distance to a primitive. Positive outside the union and then
-    /// exact; inside, `-sigma` is a lower bound of the depth. Not a number in, not a number out.
+    /// exact; inside, `-sigma` is a lower bound of the depth. A query that is
+    /// not finite gets a distance that is not.
     pub fn signed(&self, p: Vec3) -> f64 {
         self.deepest(p).signed
     }

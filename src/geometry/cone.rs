@@ -39,20 +39,20 @@ impl Cone {
     pub fn new(first: Sphere, second: Sphere) -> Self {
         let across = second.centre - first.centre;
         let growth = second.radius - first.radius;
-        if across.length_squared() <= growth * growth {
+        let length = across.length();
+        if length <= growth.abs() {
             let larger = usize::from(growth > 0.0);
             return Self::ball([first, second][larger], larger);
         }
-        let length = across.length();
         // Product form: 1 - s^2 would cancel near tangency.
-        let rise = ((length - growth) * (length + growth)).max(0.0).sqrt();
+        let rise = (length - growth).sqrt() * (length + growth).sqrt();
         Self {
             start: first.centre,
             axis: across / length,
             length,
             radius: first.radius,
             slope: growth / length,
-            lead: if rise > 0.0 { growth / rise } else { 0.0 },
+            lead: growth / rise,
             larger: None,
         }
     }

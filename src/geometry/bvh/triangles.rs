@@ -134,7 +134,7 @@ impl TriangleBvh {
         self.corners.len()
     }
 
-    /// The closest point to `p`. Not a number in, not a number out.
+    /// The closest point to `p`. A query that is not finite gets a distance that is not.
     pub fn closest(&self, p: Vec3) -> Closest {
         self.closest_from(p, None)
     }
@@ -180,7 +180,7 @@ impl TriangleBvh {
             return false;
         }
         let limit = padded(distance, self.slack);
-        let mut search = Any { bvh: self, p, squared: distance * distance, limit };
+        let mut search = Any { bvh: self, p, squared: inclusive_square(distance), limit };
         self.tree.search(&mut search);
         search.limit < 0.0
     }
@@ -226,6 +226,11 @@ fn padded(distance: f64, slack: f64) -> f64 {
     limit * limit
 }
 
+/// The square of a bound, such that a distance found earlier is within itself.
+fn inclusive_square(bound: f64) -> f64 {
+    bound * bound * (1.0 + 4.0 * f64::EPSILON)
+}
+
 /// Search for the closest triangle.
 struct Nearest<'a> {
     bvh: &'a TriangleBvh,
@@ -244,7 +249,7 @@ impl<'a> Nearest<'a> {
     }
 
     fn within(bvh: &'a TriangleBvh, p: Vec3, bound: f64) -> Self {
-        let squared = if bound >= 0.0 { bound * bound } else { -1.0 };
+        let squared = if bound >= 0.0 { inclusive_square(bound) } else { -1.0 };
         let mut search = Self { bvh, p, squared, place: NONE, limit: -1.0 };
         if bound >= 0.0 {
             search.tighten();
