@@ -39,12 +39,13 @@ fn torus(n: u32, m: u32) -> TriMesh {
     TriMesh { vertices, faces }
 }
 
-/// A strip of 25 x 20 spheres across the tube: about 500 spheres, 950 faces, 1,450 edges.
+/// A strip of 50 x 10 spheres along the tube: 500 spheres, 900 faces, 1,400 edges.
 fn sheet() -> MedialMesh {
-    let (n, m) = (25, 20);
+    let (n, m) = (50, 10);
     let spheres = (0..n * m)
         .map(|k| {
-            let (u, w) = (TAU * f64::from(k / m) / f64::from(n), f64::from(k % m) / 19.0 - 0.5);
+            let (u, w) =
+                (TAU * f64::from(k / m) / f64::from(n), f64::from(k % m) / f64::from(m - 1) - 0.5);
             let centre = Vec3::new(u.cos(), u.sin(), 0.0) * (RING + 0.4 * w);
             Sphere::new(centre + Vec3::Z * 0.05 * (3.0 * u).sin(), 0.3 - 0.3 * w * w)
         })

@@ -7,7 +7,7 @@ mod slab;
 mod sphere;
 mod tangent_planes;
 
-pub(crate) use bvh::{Bounds, Node, Search, Tree, in_morton_order};
+pub(crate) use bvh::{Bounds, Node, Plan, Search, Tree, in_morton_order};
 pub use bvh::{BvhError, Closest, Feature, TriangleBvh};
 pub use cone::Cone;
 pub use slab::Slab;

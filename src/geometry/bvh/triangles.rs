@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::super::planar_frame::{Part, PlanarFrame};
-use super::{Bounds, Node, Search, Tree, in_morton_order};
+use super::{Bounds, Node, Plan, Search, Tree, in_morton_order};
 use crate::Vec3;
 use crate::surface::TriMesh;
 
@@ -111,7 +111,7 @@ impl TriangleBvh {
             }
         }
         let boxes: Vec<_> = triangles.iter().map(|&t| (Bounds::of_points(t), 0.0)).collect();
-        let tree = Tree::build(&boxes);
+        let tree = Tree::build(&boxes, Plan { max_leaf: 4, padding: 0.0 });
         let corners: Vec<_> = tree.order().iter().map(|&f| triangles[f as usize]).collect();
         let mut places = vec![0; triangles.len()];
         for (place, &face) in (0..).zip(tree.order()) {
