@@ -122,7 +122,7 @@ impl MedialUnion {
         }
         let lone = (0..).zip(&mesh.spheres).filter(|&(v, _): &(u32, _)| isolated[v as usize]);
         parts.extend(lone.map(|(v, &m)| (Primitive::Sphere(v), Shape::Sphere(m), bounds(&[m]))));
-        Self::over(parts, ball_box(&mesh.spheres))
+        Self::over(&parts, ball_box(&mesh.spheres))
     }
 
     /// The union of the spheres alone, without cones and slabs.
@@ -135,7 +135,7 @@ impl MedialUnion {
     }
 
     fn over(
-        parts: Vec<(Primitive, Shape, (Bounds, f64))>,
+        parts: &[(Primitive, Shape, (Bounds, f64))],
         balls: Bounds,
     ) -> Result<Self, UnionError> {
         if parts.is_empty() {

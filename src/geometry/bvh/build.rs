@@ -68,6 +68,7 @@ fn node(items: &[Item], first: usize) -> Node {
 }
 
 /// Where a range of items is: its first item, and the depth of its node.
+#[derive(Clone, Copy)]
 struct Place {
     first: usize,
     depth: usize,

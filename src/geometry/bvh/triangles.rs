@@ -19,7 +19,7 @@ const LARGEST: f64 = 1e150;
 /// use medial::geometry::{Feature, TriangleBvh};
 /// use medial::surface::TriMesh;
 ///
-/// let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+/// let vertices = vec![Vec3::ZERO, 2.0 * Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
 /// let bvh = TriangleBvh::new(&TriMesh { vertices, faces: vec![[0, 1, 2]] })?;
 /// let closest = bvh.closest(Vec3::new(0.5, -3.0, 4.0));
 /// assert_eq!(closest.distance, 5.0);
