@@ -232,6 +232,12 @@ pub enum Fault {
         /// Number of its faces.
         faces: usize,
     },
+    /// So many components around one another that it takes too long to tell solid from cavity.
+    #[error("{components} components lie too densely around one another to tell their nesting")]
+    TooManyNested {
+        /// Number of components.
+        components: usize,
+    },
     /// Only from [`crate::surface::validate`]: a face that names a vertex twice.
     #[error("face {face} names a vertex twice")]
     RepeatedCorner {

@@ -16,6 +16,7 @@ mod error;
 mod inside;
 mod intersect;
 mod mesh;
+mod nesting;
 mod orient;
 mod predicates;
 mod read;
