@@ -148,7 +148,7 @@ impl Evidence<'_> {
     /// Why the mesh bounds no solid, as far as adjacency tells.
     fn structural_fault(&self) -> Option<Fault> {
         let t = self.topology;
-        if Normalisation::of(self.mesh).is_none() {
+        if !Normalisation::of(self.mesh).is_some_and(|n| n.diagonal.is_normal()) {
             return Some(Fault::Extent { diagonal: raw_diagonal(self.mesh) });
         }
         let name = |edge: [u32; 2]| edge.map(|v| self.name(v));
