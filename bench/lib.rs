@@ -1,1 +1,8 @@
-//! The runner behind the command `medial`.
+//! The runner behind the command `medial`, and the command itself.
+//!
+//! [`run`] knows inputs, items and records, and nothing of the command line; [`cmd`] holds one
+//! file for each verb; [`cli`] describes the arguments.
+
+pub mod cli;
+pub mod cmd;
+pub mod run;

@@ -1,3 +1,7 @@
 //! The command `medial`.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    medial_bench::cli::main()
+}

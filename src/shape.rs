@@ -1,35 +1,396 @@
 //! One normalised input with its substrates, each built once, on demand, and timed.
+//!
+//! A [`Shape`] is a view on a store that all methods share. What is asked for through a view is
+//! remembered in it with its cost, whoever built it first, so that the record of a run names the
+//! substrates that the method used, and a filter does not look free beside a method that starts
+//! from the mesh. [`Shape::view`] opens a fresh view on the same store.
 
-use std::sync::Arc;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::Hash;
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::Instant;
 
-use crate::complex::MedialMesh;
+use cpu_time::ProcessTime;
 
-/// One input shape, normalised to a bounding-box diagonal of 1.
+use crate::Vec3;
+use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, voronoi_medial_mesh};
+use crate::geometry::{BvhError, Delaunay, TriangleBvh, TriangulationError};
+use crate::metrics::{Judge, JudgeOptions, Truth};
+use crate::simplifier::Diagnostics;
+use crate::surface::{InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, sample};
+
+mod contacts;
+
+pub use contacts::ContactSets;
+
+/// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
 pub struct Shape {
-    initial: Arc<MedialMesh>,
+    store: Arc<Store>,
+    used: Mutex<BTreeMap<Substrate, Use>>,
+}
+
+/// What a view remembers of a substrate.
+#[derive(Clone, Copy)]
+struct Use {
+    cost: Cost,
+    /// Whether it was built through this view, rather than found.
+    built_here: bool,
+}
+
+/// How the substrates of a shape are built; the same for every method in a comparison.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShapeOptions {
+    /// Boundary samples of the Voronoi methods.
+    pub sampling: Sampling,
+    /// How dual Voronoi polygons are triangulated.
+    pub dual: DualTriangulation,
+}
+
+/// A substrate that methods share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Substrate {
+    /// Boundary samples.
+    Samples,
+    /// Delaunay triangulation of the samples.
+    Delaunay,
+    /// Circumspheres of the cells, each classified as inside or outside.
+    Inside,
+    /// Voronoi medial mesh.
+    MedialMesh,
+    /// Bounding-volume tree of the surface.
+    SurfaceTree,
+    /// Contact points of a medial mesh that came without them.
+    Contacts,
+}
+
+impl Substrate {
+    /// Name in records.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Samples => "samples",
+            Self::Delaunay => "delaunay",
+            Self::Inside => "inside",
+            Self::MedialMesh => "medial_mesh",
+            Self::SurfaceTree => "surface_tree",
+            Self::Contacts => "contacts",
+        }
+    }
+}
+
+/// What a substrate cost when it was built.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cost {
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Seconds of the whole process on all processors.
+    pub cpu_seconds: f64,
+}
+
+struct Store {
+    name: String,
+    mesh: TriMesh,
+    normalisation: Normalisation,
+    report: SurfaceReport,
+    options: ShapeOptions,
+    given: Option<Arc<MedialMesh>>,
+    samples: Cache<Sampling, Arc<[Vec3]>>,
+    delaunay: Cache<Sampling, Arc<Delaunay>>,
+    cells: Cache<Sampling, Arc<CellSpheres>>,
+    medial: Cache<Sampling, Arc<MedialMesh>>,
+    tree: Cache<(), Arc<TriangleBvh>>,
 }
 
 impl Shape {
-    /// A shape known only by its initial medial mesh, in normalised units.
-    pub fn from_initial(initial: MedialMesh) -> Self {
-        Self { initial: Arc::new(initial) }
-    }
-
-    /// The medial mesh that every simplifier of this shape starts from.
+    /// Normalises a closed, oriented surface and opens a first view on it.
+    ///
+    /// `report` is what [`crate::surface::validate`] or [`crate::surface::read`] said of `mesh`.
     ///
     /// # Errors
-    /// When the triangulation of the samples fails.
-    pub fn initial(&self) -> Result<Arc<MedialMesh>, ShapeError> {
-        Ok(Arc::clone(&self.initial))
+    /// [`ShapeError::Extent`] when the bounding box has no finite positive diagonal.
+    pub fn new(
+        name: impl Into<String>,
+        mesh: &TriMesh,
+        report: SurfaceReport,
+        options: ShapeOptions,
+    ) -> Result<Self, ShapeError> {
+        let normalisation = Normalisation::of(mesh).ok_or(ShapeError::Extent)?;
+        let mesh = TriMesh {
+            vertices: mesh.vertices.iter().map(|&v| normalisation.forward(v)).collect(),
+            faces: mesh.faces.clone(),
+        };
+        let store = Store {
+            name: name.into(),
+            mesh,
+            normalisation,
+            report,
+            options,
+            given: None,
+            samples: Cache::default(),
+            delaunay: Cache::default(),
+            cells: Cache::default(),
+            medial: Cache::default(),
+            tree: Cache::default(),
+        };
+        Ok(Self { store: Arc::new(store), used: Mutex::default() })
     }
+
+    /// The shape with an initial medial mesh from elsewhere, in input units, in place of its own.
+    ///
+    /// # Panics
+    /// If another view on the same store exists.
+    pub fn with_initial(mut self, initial: &MedialMesh) -> Self {
+        let store = Arc::get_mut(&mut self.store).expect("the only view");
+        let to_normal = store.normalisation;
+        let mesh = initial.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
+        store.given = Some(Arc::new(mesh));
+        self
+    }
+
+    /// A fresh view: the same substrates, nothing used yet.
+    pub fn view(&self) -> Self {
+        Self { store: Arc::clone(&self.store), used: Mutex::default() }
+    }
+
+    /// Name of the input.
+    pub fn name(&self) -> &str {
+        &self.store.name
+    }
+
+    /// The surface, normalised to a bounding-box diagonal of 1.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.store.mesh
+    }
+
+    /// The similarity from input to normalised coordinates.
+    pub fn normalisation(&self) -> &Normalisation {
+        &self.store.normalisation
+    }
+
+    /// What was found and repaired when the surface was read, in input units.
+    pub fn report(&self) -> &SurfaceReport {
+        &self.store.report
+    }
+
+    /// Betti numbers that the solid's topology demands of its medial axis.
+    pub fn expected_betti(&self) -> Option<[u64; 3]> {
+        self.store.report.expected_betti.map(|betti| betti.map(|number| number as u64))
+    }
+
+    /// How the substrates are built.
+    pub fn options(&self) -> &ShapeOptions {
+        &self.store.options
+    }
+
+    /// The substrates used through this view and what each cost, whoever built it.
+    pub fn used(&self) -> Vec<(Substrate, Cost)> {
+        let used = self.used.lock().expect("no panic while held");
+        used.iter().map(|(&substrate, used)| (substrate, used.cost)).collect()
+    }
+
+    /// The part of the cost of [`Shape::used`] that was spent through this view.
+    pub fn spent(&self) -> Cost {
+        let used = self.used.lock().expect("no panic while held");
+        let built = used.values().filter(|used| used.built_here);
+        built.fold(Cost::default(), |sum, used| Cost {
+            seconds: sum.seconds + used.cost.seconds,
+            cpu_seconds: sum.cpu_seconds + used.cost.cpu_seconds,
+        })
+    }
+
+    /// The boundary samples of the shape's own sampling.
+    pub fn samples(&self) -> Arc<[Vec3]> {
+        self.samples_by(&self.store.options.sampling)
+    }
+
+    /// Boundary samples by another sampling.
+    pub fn samples_by(&self, sampling: &Sampling) -> Arc<[Vec3]> {
+        let built =
+            self.store.samples.get(*sampling, || Ok(sample(&self.store.mesh, sampling).into()));
+        self.take(Substrate::Samples, built).expect("sampling cannot fail")
+    }
+
+    /// The Delaunay triangulation of the boundary samples.
+    ///
+    /// # Errors
+    /// When the samples do not span space.
+    pub fn delaunay(&self) -> Result<Arc<Delaunay>, ShapeError> {
+        let samples = self.samples();
+        let built = self.store.delaunay.get(self.store.options.sampling, || {
+            Delaunay::new(&samples).map(Arc::new).map_err(ShapeError::from)
+        });
+        self.take(Substrate::Delaunay, built)
+    }
+
+    /// The circumspheres of the Delaunay cells and which of them are centred inside.
+    ///
+    /// # Errors
+    /// When the samples do not span space.
+    pub fn cells(&self) -> Result<Arc<CellSpheres>, ShapeError> {
+        let delaunay = self.delaunay()?;
+        let tree = self.surface_tree()?;
+        let built = self.store.cells.get(self.store.options.sampling, || {
+            let inside = InsideTest::new(&self.store.mesh);
+            Ok(Arc::new(CellSpheres::classify(&delaunay, &inside, &tree)))
+        });
+        self.take(Substrate::Inside, built)
+    }
+
+    /// The Voronoi medial mesh, in normalised units, with contact points.
+    ///
+    /// # Errors
+    /// When the samples do not span space, or no circumcentre lies inside the surface.
+    pub fn voronoi(&self) -> Result<Arc<MedialMesh>, ShapeError> {
+        let delaunay = self.delaunay()?;
+        let cells = self.cells()?;
+        let options = &self.store.options;
+        let built = self.store.medial.get(options.sampling, || {
+            let mesh = voronoi_medial_mesh(&delaunay, &cells, &self.samples(), options.dual);
+            if mesh.spheres.is_empty() {
+                return Err(ShapeError::EmptyMedialMesh);
+            }
+            Ok(Arc::new(mesh))
+        });
+        self.take(Substrate::MedialMesh, built)
+    }
+
+    /// The medial mesh that every simplifier of this shape starts from, in normalised units: the
+    /// given one, or the Voronoi medial mesh.
+    ///
+    /// # Errors
+    /// As [`Shape::voronoi`].
+    pub fn initial(&self) -> Result<Arc<MedialMesh>, ShapeError> {
+        match &self.store.given {
+            Some(given) => Ok(Arc::clone(given)),
+            None => self.voronoi(),
+        }
+    }
+
+    /// The contact points of each sphere of a medial mesh of this shape: those that it carries, or
+    /// all samples within `(1 + 1e-3) r` of the centre, which is then said in `diagnostics`.
+    ///
+    /// # Errors
+    /// Never at present; reserved for samplings that can fail.
+    pub fn contacts(
+        &self,
+        mesh: &MedialMesh,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<ContactSets, ShapeError> {
+        if let Some(known) = &mesh.contacts {
+            return Ok(ContactSets::known(known));
+        }
+        let samples = self.samples();
+        let (sets, cost) = timed(|| ContactSets::search(mesh, &samples));
+        self.note(Substrate::Contacts, Use { cost, built_here: true });
+        let empty = sets.empty_sets();
+        diagnostics.warn(format!(
+            "the initial medial mesh has no contact points: they were taken to be all samples \
+             within 1.001 radii of a centre ({empty} spheres have fewer than two)"
+        ));
+        Ok(sets)
+    }
+
+    /// The bounding-volume tree of the surface.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn surface_tree(&self) -> Result<Arc<TriangleBvh>, ShapeError> {
+        let built = self.store.tree.get((), || Ok(Arc::new(TriangleBvh::new(&self.store.mesh)?)));
+        self.take(Substrate::SurfaceTree, built)
+    }
+
+    /// A judge of medial meshes of this shape. `axis` is its exactly known medial axis, in input
+    /// units. What the judge needs counts as nobody's use.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn judge(
+        &self,
+        axis: Option<&MedialMesh>,
+        options: JudgeOptions,
+    ) -> Result<Judge, ShapeError> {
+        let normal = self.store.normalisation;
+        let truth = Truth {
+            betti: self.expected_betti(),
+            axis: axis.map(|a| a.transformed(1.0 / normal.diagonal, |p| normal.forward(p))),
+            diagonal: normal.diagonal,
+        };
+        Ok(Judge::new(self.store.mesh.clone(), self.view().surface_tree()?, truth, options))
+    }
+
+    fn take<T>(
+        &self,
+        substrate: Substrate,
+        (built, used): (Result<T, ShapeError>, Use),
+    ) -> Result<T, ShapeError> {
+        self.note(substrate, used);
+        built
+    }
+
+    fn note(&self, substrate: Substrate, used: Use) {
+        let mut all = self.used.lock().expect("no panic while held");
+        // The first use tells whether it was built here.
+        all.entry(substrate).or_insert(used);
+    }
+}
+
+/// Values that are built once for each key, with what building them cost.
+struct Cache<K, T> {
+    /// Looked up by key only, never iterated.
+    slots: Mutex<HashMap<K, Arc<Slot<T>>>>,
+}
+
+type Slot<T> = OnceLock<(Result<T, ShapeError>, Cost)>;
+
+impl<K, T> Default for Cache<K, T> {
+    fn default() -> Self {
+        Self { slots: Mutex::default() }
+    }
+}
+
+impl<K: Eq + Hash, T: Clone> Cache<K, T> {
+    /// The value for a key; a second asker waits for the first.
+    fn get(
+        &self,
+        key: K,
+        build: impl FnOnce() -> Result<T, ShapeError>,
+    ) -> (Result<T, ShapeError>, Use) {
+        let slot =
+            Arc::clone(self.slots.lock().expect("no panic while held").entry(key).or_default());
+        let mut built_here = false;
+        let (value, cost) = slot
+            .get_or_init(|| {
+                built_here = true;
+                timed(build)
+            })
+            .clone();
+        (value, Use { cost, built_here })
+    }
+}
+
+fn timed<T>(work: impl FnOnce() -> T) -> (T, Cost) {
+    let (wall, cpu) = (Instant::now(), ProcessTime::now());
+    let value = work();
+    let cost =
+        Cost { seconds: wall.elapsed().as_secs_f64(), cpu_seconds: cpu.elapsed().as_secs_f64() };
+    (value, cost)
 }
 
 /// Why a substrate could not be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
+    /// The bounding box is empty, flat to a point, or not finite.
+    #[error("the surface has no extent: its bounding-box diagonal is zero or not finite")]
+    Extent,
+    /// The samples cannot be triangulated.
+    #[error("triangulating the boundary samples: {0}")]
+    Triangulation(#[from] TriangulationError),
+    /// The surface has no bounding-volume tree.
+    #[error("the surface: {0}")]
+    Tree(#[from] BvhError),
     /// The inside of the shape holds no Voronoi vertex.
     #[error(
-        "the initial medial mesh is empty: no circumcentre lies inside the surface; sample more densely"
+        "the initial medial mesh is empty: no circumcentre of the samples lies inside the surface; \
+         sample more densely, for example --sampling blue:20000"
     )]
     EmptyMedialMesh,
 }

@@ -2,30 +2,8 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use crate::Vec3;
-
-/// A medial sphere `m = (c, r)`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Sphere {
-    /// Centre `c`.
-    pub centre: Vec3,
-    /// Radius `r`, non-negative.
-    pub radius: f64,
-}
-
-impl Sphere {
-    /// A sphere from its centre and radius.
-    pub const fn new(centre: Vec3, radius: f64) -> Self {
-        Self { centre, radius }
-    }
-
-    /// The point `(1 - t) self + t other` of the edge between two spheres, in `R^4`.
-    pub fn lerp(self, other: Self, t: f64) -> Self {
-        Self::new(self.centre.lerp(other.centre, t), self.radius + t * (other.radius - self.radius))
-    }
-}
+use crate::geometry::Sphere;
 
 /// The boundary samples that each sphere touches, as known from the triangulation it came from.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,1 +1,23 @@
 //! Exact predicates, Delaunay triangulation, bounding-volume trees, distances to medial primitives.
+
+mod bvh;
+mod cone;
+pub mod delaunay;
+mod enclosing;
+mod planar_frame;
+pub mod predicates;
+mod slab;
+mod sphere;
+mod tangent_planes;
+pub mod triangulation;
+
+pub(crate) use bvh::{Bounds, Node, Search, Tree, in_morton_order};
+pub use bvh::{BvhError, Closest, Feature, TriangleBvh};
+pub use cone::Cone;
+pub use delaunay::Delaunay;
+pub use enclosing::enclosing_ball;
+pub use slab::Slab;
+pub(crate) use slab::SlabFace;
+pub use sphere::{HullFoot, Sphere};
+pub use tangent_planes::{ConeFrame, SlabPlanes, boundary_edge_normal};
+pub use triangulation::{CellId, TriangulationError, VertexId};

@@ -1,7 +1,25 @@
 //! What a medial mesh is judged by: Hausdorff distances, triangle quality, spikes, topology.
+//!
+//! [`Judge`] runs them all; each can be had alone.
 
+mod axis_distance;
+mod counts;
+mod envelope;
 mod evaluation;
+mod hausdorff;
+mod judge;
+mod quality;
+mod spikes;
+mod volume;
 
+pub use axis_distance::{AxisOptions, axis_distance};
+pub use counts::counts;
+pub use envelope::{EnvelopeOptions, sample_envelope};
 pub use evaluation::{
     AxisDistances, Counts, Distances, Evaluation, RatioSpikes, Spikes, TriangleQuality,
 };
+pub use hausdorff::{DistanceOptions, MetricError, distances};
+pub use judge::{Judge, JudgeOptions, Truth};
+pub use quality::triangle_quality;
+pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
+pub use volume::{VolumeOptions, enclosed_volume, volume_error};

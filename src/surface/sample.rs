@@ -17,10 +17,11 @@ use crate::Vec3;
 ///
 /// As text: `vertices`, `uniform:20000`, `blue:20000`, the latter two with an optional seed as in
 /// `blue:20000:7`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Sampling {
     /// The vertices of the mesh, unaltered.
+    #[default]
     MeshVertices,
     /// Independent points, uniformly distributed by area.
     AreaUniform {
@@ -67,6 +68,17 @@ impl FromStr for Sampling {
             Some("uniform") => Ok(Self::AreaUniform { count, seed }),
             Some("blue") => Ok(Self::BlueNoise { count, seed }),
             _ => Err(error()),
+        }
+    }
+}
+
+impl Sampling {
+    /// The same sampling with another seed.
+    pub fn with_seed(self, seed: u64) -> Self {
+        match self {
+            Self::MeshVertices => self,
+            Self::AreaUniform { count, .. } => Self::AreaUniform { count, seed },
+            Self::BlueNoise { count, .. } => Self::BlueNoise { count, seed },
         }
     }
 }

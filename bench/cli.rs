@@ -1,0 +1,135 @@
+//! The arguments of the command, and the way from a verb to an exit code.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::cmd;
+
+/// Simplify the 3D medial axis transform, and compare the published methods that do.
+#[derive(Debug, Parser)]
+#[command(name = "medial", version, propagate_version = true, arg_required_else_help = true)]
+pub struct Cli {
+    /// What every verb takes.
+    #[command(flatten)]
+    pub global: Global,
+    /// The verb.
+    #[command(subcommand)]
+    pub verb: Verb,
+}
+
+/// Options of every verb.
+#[derive(Clone, Debug, Args)]
+pub struct Global {
+    /// Print one JSON object on standard output, and nothing else there.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Number of threads [default: all processors].
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<usize>,
+    /// No progress on standard error.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+}
+
+/// The verbs.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// Run methods on meshes, measure, and write tables, plots and a page.
+    Compare(cmd::compare::Arguments),
+    /// Say what a mesh is: counts, defects, topology, repairs.
+    Info(cmd::info::Arguments),
+    /// Compute the initial Voronoi medial mesh.
+    Axis(cmd::axis::Arguments),
+    /// Simplify the medial axis of one mesh by one method.
+    Simplify(cmd::simplify::Arguments),
+    /// Measure a medial mesh from anywhere against a surface.
+    Evaluate(cmd::evaluate::Arguments),
+    /// Convert between surface formats, or between medial mesh formats.
+    Convert(cmd::convert::Arguments),
+    /// List the methods, or describe one.
+    Methods(cmd::methods::Arguments),
+    /// List or write the built-in shapes.
+    Datasets(cmd::datasets::Arguments),
+    /// Rebuild the report of a folder of results.
+    Report(cmd::report::Arguments),
+    /// Say what this machine lacks for oracles and baselines.
+    Doctor(cmd::doctor::Arguments),
+    /// Print shell completions.
+    Completions(cmd::completions::Arguments),
+}
+
+/// Parses the command line, runs the verb, and turns the outcome into an exit code.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome = set_threads(cli.global.threads).and_then(|()| run(cli.verb, &cli.global));
+    match outcome {
+        Ok(code) => code.into(),
+        Err(failure) => {
+            cmd::print_failure(&failure, &cli.global);
+            failure.code.into()
+        }
+    }
+}
+
+fn run(verb: Verb, global: &Global) -> Result<cmd::Exit, cmd::Failure> {
+    match verb {
+        Verb::Compare(arguments) => cmd::compare::run(&arguments, global),
+        Verb::Info(arguments) => cmd::info::run(&arguments, global),
+        Verb::Axis(arguments) => cmd::axis::run(&arguments, global),
+        Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global),
+        Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
+        Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
+        Verb::Methods(arguments) => cmd::methods::run(&arguments, global),
+        Verb::Datasets(arguments) => cmd::datasets::run(&arguments, global),
+        Verb::Report(arguments) => cmd::report::run(&arguments, global),
+        Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
+        Verb::Completions(arguments) => cmd::completions::run(&arguments),
+    }
+}
+
+fn set_threads(threads: Option<usize>) -> Result<(), cmd::Failure> {
+    let Some(threads) = threads else {
+        return Ok(());
+    };
+    if threads == 0 {
+        return Err(cmd::Failure::usage("--threads 0: ask for at least one thread"));
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    pool.map_err(|error| cmd::Failure::usage(format!("--threads {threads}: {error}")))
+}
+
+/// How the substrates of a shape are built.
+#[derive(Clone, Debug, Args)]
+pub struct SubstrateArguments {
+    /// Boundary samples: `vertices`, `uniform:COUNT` or `blue:COUNT`.
+    #[arg(long, value_name = "SAMPLING", default_value = "vertices")]
+    pub sampling: String,
+    /// Triangulation of the dual Voronoi polygons.
+    #[arg(long, value_enum, default_value_t = Dual::Fan)]
+    pub dual: Dual,
+    /// Seed of every random choice.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// Triangulation of the dual Voronoi polygons.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Dual {
+    /// A fan, as published.
+    Fan,
+    /// Planar Delaunay.
+    Delaunay,
+}
+
+/// How results are measured.
+#[derive(Clone, Debug, Args)]
+pub struct MeasureArguments {
+    /// Surface samples for the error, beside the mesh's vertices; as many on the reconstruction.
+    #[arg(long, value_name = "N", default_value_t = medial::metrics::JudgeOptions::default().samples)]
+    pub samples: usize,
+}
+
+/// A mesh argument: a file, or `builtin:ID[:RESOLUTION]`.
+pub type MeshArgument = PathBuf;

@@ -1,0 +1,96 @@
+//! `medial axis MESH -o x.ma`: the initial Voronoi medial mesh.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use medial::complex;
+use medial::metrics;
+use serde_json::json;
+
+use super::{Exit, Failure, print_json, print_line, shape_options};
+use crate::cli::{Global, MeshArgument, SubstrateArguments};
+use crate::run::{Input, Source, Stopwatch, peak_bytes};
+
+/// Arguments of `axis`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
+    mesh: MeshArgument,
+    /// The medial mesh (.ma, .ply, .obj), in the units of the surface.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    substrate: SubstrateArguments,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the surface is refused, cannot be triangulated, or the output cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
+    let options = shape_options(&arguments.substrate)?;
+    let (input, read) = Stopwatch::time(|| Input::load(&source));
+    let input = input.map_err(Failure::input)?;
+    let shape = input.shape(options).map_err(Failure::input)?;
+    let mesh = shape.voronoi().map_err(Failure::input)?;
+    let (betti, _) = Stopwatch::time(|| complex::betti(&mesh));
+    if let Some(output) = &arguments.output {
+        let back = shape.normalisation();
+        let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
+        complex::write(output, &mesh).map_err(Failure::input)?;
+    }
+    let counts = metrics::counts(&mesh);
+    let mut seconds = serde_json::Map::new();
+    let mut cpu_seconds = serde_json::Map::new();
+    let (mut total, mut cpu_total) = (read.seconds, read.cpu_seconds);
+    seconds.insert("read".into(), read.seconds.into());
+    cpu_seconds.insert("read".into(), read.cpu_seconds.into());
+    for (substrate, cost) in shape.used() {
+        let stage = if substrate.name() == "medial_mesh" { "extract" } else { substrate.name() };
+        seconds.insert(stage.into(), cost.seconds.into());
+        cpu_seconds.insert(stage.into(), cost.cpu_seconds.into());
+        total += cost.seconds;
+        cpu_total += cost.cpu_seconds;
+    }
+    seconds.insert("total".into(), total.into());
+    cpu_seconds.insert("total".into(), cpu_total.into());
+    let expected = shape.expected_betti();
+    let mut warnings = shape.report().warnings.clone();
+    if let Some(expected) = expected.filter(|&expected| expected != betti) {
+        warnings.push(format!(
+            "the medial mesh has Betti numbers {betti:?}, the solid {expected:?}: the samples are too \
+             coarse somewhere, or parts touch; try --sampling blue:{}",
+            4 * shape.samples().len()
+        ));
+    }
+    if global.json {
+        let object = json!({
+            "spheres": counts.spheres, "edges": counts.edges, "faces": counts.faces,
+            "isolated": counts.isolated, "euler": complex::euler(&mesh), "betti": betti,
+            "expected_betti": expected, "samples": shape.samples().len(),
+            "sampling": shape.options().sampling.to_string(), "seed": arguments.substrate.seed,
+            "in_guard_band": shape.cells().map_or(0, |cells| cells.in_guard_band),
+            "seconds": seconds, "cpu_seconds": cpu_seconds, "peak_bytes": peak_bytes(),
+            "output": arguments.output,
+        });
+        print_json(&object, &warnings);
+        return Ok(Exit::Done);
+    }
+    print_line(&format!(
+        "{}: {} spheres, {} edges, {} faces from {} samples in {total:.2} s",
+        input.name,
+        counts.spheres,
+        counts.edges,
+        counts.faces,
+        shape.samples().len()
+    ));
+    print_line(&format!("  Betti numbers {betti:?}, the solid's {expected:?}"));
+    for warning in warnings {
+        print_line(&format!("  warning: {warning}"));
+    }
+    if let Some(output) = &arguments.output {
+        print_line(&format!("  written: {}", output.display()));
+    }
+    Ok(Exit::Done)
+}

@@ -1,0 +1,236 @@
+//! `medial compare [MESH ...]`: the main job. Methods x meshes x levels, measured and reported.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use medial::simplifier::{Level, MedialSimplifier, Params};
+use medial_reports::{Header, Initial, Journal, Record, Status, write_report};
+use serde_json::json;
+
+use super::methods::unknown_method;
+use super::{Exit, Failure, judge_options, note, print_json, print_line, shape_options};
+use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
+use crate::run::{
+    Input, Item, Measure, Progress, Provenance, RunOptions, Source, refused_records, run_item,
+};
+
+/// Name of the append-only list of records in the folder of the results.
+pub const RESULTS: &str = "results.jsonl";
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface files (OFF, OBJ, PLY, STL) or `builtin:ID[:RESOLUTION]` [default: all built-in shapes].
+    meshes: Vec<MeshArgument>,
+    /// A set of meshes beside those named: `builtin`.
+    #[arg(long, value_name = "SET")]
+    dataset: Option<String>,
+    /// Methods, separated by commas [default: all].
+    #[arg(long, value_name = "IDS", value_delimiter = ',')]
+    methods: Vec<String>,
+    /// Sphere counts, separated by commas.
+    #[arg(long, value_name = "COUNTS", value_delimiter = ',', default_values_t = [1000, 500, 200, 100])]
+    spheres: Vec<usize>,
+    /// Also run each method at its published level.
+    #[arg(long)]
+    published: bool,
+    /// Set a parameter of one method; can be given several times.
+    #[arg(long = "set", value_name = "METHOD.KEY=VALUE")]
+    set: Vec<String>,
+    /// Time each item so many times; the median is reported, all are kept.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    repeat: usize,
+    /// Folder of the results.
+    #[arg(long, value_name = "DIR", default_value = "medial-report")]
+    out: PathBuf,
+    #[command(flatten)]
+    substrate: SubstrateArguments,
+    #[command(flatten)]
+    measure: MeasureArguments,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the command line is wrong or the results cannot be written. Meshes that are refused and
+/// methods that fail are rows of the results.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let sources = sources(arguments)?;
+    let methods = methods(&arguments.methods)?;
+    let items = items(arguments, &methods)?;
+    let shape_options = shape_options(&arguments.substrate)?;
+    let options = RunOptions {
+        seed: arguments.substrate.seed,
+        repeat: arguments.repeat.max(1),
+        out: Some(arguments.out.clone()),
+    };
+    let provenance = Provenance::here();
+    let journal_path = fresh_journal(&arguments.out)?;
+    let mut journal = Journal::open(&journal_path).map_err(Failure::input)?;
+    let mut records = Vec::new();
+    let mut progress = Progress::new(global.quiet, sources.len() * items.len());
+
+    for source in &sources {
+        let mut keep = |new: Vec<Record>| -> Result<(), Failure> {
+            for record in new {
+                journal.append(&record).map_err(Failure::input)?;
+                records.push(record);
+            }
+            Ok(())
+        };
+        let prepared = Input::load(source).map_err(|error| error.to_string()).and_then(|input| {
+            let shape = input.shape(shape_options.clone()).map_err(|error| error.to_string())?;
+            Ok((input, shape))
+        });
+        let (input, shape) = match prepared {
+            Ok(ready) => ready,
+            Err(reason) => {
+                progress.remark(&format!("{source}: refused: {reason}"));
+                for item in &items {
+                    keep(refused_records(source, item, &reason, &provenance))?;
+                    progress.done();
+                }
+                continue;
+            }
+        };
+        progress.at(&format!("{}: initial medial mesh", input.name));
+        let judge_options = judge_options(&arguments.measure, arguments.substrate.seed);
+        let judge = shape.judge(input.axis.as_ref(), judge_options).map_err(Failure::input)?;
+        let initial =
+            shape.view().initial().ok().map(|mesh| Initial::of(&mesh, judge.truth().betti));
+        let measure = Measure { input: &input, shape: &shape, judge: &judge, initial };
+        for (method, item) in methods.iter().zip(&items) {
+            progress.at(&format!("{}: {}", input.name, item.method));
+            let new = run_item(method.as_ref(), item, &measure, &options, &provenance);
+            for record in new.iter().filter(|record| record.status.is_failure()) {
+                let reason = record.reason.as_deref().unwrap_or("no reason");
+                let Record { mesh, simplify, status, .. } = record;
+                progress.remark(&format!(
+                    "{mesh}, {}, {}: {status}: {reason}",
+                    simplify.method, simplify.level
+                ));
+            }
+            keep(new)?;
+            progress.done();
+        }
+    }
+    drop(progress);
+    let header = Header {
+        title: "Medial axis simplification: a comparison".into(),
+        command: provenance.command.clone(),
+        version: provenance.version.clone(),
+        date: Some(super::report::today()),
+        machine: Some(provenance.machine.clone()),
+        methods: methods.iter().map(|method| method.info().into()).collect(),
+        notes: vec![],
+    };
+    let files = write_report(&arguments.out, &records, &header).map_err(Failure::input)?;
+    finish(&records, &arguments.out, &files, global)
+}
+
+fn sources(arguments: &Arguments) -> Result<Vec<Source>, Failure> {
+    let mut sources = Vec::new();
+    for mesh in &arguments.meshes {
+        sources.push(Source::parse(mesh).map_err(Failure::usage)?);
+    }
+    match arguments.dataset.as_deref() {
+        None if sources.is_empty() => sources = Source::built_ins(),
+        None => {}
+        Some("builtin") => sources.extend(Source::built_ins()),
+        Some(other) => {
+            return Err(Failure::usage(format!("--dataset {other}: the one set is `builtin`")));
+        }
+    }
+    Ok(sources)
+}
+
+fn methods(ids: &[String]) -> Result<Vec<Box<dyn MedialSimplifier>>, Failure> {
+    if ids.is_empty() {
+        return Ok(medial_methods::registry());
+    }
+    ids.iter().map(|id| medial_methods::find(id).ok_or_else(|| unknown_method(id))).collect()
+}
+
+/// One item for each method: its parameters, and the levels from fine to coarse.
+fn items(
+    arguments: &Arguments,
+    methods: &[Box<dyn MedialSimplifier>],
+) -> Result<Vec<Item>, Failure> {
+    let mut counts = arguments.spheres.clone();
+    counts.sort_unstable_by(|a, b| b.cmp(a));
+    counts.dedup();
+    if counts.last() == Some(&0) {
+        return Err(Failure::usage("--spheres 0: ask for at least one sphere"));
+    }
+    let mut levels: Vec<Level> = counts.into_iter().map(Level::Spheres).collect();
+    if arguments.published {
+        levels.insert(0, Level::Published);
+    }
+    let mut items: Vec<Item> = methods
+        .iter()
+        .map(|method| Item {
+            method: method.info().id.to_owned(),
+            params: Params::none(),
+            levels: levels.clone(),
+        })
+        .collect();
+    for word in &arguments.set {
+        let parts = word.split_once('=').and_then(|(name, value)| {
+            let (method, key) = name.split_once('.')?;
+            Some((method, key, value))
+        });
+        let (method, key, value) =
+            parts.ok_or_else(|| Failure::usage(format!("--set {word}: write METHOD.KEY=VALUE")))?;
+        let item = items.iter_mut().find(|item| item.method == method);
+        let item = item.ok_or_else(|| {
+            Failure::usage(format!("--set {word}: `{method}` is not among the methods that run"))
+        })?;
+        item.params.set(key, value);
+    }
+    Ok(items)
+}
+
+/// Makes the folder and removes the records of an earlier run.
+fn fresh_journal(out: &Path) -> Result<PathBuf, Failure> {
+    let fail = |error: std::io::Error| Failure::input(format!("{}: {error}", out.display()));
+    std::fs::create_dir_all(out).map_err(fail)?;
+    let path = out.join(RESULTS);
+    match std::fs::remove_file(&path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(fail(error)),
+        _ => Ok(path),
+    }
+}
+
+/// Prints the summary and decides the exit code.
+fn finish(
+    records: &[Record],
+    out: &Path,
+    files: &[PathBuf],
+    global: &Global,
+) -> Result<Exit, Failure> {
+    let count = |status: Status| records.iter().filter(|r| r.status == status).count();
+    let ok = count(Status::Ok);
+    let page = out.join("index.html");
+    if global.json {
+        let by_status: serde_json::Map<String, serde_json::Value> =
+            Status::ALL.iter().map(|&s| (s.key().to_owned(), count(s).into())).collect();
+        let object = json!({
+            "out": out, "records": records.len(), "status": by_status,
+            "results": out.join(RESULTS), "page": page, "files": files,
+        });
+        print_json(&object, &[]);
+    } else {
+        print_line(&medial_reports::summary_text(records));
+        print_line(&format!(
+            "{ok} of {} results measured; page: {}",
+            records.len(),
+            page.display()
+        ));
+    }
+    note(global, "");
+    Ok(match ok {
+        0 => Exit::NothingMeasured,
+        _ if ok < records.len() => Exit::SomeFailed,
+        _ => Exit::Done,
+    })
+}

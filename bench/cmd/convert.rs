@@ -1,0 +1,84 @@
+//! `medial convert A B`: between surface formats, or between medial mesh formats.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use medial::{complex, surface};
+use serde_json::json;
+
+use super::{Exit, Failure, extension, print_json, print_line};
+use crate::cli::Global;
+
+/// No header of a PLY file is longer, in bytes.
+const HEADER_LIMIT: u64 = 1 << 20;
+
+/// Arguments of `convert`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma, or .ply with a radius).
+    from: PathBuf,
+    /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj).
+    to: PathBuf,
+}
+
+/// Runs the verb. Surfaces are repaired on the way, and every repair is told.
+///
+/// # Errors
+/// When the input is refused, the pair of formats makes no sense, or the output cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let (notes, vertices, faces) = if is_medial(&arguments.from)? {
+        let loaded = complex::read(&arguments.from).map_err(Failure::input)?;
+        complex::write(&arguments.to, &loaded.mesh).map_err(Failure::input)?;
+        (loaded.notes, loaded.mesh.spheres.len(), loaded.mesh.faces.len())
+    } else if extension(&arguments.to) == "ma" {
+        return Err(Failure::usage(format!(
+            "a surface is not a medial mesh: `medial axis {} -o {}` computes one",
+            arguments.from.display(),
+            arguments.to.display()
+        )));
+    } else {
+        let loaded = surface::read(&arguments.from).map_err(Failure::input)?;
+        surface::write(&arguments.to, &loaded.mesh).map_err(Failure::input)?;
+        let mut notes: Vec<String> =
+            loaded.report.repairs.iter().map(ToString::to_string).collect();
+        notes.extend(loaded.report.warnings);
+        (notes, loaded.mesh.vertices.len(), loaded.mesh.faces.len())
+    };
+    if global.json {
+        let object = json!({ "output": arguments.to, "vertices": vertices, "faces": faces });
+        print_json(&object, &notes);
+    } else {
+        print_line(&format!("{}: {vertices} vertices, {faces} faces", arguments.to.display()));
+        for note in notes {
+            print_line(&format!("  note: {note}"));
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// Whether a file holds a medial mesh: `.ma`, or `.ply` whose vertices have a radius.
+fn is_medial(path: &Path) -> Result<bool, Failure> {
+    match extension(path).as_str() {
+        "ma" => Ok(true),
+        "ply" => ply_has_radius(path),
+        _ => Ok(false),
+    }
+}
+
+fn ply_has_radius(path: &Path) -> Result<bool, Failure> {
+    let fail = |error| Failure::input(format!("{}: {error}", path.display()));
+    let mut reader = BufReader::new(File::open(path).map_err(fail)?).take(HEADER_LIMIT);
+    let mut line = Vec::new();
+    while reader.read_until(b'\n', &mut line).map_err(fail)? > 0 {
+        let words: Vec<&[u8]> =
+            line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
+        match words.as_slice() {
+            [b"end_header"] => break,
+            [b"property", _, b"radius"] => return Ok(true),
+            _ => line.clear(),
+        }
+    }
+    Ok(false)
+}

@@ -1,0 +1,91 @@
+//! `medial evaluate MESH X.ma`: every metric of a medial mesh from anywhere.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use medial::complex;
+use medial::metrics::Evaluation;
+use medial::shape::ShapeOptions;
+
+use super::{Exit, Failure, judge_options, percent, print_json, print_line};
+use crate::cli::{Global, MeasureArguments, MeshArgument};
+use crate::run::{Input, Source};
+
+/// Arguments of `evaluate`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
+    mesh: MeshArgument,
+    /// Medial mesh (.ma, or .ply with radii), in the units of the surface.
+    axis: PathBuf,
+    /// Seed of the samples.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    measure: MeasureArguments,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the surface or the medial mesh is refused.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
+    let input = Input::load(&source).map_err(Failure::input)?;
+    let loaded = complex::read(&arguments.axis).map_err(Failure::input)?;
+    let shape = input.shape(ShapeOptions::default()).map_err(Failure::input)?;
+    let options = judge_options(&arguments.measure, arguments.seed);
+    let judge = shape.judge(input.axis.as_ref(), options).map_err(Failure::input)?;
+    let to_normal = shape.normalisation();
+    let mesh = loaded.mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
+    if mesh.spheres.is_empty() {
+        return Err(Failure::input(format!("{}: no sphere", arguments.axis.display())));
+    }
+    let evaluation = judge.evaluate(&mesh).map_err(Failure::input)?;
+    let mut warnings = loaded.notes;
+    warnings.extend(input.report.warnings);
+    if global.json {
+        print_json(&evaluation, &warnings);
+    } else {
+        print_evaluation(&evaluation);
+        for warning in evaluation.warnings.iter().chain(&warnings) {
+            print_line(&format!("  warning: {warning}"));
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// Prints the main numbers, lengths in percent of the diagonal.
+pub fn print_evaluation(evaluation: &Evaluation) {
+    let Evaluation { distances, quality, counts, .. } = evaluation;
+    print_line(&format!(
+        "{} spheres, {} edges ({} without a face), {} faces",
+        counts.spheres, counts.edges, counts.lone_edges, counts.faces
+    ));
+    let or_dash = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2}"));
+    let betti = match evaluation.expected_betti {
+        Some(expected) => format!("{:?} (the solid's: {expected:?})", evaluation.betti),
+        None => format!("{:?}", evaluation.betti),
+    };
+    let lines = [
+        ("Hausdorff, symmetric", percent(distances.hausdorff)),
+        ("surface to union, max", percent(distances.epsilon_union)),
+        ("  paper's reading", percent(distances.epsilon)),
+        ("  mean / rms", format!("{} / {}", percent(distances.mean), percent(distances.rms))),
+        ("  95 % / 99 %", format!("{} / {}", percent(distances.p95), percent(distances.p99))),
+        ("union to surface, max", percent(distances.reverse)),
+        ("  mean", percent(distances.reverse_mean)),
+        ("spheres only, max", percent(distances.spheres_only)),
+        (
+            "volume difference",
+            evaluation
+                .volume_error
+                .map_or_else(|| "-".to_owned(), |e| format!("{:.3} % of the volume", 100.0 * e)),
+        ),
+        ("mean smallest angle", format!("{} degrees", or_dash(quality.min_angle_mean))),
+        ("Betti numbers", betti),
+    ];
+    for (label, value) in lines {
+        print_line(&format!("  {label:<24} {value}"));
+    }
+}

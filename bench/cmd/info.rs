@@ -1,0 +1,80 @@
+//! `medial info MESH`: what a mesh is, whether or not it can be used.
+
+use clap::Args;
+use medial::surface::{self, SurfaceReport};
+
+use super::{Exit, Failure, print_json, print_line};
+use crate::cli::{Global, MeshArgument};
+use crate::run::{Input, InputError, Source};
+
+/// Arguments of `info`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
+    mesh: MeshArgument,
+}
+
+/// Runs the verb. A mesh that cannot be used is described as far as it goes, and ends in code 1.
+///
+/// # Errors
+/// When nothing can be said of the file.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
+    let (report, refusal) = match &source {
+        Source::File(path) => {
+            let inspection = surface::inspect(path).map_err(Failure::input)?;
+            (inspection.report, inspection.refused)
+        }
+        Source::BuiltIn { .. } => match Input::load(&source) {
+            Ok(input) => (input.report, None),
+            Err(InputError::Surface(error)) => return Err(Failure::input(error)),
+            Err(error) => return Err(Failure::usage(error)),
+        },
+    };
+    if global.json {
+        let mut object = serde_json::to_value(&report).map_err(Failure::input)?;
+        let reason = refusal.as_ref().map(ToString::to_string);
+        object["usable"] = reason.is_none().into();
+        object["reason"] = reason.into();
+        print_json(&object, &report.warnings);
+    } else {
+        print_report(&source, &report);
+    }
+    match refusal {
+        None => Ok(Exit::Done),
+        Some(_) if global.json => Ok(Exit::Input),
+        Some(error) => Err(Failure::input(error)),
+    }
+}
+
+fn print_report(source: &Source, report: &SurfaceReport) {
+    let yes = |flag: bool| if flag { "yes" } else { "no" };
+    let intersecting = match report.intersecting_pairs {
+        0 => "none".to_owned(),
+        pairs if report.intersecting_pairs_complete => format!("{pairs} pairs of faces"),
+        pairs => format!("more than {pairs} pairs of faces"),
+    };
+    print_line(&source.to_string());
+    let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
+    let lines = [
+        ("vertices", report.vertices.to_string()),
+        ("faces", report.faces.to_string()),
+        ("components", report.components.to_string()),
+        ("genus", genus),
+        ("closed", yes(report.closed).to_owned()),
+        ("manifold", yes(report.manifold).to_owned()),
+        ("oriented", yes(report.oriented).to_owned()),
+        ("self-intersections", intersecting),
+        ("zero-area faces", report.degenerate_faces.to_string()),
+        ("diagonal", format!("{:.6}", report.diagonal)),
+    ];
+    for (label, value) in lines {
+        print_line(&format!("  {label:<20} {value}"));
+    }
+    for repair in &report.repairs {
+        print_line(&format!("  repaired: {repair}"));
+    }
+    for warning in &report.warnings {
+        print_line(&format!("  warning: {warning}"));
+    }
+}

@@ -1,0 +1,164 @@
+//! The verbs of the command, one file each, and what they share: failures, exit codes, output.
+
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+use medial::metrics::JudgeOptions;
+use medial::shape::ShapeOptions;
+use medial::simplifier::Params;
+use medial::surface::Sampling;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use crate::cli::{Dual, Global, MeasureArguments, SubstrateArguments};
+
+pub mod axis;
+pub mod compare;
+pub mod completions;
+pub mod convert;
+pub mod datasets;
+pub mod doctor;
+pub mod evaluate;
+pub mod info;
+pub mod methods;
+pub mod report;
+pub mod simplify;
+
+/// Exit codes of the command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All was done.
+    Done = 0,
+    /// The user's input is wrong.
+    Input = 1,
+    /// The command line is wrong.
+    Usage = 2,
+    /// Some runs failed or are unsupported, the rest are reported.
+    SomeFailed = 3,
+    /// Nothing was measured.
+    NothingMeasured = 5,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// A verb that could not do its work.
+#[derive(Debug)]
+pub struct Failure {
+    /// The exit code.
+    pub code: Exit,
+    /// What is wrong and what to do, one sentence.
+    pub message: String,
+}
+
+impl Failure {
+    /// The user's input is wrong.
+    pub fn input(message: impl ToString) -> Self {
+        Self { code: Exit::Input, message: message.to_string() }
+    }
+
+    /// The command line is wrong.
+    pub fn usage(message: impl ToString) -> Self {
+        Self { code: Exit::Usage, message: message.to_string() }
+    }
+}
+
+/// Prints a failure on standard error, and with `--json` as an object on standard output.
+pub fn print_failure(failure: &Failure, global: &Global) {
+    let _ = writeln!(io::stderr(), "medial: {}", failure.message);
+    if global.json {
+        let object = json!({ "error": failure.message, "warnings": [], "version": version() });
+        print_line(&object.to_string());
+    }
+}
+
+/// Version of the program.
+pub fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}
+
+/// Prints a line on standard output. A closed pipe is nobody's error.
+pub fn print_line(line: &str) {
+    let _ = writeln!(io::stdout(), "{line}");
+}
+
+/// Prints a line on standard error unless `--quiet`.
+pub fn note(global: &Global, line: &str) {
+    if !global.quiet {
+        let _ = writeln!(io::stderr(), "{line}");
+    }
+}
+
+/// Prints an object on standard output as JSON, with `version` and `warnings`.
+pub fn print_json(object: &impl Serialize, warnings: &[String]) {
+    let mut object = match serde_json::to_value(object) {
+        Ok(Value::Object(map)) => map,
+        Ok(other) => Map::from_iter([("result".to_owned(), other)]),
+        Err(error) => Map::from_iter([("error".to_owned(), error.to_string().into())]),
+    };
+    let known = object.remove("warnings");
+    let mut all = match known {
+        Some(Value::Array(list)) => list,
+        _ => Vec::new(),
+    };
+    for warning in warnings {
+        if !all.iter().any(|known| known == warning) {
+            all.push(Value::from(warning.as_str()));
+        }
+    }
+    object.insert("warnings".to_owned(), Value::Array(all));
+    object.insert("version".to_owned(), version().into());
+    print_line(&Value::Object(object).to_string());
+}
+
+/// The options of a shape from the command line.
+///
+/// # Errors
+/// When the sampling is not understood.
+pub fn shape_options(arguments: &SubstrateArguments) -> Result<ShapeOptions, Failure> {
+    let text = &arguments.sampling;
+    let sampling: Sampling =
+        text.parse().map_err(|error| Failure::usage(format!("--sampling: {error}")))?;
+    // A seed within the sampling wins over the run's.
+    let seeded = text.split(':').count() > 2;
+    let sampling = if seeded { sampling } else { sampling.with_seed(arguments.seed) };
+    let dual = match arguments.dual {
+        Dual::Fan => medial::complex::DualTriangulation::Fan,
+        Dual::Delaunay => medial::complex::DualTriangulation::Delaunay,
+    };
+    Ok(ShapeOptions { sampling, dual })
+}
+
+/// The options of the judge from the command line.
+pub fn judge_options(arguments: &MeasureArguments, seed: u64) -> JudgeOptions {
+    JudgeOptions { samples: arguments.samples, seed, ..JudgeOptions::default() }
+}
+
+/// Parameters from `key=value` words.
+///
+/// # Errors
+/// When a word has no `=`.
+pub fn params(words: &[String]) -> Result<Params, Failure> {
+    let mut params = Params::none();
+    for word in words {
+        let (key, value) = word
+            .split_once('=')
+            .ok_or_else(|| Failure::usage(format!("--set {word}: write key=value")))?;
+        params.set(key, value);
+    }
+    Ok(params)
+}
+
+/// Lower-case extension of a path, or nothing.
+pub fn extension(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+/// A fraction of the diagonal as a percentage with three decimals.
+pub fn percent(fraction: f64) -> String {
+    format!("{:.3} %", 100.0 * fraction)
+}

@@ -1,0 +1,101 @@
+//! `medial report DIR`: rebuilds tables, plots and page from the records of a folder.
+
+use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use clap::Args;
+use medial_reports::{Header, Record, read_header, read_records, write_report};
+use serde_json::json;
+
+use super::compare::RESULTS;
+use super::{Exit, Failure, print_json, print_line};
+use crate::cli::Global;
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Folder with `results.jsonl`.
+    dir: PathBuf,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the folder has no readable records, or the report cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let journaled = read_records(&arguments.dir.join(RESULTS)).map_err(Failure::input)?;
+    let warnings: Vec<String> = journaled.bad_lines.iter().map(ToString::to_string).collect();
+    if journaled.records.is_empty() {
+        return Err(Failure {
+            code: Exit::NothingMeasured,
+            message: format!("{}: no record in {RESULTS}", arguments.dir.display()),
+        });
+    }
+    let mut header = read_header(&arguments.dir).unwrap_or_else(|_| header_of(&journaled.records));
+    header.notes.clone_from(&warnings);
+    let files =
+        write_report(&arguments.dir, &journaled.records, &header).map_err(Failure::input)?;
+    if global.json {
+        let object = json!({ "records": journaled.records.len(), "files": files });
+        print_json(&object, &warnings);
+    } else {
+        for warning in &warnings {
+            print_line(&format!("warning: {warning}"));
+        }
+        print_line(&format!(
+            "{} records; page: {}",
+            journaled.records.len(),
+            arguments.dir.join("index.html").display()
+        ));
+    }
+    Ok(Exit::Done)
+}
+
+/// A header from the records alone, for a run that was interrupted before its report.
+fn header_of(records: &[Record]) -> Header {
+    let last = records.last();
+    Header {
+        title: "Medial axis simplification: a comparison".into(),
+        command: last.map(|r| r.command.clone()).unwrap_or_default(),
+        version: last.map(|r| r.version.clone()).unwrap_or_default(),
+        date: None,
+        machine: last.map(|r| r.machine.clone()),
+        methods: medial_methods::registry().iter().map(|method| method.info().into()).collect(),
+        notes: vec![],
+    }
+}
+
+/// Today's date in UTC, as `YYYY-MM-DD`.
+pub fn today() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (year, month, day) = civil_date((seconds / 86_400) as i64);
+    format!("{year:04}-{month:02}-{day:02}")
+}
+
+/// Year, month and day of a day number counted from 1970-01-01 in the Gregorian calendar: years
+/// are counted from March, so that the leap day is a year's last.
+fn civil_date(days: i64) -> (i64, i64, i64) {
+    let days = days + 719_468;
+    let era = days.div_euclid(146_097);
+    let day_of_era = days.rem_euclid(146_097);
+    let year_of_era =
+        (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    (year, month, day)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::civil_date;
+
+    #[test]
+    fn dates() {
+        assert_eq!(civil_date(0), (1970, 1, 1));
+        assert_eq!(civil_date(11_016), (2000, 2, 29));
+        assert_eq!(civil_date(20_778), (2026, 11, 21));
+    }
+}

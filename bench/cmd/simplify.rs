@@ -1,0 +1,197 @@
+//! `medial simplify MESH --method ID -o x.ma`: one method, one mesh.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use medial::complex;
+use medial::shape::Shape;
+use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified, SimplifyError, Work};
+use medial_reports::{Simplify, Stages, Status};
+
+use super::methods::unknown_method;
+use super::{Exit, Failure, judge_options, params, percent, print_json, print_line, shape_options};
+use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
+use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes, search_error};
+
+/// Arguments of `simplify`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
+    mesh: MeshArgument,
+    /// Id of the method; `medial methods` lists them.
+    #[arg(long, short, value_name = "ID")]
+    method: String,
+    /// Number of spheres.
+    #[arg(long, value_name = "N", conflicts_with_all = ["level", "max_error"])]
+    spheres: Option<usize>,
+    /// The method's own level, in its own unit.
+    #[arg(long, value_name = "X", conflicts_with = "max_error", allow_negative_numbers = true)]
+    level: Option<f64>,
+    /// As few spheres as keep the symmetric Hausdorff error within this fraction of the diagonal.
+    #[arg(long, value_name = "E")]
+    max_error: Option<f64>,
+    /// Set a parameter of the method; can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Start from this medial mesh instead of the Voronoi one.
+    #[arg(long, value_name = "Y.ma")]
+    initial: Option<PathBuf>,
+    /// The result (.ma, .ply, .obj), in the units of the surface.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    substrate: SubstrateArguments,
+    #[command(flatten)]
+    measure: MeasureArguments,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the input is refused, the level is not met at all, or the output cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
+    let method =
+        medial_methods::find(&arguments.method).ok_or_else(|| unknown_method(&arguments.method))?;
+    let options = shape_options(&arguments.substrate)?;
+    let input = Input::load(&source).map_err(Failure::input)?;
+    let mut shape = input.shape(options).map_err(Failure::input)?;
+    let mut warnings = input.report.warnings.clone();
+    if let Some(path) = &arguments.initial {
+        let loaded = complex::read(path).map_err(Failure::input)?;
+        warnings.extend(loaded.notes);
+        shape = shape.with_initial(&loaded.mesh);
+    }
+    let (simplified, simplify) = simplify(arguments, method.as_ref(), &input, &shape)?;
+    simplified.mesh.check().map_err(Failure::input)?;
+    if let Some(output) = &arguments.output {
+        let back = shape.normalisation();
+        let mesh = simplified.mesh.transformed(back.diagonal, |p| back.backward(p));
+        complex::write(output, &mesh).map_err(Failure::input)?;
+    }
+    if global.json {
+        print_json(&simplify, &warnings);
+    } else {
+        print_result(&simplify, arguments);
+        for warning in simplify.warnings.iter().chain(&warnings) {
+            print_line(&format!("  warning: {warning}"));
+        }
+    }
+    Ok(Exit::Done)
+}
+
+fn simplify(
+    arguments: &Arguments,
+    method: &dyn MedialSimplifier,
+    input: &Input,
+    shape: &Shape,
+) -> Result<(Simplified, Simplify), Failure> {
+    let params = params(&arguments.set)?;
+    let seed = arguments.substrate.seed;
+    let run = RunContext::with_seed(seed);
+    let (prepared, mut prepare) = Stopwatch::time(|| method.prepare(shape, &params, &run));
+    let mut simplification = prepared.map_err(failure)?;
+    let spent = shape.spent();
+    prepare.seconds = (prepare.seconds - spent.seconds).max(0.0);
+    prepare.cpu_seconds = (prepare.cpu_seconds - spent.cpu_seconds).max(0.0);
+    let mut notes = Vec::new();
+    let (answer, lap) = if let Some(bound) = arguments.max_error {
+        if bound.is_nan() || bound <= 0.0 {
+            return Err(Failure::usage(format!(
+                "--max-error {bound}: a positive fraction of the diagonal"
+            )));
+        }
+        let judge = shape
+            .judge(input.axis.as_ref(), judge_options(&arguments.measure, seed))
+            .map_err(Failure::input)?;
+        let initial = shape.initial().map_err(Failure::input)?.spheres.len();
+        let found =
+            search_error(simplification.as_mut(), &judge, initial, bound).map_err(failure)?;
+        notes.push(format!(
+            "Hausdorff error {} with {} spheres, found in {} trials",
+            percent(found.hausdorff),
+            found.simplified.mesh.spheres.len(),
+            found.tried
+        ));
+        // The seconds are those of the level found, asked alone.
+        let count = found.simplified.mesh.spheres.len();
+        let mut alone = method.prepare(shape, &params, &run).map_err(failure)?;
+        Stopwatch::time(|| alone.at(Level::Spheres(count)))
+    } else {
+        let level = match (arguments.spheres, arguments.level) {
+            (Some(count), _) => Level::Spheres(count),
+            (None, Some(value)) => Level::Native(value),
+            (None, None) => Level::Published,
+        };
+        Stopwatch::time(|| simplification.at(level))
+    };
+    let simplified = answer.map_err(failure)?;
+    debug_assert!(simplified.work == Work::Anew || lap.seconds >= 0.0);
+    let mut record = describe(arguments, shape, &simplified, prepare, lap);
+    record.params = params;
+    record.warnings.extend(notes);
+    Ok((simplified, record))
+}
+
+fn describe(
+    arguments: &Arguments,
+    shape: &Shape,
+    simplified: &Simplified,
+    prepare: Lap,
+    lap: Lap,
+) -> Simplify {
+    let used = shape.used();
+    let sum = |part: fn(&medial::shape::Cost) -> f64| used.iter().map(|(_, cost)| part(cost)).sum();
+    let mesh = &simplified.mesh;
+    Simplify {
+        seed: arguments.substrate.seed,
+        reached: Some(mesh.spheres.len()),
+        native_level: simplified.native_level,
+        spheres: Some(mesh.spheres.len()),
+        edges: Some(mesh.edges.len()),
+        faces: Some(mesh.faces.len()),
+        substrates: used.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect(),
+        seconds: Some(Stages::new(sum(|c| c.seconds), prepare.seconds, lap.seconds)),
+        cpu_seconds: Some(Stages::new(
+            sum(|c| c.cpu_seconds),
+            prepare.cpu_seconds,
+            lap.cpu_seconds,
+        )),
+        peak_bytes: peak_bytes(),
+        threads: Some(rayon::current_num_threads()),
+        diagnostics: simplified.diagnostics.counts.iter().cloned().collect(),
+        warnings: simplified.diagnostics.warnings.clone(),
+        version: super::version().to_owned(),
+        ..Simplify::asked(&arguments.method, simplified.asked, Status::Ok)
+    }
+}
+
+fn failure(error: SimplifyError) -> Failure {
+    match error {
+        SimplifyError::Unsupported { .. } => {
+            Failure { code: Exit::SomeFailed, message: error.to_string() }
+        }
+        SimplifyError::Parameter(_) | SimplifyError::Level(_) => Failure::usage(error),
+        _ => Failure::input(error),
+    }
+}
+
+fn print_result(simplify: &Simplify, arguments: &Arguments) {
+    let seconds = simplify.seconds.unwrap_or_default();
+    print_line(&format!(
+        "{}: {} spheres, {} edges, {} faces; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
+        simplify.method,
+        simplify.spheres.unwrap_or(0),
+        simplify.edges.unwrap_or(0),
+        simplify.faces.unwrap_or(0),
+        seconds.substrate,
+        seconds.prepare,
+        seconds.simplify
+    ));
+    if let Some(level) = simplify.native_level {
+        print_line(&format!("  native level {level}"));
+    }
+    if let Some(output) = &arguments.output {
+        print_line(&format!("  written: {}", output.display()));
+    }
+}

@@ -1,0 +1,188 @@
+//! What a comparison runs on: a file of the user, or a built-in shape.
+
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use medial::complex::MedialMesh;
+use medial::shape::{Shape, ShapeError, ShapeOptions};
+use medial::surface::{self, SurfaceError, SurfaceReport, TriMesh};
+use serde::{Deserialize, Serialize};
+
+use super::hex_digest;
+
+/// Where a mesh comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// A surface file.
+    File(PathBuf),
+    /// A built-in shape at its default or a chosen resolution.
+    BuiltIn {
+        /// Id in the catalogue.
+        id: String,
+        /// Resolution, in the shape's own meaning.
+        resolution: Option<u32>,
+    },
+}
+
+impl Source {
+    /// Reads an argument: `builtin:ID` or `builtin:ID:RESOLUTION`, else a path.
+    ///
+    /// # Errors
+    /// [`InputError::Resolution`] when the resolution is not a number.
+    pub fn parse(argument: &Path) -> Result<Self, InputError> {
+        let Some(spec) = argument.to_str().and_then(|text| text.strip_prefix("builtin:")) else {
+            return Ok(Self::File(argument.to_owned()));
+        };
+        let (id, resolution) = match spec.split_once(':') {
+            None => (spec, None),
+            Some((id, text)) => {
+                let resolution = text.parse().map_err(|_| InputError::Resolution(text.into()))?;
+                (id, Some(resolution))
+            }
+        };
+        Ok(Self::BuiltIn { id: id.to_owned(), resolution })
+    }
+
+    /// All built-in shapes at their default resolutions, in the order of the catalogue.
+    pub fn built_ins() -> Vec<Self> {
+        let shapes = medial_datasets::catalogue();
+        shapes.iter().map(|shape| Self::BuiltIn { id: shape.id.into(), resolution: None }).collect()
+    }
+
+    /// Name for tables: the file's stem, or the id of the built-in shape.
+    pub fn name(&self) -> String {
+        match self {
+            Self::File(path) => path
+                .file_stem()
+                .map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into()),
+            Self::BuiltIn { id, resolution: None } => id.clone(),
+            Self::BuiltIn { id, resolution: Some(resolution) } => format!("{id}-{resolution}"),
+        }
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => write!(f, "{}", path.display()),
+            Self::BuiltIn { id, resolution: None } => write!(f, "builtin:{id}"),
+            Self::BuiltIn { id, resolution: Some(r) } => write!(f, "builtin:{id}:{r}"),
+        }
+    }
+}
+
+/// A mesh that was read and checked, or generated.
+pub struct Input {
+    /// Name for tables.
+    pub name: String,
+    /// Set that the mesh belongs to, where it does.
+    pub dataset: Option<String>,
+    /// SHA-256 of the file, or of the generated surface.
+    pub hash: String,
+    /// The surface, in input units.
+    pub mesh: TriMesh,
+    /// What was found and repaired.
+    pub report: SurfaceReport,
+    /// The exactly known medial axis, in input units.
+    pub axis: Option<MedialMesh>,
+}
+
+impl Input {
+    /// Reads or generates a mesh.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is refused, or no such built-in shape exists.
+    pub fn load(source: &Source) -> Result<Self, InputError> {
+        match source {
+            Source::File(path) => {
+                let bytes = fs::read(path)
+                    .map_err(|error| InputError::Read { path: path.clone(), error })?;
+                let hash = hex_digest(&bytes);
+                drop(bytes);
+                let loaded = surface::read(path)?;
+                Ok(Self {
+                    name: source.name(),
+                    dataset: None,
+                    hash,
+                    mesh: loaded.mesh,
+                    report: loaded.report,
+                    axis: None,
+                })
+            }
+            Source::BuiltIn { id, resolution } => Self::generate(source, id, *resolution),
+        }
+    }
+
+    fn generate(source: &Source, id: &str, resolution: Option<u32>) -> Result<Self, InputError> {
+        let shape =
+            medial_datasets::find(id).ok_or_else(|| InputError::NoSuchShape(id.to_owned()))?;
+        let resolution = resolution.unwrap_or(shape.default_resolution);
+        let range = shape.resolutions();
+        if !range.contains(&resolution) {
+            return Err(InputError::OutOfRange {
+                resolution,
+                least: *range.start(),
+                most: *range.end(),
+            });
+        }
+        let mesh = shape.mesh(resolution);
+        let report = surface::validate(&mesh)?;
+        Ok(Self {
+            name: source.name(),
+            dataset: Some("builtin".into()),
+            hash: hex_digest(&surface_bytes(&mesh)),
+            mesh,
+            report,
+            axis: shape.axis().map(|axis| axis.mesh),
+        })
+    }
+
+    /// The shape, normalised, with nothing built yet.
+    ///
+    /// # Errors
+    /// When the surface has no extent.
+    pub fn shape(&self, options: ShapeOptions) -> Result<Shape, ShapeError> {
+        Shape::new(self.name.clone(), &self.mesh, self.report.clone(), options)
+    }
+}
+
+fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
+    let coordinates = mesh.vertices.iter().flat_map(|v| v.to_array());
+    let indices = mesh.faces.iter().flatten();
+    coordinates.flat_map(f64::to_le_bytes).chain(indices.flat_map(|i| i.to_le_bytes())).collect()
+}
+
+/// Why an input cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// The file cannot be read.
+    #[error("{}: {error}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// The surface is refused.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// The catalogue has no such shape.
+    #[error("no built-in shape is called `{0}`; `medial datasets list` names them all")]
+    NoSuchShape(String),
+    /// The resolution of a built-in shape is not a number.
+    #[error("`{0}` is not a resolution: write builtin:ID:NUMBER")]
+    Resolution(String),
+    /// The resolution of a built-in shape is out of its range.
+    #[error("resolution {resolution} is out of range: this shape takes {least} to {most}")]
+    OutOfRange {
+        /// What was asked.
+        resolution: u32,
+        /// Coarsest resolution that shows every feature.
+        least: u32,
+        /// Finest resolution.
+        most: u32,
+    },
+}

@@ -1,0 +1,19 @@
+//! Inputs, items and records: what is run, how it is timed, what is written down.
+//!
+//! A comparison is a list of [`Item`]s: one method on one input at some levels. [`run_item`] runs
+//! one and gives a [`medial_reports::Record`] for each level. An item is plain data, so that it can
+//! be handed to another process as it is.
+
+mod input;
+mod item;
+mod progress;
+mod provenance;
+mod search;
+mod stopwatch;
+
+pub use input::{Input, InputError, Source};
+pub use item::{Item, Measure, RunOptions, refused_records, run_item};
+pub use progress::Progress;
+pub use provenance::{Provenance, hex_digest, peak_bytes};
+pub use search::{Found, search_error};
+pub use stopwatch::{Lap, Stopwatch};

@@ -1,0 +1,86 @@
+//! Where a record comes from: machine, program, command line.
+
+use std::env;
+use std::fmt::Write as _;
+use std::fs;
+use std::thread;
+
+use medial_reports::Machine;
+use sha2::{Digest, Sha256};
+
+/// What is the same for every record of a run.
+#[derive(Clone, Debug)]
+pub struct Provenance {
+    /// The machine.
+    pub machine: Machine,
+    /// SHA-256 of the running program.
+    pub binary_hash: String,
+    /// The command line.
+    pub command: String,
+    /// Version of the program.
+    pub version: String,
+}
+
+impl Provenance {
+    /// Of the running process.
+    pub fn here() -> Self {
+        Self {
+            machine: machine(),
+            binary_hash: env::current_exe()
+                .and_then(fs::read)
+                .map_or_else(|_| String::new(), |bytes| hex_digest(&bytes)),
+            command: command_line(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
+}
+
+fn machine() -> Machine {
+    let memory = proc_field("/proc/meminfo", "MemTotal").and_then(|value| kibibytes(&value));
+    Machine {
+        cpu: proc_field("/proc/cpuinfo", "model name").unwrap_or_else(|| "unknown".into()),
+        cores: thread::available_parallelism().map_or(1, usize::from),
+        os: format!("{} {}", env::consts::OS, env::consts::ARCH),
+        memory: memory.unwrap_or(0),
+    }
+}
+
+/// Largest resident size of this process so far, in bytes, where the system tells.
+pub fn peak_bytes() -> Option<u64> {
+    proc_field("/proc/self/status", "VmHWM").and_then(|value| kibibytes(&value))
+}
+
+fn proc_field(path: &str, key: &str) -> Option<String> {
+    let text = fs::read_to_string(path).ok()?;
+    let value = |line: &str| {
+        let (name, value) = line.split_once(':')?;
+        (name.trim() == key).then(|| value.trim().to_owned())
+    };
+    text.lines().find_map(value)
+}
+
+fn kibibytes(value: &str) -> Option<u64> {
+    Some(value.strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}
+
+/// The command line with the program's bare name, quoted where a shell would need it.
+fn command_line() -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
+    let words = env::args_os().skip(1).map(|word| {
+        let word = word.to_string_lossy().into_owned();
+        if !word.is_empty() && word.chars().all(plain) {
+            word
+        } else {
+            format!("'{}'", word.replace('\'', r"'\''"))
+        }
+    });
+    std::iter::once("medial".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// SHA-256 in hexadecimal.
+pub fn hex_digest(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

@@ -1,0 +1,228 @@
+//! The built-in shapes: dimensions, and a generator for each that takes the target edge length.
+
+use medial::Vec3;
+use medial::surface::TriMesh;
+
+use crate::blocks::{boundary, divided};
+use crate::fields::{Blend, Ellipsoid, Part};
+use crate::geodesic::{frequency, joined, mapped, reversed, unit_sphere};
+use crate::implicit::{polygonise, slide};
+use crate::revolved::{Ring, SECTORS, cap, mirrored, parts, surface};
+use crate::torus as torus_grid;
+
+/// Semi-axes of the ellipsoid.
+pub(crate) const ELLIPSOID: Vec3 = Vec3::new(1.0, 0.7, 0.45);
+/// Half the sides of the box.
+pub(crate) const BOX_HALF: Vec3 = Vec3::new(1.5, 1.0, 0.5);
+/// Half the sides of the box that is rounded, before it grows by [`ROUNDING`].
+pub(crate) const CORE_HALF: Vec3 = Vec3::new(1.0, 0.6, 0.25);
+/// Radius of the edges of the rounded box.
+pub(crate) const ROUNDING: f64 = 0.25;
+/// Half the sides of the plate.
+pub(crate) const PLATE_HALF: Vec3 = Vec3::new(1.0, 0.75, 0.05);
+/// Length, width and height of the bracket, and the thickness of its two plates.
+pub(crate) const BRACKET: Vec3 = Vec3::new(2.0, 1.0, 1.5);
+pub(crate) const BRACKET_THICKNESS: f64 = 0.4;
+/// Radius of capsule and rod.
+pub(crate) const ROD_RADIUS: f64 = 0.4;
+/// Half the length of the cylinder of capsule and rod.
+pub(crate) const ROD_HALF: f64 = 0.8;
+/// Height of the apex of the rod above the centre: cones of 45 degrees.
+pub(crate) const ROD_APEX: f64 = ROD_HALF + ROD_RADIUS;
+/// Centres of the ball of the pair and of its capsule's ends, and their radii.
+pub(crate) const PAIR_BALL: (Vec3, f64) = (Vec3::new(-1.0, 0.0, 0.0), 0.6);
+pub(crate) const PAIR_CAPSULE: (Vec3, f64, f64) = (Vec3::new(0.5, 0.0, 0.0), 0.5, 0.3);
+/// Radii of the torus.
+pub(crate) const TORUS: (f64, f64) = (1.0, 0.4);
+/// Radius of the cavity of the hollow sphere.
+pub(crate) const CAVITY: f64 = 0.5;
+
+pub(crate) const SPHERE_DIAGONAL: f64 = 3.464_101_615_137_754_6;
+/// Bounding-box diagonals of the blended shapes, as measured on fine meshes.
+pub(crate) const DOUBLE_TORUS_DIAGONAL: f64 = 4.017;
+pub(crate) const FRAME_DIAGONAL: f64 = 3.166;
+pub(crate) const BLOB_DIAGONAL: f64 = 3.189;
+
+pub(crate) fn diagonal_of(half: Vec3) -> f64 {
+    2.0 * half.length()
+}
+
+pub(crate) fn rounded_half() -> Vec3 {
+    CORE_HALF + Vec3::splat(ROUNDING)
+}
+
+pub(crate) fn ellipsoid_diagonal() -> f64 {
+    diagonal_of(ELLIPSOID)
+}
+
+pub(crate) fn bracket_diagonal() -> f64 {
+    BRACKET.length()
+}
+
+pub(crate) fn capsule_diagonal() -> f64 {
+    diagonal_of(Vec3::new(ROD_RADIUS, ROD_RADIUS, ROD_HALF + ROD_RADIUS))
+}
+
+pub(crate) fn rod_diagonal() -> f64 {
+    diagonal_of(Vec3::new(ROD_RADIUS, ROD_RADIUS, ROD_APEX))
+}
+
+pub(crate) fn pair_diagonal() -> f64 {
+    let (ball, radius) = PAIR_BALL;
+    let (centre, half, capsule_radius) = PAIR_CAPSULE;
+    let length = centre.x + capsule_radius - (ball.x - radius);
+    Vec3::new(length, 2.0 * radius, 2.0 * radius.max(half + capsule_radius)).length()
+}
+
+pub(crate) fn torus_diagonal() -> f64 {
+    let (major, minor) = TORUS;
+    diagonal_of(Vec3::new(major + minor, major + minor, minor))
+}
+
+pub(crate) fn sphere(edge: f64) -> TriMesh {
+    unit_sphere(frequency(1.0, edge))
+}
+
+/// A stretched geodesic sphere whose vertices then slide on the ellipsoid until they are even.
+pub(crate) fn ellipsoid(edge: f64) -> TriMesh {
+    let mean_radius = ELLIPSOID.element_sum() / 3.0;
+    let mut mesh = mapped(unit_sphere(frequency(mean_radius, edge)), |p| p * ELLIPSOID);
+    let sides = mesh.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    slide(&Ellipsoid(ELLIPSOID), &mut mesh.vertices, &sides, 30);
+    mesh
+}
+
+fn grid_box(half: Vec3, edge: f64) -> TriMesh {
+    let ticks = half.to_array().map(|h| divided(&[-h, h], edge));
+    boundary(&ticks, |_| true, |p| p)
+}
+
+pub(crate) fn cuboid(edge: f64) -> TriMesh {
+    grid_box(BOX_HALF, edge)
+}
+
+pub(crate) fn plate(edge: f64) -> TriMesh {
+    grid_box(PLATE_HALF, edge)
+}
+
+/// A grid on the box of the same size, pushed onto the rounded box along the direction from the
+/// nearest point of the core. Ticks at equal angles make equal arcs.
+pub(crate) fn rounded_box(edge: f64) -> TriMesh {
+    let eighth = std::f64::consts::FRAC_PI_4;
+    let n = parts(ROUNDING * eighth, edge, 1);
+    let ticks = CORE_HALF.to_array().map(|h| {
+        let arc: Vec<f64> =
+            (1..=n).map(|k| h + ROUNDING * (eighth * f64::from(k) / f64::from(n)).tan()).collect();
+        let low = arc.iter().rev().map(|x| -x);
+        low.chain(divided(&[-h, h], edge)).chain(arc.iter().copied()).collect()
+    });
+    boundary(
+        &ticks,
+        |_| true,
+        |p| {
+            let core = p.clamp(-CORE_HALF, CORE_HALF);
+            core + (p - core).normalize() * ROUNDING
+        },
+    )
+}
+
+pub(crate) fn bracket(edge: f64) -> TriMesh {
+    let Vec3 { x, y, z } = BRACKET;
+    let ticks = [
+        divided(&[0.0, BRACKET_THICKNESS, x], edge),
+        divided(&[0.0, y], edge),
+        divided(&[0.0, BRACKET_THICKNESS, z], edge),
+    ];
+    boundary(&ticks, |p| p.x < BRACKET_THICKNESS || p.z < BRACKET_THICKNESS, |p| p)
+}
+
+/// A cylinder of the given half length and radius with a hemisphere at each end.
+fn capsule_of(half: f64, radius: f64, edge: f64) -> TriMesh {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let steps = parts(quarter * radius, edge, 2);
+    let top = cap(steps, |t| {
+        let (sin, cos) = (quarter * t).sin_cos();
+        (radius * sin, half + radius * cos)
+    });
+    surface(&mirrored(&top, stacks(half, radius, steps)))
+}
+
+/// Parts of a cylinder as long as the sides of its rings.
+fn stacks(half: f64, radius: f64, cap_steps: u32) -> u32 {
+    let side = std::f64::consts::TAU * radius / f64::from(SECTORS * cap_steps);
+    parts(2.0 * half, side, 1)
+}
+
+pub(crate) fn capsule(edge: f64) -> TriMesh {
+    capsule_of(ROD_HALF, ROD_RADIUS, edge)
+}
+
+pub(crate) fn rod(edge: f64) -> TriMesh {
+    let height = ROD_APEX - ROD_HALF;
+    let steps = parts(height.hypot(ROD_RADIUS), edge, 2);
+    let top: Vec<Ring> = cap(steps, |t| (ROD_RADIUS * t, ROD_APEX - height * t));
+    surface(&mirrored(&top, stacks(ROD_HALF, ROD_RADIUS, steps)))
+}
+
+pub(crate) fn pair(edge: f64) -> TriMesh {
+    let (ball, radius) = PAIR_BALL;
+    let (centre, half, capsule_radius) = PAIR_CAPSULE;
+    let first = mapped(unit_sphere(frequency(radius, edge)), |p| p * radius + ball);
+    joined(first, mapped(capsule_of(half, capsule_radius, edge), |p| p + centre))
+}
+
+pub(crate) fn torus(edge: f64) -> TriMesh {
+    let (major, minor) = TORUS;
+    let tau = std::f64::consts::TAU;
+    torus_grid::torus(major, minor, parts(tau * major, edge, 8), parts(tau * minor, edge, 6))
+}
+
+pub(crate) fn hollow_sphere(edge: f64) -> TriMesh {
+    let cavity = mapped(unit_sphere(frequency(CAVITY, edge)), |p| p * CAVITY);
+    joined(sphere(edge), reversed(cavity))
+}
+
+pub(crate) fn double_torus(edge: f64) -> TriMesh {
+    polygonise(&double_torus_field(), Vec3::new(1.8, 1.0, 0.3), edge, -2)
+}
+
+pub(crate) fn double_torus_field() -> Blend {
+    let ring = |x: f64| Part::Torus { centre: Vec3::new(x, 0.0, 0.0), major: 0.7, minor: 0.25 };
+    Blend { parts: vec![ring(-0.8), ring(0.8)], sharpness: 20.0 }
+}
+
+pub(crate) fn frame(edge: f64) -> TriMesh {
+    polygonise(&frame_field(), Vec3::splat(1.0), edge, -4)
+}
+
+pub(crate) fn frame_field() -> Blend {
+    let corners = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+    let corners = corners.map(|c| Vec3::from(c) * 0.7);
+    let pairs = (0..4).flat_map(|i| (i + 1..4).map(move |j| (i, j)));
+    let tubes = pairs.map(|(i, j)| Part::Tube { a: corners[i], b: corners[j], radius: 0.17 });
+    Blend { parts: tubes.collect(), sharpness: 25.0 }
+}
+
+pub(crate) fn blob(edge: f64) -> TriMesh {
+    polygonise(&blob_field(), Vec3::new(1.7, 0.8, 1.0), edge, 2)
+}
+
+pub(crate) fn blob_field() -> Blend {
+    let tube = |a: [f64; 3], b: [f64; 3], radius: f64| Part::Tube {
+        a: Vec3::from(a),
+        b: Vec3::from(b),
+        radius,
+    };
+    Blend {
+        parts: vec![
+            tube([-0.5, 0.0, 0.0], [0.45, 0.05, 0.05], 0.32),
+            tube([0.75, 0.05, 0.38], [0.95, 0.05, 0.42], 0.24),
+            tube([-0.75, 0.0, 0.1], [-1.25, 0.1, 0.42], 0.14),
+            tube([0.4, 0.25, -0.1], [0.55, 0.42, -0.65], 0.15),
+            tube([0.4, -0.2, -0.1], [0.65, -0.38, -0.62], 0.15),
+            tube([-0.5, 0.25, -0.1], [-0.6, 0.4, -0.66], 0.16),
+            tube([-0.5, -0.25, -0.1], [-0.42, -0.42, -0.64], 0.16),
+        ],
+        sharpness: 14.0,
+    }
+}

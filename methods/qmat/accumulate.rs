@@ -1,0 +1,116 @@
+//! The initial error function of every sphere: slabs, cones of lone edges, boundary planes.
+
+use medial::complex::collapse::CollapseComplex;
+use medial::complex::{MedialMesh, Sphere};
+
+use super::params::{Boundary, QmatParams};
+use super::quadric::Quadric;
+use super::tangent::{cone_axis, cone_normals, rim_normal, slab_normals, stability_ratio};
+
+/// What had no tangent planes and was left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Skipped {
+    pub(super) slabs: usize,
+    pub(super) cones: usize,
+}
+
+/// The quadric of each sphere of the initial mesh (equation 4 and section 4.4).
+pub(super) fn initial_quadrics(
+    mesh: &MedialMesh,
+    complex: &CollapseComplex,
+    params: &QmatParams,
+) -> (Vec<Quadric>, Skipped) {
+    let mut quadrics = vec![Quadric::default(); mesh.spheres.len()];
+    let mut skipped = Skipped::default();
+    for &face in &mesh.faces {
+        let spheres = face.map(|v| mesh.spheres[v as usize]);
+        match slab_normals(spheres) {
+            Some(normals) => {
+                let mut slab = Quadric::default();
+                for normal in normals {
+                    slab.add_plane(normal, spheres[0], 1.0);
+                }
+                for v in face {
+                    quadrics[v as usize] += &slab;
+                }
+            }
+            None => skipped.slabs += 1,
+        }
+    }
+    for &[a, b] in &mesh.edges {
+        let mut faces = complex.opposite_sides(a).iter().filter(|side| side.contains(&b));
+        match (faces.next(), faces.next()) {
+            (None, _) => {
+                skipped.cones += usize::from(!add_cone(&mut quadrics, mesh, [a, b]));
+                for (end, other) in [(a, b), (b, a)] {
+                    if complex.neighbours(end).len() == 1 {
+                        add_tip(&mut quadrics, mesh, end, other, params);
+                    }
+                }
+            }
+            (Some(&[p, q]), None) => {
+                let apex = if p == b { q } else { p };
+                add_rim(&mut quadrics, mesh, [a, b], apex, params);
+            }
+            _ => {}
+        }
+    }
+    (quadrics, skipped)
+}
+
+/// The four planes of a lone edge's cone, for both ends.
+fn add_cone(quadrics: &mut [Quadric], mesh: &MedialMesh, ends: [u32; 2]) -> bool {
+    let [a, b] = ends.map(|v| mesh.spheres[v as usize]);
+    let Some(normals) = cone_normals(a, b) else {
+        return false;
+    };
+    let mut cone = Quadric::default();
+    for normal in normals {
+        cone.add_plane(normal, a, 1.0);
+    }
+    for v in ends {
+        quadrics[v as usize] += &cone;
+    }
+    true
+}
+
+/// The plane across the free end of a lone edge, for that end.
+fn add_tip(quadrics: &mut [Quadric], mesh: &MedialMesh, end: u32, other: u32, params: &QmatParams) {
+    let [tip, base] = [end, other].map(|v| mesh.spheres[v as usize]);
+    // Without an axis the ratio is 0, and so is the weight.
+    if let (Some((axis, _)), Some((weight, length))) =
+        (cone_axis(base, tip), boundary_weight(tip, base, params))
+    {
+        quadrics[end as usize].add_plane(axis * length, tip, weight);
+    }
+}
+
+/// The plane along a boundary edge, for both its ends.
+fn add_rim(
+    quadrics: &mut [Quadric],
+    mesh: &MedialMesh,
+    ends: [u32; 2],
+    apex: u32,
+    params: &QmatParams,
+) {
+    let [a, b] = ends.map(|v| mesh.spheres[v as usize]);
+    let Some((weight, length)) = boundary_weight(a, b, params) else {
+        return;
+    };
+    if let Some(normal) = rim_normal(a, b, mesh.spheres[apex as usize]) {
+        for v in ends {
+            quadrics[v as usize].add_plane(normal * length, a, weight);
+        }
+    }
+}
+
+/// Weight of a boundary plane and length of its normal.
+fn boundary_weight(a: Sphere, b: Sphere, params: &QmatParams) -> Option<(f64, f64)> {
+    let stability = stability_ratio(a, b);
+    let weight = params.boundary_weight * stability * stability;
+    match params.boundary {
+        Boundary::Paper => Some((weight, 1.0)),
+        Boundary::Legacy => Some((0.1 * weight, a.centre.distance(b.centre))),
+        Boundary::None => None,
+    }
+}

@@ -1,0 +1,159 @@
+//! The parameters of Q-MAT.
+
+use medial::simplifier::{ParamInfo, SimplifyError};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of Q-MAT; the default is the paper's. Lengths are fractions of the bounding-box
+/// diagonal.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct QmatParams {
+    /// `k` of equation 8, in squared fractions of the diagonal: the larger, the earlier spikes go.
+    pub k: f64,
+    /// How stable boundaries are kept from shrinking.
+    pub boundary: Boundary,
+    /// `k'` of section 4.4, the weight of the boundary planes; a pure number.
+    pub boundary_weight: f64,
+    /// From which sphere count on a collapse has to keep the topology.
+    pub topology_from: TopologyFrom,
+    /// Ratio of the smallest to the largest eigenvalue at which a quadric counts as singular.
+    pub singular_ratio: f64,
+}
+
+impl Default for QmatParams {
+    fn default() -> Self {
+        Self {
+            k: 1e-5,
+            boundary: Boundary::Paper,
+            boundary_weight: 0.1,
+            topology_from: TopologyFrom::Spheres(200),
+            singular_ratio: 1e-10,
+        }
+    }
+}
+
+/// How stable boundaries of the medial mesh are kept from shrinking.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Boundary {
+    /// Section 4.4: planes with unit normals, weighted by `k' Γ²`.
+    Paper,
+    /// The authors' code: a tenth of that weight, and normals as long as the edge.
+    Legacy,
+    /// No boundary planes.
+    None,
+}
+
+/// From which sphere count on a collapse has to satisfy the link condition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "TopologyWord", into = "TopologyWord")]
+pub enum TopologyFrom {
+    /// From the first collapse on.
+    All,
+    /// While at most so many spheres are left: `η` of the paper's Algorithm 1.
+    Spheres(usize),
+    /// Never.
+    Never,
+}
+
+impl TopologyFrom {
+    /// Whether a collapse has to keep the topology when so many spheres are left.
+    pub fn applies(self, spheres: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Spheres(from) => spheres <= from,
+            Self::Never => false,
+        }
+    }
+}
+
+/// How [`TopologyFrom`] is written.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(untagged, expecting = "topology_from is a number of spheres, `all` or `never`")]
+enum TopologyWord {
+    Spheres(usize),
+    Word(Word),
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Word {
+    All,
+    Never,
+}
+
+impl From<TopologyWord> for TopologyFrom {
+    fn from(word: TopologyWord) -> Self {
+        match word {
+            TopologyWord::Spheres(from) => Self::Spheres(from),
+            TopologyWord::Word(Word::All) => Self::All,
+            TopologyWord::Word(Word::Never) => Self::Never,
+        }
+    }
+}
+
+impl From<TopologyFrom> for TopologyWord {
+    fn from(from: TopologyFrom) -> Self {
+        match from {
+            TopologyFrom::Spheres(from) => Self::Spheres(from),
+            TopologyFrom::All => Self::Word(Word::All),
+            TopologyFrom::Never => Self::Word(Word::Never),
+        }
+    }
+}
+
+impl QmatParams {
+    pub(super) fn validate(self) -> Result<Self, SimplifyError> {
+        let at_least_zero = [("k", self.k), ("boundary_weight", self.boundary_weight)];
+        for (name, value) in at_least_zero {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(SimplifyError::Parameter(format!("{name} = {value} is negative")));
+            }
+        }
+        if !(0.0..1.0).contains(&self.singular_ratio) {
+            let value = self.singular_ratio;
+            return Err(SimplifyError::Parameter(format!(
+                "singular_ratio = {value} is not in [0, 1)"
+            )));
+        }
+        Ok(self)
+    }
+
+    pub(super) fn describe() -> Vec<ParamInfo> {
+        let defaults = Self::default();
+        let info = |name, default: String, unit, help| ParamInfo { name, default, unit, help };
+        vec![
+            info(
+                "k",
+                format!("{:e}", defaults.k),
+                "squared fraction of the diagonal",
+                "added to the error of every edge: the larger, the earlier spikes go (equation 8)",
+            ),
+            info(
+                "boundary",
+                "paper".into(),
+                "paper, legacy or none",
+                "planes that keep stable boundaries from shrinking (section 4.4)",
+            ),
+            info(
+                "boundary_weight",
+                defaults.boundary_weight.to_string(),
+                "pure number",
+                "weight k' of the boundary planes",
+            ),
+            info(
+                "topology_from",
+                "200".into(),
+                "spheres, or all, or never",
+                "from this count on a collapse has to satisfy the link condition (section 4.5)",
+            ),
+            info(
+                "singular_ratio",
+                format!("{:e}", defaults.singular_ratio),
+                "pure number in [0, 1)",
+                "smallest to largest eigenvalue at which a quadric counts as singular; not in the \
+                 paper",
+            ),
+        ]
+    }
+}

@@ -1,0 +1,204 @@
+//! Quadratic functions of a sphere: `E(m) = mᵀ A m + bᵀ m + c` on `R⁴`, sums of squared distances
+//! to oriented planes.
+//!
+//! With `n̄ = (n, 1)` the signed distance of a sphere `m = (c, r)` to the plane with outward normal
+//! `n` that a sphere `m₀` touches is `n̄ · (m - m₀)`; its square is one term of the sum.
+
+use std::ops::AddAssign;
+
+use medial::Vec3;
+use medial::complex::Sphere;
+
+/// The function `E`; two cache lines.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(64))]
+pub(super) struct Quadric {
+    /// Upper triangle of `A` by rows: `00 01 02 03 11 12 13 22 23 33`.
+    a: [f64; 10],
+    b: [f64; 4],
+    c: f64,
+}
+
+fn coordinates(sphere: Sphere) -> [f64; 4] {
+    let Vec3 { x, y, z } = sphere.centre;
+    [x, y, z, sphere.radius]
+}
+
+fn dot(u: [f64; 4], v: [f64; 4]) -> f64 {
+    u[0] * v[0] + u[1] * v[1] + u[2] * v[2] + u[3] * v[3]
+}
+
+impl AddAssign<&Quadric> for Quadric {
+    #[inline]
+    fn add_assign(&mut self, other: &Self) {
+        for (x, y) in self.a.iter_mut().zip(&other.a) {
+            *x += y;
+        }
+        for (x, y) in self.b.iter_mut().zip(&other.b) {
+            *x += y;
+        }
+        self.c += other.c;
+    }
+}
+
+impl Quadric {
+    /// Adds `weight * ((normal, 1) · (m - touching))²`. The normal need not be of unit length.
+    pub(super) fn add_plane(&mut self, normal: Vec3, touching: Sphere, weight: f64) {
+        let n = [normal.x, normal.y, normal.z, 1.0];
+        let offset = dot(n, coordinates(touching));
+        let mut entry = 0;
+        for row in 0..4 {
+            for column in row..4 {
+                self.a[entry] += weight * n[row] * n[column];
+                entry += 1;
+            }
+            self.b[row] -= 2.0 * weight * offset * n[row];
+        }
+        self.c += weight * offset * offset;
+    }
+
+    /// `A m` for a point of `R⁴`.
+    fn times(&self, m: [f64; 4]) -> [f64; 4] {
+        let a = &self.a;
+        [
+            a[0] * m[0] + a[1] * m[1] + a[2] * m[2] + a[3] * m[3],
+            a[1] * m[0] + a[4] * m[1] + a[5] * m[2] + a[6] * m[3],
+            a[2] * m[0] + a[5] * m[1] + a[7] * m[2] + a[8] * m[3],
+            a[3] * m[0] + a[6] * m[1] + a[8] * m[2] + a[9] * m[3],
+        ]
+    }
+
+    /// `E(m)`, not below zero: rounding can leave a little less.
+    #[inline]
+    pub(super) fn value(&self, sphere: Sphere) -> f64 {
+        let m = coordinates(sphere);
+        (dot(m, self.times(m)) + dot(m, self.b) + self.c).max(0.0)
+    }
+
+    /// The minimiser `-A⁻¹ b / 2`, or `None` when the smallest eigenvalue of `A` is at most
+    /// `singular_ratio` times the largest. The radius may be negative.
+    ///
+    /// `L D Lᵀ` with diagonal pivoting settles the question without eigenvalues in all but a
+    /// narrow band: with the pivots `d₁ ≥ .. ≥ d₄` and `|L| ≤ 1`, `λ_min` lies in `[d₄/31, d₄]`
+    /// (the entries of `L⁻¹` are at most 1, 1, 2, 4 by distance from the diagonal) and `λ_max` in
+    /// `[d₁, 4 d₁]`.
+    #[inline]
+    pub(super) fn minimiser(&self, singular_ratio: f64) -> Option<Sphere> {
+        let mut m = self.matrix();
+        let mut x = self.b.map(|b| -0.5 * b);
+        let mut order = [0, 1, 2, 3];
+        let mut largest = 0.0;
+        for k in 0..4 {
+            pivot(&mut m, &mut x, &mut order, k);
+            let d = m[k][k];
+            if k == 0 {
+                largest = d;
+            }
+            if d <= singular_ratio * largest || !(d > 0.0) {
+                return None;
+            }
+            for i in k + 1..4 {
+                let factor = m[i][k] / d;
+                for j in k + 1..=i {
+                    m[i][j] -= factor * m[j][k];
+                }
+                x[i] -= factor * x[k];
+            }
+        }
+        let in_doubt = m[3][3] <= 124.0 * singular_ratio * largest;
+        if in_doubt && self.eigenvalue_ratio() <= singular_ratio {
+            return None;
+        }
+        let mut solution = [0.0; 4];
+        for k in (0..4).rev() {
+            for i in k + 1..4 {
+                x[k] -= m[i][k] * x[i];
+            }
+            x[k] /= m[k][k];
+            solution[order[k]] = x[k];
+        }
+        let [cx, cy, cz, radius] = solution;
+        Some(Sphere::new(Vec3::new(cx, cy, cz), radius))
+    }
+
+    fn matrix(&self) -> [[f64; 4]; 4] {
+        let a = &self.a;
+        [
+            [a[0], a[1], a[2], a[3]],
+            [a[1], a[4], a[5], a[6]],
+            [a[2], a[5], a[7], a[8]],
+            [a[3], a[6], a[8], a[9]],
+        ]
+    }
+
+    /// Smallest over largest eigenvalue of `A`, by cyclic Jacobi rotations.
+    #[cold]
+    fn eigenvalue_ratio(&self) -> f64 {
+        let mut m = self.matrix();
+        for _sweep in 0..12 {
+            for p in 0..3 {
+                for q in p + 1..4 {
+                    rotate(&mut m, p, q);
+                }
+            }
+        }
+        let diagonal = [m[0][0], m[1][1], m[2][2], m[3][3]];
+        let largest = diagonal.into_iter().fold(f64::MIN, f64::max);
+        diagonal.into_iter().fold(f64::MAX, f64::min) / largest
+    }
+}
+
+/// Brings the largest remaining diagonal entry to place `k` by a symmetric exchange of the lower
+/// triangle.
+#[inline]
+fn pivot(m: &mut [[f64; 4]; 4], x: &mut [f64; 4], order: &mut [usize; 4], k: usize) {
+    let mut p = k;
+    for i in k + 1..4 {
+        if m[i][i] > m[p][p] {
+            p = i;
+        }
+    }
+    if p == k {
+        return;
+    }
+    x.swap(k, p);
+    order.swap(k, p);
+    // Columns before `k` hold the factors, to the right of it only the lower triangle counts.
+    for j in 0..k {
+        let kept = m[k][j];
+        m[k][j] = m[p][j];
+        m[p][j] = kept;
+    }
+    for i in k + 1..p {
+        let kept = m[i][k];
+        m[i][k] = m[p][i];
+        m[p][i] = kept;
+    }
+    for i in p + 1..4 {
+        m[i].swap(k, p);
+    }
+    let kept = m[k][k];
+    m[k][k] = m[p][p];
+    m[p][p] = kept;
+}
+
+/// Zeroes the entry `(p, q)` of a symmetric matrix by a rotation.
+fn rotate(m: &mut [[f64; 4]; 4], p: usize, q: usize) {
+    if m[p][q] == 0.0 {
+        return;
+    }
+    let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
+    let tangent = theta.signum() / (theta.abs() + theta.hypot(1.0));
+    let cosine = 1.0 / tangent.hypot(1.0);
+    let sine = tangent * cosine;
+    for i in 0..4 {
+        let (x, y) = (m[i][p], m[i][q]);
+        m[i][p] = cosine * x - sine * y;
+        m[i][q] = sine * x + cosine * y;
+    }
+    for i in 0..4 {
+        let (x, y) = (m[p][i], m[q][i]);
+        m[p][i] = cosine * x - sine * y;
+        m[q][i] = sine * x + cosine * y;
+    }
+}

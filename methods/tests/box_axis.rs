@@ -1,0 +1,184 @@
+//! The box: the one solid whose separation angles and enclosing balls are known everywhere.
+//!
+//! A box with half sides `A > B > C` has a central rectangle `(A - C) x (B - C)` of radius `C`,
+//! where two opposite contacts give an angle of 180 degrees and an enclosing ball of radius `C`,
+//! and twelve sheets from its edges, where contacts on two perpendicular sides give 90 degrees and
+//! an enclosing ball of radius `r / sqrt 2`.
+
+use std::sync::Arc;
+
+use medial::Vec3;
+use medial::complex::{Contacts, MedialMesh, Sphere};
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, Params, RunContext};
+use medial::surface::{self, TriMesh};
+
+const HALF: Vec3 = Vec3::new(1.5, 1.0, 0.5);
+
+/// The box as twelve triangles.
+fn box_surface() -> TriMesh {
+    let corner = |i: u32| {
+        let side = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        HALF * Vec3::new(side(0), side(1), side(2))
+    };
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    TriMesh {
+        vertices: (0..8).map(corner).collect(),
+        faces: quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+    }
+}
+
+/// A medial sphere of the box with its exact contacts.
+struct Exact {
+    sphere: Sphere,
+    contacts: [Vec3; 2],
+    central: bool,
+}
+
+/// Spheres on the central rectangle and on the sheets of all twelve edges.
+fn exact_spheres() -> Vec<Exact> {
+    let mut spheres = Vec::new();
+    for i in -4..=4 {
+        for j in -4..=4 {
+            let at = |k: i32, room: f64| f64::from(k) / 4.0 * room;
+            let centre = Vec3::new(at(i, HALF.x - HALF.z), at(j, HALF.y - HALF.z), 0.0);
+            let lift = Vec3::new(0.0, 0.0, HALF.z);
+            let contacts = [centre + lift, centre - lift];
+            spheres.push(Exact { sphere: Sphere::new(centre, HALF.z), contacts, central: true });
+        }
+    }
+    for along in 0..3 {
+        let (u, v) = ((along + 1) % 3, (along + 2) % 3);
+        for signs in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            for step in 1..10 {
+                let radius = f64::from(step) / 10.0 * HALF.z;
+                let mut centre = Vec3::ZERO;
+                centre[u] = signs.0 * (HALF[u] - radius);
+                centre[v] = signs.1 * (HALF[v] - radius);
+                let mut contacts = [centre; 2];
+                contacts[0][u] = signs.0 * HALF[u];
+                contacts[1][v] = signs.1 * HALF[v];
+                spheres.push(Exact {
+                    sphere: Sphere::new(centre, radius),
+                    contacts,
+                    central: false,
+                });
+            }
+        }
+    }
+    spheres
+}
+
+fn exact_shape(exact: &[Exact]) -> Shape {
+    let samples: Arc<[Vec3]> = exact.iter().flat_map(|e| e.contacts).collect();
+    let spheres = exact.iter().map(|e| e.sphere).collect();
+    let mut mesh = MedialMesh::from_simplices(spheres, vec![], vec![]).expect("valid spheres");
+    let of_sphere = (0..exact.len() as u32).map(|i| [2 * i, 2 * i + 1, 2 * i, 2 * i + 1]).collect();
+    mesh.contacts = Some(Contacts { samples, of_sphere });
+    let surface = box_surface();
+    let report = surface::validate(&surface).expect("a box is a solid");
+    let shape = Shape::new("box", &surface, report, ShapeOptions::default()).expect("a shape");
+    shape.with_initial(&mesh)
+}
+
+/// Whether each exact sphere survives a method at a level, by its centre.
+fn kept(shape: &Shape, exact: &[Exact], method: &str, level: f64) -> Vec<bool> {
+    let method = medial_methods::find(method).expect("registered");
+    let run = RunContext::default();
+    let mut simplification = method.prepare(shape, &Params::none(), &run).expect("prepared");
+    let result = simplification.at(Level::Native(level)).expect("a level in range").mesh;
+    let normal = shape.normalisation();
+    let centres: Vec<Vec3> = result.spheres.iter().map(|s| normal.backward(s.centre)).collect();
+    let survives = |e: &Exact| centres.iter().any(|c| c.distance(e.sphere.centre) < 1e-9);
+    exact.iter().map(survives).collect()
+}
+
+#[test]
+fn angle_leaves_the_central_rectangle_just_above_90_degrees() {
+    let exact = exact_spheres();
+    let shape = exact_shape(&exact);
+    let central: Vec<bool> = exact.iter().map(|e| e.central).collect();
+    assert_eq!(kept(&shape, &exact, "angle", 90.0 + 1e-6), central);
+    assert_eq!(kept(&shape, &exact, "angle", 179.9), central);
+    assert!(kept(&shape, &exact, "angle", 90.0 - 1e-6).iter().all(|&kept| kept));
+}
+
+#[test]
+fn lambda_eats_the_edges_up_to_its_root_two_fold() {
+    let exact = exact_spheres();
+    let shape = exact_shape(&exact);
+    let diagonal = shape.normalisation().diagonal;
+    for lambda in [0.02, 0.1, 0.2, 0.3, 0.4, 0.499] {
+        let expected: Vec<bool> =
+            exact.iter().map(|e| e.central || e.sphere.radius >= 2.0_f64.sqrt() * lambda).collect();
+        assert_eq!(kept(&shape, &exact, "lambda", lambda / diagonal), expected, "lambda {lambda}");
+    }
+    let beyond_half_thickness = (HALF.z + 1e-6) / diagonal;
+    assert!(kept(&shape, &exact, "lambda", beyond_half_thickness).iter().all(|&kept| !kept));
+}
+
+/// A grid on the box's surface with `1 / h` points to a unit of length, welded and triangulated.
+fn sampled_box(per_unit: usize) -> TriMesh {
+    let counts = [0, 1, 2].map(|axis| (2.0 * HALF[axis] * per_unit as f64).round() as i64);
+    let mut ids = std::collections::BTreeMap::new();
+    let mut mesh = TriMesh::default();
+    let mut vertex = |lattice: [i64; 3], mesh: &mut TriMesh| {
+        *ids.entry(lattice).or_insert_with(|| {
+            let position = lattice.map(|k| k as f64 / per_unit as f64);
+            mesh.vertices.push(Vec3::from_array(position) - HALF);
+            mesh.vertices.len() as u32 - 1
+        })
+    };
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for level in [0, counts[axis]] {
+            for i in 0..counts[u] {
+                for j in 0..counts[v] {
+                    let mut at = |du: i64, dv: i64| {
+                        let mut lattice = [level; 3];
+                        lattice[u] = i + du;
+                        lattice[v] = j + dv;
+                        vertex(lattice, &mut mesh)
+                    };
+                    let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
+                    let quad = if level == 0 { [a, d, c, b] } else { [a, b, c, d] };
+                    mesh.faces.push([quad[0], quad[1], quad[2]]);
+                    mesh.faces.push([quad[0], quad[2], quad[3]]);
+                }
+            }
+        }
+    }
+    mesh
+}
+
+#[test]
+fn angle_filter_on_a_sampled_box_finds_the_central_rectangle() {
+    let per_unit = 20;
+    let h = 1.0 / per_unit as f64;
+    let surface = sampled_box(per_unit);
+    let report = surface::validate(&surface).expect("a box is a solid");
+    let shape = Shape::new("box", &surface, report, ShapeOptions::default()).expect("a shape");
+    let method = medial_methods::find("angle").expect("registered");
+    let mut filter =
+        method.prepare(&shape, &Params::none(), &RunContext::default()).expect("prepared");
+    let result = filter.at(Level::Native(100.0)).expect("in range").mesh;
+    let normal = shape.normalisation();
+    let centres: Vec<Vec3> = result.spheres.iter().map(|s| normal.backward(s.centre)).collect();
+    assert!(!centres.is_empty());
+    let (reach_x, reach_y) = (HALF.x - HALF.z, HALF.y - HALF.z);
+    for centre in &centres {
+        let in_rectangle =
+            Vec3::new(centre.x.clamp(-reach_x, reach_x), centre.y.clamp(-reach_y, reach_y), 0.0);
+        assert!(centre.distance(in_rectangle) <= 2.0 * h, "{centre} is off the rectangle");
+    }
+    let steps = 40;
+    for i in 0..=steps {
+        for j in 0..=steps {
+            let along = |k: i32, reach: f64| (f64::from(2 * k) / f64::from(steps) - 1.0) * reach;
+            let point = Vec3::new(along(i, reach_x), along(j, reach_y), 0.0);
+            let near = centres.iter().map(|c| c.distance(point)).fold(f64::INFINITY, f64::min);
+            assert!(near <= 2.0 * h, "{point} of the rectangle is {near} from every kept sphere");
+        }
+    }
+}

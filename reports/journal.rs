@@ -1,0 +1,182 @@
+//! Reading and writing `results.jsonl`: one record per line, append-only.
+//!
+//! A line is written by one call and synchronised before the next item starts, so that a crash
+//! costs at most the line being written. Such a torn line is left where it is, reported on
+//! reading, and never joined with the line after it.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use crate::record::Record;
+
+/// An open `results.jsonl` that records are added to.
+#[derive(Debug)]
+pub struct Journal {
+    file: File,
+    path: PathBuf,
+}
+
+impl Journal {
+    /// Opens or creates the file for appending. Where the last line is torn, closes it with a
+    /// line break, so that it spoils no record but itself.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`] when the file cannot be opened, read or written.
+    pub fn open(path: impl Into<PathBuf>) -> Result<Self, JournalError> {
+        let path = path.into();
+        let open = || -> io::Result<File> {
+            let mut file = OpenOptions::new().read(true).append(true).create(true).open(&path)?;
+            if file.metadata()?.len() > 0 {
+                let mut last = [0];
+                file.seek(SeekFrom::End(-1))?;
+                file.read_exact(&mut last)?;
+                if last != *b"\n" {
+                    file.write_all(b"\n")?;
+                }
+            }
+            Ok(file)
+        };
+        match open() {
+            Ok(file) => Ok(Self { file, path }),
+            Err(source) => Err(JournalError::Io { path, source }),
+        }
+    }
+
+    /// Adds one record and waits until it is on the disk.
+    ///
+    /// # Errors
+    /// [`JournalError::Unreadable`] when the record holds a number that JSON cannot carry (not
+    /// finite); nothing is written then. [`JournalError::Io`] when writing fails.
+    pub fn append(&mut self, record: &Record) -> Result<(), JournalError> {
+        let line = to_line(record)?;
+        self.file
+            .write_all(line.as_bytes())
+            .and_then(|()| self.file.sync_data())
+            .map_err(|source| JournalError::Io { path: self.path.clone(), source })
+    }
+}
+
+/// What a `results.jsonl` holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Journaled {
+    /// The records, in the order of the file.
+    pub records: Vec<Record>,
+    /// Lines that hold no record.
+    pub bad_lines: Vec<BadLine>,
+}
+
+/// A line that holds no record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BadLine {
+    /// Number of the line, from 1.
+    pub line: usize,
+    /// Whether the line stops in the middle of a record: the trace of an interrupted write.
+    pub torn: bool,
+    /// What is wrong with it.
+    pub message: String,
+}
+
+impl std::fmt::Display for BadLine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.torn {
+            write!(f, "line {}: torn by an interrupted write; run its item again", self.line)
+        } else {
+            write!(f, "line {}: not a record: {}", self.line, self.message)
+        }
+    }
+}
+
+/// Reads every record of a `results.jsonl`. Lines that hold none are reported beside them, empty
+/// lines are skipped.
+///
+/// # Errors
+/// [`JournalError::Io`] when the file cannot be read.
+pub fn read_records(path: &Path) -> Result<Journaled, JournalError> {
+    let bytes =
+        fs::read(path).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
+    let mut journaled = Journaled::default();
+    for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+        if line.trim_ascii().is_empty() {
+            continue;
+        }
+        match serde_json::from_slice::<Record>(line) {
+            Ok(record) => journaled.records.push(record),
+            Err(error) => journaled.bad_lines.push(BadLine {
+                line: index + 1,
+                torn: error.is_eof(),
+                message: error.to_string(),
+            }),
+        }
+    }
+    Ok(journaled)
+}
+
+/// Writes a whole `results.jsonl` under a temporary name and renames it.
+///
+/// # Errors
+/// As [`Journal::append`].
+pub fn write_records(path: &Path, records: &[Record]) -> Result<(), JournalError> {
+    let text = records.iter().map(to_line).collect::<Result<String, _>>()?;
+    replace_file(path, text.as_bytes())
+        .map_err(|source| JournalError::Io { path: path.to_owned(), source })
+}
+
+/// Replaces a file as a whole: a reader sees the old bytes or the new ones, never a part.
+pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.tmp", std::process::id()));
+    let temporary = path.with_file_name(name);
+    let written = File::create(&temporary)
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+        .and_then(|()| fs::rename(&temporary, path));
+    if written.is_err() {
+        // The first error is the one to report.
+        let _ = fs::remove_file(&temporary);
+    }
+    written
+}
+
+/// One line with its line break. JSON has no infinity and no NaN and serde writes `null` for
+/// them, which would spoil the record for every reader: such a record is refused here.
+fn to_line(record: &Record) -> Result<String, JournalError> {
+    let unreadable = |message: String| JournalError::Unreadable {
+        mesh: record.mesh.clone(),
+        method: record.simplify.method.clone(),
+        message,
+    };
+    let mut line = serde_json::to_string(record).map_err(|error| unreadable(error.to_string()))?;
+    let back: Record =
+        serde_json::from_str(&line).map_err(|error| unreadable(error.to_string()))?;
+    if &back != record {
+        return Err(unreadable("a number is not finite".to_owned()));
+    }
+    line.push('\n');
+    Ok(line)
+}
+
+/// Why a `results.jsonl` could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum JournalError {
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The record would not read back as it was.
+    #[error("the record of {method} on {mesh} does not survive JSON: {message}")]
+    Unreadable {
+        /// Mesh of the record.
+        mesh: String,
+        /// Method of the record.
+        method: String,
+        /// What was lost.
+        message: String,
+    },
+}

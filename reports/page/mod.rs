@@ -1,0 +1,164 @@
+//! `index.html`: one page that holds everything and opens without a network.
+//!
+//! Plots are inline SVG, the style sheet and the script are our own. Without the script the page
+//! still shows everything; the script sorts and filters.
+
+mod html;
+mod meshes;
+mod overview;
+mod reference;
+mod results;
+
+use crate::comparison::Comparison;
+use crate::header::Header;
+use crate::plots::Plot;
+use crate::record::Machine;
+use crate::summary::CountSummary;
+use crate::tables::Table;
+use crate::text::{counted, escape_html, megabytes};
+
+/// Everything that the page is made of.
+pub(crate) struct Page<'a> {
+    pub(crate) header: &'a Header,
+    pub(crate) comparison: &'a Comparison<'a>,
+    pub(crate) summaries: &'a [CountSummary],
+    pub(crate) overview_plots: &'a [Plot],
+    /// In the order of the meshes.
+    pub(crate) meshes: &'a [MeshPart],
+    pub(crate) summary_tables: &'a [Table],
+}
+
+/// What the page shows of one mesh.
+pub(crate) struct MeshPart {
+    /// Name of its files.
+    pub(crate) stem: String,
+    pub(crate) table: Table,
+    pub(crate) plots: Vec<Plot>,
+}
+
+impl Page<'_> {
+    /// The page as HTML.
+    pub(crate) fn to_html(&self) -> String {
+        let title = self.title();
+        let mut html = String::new();
+        html.push_str("<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
+        html.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
+        html.push_str("<meta name=\"color-scheme\" content=\"light dark\">\n");
+        html.push_str(&format!("<title>{}</title>\n", escape_html(title)));
+        html.push_str(&format!(
+            "<style>\n{}</style>\n</head>\n<body>\n",
+            include_str!("style.css")
+        ));
+        html.push_str(&self.head(title));
+        html.push_str("<main>\n");
+        html.push_str(&self.notices());
+        if self.comparison.measured() > 0 {
+            html.push_str(&overview::section(self));
+        }
+        if !self.comparison.entries.is_empty() {
+            html.push_str(&results::section(self));
+            html.push_str(&meshes::section(self));
+        }
+        html.push_str(&reference::warnings(self));
+        html.push_str(&reference::methods(self.header, self.comparison));
+        html.push_str(reference::definitions().as_str());
+        html.push_str(&reference::files(self));
+        html.push_str("</main>\n");
+        html.push_str(&format!(
+            "<script>\n{}</script>\n</body>\n</html>\n",
+            include_str!("script.js")
+        ));
+        html
+    }
+
+    fn title(&self) -> &str {
+        match self.header.title.as_str() {
+            "" => "Simplification of the medial axis: comparison",
+            title => title,
+        }
+    }
+
+    /// Title, what was run, and the way to the sections.
+    fn head(&self, title: &str) -> String {
+        let comparison = self.comparison;
+        let mut facts = vec![format!(
+            "{} on {} at {}",
+            counted(comparison.series.len(), "method", "methods"),
+            counted(comparison.meshes.len(), "mesh", "meshes"),
+            counted(comparison.levels.len(), "level", "levels"),
+        )];
+        facts.extend(self.header.date.clone());
+        if !self.header.version.is_empty() {
+            facts.push(format!("medial {}", self.header.version));
+        }
+        let recorded = || comparison.entries.first().map(|entry| &entry.record.machine);
+        facts.extend(self.header.machine.as_ref().or_else(recorded).and_then(machine));
+        let facts: Vec<String> =
+            facts.iter().map(|fact| format!("<li>{}</li>", escape_html(fact))).collect();
+        let mut html = format!("<header>\n<h1>{}</h1>\n", escape_html(title));
+        html.push_str(&format!("<ul class=\"facts\">{}</ul>\n", facts.concat()));
+        if !self.header.command.is_empty() {
+            html.push_str(&format!(
+                "<pre class=\"command\"><code>{}</code></pre>\n",
+                escape_html(&self.header.command)
+            ));
+        }
+        html.push_str("<nav>");
+        if comparison.measured() > 0 {
+            html.push_str("<a href=\"#overview\">Overview</a>");
+        }
+        if !comparison.entries.is_empty() {
+            html.push_str("<a href=\"#results\">Results</a><a href=\"#meshes\">Meshes</a>");
+        }
+        html.push_str(
+            "<a href=\"#definitions\">Definitions</a><a href=\"#files\">Files</a></nav>\n",
+        );
+        html.push_str("</header>\n");
+        html
+    }
+
+    /// What must be read first: that nothing was measured, failures, cautions.
+    fn notices(&self) -> String {
+        let mut html = String::new();
+        let comparison = self.comparison;
+        if comparison.measured() == 0 {
+            let why = if comparison.entries.is_empty() {
+                "There is no record.".to_owned()
+            } else {
+                format!(
+                    "None of the {} led to a result that was evaluated; the reasons stand below.",
+                    counted(comparison.entries.len(), "run", "runs")
+                )
+            };
+            html.push_str(&format!(
+                "<p class=\"notice bad\" role=\"alert\"><strong>Nothing was measured.</strong> {}</p>\n",
+                escape_html(&why)
+            ));
+        }
+        let cautions = self.header.notes.iter().cloned().chain(comparison.cautions());
+        let cautions: Vec<String> =
+            cautions.map(|note| format!("<li>{}</li>", escape_html(&note))).collect();
+        if !cautions.is_empty() {
+            html.push_str(&format!("<ul class=\"notice\">{}</ul>\n", cautions.concat()));
+        }
+        html
+    }
+}
+
+/// Processor, cores, memory and system in one line.
+fn machine(machine: &Machine) -> Option<String> {
+    let mut parts = Vec::new();
+    if !machine.cpu.is_empty() {
+        parts.push(machine.cpu.clone());
+    }
+    if machine.cores > 0 {
+        parts.push(counted(machine.cores, "core", "cores"));
+    }
+    if machine.memory > 0 {
+        parts.push(format!("{} MB", megabytes(machine.memory)));
+    }
+    if !machine.os.is_empty() {
+        parts.push(machine.os.clone());
+    }
+    (!parts.is_empty()).then(|| parts.join(", "))
+}

@@ -1,0 +1,152 @@
+//! The table of all results: sortable, filterable, failures as rows.
+
+use crate::comparison::{Entry, level_label, reached};
+use crate::metric::COMPARED;
+use crate::page::{Page, html};
+use crate::tables::{Best, remark, topology_verdict, warnings};
+use crate::text::{betti, escape_html, grouped, megabytes};
+
+/// The section with its filters and its table.
+pub(crate) fn section(page: &Page<'_>) -> String {
+    let comparison = page.comparison;
+    let mut html = String::from("<section id=\"results\">\n<h2>Results</h2>\n");
+    let levels: Vec<String> = comparison.levels.iter().map(|&level| level_label(level)).collect();
+    let statuses: Vec<String> =
+        comparison.statuses().iter().map(|(status, _)| status.to_string()).collect();
+    html.push_str("<form class=\"filters\" hidden>\n");
+    html.push_str(&choice("mesh", &comparison.meshes));
+    html.push_str(&choice("method", &comparison.series));
+    html.push_str(&choice("asked", &levels));
+    html.push_str(&choice("status", &statuses));
+    html.push_str(
+        "<label>text <input type=\"search\" name=\"text\"></label>\n\
+         <button type=\"reset\">all</button> <output></output>\n</form>\n",
+    );
+    html.push_str("<div class=\"scroll tall\"><table class=\"sortable\">\n<thead><tr>");
+    html.push_str(&heads());
+    html.push_str("</tr></thead>\n<tbody>\n");
+    let mut best = None;
+    for entry in &comparison.entries {
+        let best = match &mut best {
+            Some((mesh, best)) if *mesh == entry.mesh => best,
+            slot => &mut slot.insert((entry.mesh, Best::of_mesh(comparison, entry.mesh))).1,
+        };
+        html.push_str(&row(page, entry, best));
+    }
+    html.push_str("</tbody>\n</table></div>\n");
+    html.push_str(
+        "<p class=\"note\">Lengths in % of the bounding-box diagonal of the input; seconds of wall \
+         clock, shared substrates included. Arrows: which way is better. Bold: best for this mesh \
+         at this number of spheres, among results that reached it to within 2 %. \
+         <code>results.csv</code> holds every number that was recorded.</p>\n</section>\n",
+    );
+    html
+}
+
+/// A drop-down list for one column.
+fn choice(name: &str, values: &[String]) -> String {
+    let mut html = format!("<label>{name} <select name=\"{name}\"><option value=\"\">all</option>");
+    for value in values {
+        html.push_str(&format!("<option>{}</option>", escape_html(value)));
+    }
+    html.push_str("</select></label>\n");
+    html
+}
+
+fn heads() -> String {
+    let mut heads = vec![
+        ("mesh".to_owned(), false),
+        ("asked".to_owned(), true),
+        ("method".to_owned(), false),
+        ("status".to_owned(), false),
+        ("spheres".to_owned(), true),
+        ("edges".to_owned(), true),
+        ("faces".to_owned(), true),
+    ];
+    heads.extend(COMPARED.iter().map(|metric| (metric.heading(), true)));
+    heads.push(("memory (MB) ↓".to_owned(), true));
+    heads.extend(["Betti", "as solid", "remark"].map(|title| (title.to_owned(), false)));
+    heads
+        .iter()
+        .map(|(title, number)| {
+            let class = if *number { " class=\"num\"" } else { "" };
+            format!("<th scope=\"col\"{class}>{}</th>", escape_html(title))
+        })
+        .collect()
+}
+
+/// A cell with the number that it sorts by; without one it sorts last.
+fn number(value: Option<f64>, text: &str) -> String {
+    let sort = value.map_or(String::new(), |value| format!(" data-v=\"{value}\""));
+    format!("<td class=\"num\"{sort}>{text}</td>")
+}
+
+fn row(page: &Page<'_>, entry: &Entry<'_>, best: &Best) -> String {
+    let comparison = page.comparison;
+    let record = entry.record;
+    let simplify = &record.simplify;
+    let level = level_label(simplify.level);
+    let mesh = escape_html(&comparison.meshes[entry.mesh]);
+    let series = &comparison.series[entry.series];
+    let mut html = format!(
+        "<tr data-mesh=\"{mesh}\" data-method=\"{}\" data-asked=\"{}\" data-status=\"{}\">\
+         <th scope=\"row\"><a href=\"#mesh-{}\">{mesh}</a></th>",
+        escape_html(series),
+        escape_html(&level),
+        record.status,
+        escape_html(&page.meshes[entry.mesh].stem),
+    );
+    let asked = match simplify.level {
+        medial::simplifier::Level::Spheres(count) => Some(count as f64),
+        _ => None,
+    };
+    html.push_str(&number(asked, &escape_html(&level)));
+    html.push_str(&format!(
+        "<td>{}</td><td><span class=\"status {}\">{}</span></td>",
+        html::series(entry.series, series),
+        record.status.key(),
+        record.status
+    ));
+    for count in [reached(record), simplify.edges, simplify.faces] {
+        let text = count.map_or("–".to_owned(), |count| grouped(count as u64));
+        html.push_str(&number(count.map(|count| count as f64), &text));
+    }
+    for metric in COMPARED {
+        let value = metric.of(record);
+        let text = match value {
+            Some(value) if best.is_best(entry, metric, value) => {
+                format!("<strong>{}</strong>", metric.format(value))
+            }
+            Some(value) => metric.format(value),
+            None => "–".to_owned(),
+        };
+        html.push_str(&number(value, &text));
+    }
+    let memory = simplify.peak_bytes.map_or("–".to_owned(), megabytes);
+    html.push_str(&number(simplify.peak_bytes.map(|bytes| bytes as f64), &memory));
+    let numbers = record.evaluate.as_ref().map_or("–".to_owned(), |e| betti(e.betti));
+    html.push_str(&format!("<td>{numbers}</td><td>{}</td>", topology_verdict(entry)));
+    html.push_str(&format!("<td class=\"wrap\">{}</td></tr>\n", remarks(entry)));
+    html
+}
+
+/// The remark, the number of warnings, and the way to the medial mesh.
+fn remarks(entry: &Entry<'_>) -> String {
+    let mut parts = Vec::new();
+    let remark = remark(entry);
+    if !remark.is_empty() {
+        parts.push(escape_html(&remark));
+    }
+    let warnings = warnings(entry.record);
+    if !warnings.is_empty() {
+        parts.push(format!(
+            "<span title=\"{}\">{}</span>",
+            escape_html(&warnings.join("\n")),
+            crate::text::counted(warnings.len(), "warning", "warnings")
+        ));
+    }
+    if let Some(artifact) = entry.record.artifact.as_deref().and_then(html::local_link) {
+        parts.push(format!("<a href=\"{artifact}\">.ma</a>"));
+    }
+    parts.join("; ")
+}

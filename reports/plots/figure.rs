@@ -1,0 +1,211 @@
+//! A figure with curves: one line and one marker for each method, the legend beside the data.
+
+use plotters::backend::DrawingBackend;
+use plotters::chart::{ChartBuilder, ChartContext};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use crate::plots::PlotError;
+use crate::plots::axis::{Axis, Scale};
+use crate::plots::palette::{GRID, INK, Marker, PAPER, style};
+use crate::text::{printable, shortened};
+
+/// The backend draws at whole pixels: everything is drawn at twice its size and shown at half.
+pub(crate) const RESOLUTION: i32 = 2;
+const WIDTH: i32 = 640 * RESOLUTION;
+const HEIGHT: i32 = 400 * RESOLUTION;
+const LEGEND_ROW: i32 = 21 * RESOLUTION;
+
+/// One method's points.
+pub(crate) struct Curve {
+    pub(crate) series: usize,
+    pub(crate) label: String,
+    /// In the order in which they are joined.
+    pub(crate) points: Vec<(f64, f64)>,
+    /// Texts beside some points: index and text.
+    pub(crate) tags: Vec<(usize, String)>,
+}
+
+/// A figure before it is drawn.
+pub(crate) struct Figure {
+    pub(crate) title: String,
+    pub(crate) x: (String, Scale),
+    pub(crate) y: (String, Scale),
+    pub(crate) curves: Vec<Curve>,
+}
+
+/// Text of a size, in the viewer's sans-serif font.
+pub(crate) fn font(size: i32, colour: RGBColor) -> TextStyle<'static> {
+    // The backend divides sizes by 1.24.
+    ("sans-serif", f64::from(size * RESOLUTION) * 1.24).into_font().color(&colour)
+}
+
+impl Figure {
+    /// The figure as SVG; `None` where there is no point to draw.
+    pub(crate) fn to_svg(&self) -> Result<Option<String>, PlotError> {
+        let points = || self.curves.iter().flat_map(|curve| curve.points.iter().copied());
+        let x = Axis::fit(self.x.0.as_str(), self.x.1, points().map(|point| point.0));
+        let y = Axis::fit(self.y.0.as_str(), self.y.1, points().map(|point| point.1));
+        let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
+        let legend = self.curves.len() as i32 * LEGEND_ROW + 60 * RESOLUTION;
+        let size = (WIDTH as u32, HEIGHT.max(legend) as u32);
+        let mut svg = String::new();
+        self.draw(&x, &y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())?;
+        Ok(Some(at_half_size(&svg, size)))
+    }
+
+    fn draw<B: DrawingBackend>(
+        &self,
+        x: &Axis,
+        y: &Axis,
+        area: &DrawingArea<B, Shift>,
+    ) -> Result<(), PlotError> {
+        let failed = PlotError::new;
+        area.fill(&PAPER).map_err(failed)?;
+        let title = font(15, INK).pos(Pos::new(HPos::Left, VPos::Center));
+        let title_at = (14 * RESOLUTION, 20 * RESOLUTION);
+        area.draw(&Text::new(printable(&shortened(&self.title, 76)), title_at, title))
+            .map_err(failed)?;
+        let (_, below) = area.split_vertically(34 * RESOLUTION);
+        let (plot, legend) = below.split_horizontally(WIDTH - self.legend_width());
+        let mut chart = ChartBuilder::on(&plot)
+            .margin_top(6 * RESOLUTION)
+            .margin_left(8 * RESOLUTION)
+            .margin_right(14 * RESOLUTION)
+            .margin_bottom(6 * RESOLUTION)
+            .x_label_area_size(44 * RESOLUTION)
+            .y_label_area_size(58 * RESOLUTION)
+            .build_cartesian_2d(x.clone(), y.clone())
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .bold_line_style(GRID.stroke_width(RESOLUTION as u32))
+            .light_line_style(TRANSPARENT)
+            .axis_style(INK.stroke_width(RESOLUTION as u32))
+            .set_all_tick_mark_size(0)
+            .x_labels(x.ticks.len())
+            .y_labels(y.ticks.len())
+            .label_style(font(12, INK))
+            .axis_desc_style(font(13, INK))
+            .x_desc(&x.title)
+            .y_desc(&y.title)
+            .draw()
+            .map_err(failed)?;
+        for curve in &self.curves {
+            draw_curve(&mut chart, curve)?;
+        }
+        self.draw_legend(&legend)?;
+        area.present().map_err(failed)
+    }
+
+    /// Wide enough for the longest label, as far as its width can be told without a font.
+    fn legend_width(&self) -> i32 {
+        let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
+        RESOLUTION * (44 + 7 * longest.unwrap_or(0) as i32).clamp(90, 230)
+    }
+
+    fn draw_legend<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+    ) -> Result<(), PlotError> {
+        for (row, curve) in self.curves.iter().enumerate() {
+            let y = 18 * RESOLUTION + row as i32 * LEGEND_ROW;
+            let (colour, marker) = style(curve.series);
+            let line = vec![(0, y), (24 * RESOLUTION, y)];
+            area.draw(&PathElement::new(line, colour.stroke_width(2 * RESOLUTION as u32)))
+                .map_err(PlotError::new)?;
+            for shape in shapes::<B>(marker, (12 * RESOLUTION, y), colour) {
+                area.draw(&shape).map_err(PlotError::new)?;
+            }
+            let text = font(12, INK).pos(Pos::new(HPos::Left, VPos::Center));
+            area.draw(&Text::new(legend_text(curve), (31 * RESOLUTION, y), text))
+                .map_err(PlotError::new)?;
+        }
+        Ok(())
+    }
+}
+
+fn legend_text(curve: &Curve) -> String {
+    printable(&shortened(&curve.label, 26))
+}
+
+fn draw_curve<B: DrawingBackend>(
+    chart: &mut ChartContext<'_, B, Cartesian2d<Axis, Axis>>,
+    curve: &Curve,
+) -> Result<(), PlotError> {
+    let (colour, marker) = style(curve.series);
+    let line = colour.stroke_width(2 * RESOLUTION as u32);
+    chart
+        .draw_series(LineSeries::new(curve.points.iter().copied(), line))
+        .map_err(PlotError::new)?;
+    let area = chart.plotting_area().strip_coord_spec();
+    let origin = area.get_base_pixel();
+    let pixel = |point: &(f64, f64)| {
+        let (x, y) = chart.backend_coord(point);
+        (x - origin.0, y - origin.1)
+    };
+    for point in &curve.points {
+        for shape in shapes::<B>(marker, pixel(point), colour) {
+            area.draw(&shape).map_err(PlotError::new)?;
+        }
+    }
+    for (index, tag) in &curve.tags {
+        let Some(point) = curve.points.get(*index) else { continue };
+        let (x, y) = pixel(point);
+        let text = font(10, colour).pos(Pos::new(HPos::Left, VPos::Bottom));
+        area.draw(&Text::new(tag.clone(), (x + 7 * RESOLUTION, y - 4 * RESOLUTION), text))
+            .map_err(PlotError::new)?;
+    }
+    Ok(())
+}
+
+/// A marker as lines and polygons around a pixel.
+fn shapes<B: DrawingBackend>(
+    marker: Marker,
+    (x, y): (i32, i32),
+    colour: RGBColor,
+) -> Vec<DynElement<'static, B, (i32, i32)>> {
+    let r = 4 * RESOLUTION;
+    let thick = colour.stroke_width(2 * RESOLUTION as u32);
+    let path = |points: &[(i32, i32)]| -> Vec<(i32, i32)> {
+        points.iter().map(|&(a, b)| (x + a * r / 4, y + b * r / 4)).collect()
+    };
+    let square = [(-4, -4), (4, -4), (4, 4), (-4, 4), (-4, -4)];
+    let triangle = [(0, -5), (5, 4), (-5, 4), (0, -5)];
+    let diamond = [(0, -6), (6, 0), (0, 6), (-6, 0), (0, -6)];
+    let down = [(0, 5), (5, -4), (-5, -4), (0, 5)];
+    let filled = |points: &[(i32, i32)]| Polygon::new(path(points), colour.filled()).into_dyn();
+    // Hollow markers hide the line beneath, so that they do not look like filled ones.
+    let hollow = |points: &[(i32, i32)]| {
+        vec![
+            Polygon::new(path(points), PAPER.filled()).into_dyn(),
+            PathElement::new(path(points), thick).into_dyn(),
+        ]
+    };
+    let stroke = |points: &[(i32, i32)]| PathElement::new(path(points), thick).into_dyn();
+    match marker {
+        Marker::Disc => vec![Circle::new((x, y), r, colour.filled()).into_dyn()],
+        Marker::Ring => vec![
+            Circle::new((x, y), r, PAPER.filled()).into_dyn(),
+            Circle::new((x, y), r, thick).into_dyn(),
+        ],
+        Marker::Square => vec![filled(&square)],
+        Marker::Triangle => vec![filled(&triangle)],
+        Marker::Diamond => vec![filled(&diamond)],
+        Marker::Down => vec![filled(&down)],
+        Marker::Box => hollow(&square),
+        Marker::Delta => hollow(&triangle),
+        Marker::Lozenge => hollow(&diamond),
+        Marker::Cross => vec![stroke(&[(-5, -5), (5, 5)]), stroke(&[(-5, 5), (5, -5)])],
+        Marker::Plus => vec![stroke(&[(-6, 0), (6, 0)]), stroke(&[(0, -6), (0, 6)])],
+    }
+}
+
+/// The same drawing, shown at half of the size that it was drawn at.
+pub(crate) fn at_half_size(svg: &str, (width, height): (u32, u32)) -> String {
+    let scale = RESOLUTION as u32;
+    let drawn = format!("width=\"{width}\" height=\"{height}\"");
+    let shown = format!("width=\"{}\" height=\"{}\"", width / scale, height / scale);
+    svg.replacen(&drawn, &shown, 1)
+}

@@ -1,0 +1,231 @@
+//! Plots: which figures there are and what stands in them.
+
+mod axis;
+mod bars;
+mod figure;
+mod palette;
+
+use std::fmt::Display;
+
+use crate::comparison::{Comparison, Entry, level_label, reached};
+use crate::metric::{BELOW_30, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
+use crate::summary::CountSummary;
+
+use self::axis::Scale;
+use self::bars::Bars;
+use self::figure::{Curve, Figure};
+
+pub(crate) use self::palette::style;
+
+/// Why a plot could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("plot: {0}")]
+pub(crate) struct PlotError(String);
+
+impl PlotError {
+    fn new(error: impl Display) -> Self {
+        Self(error.to_string())
+    }
+}
+
+/// A drawn plot.
+pub(crate) struct Plot {
+    /// File name without folder and extension.
+    pub(crate) stem: String,
+    /// What it shows, for those who cannot see it.
+    pub(crate) title: String,
+    pub(crate) svg: String,
+}
+
+/// What stands on the axes of a family of figures.
+struct Kind {
+    name: &'static str,
+    title: &'static str,
+    y: &'static Metric,
+    scale: Scale,
+    /// Seconds rather than spheres along the bottom.
+    against_time: bool,
+}
+
+static KINDS: [Kind; 6] = [
+    Kind {
+        name: "hausdorff",
+        title: "Hausdorff error against spheres",
+        y: &HAUSDORFF,
+        scale: Scale::Log,
+        against_time: false,
+    },
+    Kind {
+        name: "mean",
+        title: "Mean error against spheres",
+        y: &MEAN_ERROR,
+        scale: Scale::Log,
+        against_time: false,
+    },
+    Kind {
+        name: "time",
+        title: "Hausdorff error against time",
+        y: &HAUSDORFF,
+        scale: Scale::Log,
+        against_time: true,
+    },
+    Kind {
+        name: "angles",
+        title: "Triangle quality: mean smallest angle",
+        y: &MIN_ANGLE,
+        scale: Scale::Linear,
+        against_time: false,
+    },
+    Kind {
+        name: "below-30",
+        title: "Triangle quality: smallest angle below 30°",
+        y: &BELOW_30,
+        scale: Scale::Linear,
+        against_time: false,
+    },
+    Kind {
+        name: "spikes",
+        title: "Spikes left",
+        y: &SPIKES,
+        scale: Scale::LogOfOneMore,
+        against_time: false,
+    },
+];
+
+impl Kind {
+    fn figure(&self, title: String, curves: Vec<Curve>) -> Figure {
+        let spheres = || ("spheres".to_owned(), Scale::Log);
+        let x =
+            if self.against_time { (TOTAL_SECONDS.axis_title(), Scale::Log) } else { spheres() };
+        Figure { title, x, y: (self.axis_title(), self.scale), curves }
+    }
+
+    fn axis_title(&self) -> String {
+        match self.name {
+            "hausdorff" | "time" => "Hausdorff error (% of diagonal)".to_owned(),
+            "mean" => "mean error (% of diagonal)".to_owned(),
+            "angles" => "mean smallest angle (degrees)".to_owned(),
+            "below-30" => "triangles below 30° (%)".to_owned(),
+            _ => self.y.axis_title(),
+        }
+    }
+
+    fn draw(
+        &self,
+        stem: String,
+        title: String,
+        curves: Vec<Curve>,
+    ) -> Result<Option<Plot>, PlotError> {
+        let svg = self.figure(title.clone(), curves).to_svg()?;
+        Ok(svg.map(|svg| Plot { stem, title, svg }))
+    }
+}
+
+/// The figures of one mesh; those without a point are left out.
+pub(crate) fn mesh_plots(
+    comparison: &Comparison<'_>,
+    mesh: usize,
+    stem: &str,
+) -> Result<Vec<Plot>, PlotError> {
+    let mut plots = Vec::new();
+    for kind in &KINDS {
+        let curves = (0..comparison.series.len())
+            .map(|series| mesh_curve(comparison, mesh, series, kind))
+            .filter(|curve| !curve.points.is_empty())
+            .collect();
+        let title = format!("{}: {}", comparison.meshes[mesh], kind.title);
+        plots.extend(kind.draw(format!("mesh-{stem}-{}", kind.name), title, curves)?);
+    }
+    Ok(plots)
+}
+
+/// Every measured result of one method on one mesh, from many spheres to few.
+fn mesh_curve(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &Kind) -> Curve {
+    let point = |entry: &&Entry<'_>| {
+        let spheres = reached(entry.record)?;
+        let x = if kind.against_time { TOTAL_SECONDS.of(entry.record)? } else { spheres as f64 };
+        Some((spheres, (x, kind.y.of(entry.record)?)))
+    };
+    let mut points: Vec<(usize, (f64, f64))> = comparison
+        .of_mesh(mesh)
+        .filter(|entry| entry.series == series && entry.measured())
+        .filter_map(|entry| point(&entry))
+        .collect();
+    points.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.0.total_cmp(&b.1.0)));
+    let tags =
+        if kind.against_time { ends(points.iter().map(|point| point.0)) } else { Vec::new() };
+    Curve {
+        series,
+        label: comparison.series[series].clone(),
+        points: points.into_iter().map(|point| point.1).collect(),
+        tags,
+    }
+}
+
+/// The numbers of spheres at both ends of a curve.
+fn ends(counts: impl ExactSizeIterator<Item = usize>) -> Vec<(usize, String)> {
+    let last = counts.len().saturating_sub(1);
+    counts
+        .enumerate()
+        .filter(|(index, _)| *index == 0 || *index == last)
+        .map(|(index, count)| (index, crate::text::grouped(count as u64)))
+        .collect()
+}
+
+/// Figures of the means over all meshes, and the bars of the stages.
+pub(crate) fn overview_plots(
+    comparison: &Comparison<'_>,
+    summaries: &[CountSummary],
+) -> Result<Vec<Plot>, PlotError> {
+    let mut plots = Vec::new();
+    for kind in &KINDS {
+        let curves = (0..comparison.series.len())
+            .map(|series| mean_curve(comparison, summaries, series, kind))
+            .filter(|curve| !curve.points.is_empty())
+            .collect();
+        let title = format!("All meshes, {} means: {}", kind.y.mean.word(), kind.title);
+        plots.extend(kind.draw(format!("overview-{}", kind.name), title, curves)?);
+    }
+    // The fewest spheres take the most work.
+    if let Some(summary) = summaries.iter().rev().find(|summary| summary.common > 0) {
+        plots.extend(stage_bars(comparison, summary)?);
+    }
+    Ok(plots)
+}
+
+fn mean_curve(
+    comparison: &Comparison<'_>,
+    summaries: &[CountSummary],
+    series: usize,
+    kind: &Kind,
+) -> Curve {
+    let means: Vec<(usize, (f64, f64))> = summaries
+        .iter()
+        .filter_map(|summary| {
+            let row = summary.rows.iter().find(|row| row.series == series && row.compared)?;
+            let x =
+                if kind.against_time { row.mean(&TOTAL_SECONDS)? } else { summary.count as f64 };
+            Some((summary.count, (x, row.mean(kind.y)?)))
+        })
+        .collect();
+    let tags = if kind.against_time { ends(means.iter().map(|mean| mean.0)) } else { Vec::new() };
+    Curve {
+        series,
+        label: comparison.series[series].clone(),
+        points: means.into_iter().map(|mean| mean.1).collect(),
+        tags,
+    }
+}
+
+fn stage_bars(
+    comparison: &Comparison<'_>,
+    summary: &CountSummary,
+) -> Result<Option<Plot>, PlotError> {
+    let rows = summary.rows.iter().filter(|row| row.compared);
+    let rows: Vec<_> =
+        rows.filter_map(|row| Some((comparison.series[row.series].clone(), row.stages?))).collect();
+    let level = level_label(medial::simplifier::Level::Spheres(summary.count));
+    let title = format!("Seconds by stage, to {level} spheres");
+    let svg = Bars { title: title.clone(), rows }.to_svg()?;
+    Ok(svg.map(|svg| Plot { stem: "overview-stages".to_owned(), title, svg }))
+}

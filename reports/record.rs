@@ -1,0 +1,289 @@
+//! The record of one item of a comparison: a line of `results.jsonl`.
+//!
+//! One mesh, one method, one level: what was asked, what came out, what it measured, and where
+//! and how it ran. A run that failed leaves a record like any other, with its status and reason
+//! and without the parts that it never got to. Keys are part of the product's interface: other
+//! programs read them. Unknown keys are ignored on reading, so that older versions read newer
+//! files.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use medial::complex::MedialMesh;
+use medial::metrics::Evaluation;
+use medial::simplifier::{Level, Params};
+use serde::{Deserialize, Serialize};
+
+/// What became of one item.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// A valid medial mesh came out.
+    Ok,
+    /// The method does not do this: an answer, not a failure.
+    Unsupported,
+    /// The input was refused before the method saw it, or by a check of the method's own.
+    Refused,
+    /// The method returned an error.
+    Failed,
+    /// The method panicked, or its process was killed by a signal.
+    Panicked,
+    /// The time limit was reached.
+    TimedOut,
+    /// The memory limit was reached.
+    OutOfMemory,
+    /// What came out is not a valid medial mesh.
+    InvalidOutput,
+}
+
+impl Status {
+    /// Every status, in the order of the enumeration.
+    pub const ALL: [Self; 8] = [
+        Self::Ok,
+        Self::Unsupported,
+        Self::Refused,
+        Self::Failed,
+        Self::Panicked,
+        Self::TimedOut,
+        Self::OutOfMemory,
+        Self::InvalidOutput,
+    ];
+
+    /// Whether there is a result to measure.
+    pub fn is_ok(self) -> bool {
+        self == Self::Ok
+    }
+
+    /// Whether something went wrong: neither a result nor the plain answer "unsupported".
+    pub fn is_failure(self) -> bool {
+        !matches!(self, Self::Ok | Self::Unsupported)
+    }
+
+    /// The word that stands in the JSON.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Unsupported => "unsupported",
+            Self::Refused => "refused",
+            Self::Failed => "failed",
+            Self::Panicked => "panicked",
+            Self::TimedOut => "timed_out",
+            Self::OutOfMemory => "out_of_memory",
+            Self::InvalidOutput => "invalid_output",
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    /// The words for people: `timed out` rather than `timed_out`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.key().replace('_', " "))
+    }
+}
+
+/// One line of `results.jsonl`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Name of the mesh, as the user or the catalogue calls it.
+    pub mesh: String,
+    /// The dataset that the mesh comes from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dataset: Option<String>,
+    /// Hash of the input file or of the generated surface, so that equal names are not taken for
+    /// equal meshes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh_hash: Option<String>,
+    /// What became of the item.
+    pub status: Status,
+    /// Why, where the status is not `ok`: one sentence for the user.
+    #[serde(default)]
+    pub reason: Option<String>,
+    /// What was asked of the method, and what it answered.
+    pub simplify: Simplify,
+    /// What was measured on the answer. Absent where there is none, or where it was not measured.
+    #[serde(default)]
+    pub evaluate: Option<Evaluation>,
+    /// Wall-clock seconds of the evaluation; part of no method's time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evaluate_seconds: Option<f64>,
+    /// The medial mesh that every simplifier of this shape starts from.
+    #[serde(default)]
+    pub initial: Option<Initial>,
+    /// Every seed by its purpose, such as `sampling`, `method`, `evaluation`.
+    #[serde(default)]
+    pub seeds: BTreeMap<String, u64>,
+    /// Every timed repetition, raw, in the order they ran. [`Simplify::seconds`] is their summary.
+    #[serde(default)]
+    pub repetitions: Vec<Repetition>,
+    /// Where it ran.
+    #[serde(default)]
+    pub machine: Machine,
+    /// Hash of the program that ran the method: a stale build must not lend its numbers.
+    #[serde(default)]
+    pub binary_hash: String,
+    /// The command line, as the user typed it.
+    #[serde(default)]
+    pub command: String,
+    /// Version of the program.
+    #[serde(default)]
+    pub version: String,
+    /// Path of the resulting `.ma` file relative to the folder of the results, with `/`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub artifact: Option<String>,
+}
+
+/// The `simplify` object: one method at one level.
+///
+/// Only what was asked is always there; the rest is absent where the run did not get so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Simplify {
+    /// What became of the run.
+    pub status: Status,
+    /// Id of the method.
+    pub method: String,
+    /// Parameters as the user gave them; an empty object stands for the paper's values.
+    #[serde(default)]
+    pub params: Params,
+    /// Seed of the method's random choices.
+    #[serde(default)]
+    pub seed: u64,
+    /// The level that was asked.
+    pub level: Level,
+    /// Number of spheres that was reached.
+    #[serde(default)]
+    pub reached: Option<usize>,
+    /// The method's own level that was used, where it has one.
+    #[serde(default)]
+    pub native_level: Option<f64>,
+    /// Spheres of the result.
+    #[serde(default)]
+    pub spheres: Option<usize>,
+    /// Edges of the result.
+    #[serde(default)]
+    pub edges: Option<usize>,
+    /// Faces of the result.
+    #[serde(default)]
+    pub faces: Option<usize>,
+    /// Wall-clock seconds of each shared substrate that the method used, whoever built it first.
+    #[serde(default)]
+    pub substrates: BTreeMap<String, f64>,
+    /// Wall-clock seconds by stage.
+    #[serde(default)]
+    pub seconds: Option<Stages>,
+    /// Seconds of the process on all processors, by stage.
+    #[serde(default)]
+    pub cpu_seconds: Option<Stages>,
+    /// Largest resident size of the process, in bytes.
+    #[serde(default)]
+    pub peak_bytes: Option<u64>,
+    /// Threads that the method was given.
+    #[serde(default)]
+    pub threads: Option<usize>,
+    /// Named counts of the method, such as `rejected_by_link_condition`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub diagnostics: BTreeMap<String, u64>,
+    /// Sentences for the user.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// Version of the program.
+    #[serde(default)]
+    pub version: String,
+}
+
+impl Simplify {
+    /// A request without an answer: what a run that failed at once leaves behind.
+    pub fn asked(method: impl Into<String>, level: Level, status: Status) -> Self {
+        Self {
+            status,
+            method: method.into(),
+            params: Params::none(),
+            seed: 0,
+            level,
+            reached: None,
+            native_level: None,
+            spheres: None,
+            edges: None,
+            faces: None,
+            substrates: BTreeMap::new(),
+            seconds: None,
+            cpu_seconds: None,
+            peak_bytes: None,
+            threads: None,
+            diagnostics: BTreeMap::new(),
+            warnings: Vec::new(),
+            version: String::new(),
+        }
+    }
+}
+
+/// Seconds by stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Stages {
+    /// The shared substrates that the method used.
+    pub substrate: f64,
+    /// The method's work that does not depend on the level.
+    pub prepare: f64,
+    /// From there to this level, as if it had been asked alone.
+    pub simplify: f64,
+    /// The sum of the stages.
+    pub total: f64,
+}
+
+impl Stages {
+    /// The three stages and their sum, in seconds.
+    pub fn new(substrate: f64, prepare: f64, simplify: f64) -> Self {
+        Self { substrate, prepare, simplify, total: substrate + prepare + simplify }
+    }
+}
+
+/// One timed repetition.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Repetition {
+    /// Wall-clock seconds by stage.
+    #[serde(flatten)]
+    pub seconds: Stages,
+    /// Seconds of the process on all processors, by stage.
+    pub cpu_seconds: Stages,
+}
+
+/// The initial medial mesh of a shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Initial {
+    /// Spheres.
+    pub spheres: u64,
+    /// Edges.
+    pub edges: u64,
+    /// Faces.
+    pub faces: u64,
+    /// Betti numbers over Z2, where they were computed.
+    pub betti: Option<[u64; 3]>,
+    /// What the solid's own topology demands: components, total genus, cavities.
+    #[serde(default)]
+    pub expected_betti: Option<[u64; 3]>,
+}
+
+impl Initial {
+    /// What is to be said of an initial medial mesh.
+    pub fn of(mesh: &MedialMesh, expected_betti: Option<[u64; 3]>) -> Self {
+        Self {
+            spheres: mesh.spheres.len() as u64,
+            edges: mesh.edges.len() as u64,
+            faces: mesh.faces.len() as u64,
+            betti: Some(medial::complex::betti(mesh)),
+            expected_betti,
+        }
+    }
+}
+
+/// Where a run took place.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Model of the processor.
+    pub cpu: String,
+    /// Logical processors.
+    pub cores: usize,
+    /// Operating system and architecture.
+    pub os: String,
+    /// Main memory, in bytes.
+    pub memory: u64,
+}

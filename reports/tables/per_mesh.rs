@@ -1,0 +1,133 @@
+//! The table of one mesh: every method at every level, failures included.
+
+use crate::comparison::{Comparison, Entry, level_label, reached};
+use crate::metric::{COMPARED, Metric};
+use crate::summary::pick;
+use crate::tables::{Cell, Column, Row, Table};
+use crate::text::{betti, grouped, printable};
+
+/// What the bold numbers of one level have to equal.
+pub(crate) struct Best(Vec<(usize, [Option<f64>; COMPARED.len()])>);
+
+impl Best {
+    /// The best values of one mesh, for each level at which at least two results compare.
+    pub(crate) fn of_mesh(comparison: &Comparison<'_>, mesh: usize) -> Self {
+        let best_at = |level: usize| {
+            let here: Vec<&Entry<'_>> = comparison
+                .of_mesh(mesh)
+                .filter(|entry| entry.level == level && entry.comparable())
+                .collect();
+            COMPARED.map(|metric| {
+                let values: Vec<f64> =
+                    here.iter().filter_map(|entry| metric.of(entry.record)).collect();
+                if values.len() < 2 {
+                    return None;
+                }
+                values.into_iter().reduce(|a, b| pick(metric, a, b))
+            })
+        };
+        Self((0..comparison.levels.len()).map(|level| (level, best_at(level))).collect())
+    }
+
+    /// Whether a value of an entry is the best of its level, as far as it is written.
+    pub(crate) fn is_best(&self, entry: &Entry<'_>, metric: &Metric, value: f64) -> bool {
+        let column = COMPARED.iter().position(|other| other.key == metric.key);
+        let best = self.0.iter().find(|(level, _)| *level == entry.level).zip(column);
+        let best = best.and_then(|((_, values), column)| values[column]);
+        // Two numbers that read the same are equally good.
+        entry.comparable() && best.is_some_and(|best| metric.format(best) == metric.format(value))
+    }
+}
+
+/// Whether the Betti numbers are the solid's: `yes`, `no`, or a dash where one is unknown.
+pub(crate) fn topology_verdict(entry: &Entry<'_>) -> &'static str {
+    let evaluation = entry.record.evaluate.as_ref();
+    match evaluation.and_then(|e| Some((e.betti, e.expected_betti?))) {
+        Some((found, expected)) if found == expected => "yes",
+        Some(_) => "no",
+        None => "–",
+    }
+}
+
+/// Why there is no result, or what is to be known of it: the last column.
+pub(crate) fn remark(entry: &Entry<'_>) -> String {
+    let record = entry.record;
+    if !record.status.is_ok() {
+        return match &record.reason {
+            Some(reason) => format!("{}: {}", record.status, printable(reason)),
+            None => record.status.to_string(),
+        };
+    }
+    if record.evaluate.is_none() {
+        return "not evaluated".to_owned();
+    }
+    if let (medial::simplifier::Level::Spheres(_), false) =
+        (record.simplify.level, entry.comparable())
+    {
+        return "another number of spheres: not compared".to_owned();
+    }
+    String::new()
+}
+
+/// The table of one mesh. `how` tells the command line and version that made it.
+pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) -> Table {
+    let best = Best::of_mesh(comparison, mesh);
+    let mut columns =
+        vec![Column::number("asked"), Column::text("method"), Column::number("spheres")];
+    columns.extend(COMPARED.iter().map(|metric| Column::number(metric.heading())));
+    columns.extend([Column::text("Betti"), Column::text("as solid"), Column::text("remark")]);
+    let mut level = None;
+    let rows = comparison.of_mesh(mesh).map(|entry| {
+        let starts_group = level.replace(entry.level) != Some(entry.level);
+        Row { cells: cells(comparison, entry, &best), starts_group }
+    });
+    Table {
+        caption: format!("{}: every method at every level", comparison.meshes[mesh]),
+        notes: notes(comparison, mesh, how),
+        rows: rows.collect(),
+        columns,
+    }
+}
+
+fn cells(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<Cell> {
+    let record = entry.record;
+    let mut cells = vec![
+        Cell::new(level_label(record.simplify.level)),
+        Cell::new(comparison.series[entry.series].as_str()),
+        Cell::optional(reached(record).map(|count| grouped(count as u64))),
+    ];
+    cells.extend(COMPARED.iter().map(|metric| match metric.of(record) {
+        Some(value) => {
+            Cell { text: metric.format(value), best: best.is_best(entry, metric, value) }
+        }
+        None => Cell::optional(None),
+    }));
+    cells.extend([
+        Cell::optional(record.evaluate.as_ref().map(|evaluation| betti(evaluation.betti))),
+        Cell::new(topology_verdict(entry)),
+        Cell::new(remark(entry)),
+    ]);
+    cells
+}
+
+fn notes(comparison: &Comparison<'_>, mesh: usize, how: &str) -> Vec<String> {
+    let mut notes = vec![how.to_owned()];
+    if let Some(initial) = comparison.of_mesh(mesh).find_map(|entry| entry.record.initial) {
+        let known = |numbers: Option<[u64; 3]>| numbers.map_or("unknown".to_owned(), betti);
+        notes.push(format!(
+            "Initial medial mesh: {} spheres, {} edges, {} faces; Betti numbers {}; the solid's: {}.",
+            grouped(initial.spheres),
+            grouped(initial.edges),
+            grouped(initial.faces),
+            known(initial.betti),
+            known(initial.expected_betti),
+        ));
+    }
+    notes.push(UNITS.to_owned());
+    notes
+}
+
+/// Units and the meaning of bold, under every table of one mesh.
+const UNITS: &str = "Lengths in % of the bounding-box diagonal of the input; seconds of wall clock, \
+    shared substrates included. Arrows: which way is better. Bold: best at this number of spheres, \
+    among results that reached it to within 2 %.";

@@ -1,0 +1,164 @@
+//! Numbers and names as people read them, and names that are safe as file names.
+
+/// A number with a fixed count of significant digits, without an exponent where it can be read
+/// without one: `1.52`, `0.0371`, `34702`, `1.2e-9`.
+pub(crate) fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let scientific = format!("{:.*e}", digits.saturating_sub(1), value);
+    // Taken after rounding: 9.996 has the exponent of 10.0.
+    let exponent: i32 =
+        scientific.rsplit_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
+    if !(-5..9).contains(&exponent) {
+        return scientific;
+    }
+    let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// A count with commas between the thousands: `34,702`.
+pub(crate) fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// `1 mesh`, `13 meshes`.
+pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{} {}", grouped(count as u64), if count == 1 { one } else { many })
+}
+
+/// Betti numbers as `1, 4, 0`.
+pub(crate) fn betti(numbers: [u64; 3]) -> String {
+    format!("{}, {}, {}", numbers[0], numbers[1], numbers[2])
+}
+
+/// Memory in MB of a million bytes.
+pub(crate) fn megabytes(bytes: u64) -> String {
+    grouped((bytes as f64 / 1e6).round() as u64)
+}
+
+/// Text without control characters, which neither XML nor a table row can carry.
+pub(crate) fn printable(text: &str) -> String {
+    text.chars()
+        .map(|c| match c {
+            '\n' | '\r' | '\t' => ' ',
+            c if c.is_control() => '\u{fffd}',
+            // Direction marks would reorder everything beside them.
+            '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => '\u{fffd}',
+            c => c,
+        })
+        .collect()
+}
+
+/// Text cut to a number of characters, with an ellipsis where something was cut.
+pub(crate) fn shortened(text: &str, limit: usize) -> String {
+    if text.chars().count() <= limit {
+        return text.to_owned();
+    }
+    text.chars().take(limit.saturating_sub(1)).chain(['…']).collect()
+}
+
+/// Distinct file stems for names, in their order: ASCII letters, digits, `-`, `_` and `.` stay,
+/// everything else becomes `_`. No stem is empty, begins with a dot or is longer than 80 bytes,
+/// and no two are equal, not even where case is ignored.
+pub(crate) fn file_stems<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<String> {
+    let mut stems: Vec<String> = Vec::new();
+    for name in names {
+        let base: String = name
+            .chars()
+            .map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' })
+            .take(80)
+            .collect();
+        let base = base.trim_start_matches('.').trim_end_matches('.');
+        let base = if base.is_empty() { "unnamed" } else { base };
+        let taken =
+            |stem: &str| stems.iter().any(|other: &String| other.eq_ignore_ascii_case(stem));
+        let stem = std::iter::once(base.to_owned())
+            .chain((2..).map(|number| format!("{base}-{number}")))
+            .find(|stem| !taken(stem))
+            .unwrap_or_else(|| base.to_owned());
+        stems.push(stem);
+    }
+    stems
+}
+
+/// One name as a file stem: ASCII letters, digits, `-`, `_` and `.` stay, everything else becomes
+/// `_`; never empty, beginning with a dot, or longer than 80 bytes.
+pub fn file_stem(name: &str) -> String {
+    file_stems([name]).remove(0)
+}
+
+/// Escapes text for HTML and XML, element content and quoted attributes alike.
+pub(crate) fn escape_html(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in printable(text).chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn significant_digits_survive_rounding_up() {
+        assert_eq!(significant(0.0, 3), "0");
+        assert_eq!(significant(9.996, 3), "10.0");
+        assert_eq!(significant(1.5249, 3), "1.52");
+        assert_eq!(significant(0.037_149, 3), "0.0371");
+        assert_eq!(significant(34_702.4, 3), "34702");
+        assert_eq!(significant(1.234e-9, 3), "1.23e-9");
+        assert_eq!(significant(-0.5, 2), "-0.50");
+    }
+
+    #[test]
+    fn thousands_are_grouped() {
+        let texts: Vec<String> = [0, 999, 1000, 34_702, 1_234_567].map(grouped).into();
+        assert_eq!(texts, ["0", "999", "1,000", "34,702", "1,234,567"]);
+    }
+
+    #[test]
+    fn stems_are_safe_and_distinct() {
+        let names = ["bear", "../../etc/passwd", "Bear", "", "..", "a b", "a/b", "日本", ".hidden"];
+        let stems = file_stems(names);
+        assert_eq!(
+            stems,
+            [
+                "bear",
+                "_.._etc_passwd",
+                "Bear-2",
+                "unnamed",
+                "unnamed-2",
+                "a_b",
+                "a_b-2",
+                "__",
+                "hidden"
+            ]
+        );
+        assert!(file_stems(["x".repeat(500).as_str()])[0].len() <= 80);
+    }
+
+    #[test]
+    fn hostile_text_is_inert() {
+        assert_eq!(
+            escape_html("<script>alert('x')</script>&\"\u{0}\u{202e}"),
+            "&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;&amp;&quot;\u{fffd}\u{fffd}"
+        );
+    }
+}

@@ -1,0 +1,190 @@
+//! Writing a report: tables, plots and the page into one folder.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::comparison::Comparison;
+use crate::header::Header;
+use crate::journal::replace_file;
+use crate::page::{MeshPart, Page};
+use crate::plots::{PlotError, mesh_plots, overview_plots};
+use crate::record::Record;
+use crate::summary::by_count;
+use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_markdown};
+use crate::text::file_stems;
+
+/// Writes the report of some records into a folder, which is created where it is missing:
+/// `results.csv`, `tables/*.md`, `tables/*.tex`, `plots/*.svg`, `header.json` and `index.html`.
+/// Returns the paths that were written, `index.html` last.
+///
+/// Each file is written under a temporary name and renamed. The same records and header give the
+/// same bytes. Files in `tables/` and `plots/` that an earlier report left there under a name
+/// such as `mesh-*` and that this one does not write are removed, so that no stale number stays
+/// beside the new ones. `results.jsonl` is the runner's and is not touched.
+///
+/// Of several records of one item the last one counts. Records without any result give a page
+/// that says that nothing was measured; it is for the caller to end in an exit code that says so.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written, or a plot or the CSV cannot be made.
+pub fn write_report(
+    dir: &Path,
+    records: &[Record],
+    header: &Header,
+) -> Result<Vec<PathBuf>, ReportError> {
+    let comparison = Comparison::new(records);
+    let summaries = by_count(&comparison);
+    let how = header.how();
+    let mut files = Files { dir, written: Vec::new() };
+
+    files.write("results.csv", &to_csv(&comparison).map_err(|error| ReportError::csv(&error))?)?;
+    let summary_tables = summary_tables(&comparison, &summaries, &how);
+    files.write_tables("summary", "Summary", &summary_tables)?;
+
+    let overview_plots = overview_plots(&comparison, &summaries)?;
+    for plot in &overview_plots {
+        files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
+    }
+    let stems = file_stems(comparison.meshes.iter().map(String::as_str));
+    let mut meshes = Vec::new();
+    for (mesh, stem) in stems.into_iter().enumerate() {
+        let part = MeshPart {
+            table: mesh_table(&comparison, mesh, &how),
+            plots: mesh_plots(&comparison, mesh, &stem)?,
+            stem,
+        };
+        let name = format!("mesh-{}", part.stem);
+        files.write_tables(&name, &comparison.meshes[mesh], std::slice::from_ref(&part.table))?;
+        for plot in &part.plots {
+            files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
+        }
+        meshes.push(part);
+    }
+    let header_json =
+        serde_json::to_vec_pretty(header).map_err(|error| ReportError::header(&error))?;
+    files.write("header.json", &header_json)?;
+    files.remove_stale()?;
+    let page = Page {
+        header,
+        comparison: &comparison,
+        summaries: &summaries,
+        overview_plots: &overview_plots,
+        meshes: &meshes,
+        summary_tables: &summary_tables,
+    };
+    files.write("index.html", page.to_html().as_bytes())?;
+    Ok(files.written)
+}
+
+/// Reads the header that [`write_report`] left in a folder, to rebuild its report.
+///
+/// # Errors
+/// [`ReportError::Io`] when the file is missing or is no header.
+pub fn read_header(dir: &Path) -> Result<Header, ReportError> {
+    let path = dir.join("header.json");
+    let read = || serde_json::from_slice(&fs::read(&path)?).map_err(io::Error::from);
+    read().map_err(|source| ReportError::Io { path: path.clone(), source })
+}
+
+/// The folder of the report and what was written there.
+struct Files<'a> {
+    dir: &'a Path,
+    written: Vec<PathBuf>,
+}
+
+impl Files<'_> {
+    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), ReportError> {
+        let path = self.dir.join(name);
+        match replace_file(&path, bytes) {
+            Ok(()) => {
+                self.written.push(path);
+                Ok(())
+            }
+            Err(source) => Err(ReportError::Io { path, source }),
+        }
+    }
+
+    /// The same tables as Markdown and as LaTeX.
+    fn write_tables(
+        &mut self,
+        stem: &str,
+        title: &str,
+        tables: &[Table],
+    ) -> Result<(), ReportError> {
+        let mut markdown = format!("# {}\n\n", crate::tables::escape_markdown(title));
+        let mut latex = String::new();
+        for (index, table) in tables.iter().enumerate() {
+            if index > 0 {
+                markdown.push('\n');
+                latex.push('\n');
+            }
+            markdown.push_str(&to_markdown(table));
+            let label = if index == 0 { stem.to_owned() } else { format!("{stem}-{}", index + 1) };
+            latex.push_str(&to_latex(table, &label));
+        }
+        self.write(&format!("tables/{stem}.md"), markdown.as_bytes())?;
+        self.write(&format!("tables/{stem}.tex"), latex.as_bytes())
+    }
+
+    /// Removes what an earlier report left under the names that only a report gives.
+    fn remove_stale(&self) -> Result<(), ReportError> {
+        for (folder, extensions) in [("tables", &["md", "tex"][..]), ("plots", &["svg"][..])] {
+            let folder = self.dir.join(folder);
+            let failed = |source| ReportError::Io { path: folder.clone(), source };
+            let entries = match fs::read_dir(&folder) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                entries => entries.map_err(failed)?,
+            };
+            for entry in entries {
+                let path = entry.map_err(failed)?.path();
+                let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+                let ours = (name.starts_with("mesh-") || name.starts_with("overview-"))
+                    && path
+                        .extension()
+                        .is_some_and(|extension| extensions.iter().any(|&ours| extension == ours));
+                if ours && !self.written.contains(&path) {
+                    fs::remove_file(&path).map_err(failed)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why a report could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A file could not be made from the records.
+    #[error("{what} could not be made: {message}")]
+    Content {
+        /// The file.
+        what: &'static str,
+        /// What went wrong.
+        message: String,
+    },
+}
+
+impl ReportError {
+    fn csv(error: &csv::Error) -> Self {
+        Self::Content { what: "results.csv", message: error.to_string() }
+    }
+
+    fn header(error: &serde_json::Error) -> Self {
+        Self::Content { what: "header.json", message: error.to_string() }
+    }
+}
+
+impl From<PlotError> for ReportError {
+    fn from(error: PlotError) -> Self {
+        Self::Content { what: "a plot", message: error.to_string() }
+    }
+}

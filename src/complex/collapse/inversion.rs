@@ -1,0 +1,37 @@
+//! The inversion test: whether a collapse folds a face over.
+
+use super::{COINCIDENT, CollapseComplex};
+use crate::Vec3;
+
+impl CollapseComplex {
+    /// Whether moving both ends of the edge `{a, b}` to `centre` turns some face that has exactly
+    /// one of them by more than a right angle: normal after times normal before is negative.
+    ///
+    /// A face that is thinner than [`COINCIDENT`] before has no normal and is not tested: what
+    /// rounding makes of it must not hold the collapse back. Lengths in units of the diagonal.
+    ///
+    /// Source: Garland, Heckbert 1997, *Surface simplification using quadric error metrics*,
+    /// <https://doi.org/10.1145/258734.258849>, section 3.7. Cost: the faces of both ends.
+    pub fn inverts(&self, a: u32, b: u32, centre: Vec3) -> bool {
+        self.inverts_at(a, b, centre) || self.inverts_at(b, a, centre)
+    }
+
+    fn inverts_at(&self, moved: u32, other: u32, to: Vec3) -> bool {
+        let from = self.sphere(moved).centre;
+        self.opposite_sides(moved).iter().any(|&[p, q]| {
+            if p == other || q == other {
+                return false;
+            }
+            let [p, q] = [self.sphere(p).centre, self.sphere(q).centre];
+            let before = (p - from).cross(q - from);
+            let after = (p - to).cross(q - to);
+            before.dot(after) < 0.0 && !is_thin(before, p - from, q - from)
+        })
+    }
+}
+
+/// Whether the smallest height of the triangle with sides `u`, `v` and `u x v = normal` is noise.
+fn is_thin(normal: Vec3, u: Vec3, v: Vec3) -> bool {
+    let longest = u.length_squared().max(v.length_squared()).max((u - v).length_squared());
+    normal.length_squared() <= COINCIDENT * COINCIDENT * longest
+}

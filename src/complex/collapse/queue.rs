@@ -1,0 +1,240 @@
+//! The order in which edges are collapsed.
+
+use std::cmp::Ordering;
+
+use super::CollapseComplex;
+
+/// Below this length a heap is never compacted.
+const COMPACT_FROM: usize = 4096;
+
+/// Absent index of a parked candidate.
+const NONE: u32 = u32::MAX;
+
+/// An edge with its cost at the moment it was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    cost: f64,
+    tie: f64,
+    ends: [u32; 2],
+    stamp: u32,
+}
+
+impl Candidate {
+    /// The edge `{a, b}` of `complex` with a cost, and a second key for equal costs. Further ties
+    /// are broken by the smaller, then by the larger id. Not-a-number counts as infinite.
+    ///
+    /// # Panics
+    /// If an end is gone.
+    #[inline]
+    pub fn new(complex: &CollapseComplex, [a, b]: [u32; 2], cost: f64, tie: f64) -> Self {
+        let stamp = complex.stamp(a, b).expect("both ends are left");
+        let finite = |key: f64| if key.is_nan() { f64::INFINITY } else { key };
+        Self { cost: finite(cost), tie: finite(tie), ends: [a.min(b), a.max(b)], stamp }
+    }
+
+    /// The cost.
+    pub fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    /// The ends, ascending.
+    pub fn ends(&self) -> [u32; 2] {
+        self.ends
+    }
+
+    /// Whether neither end was part of a collapse since the candidate was made.
+    #[inline]
+    pub fn is_current(&self, complex: &CollapseComplex) -> bool {
+        complex.stamp(self.ends[0], self.ends[1]) == Some(self.stamp)
+    }
+
+    #[inline]
+    fn is_before(&self, other: &Self) -> bool {
+        if self.cost != other.cost {
+            return self.cost < other.cost;
+        }
+        self.tie.total_cmp(&other.tie).then(self.ends.cmp(&other.ends)) == Ordering::Less
+    }
+}
+
+/// A priority queue of candidates: smallest cost first, then the second key, then the ids.
+///
+/// Out-of-date candidates stay inside until they are popped or outnumber the current ones. Equal
+/// contents come out in the same order whatever the history.
+#[derive(Clone, Debug, Default)]
+pub struct CollapseQueue {
+    /// Four children a node: the candidates of one family lie in two cache lines.
+    heap: Vec<Candidate>,
+    parked: Parked,
+}
+
+impl CollapseQueue {
+    /// A queue of the given candidates. Cost `O(n)`.
+    pub fn from_candidates(candidates: Vec<Candidate>) -> Self {
+        let mut queue = Self { heap: candidates, parked: Parked::default() };
+        queue.heapify();
+        queue
+    }
+
+    /// Adds a candidate.
+    #[inline]
+    pub fn push(&mut self, candidate: Candidate) {
+        self.heap.push(candidate);
+        self.sift_up(self.heap.len() - 1);
+    }
+
+    /// Takes the first candidate that is still current.
+    pub fn pop(&mut self, complex: &CollapseComplex) -> Option<Candidate> {
+        // Large stars add a candidate an edge at each collapse; without this they fill the memory.
+        if self.heap.len() > COMPACT_FROM.max(4 * complex.edge_count()) {
+            self.heap.retain(|candidate| candidate.is_current(complex));
+            self.heapify();
+        }
+        loop {
+            let first = self.pop_any()?;
+            if first.is_current(complex) {
+                return Some(first);
+            }
+        }
+    }
+
+    /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of its ends.
+    pub fn park(&mut self, candidate: Candidate) {
+        self.parked.insert(candidate);
+    }
+
+    /// Queues what is parked at `v` and still current, because the surroundings of `v` changed.
+    #[inline]
+    pub fn wake(&mut self, complex: &CollapseComplex, v: u32) {
+        if self.parked.is_empty() {
+            return;
+        }
+        while let Some(candidate) = self.parked.take(v) {
+            if candidate.is_current(complex) {
+                self.push(candidate);
+            }
+        }
+    }
+
+    fn pop_any(&mut self) -> Option<Candidate> {
+        let last = self.heap.pop()?;
+        let Some(first) = self.heap.first().copied() else {
+            return Some(last);
+        };
+        self.heap[0] = last;
+        self.sift_down(0);
+        Some(first)
+    }
+
+    fn heapify(&mut self) {
+        for index in (0..self.heap.len().div_ceil(4)).rev() {
+            self.sift_down(index);
+        }
+    }
+
+    #[inline]
+    fn sift_up(&mut self, mut index: usize) {
+        let moving = self.heap[index];
+        while index > 0 {
+            let parent = (index - 1) / 4;
+            if !moving.is_before(&self.heap[parent]) {
+                break;
+            }
+            self.heap[index] = self.heap[parent];
+            index = parent;
+        }
+        self.heap[index] = moving;
+    }
+
+    fn sift_down(&mut self, mut index: usize) {
+        let heap = self.heap.as_mut_slice();
+        let moving = heap[index];
+        loop {
+            let first = 4 * index + 1;
+            if first >= heap.len() {
+                break;
+            }
+            let mut least = first;
+            for child in first + 1..heap.len().min(first + 4) {
+                if heap[child].is_before(&heap[least]) {
+                    least = child;
+                }
+            }
+            if !heap[least].is_before(&moving) {
+                break;
+            }
+            heap[index] = heap[least];
+            index = least;
+        }
+        heap[index] = moving;
+    }
+}
+
+/// Rejected candidates, listed at both of their ends.
+#[derive(Clone, Debug, Default)]
+struct Parked {
+    /// First place of the list of each vertex, by id; grown on demand.
+    heads: Vec<u32>,
+    slots: Vec<Slot>,
+    free: Vec<u32>,
+    waiting: usize,
+}
+
+/// A parked candidate. Its place in the list of `ends[e]` has the number `2 * slot + e`.
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    candidate: Candidate,
+    next: [u32; 2],
+    /// Whether it was not yet woken from its other end.
+    waiting: bool,
+    /// Lists that still hold it.
+    listed: u8,
+}
+
+impl Parked {
+    fn is_empty(&self) -> bool {
+        self.waiting == 0
+    }
+
+    fn insert(&mut self, candidate: Candidate) {
+        let largest = candidate.ends[1] as usize;
+        if self.heads.len() <= largest {
+            self.heads.resize(largest + 1, NONE);
+        }
+        let next = candidate.ends.map(|end| self.heads[end as usize]);
+        let slot = Slot { candidate, next, waiting: true, listed: 2 };
+        let index = match self.free.pop() {
+            Some(index) => {
+                self.slots[index as usize] = slot;
+                index
+            }
+            None => {
+                self.slots.push(slot);
+                (self.slots.len() - 1) as u32
+            }
+        };
+        for (place, end) in (2 * index..).zip(candidate.ends) {
+            self.heads[end as usize] = place;
+        }
+        self.waiting += 1;
+    }
+
+    /// A waiting candidate of `v`, taken out of its list.
+    fn take(&mut self, v: u32) -> Option<Candidate> {
+        let head = self.heads.get_mut(v as usize)?;
+        while *head != NONE {
+            let index = *head / 2;
+            let slot = &mut self.slots[index as usize];
+            *head = slot.next[(*head % 2) as usize];
+            slot.listed -= 1;
+            if slot.listed == 0 {
+                self.free.push(index);
+            }
+            if std::mem::take(&mut slot.waiting) {
+                self.waiting -= 1;
+                return Some(slot.candidate);
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,58 @@
+//! The record of collapses, and any level of it made from the initial mesh.
+
+use super::super::MedialMesh;
+use crate::geometry::Sphere;
+
+/// One collapse, in the ids of the initial mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Collapse {
+    /// The end whose id the merged vertex has.
+    pub kept: u32,
+    /// The end whose id is retired.
+    pub removed: u32,
+    /// The merged sphere.
+    pub sphere: Sphere,
+}
+
+/// The mesh after the first collapses of a record, without repeating them: the image of the
+/// initial mesh under the simplicial map of all of them together.
+///
+/// `replay(initial, &record[..t])` is, bit for bit, the mesh that the engine had after `t`
+/// collapses, for every `t` and in any order of asking. Cost `O(n log n)`.
+///
+/// # Panics
+/// If the collapses name spheres that `initial` does not have.
+pub fn replay(initial: &MedialMesh, collapses: &[Collapse]) -> MedialMesh {
+    let mut image: Vec<u32> = (0..initial.spheres.len() as u32).collect();
+    let mut spheres = initial.spheres.clone();
+    for collapse in collapses {
+        spheres[collapse.kept as usize] = collapse.sphere;
+        image[collapse.removed as usize] = collapse.kept;
+    }
+    // Where a kept vertex went is decided by later collapses: resolve from the last to the first.
+    for collapse in collapses.iter().rev() {
+        image[collapse.removed as usize] = image[collapse.kept as usize];
+    }
+    let left: Vec<bool> = image.iter().enumerate().map(|(v, &to)| v == to as usize).collect();
+    let mut renumbered = vec![u32::MAX; left.len()];
+    for (new, old) in (0..left.len()).filter(|&v| left[v]).enumerate() {
+        renumbered[old] = new as u32;
+    }
+    let map = |v: u32| renumbered[image[v as usize] as usize];
+    let mut edges: Vec<[u32; 2]> = initial.edges.iter().map(|e| e.map(map)).collect();
+    let mut faces: Vec<[u32; 3]> = initial.faces.iter().map(|f| f.map(map)).collect();
+    for edge in &mut edges {
+        edge.sort_unstable();
+    }
+    for face in &mut faces {
+        face.sort_unstable();
+    }
+    edges.retain(|e| e[0] < e[1]);
+    faces.retain(|f| f[0] < f[1] && f[1] < f[2]);
+    edges.sort_unstable();
+    edges.dedup();
+    faces.sort_unstable();
+    faces.dedup();
+    let spheres = spheres.iter().zip(&left).filter(|&(_, &l)| l).map(|(&s, _)| s).collect();
+    MedialMesh { spheres, edges, faces, contacts: None }
+}

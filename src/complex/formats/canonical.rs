@@ -1,0 +1,87 @@
+//! From the simplices of a file to the canonical form, with a note on every repair.
+
+use super::LoadedMa;
+use crate::complex::{MedialMesh, Sphere};
+
+/// Brings the simplices of a file to canonical form: indices ascend, lists are sorted, every
+/// simplex stands once, every side of a face is an edge. The set of points covered stays the same.
+///
+/// Precondition: indices are below the number of spheres, and spheres are valid.
+pub(super) fn canonical(
+    spheres: Vec<Sphere>,
+    mut edges: Vec<[u32; 2]>,
+    mut faces: Vec<[u32; 3]>,
+    mut notes: Vec<String>,
+) -> LoadedMa {
+    note_disorder(&edges, "edge", &mut notes);
+    note_disorder(&faces, "face", &mut notes);
+    for edge in &mut edges {
+        edge.sort_unstable();
+    }
+    for face in &mut faces {
+        face.sort_unstable();
+    }
+    flatten_faces(&mut faces, &mut edges, &mut notes);
+    let all = edges.len();
+    edges.retain(|[a, b]| a != b);
+    note(&mut notes, all - edges.len(), "edge", "dropped: both ends are the same sphere");
+    sort_once(&mut edges, "edge", &mut notes);
+    sort_once(&mut faces, "face", &mut notes);
+    add_missing_edges(&mut edges, &faces, &mut notes);
+    let mesh = MedialMesh { spheres, edges, faces, contacts: None };
+    debug_assert_eq!(mesh.check(), Ok(()));
+    LoadedMa { mesh, notes }
+}
+
+/// Whether a list is in canonical order matters to nobody but those who compare files.
+fn note_disorder<const N: usize>(
+    simplices: &[[u32; N]],
+    what: &'static str,
+    notes: &mut Vec<String>,
+) {
+    let descending = simplices.iter().filter(|s| s.windows(2).any(|pair| pair[0] > pair[1]));
+    note(notes, descending.count(), what, "written with descending indices");
+    if simplices.windows(2).any(|pair| pair[0] > pair[1]) {
+        notes.push(format!("the {what}s were not in ascending order and were sorted"));
+    }
+}
+
+/// A face that names a sphere twice covers one edge: keep that, drop the face.
+fn flatten_faces(faces: &mut Vec<[u32; 3]>, edges: &mut Vec<[u32; 2]>, notes: &mut Vec<String>) {
+    let all = faces.len();
+    faces.retain(|&[a, b, c]| {
+        let proper = a != b && b != c;
+        if !proper {
+            edges.push([a, c]);
+        }
+        proper
+    });
+    note(notes, all - faces.len(), "face", "replaced by an edge: two corners are the same sphere");
+}
+
+fn sort_once<T: Ord>(simplices: &mut Vec<T>, what: &'static str, notes: &mut Vec<String>) {
+    let all = simplices.len();
+    simplices.sort_unstable();
+    simplices.dedup();
+    note(notes, all - simplices.len(), what, "listed more than once and merged");
+}
+
+fn add_missing_edges(edges: &mut Vec<[u32; 2]>, faces: &[[u32; 3]], notes: &mut Vec<String>) {
+    let listed = edges.len();
+    let mut sides: Vec<[u32; 2]> =
+        faces.iter().flat_map(|&[a, b, c]| [[a, b], [a, c], [b, c]]).collect();
+    sides.sort_unstable();
+    sides.dedup();
+    sides.retain(|side| edges.binary_search(side).is_err());
+    edges.append(&mut sides);
+    edges.sort_unstable();
+    note(notes, edges.len() - listed, "edge", "added: sides of faces that were not listed");
+}
+
+fn note(notes: &mut Vec<String>, count: usize, what: &str, verb: &str) {
+    match count {
+        0 => {}
+        1 => notes.push(format!("1 {what} was {verb}")),
+        _ => notes.push(format!("{count} {what}s were {verb}")),
+    }
+}

@@ -1,0 +1,94 @@
+//! Files that hold a medial mesh.
+//!
+//! | extension | read | written | holds |
+//! |---|---|---|---|
+//! | `.ma` | yes | yes | spheres, edges, faces: the interchange format of the field |
+//! | `.ply` | ASCII | ASCII | the same, with a vertex property `radius`, for viewers |
+//! | `.obj` | no | yes | centres, edges (`l`) and faces (`f`), without radii, for viewers |
+//!
+//! Coordinates are in the file's own unit both ways; who normalises them converts. Numbers are
+//! written with 17 significant digits, so that what is read back is bit for bit what was written.
+
+mod atomic;
+mod canonical;
+mod error;
+mod ma;
+mod obj;
+mod ply;
+mod scan;
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+
+pub use atomic::write_atomically;
+pub use error::{MaError, MaErrorKind};
+pub use ma::parse_ma;
+pub use ply::parse_ply;
+
+use super::MedialMesh;
+
+/// A medial mesh from a file, in canonical form, and what had to be done to bring it there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedMa {
+    /// The medial mesh, in the file's unit.
+    pub mesh: MedialMesh,
+    /// One sentence for each kind of repair: added edges, dropped repetitions, ignored fields.
+    /// Empty for a file that this crate wrote.
+    pub notes: Vec<String>,
+}
+
+/// Reads a medial mesh from a `.ma` or an ASCII `.ply` file, told apart by the extension.
+///
+/// # Errors
+/// When the file cannot be read, has another extension, or does not hold a medial mesh; the error
+/// names the file and the line.
+pub fn read(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
+    let path = path.as_ref();
+    match extension(path).as_str() {
+        "ma" => read_ma(path),
+        "ply" => parse_ply(load(path)?, &path.display().to_string()),
+        other => Err(MaError::of_file(path, MaErrorKind::unreadable(other))),
+    }
+}
+
+/// Reads a `.ma` file, whatever its extension.
+///
+/// # Errors
+/// When the file cannot be read or [`parse_ma`] refuses it.
+pub fn read_ma(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
+    let path = path.as_ref();
+    parse_ma(load(path)?, &path.display().to_string())
+}
+
+/// Writes a medial mesh as `.ma`, `.ply` or `.obj`, told apart by the extension.
+///
+/// The file appears under its name only when it is complete: it is written beside the target
+/// and renamed. Contact points are not part of any of these formats.
+///
+/// # Errors
+/// When the extension is another one, the mesh is not in canonical form, or writing fails.
+pub fn write(path: impl AsRef<Path>, mesh: &MedialMesh) -> Result<(), MaError> {
+    let path = path.as_ref();
+    let write_to: fn(&mut dyn Write, &MedialMesh) -> io::Result<()> = match extension(path).as_str()
+    {
+        "ma" => ma::write_to,
+        "ply" => ply::write_to,
+        "obj" => obj::write_to,
+        other => return Err(MaError::of_file(path, MaErrorKind::unwritable(other))),
+    };
+    mesh.check().map_err(|error| MaError::of_file(path, error.into()))?;
+    write_atomically(path, |out| write_to(out, mesh))
+        .map_err(|error| MaError::of_file(path, error.into()))
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+fn load(path: &Path) -> Result<Vec<u8>, MaError> {
+    fs::read(path).map_err(|error| MaError::of_file(path, error.into()))
+}
+
+#[cfg(test)]
+mod tests;

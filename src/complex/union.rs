@@ -1,0 +1,363 @@
+//! The union of the spheres, cones and slabs of a medial mesh, and distances to it.
+//!
+//! With `s_i(p)` the signed distance to the `i`-th primitive (negative inside), two readings of
+//! "distance to the reconstruction" are in use, and they differ inside:
+//!
+//! - `sigma(p) = min_i s_i(p)`: outside the union its exact distance. Inside, `-sigma` is the
+//!   depth in the deepest single primitive, a lower bound of the depth in the union.
+//! - `mu(p) = min_i |s_i(p)|`: distance to the nearest primitive surface, including those buried
+//!   inside other primitives. The reading of the Q-MAT paper (Li et al. 2015,
+//!   doi:10.1145/2753755). Never more than `|sigma|`.
+//!
+//! Each edge is evaluated once and not once for every face: the sides of a face are edges of the
+//! mesh, so a face adds only the part between its two tangent triangles. A sphere with an edge
+//! lies in that edge's cone.
+
+use std::ops::Range;
+
+use super::{ComplexError, MedialMesh};
+use crate::Vec3;
+use crate::geometry::{Bounds, Cone, Node, Search, SlabFace, Sphere, Tree, in_morton_order};
+
+/// The union of the medial primitives of a mesh, prepared for distance queries.
+///
+/// ```
+/// use medial::Vec3;
+/// use medial::complex::{MedialMesh, MedialUnion, Sphere};
+///
+/// let spheres = vec![Sphere::new(Vec3::ZERO, 1.0), Sphere::new(4.0 * Vec3::X, 1.0)];
+/// let capsule = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![])?;
+/// let union = MedialUnion::new(&capsule)?;
+/// assert_eq!(union.signed(Vec3::new(2.0, 3.0, 0.0)), 2.0);
+/// assert_eq!(union.signed(Vec3::new(2.0, 0.0, 0.0)), -1.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct MedialUnion {
+    tree: Tree,
+    /// In leaf order.
+    shapes: Vec<Shape>,
+    /// In leaf order.
+    primitives: Vec<Primitive>,
+    /// More than rounding can contribute to a distance.
+    slack: f64,
+}
+
+/// A simplex of the mesh, which stands for its medial primitive. Ordered as evaluated: of equally
+/// near primitives the smallest is reported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Primitive {
+    /// Index into [`MedialMesh::spheres`].
+    Sphere(u32),
+    /// Index into [`MedialMesh::edges`].
+    Edge(u32),
+    /// Index into [`MedialMesh::faces`].
+    Face(u32),
+}
+
+/// The answer to a query: a signed distance and the primitive it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NearestPrimitive {
+    /// Signed distance to that primitive, negative inside.
+    pub signed: f64,
+    /// The primitive. A point nearest to the side of a face reports the edge.
+    pub primitive: Primitive,
+}
+
+/// Why a medial mesh has no union.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnionError {
+    /// There is nothing to be near to.
+    #[error("the medial mesh has no spheres")]
+    Empty,
+    /// The mesh breaks its own rules.
+    #[error(transparent)]
+    Invalid(#[from] ComplexError),
+}
+
+#[derive(Clone, Debug)]
+enum Shape {
+    Sphere(Sphere),
+    Cone(Cone),
+    Slab(SlabFace),
+}
+
+impl Shape {
+    /// Signed distance, infinite where a slab leaves the answer to the cones of its sides.
+    #[inline]
+    fn signed(&self, p: Vec3) -> f64 {
+        match self {
+            Self::Sphere(sphere) => sphere.signed_distance(p),
+            Self::Cone(cone) => cone.signed_distance(p),
+            Self::Slab(face) => face.signed_distance(p).unwrap_or(f64::INFINITY),
+        }
+    }
+}
+
+impl MedialUnion {
+    /// The union of all primitives of a mesh. Cost `O(n log n)`.
+    ///
+    /// # Errors
+    /// When the mesh has no spheres, or breaks a rule of [`MedialMesh::check`].
+    pub fn new(mesh: &MedialMesh) -> Result<Self, UnionError> {
+        mesh.check()?;
+        let sphere = |v: u32| mesh.spheres[v as usize];
+        let mut isolated = vec![true; mesh.spheres.len()];
+        let mut parts = Vec::with_capacity(mesh.edges.len() + mesh.faces.len());
+        for (e, &ends) in (0..).zip(&mesh.edges) {
+            for v in ends {
+                isolated[v as usize] = false;
+            }
+            let [a, b] = ends.map(sphere);
+            parts.push((Primitive::Edge(e), Shape::Cone(Cone::new(a, b)), bounds(&[a, b])));
+        }
+        for (f, corners) in (0..).zip(&mesh.faces) {
+            let corners = corners.map(sphere);
+            // Without tangent planes the slab is the union of its cones.
+            if let Some(face) = SlabFace::new(corners) {
+                parts.push((Primitive::Face(f), Shape::Slab(face), bounds(&corners)));
+            }
+        }
+        let lone = (0..).zip(&mesh.spheres).filter(|&(v, _): &(u32, _)| isolated[v as usize]);
+        parts.extend(lone.map(|(v, &m)| (Primitive::Sphere(v), Shape::Sphere(m), bounds(&[m]))));
+        Self::over(parts)
+    }
+
+    /// The union of the spheres alone, without cones and slabs.
+    ///
+    /// # Errors
+    /// When there are none, or one is not finite or of negative radius.
+    pub fn of_spheres(spheres: &[Sphere]) -> Result<Self, UnionError> {
+        let mesh = MedialMesh { spheres: spheres.to_vec(), ..MedialMesh::default() };
+        Self::new(&mesh)
+    }
+
+    fn over(parts: Vec<(Primitive, Shape, (Bounds, f64))>) -> Result<Self, UnionError> {
+        if parts.is_empty() {
+            return Err(UnionError::Empty);
+        }
+        let boxes: Vec<_> = parts.iter().map(|&(_, _, bounds)| bounds).collect();
+        let tree = Tree::build(&boxes);
+        let in_order = || tree.order().iter().map(|&part| &parts[part as usize]);
+        let shapes = in_order().map(|(_, shape, _)| shape.clone()).collect();
+        let primitives = in_order().map(|&(primitive, _, _)| primitive).collect();
+        let Bounds { lo, hi } = tree.bounds();
+        let slack = 64.0 * f64::EPSILON * lo.abs().max(hi.abs()).max_element();
+        Ok(Self { tree, shapes, primitives, slack })
+    }
+
+    /// Number of primitives that are evaluated.
+    pub fn primitive_count(&self) -> usize {
+        self.shapes.len()
+    }
+
+    /// Smallest and largest corner of an axis-parallel box around the union.
+    pub fn bounding_box(&self) -> (Vec3, Vec3) {
+        let Bounds { lo, hi } = self.tree.bounds();
+        (lo, hi)
+    }
+
+    /// `sigma(p)`: the least signed distance to a primitive. Positive outside the union and then
+    /// exact; inside, `-sigma` is a lower bound of the depth. Not a number in, not a number out.
+    pub fn signed(&self, p: Vec3) -> f64 {
+        self.deepest(p).signed
+    }
+
+    /// `mu(p)`: the least distance to the surface of a primitive, buried or not.
+    pub fn unsigned_nearest(&self, p: Vec3) -> f64 {
+        self.nearest_surface(p).signed.abs()
+    }
+
+    /// The primitive of least signed distance.
+    pub fn deepest(&self, p: Vec3) -> NearestPrimitive {
+        self.query::<Signed>(p, 0).0
+    }
+
+    /// The primitive whose surface is nearest.
+    pub fn nearest_surface(&self, p: Vec3) -> NearestPrimitive {
+        self.query::<Unsigned>(p, 0).0
+    }
+
+    /// [`signed`](Self::signed) for many points, in their order, in parallel.
+    pub fn signed_batch(&self, points: &[Vec3]) -> Vec<f64> {
+        in_morton_order(points, |last: &mut usize, p| {
+            let (nearest, place) = self.query::<Signed>(p, *last);
+            *last = place;
+            nearest.signed
+        })
+    }
+
+    /// [`unsigned_nearest`](Self::unsigned_nearest) for many points, in their order, in parallel.
+    pub fn unsigned_nearest_batch(&self, points: &[Vec3]) -> Vec<f64> {
+        in_morton_order(points, |last: &mut usize, p| {
+            let (nearest, place) = self.query::<Unsigned>(p, *last);
+            *last = place;
+            nearest.signed.abs()
+        })
+    }
+
+    /// [`deepest`](Self::deepest) for many points, in their order, in parallel.
+    pub fn deepest_batch(&self, points: &[Vec3]) -> Vec<NearestPrimitive> {
+        in_morton_order(points, |last: &mut usize, p| {
+            let (nearest, place) = self.query::<Signed>(p, *last);
+            *last = place;
+            nearest
+        })
+    }
+
+    /// [`nearest_surface`](Self::nearest_surface) for many points, in their order, in parallel.
+    pub fn nearest_surface_batch(&self, points: &[Vec3]) -> Vec<NearestPrimitive> {
+        in_morton_order(points, |last: &mut usize, p| {
+            let (nearest, place) = self.query::<Unsigned>(p, *last);
+            *last = place;
+            nearest
+        })
+    }
+
+    /// Whether some primitive holds `p` more than `depth` below its surface.
+    pub fn buries(&self, p: Vec3, depth: f64) -> bool {
+        let mut search = Buried { union: self, p, limit: -depth };
+        self.tree.search(&mut search);
+        search.limit == f64::NEG_INFINITY
+    }
+
+    fn query<M: Measure>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
+        let signed = self.shapes[start].signed(p);
+        let mut search = Nearest::<M> {
+            union: self,
+            p,
+            place: start,
+            signed,
+            value: M::value(signed),
+            limit: f64::INFINITY,
+            measure: std::marker::PhantomData,
+        };
+        search.tighten();
+        self.tree.search(&mut search);
+        let primitive = self.primitives[search.place];
+        (NearestPrimitive { signed: search.signed, primitive }, search.place)
+    }
+}
+
+/// Box around the balls, and the largest radius.
+fn bounds(balls: &[Sphere]) -> (Bounds, f64) {
+    let corners = balls.iter().flat_map(|m| {
+        let arm = Vec3::splat(m.radius);
+        [m.centre - arm, m.centre + arm]
+    });
+    (Bounds::of_points(corners), balls.iter().fold(0.0, |r, m| f64::max(r, m.radius)))
+}
+
+/// Lower bound of the signed distances to the primitives below a node.
+///
+/// Outside the box, the distance to the box. Inside it no primitive holds the point deeper than
+/// the box does, nor deeper than its own largest radius.
+#[inline]
+fn signed_bound(node: &Node, p: Vec3) -> f64 {
+    let outside = (node.bounds.lo - p).max(p - node.bounds.hi);
+    let nearest = outside.max_element();
+    if nearest > 0.0 { outside.max(Vec3::ZERO).length() } else { nearest.max(-node.reach) }
+}
+
+/// Which of the two distances is minimised.
+trait Measure {
+    fn value(signed: f64) -> f64;
+    /// A lower bound of the value from a lower bound of the signed distance.
+    fn bound(signed: f64) -> f64;
+}
+
+enum Signed {}
+
+impl Measure for Signed {
+    fn value(signed: f64) -> f64 {
+        signed
+    }
+
+    fn bound(signed: f64) -> f64 {
+        signed
+    }
+}
+
+enum Unsigned {}
+
+impl Measure for Unsigned {
+    fn value(signed: f64) -> f64 {
+        signed.abs()
+    }
+
+    fn bound(signed: f64) -> f64 {
+        signed.max(0.0)
+    }
+}
+
+struct Nearest<'a, M> {
+    union: &'a MedialUnion,
+    p: Vec3,
+    place: usize,
+    signed: f64,
+    value: f64,
+    limit: f64,
+    measure: std::marker::PhantomData<M>,
+}
+
+impl<M: Measure> Nearest<'_, M> {
+    /// Sets the limit above the best value by more than both can be rounded.
+    #[inline]
+    fn tighten(&mut self) {
+        self.limit = self.value + self.value.abs() * 1e-14 + self.union.slack;
+    }
+}
+
+impl<M: Measure> Search for Nearest<'_, M> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        M::bound(signed_bound(node, self.p))
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        let union = self.union;
+        for place in places {
+            let signed = union.shapes[place].signed(self.p);
+            let value = M::value(signed);
+            let first =
+                value == self.value && union.primitives[place] < union.primitives[self.place];
+            if value < self.value || first {
+                (self.place, self.signed, self.value) = (place, signed, value);
+                self.tighten();
+            }
+        }
+    }
+}
+
+/// Search for any primitive that holds the point deeply.
+struct Buried<'a> {
+    union: &'a MedialUnion,
+    p: Vec3,
+    /// Minus the depth, and minus infinity once a primitive is found.
+    limit: f64,
+}
+
+impl Search for Buried<'_> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        signed_bound(node, self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, mut places: Range<usize>) {
+        if places.any(|place| self.union.shapes[place].signed(self.p) < self.limit) {
+            self.limit = f64::NEG_INFINITY;
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! The Voronoi medial mesh: the part of the Voronoi diagram of boundary samples inside the surface.
+//!
+//! Amenta, Bern: *Surface reconstruction by Voronoi filtering*, SoCG 1998,
+//! doi:10.1145/276884.276889, without the filtering by poles; the initial mesh of Q-MAT.
+//!
+//! 1. Each finite Delaunay cell whose circumcentre lies inside the surface is a medial sphere that
+//!    touches the four samples of the cell ([`CellSpheres`]).
+//! 2. Each facet between two such cells is a medial edge.
+//! 3. Each Delaunay edge all of whose cells are finite and inside has a convex planar Voronoi
+//!    polygon, which is triangulated ([`DualTriangulation`]).
+//!
+//! Coincident circumcentres stay apart: merging by position can close loops, and the published
+//! counts are those before any merging.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use spade::{DelaunayTriangulation, Point2, Triangulation as _};
+
+use crate::Vec3;
+use crate::complex::{Contacts, MedialMesh, Sphere};
+use crate::geometry::triangulation::Triangulation;
+use crate::geometry::{CellId, Delaunay, TriangleBvh};
+use crate::surface::{InsideTest, Side};
+
+/// Circumcentres closer to the surface than this count as outside, in units of the diagonal.
+const GUARD_BAND: f64 = 1e-9;
+
+/// How a dual Voronoi polygon is cut into triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DualTriangulation {
+    /// A fan from the vertex of the smallest id, as published.
+    #[default]
+    Fan,
+    /// The planar Delaunay triangulation: larger smallest angles.
+    Delaunay,
+}
+
+/// The circumspheres of the finite Delaunay cells that are centred inside the surface.
+pub struct CellSpheres {
+    /// Circumsphere of each finite cell; `None` for those centred outside.
+    inside: Vec<Option<Sphere>>,
+    /// Circumcentres inside the surface but within the guard band of it, counted as outside.
+    pub in_guard_band: usize,
+}
+
+impl CellSpheres {
+    /// Computes and classifies the circumcentre of every finite cell, in parallel.
+    pub fn classify(delaunay: &Delaunay, inside: &InsideTest, surface: &TriangleBvh) -> Self {
+        let cells = delaunay.triangulation();
+        let spheres: Vec<Option<Sphere>> = (0..cells.finite_cell_count() as u32)
+            .into_par_iter()
+            .map(|cell| {
+                let (centre, radius) = delaunay.circumsphere(CellId(cell))?;
+                (centre.is_finite() && radius.is_finite()).then_some(Sphere::new(centre, radius))
+            })
+            .collect();
+        let centres: Vec<Vec3> = spheres.iter().flatten().map(|s| s.centre).collect();
+        let sides = inside.sides(&centres);
+        let near: Vec<bool> = centres
+            .par_iter()
+            .zip(&sides)
+            .map(|(&c, &side)| side == Side::Inside && surface.any_within(c, GUARD_BAND))
+            .collect();
+        let mut verdicts = sides.iter().zip(&near);
+        let inside = spheres.into_iter().map(|sphere| {
+            let sphere = sphere?;
+            let (&side, &near) = verdicts.next()?;
+            (side == Side::Inside && !near).then_some(sphere)
+        });
+        Self { inside: inside.collect(), in_guard_band: near.iter().filter(|&&near| near).count() }
+    }
+
+    /// Number of cells centred inside.
+    pub fn inside_count(&self) -> usize {
+        self.inside.iter().flatten().count()
+    }
+
+    fn is_inside(&self, cell: CellId) -> bool {
+        // Finite cells come first; infinite ones are beyond the list.
+        self.inside.get(cell.index()).is_some_and(Option::is_some)
+    }
+}
+
+/// The Voronoi medial mesh of a triangulation of boundary samples, with contact points. Spheres
+/// are in the order of the cells. Parallel; the same mesh for any number of threads.
+pub fn voronoi_medial_mesh(
+    delaunay: &Delaunay,
+    cells: &CellSpheres,
+    samples: &Arc<[Vec3]>,
+    dual: DualTriangulation,
+) -> MedialMesh {
+    let triangulation = delaunay.triangulation();
+    let kept: Vec<CellId> = triangulation.finite_cells().filter(|&c| cells.is_inside(c)).collect();
+    let mut sphere_of_cell = vec![u32::MAX; triangulation.cell_count()];
+    for (sphere, cell) in kept.iter().enumerate() {
+        sphere_of_cell[cell.index()] = sphere as u32;
+    }
+    let spheres: Vec<Sphere> = cells.inside.iter().flatten().copied().collect();
+    let sphere = |cell: CellId| sphere_of_cell[cell.index()];
+
+    let edges = kept.par_iter().flat_map_iter(|&cell| {
+        let neighbours = triangulation.neighbours(cell).into_iter();
+        neighbours
+            .filter(move |&other| other > cell && cells.is_inside(other))
+            .map(move |other| [sphere(cell), sphere(other)])
+    });
+    let faces = kept.par_iter().flat_map_iter(|&cell| {
+        let polygons = EDGES_OF_CELL.into_iter().filter_map(move |(i, j)| {
+            let ring = dual_polygon(triangulation, cells, cell, i, j)?;
+            Some(ring.into_iter().map(sphere).collect::<Vec<u32>>())
+        });
+        polygons.flat_map(|polygon| triangulate(&polygon, &spheres, dual))
+    });
+    let (edges, faces) = (edges.collect(), faces.collect());
+    let mut mesh = MedialMesh::from_simplices(spheres, edges, faces)
+        .expect("circumspheres are finite and ids in range");
+    mesh.contacts = Some(Contacts {
+        samples: Arc::clone(samples),
+        of_sphere: kept.iter().map(|&c| triangulation.vertices(c).map(|v| v.0)).collect(),
+    });
+    mesh
+}
+
+/// The six edges of a tetrahedron, as pairs of vertex positions.
+const EDGES_OF_CELL: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+
+/// The cells around edge `(i, j)` of `cell` in rotational order, starting with `cell`, if `cell` is
+/// the smallest of them (each edge is dualised once) and all are finite and inside.
+fn dual_polygon(
+    triangulation: &Triangulation,
+    cells: &CellSpheres,
+    cell: CellId,
+    i: usize,
+    j: usize,
+) -> Option<Vec<CellId>> {
+    let mut ring = Vec::with_capacity(8);
+    for other in triangulation.edge_ring(cell, i, j) {
+        if other < cell || !cells.is_inside(other) {
+            return None;
+        }
+        ring.push(other);
+    }
+    Some(ring)
+}
+
+fn triangulate(polygon: &[u32], spheres: &[Sphere], dual: DualTriangulation) -> Vec<[u32; 3]> {
+    match dual {
+        DualTriangulation::Fan => fan(polygon),
+        DualTriangulation::Delaunay if polygon.len() == 3 => fan(polygon),
+        DualTriangulation::Delaunay => {
+            planar_delaunay(polygon, spheres).unwrap_or_else(|| fan(polygon))
+        }
+    }
+}
+
+/// A fan from the first vertex, which is the one of the smallest id.
+fn fan(polygon: &[u32]) -> Vec<[u32; 3]> {
+    polygon[1..].windows(2).map(|pair| [polygon[0], pair[0], pair[1]]).collect()
+}
+
+/// The Delaunay triangulation of a convex planar polygon, or `None` where coincident or collinear
+/// vertices leave fewer than `n - 2` triangles; the caller then falls back to the fan.
+fn planar_delaunay(polygon: &[u32], spheres: &[Sphere]) -> Option<Vec<[u32; 3]>> {
+    let centre = |v: u32| spheres[v as usize].centre;
+    let origin = centre(polygon[0]);
+    // Newell's normal: the sum of the fan's area vectors.
+    let normal: Vec3 = polygon[1..]
+        .windows(2)
+        .map(|pair| (centre(pair[0]) - origin).cross(centre(pair[1]) - origin))
+        .sum();
+    let normal = normal.try_normalize()?;
+    let (u, v) = normal.any_orthonormal_pair();
+    let mut plane: DelaunayTriangulation<Point2<f64>> = DelaunayTriangulation::new();
+    for (k, &id) in polygon.iter().enumerate() {
+        let p = centre(id) - origin;
+        let handle = plane.insert(Point2::new(p.dot(u), p.dot(v))).ok()?;
+        if handle.index() != k {
+            return None;
+        }
+    }
+    let triangles: Vec<[u32; 3]> = plane
+        .inner_faces()
+        .map(|face| face.vertices().map(|vertex| polygon[vertex.fix().index()]))
+        .collect();
+    (triangles.len() + 2 == polygon.len()).then_some(triangles)
+}

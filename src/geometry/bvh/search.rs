@@ -1,0 +1,64 @@
+//! Searching the tree: nearest box first, giving up boxes beyond the limit.
+
+use std::ops::Range;
+
+use super::build::MAX_DEPTH;
+use super::{Node, Tree};
+
+/// What is looked for in a tree.
+pub(crate) trait Search {
+    /// A lower bound over all items below a node, in whatever measure `limit` is in.
+    fn bound(&self, node: &Node) -> f64;
+
+    /// Nodes whose bound is above this hold nothing of interest.
+    fn limit(&self) -> f64;
+
+    /// Looks at the items of a leaf, given as places in [`Tree::order`].
+    fn visit(&mut self, places: Range<usize>);
+}
+
+impl Tree {
+    /// Shows the leaves to a search, roughly from near to far.
+    #[inline]
+    pub fn search(&self, search: &mut impl Search) {
+        let Some(root) = self.nodes.first() else {
+            return;
+        };
+        // A node is popped before its two children are pushed, so the stack grows by one a level.
+        let mut stack = [(0.0, 0_u32); MAX_DEPTH + 1];
+        let mut height = 0;
+        let mut node = root;
+        if search.bound(root) > search.limit() {
+            return;
+        }
+        loop {
+            let first = node.first as usize;
+            if node.count > 0 {
+                search.visit(first..first + node.count as usize);
+            } else {
+                let bounds = [first, first + 1].map(|child| search.bound(&self.nodes[child]));
+                let near = usize::from(bounds[1] < bounds[0]);
+                let limit = search.limit();
+                if bounds[near] <= limit {
+                    if bounds[1 - near] <= limit {
+                        stack[height] = (bounds[1 - near], (first + 1 - near) as u32);
+                        height += 1;
+                    }
+                    node = &self.nodes[first + near];
+                    continue;
+                }
+            }
+            loop {
+                if height == 0 {
+                    return;
+                }
+                height -= 1;
+                let (bound, index) = stack[height];
+                if bound <= search.limit() {
+                    node = &self.nodes[index as usize];
+                    break;
+                }
+            }
+        }
+    }
+}

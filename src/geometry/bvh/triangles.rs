@@ -1,0 +1,315 @@
+//! Closest point on a triangle mesh.
+
+use std::ops::Range;
+
+use super::super::planar_frame::{Part, PlanarFrame};
+use super::{Bounds, Node, Search, Tree, in_morton_order};
+use crate::Vec3;
+use crate::surface::TriMesh;
+
+/// Coordinates beyond this would overflow when squared.
+const LARGEST: f64 = 1e150;
+
+/// A bounding-volume tree over triangles. Triangles of no area are segments or points, and valid.
+///
+/// Lengths are in the unit of the triangles.
+///
+/// ```
+/// use medial::Vec3;
+/// use medial::geometry::{Feature, TriangleBvh};
+/// use medial::surface::TriMesh;
+///
+/// let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+/// let bvh = TriangleBvh::new(&TriMesh { vertices, faces: vec![[0, 1, 2]] })?;
+/// let closest = bvh.closest(Vec3::new(0.5, -3.0, 4.0));
+/// assert_eq!(closest.distance, 5.0);
+/// assert_eq!(closest.point, Vec3::new(0.5, 0.0, 0.0));
+/// assert_eq!(closest.feature, Feature::Edge(0));
+/// # Ok::<(), medial::geometry::BvhError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct TriangleBvh {
+    tree: Tree,
+    /// In leaf order.
+    frames: Vec<PlanarFrame>,
+    /// In leaf order.
+    corners: Vec<[Vec3; 3]>,
+    /// In leaf order, which corner the frame starts at.
+    firsts: Vec<u8>,
+    /// For each face its place in leaf order.
+    places: Vec<u32>,
+    /// More than rounding can contribute to a distance between a query and these triangles, as
+    /// long as the query is not farther away than the mesh is large.
+    slack: f64,
+}
+
+/// The closest point of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closest {
+    /// The point.
+    pub point: Vec3,
+    /// Its distance from the query.
+    pub distance: f64,
+    /// Index of a face that holds it: of several equally near ones the smallest.
+    pub face: u32,
+    /// The part of that face that holds it.
+    pub feature: Feature,
+}
+
+/// A part of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feature {
+    /// The inside.
+    Face,
+    /// The side from corner `k` to corner `k + 1` modulo 3, without its ends.
+    Edge(u8),
+    /// Corner `k`.
+    Vertex(u8),
+}
+
+/// Why no tree can be built over a mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BvhError {
+    /// There is nothing to be near to.
+    #[error("the mesh has no faces")]
+    Empty,
+    /// A corner is not a number or too large to be squared.
+    #[error("face {face} has the corner {corner}, which is not finite or exceeds 1e150")]
+    Corner {
+        /// Index of the face.
+        face: usize,
+        /// The corner.
+        corner: Vec3,
+    },
+}
+
+impl TriangleBvh {
+    /// A tree over the faces of a mesh. Cost `O(n log n)`.
+    ///
+    /// # Errors
+    /// When the mesh has no faces, or a corner of one is not finite.
+    ///
+    /// # Panics
+    /// If a face names a vertex that does not exist.
+    pub fn new(mesh: &TriMesh) -> Result<Self, BvhError> {
+        Self::from_triangles(&(0..mesh.faces.len()).map(|f| mesh.triangle(f)).collect::<Vec<_>>())
+    }
+
+    /// A tree over triangles given by their corners. A segment repeats a corner, a point is three
+    /// times the same.
+    ///
+    /// # Errors
+    /// When there are none, or a corner is not finite.
+    pub fn from_triangles(triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
+        if triangles.is_empty() {
+            return Err(BvhError::Empty);
+        }
+        for (face, corners) in triangles.iter().enumerate() {
+            let fits = |corner: &&Vec3| corner.abs().max_element() <= LARGEST && !corner.is_nan();
+            if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
+                return Err(BvhError::Corner { face, corner });
+            }
+        }
+        let boxes: Vec<_> = triangles.iter().map(|&t| (Bounds::of_points(t), 0.0)).collect();
+        let tree = Tree::build(&boxes);
+        let corners: Vec<_> = tree.order().iter().map(|&f| triangles[f as usize]).collect();
+        let mut places = vec![0; triangles.len()];
+        for (place, &face) in (0..).zip(tree.order()) {
+            places[face as usize] = place;
+        }
+        let Bounds { lo, hi } = tree.bounds();
+        let slack = 64.0 * f64::EPSILON * lo.abs().max(hi.abs()).max_element();
+        let (frames, firsts) = corners
+            .iter()
+            .map(|&t| {
+                let (frame, first) = PlanarFrame::new(t);
+                (frame, first as u8)
+            })
+            .unzip();
+        Ok(Self { tree, frames, corners, firsts, places, slack })
+    }
+
+    /// Number of triangles.
+    pub fn face_count(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// The closest point to `p`. Not a number in, not a number out.
+    pub fn closest(&self, p: Vec3) -> Closest {
+        self.closest_from(p, None)
+    }
+
+    /// The closest point to `p`, found sooner when `start` is a face near to it. The answer is the
+    /// same for every start.
+    ///
+    /// # Panics
+    /// If `start` is not a face.
+    pub fn closest_from(&self, p: Vec3, start: Option<u32>) -> Closest {
+        let place = start.map_or(0, |face| self.places[face as usize]);
+        self.closest_at(p, place).1
+    }
+
+    /// The closest points to many queries, in their order, in parallel. Cost per query is about
+    /// half that of single queries, as each starts from its neighbour's answer.
+    pub fn closest_batch(&self, points: &[Vec3]) -> Vec<Closest> {
+        in_morton_order(points, |last: &mut u32, p| {
+            let (place, closest) = self.closest_at(p, *last);
+            *last = place;
+            closest
+        })
+    }
+
+    /// The distances of many queries, in their order, in parallel.
+    pub fn distance_batch(&self, points: &[Vec3]) -> Vec<f64> {
+        in_morton_order(points, |last: &mut u32, p| {
+            let search = self.nearest(Nearest::starting(self, p, *last as usize));
+            *last = search.place as u32;
+            search.squared.sqrt()
+        })
+    }
+
+    /// The closest point to `p` that is not farther away than `bound`, if there is one.
+    pub fn closest_within(&self, p: Vec3, bound: f64) -> Option<Closest> {
+        let found = self.nearest(Nearest::within(self, p, bound));
+        (found.place != NONE).then(|| self.describe(p, found.place, found.squared))
+    }
+
+    /// Whether some point of the mesh is not farther away from `p` than `distance`.
+    pub fn any_within(&self, p: Vec3, distance: f64) -> bool {
+        if distance.is_nan() || distance < 0.0 {
+            return false;
+        }
+        let limit = padded(distance, self.slack);
+        let mut search = Any { bvh: self, p, squared: distance * distance, limit };
+        self.tree.search(&mut search);
+        search.limit < 0.0
+    }
+
+    fn closest_at(&self, p: Vec3, start: u32) -> (u32, Closest) {
+        let found = self.nearest(Nearest::starting(self, p, start as usize));
+        (found.place as u32, self.describe(p, found.place, found.squared))
+    }
+
+    fn nearest<'a>(&'a self, mut search: Nearest<'a>) -> Nearest<'a> {
+        self.tree.search(&mut search);
+        search
+    }
+
+    fn describe(&self, p: Vec3, place: usize, squared: f64) -> Closest {
+        let frame = &self.frames[place];
+        let corners = &self.corners[place];
+        let first = usize::from(self.firsts[place]);
+        let corner = |k: usize| (first + k) % 3;
+        let (part, t) = frame.nearest_part(p);
+        let (feature, point) = match part {
+            Part::Face => {
+                let [x, y, _] = frame.local(p);
+                (Feature::Face, frame.point(x, y))
+            }
+            Part::Side(k) => {
+                let (a, b) = (corners[corner(k)], corners[corner(k + 1)]);
+                (Feature::Edge(corner(k) as u8), a.lerp(b, t))
+            }
+            Part::Corner(k) => (Feature::Vertex(corner(k) as u8), corners[corner(k)]),
+        };
+        Closest { point, distance: squared.sqrt(), face: self.tree.order()[place], feature }
+    }
+}
+
+/// No place.
+const NONE: usize = usize::MAX;
+
+/// The square of a distance increased by more than rounding can have taken from it.
+#[inline]
+fn padded(distance: f64, slack: f64) -> f64 {
+    let limit = distance * (1.0 + 1e-14) + slack;
+    limit * limit
+}
+
+/// Search for the closest triangle.
+struct Nearest<'a> {
+    bvh: &'a TriangleBvh,
+    p: Vec3,
+    squared: f64,
+    place: usize,
+    limit: f64,
+}
+
+impl<'a> Nearest<'a> {
+    fn starting(bvh: &'a TriangleBvh, p: Vec3, place: usize) -> Self {
+        let squared = bvh.frames[place].distance_squared(p);
+        let mut search = Self { bvh, p, squared, place, limit: 0.0 };
+        search.tighten();
+        search
+    }
+
+    fn within(bvh: &'a TriangleBvh, p: Vec3, bound: f64) -> Self {
+        let squared = if bound >= 0.0 { bound * bound } else { -1.0 };
+        let mut search = Self { bvh, p, squared, place: NONE, limit: -1.0 };
+        if bound >= 0.0 {
+            search.tighten();
+        }
+        search
+    }
+
+    fn tighten(&mut self) {
+        self.limit = padded(self.squared.sqrt(), self.bvh.slack);
+    }
+}
+
+impl Search for Nearest<'_> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        node.bounds.distance_squared(self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        let order = self.bvh.tree.order();
+        for place in places {
+            let squared = self.bvh.frames[place].distance_squared(self.p);
+            if squared > self.squared {
+                continue;
+            }
+            let first = self.place == NONE || order[place] < order[self.place];
+            if squared < self.squared || first {
+                self.place = place;
+                self.squared = squared;
+                self.tighten();
+            }
+        }
+    }
+}
+
+/// Search for any triangle within a distance.
+struct Any<'a> {
+    bvh: &'a TriangleBvh,
+    p: Vec3,
+    squared: f64,
+    /// Negative once one is found.
+    limit: f64,
+}
+
+impl Search for Any<'_> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        node.bounds.distance_squared(self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, mut places: Range<usize>) {
+        if places.any(|k| self.bvh.frames[k].distance_squared(self.p) <= self.squared) {
+            self.limit = -1.0;
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Signed distance to the convex hull of two balls: the medial cone of an edge.
+//!
+//! The hull is the union of the balls `B(c(t), r(t))`, `t` in `[0, 1]`, so the signed distance is
+//! the minimum over `t` of `|p - c(t)| - r(t)`: convex in `t`, which makes clamping exact.
+//!
+//! # Notation
+//! | | |
+//! |---|---|
+//! | `u`, `l` | unit axis from the first to the second centre, and their distance |
+//! | `s` | slope `(r_2 - r_1) / l` of the radius, `abs(s) < 1` unless one ball holds the other |
+//! | `xi`, `y` | coordinate of the query along the axis, and its distance from the axis |
+//! | `tau` | coordinate of the best centre, `xi + y s / sqrt(1 - s^2)` clamped to `[0, l]` |
+//!
+//! The distance is evaluated at `tau` and not by the closed form of the tangent line: near
+//! internal tangency `tau` carries few digits, but the objective is flat there.
+
+use super::{ConeFrame, HullFoot, Sphere};
+use crate::Vec3;
+
+/// The convex hull of two balls, prepared for distance queries.
+///
+/// When one ball holds the other (tangency and equality included) the hull is the larger ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    start: Vec3,
+    axis: Vec3,
+    length: f64,
+    /// Radius at `start`.
+    radius: f64,
+    slope: f64,
+    /// `s / sqrt(1 - s^2)`: how far the best centre lies ahead, for each unit of `y`.
+    lead: f64,
+    /// Which of the two balls holds the other.
+    larger: Option<usize>,
+}
+
+impl Cone {
+    /// The hull of two balls.
+    pub fn new(first: Sphere, second: Sphere) -> Self {
+        let across = second.centre - first.centre;
+        let growth = second.radius - first.radius;
+        if across.length_squared() <= growth * growth {
+            let larger = usize::from(growth > 0.0);
+            return Self::ball([first, second][larger], larger);
+        }
+        let length = across.length();
+        // Product form: 1 - s^2 would cancel near tangency.
+        let rise = ((length - growth) * (length + growth)).max(0.0).sqrt();
+        Self {
+            start: first.centre,
+            axis: across / length,
+            length,
+            radius: first.radius,
+            slope: growth / length,
+            lead: if rise > 0.0 { growth / rise } else { 0.0 },
+            larger: None,
+        }
+    }
+
+    fn ball(sphere: Sphere, larger: usize) -> Self {
+        Self {
+            start: sphere.centre,
+            axis: Vec3::ZERO,
+            length: 0.0,
+            radius: sphere.radius,
+            slope: 0.0,
+            lead: 0.0,
+            larger: Some(larger),
+        }
+    }
+
+    /// Which ball (0 or 1) holds the other, if one does.
+    pub fn larger(&self) -> Option<usize> {
+        self.larger
+    }
+
+    /// Signed distance of `p` to the boundary of the hull, negative inside. Exact on both sides.
+    #[inline]
+    pub fn signed_distance(&self, p: Vec3) -> f64 {
+        let (tau, squared) = self.best_centre(p);
+        squared.sqrt() - (self.radius + tau * self.slope)
+    }
+
+    /// Coordinate of the best centre, and squared distance of `p` from it.
+    #[inline]
+    fn best_centre(&self, p: Vec3) -> (f64, f64) {
+        let w = p - self.start;
+        let xi = w.dot(self.axis);
+        // As a vector: sqrt(|w|^2 - xi^2) loses half the digits near the axis.
+        let y_squared = (w - xi * self.axis).length_squared();
+        let tau = (xi + y_squared.sqrt() * self.lead).clamp(0.0, self.length);
+        (tau, (xi - tau) * (xi - tau) + y_squared)
+    }
+
+    /// Where `p` is nearest to the boundary of the hull. On the axis, where a whole circle is
+    /// nearest, one of its points is returned.
+    pub fn foot(&self, p: Vec3) -> HullFoot<2> {
+        let (tau, _) = self.best_centre(p);
+        let sphere = Sphere::new(self.start + tau * self.axis, self.radius + tau * self.slope);
+        let weights = match self.larger {
+            Some(0) => [1.0, 0.0],
+            Some(_) => [0.0, 1.0],
+            None => {
+                let t = tau / self.length;
+                [1.0 - t, t]
+            }
+        };
+        HullFoot::towards(sphere, weights, p, || {
+            self.frame().map_or(Vec3::X, |frame| frame.normal(frame.v))
+        })
+    }
+
+    /// The axis frame from which the tangent planes follow, or `None` when one ball holds the
+    /// other and there are none.
+    pub fn frame(&self) -> Option<ConeFrame> {
+        self.larger.is_none().then(|| ConeFrame::new(self.axis, self.slope))
+    }
+}

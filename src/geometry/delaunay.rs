@@ -1,0 +1,196 @@
+//! The Delaunay triangulation of points in space.
+//!
+//! Exact and unique for every input: cospherical points are resolved by the symbolic perturbation
+//! of [`super::predicates`], which never makes a flat cell, so grids, spheres, cylinders and
+//! coplanar subsets give one valid triangulation, whatever the order of the points.
+
+use std::ops::Deref;
+
+use super::predicates::{
+    MAX_COORDINATE, PowerFilter, Sign, Site, Unweighted, circumsphere, exact_orientation,
+    lexicographic,
+};
+use super::triangulation::{
+    CellId, Facet, Triangulated, Triangulation, TriangulationError, VertexId, Violation,
+    triangulate,
+};
+use crate::Vec3;
+
+/// The Delaunay triangulation of points in space.
+///
+/// Dereferences to its [`Triangulation`], whose vertex ids are indices of the input points.
+///
+/// ```
+/// use medial::{Vec3, geometry::delaunay::Delaunay};
+///
+/// let corners: Vec<Vec3> = (0..8u32)
+///     .map(|i| Vec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)))
+///     .collect();
+/// let cube = Delaunay::new(&corners)?;
+/// assert_eq!(cube.infinite_cell_count(), 12);
+/// for cell in cube.finite_cells() {
+///     let (centre, radius) = cube.circumsphere(cell).unwrap();
+///     assert_eq!(centre, Vec3::splat(0.5));
+///     assert!((radius - 0.75f64.sqrt()).abs() < 1e-15);
+/// }
+/// # Ok::<(), medial::geometry::triangulation::TriangulationError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Delaunay {
+    triangulation: Triangulation,
+    sites: Vec<Site>,
+    duplicates: Vec<(VertexId, VertexId)>,
+    filter: PowerFilter,
+}
+
+/// Where a position is in a triangulation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Location {
+    /// On a vertex.
+    Vertex(VertexId),
+    /// In the interior of an edge: a cell and the indices of the edge's vertices in it.
+    Edge(CellId, usize, usize),
+    /// In the interior of a facet.
+    Facet(Facet),
+    /// In the interior of a finite cell.
+    Cell(CellId),
+    /// Strictly outside the convex hull, beyond the facet of this infinite cell.
+    Outside(CellId),
+}
+
+impl Delaunay {
+    /// Triangulates `points`, in any unit.
+    ///
+    /// Repeated points are recorded, see [`Delaunay::representative`]. Incremental insertion with
+    /// exact predicates: expected `O(n log n)` for points in random position and near that for
+    /// samples of surfaces, `O(n^2)` at worst.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite or exceeds [`MAX_COORDINATE`]; fewer than four distinct
+    /// points; all points on one line or in one plane; more points than ids.
+    pub fn new(points: &[Vec3]) -> Result<Self, TriangulationError> {
+        let sites = admissible_sites(points)?;
+        let Triangulated { triangulation, repeated, filter } = triangulate::<Unweighted>(&sites)?;
+        let duplicates = repeated.into_iter().map(|(i, j)| (VertexId(i), VertexId(j))).collect();
+        Ok(Self { triangulation, sites, duplicates, filter })
+    }
+
+    /// The combinatorial triangulation.
+    pub fn triangulation(&self) -> &Triangulation {
+        &self.triangulation
+    }
+
+    /// The position of a finite vertex.
+    ///
+    /// # Panics
+    /// If the vertex is the one at infinity.
+    #[inline]
+    pub fn point(&self, vertex: VertexId) -> Vec3 {
+        Vec3::from_array(self.sites[vertex.index()].p)
+    }
+
+    /// The number of input points, repeated ones included.
+    pub fn point_count(&self) -> usize {
+        self.sites.len()
+    }
+
+    /// The input points that repeat the position of another, each with the one that is a vertex:
+    /// the first at that position. Ascending.
+    pub fn duplicates(&self) -> &[(VertexId, VertexId)] {
+        &self.duplicates
+    }
+
+    /// The vertex at the position of an input point: the point itself unless it is a duplicate.
+    pub fn representative(&self, point: VertexId) -> VertexId {
+        match self.duplicates.binary_search_by_key(&point, |d| d.0) {
+            Ok(found) => self.duplicates[found].1,
+            Err(_) => point,
+        }
+    }
+
+    /// The centre and radius of the circumsphere of a finite cell, see
+    /// [`circumsphere`]; `None` if the centre is not
+    /// representable.
+    ///
+    /// # Panics
+    /// If the cell is infinite.
+    #[inline]
+    pub fn circumsphere(&self, cell: CellId) -> Option<(Vec3, f64)> {
+        circumsphere(self.vertices(cell).map(|v| self.point(v)))
+    }
+
+    /// Where a position is; `hint` is a cell near it, if one is known.
+    ///
+    /// Costs a walk through the cells between the hint and the position.
+    ///
+    /// # Panics
+    /// If a coordinate is not finite or exceeds [`MAX_COORDINATE`].
+    pub fn locate(&self, position: Vec3, hint: Option<CellId>) -> Location {
+        assert!(
+            position.abs().max_element() <= MAX_COORDINATE && position.is_finite(),
+            "{position} cannot be located"
+        );
+        let p = &position.to_array();
+        let cell = self.walk(&self.sites, hint.unwrap_or(CellId(0)), p);
+        if self.is_infinite(cell) {
+            return Location::Outside(cell);
+        }
+        // The vertices whose opposite facet's plane does not contain the position.
+        let mut support = Vec::with_capacity(4);
+        for opposite in 0..4 {
+            let [a, b, c] = self.facet_vertices(Facet { cell, opposite });
+            let [a, b, c] = [a, b, c].map(|v| &self.sites[v.index()].p);
+            if exact_orientation(a, b, c, p) != Sign::Zero {
+                support.push(opposite);
+            }
+        }
+        match support[..] {
+            [i] => Location::Vertex(self.vertices(cell)[i]),
+            [i, j] => Location::Edge(cell, i, j),
+            [i, j, k] => Location::Facet(Facet { cell, opposite: 6 - i - j - k }),
+            _ => Location::Cell(cell),
+        }
+    }
+
+    /// Checks exactly that every cell is positive, that every circumsphere is empty (facet by
+    /// facet, which implies it globally), that the hull is convex, and that every input point is a
+    /// vertex or recorded as the duplicate of one.
+    ///
+    /// # Errors
+    /// The first violation found.
+    pub fn check_geometry(&self) -> Result<(), Violation> {
+        self.check_regularity::<Unweighted>(&self.sites, self.filter)?;
+        for point in 0..self.sites.len() {
+            let id = VertexId(point as u32);
+            let kept = self.representative(id);
+            let same = lexicographic(&self.sites[point].p, &self.sites[kept.index()].p).is_eq();
+            if !same || !self.is_vertex(kept) || (kept != id && self.is_vertex(id)) {
+                return Err(Violation::Missing { point });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Deref for Delaunay {
+    type Target = Triangulation;
+
+    fn deref(&self) -> &Triangulation {
+        &self.triangulation
+    }
+}
+
+/// Sites of weight zero, or the reason why a point cannot be one.
+pub(super) fn admissible_sites(points: &[Vec3]) -> Result<Vec<Site>, TriangulationError> {
+    let site = |(index, &point): (usize, &Vec3)| {
+        if !point.is_finite() {
+            return Err(TriangulationError::NotFinite { index, point });
+        }
+        if point.abs().max_element() > MAX_COORDINATE {
+            return Err(TriangulationError::OutOfRange { index, point });
+        }
+        // Adding zero makes -0.0 the same position as 0.0.
+        Ok(Site { p: (point + Vec3::ZERO).to_array(), w: 0.0 })
+    };
+    points.iter().enumerate().map(site).collect()
+}

@@ -1,0 +1,156 @@
+//! The filter stage of the predicates: double precision with a bound on the rounding error.
+//!
+//! Notation: `u = 2^-53`; `M` the largest distance of the points to the origin of the call.
+//!
+//! Rounding errors multiply along a formula: a sum of products, each the result of at most `k`
+//! roundings on its way, is off by at most `((1 + u)^k - 1)` times the sum of the absolute values
+//! of the products, the *permanent*.
+//!
+//! * Orientation: `k = 8` (two differences, product, difference of products, third difference,
+//!   product, two sums). The permanent is computed.
+//! * In-sphere: `k = 16` (`3 x 3` minors 8, lift 5, product, two sums), 17 with weights. By
+//!   Cauchy-Schwarz `|x y'| + |y x'| <= M^2`, so the permanent is at most `12 M^3 B`, where `B` bounds
+//!   the lifts, and the error at most `17 * 12 u M^3 B`.
+//!
+//! Differences of coordinates may underflow gradually, which is exact; products may underflow
+//! with an absolute error below `2^-1074` each, which [`UNDERFLOW`] covers when `M <= 1` and the slack
+//! of the constants when `M > 1`.
+
+use super::{Sign, exact};
+
+/// A point with its weight; the weight of a Delaunay site is zero and never read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Site {
+    pub(crate) p: [f64; 3],
+    pub(crate) w: f64,
+}
+
+/// Whether the lift of a site to the paraboloid carries a weight.
+pub(crate) trait Metric {
+    const WEIGHTED: bool;
+}
+
+/// `|p|^2`: the Delaunay triangulation.
+pub(crate) struct Unweighted;
+
+/// `|p|^2 - w`: the regular triangulation.
+pub(crate) struct Weighted;
+
+impl Metric for Unweighted {
+    const WEIGHTED: bool = false;
+}
+
+impl Metric for Weighted {
+    const WEIGHTED: bool = true;
+}
+
+const U: f64 = f64::EPSILON / 2.0;
+const ORIENTATION_BOUND: f64 = 8.5 * U;
+const IN_SPHERE_BOUND: f64 = 216.0 * U;
+const UNDERFLOW: f64 = 1e-300;
+
+#[inline(always)]
+fn sub(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// The sign of `det(b - a, c - a, d - a)`.
+#[inline]
+pub(crate) fn orient3d(a: &[f64; 3], b: &[f64; 3], c: &[f64; 3], d: &[f64; 3]) -> Sign {
+    let (b1, c1, d1) = (sub(b, a), sub(c, a), sub(d, a));
+    let (cxdy, cydx) = (c1[0] * d1[1], c1[1] * d1[0]);
+    let (dxby, dybx) = (d1[0] * b1[1], d1[1] * b1[0]);
+    let (bxcy, bycx) = (b1[0] * c1[1], b1[1] * c1[0]);
+    let det = b1[2] * (cxdy - cydx) + c1[2] * (dxby - dybx) + d1[2] * (bxcy - bycx);
+    let permanent = b1[2].abs() * (cxdy.abs() + cydx.abs())
+        + c1[2].abs() * (dxby.abs() + dybx.abs())
+        + d1[2].abs() * (bxcy.abs() + bycx.abs());
+    if det.abs() > ORIENTATION_BOUND * permanent + UNDERFLOW {
+        Sign::of(det)
+    } else {
+        exact::orient3d(a, b, c, d)
+    }
+}
+
+/// `det(b - a, c - a, d - a)` in double precision, for walks that are finished exactly.
+#[inline(always)]
+pub(crate) fn approximate_orientation(
+    a: &[f64; 3],
+    b: &[f64; 3],
+    c: &[f64; 3],
+    d: &[f64; 3],
+) -> f64 {
+    let (b, c, d) = (sub(b, a), sub(c, a), sub(d, a));
+    b[2] * (c[0] * d[1] - c[1] * d[0])
+        + c[2] * (d[0] * b[1] - d[1] * b[0])
+        + d[2] * (b[0] * c[1] - b[1] * c[0])
+}
+
+/// The filter of the power test, with what is known of all sites.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PowerFilter {
+    /// Error bounds up to this value belong to calls in which nothing is rounded at all, because
+    /// every intermediate value is a small multiple of a power of the common quantum.
+    exact_up_to: f64,
+}
+
+impl PowerFilter {
+    /// The filter that knows nothing of the sites.
+    pub(crate) const ANY: Self = Self { exact_up_to: -1.0 };
+
+    /// The filter for sites whose coordinates are multiples of `2^quantum` and whose weights are
+    /// multiples of its square.
+    pub(crate) fn with_quantum(quantum: i32) -> Self {
+        // Multiples of q^5 up to 2^53 q^5 are exact; q^5 itself must be a normal number.
+        if !(-180..=180).contains(&quantum) {
+            return Self::ANY;
+        }
+        let permanent = f64::powi(2.0, 52 + 5 * quantum);
+        Self { exact_up_to: IN_SPHERE_BOUND / 12.0 * permanent }
+    }
+
+    /// The sign of the power test of `e` against the orthosphere of four sites.
+    #[inline(always)]
+    pub(crate) fn sign<M: Metric>(self, [a, b, c, d]: [&Site; 4], e: &Site) -> Sign {
+        let (ap, bp, cp, dp) = (sub(&a.p, &e.p), sub(&b.p, &e.p), sub(&c.p, &e.p), sub(&d.p, &e.p));
+        let ab = ap[0] * bp[1] - bp[0] * ap[1];
+        let bc = bp[0] * cp[1] - cp[0] * bp[1];
+        let cd = cp[0] * dp[1] - dp[0] * cp[1];
+        let da = dp[0] * ap[1] - ap[0] * dp[1];
+        let ac = ap[0] * cp[1] - cp[0] * ap[1];
+        let bd = bp[0] * dp[1] - dp[0] * bp[1];
+        let abc = ap[2] * bc - bp[2] * ac + cp[2] * ab;
+        let bcd = bp[2] * cd - cp[2] * bd + dp[2] * bc;
+        let cda = cp[2] * da + dp[2] * ac + ap[2] * cd;
+        let dab = dp[2] * ab + ap[2] * bd + bp[2] * da;
+        let norm2 = |p: &[f64; 3]| p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+        let (mut al, mut bl, mut cl, mut dl) = (norm2(&ap), norm2(&bp), norm2(&cp), norm2(&dp));
+        let reach2 = al.max(bl).max(cl.max(dl));
+        let mut lift = reach2;
+        if M::WEIGHTED {
+            let offsets = [e.w - a.w, e.w - b.w, e.w - c.w, e.w - d.w];
+            al += offsets[0];
+            bl += offsets[1];
+            cl += offsets[2];
+            dl += offsets[3];
+            let w = offsets.map(f64::abs);
+            lift += w[0].max(w[1]).max(w[2].max(w[3]));
+        }
+        let det = (al * bcd - bl * cda) + (cl * dab - dl * abc);
+        let bound = IN_SPHERE_BOUND * (reach2 * reach2.sqrt()) * lift;
+        if det.abs() > bound + UNDERFLOW || bound <= self.exact_up_to {
+            return Sign::of(det);
+        }
+        exact_power_test::<M>([a, b, c, d], e)
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn exact_power_test<M: Metric>(s: [&Site; 4], e: &Site) -> Sign {
+    if M::WEIGHTED {
+        exact::power_test(s.map(|s| (&s.p, s.w)), (&e.p, e.w))
+    } else {
+        exact::in_sphere(s.map(|s| &s.p), &e.p)
+    }
+}

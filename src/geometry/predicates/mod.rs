@@ -1,0 +1,109 @@
+//! Exact geometric predicates behind cheap filters, and the symbolic perturbation of the
+//! in-sphere and power tests.
+//!
+//! Each predicate is first evaluated in double precision with a bound on its rounding error
+//! (file `filter.rs`); where the bound does not decide, integers wide enough to hold the exact
+//! value do (file `exact.rs`).
+//!
+//! Orientation: [`orient3d`]`(a, b, c, d)` is the sign of `det(b - a, c - a, d - a)`, positive if
+//! `d` sees `a, b, c` counter-clockwise. [`in_sphere`] is positive for a point inside the
+//! circumsphere of a positively oriented tetrahedron.
+//!
+//! Coordinates must be finite and at most [`MAX_COORDINATE`] in absolute value.
+
+mod circumsphere;
+mod exact;
+mod filter;
+mod perturb;
+mod wide;
+
+pub use circumsphere::{circumsphere, orthosphere};
+pub(crate) use exact::collinear as sites_collinear;
+pub(crate) use exact::lowest_bit;
+pub(crate) use filter::orient3d as exact_orientation;
+pub(crate) use filter::{Metric, PowerFilter, Site, Unweighted, Weighted, approximate_orientation};
+pub(crate) use perturb::{in_conflict, lexicographic};
+
+use crate::Vec3;
+
+/// The largest absolute value of a coordinate for which no product in a predicate overflows.
+pub const MAX_COORDINATE: f64 = 1e57;
+
+/// The sign of an exactly evaluated expression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Sign {
+    /// Below zero.
+    Negative = -1,
+    /// Exactly zero.
+    Zero = 0,
+    /// Above zero.
+    Positive = 1,
+}
+
+impl Sign {
+    #[inline]
+    fn of(x: f64) -> Self {
+        if x > 0.0 {
+            Self::Positive
+        } else if x < 0.0 {
+            Self::Negative
+        } else {
+            Self::Zero
+        }
+    }
+}
+
+impl std::ops::Neg for Sign {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        match self {
+            Self::Negative => Self::Positive,
+            Self::Zero => Self::Zero,
+            Self::Positive => Self::Negative,
+        }
+    }
+}
+
+/// The side of the plane `a, b, c` on which `d` lies: positive if `d` sees them counter-clockwise.
+///
+/// Exact for finite coordinates of at most [`MAX_COORDINATE`].
+#[inline]
+pub fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
+    filter::orient3d(&a.to_array(), &b.to_array(), &c.to_array(), &d.to_array())
+}
+
+/// Whether three points lie on one line, exactly.
+pub fn collinear(a: Vec3, b: Vec3, c: Vec3) -> bool {
+    exact::collinear(&a.to_array(), &b.to_array(), &c.to_array())
+}
+
+/// The side of the circumsphere of `a, b, c, d` on which `e` lies: positive inside, zero on it,
+/// if [`orient3d`]`(a, b, c, d)` is positive, and the opposite sign if it is negative.
+///
+/// Exact for finite coordinates of at most [`MAX_COORDINATE`].
+#[inline]
+pub fn in_sphere(a: Vec3, b: Vec3, c: Vec3, d: Vec3, e: Vec3) -> Sign {
+    let [a, b, c, d, e] = [a, b, c, d, e].map(|p| Site { p: p.to_array(), w: 0.0 });
+    PowerFilter::ANY.sign::<Unweighted>([&a, &b, &c, &d], &e)
+}
+
+/// The in-sphere test of weighted points `(p, w)` with the power distance `|x - p|^2 - w`:
+/// positive if the power of `e` to the orthosphere of the positively oriented `a, b, c, d` is
+/// negative, that is if `e` does not allow them to be a cell of the regular triangulation.
+///
+/// Exact, the lift `|p|^2 - w` included, for coordinates of at most [`MAX_COORDINATE`] and weights
+/// of at most its square.
+pub fn power_test(
+    a: (Vec3, f64),
+    b: (Vec3, f64),
+    c: (Vec3, f64),
+    d: (Vec3, f64),
+    e: (Vec3, f64),
+) -> Sign {
+    let [a, b, c, d, e] = [a, b, c, d, e].map(|(p, w)| Site { p: p.to_array(), w });
+    PowerFilter::ANY.sign::<Weighted>([&a, &b, &c, &d], &e)
+}
+
+#[cfg(test)]
+mod tests;

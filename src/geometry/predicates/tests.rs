@@ -1,0 +1,135 @@
+//! Predicates against an independent implementation and against each other's stages.
+
+use proptest::prelude::*;
+
+use super::*;
+
+fn robust(p: Vec3) -> ::robust::Coord3D<f64> {
+    ::robust::Coord3D { x: p.x, y: p.y, z: p.z }
+}
+
+/// `robust` is positive for a point below the plane and its in-sphere test follows its own
+/// orientation.
+fn oracle_orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
+    -Sign::of(::robust::orient3d(robust(a), robust(b), robust(c), robust(d)))
+}
+
+fn oracle_in_sphere(p: [Vec3; 4], e: Vec3) -> Sign {
+    let [a, b, c, d] = p.map(robust);
+    -Sign::of(::robust::insphere(a, b, c, d, robust(e)))
+}
+
+/// Points of many kinds: grids, spheres, planes, ranges of exponents, single-bit noise.
+fn point() -> impl Strategy<Value = Vec3> {
+    let small = -4..5i32;
+    prop_oneof![
+        [small.clone(), small.clone(), small.clone()].prop_map(|c| Vec3::from(c.map(f64::from))),
+        [small.clone(), small.clone(), small.clone()]
+            .prop_map(|c| Vec3::from(c.map(|x| f64::from(x) / 100.0))),
+        [-1.0..1.0f64, -1.0..1.0, -1.0..1.0].prop_map(|c| Vec3::from(c).normalize_or_zero()),
+        [-1.0..1.0f64, -1.0..1.0, -1.0..1.0].prop_map(Vec3::from),
+        ([small.clone(), small.clone(), small], -60..60i32)
+            .prop_map(|(c, e)| { Vec3::from(c.map(f64::from)) + Vec3::splat(2f64.powi(e - 52)) }),
+        ([-1.0..1.0f64, -1.0..1.0, -1.0..1.0], -30..30i32)
+            .prop_map(|(c, e)| Vec3::from(c) * 2f64.powi(e)),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+    #[test]
+    fn orientation_agrees_with_expansions(a in point(), b in point(), c in point(), d in point()) {
+        prop_assert_eq!(orient3d(a, b, c, d), oracle_orient3d(a, b, c, d));
+        prop_assert_eq!(orient3d(b, a, c, d), -orient3d(a, b, c, d));
+    }
+
+    #[test]
+    fn in_sphere_agrees_with_expansions(
+        a in point(), b in point(), c in point(), d in point(), e in point(),
+    ) {
+        let sign = in_sphere(a, b, c, d, e);
+        prop_assert_eq!(sign, oracle_in_sphere([a, b, c, d], e));
+        prop_assert_eq!(in_sphere(b, c, a, d, e), sign);
+        prop_assert_eq!(in_sphere(b, a, c, d, e), -sign);
+        // Equal weights do not matter.
+        let w = 0.1;
+        prop_assert_eq!(power_test((a, w), (b, w), (c, w), (d, w), (e, w)), sign);
+    }
+
+    #[test]
+    fn stages_agree(p in prop::array::uniform5(point()), w in prop::array::uniform5(-3..4i32)) {
+        // The exact stage alone, of scaled integers and their quarter: the sign may not change.
+        let site = |i: usize, unit: f64| (p[i].to_array(), f64::from(w[i]) * unit);
+        for unit in [0.0, 0.25, 0.1] {
+            let s = [0, 1, 2, 3, 4].map(|i| site(i, unit));
+            let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|i| Site { p: s[i].0, w: s[i].1 });
+            let filtered = PowerFilter::ANY.sign::<Weighted>([&a, &b, &c, &d], &e);
+            let exact =
+                exact::power_test([0, 1, 2, 3].map(|i| (&s[i].0, s[i].1)), (&s[4].0, s[4].1));
+            prop_assert_eq!(filtered, exact);
+        }
+    }
+
+    #[test]
+    fn circumspheres_pass_through_their_points(p in prop::array::uniform4(point())) {
+        let flat = orient3d(p[0], p[1], p[2], p[3]) == Sign::Zero;
+        match circumsphere(p) {
+            None => prop_assert!(flat),
+            Some((centre, radius)) => {
+                prop_assert!(!flat);
+                let reach = p.iter().fold(radius, |r, p| r.max(p.length()));
+                for q in p {
+                    prop_assert!(((q - centre).length() - radius).abs() <= 1e-6 * reach);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn orientation_and_side_have_the_documented_signs() {
+    let (o, x, y, z) = (Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z);
+    assert_eq!(orient3d(o, x, y, z), Sign::Positive);
+    assert_eq!(in_sphere(o, x, y, z, Vec3::splat(0.5)), Sign::Positive);
+    assert_eq!(in_sphere(o, x, y, z, Vec3::splat(1.0)), Sign::Zero);
+    assert_eq!(in_sphere(o, x, y, z, Vec3::splat(1.5)), Sign::Negative);
+    assert_eq!(in_sphere(x, o, y, z, Vec3::splat(0.5)), Sign::Negative);
+    // A heavier query is inside sooner, a lighter one later.
+    let weigh = |w| power_test((o, 0.0), (x, 0.0), (y, 0.0), (z, 0.0), (Vec3::ONE, w));
+    assert_eq!([weigh(1e-300), weigh(0.0), weigh(-1e-300)].map(|s| s as i32), [1, 0, -1]);
+}
+
+#[test]
+fn extreme_ranges_are_exact() {
+    // Coordinates of 1e-300 beside others of 1e57 need the widest tier.
+    let (big, tiny) = (1e57, 5e-324);
+    let (o, x, y) = (Vec3::ZERO, Vec3::new(big, 0.0, 0.0), Vec3::new(0.0, big, 0.0));
+    assert_eq!(orient3d(o, x, y, Vec3::new(1.0, 1.0, tiny)), Sign::Positive);
+    assert_eq!(orient3d(o, x, y, Vec3::new(1.0, 1.0, -tiny)), Sign::Negative);
+    let z = Vec3::new(0.0, 0.0, big);
+    let corner = Vec3::splat(big);
+    assert_eq!(in_sphere(o, x, y, z, corner), Sign::Zero);
+    // Two chords through one point: as the corner at the origin moves in, the other end moves out.
+    assert_eq!(in_sphere(Vec3::new(tiny, tiny, tiny), x, y, z, corner), Sign::Positive);
+    assert_eq!(in_sphere(Vec3::new(-tiny, -tiny, -tiny), x, y, z, corner), Sign::Negative);
+    // Everything underflows in double precision.
+    let small = 1e-200;
+    let [a, b, c, d] = [o, Vec3::X * small, Vec3::Y * small, Vec3::Z * small];
+    assert_eq!(orient3d(a, b, c, d), Sign::Positive);
+    assert_eq!(in_sphere(a, b, c, d, Vec3::splat(0.9 * small)), Sign::Positive);
+    let (centre, radius) = circumsphere([a, b, c, d]).expect("not flat");
+    assert!((centre / small - Vec3::splat(0.5)).abs().max_element() < 1e-15);
+    assert!(radius > 0.0);
+}
+
+#[test]
+fn circumcentres_of_slivers_are_exact() {
+    // Four points of a unit circle, one lifted by 2^-50: the centre is on the axis, at
+    // half the lift plus what the determinant says, computed here in closed form.
+    let h = f64::powi(2.0, -50);
+    let p = [Vec3::X, Vec3::Y, -Vec3::X, Vec3::new(0.0, -1.0, h)];
+    let (centre, radius) = circumsphere(p).expect("not flat");
+    assert_eq!(centre, Vec3::new(0.0, 0.0, h / 2.0));
+    assert_eq!(radius, 1.0);
+}

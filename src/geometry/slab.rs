@@ -1,0 +1,175 @@
+//! Signed distance to the convex hull of three balls: the medial slab of a triangle.
+//!
+//! The hull is the union of the balls `B(c(a), r(a))` over the triangle, so the signed distance is
+//! the minimum over the triangle of `|p - c(a)| - r(a)`: convex, hence either the unconstrained
+//! minimum, if that lies in the triangle, or on a side, where it is the distance to a cone.
+//!
+//! 1. In the frame of the centres' plane ([`PlanarFrame`]) the query is `(x, y, h)`, and the
+//!    radius is linear with gradient `g`.
+//! 2. The best centre is `(x, y) + |h| / k g` with `k = sqrt(1 - g.g)`.
+//! 3. Inside the triangle, the distance to its sphere is the answer; else the least of the cones.
+//!
+//! With collinear centres, or `g.g >= 1` (no plane touches all three balls from outside), the hull
+//! is the union of the three cones, exactly.
+//!
+//! The distance is evaluated at the best centre, as in [`Cone`] and for the same reason.
+
+use super::planar_frame::PlanarFrame;
+use super::{Cone, HullFoot, SlabPlanes, Sphere};
+use crate::Vec3;
+
+/// The convex hull of three balls, prepared for distance queries.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slab {
+    spheres: [Sphere; 3],
+    face: Option<SlabFace>,
+    /// Cones of the sides 01, 12, 20.
+    cones: [Cone; 3],
+}
+
+impl Slab {
+    /// The hull of three balls.
+    pub fn new(spheres: [Sphere; 3]) -> Self {
+        let cones = [0, 1, 2].map(|k| Cone::new(spheres[k], spheres[(k + 1) % 3]));
+        Self { spheres, face: SlabFace::new(spheres), cones }
+    }
+
+    /// Signed distance of `p` to the boundary of the hull, negative inside. Exact on both sides.
+    pub fn signed_distance(&self, p: Vec3) -> f64 {
+        if let Some(distance) = self.face.as_ref().and_then(|face| face.signed_distance(p)) {
+            return distance;
+        }
+        self.cones.iter().map(|cone| cone.signed_distance(p)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Where `p` is nearest to the boundary of the hull. Of several nearest points one is returned.
+    pub fn foot(&self, p: Vec3) -> HullFoot<3> {
+        if let Some(foot) = self.face.as_ref().and_then(|face| face.foot(p)) {
+            return foot;
+        }
+        let feet = [0, 1, 2].map(|k| (k, self.cones[k].foot(p)));
+        let nearer = |a: (usize, HullFoot<2>), b: (usize, HullFoot<2>)| {
+            if b.1.signed_distance < a.1.signed_distance { b } else { a }
+        };
+        let (side, foot) = nearer(nearer(feet[0], feet[1]), feet[2]);
+        let mut weights = [0.0; 3];
+        weights[side] = foot.weights[0];
+        weights[(side + 1) % 3] = foot.weights[1];
+        HullFoot::towards(foot.sphere, weights, p, || self.free_direction(foot.sphere))
+    }
+
+    /// A direction in which `sphere`, on some side, reaches the boundary of the hull: of the
+    /// slab's tangent planes and some of each cone the one that the three balls overstep least.
+    fn free_direction(&self, sphere: Sphere) -> Vec3 {
+        let mut candidates: Vec<Vec3> = self.planes().map_or(vec![], |p| p.normals().to_vec());
+        for (side, cone) in self.cones.iter().enumerate() {
+            let away = sphere.centre - self.spheres[(side + 2) % 3].centre;
+            match cone.frame() {
+                Some(frame) => {
+                    let across = away.reject_from_normalized(frame.u).try_normalize();
+                    let across = across.unwrap_or(frame.v);
+                    let around = [across, frame.u.cross(across), -across];
+                    candidates.extend(around.map(|across| frame.normal(across)));
+                }
+                None => candidates.push(away.try_normalize().unwrap_or(Vec3::X)),
+            }
+        }
+        let overstep = |n: Vec3| {
+            let reach = self.spheres.iter().map(|m| n.dot(m.centre - sphere.centre) + m.radius);
+            reach.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let best = candidates.iter().copied().min_by(|&a, &b| overstep(a).total_cmp(&overstep(b)));
+        best.unwrap_or(Vec3::X)
+    }
+
+    /// The two planes tangent to all three balls from outside, or `None` when there are none:
+    /// collinear centres, or radii that grow as fast as the centres move apart.
+    pub fn planes(&self) -> Option<SlabPlanes> {
+        self.face.as_ref().map(SlabFace::planes)
+    }
+}
+
+/// The part of a slab between its two tangent triangles, without the cones of its sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SlabFace {
+    frame: PlanarFrame,
+    /// Radius at the origin of the frame.
+    radius: f64,
+    /// `g` in the frame.
+    gradient: [f64; 2],
+    /// `1 / k`.
+    lead: f64,
+    /// The corner that is the origin of the frame.
+    first: u8,
+}
+
+impl SlabFace {
+    /// `None` when no two planes touch all three balls from outside.
+    pub fn new(spheres: [Sphere; 3]) -> Option<Self> {
+        let (frame, first) = PlanarFrame::new(spheres.map(|m| m.centre));
+        if frame.is_flat() {
+            return None;
+        }
+        let [a, b, c] = [0, 1, 2].map(|k| spheres[(first + k) % 3].radius);
+        let [cx, cy] = frame.apex;
+        let along = (b - a) / frame.length;
+        // Fused, because for a thin triangle this is a small difference divided by a small height.
+        let gradient = [along, (-along).mul_add(cx, c - a) / cy];
+        let squared = gradient[0] * gradient[0] + gradient[1] * gradient[1];
+        (squared < 1.0).then(|| Self {
+            frame,
+            radius: a,
+            gradient,
+            lead: 1.0 / (1.0 - squared).sqrt(),
+            first: first as u8,
+        })
+    }
+
+    /// Signed distance to the slab where its nearest sphere is inside the triangle; `None` where
+    /// that sphere is on a side.
+    #[inline]
+    pub fn signed_distance(&self, p: Vec3) -> Option<f64> {
+        let [x, y, height] = self.frame.local(p);
+        let ahead = height.abs() * self.lead;
+        let [dx, dy] = [ahead * self.gradient[0], ahead * self.gradient[1]];
+        let (x, y) = (x + dx, y + dy);
+        if !self.frame.contains(x, y) {
+            return None;
+        }
+        let distance = (dx * dx + dy * dy + height * height).sqrt();
+        Some(distance - self.radius_at(x, y))
+    }
+
+    #[inline]
+    fn radius_at(&self, x: f64, y: f64) -> f64 {
+        self.radius + self.gradient[0] * x + self.gradient[1] * y
+    }
+
+    fn foot(&self, p: Vec3) -> Option<HullFoot<3>> {
+        let [x, y, height] = self.frame.local(p);
+        let ahead = height.abs() * self.lead;
+        let (x, y) = (x + ahead * self.gradient[0], y + ahead * self.gradient[1]);
+        if !self.frame.contains(x, y) {
+            return None;
+        }
+        let [cx, cy] = self.frame.apex;
+        let third = (y / cy).min(1.0);
+        let second = ((x - cx * third) / self.frame.length).clamp(0.0, 1.0 - third);
+        let mut weights = [0.0; 3];
+        for (k, weight) in [1.0 - second - third, second, third].into_iter().enumerate() {
+            weights[(usize::from(self.first) + k) % 3] = weight;
+        }
+        let sphere = Sphere::new(self.frame.point(x, y), self.radius_at(x, y));
+        let foot = HullFoot::towards(sphere, weights, p, || self.planes().normals()[0]);
+        Some(foot)
+    }
+
+    fn planes(&self) -> SlabPlanes {
+        let [gx, gy] = self.gradient;
+        SlabPlanes {
+            centre_normal: self.frame.normal,
+            gradient: gx * self.frame.x + gy * self.frame.y,
+            rise: 1.0 / self.lead,
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! The sphere, its signed distance, and the answer type shared by sphere, cone and slab.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Vec3;
+
+/// A medial sphere `m = (c, r)`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sphere {
+    /// Centre `c`.
+    pub centre: Vec3,
+    /// Radius `r`, non-negative.
+    pub radius: f64,
+}
+
+impl Sphere {
+    /// A sphere from its centre and radius.
+    pub const fn new(centre: Vec3, radius: f64) -> Self {
+        Self { centre, radius }
+    }
+
+    /// The point `(1 - t) self + t other` of the edge between two spheres, in `R^4`.
+    pub fn lerp(self, other: Self, t: f64) -> Self {
+        Self::new(self.centre.lerp(other.centre, t), self.radius + t * (other.radius - self.radius))
+    }
+
+    /// Signed distance of `p` to the sphere, negative inside. A sphere of radius 0 is a point.
+    pub fn signed_distance(&self, p: Vec3) -> f64 {
+        p.distance(self.centre) - self.radius
+    }
+
+    /// Where `p` is nearest to the sphere. From the centre itself every point is nearest, and the
+    /// one in direction `x` is returned.
+    pub fn foot(&self, p: Vec3) -> HullFoot<1> {
+        HullFoot::towards(*self, [1.0], p, || Vec3::X)
+    }
+}
+
+/// The nearest point on the boundary of the convex hull of `N` balls: one ball is a sphere, two a
+/// cone, three a slab.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HullFoot<const N: usize> {
+    /// Signed distance of the query to the hull, negative inside.
+    pub signed_distance: f64,
+    /// The interpolated sphere `sum_i weights[i] m_i` that attains the distance.
+    pub sphere: Sphere,
+    /// Barycentric weights of that sphere over the given ones: non-negative, of sum 1.
+    pub weights: [f64; N],
+    /// The nearest point, on `sphere` and on the boundary of the hull.
+    pub point: Vec3,
+}
+
+impl<const N: usize> HullFoot<N> {
+    /// The foot of `p` on the interpolated sphere that attains its distance: on the ray from the
+    /// centre through `p`, or, when `p` is the centre, in the direction `apart`.
+    pub(super) fn towards(
+        sphere: Sphere,
+        weights: [f64; N],
+        p: Vec3,
+        apart: impl FnOnce() -> Vec3,
+    ) -> Self {
+        let arm = p - sphere.centre;
+        let distance = arm.length();
+        let direction = if distance > 0.0 { arm / distance } else { apart() };
+        Self {
+            signed_distance: distance - sphere.radius,
+            sphere,
+            weights,
+            point: sphere.centre + sphere.radius * direction,
+        }
+    }
+}

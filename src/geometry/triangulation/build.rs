@@ -1,0 +1,383 @@
+//! Incremental construction of Delaunay and regular triangulations.
+//!
+//! * A. Bowyer: *Computing Dirichlet tessellations*, The Computer Journal 24 (1981),
+//!   <https://doi.org/10.1093/comjnl/24.2.162>; D. F. Watson, the same issue,
+//!   <https://doi.org/10.1093/comjnl/24.2.167>.
+//! * O. Devillers, S. Pion, M. Teillaud: *Walking in a triangulation*, IJFCS 13 (2002),
+//!   <https://doi.org/10.1142/S0129054102001047>.
+//! * S. Funke, K. Mehlhorn, S. Naeher: *Structural filtering: a paradigm for efficient and exact
+//!   geometric programs*, Computational Geometry 31 (2005),
+//!   <https://doi.org/10.1016/j.comgeo.2004.12.007>.
+//!
+//! 1. Four affinely independent sites make the first cell; four infinite cells, with the vertex at
+//!    infinity, close it.
+//! 2. Each further site, in the order of [`super::order`], is located by a walk in rounded
+//!    arithmetic from the last new cell.
+//! 3. The *conflict zone*, the connected set of cells whose perturbed orthosphere contains the site,
+//!    grows from the cell found. If that cell is not in conflict, an exact walk finds the one that
+//!    contains the site; if that is not in conflict either, the site is hidden (weighted only).
+//! 4. The zone is *stellated*: its cells are replaced by the cone of its boundary from the site.
+//!    Neighbours are linked through a table of the boundary's edges.
+//!
+//! An infinite cell is in conflict with the sites strictly beyond its facet; with a site in the
+//! facet's plane, if its finite neighbour is, since the sphere through three coplanar points meets
+//! the plane in their circle, perturbed alike.
+
+use super::cells::{Cell, Face, INFINITE, MAX_CELLS, OPPOSITE, UNUSED};
+use super::error::TriangulationError;
+use crate::geometry::predicates::{
+    Metric, PowerFilter, Sign, Site, approximate_orientation, exact_orientation, in_conflict,
+    sites_collinear,
+};
+
+/// What is known of a cell while a conflict zone grows.
+const UNKNOWN: u8 = 0;
+const CONFLICT: u8 = 1;
+const OUTSIDE: u8 = 2;
+
+/// Local number of a vertex that is not on the boundary of the conflict zone.
+const ABSENT: u8 = u8::MAX;
+
+/// Boundaries of up to this many vertices are linked through a square table.
+const TABLE: usize = 64;
+
+/// A facet of the boundary of the conflict zone: its vertices, counter-clockwise from outside, and
+/// the facet as a face of the cell outside.
+#[derive(Clone, Copy)]
+struct Wall {
+    v: [u32; 3],
+    outside: Face,
+}
+
+/// A triangulation that grows.
+pub(super) struct Builder<M> {
+    /// Sites by vertex, in the order of insertion; the first is a dummy for the vertex at infinity.
+    pub(super) sites: Vec<Site>,
+    pub(super) cells: Vec<Cell>,
+    filter: PowerFilter,
+    state: Vec<u8>,
+    free: Vec<u32>,
+    last: u32,
+    zone: Vec<u32>,
+    walls: Vec<Wall>,
+    local: Vec<u8>,
+    rim: Vec<u32>,
+    table: Box<[Face]>,
+    metric: std::marker::PhantomData<M>,
+}
+
+impl<M: Metric> Builder<M> {
+    /// Triangulates distinct sites; `sites[0]` is a dummy, and the order of the others may change
+    /// to bring four independent ones to the front, in `ids` alike.
+    pub(super) fn build(
+        mut sites: Vec<Site>,
+        ids: &mut [u32],
+        filter: PowerFilter,
+    ) -> Result<Self, TriangulationError> {
+        bring_independent_to_front(&mut sites, ids)?;
+        let expected = 7 * sites.len() + 64;
+        let mut builder = Self {
+            cells: Vec::with_capacity(expected),
+            filter,
+            state: Vec::with_capacity(expected),
+            free: Vec::new(),
+            last: 0,
+            zone: Vec::new(),
+            walls: Vec::new(),
+            local: vec![ABSENT; sites.len()],
+            rim: Vec::new(),
+            table: vec![Face::NONE; TABLE * TABLE].into(),
+            sites,
+            metric: std::marker::PhantomData,
+        };
+        builder.start();
+        for vertex in 5..builder.sites.len() as u32 {
+            builder.insert(vertex)?;
+        }
+        Ok(builder)
+    }
+
+    /// The first cell and its four infinite neighbours.
+    fn start(&mut self) {
+        let s = &self.sites;
+        let positive = exact_orientation(&s[1].p, &s[2].p, &s[3].p, &s[4].p) == Sign::Positive;
+        let v = if positive { [1, 2, 3, 4] } else { [1, 2, 4, 3] };
+        self.cells.push(Cell { v, n: [Face::NONE; 4] });
+        for i in 0..4 {
+            let f = OPPOSITE[i].map(|k| v[k]);
+            self.cells.push(Cell { v: [f[0], f[1], f[2], INFINITE], n: [Face::NONE; 4] });
+            self.cells[0].n[i] = Face::new(i as u32 + 1, 3);
+            self.cells[i + 1].n[3] = Face::new(0, i);
+        }
+        for i in 1..5u32 {
+            for j in (1..5u32).filter(|&j| j != i) {
+                // Infinite cell `i` lacks vertex `v[i - 1]`: its neighbour opposite to `v[j - 1]`
+                // is cell `j`.
+                let a = self.position(i, v[j as usize - 1]);
+                let b = self.position(j, v[i as usize - 1]);
+                self.cells[i as usize].n[a] = Face::new(j, b);
+            }
+        }
+        self.state.resize(5, UNKNOWN);
+    }
+
+    fn position(&self, cell: u32, vertex: u32) -> usize {
+        let v = self.cells[cell as usize].v;
+        v.iter().position(|&x| x == vertex).expect("the cell has the vertex")
+    }
+
+    fn insert(&mut self, vertex: u32) -> Result<(), TriangulationError> {
+        let mut seed = self.walk_approximately(vertex);
+        if !self.conflicts(seed, vertex) {
+            seed = self.walk_exactly(vertex, seed);
+            if !self.conflicts(seed, vertex) {
+                debug_assert!(M::WEIGHTED, "the cell that contains a site is in conflict with it");
+                return Ok(());
+            }
+        }
+        self.find_conflict_zone(vertex, seed);
+        self.stellate(vertex)
+    }
+
+    /// Walks towards the site in rounded arithmetic, for a bounded number of steps.
+    fn walk_approximately(&self, vertex: u32) -> u32 {
+        let p = &self.sites[vertex as usize].p;
+        let mut c = self.last;
+        if self.cells[c as usize].is_infinite() {
+            c = self.cells[c as usize].n[3].cell();
+        }
+        let mut from = c;
+        for _ in 0..self.cells.len() {
+            let cell = &self.cells[c as usize];
+            if cell.is_infinite() {
+                break;
+            }
+            let s = cell.v.map(|v| &self.sites[v as usize].p);
+            let exit = (0..4).find(|&i| {
+                let f = OPPOSITE[i];
+                cell.n[i].cell() != from
+                    && approximate_orientation(p, s[f[0]], s[f[1]], s[f[2]]) < 0.0
+            });
+            match exit {
+                Some(i) => {
+                    from = c;
+                    c = cell.n[i].cell();
+                }
+                None => break,
+            }
+        }
+        c
+    }
+
+    /// Walks to the cell that contains the site, or to an infinite cell that it is strictly beyond
+    /// the facet of.
+    ///
+    /// Visibility walks end in Delaunay and regular triangulations, because they climb the power
+    /// of the site.
+    fn walk_exactly(&self, vertex: u32, start: u32) -> u32 {
+        let p = &self.sites[vertex as usize].p;
+        let mut c = start;
+        if self.cells[c as usize].is_infinite() {
+            c = self.cells[c as usize].n[3].cell();
+        }
+        loop {
+            let cell = &self.cells[c as usize];
+            if cell.is_infinite() {
+                return c;
+            }
+            let s = cell.v.map(|v| &self.sites[v as usize].p);
+            let exit = (0..4).find(|&i| {
+                let f = OPPOSITE[i];
+                exact_orientation(p, s[f[0]], s[f[1]], s[f[2]]) == Sign::Negative
+            });
+            match exit {
+                Some(i) => c = cell.n[i].cell(),
+                None => return c,
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn conflicts(&self, cell: u32, vertex: u32) -> bool {
+        conflicts::<M>(self.filter, &self.cells, &self.sites, cell, vertex)
+    }
+
+    /// Marks and lists the cells in conflict with the site and the walls around them.
+    fn find_conflict_zone(&mut self, vertex: u32, seed: u32) {
+        let Self { cells, sites, state, zone, walls, filter, .. } = self;
+        zone.clear();
+        walls.clear();
+        zone.push(seed);
+        state[seed as usize] = CONFLICT;
+        let mut next = 0;
+        while next < zone.len() {
+            let cell = cells[zone[next] as usize];
+            next += 1;
+            for i in 0..4 {
+                let outside = cell.n[i];
+                let neighbour = outside.cell();
+                let known = &mut state[neighbour as usize];
+                if *known == UNKNOWN {
+                    if conflicts::<M>(*filter, cells, sites, neighbour, vertex) {
+                        *known = CONFLICT;
+                        zone.push(neighbour);
+                    } else {
+                        *known = OUTSIDE;
+                    }
+                }
+                if *known == OUTSIDE {
+                    walls.push(Wall { v: OPPOSITE[i].map(|k| cell.v[k]), outside });
+                }
+            }
+        }
+    }
+
+    /// Replaces the conflict zone by the cone of its walls from the site.
+    fn stellate(&mut self, vertex: u32) -> Result<(), TriangulationError> {
+        if self.cells.len() + self.walls.len() > MAX_CELLS {
+            let points = self.sites.len() - 1;
+            return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
+        }
+        self.number_rim();
+        let mut reused = 0;
+        for w in 0..self.walls.len() {
+            let id = if reused < self.zone.len() {
+                reused += 1;
+                self.zone[reused - 1]
+            } else if let Some(id) = self.free.pop() {
+                id
+            } else {
+                self.state.push(UNKNOWN);
+                self.cells.push(Cell { v: [UNUSED; 4], n: [Face::NONE; 4] });
+                self.cells.len() as u32 - 1
+            };
+            let wall = &mut self.walls[w];
+            // The vertex at infinity goes last.
+            if wall.v[0] == INFINITE {
+                wall.v.rotate_left(1);
+            } else if wall.v[1] == INFINITE {
+                wall.v.rotate_right(1);
+            }
+            let [a, b, c] = wall.v;
+            let outside = wall.outside;
+            self.cells[id as usize] =
+                Cell { v: [vertex, a, b, c], n: [outside, Face::NONE, Face::NONE, Face::NONE] };
+            self.state[id as usize] = UNKNOWN;
+            self.cells[outside.cell() as usize].n[outside.index()] = Face::new(id, 0);
+            self.state[outside.cell() as usize] = UNKNOWN;
+            wall.outside = Face::new(id, 0);
+            self.last = id;
+        }
+        for &id in &self.zone[reused..] {
+            self.cells[id as usize].v[0] = UNUSED;
+            self.state[id as usize] = UNKNOWN;
+            self.free.push(id);
+        }
+        if self.rim.len() <= TABLE {
+            self.link_by_table();
+        } else {
+            self.link_by_sorting();
+        }
+        for &v in &self.rim {
+            self.local[v as usize] = ABSENT;
+        }
+        Ok(())
+    }
+
+    /// Numbers the vertices of the walls from zero, as far as the table reaches.
+    fn number_rim(&mut self) {
+        self.rim.clear();
+        for wall in &self.walls {
+            for v in wall.v {
+                if self.local[v as usize] == ABSENT && self.rim.len() <= TABLE {
+                    self.local[v as usize] = self.rim.len() as u8;
+                    self.rim.push(v);
+                }
+            }
+        }
+    }
+
+    /// Two new cells share a facet where their walls share an edge; each directed edge belongs to
+    /// one wall.
+    fn link_by_table(&mut self) {
+        let Self { walls, local, table, cells, .. } = self;
+        for wall in walls.iter() {
+            let id = wall.outside.cell();
+            let [a, b, c] = wall.v.map(|v| local[v as usize] as usize);
+            table[b * TABLE + c] = Face::new(id, 1);
+            table[c * TABLE + a] = Face::new(id, 2);
+            table[a * TABLE + b] = Face::new(id, 3);
+        }
+        for wall in walls.iter() {
+            let [a, b, c] = wall.v.map(|v| local[v as usize] as usize);
+            let n = &mut cells[wall.outside.cell() as usize].n;
+            n[1] = table[c * TABLE + b];
+            n[2] = table[a * TABLE + c];
+            n[3] = table[b * TABLE + a];
+        }
+    }
+
+    /// The same for large conflict zones.
+    fn link_by_sorting(&mut self) {
+        let mut edges = Vec::with_capacity(3 * self.walls.len());
+        for wall in &self.walls {
+            let id = wall.outside.cell();
+            let [a, b, c] = wall.v;
+            for (i, (x, y)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
+                edges.push((x.min(y), x.max(y), Face::new(id, i + 1).0));
+            }
+        }
+        edges.sort_unstable();
+        for pair in edges.chunks_exact(2) {
+            let (f, g) = (Face(pair[0].2), Face(pair[1].2));
+            debug_assert!(pair[0].0 == pair[1].0 && pair[0].1 == pair[1].1);
+            self.cells[f.cell() as usize].n[f.index()] = g;
+            self.cells[g.cell() as usize].n[g.index()] = f;
+        }
+    }
+}
+
+/// Whether a site is in conflict with a cell, see the head of this file.
+#[inline(always)]
+fn conflicts<M: Metric>(
+    filter: PowerFilter,
+    cells: &[Cell],
+    sites: &[Site],
+    cell: u32,
+    vertex: u32,
+) -> bool {
+    let mut v = cells[cell as usize].v;
+    let site = &sites[vertex as usize];
+    if v[3] == INFINITE {
+        let [a, b, c, _] = v.map(|v| &sites[v as usize].p);
+        match exact_orientation(a, b, c, &site.p) {
+            Sign::Positive => return true,
+            Sign::Negative => return false,
+            Sign::Zero => v = cells[cells[cell as usize].n[3].cell() as usize].v,
+        }
+    }
+    in_conflict::<M>(filter, v.map(|v| &sites[v as usize]), site)
+}
+
+/// Swaps the first four affinely independent sites into places 1 to 4.
+fn bring_independent_to_front(
+    sites: &mut [Site],
+    ids: &mut [u32],
+) -> Result<(), TriangulationError> {
+    let distinct = sites.len() - 1;
+    if distinct < 4 {
+        return Err(TriangulationError::TooFewPoints { points: distinct, distinct });
+    }
+    let (a, b) = (sites[1].p, sites[2].p);
+    let third = (3..sites.len()).find(|&i| !sites_collinear(&a, &b, &sites[i].p));
+    let third = third.ok_or(TriangulationError::Collinear { distinct })?;
+    sites.swap(3, third);
+    ids.swap(2, third - 1);
+    let c = sites[3].p;
+    let fourth =
+        (4..sites.len()).find(|&i| exact_orientation(&a, &b, &c, &sites[i].p) != Sign::Zero);
+    let fourth = fourth.ok_or(TriangulationError::Coplanar { distinct })?;
+    sites.swap(4, fourth);
+    ids.swap(3, fourth - 1);
+    Ok(())
+}

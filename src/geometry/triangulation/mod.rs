@@ -1,0 +1,108 @@
+//! Three-dimensional triangulations: who is next to whom, without coordinates.
+//!
+//! A triangulation of points in space is kept as that of a topological 3-sphere: every facet of
+//! the convex hull is closed by an *infinite* cell with the vertex [`VertexId::INFINITE`], so that
+//! every cell has four neighbours. [`super::delaunay::Delaunay`] builds it.
+//!
+//! Vertex ids are indices of the input points. Cell ids count finite cells first, then infinite
+//! ones, in an order that depends on the input alone.
+
+mod build;
+mod cells;
+mod check;
+mod error;
+mod freeze;
+mod order;
+mod query;
+
+use cells::Cell;
+pub use check::Violation;
+pub use error::TriangulationError;
+pub use query::{EdgeRing, Facet};
+
+use super::predicates::{Metric, PowerFilter, Site, lowest_bit};
+use build::Builder;
+
+/// A vertex: the index of an input point, or the vertex at infinity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct VertexId(pub u32);
+
+impl VertexId {
+    /// The vertex at infinity.
+    pub const INFINITE: Self = Self(u32::MAX);
+
+    /// The index of the input point; meaningless for the vertex at infinity.
+    #[inline]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A cell (tetrahedron), finite or infinite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CellId(pub u32);
+
+impl CellId {
+    const NONE: Self = Self(u32::MAX);
+
+    /// The index of the cell.
+    #[inline]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// The cells of a triangulation and their adjacency.
+///
+/// Every finite cell `[a, b, c, d]` is positively oriented: `det(b - a, c - a, d - a) > 0`. An
+/// infinite cell has the vertex at infinity last, and its other three vertices are
+/// counter-clockwise as seen from outside the convex hull.
+#[derive(Clone, Debug)]
+pub struct Triangulation {
+    cells: Vec<Cell>,
+    finite: usize,
+    vertices: usize,
+    /// For each input point one of its cells, the first.
+    incident: Vec<CellId>,
+}
+
+/// A triangulation of sites, with what did not become a vertex.
+pub(super) struct Triangulated {
+    pub(super) triangulation: Triangulation,
+    /// Pairs (site, the kept site at the same position), ascending.
+    pub(super) repeated: Vec<(u32, u32)>,
+    pub(super) filter: PowerFilter,
+}
+
+/// Triangulates finite sites of admissible size, in any number and position.
+pub(super) fn triangulate<M: Metric>(sites: &[Site]) -> Result<Triangulated, TriangulationError> {
+    if sites.len() >= cells::MAX_CELLS {
+        return Err(TriangulationError::TooLarge { points: sites.len(), limit: cells::MAX_CELLS });
+    }
+    let order::Order { inserted: mut ids, repeated } = order::insertion_order(sites);
+    if ids.len() < 4 {
+        let distinct = ids.len();
+        return Err(TriangulationError::TooFewPoints { points: sites.len(), distinct });
+    }
+    let filter = PowerFilter::with_quantum(common_quantum::<M>(sites));
+    let dummy = Site { p: [f64::NAN; 3], w: f64::NAN };
+    let ordered =
+        std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
+    let cells = Builder::<M>::build(ordered, &mut ids, filter)?.cells;
+    let triangulation = freeze::freeze(cells, &ids, sites.len());
+    Ok(Triangulated { triangulation, repeated, filter })
+}
+
+/// The largest `q` such that all coordinates are multiples of `2^q` and all weights of `2^(2 q)`.
+fn common_quantum<M: Metric>(sites: &[Site]) -> i32 {
+    let mut quantum = i32::MAX;
+    for s in sites {
+        for x in s.p {
+            quantum = quantum.min(lowest_bit(x));
+        }
+        if M::WEIGHTED && s.w != 0.0 {
+            quantum = quantum.min(lowest_bit(s.w).div_euclid(2));
+        }
+    }
+    quantum
+}

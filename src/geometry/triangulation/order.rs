@@ -1,0 +1,256 @@
+//! The order of insertion: biased randomized insertion order along a Hilbert curve.
+//!
+//! * N. Amenta, S. Choi, G. Rote: *Incremental constructions con BRIO*, SoCG 2003,
+//!   <https://doi.org/10.1145/777792.777824>.
+//! * C. Hamilton: *Compact Hilbert indices*, Dalhousie University CS-2006-07, 2006 (the state of
+//!   the curve as an entry corner and a direction).
+//!
+//! 1. Points are sorted along a Hilbert curve through the cube around them. Points that share a
+//!    cell of the curve's grid are sorted along a curve through their own bounding box, or
+//!    lexicographically when they are few, so that clusters stay local and equal points end side by
+//!    side.
+//! 2. Of equal points one is kept.
+//! 3. Each point falls into a round by a hash of its index: 7/8 of all into the last, 7/8 of the
+//!    rest into the one before, and so on. Within a round the order is that of the curve.
+
+use std::cmp::Ordering;
+
+use crate::geometry::predicates::{Site, lexicographic};
+
+/// Bits of a Hilbert index for each axis.
+const BITS: u32 = 16;
+
+/// Runs of equal index up to this length are sorted lexicographically.
+const SHORT_RUN: usize = 24;
+
+/// Below this number a round is not split further.
+const SMALLEST_ROUND: usize = 64;
+
+/// Next state and digit for a state of the curve and an octant.
+const CURVE: [[(u8, u8); 8]; 24] = hilbert_states();
+
+const fn rotate_left(x: usize, by: usize) -> usize {
+    ((x << by) | (x >> (3 - by))) & 7
+}
+
+const fn trailing_ones(i: usize) -> usize {
+    (!i).trailing_zeros() as usize
+}
+
+const fn hilbert_states() -> [[(u8, u8); 8]; 24] {
+    let mut states = [[(0, 0); 8]; 24];
+    let mut state = 0;
+    while state < 24 {
+        let (entry, direction) = (state / 3, state % 3);
+        let mut octant = 0;
+        while octant < 8 {
+            let turn = (direction + 1) % 3;
+            let gray = rotate_left(octant ^ entry, (3 - turn) % 3);
+            let digit = gray ^ (gray >> 1) ^ (gray >> 2);
+            let corner = if digit == 0 { 0 } else { (digit - 1) / 2 * 2 };
+            let corner = corner ^ (corner >> 1);
+            let along = if digit == 0 {
+                0
+            } else if digit & 1 == 0 {
+                trailing_ones(digit - 1) % 3
+            } else {
+                trailing_ones(digit) % 3
+            };
+            let next_entry = entry ^ rotate_left(corner, turn);
+            let next_direction = (direction + along + 1) % 3;
+            states[state][octant] = ((next_entry * 3 + next_direction) as u8, digit as u8);
+            octant += 1;
+        }
+        state += 1;
+    }
+    states
+}
+
+/// The position of a grid cell on the curve.
+fn hilbert_index(cell: [u32; 3]) -> u64 {
+    let mut state = 0u8;
+    let mut index = 0u64;
+    for bit in (0..BITS).rev() {
+        let octant = (cell[0] >> bit & 1) | (cell[1] >> bit & 1) << 1 | (cell[2] >> bit & 1) << 2;
+        let (next, digit) = CURVE[state as usize][octant as usize];
+        state = next;
+        index = index << 3 | u64::from(digit);
+    }
+    index
+}
+
+/// The grid of the curve on the bounding cube of some sites.
+struct Grid {
+    low: [f64; 3],
+    scale: f64,
+}
+
+impl Grid {
+    fn around<'a>(sites: impl Iterator<Item = &'a Site>) -> Self {
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for s in sites {
+            for k in 0..3 {
+                low[k] = low[k].min(s.p[k]);
+                high[k] = high[k].max(s.p[k]);
+            }
+        }
+        let side = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+        let scale = f64::from((1u32 << BITS) - 1) / side;
+        Self { low, scale: if scale.is_finite() { scale } else { 0.0 } }
+    }
+
+    fn index(&self, s: &Site) -> u64 {
+        hilbert_index([0, 1, 2].map(|k| ((s.p[k] - self.low[k]) * self.scale) as u32))
+    }
+}
+
+/// Sorts indices of sites along the curve, equal positions side by side.
+fn hilbert_sort(sites: &[Site], indices: &mut [u32]) {
+    let grid = Grid::around(indices.iter().map(|&i| &sites[i as usize]));
+    if grid.scale == 0.0 {
+        // All equal, or too close together for a grid.
+        indices.sort_unstable_by(|&i, &j| by_position(sites, i, j));
+        return;
+    }
+    let mut keyed: Vec<(u64, u32)> =
+        indices.iter().map(|&i| (grid.index(&sites[i as usize]), i)).collect();
+    keyed.sort_unstable();
+    for (slot, &(_, i)) in indices.iter_mut().zip(&keyed) {
+        *slot = i;
+    }
+    let mut start = 0;
+    for run in keyed.chunk_by(|a, b| a.0 == b.0) {
+        let part = &mut indices[start..start + run.len()];
+        start += run.len();
+        if part.len() > SHORT_RUN {
+            hilbert_sort(sites, part);
+        } else if part.len() > 1 {
+            part.sort_unstable_by(|&i, &j| by_position(sites, i, j));
+        }
+    }
+}
+
+fn by_position(sites: &[Site], i: u32, j: u32) -> Ordering {
+    lexicographic(&sites[i as usize].p, &sites[j as usize].p).then(i.cmp(&j))
+}
+
+/// Sites in the order of their insertion, and those that are not inserted.
+pub(crate) struct Order {
+    /// Indices of the sites to insert.
+    pub(crate) inserted: Vec<u32>,
+    /// Pairs (site, the kept site at the same position), ascending.
+    pub(crate) repeated: Vec<(u32, u32)>,
+}
+
+/// The order of insertion of `sites`; of equal positions the one with the largest weight is kept,
+/// among these the first.
+pub(crate) fn insertion_order(sites: &[Site]) -> Order {
+    let mut sorted: Vec<u32> = (0..sites.len() as u32).collect();
+    hilbert_sort(sites, &mut sorted);
+    let repeated = remove_repeated(sites, &mut sorted);
+    Order { inserted: into_rounds(sorted), repeated }
+}
+
+fn remove_repeated(sites: &[Site], sorted: &mut Vec<u32>) -> Vec<(u32, u32)> {
+    let mut repeated = Vec::new();
+    let mut kept = 0;
+    let mut start = 0;
+    while start < sorted.len() {
+        let position = sites[sorted[start] as usize].p;
+        let mut end = start + 1;
+        while end < sorted.len() && sites[sorted[end] as usize].p == position {
+            end += 1;
+        }
+        let mut best = sorted[start];
+        for &i in &sorted[start + 1..end] {
+            let (w, best_w) = (sites[i as usize].w, sites[best as usize].w);
+            if w > best_w || (w == best_w && i < best) {
+                best = i;
+            }
+        }
+        repeated.extend(sorted[start..end].iter().filter(|&&i| i != best).map(|&i| (i, best)));
+        sorted[kept] = best;
+        kept += 1;
+        start = end;
+    }
+    sorted.truncate(kept);
+    repeated.sort_unstable();
+    repeated
+}
+
+/// Splits a sequence stably into rounds of growing size.
+fn into_rounds(sorted: Vec<u32>) -> Vec<u32> {
+    let mut rounds = 1u32;
+    while sorted.len() >> (3 * rounds) > SMALLEST_ROUND {
+        rounds += 1;
+    }
+    if rounds == 1 {
+        return sorted;
+    }
+    // Round 0 is the last: a site descends one round for every three zero bits of its hash.
+    let round = |i: u32| (splitmix(u64::from(i)).trailing_zeros() / 3).min(rounds - 1);
+    let mut starts = vec![0usize; rounds as usize + 1];
+    for &i in &sorted {
+        starts[(rounds - 1 - round(i)) as usize + 1] += 1;
+    }
+    for r in 0..rounds as usize {
+        starts[r + 1] += starts[r];
+    }
+    let mut ordered = vec![0; sorted.len()];
+    for &i in &sorted {
+        let slot = &mut starts[(rounds - 1 - round(i)) as usize];
+        ordered[*slot] = i;
+        *slot += 1;
+    }
+    ordered
+}
+
+/// Steele, Lea, Flood: *Fast splittable pseudorandom number generators*, OOPSLA 2014.
+fn splitmix(seed: u64) -> u64 {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn site(x: f64, y: f64, z: f64) -> Site {
+        Site { p: [x, y, z], w: 0.0 }
+    }
+
+    #[test]
+    fn the_curve_visits_neighbouring_cells() {
+        let shift = BITS - 3;
+        let mut cells: Vec<_> = (0..512u32)
+            .map(|i| [i & 7, i >> 3 & 7, i >> 6])
+            .map(|c| (hilbert_index(c.map(|x| x << shift)), c))
+            .collect();
+        cells.sort_unstable();
+        for pair in cells.windows(2) {
+            let distance: u32 = (0..3).map(|k| pair[0].1[k].abs_diff(pair[1].1[k])).sum();
+            assert_eq!(distance, 1, "{pair:?}");
+        }
+    }
+
+    #[test]
+    fn repeated_positions_are_found_in_clusters() {
+        // A far point squeezes all others into one cell of the grid.
+        let mut sites = vec![site(1e9, 0.0, 0.0)];
+        for i in 0..1000u32 {
+            let k = f64::from(i % 250);
+            sites.push(site(k * 1e-6, (k * 7.0 % 11.0) * 1e-6, 0.0));
+        }
+        let order = insertion_order(&sites);
+        assert_eq!(order.inserted.len(), 251);
+        assert_eq!(order.repeated.len(), 750);
+        assert!(order.repeated.iter().all(|&(i, kept)| (i - kept) % 250 == 0 && kept <= 250));
+        let mut seen = order.inserted;
+        seen.extend(order.repeated.iter().map(|r| r.0));
+        seen.sort_unstable();
+        assert!(seen.iter().enumerate().all(|(i, &s)| i == s as usize));
+    }
+}

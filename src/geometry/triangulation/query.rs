@@ -1,0 +1,210 @@
+//! Questions that adjacency alone answers.
+
+use super::cells::{Cell, Face, OPPOSITE};
+use super::{CellId, Triangulation, VertexId};
+
+/// A facet (triangle), given as a cell and the index of the vertex opposite to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Facet {
+    /// One of the two cells of the facet.
+    pub cell: CellId,
+    /// The index, 0 to 3, of the cell's vertex that the facet lacks.
+    pub opposite: usize,
+}
+
+impl Triangulation {
+    /// The number of cells, finite and infinite.
+    pub fn cell_count(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// The number of finite cells; their ids are those below it.
+    pub fn finite_cell_count(&self) -> usize {
+        self.finite
+    }
+
+    /// The number of infinite cells, equally of the facets of the convex hull.
+    pub fn infinite_cell_count(&self) -> usize {
+        self.cells.len() - self.finite
+    }
+
+    /// The number of finite vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.vertices
+    }
+
+    /// The number of finite facets.
+    pub fn finite_facet_count(&self) -> usize {
+        // Each finite cell has four, those of the hull counted once and the others twice.
+        (4 * self.finite + self.infinite_cell_count()) / 2
+    }
+
+    /// The number of finite edges, by Euler's relation for a 3-ball.
+    pub fn finite_edge_count(&self) -> usize {
+        self.vertices + self.finite_facet_count() - self.finite - 1
+    }
+
+    /// Whether a cell has the vertex at infinity, its last.
+    #[inline]
+    pub fn is_infinite(&self, cell: CellId) -> bool {
+        cell.index() >= self.finite
+    }
+
+    /// The vertices of a cell.
+    #[inline]
+    pub fn vertices(&self, cell: CellId) -> [VertexId; 4] {
+        self.cells[cell.index()].v.map(VertexId)
+    }
+
+    /// The neighbours of a cell; the `i`-th shares the facet opposite to the `i`-th vertex.
+    #[inline]
+    pub fn neighbours(&self, cell: CellId) -> [CellId; 4] {
+        self.cells[cell.index()].n.map(|f| CellId(f.cell()))
+    }
+
+    /// The same facet as seen from its other cell.
+    #[inline]
+    pub fn mirror(&self, facet: Facet) -> Facet {
+        self.cells[facet.cell.index()].n[facet.opposite].into()
+    }
+
+    /// The vertices of a facet, counter-clockwise as seen from outside its cell.
+    #[inline]
+    pub fn facet_vertices(&self, facet: Facet) -> [VertexId; 3] {
+        let v = self.cells[facet.cell.index()].v;
+        OPPOSITE[facet.opposite].map(|k| VertexId(v[k]))
+    }
+
+    /// All cells.
+    pub fn cells(&self) -> impl ExactSizeIterator<Item = CellId> + use<> {
+        (0..self.cells.len() as u32).map(CellId)
+    }
+
+    /// The finite cells.
+    pub fn finite_cells(&self) -> impl ExactSizeIterator<Item = CellId> + use<> {
+        (0..self.finite as u32).map(CellId)
+    }
+
+    /// The infinite cells, one for each facet of the convex hull.
+    pub fn infinite_cells(&self) -> impl ExactSizeIterator<Item = CellId> + use<> {
+        (self.finite as u32..self.cells.len() as u32).map(CellId)
+    }
+
+    /// The finite facets, each once, from the cell with the smaller id, which is finite.
+    pub fn finite_facets(&self) -> impl Iterator<Item = Facet> + '_ {
+        self.finite_cells().flat_map(move |cell| {
+            (0..4)
+                .map(move |opposite| Facet { cell, opposite })
+                .filter(move |&f| self.mirror(f).cell > cell)
+        })
+    }
+
+    /// The finite edges, each once, as a cell and the indices of its two vertices there; the cell
+    /// is the one with the smallest id around the edge.
+    ///
+    /// Costs a turn around each edge for each of its cells.
+    pub fn finite_edges(&self) -> impl Iterator<Item = (CellId, usize, usize)> + '_ {
+        const PAIRS: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+        self.finite_cells().flat_map(move |cell| {
+            PAIRS.into_iter().filter_map(move |(i, j)| {
+                self.edge_ring(cell, i, j).all(|c| c >= cell).then_some((cell, i, j))
+            })
+        })
+    }
+
+    /// The cells around the edge of vertices `i` and `j` of a cell, from that cell on, infinite
+    /// ones included, counter-clockwise about the direction from `i` to `j`.
+    ///
+    /// Consecutive cells share a facet, as do the last and the first.
+    ///
+    /// # Panics
+    /// If `i` equals `j` or one of them exceeds 3.
+    pub fn edge_ring(&self, cell: CellId, i: usize, j: usize) -> EdgeRing<'_> {
+        assert!(i != j && i < 4 && j < 4, "an edge has two different ends, not {i} and {j}");
+        let v = self.cells[cell.index()].v;
+        // (i, j, x, y) even: the ring turns from x to y and leaves through the facet without x.
+        let f = OPPOSITE[i];
+        let at = f.iter().position(|&k| k == j).unwrap_or(0);
+        let (x, y) = (f[(at + 1) % 3], f[(at + 2) % 3]);
+        EdgeRing { triangulation: self, start: cell.0, next: Some((cell.0, x)), hinge: v[y] }
+    }
+
+    /// The cells of a vertex, in ascending order; none for a point that is not a vertex.
+    ///
+    /// The vertex at infinity has the infinite cells.
+    pub fn incident_cells(&self, vertex: VertexId) -> Vec<CellId> {
+        if vertex == VertexId::INFINITE {
+            return self.infinite_cells().collect();
+        }
+        let Some(first) = self.incident_cell(vertex) else { return Vec::new() };
+        let mut found = vec![first];
+        let mut seen = std::collections::HashSet::from([first]);
+        let mut next = 0;
+        while next < found.len() {
+            let cell = &self.cells[found[next].index()];
+            next += 1;
+            for i in (0..4).filter(|&i| cell.v[i] != vertex.0) {
+                let neighbour = CellId(cell.n[i].cell());
+                if seen.insert(neighbour) {
+                    found.push(neighbour);
+                }
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// The cell of a vertex with the smallest id; `None` for a point that is not a vertex.
+    #[inline]
+    pub fn incident_cell(&self, vertex: VertexId) -> Option<CellId> {
+        self.incident.get(vertex.index()).copied().filter(|&c| c != CellId::NONE)
+    }
+
+    /// Whether an input point is a vertex.
+    #[inline]
+    pub fn is_vertex(&self, vertex: VertexId) -> bool {
+        self.incident_cell(vertex).is_some()
+    }
+
+    pub(super) fn records(&self) -> &[Cell] {
+        &self.cells
+    }
+}
+
+impl From<Face> for Facet {
+    #[inline]
+    fn from(face: Face) -> Self {
+        Self { cell: CellId(face.cell()), opposite: face.index() }
+    }
+}
+
+/// The cells around an edge, see [`Triangulation::edge_ring`].
+#[derive(Clone, Debug)]
+pub struct EdgeRing<'t> {
+    triangulation: &'t Triangulation,
+    start: u32,
+    /// The current cell and the index of the vertex whose opposite facet leads on.
+    next: Option<(u32, usize)>,
+    /// The vertex of the current cell that the next cell keeps, beside the edge.
+    hinge: u32,
+}
+
+impl Iterator for EdgeRing<'_> {
+    type Item = CellId;
+
+    #[inline]
+    fn next(&mut self) -> Option<CellId> {
+        let (cell, leave) = self.next?;
+        let cells = &self.triangulation.cells;
+        let face = cells[cell as usize].n[leave];
+        let (after, arrived) = (face.cell(), face.index());
+        self.next = (after != self.start).then(|| {
+            // The facet opposite to the old hinge leads on; the newly met vertex is the new one.
+            let v = &cells[after as usize].v;
+            let leave = v.iter().position(|&x| x == self.hinge).unwrap_or(0);
+            self.hinge = v[arrived];
+            (after, leave)
+        });
+        Some(CellId(cell))
+    }
+}

@@ -1,0 +1,188 @@
+//! Points on the boundary of the union of medial primitives, uniform by area.
+//!
+//! The boundary consists of parts of spheres, of cone laterals and of the tangent triangles of
+//! slabs. Each patch is sampled on its own, all with one density, and the points that lie inside
+//! another primitive are dropped:
+//!
+//! 1. Patches and their areas: `4 pi r^2`; `pi (1 - s^2) l (r_1 + r_2)`; two triangles for a slab.
+//! 2. A pilot run, as dense as if nothing were buried, tells which share survives.
+//! 3. The run proper is denser by that share, so that about the asked number survives.
+//!
+//! Spheres are sampled along an equal-area spiral, cones and triangles by low-discrepancy
+//! sequences, each patch turned or shifted at random, so that a patch with a single sample has it
+//! anywhere on it with equal probability.
+
+use std::f64::consts::{PI, TAU};
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+use super::MetricError;
+use crate::Vec3;
+use crate::complex::{MedialMesh, MedialUnion};
+use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
+
+/// How the boundary of a union is sampled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvelopeOptions {
+    /// Approximate number of samples.
+    pub samples: usize,
+    /// A point deeper than this inside some primitive is not on the boundary. In the unit of the
+    /// medial mesh.
+    pub burial: f64,
+    /// Seed of the turns and shifts.
+    pub seed: u64,
+}
+
+/// The run proper makes at most this many candidates for each sample asked: beyond, nearly all of
+/// the patches' area is buried, and fewer samples than asked are returned.
+const MOST_CANDIDATES: f64 = 40.0;
+
+/// The golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+
+/// Points on the boundary of the union of the primitives of `mesh`, uniform by area.
+///
+/// A union without area (all radii zero, no faces) is represented by its sphere centres. The same
+/// points come out for any number of threads.
+///
+/// # Errors
+/// When no samples are asked for.
+pub fn sample_envelope(
+    mesh: &MedialMesh,
+    union: &MedialUnion,
+    options: &EnvelopeOptions,
+) -> Result<Vec<Vec3>, MetricError> {
+    if options.samples == 0 {
+        return Err(MetricError::NoSamples("envelope_samples"));
+    }
+    let patches = patches(mesh);
+    let total = patches.iter().map(Patch::area).sum::<f64>();
+    if !(total > 0.0 && total.is_finite()) {
+        return Ok(mesh.spheres.iter().map(|m| m.centre).collect());
+    }
+    let asked = options.samples as f64;
+    let mut points = sample_patches(&patches, asked / total, union, options);
+    let share = points.len() as f64 / asked;
+    if share < 0.9 {
+        let candidates = asked * (1.0 / share).min(MOST_CANDIDATES);
+        points = sample_patches(&patches, candidates / total, union, options);
+    }
+    Ok(points)
+}
+
+/// A piece of the boundary of one primitive.
+enum Patch {
+    Sphere(Sphere),
+    /// Start sphere, end sphere, frame.
+    Lateral(Sphere, Sphere, ConeFrame),
+    Triangle([Vec3; 3]),
+}
+
+fn patches(mesh: &MedialMesh) -> Vec<Patch> {
+    let sphere = |v: u32| mesh.spheres[v as usize];
+    let mut patches: Vec<Patch> = mesh.spheres.iter().map(|&m| Patch::Sphere(m)).collect();
+    for ends in &mesh.edges {
+        let [a, b] = ends.map(sphere);
+        if let Some(frame) = Cone::new(a, b).frame() {
+            patches.push(Patch::Lateral(a, b, frame));
+        }
+    }
+    for corners in &mesh.faces {
+        let corners = corners.map(sphere);
+        if let Some(planes) = Slab::new(corners).planes() {
+            let touched = |n: Vec3| corners.map(|m| m.centre + m.radius * n);
+            patches.extend(planes.normals().map(|n| Patch::Triangle(touched(n))));
+        }
+    }
+    patches
+}
+
+/// The candidates of all patches at one density (points per area) that are not buried.
+fn sample_patches(
+    patches: &[Patch],
+    density: f64,
+    union: &MedialUnion,
+    options: &EnvelopeOptions,
+) -> Vec<Vec3> {
+    // Rounding the running sum, not each patch, keeps the density right for small patches.
+    let mut expected = Pcg64::seed_from_u64(options.seed).random::<f64>();
+    let counts: Vec<usize> = patches
+        .iter()
+        .map(|patch| {
+            let before = expected.floor();
+            expected += patch.area() * density;
+            (expected.floor() - before) as usize
+        })
+        .collect();
+    patches
+        .par_iter()
+        .zip(&counts)
+        .enumerate()
+        .flat_map_iter(|(index, (patch, &count))| {
+            let stream = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mut points = Vec::new();
+            if count > 0 {
+                patch.sample(count, &mut Pcg64::seed_from_u64(options.seed ^ stream), &mut points);
+                points.retain(|&p| !union.buries(p, options.burial));
+            }
+            points
+        })
+        .collect()
+}
+
+impl Patch {
+    fn area(&self) -> f64 {
+        match self {
+            Self::Sphere(m) => 4.0 * PI * m.radius * m.radius,
+            Self::Lateral(a, b, frame) => {
+                let rise_squared = (1.0 - frame.s) * (1.0 + frame.s);
+                PI * rise_squared * a.centre.distance(b.centre) * (a.radius + b.radius)
+            }
+            Self::Triangle([a, b, c]) => (b - a).cross(c - a).length() * 0.5,
+        }
+    }
+
+    fn sample(&self, count: usize, rng: &mut Pcg64, points: &mut Vec<Vec3>) {
+        let shift = [rng.random::<f64>(), rng.random::<f64>()];
+        let level = |i: usize| (i as f64 + 0.5) / count as f64;
+        match self {
+            Self::Sphere(m) => {
+                let turn = random_rotation(rng);
+                points.extend((0..count).map(|i| {
+                    let z = 1.0 - 2.0 * level(i);
+                    let (sin, cos) = (TAU * (i as f64 * GOLDEN).fract()).sin_cos();
+                    let rho = ((1.0 - z) * (1.0 + z)).sqrt();
+                    m.centre + m.radius * (turn * Vec3::new(rho * cos, rho * sin, z))
+                }));
+            }
+            Self::Lateral(a, b, frame) => points.extend((0..count).map(|i| {
+                let share = (level(i) + shift[0]).fract();
+                let (sin, cos) = (TAU * (i as f64 * GOLDEN + shift[1]).fract()).sin_cos();
+                // Area grows with the radius; this form does not cancel for equal radii.
+                let sum = a.radius + b.radius;
+                let radius = (a.radius * a.radius + share * (b.radius - a.radius) * sum).sqrt();
+                let m = a.lerp(*b, share * sum / (a.radius + radius));
+                m.centre + m.radius * frame.normal(cos * frame.v + sin * frame.w)
+            })),
+            Self::Triangle([a, b, c]) => points.extend((0..count).map(|i| {
+                let [mut s, mut t] = [0, 1].map(|k| (i as f64 * PLASTIC[k] + shift[k]).fract());
+                if s + t > 1.0 {
+                    (s, t) = (1.0 - s, 1.0 - t);
+                }
+                *a + s * (*b - *a) + t * (*c - *a)
+            })),
+        }
+    }
+}
+
+/// Uniform over all rotations (Shoemake 1992, "Uniform random rotations", Graphics Gems III).
+fn random_rotation(rng: &mut Pcg64) -> glam::DQuat {
+    let [split, first, second] = [(); 3].map(|()| rng.random::<f64>());
+    let (s1, c1) = (TAU * first).sin_cos();
+    let (s2, c2) = (TAU * second).sin_cos();
+    let (a, b) = ((1.0 - split).sqrt(), split.sqrt());
+    glam::DQuat::from_xyzw(a * s1, a * c1, b * s2, b * c2)
+}

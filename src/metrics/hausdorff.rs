@@ -1,0 +1,225 @@
+//! Distances between a surface and the union of medial primitives, both ways.
+//!
+//! 1. The surface S is sampled uniformly by area; its vertices are added, because the largest
+//!    error is usually at one.
+//! 2. Each sample is measured against the union U: `|sigma|` and `mu` of
+//!    [`MedialUnion`], and `|sigma|` of the spheres alone.
+//! 3. The boundary of U is sampled uniformly by area ([`super::envelope`]) and measured against S.
+//!
+//! Means, root mean squares and percentiles are those of the area-uniform samples; maxima are over
+//! all samples.
+//!
+//! # Biases
+//! - A sampled maximum is a lower bound of the true one. Distances are 1-Lipschitz, so it falls
+//!   short by at most the largest distance from a point of the surface to the nearest sample.
+//! - Where S runs inside U, `|sigma|` is a lower bound of the distance to the boundary of U:
+//!   `epsilon_union` is the distance between the surfaces only where S runs outside U. The reverse
+//!   distance, which is exact, covers the other case.
+//! - Points of U's boundary that some primitive covers by less than the burial depth are kept, so
+//!   strips along the tangent curves of neighbouring primitives count more than once in
+//!   `reverse_mean`.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::Distances;
+use super::envelope::{EnvelopeOptions, sample_envelope};
+use crate::Vec3;
+use crate::complex::{MedialMesh, MedialUnion, UnionError};
+use crate::geometry::{BvhError, TriangleBvh};
+use crate::surface::TriMesh;
+
+/// How densely to sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DistanceOptions {
+    /// Area-uniform samples on the surface; its vertices come on top.
+    pub surface_samples: usize,
+    /// Approximate number of samples on the boundary of the union.
+    pub envelope_samples: usize,
+    /// Seed of both.
+    pub seed: u64,
+}
+
+impl Default for DistanceOptions {
+    fn default() -> Self {
+        Self { surface_samples: 50_000, envelope_samples: 50_000, seed: 0 }
+    }
+}
+
+/// Why distances could not be measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MetricError {
+    /// The medial mesh has no union.
+    #[error(transparent)]
+    Union(#[from] UnionError),
+    /// The axis or surface to measure against has no tree.
+    #[error(transparent)]
+    Tree(BvhError),
+    /// The surface has no area that could be sampled.
+    #[error("the surface has no area, or an area that is not finite: nothing can be sampled on it")]
+    NoArea,
+    /// The surface has no volume that could be compared with.
+    #[error("the surface encloses no volume (signed volume {0}): is it closed and oriented?")]
+    NoVolume(f64),
+    /// Too few samples were asked for.
+    #[error("at least one sample is needed, {0} asks for none")]
+    NoSamples(&'static str),
+}
+
+/// Distances between the surface `surface`, whose faces are in `bvh`, and the union of the
+/// primitives of `mesh`, in the unit of both.
+///
+/// The result is the same for any number of threads.
+///
+/// # Errors
+/// When the medial mesh is empty or not valid, the surface has no area, or no samples are asked.
+///
+/// # Panics
+/// If a face of `surface` names a vertex that does not exist.
+pub fn distances(
+    surface: &TriMesh,
+    bvh: &TriangleBvh,
+    mesh: &MedialMesh,
+    options: &DistanceOptions,
+) -> Result<Distances, MetricError> {
+    let union = MedialUnion::new(mesh)?;
+    let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
+    let sigma = absolute(union.signed_batch(&samples.points));
+    let mu = union.unsigned_nearest_batch(&samples.points);
+    let spheres = absolute(MedialUnion::of_spheres(&mesh.spheres)?.signed_batch(&samples.points));
+    let envelope = sample_envelope(
+        mesh,
+        &union,
+        &EnvelopeOptions {
+            samples: options.envelope_samples,
+            burial: BURIAL * diagonal(surface),
+            seed: options.seed,
+        },
+    )?;
+    let reverse = bvh.distance_batch(&envelope);
+    let uniform = Summary::new(&sigma[..samples.uniform]);
+    let (epsilon_union, reverse_max) = (largest(&sigma), largest(&reverse));
+    Ok(Distances {
+        epsilon: largest(&mu),
+        epsilon_union,
+        reverse: reverse_max,
+        hausdorff: epsilon_union.max(reverse_max),
+        mean: uniform.mean,
+        rms: uniform.rms,
+        p95: uniform.p95,
+        p99: uniform.p99,
+        reverse_mean: Summary::new(&reverse).mean,
+        spheres_only: largest(&spheres),
+        samples: samples.points.len(),
+        reverse_samples: reverse.len(),
+    })
+}
+
+/// Depth, as a fraction of the surface's diagonal, from which a point of one primitive's surface
+/// counts as buried in another primitive and not as a point of the union's boundary.
+const BURIAL: f64 = 1e-7;
+
+fn diagonal(surface: &TriMesh) -> f64 {
+    surface.bounding_box().map_or(0.0, |(lo, hi)| lo.distance(hi))
+}
+
+fn absolute(mut values: Vec<f64>) -> Vec<f64> {
+    for value in &mut values {
+        *value = value.abs();
+    }
+    values
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+/// Samples of a surface: the area-uniform ones first, then the vertices of its faces.
+pub(super) struct SurfaceSamples {
+    pub points: Vec<Vec3>,
+    /// How many of them are area-uniform.
+    pub uniform: usize,
+}
+
+impl SurfaceSamples {
+    pub fn new(surface: &TriMesh, count: usize, seed: u64) -> Result<Self, MetricError> {
+        if count == 0 {
+            return Err(MetricError::NoSamples("surface_samples"));
+        }
+        let triangles: Vec<_> = (0..surface.faces.len()).map(|f| surface.triangle(f)).collect();
+        let mut points = sample_triangles(&triangles, count, seed).ok_or(MetricError::NoArea)?;
+        let mut used = vec![false; surface.vertices.len()];
+        for &v in surface.faces.iter().flatten() {
+            used[v as usize] = true;
+        }
+        points.extend(surface.vertices.iter().zip(used).filter(|&(_, u)| u).map(|(&v, _)| v));
+        Ok(Self { points, uniform: count })
+    }
+}
+
+/// `count` points, uniform by area and stratified along the list of triangles; `None` when there
+/// is no area or it is not finite.
+pub(super) fn sample_triangles(
+    triangles: &[[Vec3; 3]],
+    count: usize,
+    seed: u64,
+) -> Option<Vec<Vec3>> {
+    let area = |&[a, b, c]: &[Vec3; 3]| (b - a).cross(c - a).length() * 0.5;
+    let total: f64 = triangles.iter().map(area).sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return None;
+    }
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut points = Vec::with_capacity(count);
+    let (mut below, mut last) = (0.0, None);
+    let mut target = rng.random::<f64>() / count as f64 * total;
+    for triangle in triangles {
+        let size = area(triangle);
+        below += size;
+        while points.len() < count && target < below {
+            points.push(uniform_in(triangle, &mut rng));
+            target = (points.len() as f64 + rng.random::<f64>()) / count as f64 * total;
+        }
+        if size > 0.0 {
+            last = Some(triangle);
+        }
+    }
+    // The running sum may end a rounding below the total.
+    while let (true, Some(triangle)) = (points.len() < count, last) {
+        points.push(uniform_in(triangle, &mut rng));
+    }
+    Some(points)
+}
+
+fn uniform_in(&[a, b, c]: &[Vec3; 3], rng: &mut Pcg64) -> Vec3 {
+    let root = rng.random::<f64>().sqrt();
+    let v = rng.random::<f64>();
+    a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)
+}
+
+/// Mean, root mean square and percentiles of some values.
+struct Summary {
+    mean: f64,
+    rms: f64,
+    p95: f64,
+    p99: f64,
+}
+
+impl Summary {
+    /// Percentiles are nearest ranks: the smallest value that at least that share does not exceed.
+    fn new(values: &[f64]) -> Self {
+        let count = values.len().max(1) as f64;
+        let mut sorted = values.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let rank = |share: f64| {
+            let rank = ((share * count).ceil() as usize).clamp(1, values.len().max(1));
+            sorted.get(rank - 1).copied().unwrap_or(0.0)
+        };
+        Self {
+            mean: values.iter().sum::<f64>() / count,
+            rms: (values.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
+            p95: rank(0.95),
+            p99: rank(0.99),
+        }
+    }
+}

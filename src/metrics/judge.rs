@@ -1,0 +1,170 @@
+//! All metrics of a medial mesh against one surface.
+
+use std::sync::Arc;
+
+use super::{
+    AxisDistances, AxisOptions, DistanceOptions, Distances, Evaluation, MetricError, VolumeOptions,
+    axis_distance, counts, distances, spikes, triangle_quality, volume_error,
+};
+use crate::complex::{MedialMesh, MedialUnion, betti, euler};
+use crate::geometry::TriangleBvh;
+use crate::surface::{InsideTest, Side, TriMesh};
+
+/// How results are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JudgeOptions {
+    /// Area-uniform samples on the surface, beside its vertices, and about as many on the
+    /// boundary of the union.
+    pub samples: usize,
+    /// Levels of division of space for the volume difference; 0 leaves it out.
+    pub volume_depth: u32,
+    /// Seed of every sample.
+    pub seed: u64,
+}
+
+impl Default for JudgeOptions {
+    fn default() -> Self {
+        Self { samples: 50_000, volume_depth: 7, seed: 0 }
+    }
+}
+
+/// What a result must agree with, whatever method it came from.
+#[derive(Clone, Debug, Default)]
+pub struct Truth {
+    /// Betti numbers that the solid's topology demands of its medial axis.
+    pub betti: Option<[u64; 3]>,
+    /// The exactly known medial axis, in the units of the surface.
+    pub axis: Option<MedialMesh>,
+    /// Bounding-box diagonal of the input, in its own units, for the record.
+    pub diagonal: f64,
+}
+
+/// Measures medial meshes against one surface.
+pub struct Judge {
+    surface: TriMesh,
+    tree: Arc<TriangleBvh>,
+    inside: InsideTest,
+    truth: Truth,
+    options: JudgeOptions,
+}
+
+impl Judge {
+    /// A judge for a closed, oriented surface of bounding-box diagonal 1.
+    pub fn new(
+        surface: TriMesh,
+        tree: Arc<TriangleBvh>,
+        truth: Truth,
+        options: JudgeOptions,
+    ) -> Self {
+        let inside = InsideTest::new(&surface);
+        Self { surface, tree, inside, truth, options }
+    }
+
+    /// How results are measured.
+    pub fn options(&self) -> JudgeOptions {
+        self.options
+    }
+
+    /// What results must agree with.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    /// Every metric of a medial mesh in normalised units.
+    ///
+    /// # Errors
+    /// When the mesh has no sphere or is not valid.
+    pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
+        let union = MedialUnion::new(mesh)?;
+        let distances = self.distances(mesh)?;
+        let axis = match &self.truth.axis {
+            Some(truth) => Some(self.axis_distances(mesh, truth)?),
+            None => None,
+        };
+        Ok(Evaluation {
+            warnings: self.misfits(mesh, &union, &distances),
+            distances,
+            volume_error: self.volume_error(&union)?,
+            quality: triangle_quality(mesh),
+            spikes: spikes(mesh),
+            betti: betti(mesh),
+            euler: euler(mesh),
+            expected_betti: self.truth.betti,
+            counts: counts(mesh),
+            axis,
+            diagonal: self.truth.diagonal,
+            seed: self.options.seed,
+        })
+    }
+
+    /// The distances alone.
+    ///
+    /// # Errors
+    /// As [`Judge::evaluate`].
+    pub fn distances(&self, mesh: &MedialMesh) -> Result<Distances, MetricError> {
+        let options = DistanceOptions {
+            surface_samples: self.options.samples,
+            envelope_samples: self.options.samples,
+            seed: self.options.seed,
+        };
+        distances(&self.surface, &self.tree, mesh, &options)
+    }
+
+    fn volume_error(&self, union: &MedialUnion) -> Result<Option<f64>, MetricError> {
+        if self.options.volume_depth == 0 {
+            return Ok(None);
+        }
+        let options = VolumeOptions { depth: self.options.volume_depth, seed: self.options.seed };
+        let inside = |p| self.inside.side(p) == Side::Inside;
+        volume_error(&self.surface, &self.tree, inside, union, &options).map(Some)
+    }
+
+    fn axis_distances(
+        &self,
+        mesh: &MedialMesh,
+        truth: &MedialMesh,
+    ) -> Result<AxisDistances, MetricError> {
+        let options = AxisOptions { seed: self.options.seed, ..AxisOptions::default() };
+        axis_distance(mesh, truth, &options)
+    }
+
+    /// Signs that the medial mesh does not belong to this surface: published files have had the
+    /// wrong units or radii.
+    fn misfits(
+        &self,
+        mesh: &MedialMesh,
+        union: &MedialUnion,
+        distances: &Distances,
+    ) -> Vec<String> {
+        let mut misfits = Vec::new();
+        let (lo, hi) = union.bounding_box();
+        let extent = (hi - lo).length();
+        if !(0.5..=2.0).contains(&extent) {
+            misfits.push(format!(
+                "the union's bounding box has {extent:.3} times the diagonal of the surface's: \
+                 is the medial mesh in other units?"
+            ));
+        }
+        let (surface_lo, surface_hi) = self.surface.bounding_box().unwrap_or_default();
+        let centres = mesh.spheres.iter().map(|s| s.centre);
+        let outside =
+            centres.filter(|c| c.cmplt(surface_lo).any() || c.cmpgt(surface_hi).any()).count();
+        if 2 * outside > mesh.spheres.len() {
+            misfits.push(format!(
+                "{outside} of {} centres lie outside the bounding box of the surface: \
+                 is the medial mesh moved, or of another mesh?",
+                mesh.spheres.len()
+            ));
+        }
+        let depth = |s: &crate::complex::Sphere| self.tree.closest(s.centre).distance;
+        let shallow = mesh.spheres.iter().filter(|s| s.radius < 0.5 * depth(s)).count();
+        if 2 * shallow > mesh.spheres.len() && distances.mean > 0.005 {
+            misfits.push(format!(
+                "{shallow} of {} radii are less than half the distance to the surface: \
+                 are the radii scaled, or squared?",
+                mesh.spheres.len()
+            ));
+        }
+        misfits
+    }
+}
