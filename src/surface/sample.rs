@@ -120,6 +120,15 @@ const CANDIDATES: usize = 5;
 ///
 /// # Cost
 /// `O(F + n log F)`, blue noise `O(F + n log n)`.
+///
+/// ```
+/// use medial::{Vec3, surface::{Sampling, TriMesh, sample}};
+///
+/// let triangle = TriMesh { vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y], faces: vec![[0, 1, 2]] };
+/// let sampling: Sampling = "blue:100".parse()?;
+/// assert_eq!(sample(&triangle, &sampling).len(), 100);
+/// # Ok::<(), medial::surface::ParseSamplingError>(())
+/// ```
 pub fn sample(mesh: &TriMesh, sampling: &Sampling) -> Vec<Vec3> {
     match *sampling {
         Sampling::MeshVertices => mesh.vertices.clone(),
