@@ -204,7 +204,8 @@ impl Shape {
 
     /// Boundary samples by another sampling.
     pub fn samples_by(&self, sampling: &Sampling) -> Arc<[Vec3]> {
-        let built = self.store.samples.get(*sampling, || Ok(sample(&self.store.mesh, sampling).into()));
+        let built =
+            self.store.samples.get(*sampling, || Ok(sample(&self.store.mesh, sampling).into()));
         self.take(Substrate::Samples, built).expect("sampling cannot fail")
     }
 
@@ -353,7 +354,8 @@ impl<K: Eq + Hash, T: Clone> Cache<K, T> {
         key: K,
         build: impl FnOnce() -> Result<T, ShapeError>,
     ) -> (Result<T, ShapeError>, Use) {
-        let slot = Arc::clone(self.slots.lock().expect("no panic while held").entry(key).or_default());
+        let slot =
+            Arc::clone(self.slots.lock().expect("no panic while held").entry(key).or_default());
         let mut built_here = false;
         let (value, cost) = slot
             .get_or_init(|| {

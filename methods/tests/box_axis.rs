@@ -21,7 +21,8 @@ fn box_surface() -> TriMesh {
         let side = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
         HALF * Vec3::new(side(0), side(1), side(2))
     };
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     TriMesh {
         vertices: (0..8).map(corner).collect(),
         faces: quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
@@ -58,7 +59,11 @@ fn exact_spheres() -> Vec<Exact> {
                 let mut contacts = [centre; 2];
                 contacts[0][u] = signs.0 * HALF[u];
                 contacts[1][v] = signs.1 * HALF[v];
-                spheres.push(Exact { sphere: Sphere::new(centre, radius), contacts, central: false });
+                spheres.push(Exact {
+                    sphere: Sphere::new(centre, radius),
+                    contacts,
+                    central: false,
+                });
             }
         }
     }
@@ -105,10 +110,8 @@ fn lambda_eats_the_edges_up_to_its_root_two_fold() {
     let shape = exact_shape(&exact);
     let diagonal = shape.normalisation().diagonal;
     for lambda in [0.02, 0.1, 0.2, 0.3, 0.4, 0.499] {
-        let expected: Vec<bool> = exact
-            .iter()
-            .map(|e| e.central || e.sphere.radius >= 2.0_f64.sqrt() * lambda)
-            .collect();
+        let expected: Vec<bool> =
+            exact.iter().map(|e| e.central || e.sphere.radius >= 2.0_f64.sqrt() * lambda).collect();
         assert_eq!(kept(&shape, &exact, "lambda", lambda / diagonal), expected, "lambda {lambda}");
     }
     let beyond_half_thickness = (HALF.z + 1e-6) / diagonal;

@@ -125,6 +125,11 @@ fn documented_defaults_are_the_defaults() {
         let run = RunContext::default();
         let mut spelled = method.prepare(&shape, &params, &run).expect("defaults are accepted");
         let spelled = spelled.at(Level::Spheres(50)).expect("a count").mesh;
-        assert_eq!(spelled, at(method.as_ref(), &shape, Level::Spheres(50)), "{}", method.info().id);
+        assert_eq!(
+            spelled,
+            at(method.as_ref(), &shape, Level::Spheres(50)),
+            "{}",
+            method.info().id
+        );
     }
 }

@@ -70,10 +70,7 @@ impl CellSpheres {
             let (&side, &near) = verdicts.next()?;
             (side == Side::Inside && !near).then_some(sphere)
         });
-        Self {
-            inside: inside.collect(),
-            in_guard_band: near.iter().filter(|&&near| near).count(),
-        }
+        Self { inside: inside.collect(), in_guard_band: near.iter().filter(|&&near| near).count() }
     }
 
     /// Number of cells centred inside.

@@ -164,7 +164,7 @@ impl SlabFace {
         Some(foot)
     }
 
-    fn planes(&self) -> SlabPlanes {
+    pub(super) fn planes(&self) -> SlabPlanes {
         let [gx, gy] = self.gradient;
         SlabPlanes {
             centre_normal: self.frame.normal,

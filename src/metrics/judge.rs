@@ -147,9 +147,8 @@ impl Judge {
         }
         let (surface_lo, surface_hi) = self.surface.bounding_box().unwrap_or_default();
         let centres = mesh.spheres.iter().map(|s| s.centre);
-        let outside = centres
-            .filter(|c| c.cmplt(surface_lo).any() || c.cmpgt(surface_hi).any())
-            .count();
+        let outside =
+            centres.filter(|c| c.cmplt(surface_lo).any() || c.cmpgt(surface_hi).any()).count();
         if 2 * outside > mesh.spheres.len() {
             misfits.push(format!(
                 "{outside} of {} centres lie outside the bounding box of the surface: \

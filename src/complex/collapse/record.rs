@@ -1,6 +1,6 @@
 //! The record of collapses, and any level of it made from the initial mesh.
 
-use super::super::mesh::{MedialMesh, Sphere};
+use crate::complex::{MedialMesh, Sphere};
 
 /// One collapse, in the ids of the initial mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
