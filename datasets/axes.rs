@@ -3,7 +3,7 @@
 //! Flat sheets and straight edges, on which the radius is linear, are exact. Curved ones are
 //! triangulated finely, with vertices on the true axis; the tolerance bounds the rest.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
@@ -16,7 +16,7 @@ use crate::shapes::{
 };
 
 /// Rings of a triangulated disc, and vertices that each has more than the one inside it.
-const DISC_RINGS: u32 = 24;
+const DISC_RINGS: u32 = 32;
 const DISC_SECTORS: u32 = 6;
 /// Edges of a triangulated circle.
 const CIRCLE_EDGES: u32 = 360;
@@ -44,13 +44,26 @@ pub(crate) fn sphere() -> KnownAxis {
 pub(crate) fn ellipsoid() -> KnownAxis {
     let Vec3 { x: a, y: b, z: c } = ELLIPSOID;
     let (u, v) = (a * a - c * c, b * b - c * c);
+    let on_axis = |x: f64, y: f64| {
+        Sphere::new(Vec3::new(x, y, 0.0), c * (1.0 - x * x / u - y * y / v).sqrt())
+    };
     let (vertices, faces) = disc();
     let spheres = vertices.iter().map(|&[s, t]| {
-        let (x, y) = (s * u / a, t * v / b);
-        Sphere::new(Vec3::new(x, y, 0.0), c * (1.0 - x * x / u - y * y / v).sqrt())
+        // Rings at equal angles of the surface: closer towards the rim, where the radius falls
+        // ever more steeply.
+        let rho = s.hypot(t);
+        let stretch = if rho > 0.0 { (FRAC_PI_2 * rho).sin() / rho } else { 0.0 };
+        on_axis(s * stretch * u / a, t * stretch * v / b)
     });
-    // The chords of the rim are the coarsest part: checked against the formula in the tests.
-    known(spheres.collect(), vec![], faces, 2.0 * sagitta(u / a, DISC_SECTORS * DISC_RINGS))
+    let mut axis = known(spheres.collect(), vec![], faces, 0.0);
+    // The radius is concave, so that it is nearly farthest from linear halfway between vertices.
+    let sagging = axis.mesh.edges.iter().map(|edge| {
+        let [p, q] = edge.map(|sphere| axis.mesh.spheres[sphere as usize]);
+        let middle = p.lerp(q, 0.5);
+        on_axis(middle.centre.x, middle.centre.y).radius - middle.radius
+    });
+    axis.tolerance = 2.0 * sagging.fold(0.0, f64::max) + sagitta(u / a, DISC_SECTORS * DISC_RINGS);
+    axis
 }
 
 /// How far a regular polygon of `sides` inscribed in a circle stays away from it.
@@ -149,19 +162,22 @@ pub(crate) fn rod() -> KnownAxis {
     for side in [-1.0, 1.0] {
         let first = spheres.len() as u32;
         spheres.extend(vertices.iter().map(|&[s, t]| {
+            // Rings at squares: an inner ring has fewer vertices, so it must be smaller in
+            // proportion for its chords to stay as close to the cone as those of the crease.
             let rho = s.hypot(t);
-            let z = side * (fork + (ROD_HALF - fork) * rho);
-            Sphere::new(
-                Vec3::new(ROD_RADIUS * s, ROD_RADIUS * t, z),
-                ROD_RADIUS * (1.0 - rho).max(0.0),
-            )
+            let centre = Vec3::new(
+                ROD_RADIUS * s * rho,
+                ROD_RADIUS * t * rho,
+                side * (fork + (ROD_HALF - fork) * rho * rho),
+            );
+            Sphere::new(centre, ROD_RADIUS * (1.0 - rho * rho).max(0.0))
         }));
         faces.extend(disc_faces.iter().map(|face| face.map(|v| v + first)));
         edges.push([first, spheres.len() as u32]);
         spheres.push(Sphere::new(Vec3::new(0.0, 0.0, side * ROD_APEX), 0.0));
     }
     edges.push([0, spheres.len() as u32 / 2]);
-    known(spheres, edges, faces, sagitta(ROD_RADIUS, DISC_SECTORS * DISC_RINGS))
+    known(spheres, edges, faces, 1.5 * sagitta(ROD_RADIUS, DISC_SECTORS * DISC_RINGS))
 }
 
 /// The circle of the tube's centres.

@@ -53,6 +53,11 @@ impl BuiltIn {
         (self.generate)(self.diagonal / f64::from(resolution))
     }
 
+    /// The resolutions that [`BuiltIn::mesh`] takes as they are.
+    pub fn resolutions(&self) -> std::ops::RangeInclusive<u32> {
+        self.min_resolution..=MAX_RESOLUTION
+    }
+
     /// The medial axis where it is known in closed form.
     pub fn axis(&self) -> Option<KnownAxis> {
         self.known_axis.map(|axis| axis())
@@ -193,7 +198,7 @@ pub fn catalogue() -> Vec<BuiltIn> {
             title: "Double torus",
             summary: "Two blended tori side by side, genus 2, from an implicit function.",
             expected_betti: [1, 2, 0],
-            default_resolution: 52,
+            default_resolution: 44,
             min_resolution: 30,
             generate: shapes::double_torus,
             known_axis: None,
@@ -204,7 +209,7 @@ pub fn catalogue() -> Vec<BuiltIn> {
             title: "Tetrahedral frame",
             summary: "The six edges of a tetrahedron as blended tubes, genus 3.",
             expected_betti: [1, 3, 0],
-            default_resolution: 52,
+            default_resolution: 36,
             min_resolution: 30,
             generate: shapes::frame,
             known_axis: None,
@@ -215,8 +220,8 @@ pub fn catalogue() -> Vec<BuiltIn> {
             title: "Blob",
             summary: "A smooth body with head, tail and four limbs, from an implicit function.",
             expected_betti: [1, 0, 0],
-            default_resolution: 52,
-            min_resolution: 24,
+            default_resolution: 46,
+            min_resolution: 30,
             generate: shapes::blob,
             known_axis: None,
             diagonal: shapes::BLOB_DIAGONAL,

@@ -80,7 +80,7 @@ pub(crate) fn project(field: &impl Field, mut p: Vec3) -> Vec3 {
         let next = p - gradient * (value / gradient.length_squared());
         let (next_value, next_gradient) = field.at(next);
         // Steps end where rounding does: when the value no longer falls.
-        if !(next_value.abs() < value.abs()) {
+        if next_value.is_nan() || next_value.abs() >= value.abs() {
             break;
         }
         (p, value, gradient) = (next, next_value, next_gradient);

@@ -24,8 +24,8 @@ use crate::blocks::split;
 use crate::fields::{Field, project};
 use crate::manifold::{euler, first_defect};
 
-/// Rounds of step 4; the triangles hardly change after twenty.
-const ROUNDS: usize = 20;
+/// Rounds of step 4; the triangles hardly change after that.
+const ROUNDS: usize = 15;
 /// Lattices tried, each finer by [`REFINEMENT`], before the shape is given up.
 const ATTEMPTS: i32 = 60;
 const REFINEMENT: f64 = 0.98;
@@ -169,7 +169,7 @@ impl Net {
 /// Step 4.
 fn relax(field: &impl Field, vertices: &mut Vec<Vec3>, quads: &[[u32; 4]]) {
     let sides = quads.iter().flat_map(|&[a, b, c, d]| [[a, b], [b, c], [c, d], [d, a]]);
-    slide(field, vertices, sides, ROUNDS);
+    slide(field, vertices, &sides, ROUNDS);
 }
 
 /// Moves the vertices on the surface halfway towards the mean of their neighbours, `rounds` times.
@@ -177,7 +177,7 @@ fn relax(field: &impl Field, vertices: &mut Vec<Vec3>, quads: &[[u32; 4]]) {
 pub(crate) fn slide(
     field: &impl Field,
     vertices: &mut Vec<Vec3>,
-    directed_sides: impl Iterator<Item = [u32; 2]> + Clone,
+    directed_sides: &(impl Iterator<Item = [u32; 2]> + Clone),
     rounds: usize,
 ) {
     for _ in 0..rounds {

@@ -22,7 +22,7 @@ pub(crate) const ROUNDING: f64 = 0.25;
 pub(crate) const PLATE_HALF: Vec3 = Vec3::new(1.0, 0.75, 0.05);
 /// Length, width and height of the bracket, and the thickness of its two plates.
 pub(crate) const BRACKET: Vec3 = Vec3::new(2.0, 1.0, 1.5);
-const BRACKET_THICKNESS: f64 = 0.4;
+pub(crate) const BRACKET_THICKNESS: f64 = 0.4;
 /// Radius of capsule and rod.
 pub(crate) const ROD_RADIUS: f64 = 0.4;
 /// Half the length of the cylinder of capsule and rod.
@@ -39,9 +39,9 @@ pub(crate) const CAVITY: f64 = 0.5;
 
 pub(crate) const SPHERE_DIAGONAL: f64 = 3.464_101_615_137_754_6;
 /// Bounding-box diagonals of the blended shapes, as measured on fine meshes.
-pub(crate) const DOUBLE_TORUS_DIAGONAL: f64 = 4.01;
-pub(crate) const FRAME_DIAGONAL: f64 = 3.17;
-pub(crate) const BLOB_DIAGONAL: f64 = 3.13;
+pub(crate) const DOUBLE_TORUS_DIAGONAL: f64 = 4.017;
+pub(crate) const FRAME_DIAGONAL: f64 = 3.166;
+pub(crate) const BLOB_DIAGONAL: f64 = 3.189;
 
 pub(crate) fn diagonal_of(half: Vec3) -> f64 {
     2.0 * half.length()
@@ -88,7 +88,7 @@ pub(crate) fn ellipsoid(edge: f64) -> TriMesh {
     let mean_radius = ELLIPSOID.element_sum() / 3.0;
     let mut mesh = mapped(unit_sphere(frequency(mean_radius, edge)), |p| p * ELLIPSOID);
     let sides = mesh.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-    slide(&Ellipsoid(ELLIPSOID), &mut mesh.vertices, sides, 30);
+    slide(&Ellipsoid(ELLIPSOID), &mut mesh.vertices, &sides, 30);
     mesh
 }
 
@@ -183,37 +183,46 @@ pub(crate) fn hollow_sphere(edge: f64) -> TriMesh {
 }
 
 pub(crate) fn double_torus(edge: f64) -> TriMesh {
+    polygonise(&double_torus_field(), Vec3::new(1.8, 1.0, 0.3), edge, -2)
+}
+
+pub(crate) fn double_torus_field() -> Blend {
     let ring = |x: f64| Part::Torus { centre: Vec3::new(x, 0.0, 0.0), major: 0.7, minor: 0.25 };
-    let field = Blend { parts: vec![ring(-0.8), ring(0.8)], sharpness: 20.0 };
-    polygonise(&field, Vec3::new(1.8, 1.0, 0.3), edge, -2)
+    Blend { parts: vec![ring(-0.8), ring(0.8)], sharpness: 20.0 }
 }
 
 pub(crate) fn frame(edge: f64) -> TriMesh {
+    polygonise(&frame_field(), Vec3::splat(1.0), edge, -4)
+}
+
+pub(crate) fn frame_field() -> Blend {
     let corners = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
     let corners = corners.map(|c| Vec3::from(c) * 0.7);
     let pairs = (0..4).flat_map(|i| (i + 1..4).map(move |j| (i, j)));
     let tubes = pairs.map(|(i, j)| Part::Tube { a: corners[i], b: corners[j], radius: 0.17 });
-    let field = Blend { parts: tubes.collect(), sharpness: 25.0 };
-    polygonise(&field, Vec3::splat(1.0), edge, -4)
+    Blend { parts: tubes.collect(), sharpness: 25.0 }
 }
 
 pub(crate) fn blob(edge: f64) -> TriMesh {
+    polygonise(&blob_field(), Vec3::new(1.7, 0.8, 1.0), edge, 2)
+}
+
+pub(crate) fn blob_field() -> Blend {
     let tube = |a: [f64; 3], b: [f64; 3], radius: f64| Part::Tube {
         a: Vec3::from(a),
         b: Vec3::from(b),
         radius,
     };
-    let field = Blend {
+    Blend {
         parts: vec![
             tube([-0.5, 0.0, 0.0], [0.45, 0.05, 0.05], 0.32),
             tube([0.75, 0.05, 0.38], [0.95, 0.05, 0.42], 0.24),
-            tube([-0.75, 0.0, 0.1], [-1.25, 0.1, 0.42], 0.1),
-            tube([0.4, 0.25, -0.1], [0.55, 0.42, -0.65], 0.13),
-            tube([0.4, -0.2, -0.1], [0.65, -0.38, -0.62], 0.13),
-            tube([-0.5, 0.25, -0.1], [-0.6, 0.4, -0.66], 0.14),
-            tube([-0.5, -0.25, -0.1], [-0.42, -0.42, -0.64], 0.14),
+            tube([-0.75, 0.0, 0.1], [-1.25, 0.1, 0.42], 0.14),
+            tube([0.4, 0.25, -0.1], [0.55, 0.42, -0.65], 0.15),
+            tube([0.4, -0.2, -0.1], [0.65, -0.38, -0.62], 0.15),
+            tube([-0.5, 0.25, -0.1], [-0.6, 0.4, -0.66], 0.16),
+            tube([-0.5, -0.25, -0.1], [-0.42, -0.42, -0.64], 0.16),
         ],
         sharpness: 14.0,
-    };
-    polygonise(&field, Vec3::new(1.7, 0.8, 1.0), edge, 2)
+    }
 }

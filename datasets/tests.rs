@@ -1,49 +1,343 @@
-#[test]
-fn probe() {
-    for s in crate::catalogue() {
-        let t = std::time::Instant::now();
-        let m = s.mesh(s.default_resolution);
-        let el = t.elapsed();
-        let (lo, hi) = m.bounding_box().unwrap();
-        let mut min_angle: f64 = 180.0;
-        let (mut emin, mut emax, mut esum) = (f64::MAX, 0f64, 0.0);
-        for f in 0..m.faces.len() {
-            let t = m.triangle(f);
-            for i in 0..3 {
-                let (a, b, c) = (t[i], t[(i + 1) % 3], t[(i + 2) % 3]);
-                min_angle = min_angle.min((b - a).angle_between(c - a).to_degrees());
-                let e = a.distance(b);
-                emin = emin.min(e);
-                emax = emax.max(e);
-                esum += e;
-            }
+//! Every shape against an analytic depth function of its own: nothing shared with the generators.
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, Sphere, betti};
+use medial::metrics::{spikes, triangle_quality};
+use medial::surface::{Normalisation, TriMesh};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use crate::fields::{Blend, Field};
+use crate::manifold::{euler, first_defect};
+use crate::shapes::{blob_field, double_torus_field, frame_field};
+use crate::{BuiltIn, add_noise, catalogue, find};
+
+/// Distance from a point to the surface, positive inside.
+///
+/// Exact inside every shape and on its surface; outside, only the sign is right. For the blended
+/// shapes it is the value of the field, at most the distance.
+fn depth(id: &str, p: Vec3) -> f64 {
+    let rho = p.x.hypot(p.y);
+    let in_box = |p: Vec3, half: [f64; 3]| (Vec3::from(half) - p.abs()).min_element();
+    let in_capsule = |p: Vec3, half: f64, radius: f64| {
+        radius - p.distance(Vec3::new(0.0, 0.0, p.z.clamp(-half, half)))
+    };
+    let in_blend = |field: Blend| -field.at(p).0;
+    match id {
+        "sphere" => 1.0 - p.length(),
+        "ellipsoid" => in_ellipsoid(p),
+        "box" => in_box(p, [1.5, 1.0, 0.5]),
+        "plate" => in_box(p, [1.0, 0.75, 0.05]),
+        "rounded-box" => {
+            let beyond = p.abs() - Vec3::new(1.0, 0.6, 0.25);
+            0.25 - beyond.max(Vec3::ZERO).length() - beyond.max_element().min(0.0)
         }
-        let mean = esum / (3 * m.faces.len()) as f64;
-        eprintln!(
-            "{:14} v {:5} f {:5} chi {:3} defect {:?} diag {:.3}/{:.3} ext {:.3} angle {:.1} edge {:.3}..{:.3} mean/target {:.2} {:?}",
-            s.id,
-            m.vertices.len(),
-            m.faces.len(),
-            crate::manifold::euler(&m),
-            crate::manifold::first_defect(&m),
-            (hi - lo).length(),
-            s.diagonal,
-            hi - lo,
-            min_angle,
-            emin,
-            emax,
-            mean / (s.diagonal / s.default_resolution as f64),
-            el
-        );
-        if let Some(a) = s.axis() {
-            eprintln!(
-                "    axis {} {} {} betti {:?} tol {:.2e}",
-                a.mesh.spheres.len(),
-                a.mesh.edges.len(),
-                a.mesh.faces.len(),
-                medial::complex::betti(&a.mesh),
-                a.tolerance
+        "bracket" => {
+            let foot = in_box(p - Vec3::new(1.0, 0.5, 0.2), [1.0, 0.5, 0.2]);
+            foot.max(in_box(p - Vec3::new(0.2, 0.5, 0.75), [0.2, 0.5, 0.75]))
+        }
+        "capsule" => in_capsule(p, 0.8, 0.4),
+        "rod" => (0.4 - rho).min((1.2 - p.z.abs() - rho) * 0.5f64.sqrt()),
+        "pair" => {
+            let ball = 0.6 - p.distance(Vec3::new(-1.0, 0.0, 0.0));
+            ball.max(in_capsule(p - Vec3::new(0.5, 0.0, 0.0), 0.5, 0.3))
+        }
+        "torus" => 0.4 - (rho - 1.0).hypot(p.z),
+        "hollow-sphere" => (1.0 - p.length()).min(p.length() - 0.5),
+        "double-torus" => in_blend(double_torus_field()),
+        "frame" => in_blend(frame_field()),
+        "blob" => in_blend(blob_field()),
+        other => panic!("{other} has no depth function"),
+    }
+}
+
+/// By brute force over the angles of the surface, then by a pattern search from the best.
+fn in_ellipsoid(p: Vec3) -> f64 {
+    let semi_axes = Vec3::new(1.0, 0.7, 0.45);
+    let level = (p / semi_axes).length() - 1.0;
+    if level > -1e-6 {
+        return -level * semi_axes.z;
+    }
+    let distance = |theta: f64, phi: f64| {
+        let (st, ct) = theta.sin_cos();
+        let (sp, cp) = phi.sin_cos();
+        p.distance(Vec3::new(st * cp, st * sp, ct) * semi_axes)
+    };
+    let mut step = 0.05;
+    let grid = (0..63).flat_map(|i| (0..126).map(move |j| (f64::from(i), f64::from(j))));
+    let starts = grid.map(|(i, j)| (i * step, j * step));
+    let (mut best, mut at) = (f64::INFINITY, (0.0, 0.0));
+    for (theta, phi) in starts {
+        if distance(theta, phi) < best {
+            (best, at) = (distance(theta, phi), (theta, phi));
+        }
+    }
+    while step > 1e-9 {
+        let around = [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)];
+        let better = around
+            .map(|(dt, dp)| (at.0 + dt, at.1 + dp))
+            .into_iter()
+            .find(|&(theta, phi)| distance(theta, phi) < best);
+        match better {
+            Some(next) => (best, at) = (distance(next.0, next.1), next),
+            None => step /= 2.0,
+        }
+    }
+    best
+}
+
+fn volume(mesh: &TriMesh) -> f64 {
+    let parts = (0..mesh.faces.len()).map(|face| {
+        let [a, b, c] = mesh.triangle(face);
+        a.dot(b.cross(c)) / 6.0
+    });
+    parts.sum()
+}
+
+fn smallest_angle(mesh: &TriMesh) -> f64 {
+    let angles = (0..mesh.faces.len()).flat_map(|face| {
+        let [a, b, c] = mesh.triangle(face);
+        [[a, b, c], [b, c, a], [c, a, b]].map(|[a, b, c]| (b - a).angle_between(c - a))
+    });
+    angles.fold(f64::INFINITY, f64::min).to_degrees()
+}
+
+fn check_mesh(shape: &BuiltIn, resolution: u32) {
+    let mesh = shape.mesh(resolution);
+    let name = format!("{} at {resolution}", shape.id);
+    assert_eq!(first_defect(&mesh), None, "{name}");
+    let [components, genus, cavities] = shape.expected_betti.map(|b| b as i64);
+    assert_eq!(euler(&mesh), 2 * (components - genus + cavities), "{name}");
+    assert!(volume(&mesh) > 0.0, "{name} is turned inside out");
+    assert!(smallest_angle(&mesh) > 15.0, "{name} has an angle of {}", smallest_angle(&mesh));
+    for &vertex in &mesh.vertices {
+        let off = depth(shape.id, vertex).abs();
+        assert!(off < 1e-12, "{name}: {vertex} is {off:e} away from the surface");
+    }
+    let (low, high) = mesh.bounding_box().unwrap();
+    let diagonal = low.distance(high);
+    let coarse = 1.0 / f64::from(resolution.max(shape.min_resolution));
+    assert!((diagonal / shape.diagonal - 1.0).abs() < coarse, "{name}: diagonal {diagonal}");
+}
+
+#[test]
+fn every_shape_is_a_closed_oriented_manifold_on_its_surface() {
+    for shape in catalogue() {
+        for resolution in [0, shape.min_resolution + 3, shape.default_resolution] {
+            check_mesh(&shape, resolution);
+        }
+    }
+}
+
+#[test]
+fn every_lattice_resolves_the_implicit_shapes() {
+    for id in ["double-torus", "frame", "blob"] {
+        let shape = find(id).unwrap();
+        for resolution in (shape.min_resolution..shape.min_resolution + 16).step_by(3) {
+            check_mesh(&shape, resolution);
+        }
+    }
+}
+
+#[test]
+fn default_meshes_have_a_few_thousand_vertices_with_edges_as_announced() {
+    for shape in catalogue() {
+        let mesh = shape.mesh(shape.default_resolution);
+        let count = mesh.vertices.len();
+        assert!((1000..3500).contains(&count), "{} has {count} vertices", shape.id);
+        let edges = (0..mesh.faces.len()).flat_map(|face| {
+            let [a, b, c] = mesh.triangle(face);
+            [a.distance(b), b.distance(c), c.distance(a)]
+        });
+        let mean = edges.sum::<f64>() / (3 * mesh.faces.len()) as f64;
+        let announced = shape.diagonal / f64::from(shape.default_resolution);
+        assert!((0.8..1.25).contains(&(mean / announced)), "{}: {mean} {announced}", shape.id);
+        let finer = shape.mesh(2 * shape.default_resolution).vertices.len() as f64;
+        assert!((3.0..5.0).contains(&(finer / count as f64)), "{}: {count} {finer}", shape.id);
+        assert_eq!(mesh, shape.mesh(shape.default_resolution), "{}", shape.id);
+    }
+}
+
+#[test]
+fn the_catalogue_is_consistent() {
+    let shapes = catalogue();
+    let mut ids: Vec<_> = shapes.iter().map(|shape| shape.id).collect();
+    assert_eq!(shapes.iter().filter(|shape| shape.axis().is_some()).count(), 10);
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), shapes.len());
+    assert!(find("cube").is_none());
+    for shape in &shapes {
+        assert!(shape.min_resolution <= shape.default_resolution, "{}", shape.id);
+        assert!(shape.summary.ends_with('.'), "{}", shape.id);
+        let entry = serde_json::to_value(shape).unwrap();
+        assert_eq!(entry["expected_betti"][0], shape.expected_betti[0]);
+    }
+}
+
+/// Points of the complex: every sphere, and random ones on edges and faces.
+fn points_of(axis: &MedialMesh, random: &mut Pcg64, count: usize) -> Vec<Sphere> {
+    let sphere = |i: u32| axis.spheres[i as usize];
+    let mut points = axis.spheres.clone();
+    for _ in 0..count {
+        if !axis.edges.is_empty() {
+            let [a, b] = axis.edges[random.random_range(0..axis.edges.len())].map(sphere);
+            points.push(a.lerp(b, random.random()));
+        }
+        if !axis.faces.is_empty() {
+            let [a, b, c] = axis.faces[random.random_range(0..axis.faces.len())].map(sphere);
+            points.push(a.lerp(b, random.random()).lerp(c, random.random()));
+        }
+    }
+    points
+}
+
+#[test]
+fn the_spheres_of_a_known_axis_touch_the_surface_from_inside() {
+    let mut random = Pcg64::seed_from_u64(11);
+    for shape in catalogue() {
+        let Some(axis) = shape.axis() else { continue };
+        assert_eq!(axis.mesh.check(), Ok(()), "{}", shape.id);
+        assert_eq!(betti(&axis.mesh), shape.expected_betti, "{}", shape.id);
+        assert!(axis.tolerance < 3e-4 * shape.diagonal, "{}: {}", shape.id, axis.tolerance);
+        let (count, step) = if shape.id == "ellipsoid" { (300, 23) } else { (5000, 1) };
+        for Sphere { centre, radius } in
+            points_of(&axis.mesh, &mut random, count).into_iter().step_by(step)
+        {
+            let error = (depth(shape.id, centre) - radius).abs();
+            assert!(
+                error <= axis.tolerance + 1e-12,
+                "{}: radius {radius} at {centre} is off by {error:e}",
+                shape.id
             );
         }
     }
+}
+
+fn distance_to_segment(p: Vec3, a: Vec3, b: Vec3) -> f64 {
+    let t = (p - a).dot(b - a) / (b - a).length_squared();
+    p.distance(a.lerp(b, t.clamp(0.0, 1.0)))
+}
+
+fn distance_to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f64 {
+    let normal = (b - a).cross(c - a);
+    let inside = |u: Vec3, v: Vec3| normal.cross(v - u).dot(p - u) >= 0.0;
+    if inside(a, b) && inside(b, c) && inside(c, a) {
+        return (p - a).dot(normal).abs() / normal.length();
+    }
+    let sides = [(a, b), (b, c), (c, a)].map(|(u, v)| distance_to_segment(p, u, v));
+    sides.into_iter().fold(f64::INFINITY, f64::min)
+}
+
+fn distance_to_complex(p: Vec3, axis: &MedialMesh) -> f64 {
+    let at = |i: u32| axis.spheres[i as usize].centre;
+    let spheres = axis.spheres.iter().map(|sphere| p.distance(sphere.centre));
+    let edges = axis.edges.iter().map(|e| e.map(at)).map(|[a, b]| distance_to_segment(p, a, b));
+    let faces = axis.faces.iter().map(|f| distance_to_triangle(p, f.map(at)));
+    spheres.chain(edges).chain(faces).fold(f64::INFINITY, f64::min)
+}
+
+/// The centre of the largest ball that touches the surface where `p` is nearest to it: as far as
+/// one can go from the surface in the direction in which the depth grows as fast as the way.
+fn centre_of_maximal_ball(id: &str, p: Vec3) -> Option<Vec3> {
+    const H: f64 = 1e-6;
+    let slope = |e: Vec3| (depth(id, p + e * H) - depth(id, p - e * H)) / (2.0 * H);
+    let direction = Vec3::new(slope(Vec3::X), slope(Vec3::Y), slope(Vec3::Z));
+    // Where the slope is not 1, the point is on the axis or too close to it to tell.
+    if (direction.length() - 1.0).abs() > 1e-4 {
+        return None;
+    }
+    let direction = direction.normalize();
+    let start = depth(id, p);
+    let reached = |t: f64| depth(id, p + direction * t) >= start + t - 1e-7;
+    let (mut low, mut high) = (0.0, 4.0);
+    for _ in 0..50 {
+        let middle = (low + high) / 2.0;
+        if reached(middle) { low = middle } else { high = middle }
+    }
+    Some(p + direction * low)
+}
+
+#[test]
+fn every_maximal_ball_is_centred_on_the_known_axis() {
+    let mut random = Pcg64::seed_from_u64(12);
+    for shape in catalogue() {
+        let Some(axis) = shape.axis() else { continue };
+        let (low, high) = shape.mesh(shape.default_resolution).bounding_box().unwrap();
+        let wanted = if shape.id == "ellipsoid" { 12 } else { 150 };
+        let mut met = 0;
+        while met < wanted {
+            let mut coordinate = |axis: usize| random.random_range(low[axis]..high[axis]);
+            let p = Vec3::new(coordinate(0), coordinate(1), coordinate(2));
+            if depth(shape.id, p) < 0.01 {
+                continue;
+            }
+            let Some(centre) = centre_of_maximal_ball(shape.id, p) else { continue };
+            met += 1;
+            let away = distance_to_complex(centre, &axis.mesh);
+            // The search stops early or late where the sheets meet at a small angle.
+            assert!(away < axis.tolerance + 2e-3, "{}: {centre} is {away:e} away", shape.id);
+        }
+    }
+}
+
+#[test]
+fn the_exact_axis_of_a_box_shows_no_spike_and_noise_moves_vertices_only() {
+    let shape = find("box").unwrap();
+    let axis = shape.axis().unwrap().mesh.transformed(1.0 / shape.diagonal, |p| p / shape.diagonal);
+    let measured = spikes(&axis);
+    assert!(measured.by_ratio.iter().all(|at| at.edge_share == 0.0 && at.spikes == 0));
+    assert_eq!((measured.dangling_edges, measured.fins), (0, 0));
+    assert_eq!(triangle_quality(&axis).zero_area, 0);
+    let mesh = shape.mesh(12);
+    let noisy = add_noise(&mesh, 0.01, 3);
+    assert_eq!(noisy.faces, mesh.faces);
+    assert_ne!(noisy.vertices, mesh.vertices);
+}
+
+#[test]
+fn noise_is_uniform_in_the_ball_repeatable_and_in_proportion() {
+    let mesh = find("sphere").unwrap().mesh(60);
+    let diagonal = Normalisation::of(&mesh).unwrap().diagonal;
+    let eta = 0.02;
+    let displacements = |seed: u64, eta: f64| -> Vec<Vec3> {
+        let noisy = add_noise(&mesh, eta, seed);
+        noisy.vertices.iter().zip(&mesh.vertices).map(|(n, v)| (n - v) / (eta * diagonal)).collect()
+    };
+    let first = displacements(5, eta);
+    assert_eq!(first, displacements(5, eta));
+    assert_ne!(first, displacements(6, eta));
+    let n = first.len() as f64;
+    assert!(first.iter().all(|d| d.length() <= 1.0 + 1e-12));
+    assert!(first.iter().zip(displacements(5, 2.0 * eta)).all(|(a, b)| a.distance(b) < 1e-9));
+    // In a ball the cube of the radius is uniform in 0..1: mean 1/2, deviation 1/sqrt(12 n).
+    let mean_cube = first.iter().map(|d| d.length().powi(3)).sum::<f64>() / n;
+    assert!((mean_cube - 0.5).abs() < 4.0 / (12.0 * n).sqrt(), "{mean_cube}");
+    let mean: Vec3 = first.iter().copied().sum::<Vec3>() / n;
+    assert!(mean.abs().max_element() < 4.0 * (0.2 / n).sqrt(), "{mean}");
+    assert_eq!(add_noise(&mesh, 0.0, 5), mesh);
+    assert_eq!(add_noise(&TriMesh::default(), 0.1, 5), TriMesh::default());
+}
+
+#[test]
+fn defects_are_found() {
+    let closed = find("sphere").unwrap().mesh(0);
+    assert_eq!(first_defect(&closed), None);
+    let defect = |change: fn(&mut TriMesh)| {
+        let mut mesh = closed.clone();
+        change(&mut mesh);
+        first_defect(&mesh).expect("a defect")
+    };
+    assert!(defect(|mesh| _ = mesh.faces.pop()).contains("no opposite"));
+    assert!(defect(|mesh| mesh.faces[0].swap(0, 1)).contains("stands twice"));
+    assert!(defect(|mesh| mesh.vertices.push(Vec3::ZERO)).contains("belongs to no face"));
+    // Two spheres that share one vertex.
+    let pinched = defect(|mesh| {
+        let n = mesh.vertices.len() as u32;
+        let copy: Vec<_> =
+            mesh.faces.iter().map(|f| f.map(|v| if v == 0 { 0 } else { v + n - 1 })).collect();
+        mesh.vertices.extend(mesh.vertices[1..].to_vec());
+        mesh.faces.extend(copy);
+    });
+    assert!(pinched.contains("more than one fan"));
 }

@@ -9,6 +9,7 @@
 //! | `summary` | means over meshes at equal numbers of spheres |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
+//! | `terminal` | the summary in plain text |
 //! | `page` | the self-contained `index.html` |
 //! | `write` | [`write_report`], all of it into one folder |
 
@@ -21,10 +22,13 @@ mod plots;
 mod record;
 mod summary;
 mod tables;
+mod terminal;
 mod text;
 mod write;
 
 pub use header::{Header, MethodNote};
 pub use journal::{BadLine, Journal, JournalError, Journaled, read_records, write_records};
 pub use record::{Initial, Machine, Record, Repetition, Simplify, Stages, Status};
+pub use terminal::summary_text;
+pub use text::file_stem;
 pub use write::{ReportError, read_header, write_report};

@@ -9,6 +9,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use medial::complex::MedialMesh;
 use medial::metrics::Evaluation;
 use medial::simplifier::{Level, Params};
 use serde::{Deserialize, Serialize};
@@ -259,6 +260,19 @@ pub struct Initial {
     /// What the solid's own topology demands: components, total genus, cavities.
     #[serde(default)]
     pub expected_betti: Option<[u64; 3]>,
+}
+
+impl Initial {
+    /// What is to be said of an initial medial mesh.
+    pub fn of(mesh: &MedialMesh, expected_betti: Option<[u64; 3]>) -> Self {
+        Self {
+            spheres: mesh.spheres.len() as u64,
+            edges: mesh.edges.len() as u64,
+            faces: mesh.faces.len() as u64,
+            betti: Some(medial::complex::betti(mesh)),
+            expected_betti,
+        }
+    }
 }
 
 /// Where a run took place.

@@ -90,6 +90,12 @@ pub(crate) fn file_stems<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<St
     stems
 }
 
+/// One name as a file stem: ASCII letters, digits, `-`, `_` and `.` stay, everything else becomes
+/// `_`; never empty, beginning with a dot, or longer than 80 bytes.
+pub fn file_stem(name: &str) -> String {
+    file_stems([name]).remove(0)
+}
+
 /// Escapes text for HTML and XML, element content and quoted attributes alike.
 pub(crate) fn escape_html(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());

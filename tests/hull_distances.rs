@@ -94,7 +94,9 @@ fn pair(class: &str, rng: &mut Pcg64) -> Spheres {
         }
         "tangent" => {
             let inner = a.radius * 0.5;
-            let off = 1.0 + (rng.random::<f64>() * 2.0 - 1.0) * 1e-12;
+            // Down to tangency that only rounding decides.
+            let near = 10.0_f64.powf(-12.0 - 5.0 * rng.random::<f64>());
+            let off = 1.0 + (rng.random::<f64>() * 2.0 - 1.0) * near;
             vec![a, Sphere::new(a.centre + direction * (a.radius - inner) * off, inner)]
         }
         "zero radii" => vec![Sphere::new(a.centre, 0.0), Sphere::new(b.centre, 0.0)],

@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     seconds.insert("total".into(), total.into());
     cpu_seconds.insert("total".into(), cpu_total.into());
-    let expected = shape.report().expected_betti;
+    let expected = shape.expected_betti();
     let mut warnings = shape.report().warnings.clone();
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
         warnings.push(format!(

@@ -96,7 +96,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         progress.at(&format!("{}: initial medial mesh", input.name));
         let judge_options = judge_options(&arguments.measure, arguments.substrate.seed);
         let judge = shape.judge(input.axis.as_ref(), judge_options).map_err(Failure::input)?;
-        let initial = shape.view().initial().ok().map(|mesh| Initial::of(&mesh, judge.truth().betti));
+        let initial =
+            shape.view().initial().ok().map(|mesh| Initial::of(&mesh, judge.truth().betti));
         let measure = Measure { input: &input, shape: &shape, judge: &judge, initial };
         for (method, item) in methods.iter().zip(&items) {
             progress.at(&format!("{}: {}", input.name, item.method));
@@ -104,7 +105,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             for record in new.iter().filter(|record| record.status.is_failure()) {
                 let reason = record.reason.as_deref().unwrap_or("no reason");
                 let Record { mesh, simplify, status, .. } = record;
-                progress.remark(&format!("{mesh}, {}, {}: {status}: {reason}", simplify.method, simplify.level));
+                progress.remark(&format!(
+                    "{mesh}, {}, {}: {status}: {reason}",
+                    simplify.method, simplify.level
+                ));
             }
             keep(new)?;
             progress.done();
@@ -217,7 +221,11 @@ fn finish(
         print_json(&object, &[]);
     } else {
         print_line(&medial_reports::summary_text(records));
-        print_line(&format!("{ok} of {} results measured; page: {}", records.len(), page.display()));
+        print_line(&format!(
+            "{ok} of {} results measured; page: {}",
+            records.len(),
+            page.display()
+        ));
     }
     note(global, "");
     Ok(match ok {

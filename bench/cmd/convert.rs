@@ -41,7 +41,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     } else {
         let loaded = surface::read(&arguments.from).map_err(Failure::input)?;
         surface::write(&arguments.to, &loaded.mesh).map_err(Failure::input)?;
-        let mut notes: Vec<String> = loaded.report.repairs.iter().map(ToString::to_string).collect();
+        let mut notes: Vec<String> =
+            loaded.report.repairs.iter().map(ToString::to_string).collect();
         notes.extend(loaded.report.warnings);
         (notes, loaded.mesh.vertices.len(), loaded.mesh.faces.len())
     };
@@ -71,7 +72,8 @@ fn ply_has_radius(path: &Path) -> Result<bool, Failure> {
     let mut reader = BufReader::new(File::open(path).map_err(fail)?).take(HEADER_LIMIT);
     let mut line = Vec::new();
     while reader.read_until(b'\n', &mut line).map_err(fail)? > 0 {
-        let words: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
+        let words: Vec<&[u8]> =
+            line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
         match words.as_slice() {
             [b"end_header"] => break,
             [b"property", _, b"radius"] => return Ok(true),

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::{Exit, Failure, print_json, print_line};
 use crate::cli::Global;
+use crate::run::{Input, Source};
 
 /// Arguments of `datasets`.
 #[derive(Debug, Args)]
@@ -34,7 +35,7 @@ struct Make {
     output: PathBuf,
     /// Resolution, in the shape's own meaning [default: that of `compare`].
     #[arg(long)]
-    resolution: Option<usize>,
+    resolution: Option<u32>,
     /// Displace every vertex at random, uniformly in a ball of this fraction of the diagonal.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     noise: f64,
@@ -82,19 +83,18 @@ fn list(global: &Global) {
 }
 
 fn write(make: &Make, global: &Global) -> Result<(), Failure> {
-    let shape = medial_datasets::find(&make.id).ok_or_else(|| {
-        Failure::usage(format!("no built-in shape is called `{}`; see `medial datasets list`", make.id))
-    })?;
+    let source = Source::BuiltIn { id: make.id.clone(), resolution: make.resolution };
+    let input = Input::load(&source).map_err(Failure::usage)?;
     if !(0.0..=1.0).contains(&make.noise) {
         return Err(Failure::usage(format!("--noise {}: a fraction from 0 to 1", make.noise)));
     }
-    let mut mesh = shape.mesh(make.resolution.unwrap_or(shape.default_resolution));
+    let mut mesh = input.mesh;
     if make.noise > 0.0 {
         mesh = medial_datasets::add_noise(&mesh, make.noise, make.seed);
     }
     surface::write(&make.output, &mesh).map_err(Failure::input)?;
     let object = json!({
-        "id": shape.id, "output": make.output, "vertices": mesh.vertices.len(),
+        "id": make.id, "output": make.output, "vertices": mesh.vertices.len(),
         "faces": mesh.faces.len(), "noise": make.noise, "seed": make.seed,
     });
     if global.json {

@@ -78,7 +78,9 @@ pub fn print_evaluation(evaluation: &Evaluation) {
         ("spheres only, max", percent(distances.spheres_only)),
         (
             "volume difference",
-            evaluation.volume_error.map_or_else(|| "-".to_owned(), |e| format!("{:.3} % of the volume", 100.0 * e)),
+            evaluation
+                .volume_error
+                .map_or_else(|| "-".to_owned(), |e| format!("{:.3} % of the volume", 100.0 * e)),
         ),
         ("mean smallest angle", format!("{} degrees", or_dash(quality.min_angle_mean))),
         ("Betti numbers", betti),

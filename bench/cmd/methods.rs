@@ -60,6 +60,9 @@ fn describe(info: &MethodInfo) {
     }
     print_line(&format!("  published level: {}", info.published));
     for param in &info.params {
-        print_line(&format!("  --set {}={}   ({}) {}", param.name, param.default, param.unit, param.help));
+        print_line(&format!(
+            "  --set {}={}   ({}) {}",
+            param.name, param.default, param.unit, param.help
+        ));
     }
 }

@@ -33,7 +33,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     let mut header = read_header(&arguments.dir).unwrap_or_else(|_| header_of(&journaled.records));
     header.notes.clone_from(&warnings);
-    let files = write_report(&arguments.dir, &journaled.records, &header).map_err(Failure::input)?;
+    let files =
+        write_report(&arguments.dir, &journaled.records, &header).map_err(Failure::input)?;
     if global.json {
         let object = json!({ "records": journaled.records.len(), "files": files });
         print_json(&object, &warnings);
@@ -41,7 +42,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         for warning in &warnings {
             print_line(&format!("warning: {warning}"));
         }
-        print_line(&format!("{} records; page: {}", journaled.records.len(), arguments.dir.join("index.html").display()));
+        print_line(&format!(
+            "{} records; page: {}",
+            journaled.records.len(),
+            arguments.dir.join("index.html").display()
+        ));
     }
     Ok(Exit::Done)
 }

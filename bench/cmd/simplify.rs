@@ -4,10 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use medial::complex;
-use medial::simplifier::{
-    Level, MedialSimplifier, RunContext, Simplified, SimplifyError, Work,
-};
 use medial::shape::Shape;
+use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified, SimplifyError, Work};
 use medial_reports::{Simplify, Stages, Status};
 
 use super::methods::unknown_method;
@@ -53,8 +51,8 @@ pub struct Arguments {
 /// When the input is refused, the level is not met at all, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
-    let method = medial_methods::find(&arguments.method)
-        .ok_or_else(|| unknown_method(&arguments.method))?;
+    let method =
+        medial_methods::find(&arguments.method).ok_or_else(|| unknown_method(&arguments.method))?;
     let options = shape_options(&arguments.substrate)?;
     let input = Input::load(&source).map_err(Failure::input)?;
     let mut shape = input.shape(options).map_err(Failure::input)?;
@@ -99,11 +97,16 @@ fn simplify(
     let mut notes = Vec::new();
     let (answer, lap) = if let Some(bound) = arguments.max_error {
         if bound.is_nan() || bound <= 0.0 {
-            return Err(Failure::usage(format!("--max-error {bound}: a positive fraction of the diagonal")));
+            return Err(Failure::usage(format!(
+                "--max-error {bound}: a positive fraction of the diagonal"
+            )));
         }
-        let judge = shape.judge(input.axis.as_ref(), judge_options(&arguments.measure, seed)).map_err(Failure::input)?;
+        let judge = shape
+            .judge(input.axis.as_ref(), judge_options(&arguments.measure, seed))
+            .map_err(Failure::input)?;
         let initial = shape.initial().map_err(Failure::input)?.spheres.len();
-        let found = search_error(simplification.as_mut(), &judge, initial, bound).map_err(failure)?;
+        let found =
+            search_error(simplification.as_mut(), &judge, initial, bound).map_err(failure)?;
         notes.push(format!(
             "Hausdorff error {} with {} spheres, found in {} trials",
             percent(found.hausdorff),
@@ -149,7 +152,11 @@ fn describe(
         faces: Some(mesh.faces.len()),
         substrates: used.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect(),
         seconds: Some(Stages::new(sum(|c| c.seconds), prepare.seconds, lap.seconds)),
-        cpu_seconds: Some(Stages::new(sum(|c| c.cpu_seconds), prepare.cpu_seconds, lap.cpu_seconds)),
+        cpu_seconds: Some(Stages::new(
+            sum(|c| c.cpu_seconds),
+            prepare.cpu_seconds,
+            lap.cpu_seconds,
+        )),
         peak_bytes: peak_bytes(),
         threads: Some(rayon::current_num_threads()),
         diagnostics: simplified.diagnostics.counts.iter().cloned().collect(),

@@ -23,7 +23,7 @@ pub enum Source {
         /// Id in the catalogue.
         id: String,
         /// Resolution, in the shape's own meaning.
-        resolution: Option<usize>,
+        resolution: Option<u32>,
     },
 }
 
@@ -116,10 +116,19 @@ impl Input {
         }
     }
 
-    fn generate(source: &Source, id: &str, resolution: Option<usize>) -> Result<Self, InputError> {
+    fn generate(source: &Source, id: &str, resolution: Option<u32>) -> Result<Self, InputError> {
         let shape =
             medial_datasets::find(id).ok_or_else(|| InputError::NoSuchShape(id.to_owned()))?;
-        let mesh = shape.mesh(resolution.unwrap_or(shape.default_resolution));
+        let resolution = resolution.unwrap_or(shape.default_resolution);
+        let range = shape.resolutions();
+        if !range.contains(&resolution) {
+            return Err(InputError::OutOfRange {
+                resolution,
+                least: *range.start(),
+                most: *range.end(),
+            });
+        }
+        let mesh = shape.mesh(resolution);
         let report = surface::validate(&mesh)?;
         Ok(Self {
             name: source.name(),
@@ -166,4 +175,14 @@ pub enum InputError {
     /// The resolution of a built-in shape is not a number.
     #[error("`{0}` is not a resolution: write builtin:ID:NUMBER")]
     Resolution(String),
+    /// The resolution of a built-in shape is out of its range.
+    #[error("resolution {resolution} is out of range: this shape takes {least} to {most}")]
+    OutOfRange {
+        /// What was asked.
+        resolution: u32,
+        /// Coarsest resolution that shows every feature.
+        least: u32,
+        /// Finest resolution.
+        most: u32,
+    },
 }

@@ -136,12 +136,12 @@ pub fn refused_records(
 ) -> Vec<Record> {
     let record = |&level: &Level| {
         let asked = Simplify::asked(&item.method, level, Status::Refused);
-        let simplify = Simplify {
-            params: item.params.clone(),
-            version: provenance.version.clone(),
-            ..asked
-        };
-        Record { reason: Some(reason.to_owned()), ..blank_record(source.name(), simplify, provenance) }
+        let simplify =
+            Simplify { params: item.params.clone(), version: provenance.version.clone(), ..asked };
+        Record {
+            reason: Some(reason.to_owned()),
+            ..blank_record(source.name(), simplify, provenance)
+        }
     };
     item.levels.iter().map(record).collect()
 }
@@ -163,7 +163,8 @@ fn answer_levels(
     let mut simplification = match prepared {
         Ok(simplification) => simplification,
         Err(failure) => {
-            let fail = |_| Answer { outcome: Err(failure.clone()), prepare, simplify: Lap::default() };
+            let fail =
+                |_| Answer { outcome: Err(failure.clone()), prepare, simplify: Lap::default() };
             return item.levels.iter().map(fail).collect();
         }
     };
@@ -210,7 +211,9 @@ fn warn_if_different(first: &mut Answer, again: &Answer) {
     if let (Ok(first), Ok(again)) = (&mut first.outcome, &again.outcome)
         && first.mesh != again.mesh
     {
-        first.diagnostics.warn("a repetition gave another medial mesh: the method is not deterministic");
+        first
+            .diagnostics
+            .warn("a repetition gave another medial mesh: the method is not deterministic");
     }
 }
 
@@ -326,7 +329,8 @@ fn save(
         Level::Native(value) => format!("level-{value}"),
     };
     let folder = format!("axes/{}", medial_reports::file_stem(&record.mesh));
-    let artifact = format!("{folder}/{}-{level}.ma", medial_reports::file_stem(&record.simplify.method));
+    let artifact =
+        format!("{folder}/{}-{level}.ma", medial_reports::file_stem(&record.simplify.method));
     std::fs::create_dir_all(out.join(&folder))?;
     let back = measure.shape.normalisation();
     let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));

@@ -1,13 +1,12 @@
 //! Quadrics against their definition, their null spaces, and the singularity test against
 //! eigenvalues.
 
+use medial::Vec3;
+use medial::complex::Sphere;
 use medial::geometry::{Cone, SlabPlanes};
 use proptest::prelude::*;
 
 use super::quadric::Quadric;
-use super::*;
-use medial::Vec3;
-use medial::complex::Sphere;
 
 fn vector() -> impl Strategy<Value = Vec3> {
     prop::array::uniform3(-1.0..1.0f64).prop_map(Vec3::from)

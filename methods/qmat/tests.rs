@@ -118,12 +118,13 @@ fn coincident_centres_go_first_and_keep_loops() {
 fn degenerate_complexes_are_contracted_to_one_sphere_of_each_component() {
     let point = |_: u32| (Vec3::new(0.1, 0.2, 0.3), 0.25);
     let line = |v: u32| (Vec3::new(f64::from(v), 0.0, 0.0), 0.0);
-    let nested = |v: u32| (Vec3::new(0.1 * f64::from(v), 0.01 * f64::from(v * v), 0.0), f64::from(v));
+    let nested =
+        |v: u32| (Vec3::new(0.1 * f64::from(v), 0.01 * f64::from(v * v), 0.0), f64::from(v));
     let makers: [&dyn Fn(u32) -> (Vec3, f64); 3] = [&point, &line, &nested];
     for make in makers {
-        let spheres = spheres_at((0..9).map(make));
+        let spheres = spheres_at((0..10).map(make));
         let faces = vec![[0, 1, 2], [1, 2, 3], [1, 2, 4], [2, 3, 5], [5, 6, 7]];
-        let initial = MedialMesh::from_simplices(spheres, vec![[4, 6]], faces).unwrap();
+        let initial = MedialMesh::from_simplices(spheres, vec![[4, 8]], faces).unwrap();
         let (mesh, mut contraction) = contract(&initial, params(), 1);
         assert_eq!(mesh.spheres.len(), 2, "two components, {:?}", initial.spheres);
         assert!(contraction.why_stopped().contains("component"));

@@ -9,7 +9,7 @@ use medial::surface::{self, TriMesh};
 use medial_methods::registry;
 
 /// Small built-in shapes that differ in kind: thin, round, looped, hollow, sharp.
-const SHAPES: [&str; 6] = ["sphere", "box", "capsule", "torus", "hollow-sphere", "l-bracket"];
+const SHAPES: [&str; 6] = ["sphere", "box", "capsule", "torus", "hollow-sphere", "bracket"];
 
 fn built_in(id: &str) -> TriMesh {
     let shape = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
@@ -74,7 +74,7 @@ fn the_number_of_threads_changes_nothing() {
         let results = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("a pool").install(|| {
-                let shape = shape_of(&built_in("l-bracket"));
+                let shape = shape_of(&built_in("bracket"));
                 at(method.as_ref(), &shape, Level::Spheres(150))
             })
         });

@@ -31,6 +31,15 @@ use super::reduction::rank;
 /// They depend on the combinatorics alone. A tenth of a second for a closed surface of a
 /// million faces, 0.7 s for a foam of as many (150,000 bubbles).
 ///
+/// ```
+/// use medial::complex::{MedialMesh, Sphere, betti, euler};
+/// let spheres = vec![Sphere::new(medial::Vec3::ZERO, 1.0); 4];
+/// let hollow = vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
+/// let tetrahedron = MedialMesh::from_simplices(spheres, vec![], hollow)?;
+/// assert_eq!((betti(&tetrahedron), euler(&tetrahedron)), ([1, 0, 1], 2));
+/// # Ok::<(), medial::complex::ComplexError>(())
+/// ```
+///
 /// # Panics
 /// If the mesh is not in canonical form; see [`MedialMesh::check`].
 pub fn betti(mesh: &MedialMesh) -> [u64; 3] {

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use super::{ComplexError, MedialMesh};
 use crate::Vec3;
-use crate::geometry::{Bounds, Cone, Node, Search, SlabFace, Sphere, Tree, in_morton_order};
+use crate::geometry::{Bounds, Cone, Node, Plan, Search, SlabFace, Sphere, Tree, in_morton_order};
 
 /// The union of the medial primitives of a mesh, prepared for distance queries.
 ///
@@ -39,6 +39,8 @@ pub struct MedialUnion {
     shapes: Vec<Shape>,
     /// In leaf order.
     primitives: Vec<Primitive>,
+    /// Box around all balls.
+    balls: Bounds,
     /// More than rounding can contribute to a distance.
     slack: f64,
 }
@@ -120,7 +122,7 @@ impl MedialUnion {
         }
         let lone = (0..).zip(&mesh.spheres).filter(|&(v, _): &(u32, _)| isolated[v as usize]);
         parts.extend(lone.map(|(v, &m)| (Primitive::Sphere(v), Shape::Sphere(m), bounds(&[m]))));
-        Self::over(parts)
+        Self::over(&parts, ball_box(&mesh.spheres))
     }
 
     /// The union of the spheres alone, without cones and slabs.
@@ -132,18 +134,22 @@ impl MedialUnion {
         Self::new(&mesh)
     }
 
-    fn over(parts: Vec<(Primitive, Shape, (Bounds, f64))>) -> Result<Self, UnionError> {
+    fn over(
+        parts: &[(Primitive, Shape, (Bounds, f64))],
+        balls: Bounds,
+    ) -> Result<Self, UnionError> {
         if parts.is_empty() {
             return Err(UnionError::Empty);
         }
         let boxes: Vec<_> = parts.iter().map(|&(_, _, bounds)| bounds).collect();
-        let tree = Tree::build(&boxes);
+        let sides = boxes.iter().map(|(b, _)| (b.hi - b.lo).max_element());
+        let padding = sides.sum::<f64>() / boxes.len() as f64;
+        let tree = Tree::build(&boxes, Plan { max_leaf: 2, padding });
         let in_order = || tree.order().iter().map(|&part| &parts[part as usize]);
         let shapes = in_order().map(|(_, shape, _)| shape.clone()).collect();
         let primitives = in_order().map(|&(primitive, _, _)| primitive).collect();
-        let Bounds { lo, hi } = tree.bounds();
-        let slack = 64.0 * f64::EPSILON * lo.abs().max(hi.abs()).max_element();
-        Ok(Self { tree, shapes, primitives, slack })
+        let slack = 64.0 * f64::EPSILON * balls.lo.abs().max(balls.hi.abs()).max_element();
+        Ok(Self { tree, shapes, primitives, balls, slack })
     }
 
     /// Number of primitives that are evaluated.
@@ -153,12 +159,13 @@ impl MedialUnion {
 
     /// Smallest and largest corner of an axis-parallel box around the union.
     pub fn bounding_box(&self) -> (Vec3, Vec3) {
-        let Bounds { lo, hi } = self.tree.bounds();
+        let Bounds { lo, hi } = self.balls;
         (lo, hi)
     }
 
     /// `sigma(p)`: the least signed distance to a primitive. Positive outside the union and then
-    /// exact; inside, `-sigma` is a lower bound of the depth. Not a number in, not a number out.
+    /// exact; inside, `-sigma` is a lower bound of the depth. A query that is
+    /// not finite gets a distance that is not.
     pub fn signed(&self, p: Vec3) -> f64 {
         self.deepest(p).signed
     }
@@ -239,24 +246,24 @@ impl MedialUnion {
     }
 }
 
-/// Box around the balls, and the largest radius.
+fn ball_box(balls: &[Sphere]) -> Bounds {
+    let corners = |m: &Sphere| [-m.radius, m.radius].map(|r| m.centre + Vec3::splat(r));
+    Bounds::of_points(balls.iter().flat_map(corners))
+}
+
+/// Box around the centres, and the largest radius.
 fn bounds(balls: &[Sphere]) -> (Bounds, f64) {
-    let corners = balls.iter().flat_map(|m| {
-        let arm = Vec3::splat(m.radius);
-        [m.centre - arm, m.centre + arm]
-    });
-    (Bounds::of_points(corners), balls.iter().fold(0.0, |r, m| f64::max(r, m.radius)))
+    let largest = balls.iter().fold(0.0, |r, m| f64::max(r, m.radius));
+    (Bounds::of_points(balls.iter().map(|m| m.centre)), largest)
 }
 
 /// Lower bound of the signed distances to the primitives below a node.
 ///
-/// Outside the box, the distance to the box. Inside it no primitive holds the point deeper than
-/// the box does, nor deeper than its own largest radius.
+/// Every interpolated sphere has its centre in the box of the centres and no larger radius. Boxes
+/// around the balls would hardly differ from one sphere of a sheet to the next.
 #[inline]
 fn signed_bound(node: &Node, p: Vec3) -> f64 {
-    let outside = (node.bounds.lo - p).max(p - node.bounds.hi);
-    let nearest = outside.max_element();
-    if nearest > 0.0 { outside.max(Vec3::ZERO).length() } else { nearest.max(-node.reach) }
+    node.bounds.distance_squared(p).sqrt() - node.reach
 }
 
 /// Which of the two distances is minimised.

@@ -40,7 +40,7 @@ pub enum DualTriangulation {
 
 /// The circumspheres of the finite Delaunay cells that are centred inside the surface.
 pub struct CellSpheres {
-    /// Circumsphere of each cell, finite cells first; `None` for the others.
+    /// Circumsphere of each finite cell; `None` for those centred outside.
     inside: Vec<Option<Sphere>>,
     /// Circumcentres inside the surface but within the guard band of it, counted as outside.
     pub in_guard_band: usize,
@@ -50,7 +50,7 @@ impl CellSpheres {
     /// Computes and classifies the circumcentre of every finite cell, in parallel.
     pub fn classify(delaunay: &Delaunay, inside: &InsideTest, surface: &TriangleBvh) -> Self {
         let cells = delaunay.triangulation();
-        let spheres: Vec<Option<Sphere>> = (0..cells.cell_count() as u32)
+        let spheres: Vec<Option<Sphere>> = (0..cells.finite_cell_count() as u32)
             .into_par_iter()
             .map(|cell| {
                 let (centre, radius) = delaunay.circumsphere(CellId(cell))?;
@@ -79,7 +79,8 @@ impl CellSpheres {
     }
 
     fn is_inside(&self, cell: CellId) -> bool {
-        self.inside[cell.index()].is_some()
+        // Finite cells come first; infinite ones are beyond the list.
+        self.inside.get(cell.index()).is_some_and(Option::is_some)
     }
 }
 

@@ -39,20 +39,20 @@ impl Cone {
     pub fn new(first: Sphere, second: Sphere) -> Self {
         let across = second.centre - first.centre;
         let growth = second.radius - first.radius;
-        if across.length_squared() <= growth * growth {
+        let length = across.length();
+        if length <= growth.abs() {
             let larger = usize::from(growth > 0.0);
             return Self::ball([first, second][larger], larger);
         }
-        let length = across.length();
         // Product form: 1 - s^2 would cancel near tangency.
-        let rise = ((length - growth) * (length + growth)).max(0.0).sqrt();
+        let rise = (length - growth).sqrt() * (length + growth).sqrt();
         Self {
             start: first.centre,
             axis: across / length,
             length,
             radius: first.radius,
             slope: growth / length,
-            lead: if rise > 0.0 { growth / rise } else { 0.0 },
+            lead: growth / rise,
             larger: None,
         }
     }
@@ -96,7 +96,8 @@ impl Cone {
     /// nearest, one of its points is returned.
     pub fn foot(&self, p: Vec3) -> HullFoot<2> {
         let (tau, _) = self.best_centre(p);
-        let sphere = Sphere::new(self.start + tau * self.axis, self.radius + tau * self.slope);
+        let radius = (self.radius + tau * self.slope).max(0.0);
+        let sphere = Sphere::new(self.start + tau * self.axis, radius);
         let weights = match self.larger {
             Some(0) => [1.0, 0.0],
             Some(_) => [0.0, 1.0],
@@ -105,9 +106,15 @@ impl Cone {
                 [1.0 - t, t]
             }
         };
-        HullFoot::towards(sphere, weights, p, || {
-            self.frame().map_or(Vec3::X, |frame| frame.normal(frame.v))
-        })
+        let Some(frame) = self.frame() else {
+            return HullFoot::towards(sphere, weights, p, || Vec3::X);
+        };
+        if tau <= 0.0 || tau >= self.length {
+            return HullFoot::towards(sphere, weights, p, || frame.normal(frame.v));
+        }
+        // On the lateral the direction follows from the axis: near it the arm is mere rounding.
+        let across = frame.across(p - self.start).unwrap_or(frame.v);
+        HullFoot::along(sphere, weights, p, frame.normal(across))
     }
 
     /// The axis frame from which the tangent planes follow, or `None` when one ball holds the

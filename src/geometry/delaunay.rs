@@ -7,8 +7,7 @@
 use std::ops::Deref;
 
 use super::predicates::{
-    MAX_COORDINATE, PowerFilter, Sign, Site, Unweighted, circumsphere, exact_orientation,
-    lexicographic,
+    Filter, MAX_COORDINATE, Sign, Site, Unweighted, circumsphere, lexicographic,
 };
 use super::triangulation::{
     CellId, Facet, Triangulated, Triangulation, TriangulationError, VertexId, Violation,
@@ -40,7 +39,7 @@ pub struct Delaunay {
     triangulation: Triangulation,
     sites: Vec<Site>,
     duplicates: Vec<(VertexId, VertexId)>,
-    filter: PowerFilter,
+    filter: Filter,
 }
 
 /// Where a position is in a triangulation.
@@ -140,7 +139,7 @@ impl Delaunay {
         for opposite in 0..4 {
             let [a, b, c] = self.facet_vertices(Facet { cell, opposite });
             let [a, b, c] = [a, b, c].map(|v| &self.sites[v.index()].p);
-            if exact_orientation(a, b, c, p) != Sign::Zero {
+            if Filter::ANY.orient3d(a, b, c, p) != Sign::Zero {
                 support.push(opposite);
             }
         }

@@ -18,6 +18,10 @@ use super::planar_frame::PlanarFrame;
 use super::{Cone, HullFoot, SlabPlanes, Sphere};
 use crate::Vec3;
 
+/// Height of the centres' triangle, relative to its size and radius, below which the tangent planes
+/// are not told. Distances stay exact: the objective is flat there.
+const THIN: f64 = 1e-10;
+
 /// The convex hull of three balls, prepared for distance queries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slab {
@@ -44,8 +48,8 @@ impl Slab {
 
     /// Where `p` is nearest to the boundary of the hull. Of several nearest points one is returned.
     pub fn foot(&self, p: Vec3) -> HullFoot<3> {
-        if let Some(foot) = self.face.as_ref().and_then(|face| face.foot(p)) {
-            return foot;
+        if let Some((sphere, weights)) = self.face.as_ref().and_then(|face| face.best_sphere(p)) {
+            return HullFoot::towards(sphere, weights, p, || self.free_direction(sphere));
         }
         let feet = [0, 1, 2].map(|k| (k, self.cones[k].foot(p)));
         let nearer = |a: (usize, HullFoot<2>), b: (usize, HullFoot<2>)| {
@@ -66,8 +70,7 @@ impl Slab {
             let away = sphere.centre - self.spheres[(side + 2) % 3].centre;
             match cone.frame() {
                 Some(frame) => {
-                    let across = away.reject_from_normalized(frame.u).try_normalize();
-                    let across = across.unwrap_or(frame.v);
+                    let across = frame.across(away).unwrap_or(frame.v);
                     let around = [across, frame.u.cross(across), -across];
                     candidates.extend(around.map(|across| frame.normal(across)));
                 }
@@ -83,9 +86,10 @@ impl Slab {
     }
 
     /// The two planes tangent to all three balls from outside, or `None` when there are none:
-    /// collinear centres, or radii that grow as fast as the centres move apart.
+    /// collinear centres, or radii that grow as fast as the centres move apart. Nearly collinear
+    /// centres count as collinear: their planes would be made of rounding.
     pub fn planes(&self) -> Option<SlabPlanes> {
-        self.face.as_ref().map(SlabFace::planes)
+        self.face.as_ref().filter(|face| !face.is_thin()).map(SlabFace::planes)
     }
 }
 
@@ -145,7 +149,8 @@ impl SlabFace {
         self.radius + self.gradient[0] * x + self.gradient[1] * y
     }
 
-    fn foot(&self, p: Vec3) -> Option<HullFoot<3>> {
+    /// The sphere that attains the distance, with its weights, if inside the triangle.
+    fn best_sphere(&self, p: Vec3) -> Option<(Sphere, [f64; 3])> {
         let [x, y, height] = self.frame.local(p);
         let ahead = height.abs() * self.lead;
         let (x, y) = (x + ahead * self.gradient[0], y + ahead * self.gradient[1]);
@@ -159,9 +164,13 @@ impl SlabFace {
         for (k, weight) in [1.0 - second - third, second, third].into_iter().enumerate() {
             weights[(usize::from(self.first) + k) % 3] = weight;
         }
-        let sphere = Sphere::new(self.frame.point(x, y), self.radius_at(x, y));
-        let foot = HullFoot::towards(sphere, weights, p, || self.planes().normals()[0]);
-        Some(foot)
+        let sphere = Sphere::new(self.frame.point(x, y), self.radius_at(x, y).max(0.0));
+        Some((sphere, weights))
+    }
+
+    /// Whether the gradient across the triangle is not known to at least five digits.
+    fn is_thin(&self) -> bool {
+        self.frame.apex[1] <= THIN * (self.frame.length + self.radius)
     }
 
     pub(super) fn planes(&self) -> SlabPlanes {

@@ -50,9 +50,13 @@ pub struct HullFoot<const N: usize> {
     pub point: Vec3,
 }
 
+/// Share of the radius below which the arm from a centre to the query is too short to tell a
+/// direction: its own rounding turns it as much as leaving it out would.
+const SHORT_ARM: f64 = 1e-8;
+
 impl<const N: usize> HullFoot<N> {
     /// The foot of `p` on the interpolated sphere that attains its distance: on the ray from the
-    /// centre through `p`, or, when `p` is the centre, in the direction `apart`.
+    /// centre through `p`, or, when `p` is as good as the centre, in the direction `apart`.
     pub(super) fn towards(
         sphere: Sphere,
         weights: [f64; N],
@@ -61,12 +65,14 @@ impl<const N: usize> HullFoot<N> {
     ) -> Self {
         let arm = p - sphere.centre;
         let distance = arm.length();
-        let direction = if distance > 0.0 { arm / distance } else { apart() };
-        Self {
-            signed_distance: distance - sphere.radius,
-            sphere,
-            weights,
-            point: sphere.centre + sphere.radius * direction,
-        }
+        let tells = distance > 0.0 && distance > SHORT_ARM * sphere.radius;
+        Self::along(sphere, weights, p, if tells { arm / distance } else { apart() })
+    }
+
+    /// The foot of `p` in a known direction from the centre.
+    pub(super) fn along(sphere: Sphere, weights: [f64; N], p: Vec3, direction: Vec3) -> Self {
+        let signed_distance = sphere.signed_distance(p);
+        let point = sphere.centre + sphere.radius * direction;
+        Self { signed_distance, sphere, weights, point }
     }
 }

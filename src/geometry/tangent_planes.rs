@@ -53,6 +53,16 @@ impl ConeFrame {
         Self { u, s, v, w: u.cross(v) }
     }
 
+    /// The unit vector orthogonal to the axis in the direction of `towards`, or `None` when that is
+    /// along the axis up to rounding.
+    pub fn across(&self, towards: Vec3) -> Option<Vec3> {
+        let rejected = towards.reject_from_normalized(self.u).try_normalize()?;
+        // What rounding leaves of a vector along the axis is not orthogonal to it.
+        let again = rejected.reject_from_normalized(self.u);
+        let length = again.length();
+        (length > 0.5).then(|| again / length)
+    }
+
     /// Outward unit normal of the tangent plane in the direction `across`, a unit vector
     /// orthogonal to `u`.
     pub fn normal(&self, across: Vec3) -> Vec3 {
@@ -72,9 +82,6 @@ impl ConeFrame {
 /// `None` when one ball holds the other or the three centres are collinear.
 pub fn boundary_edge_normal(ends: [Sphere; 2], opposite: Sphere) -> Option<Vec3> {
     let frame = super::Cone::new(ends[0], ends[1]).frame()?;
-    let inwards = (opposite.centre - ends[0].centre).reject_from_normalized(frame.u);
-    let away = (-inwards).try_normalize()?;
-    // Once more: a nearly collinear triple leaves a remainder along the axis.
-    let away = away.reject_from_normalized(frame.u).try_normalize()?;
-    Some(frame.normal(away).normalize())
+    let away = frame.across(ends[0].centre - opposite.centre)?;
+    Some(frame.normal(away))
 }

@@ -6,10 +6,15 @@
 //! 2. connected components of the edges with `G < tau` that reach the boundary of the mesh: the
 //!    "number of spikes";
 //! 3. dangling edges: no face, and an end with no other edge; all, and those with `G < tau`;
-//! 4. fins: faces with two boundary edges or three, and a smallest angle below 10 degrees;
+//! 4. fins: faces with two or three boundary edges and a smallest angle below 10 degrees;
 //! 5. idle spheres: on the boundary, with a ball that sticks out of a neighbour's at least as
 //!    large by less than `eta`;
 //! 6. angle spikes: spheres whose contact points subtend less than 20 degrees at the centre.
+//!
+//! Spheres that coincide (edges below [`ZERO_LENGTH`], triangles without area) make no spike: such
+//! edges enter measures 1 to 3, and such triangles measure 4, neither above nor below the line. A
+//! regular grid has as many coincident circumcentres as others, and with their ratio of zero by
+//! convention a perfect axis would look worse than a noisy one.
 //!
 //! An edge is a *boundary edge* when it has one face, a sphere is *on the boundary* when one of
 //! its edges has at most one face.
@@ -55,6 +60,7 @@ pub fn spikes(mesh: &MedialMesh) -> Spikes {
 /// What measures 1 to 3 ask of the edges, once for all thresholds.
 struct EdgeFacts {
     ratios: Vec<f64>,
+    /// Zero where the ends coincide.
     lengths: Vec<f64>,
     dangling: Vec<bool>,
     boundary_spheres: Vec<bool>,
@@ -69,49 +75,57 @@ impl EdgeFacts {
         for (edge, _) in mesh.edges.iter().zip(faces_at).filter(|&(_, &faces)| faces <= 1) {
             edge.iter().for_each(|&sphere| boundary_spheres[sphere as usize] = true);
         }
-        let dangling = mesh.edges.iter().zip(faces_at).map(|(edge, &faces)| {
-            faces == 0 && edge.iter().any(|&sphere| degrees[sphere as usize] == 1)
-        });
+        let length = |[a, b]: [Sphere; 2]| {
+            let d = a.centre.distance(b.centre);
+            if d < ZERO_LENGTH { 0.0 } else { d }
+        };
+        let lengths: Vec<f64> = ends().map(length).collect();
+        let is_dangling = |edge: usize| {
+            let loose = mesh.edges[edge].iter().any(|&sphere| degrees[sphere as usize] == 1);
+            lengths[edge] > 0.0 && faces_at[edge] == 0 && loose
+        };
         Self {
             ratios: ends().map(|[a, b]| stability_ratio(a, b)).collect(),
-            lengths: ends().map(|[a, b]| a.centre.distance(b.centre)).collect(),
-            dangling: dangling.collect(),
+            dangling: (0..lengths.len()).map(is_dangling).collect(),
+            lengths,
             boundary_spheres,
         }
     }
 
     fn by_ratio(&self, mesh: &MedialMesh, threshold: f64) -> RatioSpikes {
-        let weak = || (0..self.ratios.len()).filter(|&edge| self.ratios[edge] < threshold);
+        let proper = || (0..self.lengths.len()).filter(|&edge| self.lengths[edge] > 0.0);
+        let weak = || proper().filter(|&edge| self.ratios[edge] < threshold);
+        // A fold from zero, since the sum of nothing is minus zero.
+        let length = |edges: &mut dyn Iterator<Item = usize>| {
+            edges.fold(0.0, |sum, edge| sum + self.lengths[edge])
+        };
         let share = |part: f64, all: f64| if all > 0.0 { part / all } else { 0.0 };
-        let weak_length = weak().map(|edge| self.lengths[edge]).sum();
         RatioSpikes {
             threshold,
-            edge_share: share(weak().count() as f64, self.ratios.len() as f64),
-            length_share: share(weak_length, self.lengths.iter().sum()),
-            spikes: self.components_on_the_boundary(mesh, weak()),
+            edge_share: share(weak().count() as f64, proper().count() as f64),
+            length_share: share(length(&mut weak()), length(&mut proper())),
+            spikes: self.spikes_on_the_boundary(mesh, threshold),
             dangling_edges: weak().filter(|&edge| self.dangling[edge]).count() as u64,
         }
     }
 
-    fn components_on_the_boundary(
-        &self,
-        mesh: &MedialMesh,
-        edges: impl Iterator<Item = usize>,
-    ) -> u64 {
+    /// Measure 2. Edges without length carry a component on, but do not make one.
+    fn spikes_on_the_boundary(&self, mesh: &MedialMesh, threshold: f64) -> u64 {
+        let weak = || (0..self.ratios.len()).filter(|&edge| self.ratios[edge] < threshold);
         let mut components = DisjointSets::singletons(mesh.spheres.len());
-        let mut touched = vec![false; mesh.spheres.len()];
-        for [a, b] in edges.map(|edge| mesh.edges[edge]) {
+        for [a, b] in weak().map(|edge| mesh.edges[edge]) {
             components.join(a, b);
-            touched[a as usize] = true;
-            touched[b as usize] = true;
         }
-        let mut reaches = vec![false; mesh.spheres.len()];
-        for sphere in 0..mesh.spheres.len() {
-            if touched[sphere] && self.boundary_spheres[sphere] {
-                reaches[components.find(sphere as u32) as usize] = true;
-            }
+        let mut on_boundary = vec![false; mesh.spheres.len()];
+        for sphere in (0..mesh.spheres.len()).filter(|&sphere| self.boundary_spheres[sphere]) {
+            on_boundary[components.find(sphere as u32) as usize] = true;
         }
-        reaches.into_iter().filter(|&r| r).count() as u64
+        let mut counted = vec![false; mesh.spheres.len()];
+        for edge in weak().filter(|&edge| self.lengths[edge] > 0.0) {
+            let component = components.find(mesh.edges[edge][0]) as usize;
+            counted[component] = on_boundary[component];
+        }
+        counted.into_iter().filter(|&c| c).count() as u64
     }
 }
 
@@ -122,8 +136,7 @@ fn fins(mesh: &MedialMesh, incidence: &Incidence) -> u64 {
         let boundary =
             sides.iter().filter(|&&edge| incidence.faces_at()[edge as usize] == 1).count();
         let angles = || extreme_angles(corners(mesh, &mesh.faces[face]));
-        // A triangle without area is a fin as well: its smallest angle is zero.
-        boundary >= 2 && angles().is_none_or(|[smallest, _]| smallest < FIN_ANGLE)
+        boundary >= 2 && angles().is_some_and(|[smallest, _]| smallest < FIN_ANGLE)
     };
     (0..mesh.faces.len()).filter(|&face| is_fin(face)).count() as u64
 }

@@ -118,11 +118,25 @@ fn an_angle_spike_sees_its_contacts_close_together() {
 #[test]
 fn nothing_is_measured_on_nothing() {
     let measured = spikes(&MedialMesh::default());
-    assert!(measured.by_ratio.iter().all(|at| at.edge_share == 0.0 && at.length_share == 0.0));
-    let coincident = vec![sphere(0.0, 0.0, 0.0, 0.5); 2];
-    let mesh = MedialMesh::from_simplices(coincident, vec![[0, 1]], vec![]).unwrap();
-    let at = spikes(&mesh).by_ratio[0];
-    assert_eq!((at.edge_share, at.length_share, at.spikes), (1.0, 0.0, 1));
+    for at in measured.by_ratio {
+        let shares = [at.edge_share, at.length_share];
+        assert!(shares.iter().all(|share| share.to_bits() == 0), "{shares:?} is not plain zero");
+    }
+}
+
+#[test]
+fn coincident_spheres_make_no_spike_but_carry_one_on() {
+    let chain = |xs: &[f64]| {
+        let spheres = xs.iter().map(|&x| sphere(x, 0.0, 0.0, 0.5 - 0.99 * x)).collect();
+        let edges = (1..xs.len() as u32).map(|i| [i - 1, i]).collect();
+        MedialMesh::from_simplices(spheres, edges, vec![]).unwrap()
+    };
+    let none = spikes(&chain(&[0.0, 0.0, 1e-13])).by_ratio[0];
+    assert_eq!((none.edge_share, none.spikes, none.dangling_edges), (0.0, 0, 0));
+    // Two weak edges, and two that have no length between and after them: one spike.
+    let one = spikes(&chain(&[0.0, 0.1, 0.1, 0.2, 0.2])).by_ratio[0];
+    assert_eq!((one.edge_share, one.length_share, one.spikes), (1.0, 1.0, 1));
+    assert_eq!(one.dangling_edges, 1);
 }
 
 proptest! {

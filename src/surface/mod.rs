@@ -1,5 +1,140 @@
 //! Triangle meshes: reading, repairing, checking, sampling, the inside test.
+//!
+//! ```text
+//! file -> read (polygon soup) -> repair (weld, triangulate, drop) -> orient -> check -> TriMesh
+//! ```
+//!
+//! [`read`] gives a mesh only if it bounds a solid: closed, manifold, oriented outward, with
+//! positive volume. Whatever was changed on the way, and whatever may spoil results without being
+//! a reason to refuse (intersecting faces, faces without area), is in its [`SurfaceReport`].
+//! Every sign that a decision depends on is computed exactly.
 
+mod boxes;
+mod check;
+mod eliminate;
+mod error;
+mod inside;
+mod intersect;
 mod mesh;
+mod orient;
+mod predicates;
+mod read;
+mod repair;
+mod report;
+mod sample;
+mod soup;
+mod topology;
+mod triangulate;
+mod write;
 
+use std::path::Path;
+
+use serde::Serialize;
+
+pub use error::{Fault, Place, SurfaceError, VertexName};
+pub use inside::{InsideTest, Side};
 pub use mesh::{Normalisation, TriMesh};
+pub use read::Format;
+pub use report::{Repair, SurfaceReport};
+pub use sample::{ParseSamplingError, Sampling, sample};
+pub use write::write;
+
+/// A surface that bounds a solid: closed, manifold, oriented outward, with positive volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The mesh, in the unit of the file.
+    pub mesh: TriMesh,
+    /// What was found and repaired.
+    pub report: SurfaceReport,
+}
+
+/// A surface of any kind, as far as it could be examined: the answer of `medial info`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Inspection {
+    /// What was found and repaired.
+    #[serde(flatten)]
+    pub report: SurfaceReport,
+    /// Why [`read`] refuses this surface, if it does.
+    #[serde(serialize_with = "as_message")]
+    pub refused: Option<SurfaceError>,
+}
+
+fn as_message<S: serde::Serializer>(
+    refused: &Option<SurfaceError>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    refused.as_ref().map(ToString::to_string).serialize(serializer)
+}
+
+/// Reads a surface, repairs it and checks it. The extension tells the format (`.off`, `.obj`,
+/// `.ply`, `.stl`).
+///
+/// # Errors
+/// When the file cannot be read, is not what its extension says, or does not bound a solid after
+/// the repairs. The error names the file and the line or element.
+///
+/// # Cost
+/// `O(n log n)` time; memory below 16 MB plus 100 times the size of the file.
+pub fn read(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
+    let path = path.as_ref();
+    load(path).and_then(accept).map_err(|fault| in_file(path, fault))
+}
+
+/// [`read`] for the content of a file.
+///
+/// # Errors
+/// As [`read`], without the name of a file.
+pub fn read_bytes(bytes: &[u8], format: Format) -> Result<Loaded, SurfaceError> {
+    Ok(examine(bytes, format).and_then(accept)?)
+}
+
+/// Examines a surface that may be unfit for [`read`].
+///
+/// # Errors
+/// When the file cannot be read or understood, or holds no face. A surface that is open,
+/// non-manifold or otherwise refused is no error here; see [`Inspection::refused`].
+pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
+    let path = path.as_ref();
+    let examined = load(path).map_err(|fault| in_file(path, fault))?;
+    let refused = examined.fault.map(|fault| in_file(path, fault));
+    Ok(Inspection { report: examined.report, refused })
+}
+
+/// [`inspect`] for the content of a file.
+///
+/// # Errors
+/// As [`inspect`], without the name of a file.
+pub fn inspect_bytes(bytes: &[u8], format: Format) -> Result<Inspection, SurfaceError> {
+    let examined = examine(bytes, format)?;
+    Ok(Inspection { report: examined.report, refused: examined.fault.map(SurfaceError::from) })
+}
+
+/// Checks a mesh that was not read from a file. Nothing is repaired: repeated corners, duplicate
+/// faces, unreferenced vertices and faces that are oriented the wrong way are errors.
+///
+/// # Errors
+/// The first reason why the mesh does not bound a solid.
+pub fn validate(mesh: &TriMesh) -> Result<SurfaceReport, SurfaceError> {
+    Ok(check::examine_unrepaired(mesh)?)
+}
+
+fn load(path: &Path) -> Result<check::Examined, Fault> {
+    let format = Format::of(path)?;
+    examine(&read::content(path)?, format)
+}
+
+fn examine(bytes: &[u8], format: Format) -> Result<check::Examined, Fault> {
+    let repaired = repair::repair(read::parse(bytes, format)?)?;
+    Ok(check::orient_and_examine(repaired))
+}
+
+fn accept(examined: check::Examined) -> Result<Loaded, Fault> {
+    match examined.fault {
+        Some(fault) => Err(fault),
+        None => Ok(Loaded { mesh: examined.mesh, report: examined.report }),
+    }
+}
+
+fn in_file(path: &Path, fault: Fault) -> SurfaceError {
+    SurfaceError { file: Some(path.to_owned()), fault }
+}

@@ -1,6 +1,7 @@
 //! The collapse of an edge, with set semantics for the simplices that become equal.
 
-use super::{Collapse, CollapseComplex, Sphere};
+use super::{Collapse, CollapseComplex};
+use crate::geometry::Sphere;
 
 impl CollapseComplex {
     /// Collapses the edge `{kept, removed}`: one vertex with the id `kept` and the given sphere

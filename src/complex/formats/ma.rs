@@ -26,6 +26,14 @@ const SHORTEST_RECORD: usize = 5;
 /// accepted. Edges and faces may be in any order and orientation; missing sides of faces are
 /// added, and [`LoadedMa::notes`] says what was done.
 ///
+/// ```
+/// let text = "3 0 1\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 0 1 2\n";
+/// let loaded = medial::complex::parse_ma(text, "triangle.ma")?;
+/// assert_eq!(loaded.mesh.edges, [[0, 1], [0, 2], [1, 2]]);
+/// assert_eq!(loaded.notes, ["3 edges were added: sides of faces that were not listed"]);
+/// # Ok::<(), medial::complex::MaError>(())
+/// ```
+///
 /// # Errors
 /// When the header or a line is not as above, a number is not finite, a radius is negative, an
 /// index is out of range, or the lines are not as many as announced.

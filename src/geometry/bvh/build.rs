@@ -11,8 +11,6 @@ use crate::Vec3;
 const BINS: usize = 16;
 /// Cost of descending into a node, in units of one item.
 const DESCENT: f64 = 1.0;
-/// Leaves never hold more.
-const MAX_LEAF: usize = 8;
 /// From here on ranges are halved by count, so that no input makes a tree deeper than
 /// [`MAX_DEPTH`]: geometrically growing coordinates would peel off one item at a time.
 const HALVING_DEPTH: usize = 40;
@@ -34,11 +32,21 @@ struct Bin {
     count: usize,
 }
 
+/// What a tree is built for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plan {
+    /// Leaves never hold more items.
+    pub max_leaf: usize,
+    /// Added to the sides of boxes when costs are compared: how much farther than a box itself
+    /// its items are felt. Also what tells flat boxes apart, which have no area.
+    pub padding: f64,
+}
+
 impl Tree {
     /// A tree over the boxes of items, each with a value whose maximum is kept in the nodes.
     ///
     /// Cost `O(n log n)`.
-    pub fn build(items: &[(Bounds, f64)]) -> Self {
+    pub fn build(items: &[(Bounds, f64)], plan: Plan) -> Self {
         let mut items: Vec<Item> = (0..)
             .zip(items)
             .map(|(id, &(bounds, reach))| Item { bounds, centre: bounds.lo + bounds.hi, reach, id })
@@ -46,7 +54,7 @@ impl Tree {
         let mut nodes = Vec::with_capacity(items.len().max(1));
         if !items.is_empty() {
             nodes.push(node(&items, 0));
-            split(&mut nodes, 0, &mut items, 0, 0);
+            split(&mut nodes, 0, &mut items, Place { first: 0, depth: 0 }, plan);
         }
         Self { nodes, order: items.iter().map(|item| item.id).collect() }
     }
@@ -59,22 +67,30 @@ fn node(items: &[Item], first: usize) -> Node {
     Node { bounds, reach, first: first as u32, count: items.len() as u32 }
 }
 
+/// Where a range of items is: its first item, and the depth of its node.
+#[derive(Clone, Copy)]
+struct Place {
+    first: usize,
+    depth: usize,
+}
+
 /// Turns the leaf `index` over `items`, which start at `first`, into a subtree where that pays.
-fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], first: usize, depth: usize) {
+fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], place: Place, plan: Plan) {
+    let Place { first, depth } = place;
     let count = items.len();
-    let plane = if depth < HALVING_DEPTH { cheapest_plane(items) } else { None };
+    let plane = if depth < HALVING_DEPTH { cheapest_plane(items, plan.padding) } else { None };
     let middle = match plane {
         _ if count < 2 => return,
         Some(plane) => {
-            let cost = DESCENT + plane.cost / nodes[index].bounds.half_area();
+            let cost = DESCENT + plane.cost / nodes[index].bounds.half_area(plan.padding);
             // Also false when the area vanishes and the cost is not a number.
             let pays = cost < count as f64;
-            if count <= MAX_LEAF && !pays {
+            if count <= plan.max_leaf && !pays {
                 return;
             }
             partition(items, &plane)
         }
-        None if count <= MAX_LEAF => return,
+        None if count <= plan.max_leaf => return,
         None => count / 2,
     };
     let (left, right) = items.split_at_mut(middle);
@@ -83,8 +99,9 @@ fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], first: usize, 
     nodes.push(node(right, first + middle));
     nodes[index].first = child as u32;
     nodes[index].count = 0;
-    split(nodes, child, left, first, depth + 1);
-    split(nodes, child + 1, right, first + middle, depth + 1);
+    let depth = depth + 1;
+    split(nodes, child, left, Place { first, depth }, plan);
+    split(nodes, child + 1, right, Place { first: first + middle, depth }, plan);
 }
 
 struct Plane {
@@ -111,7 +128,7 @@ impl Binning {
 }
 
 /// The cheapest plane with items on both sides, `None` when all centres share one bin.
-fn cheapest_plane(items: &[Item]) -> Option<Plane> {
+fn cheapest_plane(items: &[Item], padding: f64) -> Option<Plane> {
     let centres = Bounds::of_points(items.iter().map(|item| item.centre));
     let mut best: Option<Plane> = None;
     for axis in 0..3 {
@@ -127,7 +144,7 @@ fn cheapest_plane(items: &[Item]) -> Option<Plane> {
             bin.bounds = bin.bounds.union(&item.bounds);
             bin.count += 1;
         }
-        let (bin, cost) = sweep(&bins);
+        let (bin, cost) = sweep(&bins, padding);
         if best.as_ref().is_none_or(|b| cost < b.cost) {
             best = Some(Plane { axis, binning, bin, cost });
         }
@@ -136,14 +153,14 @@ fn cheapest_plane(items: &[Item]) -> Option<Plane> {
 }
 
 /// The best first bin of the right side, and its cost; infinite when one side would be empty.
-fn sweep(bins: &[Bin; BINS]) -> (usize, f64) {
+fn sweep(bins: &[Bin; BINS], padding: f64) -> (usize, f64) {
     let mut right_cost = [f64::INFINITY; BINS];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
     for k in (1..BINS).rev() {
         bounds = bounds.union(&bins[k].bounds);
         count += bins[k].count;
         if count > 0 {
-            right_cost[k] = count as f64 * bounds.half_area();
+            right_cost[k] = count as f64 * bounds.half_area(padding);
         }
     }
     let mut best = (0, f64::INFINITY);
@@ -152,7 +169,7 @@ fn sweep(bins: &[Bin; BINS]) -> (usize, f64) {
         bounds = bounds.union(&bins[k - 1].bounds);
         count += bins[k - 1].count;
         if count > 0 {
-            let cost = count as f64 * bounds.half_area() + right_cost[k];
+            let cost = count as f64 * bounds.half_area(padding) + right_cost[k];
             if cost < best.1 {
                 best = (k, cost);
             }
@@ -176,6 +193,8 @@ fn partition(items: &mut [Item], plane: &Plane) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const PLAN: Plan = Plan { max_leaf: 4, padding: 0.0 };
 
     fn boxes(centres: impl IntoIterator<Item = Vec3>, half: f64) -> Vec<(Bounds, f64)> {
         let half = Vec3::splat(half);
@@ -204,7 +223,7 @@ mod tests {
             boxes([Vec3::ZERO], 1.0),
         ];
         for items in cases {
-            let tree = Tree::build(&items);
+            let tree = Tree::build(&items, PLAN);
             assert_eq!(tree.check(&items), Ok(()));
             assert!(depth(&tree, 0) <= MAX_DEPTH);
         }
@@ -213,7 +232,7 @@ mod tests {
     #[test]
     fn geometric_progressions_are_halved() {
         let items = boxes((0..2000).map(|i| Vec3::X * 0.5_f64.powi(i / 2)), 0.0);
-        let tree = Tree::build(&items);
+        let tree = Tree::build(&items, PLAN);
         assert_eq!(tree.check(&items), Ok(()));
         assert!(depth(&tree, 0) <= HALVING_DEPTH + 12);
     }

@@ -16,6 +16,7 @@ mod morton;
 mod search;
 mod triangles;
 
+pub(crate) use build::Plan;
 pub(crate) use morton::in_morton_order;
 pub(crate) use search::Search;
 pub use triangles::{BvhError, Closest, Feature, TriangleBvh};
@@ -41,8 +42,9 @@ impl Bounds {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
-    fn half_area(&self) -> f64 {
-        let e = self.hi - self.lo;
+    /// Half the surface area of the box grown by half of `padding` on all sides.
+    fn half_area(&self, padding: f64) -> f64 {
+        let e = self.hi - self.lo + Vec3::splat(padding);
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::super::planar_frame::{Part, PlanarFrame};
-use super::{Bounds, Node, Search, Tree, in_morton_order};
+use super::{Bounds, Node, Plan, Search, Tree, in_morton_order};
 use crate::Vec3;
 use crate::surface::TriMesh;
 
@@ -19,7 +19,7 @@ const LARGEST: f64 = 1e150;
 /// use medial::geometry::{Feature, TriangleBvh};
 /// use medial::surface::TriMesh;
 ///
-/// let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+/// let vertices = vec![Vec3::ZERO, 2.0 * Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
 /// let bvh = TriangleBvh::new(&TriMesh { vertices, faces: vec![[0, 1, 2]] })?;
 /// let closest = bvh.closest(Vec3::new(0.5, -3.0, 4.0));
 /// assert_eq!(closest.distance, 5.0);
@@ -111,7 +111,7 @@ impl TriangleBvh {
             }
         }
         let boxes: Vec<_> = triangles.iter().map(|&t| (Bounds::of_points(t), 0.0)).collect();
-        let tree = Tree::build(&boxes);
+        let tree = Tree::build(&boxes, Plan { max_leaf: 4, padding: 0.0 });
         let corners: Vec<_> = tree.order().iter().map(|&f| triangles[f as usize]).collect();
         let mut places = vec![0; triangles.len()];
         for (place, &face) in (0..).zip(tree.order()) {
@@ -134,7 +134,7 @@ impl TriangleBvh {
         self.corners.len()
     }
 
-    /// The closest point to `p`. Not a number in, not a number out.
+    /// The closest point to `p`. A query that is not finite gets a distance that is not.
     pub fn closest(&self, p: Vec3) -> Closest {
         self.closest_from(p, None)
     }
@@ -180,7 +180,7 @@ impl TriangleBvh {
             return false;
         }
         let limit = padded(distance, self.slack);
-        let mut search = Any { bvh: self, p, squared: distance * distance, limit };
+        let mut search = Any { bvh: self, p, squared: inclusive_square(distance), limit };
         self.tree.search(&mut search);
         search.limit < 0.0
     }
@@ -226,6 +226,11 @@ fn padded(distance: f64, slack: f64) -> f64 {
     limit * limit
 }
 
+/// The square of a bound, such that a distance found earlier is within itself.
+fn inclusive_square(bound: f64) -> f64 {
+    bound * bound * (1.0 + 4.0 * f64::EPSILON)
+}
+
 /// Search for the closest triangle.
 struct Nearest<'a> {
     bvh: &'a TriangleBvh,
@@ -244,7 +249,7 @@ impl<'a> Nearest<'a> {
     }
 
     fn within(bvh: &'a TriangleBvh, p: Vec3, bound: f64) -> Self {
-        let squared = if bound >= 0.0 { bound * bound } else { -1.0 };
+        let squared = if bound >= 0.0 { inclusive_square(bound) } else { -1.0 };
         let mut search = Self { bvh, p, squared, place: NONE, limit: -1.0 };
         if bound >= 0.0 {
             search.tighten();

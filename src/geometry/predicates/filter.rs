@@ -19,7 +19,10 @@
 use super::{Sign, exact};
 
 /// A point with its weight; the weight of a Delaunay site is zero and never read.
+///
+/// Aligned so that a site never straddles two cache lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(32))]
 pub(crate) struct Site {
     pub(crate) p: [f64; 3],
     pub(crate) w: f64,
@@ -47,29 +50,11 @@ impl Metric for Weighted {
 const U: f64 = f64::EPSILON / 2.0;
 const ORIENTATION_BOUND: f64 = 8.5 * U;
 const IN_SPHERE_BOUND: f64 = 216.0 * U;
-const UNDERFLOW: f64 = 1e-300;
+pub(crate) const UNDERFLOW: f64 = 1e-300;
 
 #[inline(always)]
 fn sub(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-/// The sign of `det(b - a, c - a, d - a)`.
-#[inline]
-pub(crate) fn orient3d(a: &[f64; 3], b: &[f64; 3], c: &[f64; 3], d: &[f64; 3]) -> Sign {
-    let (b1, c1, d1) = (sub(b, a), sub(c, a), sub(d, a));
-    let (cxdy, cydx) = (c1[0] * d1[1], c1[1] * d1[0]);
-    let (dxby, dybx) = (d1[0] * b1[1], d1[1] * b1[0]);
-    let (bxcy, bycx) = (b1[0] * c1[1], b1[1] * c1[0]);
-    let det = b1[2] * (cxdy - cydx) + c1[2] * (dxby - dybx) + d1[2] * (bxcy - bycx);
-    let permanent = b1[2].abs() * (cxdy.abs() + cydx.abs())
-        + c1[2].abs() * (dxby.abs() + dybx.abs())
-        + d1[2].abs() * (bxcy.abs() + bycx.abs());
-    if det.abs() > ORIENTATION_BOUND * permanent + UNDERFLOW {
-        Sign::of(det)
-    } else {
-        exact::orient3d(a, b, c, d)
-    }
 }
 
 /// `det(b - a, c - a, d - a)` in double precision, for walks that are finished exactly.
@@ -86,17 +71,18 @@ pub(crate) fn approximate_orientation(
         + d[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
-/// The filter of the power test, with what is known of all sites.
+/// The filters, with what is known of all sites.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PowerFilter {
-    /// Error bounds up to this value belong to calls in which nothing is rounded at all, because
+pub(crate) struct Filter {
+    /// Error bounds up to these values belong to calls in which nothing is rounded at all, because
     /// every intermediate value is a small multiple of a power of the common quantum.
-    exact_up_to: f64,
+    exact_orientation: f64,
+    exact_power: f64,
 }
 
-impl PowerFilter {
+impl Filter {
     /// The filter that knows nothing of the sites.
-    pub(crate) const ANY: Self = Self { exact_up_to: -1.0 };
+    pub(crate) const ANY: Self = Self { exact_orientation: -1.0, exact_power: -1.0 };
 
     /// The filter for sites whose coordinates are multiples of `2^quantum` and whose weights are
     /// multiples of its square.
@@ -105,13 +91,66 @@ impl PowerFilter {
         if !(-180..=180).contains(&quantum) {
             return Self::ANY;
         }
-        let permanent = f64::powi(2.0, 52 + 5 * quantum);
-        Self { exact_up_to: IN_SPHERE_BOUND / 12.0 * permanent }
+        let largest = |degree: i32| f64::powi(2.0, 52 + degree * quantum);
+        Self {
+            exact_orientation: ORIENTATION_BOUND * largest(3),
+            exact_power: IN_SPHERE_BOUND / 12.0 * largest(5),
+        }
+    }
+
+    /// The sign of `det(b - a, c - a, d - a)`.
+    #[inline]
+    pub(crate) fn orient3d(self, a: &[f64; 3], b: &[f64; 3], c: &[f64; 3], d: &[f64; 3]) -> Sign {
+        let (b1, c1, d1) = (sub(b, a), sub(c, a), sub(d, a));
+        let (cxdy, cydx) = (c1[0] * d1[1], c1[1] * d1[0]);
+        let (dxby, dybx) = (d1[0] * b1[1], d1[1] * b1[0]);
+        let (bxcy, bycx) = (b1[0] * c1[1], b1[1] * c1[0]);
+        let det = b1[2] * (cxdy - cydx) + c1[2] * (dxby - dybx) + d1[2] * (bxcy - bycx);
+        let permanent = b1[2].abs() * (cxdy.abs() + cydx.abs())
+            + c1[2].abs() * (dxby.abs() + dybx.abs())
+            + d1[2].abs() * (bxcy.abs() + bycx.abs());
+        let bound = ORIENTATION_BOUND * permanent;
+        if det.abs() > bound + UNDERFLOW {
+            return Sign::of(det);
+        }
+        // Points in a plane across an axis need no arithmetic.
+        if (0..3).any(|k| b1[k] == 0.0 && c1[k] == 0.0 && d1[k] == 0.0) {
+            return Sign::Zero;
+        }
+        let reach = [b1, c1, d1].iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+        if 6.0 * ORIENTATION_BOUND * reach * reach * reach <= self.exact_orientation {
+            return Sign::of(det);
+        }
+        exact::orient3d(a, b, c, d)
     }
 
     /// The sign of the power test of `e` against the orthosphere of four sites.
+    #[inline]
+    pub(crate) fn power_test<M: Metric>(self, cell: [&Site; 4], e: &Site) -> Sign {
+        let (det, bound) = Self::lifted_determinant::<M>(cell, e);
+        self.resolve::<M>(det, bound, cell, e)
+    }
+
+    /// The sign of the power test from what [`Filter::lifted_determinant`] returned.
     #[inline(always)]
-    pub(crate) fn sign<M: Metric>(self, [a, b, c, d]: [&Site; 4], e: &Site) -> Sign {
+    pub(crate) fn resolve<M: Metric>(
+        self,
+        det: f64,
+        bound: f64,
+        cell: [&Site; 4],
+        e: &Site,
+    ) -> Sign {
+        if det.abs() > bound + UNDERFLOW || bound <= self.exact_power {
+            Sign::of(det)
+        } else {
+            exact_power_test::<M>(cell, e)
+        }
+    }
+
+    /// The determinant of the power test in double precision, and a bound on its error beside
+    /// [`UNDERFLOW`].
+    #[inline(always)]
+    pub(crate) fn lifted_determinant<M: Metric>([a, b, c, d]: [&Site; 4], e: &Site) -> (f64, f64) {
         let (ap, bp, cp, dp) = (sub(&a.p, &e.p), sub(&b.p, &e.p), sub(&c.p, &e.p), sub(&d.p, &e.p));
         let ab = ap[0] * bp[1] - bp[0] * ap[1];
         let bc = bp[0] * cp[1] - cp[0] * bp[1];
@@ -137,11 +176,7 @@ impl PowerFilter {
             lift += w[0].max(w[1]).max(w[2].max(w[3]));
         }
         let det = (al * bcd - bl * cda) + (cl * dab - dl * abc);
-        let bound = IN_SPHERE_BOUND * (reach2 * reach2.sqrt()) * lift;
-        if det.abs() > bound + UNDERFLOW || bound <= self.exact_up_to {
-            return Sign::of(det);
-        }
-        exact_power_test::<M>([a, b, c, d], e)
+        (det, IN_SPHERE_BOUND * (reach2 * reach2.sqrt()) * lift)
     }
 }
 

@@ -20,9 +20,8 @@ mod wide;
 pub use circumsphere::{circumsphere, orthosphere};
 pub(crate) use exact::collinear as sites_collinear;
 pub(crate) use exact::lowest_bit;
-pub(crate) use filter::orient3d as exact_orientation;
-pub(crate) use filter::{Metric, PowerFilter, Site, Unweighted, Weighted, approximate_orientation};
-pub(crate) use perturb::{in_conflict, lexicographic};
+pub(crate) use filter::{Filter, Metric, Site, Unweighted, Weighted, approximate_orientation};
+pub(crate) use perturb::{in_conflict, in_conflict_given, lexicographic};
 
 use crate::Vec3;
 
@@ -70,7 +69,7 @@ impl std::ops::Neg for Sign {
 /// Exact for finite coordinates of at most [`MAX_COORDINATE`].
 #[inline]
 pub fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
-    filter::orient3d(&a.to_array(), &b.to_array(), &c.to_array(), &d.to_array())
+    Filter::ANY.orient3d(&a.to_array(), &b.to_array(), &c.to_array(), &d.to_array())
 }
 
 /// Whether three points lie on one line, exactly.
@@ -85,7 +84,7 @@ pub fn collinear(a: Vec3, b: Vec3, c: Vec3) -> bool {
 #[inline]
 pub fn in_sphere(a: Vec3, b: Vec3, c: Vec3, d: Vec3, e: Vec3) -> Sign {
     let [a, b, c, d, e] = [a, b, c, d, e].map(|p| Site { p: p.to_array(), w: 0.0 });
-    PowerFilter::ANY.sign::<Unweighted>([&a, &b, &c, &d], &e)
+    Filter::ANY.power_test::<Unweighted>([&a, &b, &c, &d], &e)
 }
 
 /// The in-sphere test of weighted points `(p, w)` with the power distance `|x - p|^2 - w`:
@@ -102,7 +101,7 @@ pub fn power_test(
     e: (Vec3, f64),
 ) -> Sign {
     let [a, b, c, d, e] = [a, b, c, d, e].map(|(p, w)| Site { p: p.to_array(), w });
-    PowerFilter::ANY.sign::<Weighted>([&a, &b, &c, &d], &e)
+    Filter::ANY.power_test::<Weighted>([&a, &b, &c, &d], &e)
 }
 
 #[cfg(test)]

@@ -12,43 +12,71 @@
 //! Orientation is never perturbed, hence no cell is flat. The result is the one weighted Delaunay
 //! triangulation of infinitesimally different weights: unique, whatever the order of insertion.
 
+use std::cmp::Ordering;
+
 use super::Sign;
-use super::filter::{Metric, PowerFilter, Site, orient3d};
+use super::filter::{Filter, Metric, Site};
 
 /// Whether `e` is in conflict with the positively oriented cell: inside its perturbed orthosphere.
 ///
 /// The five positions must be distinct.
+#[inline]
+pub(crate) fn in_conflict<M: Metric>(filter: Filter, cell: [&Site; 4], e: &Site) -> bool {
+    let (det, bound) = Filter::lifted_determinant::<M>(cell, e);
+    in_conflict_given::<M>(filter, det, bound, cell, e)
+}
+
+/// The same from what [`Filter::lifted_determinant`] returned.
 #[inline(always)]
-pub(crate) fn in_conflict<M: Metric>(filter: PowerFilter, cell: [&Site; 4], e: &Site) -> bool {
-    match filter.sign::<M>(cell, e) {
+pub(crate) fn in_conflict_given<M: Metric>(
+    filter: Filter,
+    det: f64,
+    bound: f64,
+    cell: [&Site; 4],
+    e: &Site,
+) -> bool {
+    match filter.resolve::<M>(det, bound, cell, e) {
         Sign::Positive => true,
         Sign::Negative => false,
-        Sign::Zero => perturbed(cell, e),
+        Sign::Zero => perturbed(filter, cell, e),
     }
 }
 
 #[cold]
 #[inline(never)]
-fn perturbed([a, b, c, d]: [&Site; 4], e: &Site) -> bool {
-    let sites = [a, b, c, d, e].map(|s| &s.p);
-    let mut order = [0, 1, 2, 3, 4];
-    order.sort_unstable_by(|&i, &j| lexicographic(sites[j], sites[i]));
-    for largest in order {
-        let cofactor = match largest {
-            0 => orient3d(sites[4], sites[1], sites[2], sites[3]),
-            1 => orient3d(sites[0], sites[4], sites[2], sites[3]),
-            2 => orient3d(sites[0], sites[1], sites[4], sites[3]),
-            3 => orient3d(sites[0], sites[1], sites[2], sites[4]),
-            _ => Sign::Negative,
-        };
-        if cofactor != Sign::Zero {
-            return cofactor == Sign::Positive;
+fn perturbed(filter: Filter, cell: [&Site; 4], e: &Site) -> bool {
+    // What is left of the five sites in descending order; `e` ends the search.
+    let mut left = [true; 4];
+    loop {
+        let mut largest = 4;
+        for i in (0..4).filter(|&i| left[i]) {
+            let top = if largest == 4 { e } else { cell[largest] };
+            if lexicographic(&cell[i].p, &top.p).is_gt() {
+                largest = i;
+            }
+        }
+        if largest == 4 {
+            return false;
+        }
+        left[largest] = false;
+        let mut replaced = cell;
+        replaced[largest] = e;
+        let [a, b, c, d] = replaced;
+        match filter.orient3d(&a.p, &b.p, &c.p, &d.p) {
+            Sign::Positive => return true,
+            Sign::Negative => return false,
+            Sign::Zero => {}
         }
     }
-    false
 }
 
+/// Lexicographic order of positions, none of which has a coordinate of -0.0.
 #[inline]
-pub(crate) fn lexicographic(a: &[f64; 3], b: &[f64; 3]) -> std::cmp::Ordering {
-    a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
+pub(crate) fn lexicographic(a: &[f64; 3], b: &[f64; 3]) -> Ordering {
+    for k in 0..3 {
+        if a[k] != b[k] {
+            return if a[k] < b[k] { Ordering::Less } else { Ordering::Greater };
+        }
+    }
+    Ordering::Equal
 }

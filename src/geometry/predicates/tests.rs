@@ -64,7 +64,7 @@ proptest! {
         for unit in [0.0, 0.25, 0.1] {
             let s = [0, 1, 2, 3, 4].map(|i| site(i, unit));
             let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|i| Site { p: s[i].0, w: s[i].1 });
-            let filtered = PowerFilter::ANY.sign::<Weighted>([&a, &b, &c, &d], &e);
+            let filtered = Filter::ANY.power_test::<Weighted>([&a, &b, &c, &d], &e);
             let exact =
                 exact::power_test([0, 1, 2, 3].map(|i| (&s[i].0, s[i].1)), (&s[4].0, s[4].1));
             prop_assert_eq!(filtered, exact);

@@ -26,8 +26,7 @@
 use super::cells::{Cell, Face, INFINITE, MAX_CELLS, OPPOSITE, UNUSED};
 use super::error::TriangulationError;
 use crate::geometry::predicates::{
-    Metric, PowerFilter, Sign, Site, approximate_orientation, exact_orientation, in_conflict,
-    sites_collinear,
+    Filter, Metric, Sign, Site, approximate_orientation, in_conflict_given, sites_collinear,
 };
 
 /// What is known of a cell while a conflict zone grows.
@@ -49,17 +48,26 @@ struct Wall {
     outside: Face,
 }
 
+/// A cell beside the conflict zone, and what decides whether it belongs to it.
+#[derive(Clone, Copy)]
+struct Candidate {
+    cell: u32,
+    det: f64,
+    bound: f64,
+}
+
 /// A triangulation that grows.
 pub(super) struct Builder<M> {
     /// Sites by vertex, in the order of insertion; the first is a dummy for the vertex at infinity.
     pub(super) sites: Vec<Site>,
     pub(super) cells: Vec<Cell>,
-    filter: PowerFilter,
+    filter: Filter,
     state: Vec<u8>,
     free: Vec<u32>,
     last: u32,
     zone: Vec<u32>,
     walls: Vec<Wall>,
+    front: Vec<Candidate>,
     local: Vec<u8>,
     rim: Vec<u32>,
     table: Box<[Face]>,
@@ -72,10 +80,11 @@ impl<M: Metric> Builder<M> {
     pub(super) fn build(
         mut sites: Vec<Site>,
         ids: &mut [u32],
-        filter: PowerFilter,
+        filter: Filter,
     ) -> Result<Self, TriangulationError> {
         bring_independent_to_front(&mut sites, ids)?;
-        let expected = 7 * sites.len() + 64;
+        // Surfaces need up to 8 cells for each site. Reserved memory that is not touched costs nothing.
+        let expected = 9 * sites.len() + 64;
         let mut builder = Self {
             cells: Vec::with_capacity(expected),
             filter,
@@ -84,6 +93,7 @@ impl<M: Metric> Builder<M> {
             last: 0,
             zone: Vec::new(),
             walls: Vec::new(),
+            front: Vec::new(),
             local: vec![ABSENT; sites.len()],
             rim: Vec::new(),
             table: vec![Face::NONE; TABLE * TABLE].into(),
@@ -100,7 +110,7 @@ impl<M: Metric> Builder<M> {
     /// The first cell and its four infinite neighbours.
     fn start(&mut self) {
         let s = &self.sites;
-        let positive = exact_orientation(&s[1].p, &s[2].p, &s[3].p, &s[4].p) == Sign::Positive;
+        let positive = self.filter.orient3d(&s[1].p, &s[2].p, &s[3].p, &s[4].p) == Sign::Positive;
         let v = if positive { [1, 2, 3, 4] } else { [1, 2, 4, 3] };
         self.cells.push(Cell { v, n: [Face::NONE; 4] });
         for i in 0..4 {
@@ -152,7 +162,8 @@ impl<M: Metric> Builder<M> {
             if cell.is_infinite() {
                 break;
             }
-            let s = cell.v.map(|v| &self.sites[v as usize].p);
+            let site = |i: usize| &self.sites[cell.v[i] as usize].p;
+            let s = [site(0), site(1), site(2), site(3)];
             let exit = (0..4).find(|&i| {
                 let f = OPPOSITE[i];
                 cell.n[i].cell() != from
@@ -188,7 +199,7 @@ impl<M: Metric> Builder<M> {
             let s = cell.v.map(|v| &self.sites[v as usize].p);
             let exit = (0..4).find(|&i| {
                 let f = OPPOSITE[i];
-                exact_orientation(p, s[f[0]], s[f[1]], s[f[2]]) == Sign::Negative
+                self.filter.orient3d(p, s[f[0]], s[f[1]], s[f[2]]) == Sign::Negative
             });
             match exit {
                 Some(i) => c = cell.n[i].cell(),
@@ -197,36 +208,53 @@ impl<M: Metric> Builder<M> {
         }
     }
 
-    #[inline(always)]
     fn conflicts(&self, cell: u32, vertex: u32) -> bool {
-        conflicts::<M>(self.filter, &self.cells, &self.sites, cell, vertex)
+        let site = &self.sites[vertex as usize];
+        let (det, bound) = determinant::<M>(&self.cells, &self.sites, cell, site);
+        conflicts_given::<M>(self.filter, &self.cells, &self.sites, cell, site, det, bound)
     }
 
     /// Marks and lists the cells in conflict with the site and the walls around them.
+    ///
+    /// Generation by generation: the neighbours of the last one are collected, then tested
+    /// together, so that no test waits for the verdict on another.
     fn find_conflict_zone(&mut self, vertex: u32, seed: u32) {
-        let Self { cells, sites, state, zone, walls, filter, .. } = self;
+        let Self { cells, sites, state, zone, walls, front, filter, .. } = self;
+        let site = &sites[vertex as usize];
         zone.clear();
-        walls.clear();
         zone.push(seed);
         state[seed as usize] = CONFLICT;
-        let mut next = 0;
-        while next < zone.len() {
-            let cell = cells[zone[next] as usize];
-            next += 1;
-            for i in 0..4 {
-                let outside = cell.n[i];
-                let neighbour = outside.cell();
-                let known = &mut state[neighbour as usize];
-                if *known == UNKNOWN {
-                    if conflicts::<M>(*filter, cells, sites, neighbour, vertex) {
-                        *known = CONFLICT;
-                        zone.push(neighbour);
-                    } else {
+        let mut generation = 0;
+        while generation < zone.len() {
+            front.clear();
+            for &c in &zone[generation..] {
+                for n in cells[c as usize].n {
+                    let known = &mut state[n.cell() as usize];
+                    if *known == UNKNOWN {
                         *known = OUTSIDE;
+                        front.push(Candidate { cell: n.cell(), det: 0.0, bound: 0.0 });
                     }
                 }
-                if *known == OUTSIDE {
-                    walls.push(Wall { v: OPPOSITE[i].map(|k| cell.v[k]), outside });
+            }
+            generation = zone.len();
+            for candidate in front.iter_mut() {
+                (candidate.det, candidate.bound) =
+                    determinant::<M>(cells, sites, candidate.cell, site);
+            }
+            for &Candidate { cell, det, bound } in front.iter() {
+                if conflicts_given::<M>(*filter, cells, sites, cell, site, det, bound) {
+                    state[cell as usize] = CONFLICT;
+                    zone.push(cell);
+                }
+            }
+        }
+        walls.clear();
+        for &c in zone.iter() {
+            let cell = &cells[c as usize];
+            for (i, outside) in cell.n.into_iter().enumerate() {
+                if state[outside.cell() as usize] == OUTSIDE {
+                    let [a, b, c] = OPPOSITE[i];
+                    walls.push(Wall { v: [cell.v[a], cell.v[b], cell.v[c]], outside });
                 }
             }
         }
@@ -303,13 +331,17 @@ impl<M: Metric> Builder<M> {
         let Self { walls, local, table, cells, .. } = self;
         for wall in walls.iter() {
             let id = wall.outside.cell();
-            let [a, b, c] = wall.v.map(|v| local[v as usize] as usize);
+            let [a, b, c] = wall.v;
+            let [a, b, c] =
+                [local[a as usize], local[b as usize], local[c as usize]].map(usize::from);
             table[b * TABLE + c] = Face::new(id, 1);
             table[c * TABLE + a] = Face::new(id, 2);
             table[a * TABLE + b] = Face::new(id, 3);
         }
         for wall in walls.iter() {
-            let [a, b, c] = wall.v.map(|v| local[v as usize] as usize);
+            let [a, b, c] = wall.v;
+            let [a, b, c] =
+                [local[a as usize], local[b as usize], local[c as usize]].map(usize::from);
             let n = &mut cells[wall.outside.cell() as usize].n;
             n[1] = table[c * TABLE + b];
             n[2] = table[a * TABLE + c];
@@ -337,26 +369,48 @@ impl<M: Metric> Builder<M> {
     }
 }
 
-/// Whether a site is in conflict with a cell, see the head of this file.
+/// The finite cell whose orthosphere decides about conflict with a cell, itself or the finite
+/// neighbour of an infinite one.
 #[inline(always)]
-fn conflicts<M: Metric>(
-    filter: PowerFilter,
+fn finite_side(cells: &[Cell], cell: u32) -> [u32; 4] {
+    let record = &cells[cell as usize];
+    if record.is_infinite() { cells[record.n[3].cell() as usize].v } else { record.v }
+}
+
+#[inline(always)]
+fn sites_of(sites: &[Site], [a, b, c, d]: [u32; 4]) -> [&Site; 4] {
+    [&sites[a as usize], &sites[b as usize], &sites[c as usize], &sites[d as usize]]
+}
+
+/// The determinant that decides whether a site is in conflict with a cell, and its error bound.
+#[inline(always)]
+fn determinant<M: Metric>(cells: &[Cell], sites: &[Site], cell: u32, site: &Site) -> (f64, f64) {
+    Filter::lifted_determinant::<M>(sites_of(sites, finite_side(cells, cell)), site)
+}
+
+/// Whether a site is in conflict with a cell, see the head of this file; `det` and `bound` are
+/// those of [`determinant`].
+#[inline(always)]
+fn conflicts_given<M: Metric>(
+    filter: Filter,
     cells: &[Cell],
     sites: &[Site],
     cell: u32,
-    vertex: u32,
+    site: &Site,
+    det: f64,
+    bound: f64,
 ) -> bool {
-    let mut v = cells[cell as usize].v;
-    let site = &sites[vertex as usize];
+    let v = cells[cell as usize].v;
     if v[3] == INFINITE {
-        let [a, b, c, _] = v.map(|v| &sites[v as usize].p);
-        match exact_orientation(a, b, c, &site.p) {
+        let [a, b, c] = [&sites[v[0] as usize], &sites[v[1] as usize], &sites[v[2] as usize]];
+        match filter.orient3d(&a.p, &b.p, &c.p, &site.p) {
             Sign::Positive => return true,
             Sign::Negative => return false,
-            Sign::Zero => v = cells[cells[cell as usize].n[3].cell() as usize].v,
+            Sign::Zero => {}
         }
     }
-    in_conflict::<M>(filter, v.map(|v| &sites[v as usize]), site)
+    let finite = sites_of(sites, finite_side(cells, cell));
+    in_conflict_given::<M>(filter, det, bound, finite, site)
 }
 
 /// Swaps the first four affinely independent sites into places 1 to 4.
@@ -375,7 +429,7 @@ fn bring_independent_to_front(
     ids.swap(2, third - 1);
     let c = sites[3].p;
     let fourth =
-        (4..sites.len()).find(|&i| exact_orientation(&a, &b, &c, &sites[i].p) != Sign::Zero);
+        (4..sites.len()).find(|&i| Filter::ANY.orient3d(&a, &b, &c, &sites[i].p) != Sign::Zero);
     let fourth = fourth.ok_or(TriangulationError::Coplanar { distinct })?;
     sites.swap(4, fourth);
     ids.swap(3, fourth - 1);

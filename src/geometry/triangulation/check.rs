@@ -2,9 +2,7 @@
 
 use super::cells::OPPOSITE;
 use super::{CellId, Facet, Triangulation, VertexId};
-use crate::geometry::predicates::{
-    Metric, PowerFilter, Sign, Site, exact_orientation, in_conflict,
-};
+use crate::geometry::predicates::{Filter, Metric, Sign, Site, in_conflict};
 
 /// The first violation that a check met.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -136,12 +134,12 @@ impl Triangulation {
     pub(in crate::geometry) fn check_regularity<M: Metric>(
         &self,
         sites: &[Site],
-        filter: PowerFilter,
+        filter: Filter,
     ) -> Result<(), Violation> {
         let site = |v: VertexId| &sites[v.index()];
         for cell in self.finite_cells() {
             let [a, b, c, d] = self.vertices(cell).map(|v| &site(v).p);
-            let sign = exact_orientation(a, b, c, d);
+            let sign = filter.orient3d(a, b, c, d);
             if sign != Sign::Positive {
                 return Err(Violation::Orientation { cell, sign });
             }
@@ -165,7 +163,7 @@ impl Triangulation {
     pub(in crate::geometry) fn conflicts<M: Metric>(
         &self,
         sites: &[Site],
-        filter: PowerFilter,
+        filter: Filter,
         cell: CellId,
         site: &Site,
     ) -> bool {
@@ -173,7 +171,7 @@ impl Triangulation {
         if self.is_infinite(cell) {
             let [a, b, c, _] = self.vertices(cell);
             let [a, b, c] = [a, b, c].map(|v| &sites[v.index()].p);
-            match exact_orientation(a, b, c, &site.p) {
+            match filter.orient3d(a, b, c, &site.p) {
                 Sign::Positive => return true,
                 Sign::Negative => return false,
                 Sign::Zero => cell = self.neighbours(cell)[3],
@@ -195,7 +193,7 @@ impl Triangulation {
             let s = self.vertices(cell).map(|v| &sites[v.index()].p);
             let exit = (0..4).find(|&i| {
                 let f = OPPOSITE[i];
-                exact_orientation(p, s[f[0]], s[f[1]], s[f[2]]) == Sign::Negative
+                Filter::ANY.orient3d(p, s[f[0]], s[f[1]], s[f[2]]) == Sign::Negative
             });
             match exit {
                 Some(i) => cell = self.neighbours(cell)[i],

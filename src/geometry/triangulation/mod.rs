@@ -20,7 +20,7 @@ pub use check::Violation;
 pub use error::TriangulationError;
 pub use query::{EdgeRing, Facet};
 
-use super::predicates::{Metric, PowerFilter, Site, lowest_bit};
+use super::predicates::{Filter, Metric, Site, lowest_bit};
 use build::Builder;
 
 /// A vertex: the index of an input point, or the vertex at infinity.
@@ -71,7 +71,7 @@ pub(super) struct Triangulated {
     pub(super) triangulation: Triangulation,
     /// Pairs (site, the kept site at the same position), ascending.
     pub(super) repeated: Vec<(u32, u32)>,
-    pub(super) filter: PowerFilter,
+    pub(super) filter: Filter,
 }
 
 /// Triangulates finite sites of admissible size, in any number and position.
@@ -84,7 +84,7 @@ pub(super) fn triangulate<M: Metric>(sites: &[Site]) -> Result<Triangulated, Tri
         let distinct = ids.len();
         return Err(TriangulationError::TooFewPoints { points: sites.len(), distinct });
     }
-    let filter = PowerFilter::with_quantum(common_quantum::<M>(sites));
+    let filter = Filter::with_quantum(common_quantum::<M>(sites));
     let dummy = Site { p: [f64::NAN; 3], w: f64::NAN };
     let ordered =
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();

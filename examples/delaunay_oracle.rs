@@ -1,0 +1,204 @@
+//! One side of the comparison with CGAL: makes point sets, triangulates a file of points, and
+//! prints what `scripts/oracles/delaunay_cgal.cpp` prints for the same file.
+//!
+//! ```text
+//! delaunay_oracle make NAME FILE       one of the point sets below, 4 f64 for each point
+//! delaunay_oracle run FILE [REPEAT]    cells, an order-free hash of them, best CPU seconds, peak KiB
+//! ```
+#![allow(clippy::print_stdout)]
+
+use std::collections::HashMap;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use medial::Vec3;
+use medial::geometry::delaunay::Delaunay;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    match args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["make", name, file] => {
+            let points = make(name).ok_or_else(|| format!("unknown point set {name}"))?;
+            let bytes: Vec<u8> = points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+            std::fs::write(file, bytes)?;
+        }
+        ["run", file] => run(file, 1)?,
+        ["run", file, repeat] => run(file, repeat.parse()?)?,
+        _ => return Err("usage: delaunay_oracle make NAME FILE | run FILE [REPEAT]".into()),
+    }
+    Ok(())
+}
+
+fn run(file: &str, repeat: usize) -> Result<(), Box<dyn std::error::Error>> {
+    let points: Vec<Vec3> = std::fs::read(file)?
+        .chunks_exact(32)
+        .map(|c| {
+            let x = |k: usize| f64::from_le_bytes(c[8 * k..8 * k + 8].try_into().unwrap_or([0; 8]));
+            Vec3::new(x(0), x(1), x(2))
+        })
+        .collect();
+    let before = peak_kib();
+    let mut best = f64::INFINITY;
+    let mut result = None;
+    for _ in 0..repeat.max(1) {
+        drop(result.take());
+        let start = cpu_seconds();
+        let delaunay = Delaunay::new(&points)?;
+        best = best.min(cpu_seconds() - start);
+        result = Some(delaunay);
+    }
+    let after = peak_kib();
+    let d = result.ok_or("no run")?;
+    let set = d.finite_cells().fold(0u64, |sum, c| {
+        let mut v = d.vertices(c).map(|v| hash_point(d.point(v)));
+        v.sort_unstable();
+        sum.wrapping_add(v.into_iter().fold(0, |h, x| mix(h ^ x)))
+    });
+    println!("{} {set:016x} {best:.4} {}", d.finite_cell_count(), after - before);
+    Ok(())
+}
+
+/// CPU seconds of the main thread, which other work on the machine disturbs less than the clock.
+fn cpu_seconds() -> f64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    let nanoseconds: Option<f64> = std::fs::read_to_string("/proc/self/schedstat")
+        .ok()
+        .and_then(|s| s.split_whitespace().next()?.parse().ok());
+    nanoseconds
+        .map_or_else(|| START.get_or_init(Instant::now).elapsed().as_secs_f64(), |ns| ns * 1e-9)
+}
+
+fn peak_kib() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|l| l.starts_with("VmHWM"));
+    line.and_then(|l| l.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
+}
+
+fn mix(x: u64) -> u64 {
+    let x = (x ^ (x >> 33)).wrapping_mul(0xff51_afd7_ed55_8ccd);
+    let x = (x ^ (x >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+    x ^ (x >> 33)
+}
+
+fn hash_point(p: Vec3) -> u64 {
+    p.to_array().iter().fold(1, |h, x| mix(h ^ x.to_bits()))
+}
+
+fn make(name: &str) -> Option<Vec<[f64; 4]>> {
+    let (kind, size) = name.split_once('-')?;
+    let n = size.parse().ok()?;
+    let points = match kind {
+        "cube" => cube(n),
+        "surface" => surface(n),
+        "sphere" => sphere(n),
+        "lattice" => lattice(n, |x| f64::from(x)),
+        "box" => box_grid(n),
+        "icosphere" => icosphere(n),
+        "cylinder" => cylinder(n),
+        _ => return None,
+    };
+    Some(points.into_iter().map(|p| [p.x, p.y, p.z, 0.0]).collect())
+}
+
+fn unit(rng: &mut Pcg64) -> Vec3 {
+    Vec3::new(rng.random(), rng.random(), rng.random())
+}
+
+fn direction(rng: &mut Pcg64) -> Vec3 {
+    loop {
+        let v = 2.0 * unit(rng) - Vec3::ONE;
+        if (1e-3..=1.0).contains(&v.length_squared()) {
+            return v.normalize();
+        }
+    }
+}
+
+/// Uniformly random in the unit cube.
+fn cube(n: u32) -> Vec<Vec3> {
+    let mut rng = Pcg64::seed_from_u64(1);
+    (0..n).map(|_| unit(&mut rng)).collect()
+}
+
+/// Random on a smooth surface with bumps and hollows.
+fn surface(n: u32) -> Vec<Vec3> {
+    let mut rng = Pcg64::seed_from_u64(2);
+    (0..n)
+        .map(|_| {
+            let u = direction(&mut rng);
+            u * (1.0 + 0.25 * (3.0 * u.x).sin() * (4.0 * u.y).cos() + 0.15 * (5.0 * u.z).sin())
+        })
+        .collect()
+}
+
+/// Random on the unit sphere, rounded.
+fn sphere(n: u32) -> Vec<Vec3> {
+    let mut rng = Pcg64::seed_from_u64(3);
+    (0..n).map(|_| direction(&mut rng)).collect()
+}
+
+/// `n^3` integer points.
+fn lattice(n: u32, coordinate: impl Fn(u32) -> f64) -> Vec<Vec3> {
+    (0..n * n * n)
+        .map(|i| Vec3::new(coordinate(i % n), coordinate(i / n % n), coordinate(i / n / n)))
+        .collect()
+}
+
+/// The surface of the unit cube in steps of `1 / n`.
+fn box_grid(n: u32) -> Vec<Vec3> {
+    let extreme = |x: f64| x == 0.0 || x == 1.0;
+    let all = lattice(n + 1, |x| f64::from(x) / f64::from(n));
+    all.into_iter().filter(|p| p.to_array().into_iter().any(extreme)).collect()
+}
+
+/// An icosahedron, subdivided `n` times, on the unit sphere.
+fn icosphere(n: u32) -> Vec<Vec3> {
+    let g = (1.0 + 5f64.sqrt()) / 2.0;
+    let mut points = Vec::new();
+    for k in 0..3 {
+        for (a, b) in [(1.0, g), (1.0, -g), (-1.0, g), (-1.0, -g)] {
+            let mut p = [0.0; 3];
+            p[(k + 1) % 3] = a;
+            p[(k + 2) % 3] = b;
+            points.push(Vec3::from(p).normalize());
+        }
+    }
+    let near = |a: usize, b: usize, p: &[Vec3]| p[a].distance(p[b]) < 1.2;
+    let mut faces = Vec::new();
+    for a in 0..12 {
+        for b in 0..a {
+            for c in 0..b {
+                if near(a, b, &points) && near(b, c, &points) && near(a, c, &points) {
+                    faces.push([a, b, c]);
+                }
+            }
+        }
+    }
+    for _ in 0..n {
+        let mut middle = HashMap::new();
+        let mut finer = Vec::with_capacity(4 * faces.len());
+        for [a, b, c] in faces {
+            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b)| {
+                *middle.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    points.push((points[a] + points[b]).normalize());
+                    points.len() - 1
+                })
+            });
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        faces = finer;
+    }
+    points
+}
+
+/// `n` rings of `n` points on a cylinder without caps, square in its unrolled steps.
+fn cylinder(n: u32) -> Vec<Vec3> {
+    let step = std::f64::consts::TAU / f64::from(n);
+    (0..n * n)
+        .map(|i| {
+            let (sin, cos) = (f64::from(i % n) * step).sin_cos();
+            Vec3::new(cos, sin, f64::from(i / n) * step)
+        })
+        .collect()
+}

@@ -1,0 +1,74 @@
+//! A comparison in a few lines of plain text, for the terminal.
+
+use std::fmt::Write as _;
+
+use crate::comparison::Comparison;
+use crate::metric::{HAUSDORFF, MEAN_ERROR, Metric, TOTAL_SECONDS};
+use crate::record::Record;
+use crate::summary::{CountSummary, SeriesSummary, by_count};
+
+/// The columns behind the name of the method: title and width.
+const COLUMNS: [(&str, usize); 6] = [
+    ("Hausdorff %", 12),
+    ("mean %", 9),
+    ("topology", 9),
+    ("seconds", 9),
+    ("reached", 9),
+    ("failed", 7),
+];
+
+/// Means over the meshes for each number of spheres, one line for each method. Empty without
+/// results at a number of spheres.
+pub fn summary_text(records: &[Record]) -> String {
+    let comparison = Comparison::new(records);
+    let widest = comparison.series.iter().map(|label| label.chars().count()).max().unwrap_or(0);
+    let mut text = String::new();
+    for count in by_count(&comparison) {
+        write_count(&mut text, &count, &comparison, widest.max(8));
+    }
+    text
+}
+
+fn write_count(
+    text: &mut String,
+    summary: &CountSummary,
+    comparison: &Comparison<'_>,
+    width: usize,
+) {
+    let meshes = if summary.common == 1 { "mesh" } else { "meshes" };
+    let _ = writeln!(
+        text,
+        "{} spheres, means over {} {meshes} that all reached",
+        summary.count, summary.common
+    );
+    let _ = write!(text, "  {:<width$}", "method");
+    for (title, width) in COLUMNS {
+        let _ = write!(text, "{title:>width$}");
+    }
+    text.push('\n');
+    for row in &summary.rows {
+        write_row(text, row, &comparison.series[row.series], width);
+    }
+    text.push('\n');
+}
+
+fn write_row(text: &mut String, row: &SeriesSummary, label: &str, width: usize) {
+    let number = |metric: &Metric| {
+        row.mean(metric).map_or_else(|| "-".to_owned(), |value| metric.format_mean(value))
+    };
+    let (right, known) = row.topology;
+    let cells = [
+        number(&HAUSDORFF),
+        number(&MEAN_ERROR),
+        format!("{right}/{known}"),
+        number(&TOTAL_SECONDS),
+        format!("{}/{}", row.reached, row.asked),
+        row.failed.to_string(),
+    ];
+    let _ = write!(text, "  {label:<width$}");
+    for (cell, (_, width)) in cells.iter().zip(COLUMNS) {
+        let _ = write!(text, "{cell:>width$}");
+    }
+    // Means over other meshes than the rest cannot be read beside them.
+    text.push_str(if row.compared { "\n" } else { "  (own meshes)\n" });
+}

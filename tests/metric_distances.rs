@@ -1,0 +1,289 @@
+//! Distances, volume error and axis distance against closed forms.
+
+use std::f64::consts::{PI, TAU};
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, MedialUnion};
+use medial::geometry::{Sphere, TriangleBvh};
+use medial::metrics::{
+    AxisOptions, DistanceOptions, Distances, EnvelopeOptions, MetricError, VolumeOptions,
+    axis_distance, distances, enclosed_volume, sample_envelope, volume_error,
+};
+use medial::surface::TriMesh;
+
+fn measure(surface: &TriMesh, mesh: &MedialMesh) -> Distances {
+    let options =
+        DistanceOptions { surface_samples: 20_000, envelope_samples: 20_000, ..Default::default() };
+    distances(surface, &TriangleBvh::new(surface).unwrap(), mesh, &options).unwrap()
+}
+
+fn complex(spheres: &[(Vec3, f64)], edges: &[[u32; 2]], faces: &[[u32; 3]]) -> MedialMesh {
+    let spheres = spheres.iter().map(|&(c, r)| Sphere::new(c, r)).collect();
+    MedialMesh::from_simplices(spheres, edges.to_vec(), faces.to_vec()).unwrap()
+}
+
+/// A surface of revolution around x. The profile runs from pole to pole.
+fn revolve(profile: &[(f64, f64)], around: u32) -> TriMesh {
+    let rings = profile.len() as u32 - 2;
+    let mut mesh = TriMesh::default();
+    mesh.vertices.push(Vec3::X * profile[0].0);
+    for &(x, rho) in &profile[1..=rings as usize] {
+        mesh.vertices.extend((0..around).map(|k| {
+            let (sin, cos) = (TAU * f64::from(k) / f64::from(around)).sin_cos();
+            Vec3::new(x, rho * cos, rho * sin)
+        }));
+    }
+    mesh.vertices.push(Vec3::X * profile[rings as usize + 1].0);
+    let id = |ring: u32, k: u32| 1 + ring * around + k % around;
+    let last = mesh.vertices.len() as u32 - 1;
+    for k in 0..around {
+        mesh.faces.push([0, id(0, k + 1), id(0, k)]);
+        mesh.faces.push([last, id(rings - 1, k), id(rings - 1, k + 1)]);
+        for ring in 1..rings {
+            let [a, b] = [id(ring - 1, k), id(ring - 1, k + 1)];
+            let [c, d] = [id(ring, k + 1), id(ring, k)];
+            mesh.faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    mesh
+}
+
+/// Hull of the balls at x = 0 and x = `length`, as a fine mesh with all vertices on it.
+fn tapered_capsule(length: f64, radii: [f64; 2], steps: u32) -> TriMesh {
+    let slope = (radii[1] - radii[0]) / length;
+    // Angle from the -x direction at which both spheres meet the lateral.
+    let meet = PI - (-slope).acos();
+    let angle = |k: u32, from: f64, to: f64| from + (to - from) * f64::from(k) / f64::from(steps);
+    let on = |x: f64, r: f64, a: f64| (x - r * a.cos(), r * a.sin());
+    let mut profile: Vec<_> = (0..=steps).map(|k| on(0.0, radii[0], angle(k, 0.0, meet))).collect();
+    profile.extend((0..=steps).map(|k| on(length, radii[1], angle(k, meet, PI))));
+    let mut profile: Vec<_> = profile.into_iter().map(|(x, rho)| (x, rho.max(0.0))).collect();
+    let end = profile.len() - 1;
+    (profile[0].1, profile[end].1) = (0.0, 0.0);
+    revolve(&profile, 4 * steps)
+}
+
+/// The box `[0, a] x [0, b] x [0, c]` with `a >= b >= c`, and its exact medial axis: 13 sheets.
+fn cuboid(a: f64, b: f64, c: f64) -> (TriMesh, MedialMesh) {
+    let corner =
+        |k: u32| Vec3::new(f64::from(k & 1) * a, f64::from(k >> 1 & 1) * b, f64::from(k >> 2) * c);
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let faces = quads.iter().flat_map(|&[i, j, k, l]| [[i, j, k], [i, k, l]]).collect();
+    let surface = TriMesh { vertices: (0..8).map(corner).collect(), faces };
+
+    let h = c / 2.0;
+    let mut spheres: Vec<_> = (0..8).map(|k| (corner(k), 0.0)).collect();
+    let inset = |k: u32| {
+        let clamp = |x: f64, side: f64| x.clamp(h, side - h);
+        let p = corner(k);
+        (Vec3::new(clamp(p.x, a), clamp(p.y, b), h), h)
+    };
+    spheres.extend((0..4).map(inset));
+    let mut sheets = vec![[8, 9, 11], [8, 11, 10]];
+    // One sheet below each edge of the box: triangles at the upright ones, else trapezoids.
+    for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3)] {
+        for top in [0, 4] {
+            sheets.extend([[i + top, j + top, j + 8], [i + top, j + 8, i + 8]]);
+        }
+    }
+    sheets.extend((0..4).map(|k| [k, k + 4, k + 8]));
+    (surface, complex(&spheres, &[], &sheets))
+}
+
+#[test]
+fn a_box_is_rebuilt_from_its_exact_axis() {
+    let (surface, axis) = cuboid(3.0, 2.0, 1.0);
+    assert_eq!(axis.faces.len(), 2 + 16 + 4);
+    let d = measure(&surface, &axis);
+    assert!(d.epsilon < 1e-14 && d.epsilon_union < 1e-14, "{d:?}");
+    // Points buried by less than 1e-7 of the diagonal count as boundary.
+    assert!(d.reverse < 4e-7 && d.hausdorff < 4e-7, "{d:?}");
+    assert!(d.rms < 1e-15 && d.p99 < 1e-15, "{d:?}");
+    // From the middle of a long edge the nearest balls of radius 0.5 are 1 along and 0.5 across.
+    let exact = 1.5_f64.sqrt() - 0.5;
+    assert!(d.spheres_only <= exact && d.spheres_only > exact - 0.01, "{d:?}");
+    assert_eq!(d.samples, 20_008);
+
+    let union = MedialUnion::new(&axis).unwrap();
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    let size = Vec3::new(3.0, 2.0, 1.0);
+    let inside = |p: Vec3| p.cmpgt(Vec3::ZERO).all() && p.cmplt(size).all();
+    assert_eq!(enclosed_volume(&surface), 6.0);
+    let error = volume_error(&surface, &bvh, inside, &union, &VolumeOptions::default()).unwrap();
+    assert_eq!(error, 0.0);
+
+    // Without one corner of the axis the box lacks the edges that meet there.
+    let chipped = axis.induced(&(0..12).map(|k| k != 4).collect::<Vec<_>>());
+    let d = measure(&surface, &chipped);
+    assert!((d.epsilon_union - (0.75_f64.sqrt() - 0.5)).abs() < 1e-14, "{d:?}");
+    let blunt = 0.5 - 0.5 / 3.0_f64.sqrt();
+    assert!(d.reverse <= blunt && d.reverse > blunt - 0.02, "{d:?}");
+}
+
+#[test]
+fn a_tapered_capsule_is_rebuilt_from_one_edge() {
+    let (length, radii) = (2.0, [0.5, 0.9]);
+    let surface = tapered_capsule(length, radii, 40);
+    let axis = complex(&[(Vec3::ZERO, radii[0]), (Vec3::X * length, radii[1])], &[[0, 1]], &[]);
+    let d = measure(&surface, &axis);
+    // Chords of the mesh cut below the round surface by their sagitta.
+    let sag = 0.9 * (1.0 - (PI / 80.0).cos()) * 3.0;
+    assert!(d.epsilon_union < sag && d.reverse < sag, "{d:?} against {sag}");
+    assert!((d.epsilon - d.epsilon_union).abs() < 1e-15);
+    let vertices_on = MedialUnion::new(&axis).unwrap().signed_batch(&surface.vertices);
+    assert!(vertices_on.iter().all(|s| s.abs() < 1e-14));
+    assert!(d.mean > 0.0 && d.mean <= d.rms && d.rms <= d.p99 && d.p95 <= d.p99);
+    assert!(d.spheres_only > 10.0 * d.epsilon_union);
+}
+
+#[test]
+fn a_ball_in_a_ball_has_the_difference_of_the_radii_everywhere() {
+    let (outer, inner) = (1.0, 0.8);
+    let surface = tapered_capsule(1e-9, [outer; 2], 40);
+    let axis = complex(&[(Vec3::ZERO, inner)], &[], &[]);
+    let d = measure(&surface, &axis);
+    let sag = 2.0 * (1.0 - (PI / 80.0).cos());
+    for value in [d.epsilon, d.epsilon_union, d.reverse, d.hausdorff, d.spheres_only] {
+        assert!(value <= 0.2 + 1e-8 && value > 0.2 - sag, "{d:?}");
+    }
+    assert!((d.mean - 0.2).abs() < sag && (d.reverse_mean - 0.2).abs() < sag);
+
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    let union = MedialUnion::new(&axis).unwrap();
+    let volume = enclosed_volume(&surface);
+    let inside = |p: Vec3| bvh.closest(p).point.length() > p.length();
+    let options = VolumeOptions { depth: 6, seed: 3 };
+    let error = volume_error(&surface, &bvh, inside, &union, &options).unwrap();
+    let exact = 1.0 - 4.0 / 3.0 * PI * inner.powi(3) / volume;
+    assert!((error - exact).abs() < 2e-3, "{error} for {exact}");
+}
+
+#[test]
+fn buried_surfaces_count_for_epsilon_alone() {
+    // The wall between the balls lies deep in the union, but on the surface of each.
+    let wall = TriMesh {
+        vertices: vec![
+            Vec3::new(1.0, -0.1, 0.0),
+            Vec3::new(1.0, 0.1, 0.0),
+            Vec3::new(1.0, 0.0, 0.1),
+        ],
+        faces: vec![[0, 1, 2]],
+    };
+    let balls = complex(&[(Vec3::ZERO, 1.0), (Vec3::X * 0.5, 2.0)], &[], &[]);
+    let d = measure(&wall, &balls);
+    assert!(d.epsilon < 0.01, "{d:?}");
+    assert!((d.epsilon_union - 1.5).abs() < 0.01, "{d:?}");
+}
+
+#[test]
+fn the_envelope_is_sampled_by_area() {
+    let (r, l) = (0.5, 2.0);
+    let mesh = complex(&[(Vec3::ZERO, r), (Vec3::X * l, r)], &[[0, 1]], &[]);
+    let union = MedialUnion::new(&mesh).unwrap();
+    let options = EnvelopeOptions { samples: 10_000, burial: 1e-9, seed: 4 };
+    let points = sample_envelope(&mesh, &union, &options).unwrap();
+    // Half of either sphere is buried, and made up for.
+    assert!((points.len() as f64 - 1e4).abs() < 500.0, "{}", points.len());
+    assert!(points.iter().all(|&p| union.signed(p).abs() < 1e-8));
+    let lateral = points.iter().filter(|p| p.x > 0.0 && p.x < l).count() as f64;
+    let share = TAU * r * l / (TAU * r * l + 2.0 * TAU * r * r);
+    assert!((lateral / points.len() as f64 - share).abs() < 0.01);
+
+    let tapered = complex(&[(Vec3::ZERO, 0.2), (Vec3::X * l, 1.0)], &[[0, 1]], &[]);
+    let union = MedialUnion::new(&tapered).unwrap();
+    let points = sample_envelope(&tapered, &union, &options).unwrap();
+    let (s, k) = (0.4, (1.0_f64 - 0.16).sqrt());
+    let lateral = PI * k * k * l * 1.2;
+    let caps = TAU * (0.04 * (1.0 - s) + (1.0 + s));
+    // The lateral spans -s r from either centre.
+    let on_lateral = points.iter().filter(|p| p.x > -s * 0.2 && p.x < l - s).count() as f64;
+    assert!((on_lateral / points.len() as f64 - lateral / (lateral + caps)).abs() < 0.01);
+
+    let slab = [(Vec3::ZERO, 0.1), (Vec3::X, 0.1), (Vec3::Y, 0.1)];
+    let slab = complex(&slab, &[], &[[0, 1, 2]]);
+    let union = MedialUnion::new(&slab).unwrap();
+    let points = sample_envelope(&slab, &union, &options).unwrap();
+    let flat = points.iter().filter(|p| (p.z.abs() - 0.1).abs() < 1e-12).count() as f64;
+    let rim = PI * 0.1 * (2.0 + 2.0_f64.sqrt());
+    let area = 1.0 + rim + 4.0 * PI * 0.01;
+    assert!((flat / points.len() as f64 - 1.0 / area).abs() < 0.01);
+}
+
+#[test]
+fn unions_without_area_are_measured_at_their_centres() {
+    let (surface, _) = cuboid(3.0, 2.0, 1.0);
+    let point = complex(&[(Vec3::new(1.0, 1.0, 0.25), 0.0)], &[], &[]);
+    let d = measure(&surface, &point);
+    assert_eq!((d.reverse, d.reverse_samples), (0.25, 1));
+    assert!((d.epsilon_union - (4.0_f64 + 1.0 + 0.5625).sqrt()).abs() < 1e-12);
+}
+
+#[test]
+fn axes_are_compared_as_point_sets() {
+    let (_, axis) = cuboid(3.0, 2.0, 1.0);
+    let options = AxisOptions { samples: 5_000, seed: 0 };
+    let same = axis_distance(&axis, &axis, &options).unwrap();
+    assert!(same.computed_to_true_max < 1e-14 && same.true_to_computed_mean < 1e-15);
+
+    let shifted = axis.transformed(1.0, |p| p + 0.01 * Vec3::Z);
+    let off = axis_distance(&shifted, &axis, &options).unwrap();
+    assert!((off.computed_to_true_max - 0.01).abs() < 1e-6, "{off:?}");
+
+    // A segment against a longer one: everything of the short one is near, but not conversely.
+    let ends = |a: f64, b: f64, y: f64| [(Vec3::new(a, y, 0.0), 0.1), (Vec3::new(b, y, 0.0), 0.1)];
+    let short = complex(&ends(0.0, 1.0, 0.5), &[[0, 1]], &[]);
+    let long = complex(&ends(0.0, 2.0, 0.0), &[[0, 1]], &[]);
+    let d = axis_distance(&short, &long, &options).unwrap();
+    assert!((d.computed_to_true_max - 0.5).abs() < 1e-15);
+    assert!((d.computed_to_true_mean - 0.5).abs() < 1e-15);
+    assert!((d.true_to_computed_max - 1.25_f64.sqrt()).abs() < 1e-15);
+    // Mean over [1, 2] of the hypotenuse over (x - 1, 0.5), by its antiderivative.
+    let tail = 0.5 * 1.25_f64.sqrt() + 0.125 * 2.0_f64.asinh();
+    assert!((d.true_to_computed_mean - (0.5 + tail) / 2.0).abs() < 1e-6);
+
+    let point = complex(&[(Vec3::Y, 0.1)], &[], &[]);
+    let d = axis_distance(&point, &long, &options).unwrap();
+    assert_eq!((d.computed_to_true_max, d.computed_to_true_mean), (1.0, 1.0));
+    assert!((d.true_to_computed_max - 5.0_f64.sqrt()).abs() < 1e-15);
+}
+
+#[test]
+fn results_do_not_depend_on_threads() {
+    let (surface, axis) = cuboid(3.0, 2.0, 1.0);
+    let blunt = axis.induced(&(0..12).map(|k| k % 3 != 0).collect::<Vec<_>>());
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    let union = MedialUnion::new(&blunt).unwrap();
+    let inside = |p: Vec3| p.cmpgt(Vec3::ZERO).all() && p.cmplt(Vec3::new(3.0, 2.0, 1.0)).all();
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let options = VolumeOptions { depth: 5, seed: 1 };
+        pool.install(|| {
+            let volume = volume_error(&surface, &bvh, inside, &union, &options).unwrap();
+            (measure(&surface, &blunt), volume)
+        })
+    };
+    let one = run(1);
+    assert!(one.1 > 0.0);
+    assert_eq!(one, run(3));
+}
+
+#[test]
+fn what_cannot_be_measured_is_refused() {
+    let (surface, axis) = cuboid(3.0, 2.0, 1.0);
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    let options = DistanceOptions { surface_samples: 10, envelope_samples: 10, seed: 0 };
+    let empty = MedialMesh::default();
+    assert!(matches!(distances(&surface, &bvh, &empty, &options), Err(MetricError::Union(_))));
+    let flat = TriMesh { vertices: vec![Vec3::ZERO; 3], faces: vec![[0, 1, 2]] };
+    assert_eq!(distances(&flat, &bvh, &axis, &options), Err(MetricError::NoArea));
+    let none = DistanceOptions { surface_samples: 0, ..options };
+    assert!(matches!(distances(&surface, &bvh, &axis, &none), Err(MetricError::NoSamples(_))));
+    let none = DistanceOptions { envelope_samples: 0, ..options };
+    assert!(matches!(distances(&surface, &bvh, &axis, &none), Err(MetricError::NoSamples(_))));
+    let union = MedialUnion::new(&axis).unwrap();
+    let open = TriMesh { vertices: surface.vertices.clone(), faces: vec![[0, 1, 2]] };
+    let error = volume_error(&open, &bvh, |_| false, &union, &VolumeOptions::default());
+    assert!(matches!(error, Err(MetricError::NoVolume(_))));
+    assert!(axis_distance(&empty, &axis, &AxisOptions::default()).is_err());
+}

@@ -1,0 +1,220 @@
+//! Closest points on meshes and distances to unions of medial primitives, against brute force.
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, MedialUnion, Primitive, UnionError};
+use medial::geometry::{BvhError, Cone, Feature, Slab, Sphere, TriangleBvh};
+use medial::surface::TriMesh;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+fn vector(rng: &mut Pcg64) -> Vec3 {
+    Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0
+}
+
+fn on_segment(p: Vec3, a: Vec3, b: Vec3) -> f64 {
+    let squared = a.distance_squared(b);
+    let t = if squared > 0.0 { ((p - a).dot(b - a) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    p.distance(a.lerp(b, t))
+}
+
+/// Distance to a triangle, thin ones included: its plane where the foot is inside, else its sides.
+fn to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f64 {
+    let sides = on_segment(p, a, b).min(on_segment(p, b, c)).min(on_segment(p, c, a));
+    let n = (b - a).cross(c - a);
+    let inside = [(a, b), (b, c), (c, a)].iter().all(|&(u, v)| n.dot((v - u).cross(p - u)) > 0.0);
+    if inside { sides.min((p - a).dot(n.normalize()).abs()) } else { sides }
+}
+
+/// Triangles of all shapes: fat, needles, caps, segments, points, in a soup.
+fn soup(count: usize, rng: &mut Pcg64) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    for k in 0..count {
+        let a = vector(rng);
+        let [u, v] = [vector(rng) * 0.1, vector(rng) * 0.1];
+        let (b, c) = match k % 5 {
+            0 => (a + u, a + v * 1e-5),
+            1 => (a + u, a + u * 0.4 + v * 1e-6),
+            2 if k % 2 == 0 => (a + u, a + u),
+            2 => (a, a),
+            _ => (a + u, a + v),
+        };
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend([a, b, c]);
+        mesh.faces.push([first, first + 1, first + 2]);
+    }
+    mesh
+}
+
+fn assert_describes(mesh: &TriMesh, p: Vec3, closest: &medial::geometry::Closest) {
+    let corners = mesh.triangle(closest.face as usize);
+    assert!((closest.point.distance(p) - closest.distance).abs() < 1e-14);
+    let off = match closest.feature {
+        Feature::Face => to_triangle(closest.point, corners),
+        Feature::Edge(k) => {
+            on_segment(closest.point, corners[k as usize], corners[(k as usize + 1) % 3])
+        }
+        Feature::Vertex(k) => closest.point.distance(corners[k as usize]),
+    };
+    assert!(off < 1e-15, "{closest:?} is {off:e} off its feature");
+}
+
+#[test]
+fn closest_points_match_brute_force() {
+    let mut rng = Pcg64::seed_from_u64(11);
+    let mesh = soup(400, &mut rng);
+    let bvh = TriangleBvh::new(&mesh).unwrap();
+    assert_eq!(bvh.face_count(), 400);
+    let mut queries: Vec<Vec3> = (0..1000).map(|_| vector(&mut rng) * 1.3).collect();
+    queries.extend(mesh.vertices.iter().take(300));
+    queries.extend((0..50).map(|_| vector(&mut rng) * 1e4));
+    let batch = bvh.closest_batch(&queries);
+    let distances = bvh.distance_batch(&queries);
+    for (k, &p) in queries.iter().enumerate() {
+        let oracle =
+            (0..400).map(|f| to_triangle(p, mesh.triangle(f))).fold(f64::INFINITY, f64::min);
+        let closest = bvh.closest(p);
+        let tolerance = 1e-14 * (1.0 + p.length());
+        assert!((closest.distance - oracle).abs() < tolerance, "{closest:?} for {oracle}");
+        if p.length() < 10.0 {
+            assert_describes(&mesh, p, &closest);
+        }
+        // Not only close: the same answer, whatever the search started from.
+        assert_eq!(batch[k], closest);
+        assert_eq!(distances[k], closest.distance);
+        assert_eq!(bvh.closest_from(p, Some(k as u32 % 400)), closest);
+        assert_eq!(bvh.closest_within(p, closest.distance), Some(closest));
+        assert_eq!(bvh.closest_within(p, closest.distance * 0.999 - 1e-12), None);
+        assert!(bvh.any_within(p, closest.distance));
+        assert!(!bvh.any_within(p, closest.distance * 0.999 - 1e-12));
+    }
+}
+
+#[test]
+fn features_are_told_apart() {
+    let vertices = vec![Vec3::ZERO, Vec3::X, 2.0 * Vec3::Y];
+    for turn in 0..3 {
+        let mut face = [0, 1, 2];
+        face.rotate_left(turn);
+        let bvh = TriangleBvh::new(&TriMesh { vertices: vertices.clone(), faces: vec![face] });
+        let bvh = bvh.unwrap();
+        let corner = |v: u32| face.iter().position(|&c| c == v).unwrap() as u8;
+        let feature = |x, y| bvh.closest(Vec3::new(x, y, 1.0)).feature;
+        assert_eq!(feature(0.2, 0.2), Feature::Face);
+        assert_eq!(feature(0.5, -1.0), Feature::Edge(corner(0)));
+        assert_eq!(feature(1.0, 1.5), Feature::Edge(corner(1)));
+        assert_eq!(feature(-1.0, 1.0), Feature::Edge(corner(2)));
+        assert_eq!(feature(-1.0, -1.0), Feature::Vertex(corner(0)));
+        assert_eq!(feature(3.0, -1.0), Feature::Vertex(corner(1)));
+        assert_eq!(feature(0.0, 3.0), Feature::Vertex(corner(2)));
+    }
+}
+
+#[test]
+fn unusable_meshes_are_refused_by_name() {
+    assert_eq!(TriangleBvh::new(&TriMesh::default()).unwrap_err(), BvhError::Empty);
+    for bad in [f64::NAN, f64::INFINITY, -1e200] {
+        let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, bad, 0.0)];
+        let mesh = TriMesh { vertices, faces: vec![[0, 0, 1], [0, 1, 2]] };
+        let error = TriangleBvh::new(&mesh).unwrap_err();
+        assert!(matches!(error, BvhError::Corner { face: 1, .. }), "{error}");
+    }
+    let mesh = soup(10, &mut Pcg64::seed_from_u64(1));
+    let bvh = TriangleBvh::new(&mesh).unwrap();
+    assert!(bvh.closest(Vec3::NAN).distance.is_nan());
+    assert!(!bvh.closest(Vec3::splat(f64::INFINITY)).distance.is_finite());
+    assert!(!bvh.any_within(Vec3::NAN, 1.0) && !bvh.any_within(Vec3::ZERO, f64::NAN));
+    assert_eq!(bvh.closest_within(Vec3::ZERO, -1.0), None);
+}
+
+/// A random complex with faces, lone edges, isolated spheres, contained edges and steep faces.
+fn complex(count: u32, radius: f64, rng: &mut Pcg64) -> MedialMesh {
+    let spheres =
+        (0..count).map(|_| Sphere::new(vector(rng), rng.random::<f64>() * radius)).collect();
+    let near = |k: u32, step: u32| (k + step) % (count * 9 / 10);
+    let faces = (0..count / 2).map(|k| [k, near(k, 1), near(k, 5)]).collect();
+    let edges = (0..count / 4).map(|k| [k, near(k, 9)]).collect();
+    MedialMesh::from_simplices(spheres, edges, faces).unwrap()
+}
+
+fn all_signed(mesh: &MedialMesh, p: Vec3) -> Vec<(Primitive, f64)> {
+    let sphere = |v: u32| mesh.spheres[v as usize];
+    let mut all = Vec::new();
+    for (f, corners) in (0..).zip(&mesh.faces) {
+        all.push((Primitive::Face(f), Slab::new(corners.map(sphere)).signed_distance(p)));
+    }
+    for (e, &[a, b]) in (0..).zip(&mesh.edges) {
+        all.push((Primitive::Edge(e), Cone::new(sphere(a), sphere(b)).signed_distance(p)));
+    }
+    for (v, m) in (0..).zip(&mesh.spheres) {
+        let v: u32 = v;
+        if !mesh.edges.iter().any(|e| e.contains(&v)) {
+            all.push((Primitive::Sphere(v), m.signed_distance(p)));
+        }
+    }
+    all
+}
+
+#[test]
+fn union_distances_match_brute_force() {
+    let mut rng = Pcg64::seed_from_u64(12);
+    for radius in [0.0, 0.1, 0.8] {
+        let mesh = complex(60, radius, &mut rng);
+        let union = MedialUnion::new(&mesh).unwrap();
+        let queries: Vec<Vec3> = (0..600).map(|_| vector(&mut rng) * 2.0).collect();
+        let (signed, nearest) =
+            (union.signed_batch(&queries), union.unsigned_nearest_batch(&queries));
+        let (deepest, surface) =
+            (union.deepest_batch(&queries), union.nearest_surface_batch(&queries));
+        for (k, &p) in queries.iter().enumerate() {
+            let all = all_signed(&mesh, p);
+            let sigma = all.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
+            let mu = all.iter().map(|s| s.1.abs()).fold(f64::INFINITY, f64::min);
+            assert!((signed[k] - sigma).abs() < 1e-14, "{} for {sigma}", signed[k]);
+            assert!((nearest[k] - mu).abs() < 1e-14, "{} for {mu}", nearest[k]);
+            assert_eq!(union.signed(p), signed[k]);
+            assert_eq!(union.unsigned_nearest(p), nearest[k]);
+            assert_eq!(union.deepest(p), deepest[k]);
+            assert_eq!(union.nearest_surface(p), surface[k]);
+            let told = |primitive| all.iter().find(|s| s.0 == primitive).unwrap().1;
+            assert!((told(deepest[k].primitive) - sigma).abs() < 1e-14);
+            assert!((told(surface[k].primitive).abs() - mu).abs() < 1e-14);
+            for depth in [0.0, 1e-3, -sigma - 1e-12, -sigma + 1e-12] {
+                if (depth + sigma).abs() > 1e-14 {
+                    assert_eq!(union.buries(p, depth), sigma < -depth);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn answers_do_not_depend_on_threads() {
+    let mut rng = Pcg64::seed_from_u64(13);
+    let (mesh, surface) = (complex(200, 0.3, &mut rng), soup(500, &mut rng));
+    let queries: Vec<Vec3> = (0..5000).map(|_| vector(&mut rng) * 1.5).collect();
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let union = MedialUnion::new(&mesh).unwrap();
+            let bvh = TriangleBvh::new(&surface).unwrap();
+            (union.deepest_batch(&queries), bvh.closest_batch(&queries))
+        })
+    };
+    let one = run(1);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(5));
+}
+
+#[test]
+fn spheres_alone_and_degenerate_unions() {
+    let spheres = [Sphere::new(Vec3::ZERO, 1.0), Sphere::new(3.0 * Vec3::X, 0.5)];
+    let union = MedialUnion::of_spheres(&spheres).unwrap();
+    assert_eq!(union.signed(1.5 * Vec3::X), 0.5);
+    assert_eq!(union.deepest(1.6 * Vec3::X).primitive, Primitive::Sphere(0));
+    assert_eq!(union.deepest(2.0 * Vec3::X).primitive, Primitive::Sphere(1));
+    assert_eq!(union.bounding_box(), (Vec3::splat(-1.0), Vec3::new(3.5, 1.0, 1.0)));
+    assert_eq!(MedialUnion::of_spheres(&[]).unwrap_err(), UnionError::Empty);
+    let bad = MedialUnion::of_spheres(&[Sphere::new(Vec3::ZERO, -1.0)]);
+    assert!(matches!(bad, Err(UnionError::Invalid(_))));
+    assert!(union.signed(Vec3::NAN).is_nan());
+}

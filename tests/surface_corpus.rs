@@ -1,0 +1,151 @@
+//! Every mesh and every bad file of the shared collection, where it is present.
+
+#![allow(clippy::print_stderr)] // A skipped test says so.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use medial::surface::{self, Fault, Repair};
+
+/// The collection of meshes, or `None` with a notice.
+fn collection() -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
+    let folder = std::env::var_os("MEDIAL_MESHES").map_or(beside, PathBuf::from);
+    if folder.join("MANIFEST.csv").exists() {
+        return Some(folder);
+    }
+    eprintln!("skipped: no meshes in {}; set MEDIAL_MESHES", folder.display());
+    None
+}
+
+/// The rows of a table with quoted fields, by column name.
+fn table(path: &Path) -> Vec<HashMap<String, String>> {
+    let text = fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().map(|line| {
+        let mut fields = vec![String::new()];
+        let mut quoted = false;
+        for c in line.chars() {
+            match c {
+                '"' => quoted = !quoted,
+                ',' if !quoted => fields.push(String::new()),
+                c => fields.last_mut().unwrap().push(c),
+            }
+        }
+        fields
+    });
+    let names = lines.next().unwrap();
+    lines.map(|fields| names.iter().cloned().zip(fields).collect()).collect()
+}
+
+#[test]
+fn good_meshes_are_what_the_manifest_says() {
+    let Some(folder) = collection() else { return };
+    let rows = table(&folder.join("MANIFEST.csv"));
+    assert!(rows.len() >= 12);
+    for row in rows {
+        let loaded = surface::read(folder.join(&row["file"])).unwrap();
+        let r = &loaded.report;
+        let flag = |b: bool| if b { "True" } else { "False" };
+        let found = [
+            ("V", r.vertices.to_string()),
+            ("F", r.faces.to_string()),
+            ("closed", flag(r.closed).to_owned()),
+            ("manifold", flag(r.manifold).to_owned()),
+            ("oriented", flag(r.oriented).to_owned()),
+            ("self_intersects", flag(r.self_intersecting).to_owned()),
+            ("degenerate_faces", r.degenerate_faces.to_string()),
+            ("genus", r.genus.unwrap().to_string()),
+            ("components", r.components.to_string()),
+        ];
+        for (key, value) in found {
+            assert_eq!(value, row[key], "{}: {key}", row["file"]);
+        }
+        let diagonal: f64 = row["diagonal"].parse().unwrap();
+        assert!((r.diagonal / diagonal - 1.0).abs() < 1e-5, "{}", row["file"]);
+        assert!(r.repairs.is_empty() && r.warnings.is_empty(), "{}: {r:?}", row["file"]);
+        assert!(r.volume.unwrap() > 0.0);
+        // What reading guarantees is what checking demands.
+        let checked = surface::validate(&loaded.mesh).unwrap();
+        assert_eq!(checked, *r);
+    }
+}
+
+#[test]
+fn bad_files_get_what_the_manifest_expects() {
+    let Some(folder) = collection() else { return };
+    let folder = folder.join("bad");
+    for row in table(&folder.join("MANIFEST.csv")) {
+        let (file, expected) = (&row["file"], row["expected"].as_str());
+        let path = folder.join(file);
+        let result = surface::read(&path);
+        // A sound solid once it is read as it is meant: its repeated positions welded and its
+        // non-convex faces cut without crossing their outline.
+        let expected = if file == "line_continuation.obj" { "repair" } else { expected };
+        match (expected, &result) {
+            ("error", Err(error)) => {
+                assert_eq!(error.file.as_ref(), Some(&path));
+            }
+            ("repair", Ok(loaded)) => assert!(!loaded.report.repairs.is_empty(), "{file}"),
+            ("warn", Ok(loaded)) => assert!(!loaded.report.warnings.is_empty(), "{file}"),
+            ("ok", Ok(loaded)) => assert!(loaded.report.warnings.is_empty(), "{file}"),
+            ("ok or error", _) => {}
+            _ => panic!("{file}: expected {expected} ({}), got {result:?}", row["what_is_wrong"]),
+        }
+        if let Ok(loaded) = result {
+            surface::validate(&loaded.mesh).unwrap_or_else(|e| panic!("{file}: {e}"));
+        }
+    }
+}
+
+#[test]
+fn particular_faults_and_repairs_of_bad_files() {
+    let Some(folder) = collection() else { return };
+    let folder = folder.join("bad");
+    let fault = |file: &str| surface::read(folder.join(file)).unwrap_err().fault;
+    let report = |file: &str| surface::read(folder.join(file)).unwrap().report;
+
+    assert!(matches!(fault("open_lionhead.off"), Fault::Open { edges: 36, .. }));
+    assert!(matches!(fault("open_bunny_welds.obj"), Fault::Open { edges: 223, .. }));
+    assert!(matches!(fault("nonmanifold_tetras.obj"), Fault::NonManifoldEdge { edges: 3, .. }));
+    let cow = fault("nonmanifold_vertex_cow.off");
+    assert!(matches!(cow, Fault::NonManifoldVertex { vertices: 1, .. }));
+    let diplodocus = fault("nonmanifold_edges_diplodocus.off");
+    assert!(matches!(diplodocus, Fault::NonManifoldEdge { edges: 2, .. }), "{diplodocus}");
+    assert_eq!(report("selfintersect_elk.off").genus, Some(1));
+    assert_eq!(report("selfintersect_neptune.off").genus, Some(3));
+    let seahorse = report("degenerate_seahorse.off");
+    assert_eq!((seahorse.genus, seahorse.degenerate_faces), (Some(8), 1));
+    assert_eq!(report("multi_component_ant.ply").components, 15);
+    assert_eq!(report("multi_component_bones.off").components, 26);
+    assert_eq!(report("inverted_ellipse.off").repairs, [Repair::TurnedOutward { components: 1 }]);
+    assert_eq!(report("polygons_hedra.off").genus, Some(2));
+
+    // A box of 10 x 10 x 10 with a slot of 10 x 5 x 2 and a pyramid of height 5 on top.
+    let wall = report("line_continuation.obj");
+    assert!((wall.volume.unwrap() - (1000.0 - 100.0 + 500.0 / 3.0)).abs() < 1e-9);
+    assert!(!wall.self_intersecting && wall.genus == Some(0));
+}
+
+/// Positions and faces of OBJ files agree with those of an independent reader.
+#[test]
+fn obj_files_agree_with_tobj() {
+    let Some(folder) = collection() else { return };
+    for file in ["maxplanck.obj", "scorpion.obj", "abc_bracket.obj"] {
+        let path = folder.join(file);
+        let ours = surface::read(&path).unwrap().mesh;
+        let options = tobj::LoadOptions { triangulate: false, ..Default::default() };
+        let (models, _) = tobj::load_obj(&path, &options).unwrap();
+        let triangles: Vec<[[f64; 3]; 3]> = models
+            .iter()
+            .flat_map(|model| {
+                let p = &model.mesh.positions;
+                let at = |i: u32| [0, 1, 2].map(|k| p[3 * i as usize + k]);
+                model.mesh.indices.chunks(3).map(move |t| [at(t[0]), at(t[1]), at(t[2])])
+            })
+            .collect();
+        let our_triangles: Vec<_> =
+            (0..ours.faces.len()).map(|f| ours.triangle(f).map(|v| v.to_array())).collect();
+        assert_eq!(triangles, our_triangles, "{file}");
+    }
+}
