@@ -1,11 +1,11 @@
 //! The initial error function of every sphere: slabs, cones of lone edges, boundary planes.
 
 use medial::complex::collapse::CollapseComplex;
-use medial::complex::{MedialMesh, Sphere};
+use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH, stability_ratio};
+use medial::geometry::{Cone, ConeFrame, SlabPlanes, boundary_edge_normal};
 
 use super::params::{Boundary, QmatParams};
 use super::quadric::Quadric;
-use super::tangent::{cone_axis, cone_normals, rim_normal, slab_normals, stability_ratio};
 
 /// What had no tangent planes and was left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,10 +24,10 @@ pub(super) fn initial_quadrics(
     let mut skipped = Skipped::default();
     for &face in &mesh.faces {
         let spheres = face.map(|v| mesh.spheres[v as usize]);
-        match slab_normals(spheres) {
-            Some(normals) => {
+        match slab_planes(spheres) {
+            Some(planes) => {
                 let mut slab = Quadric::default();
-                for normal in normals {
+                for normal in planes.normals() {
                     slab.add_plane(normal, spheres[0], 1.0);
                 }
                 for v in face {
@@ -61,11 +61,11 @@ pub(super) fn initial_quadrics(
 /// The four planes of a lone edge's cone, for both ends.
 fn add_cone(quadrics: &mut [Quadric], mesh: &MedialMesh, ends: [u32; 2]) -> bool {
     let [a, b] = ends.map(|v| mesh.spheres[v as usize]);
-    let Some(normals) = cone_normals(a, b) else {
+    let Some(frame) = cone_frame(a, b) else {
         return false;
     };
     let mut cone = Quadric::default();
-    for normal in normals {
+    for normal in frame.normals() {
         cone.add_plane(normal, a, 1.0);
     }
     for v in ends {
@@ -77,11 +77,11 @@ fn add_cone(quadrics: &mut [Quadric], mesh: &MedialMesh, ends: [u32; 2]) -> bool
 /// The plane across the free end of a lone edge, for that end.
 fn add_tip(quadrics: &mut [Quadric], mesh: &MedialMesh, end: u32, other: u32, params: &QmatParams) {
     let [tip, base] = [end, other].map(|v| mesh.spheres[v as usize]);
-    // Without an axis the ratio is 0, and so is the weight.
-    if let (Some((axis, _)), Some((weight, length))) =
-        (cone_axis(base, tip), boundary_weight(tip, base, params))
+    // Without an axis the stability ratio is 0, and so is the weight.
+    if let (Some(frame), Some((weight, length))) =
+        (cone_frame(base, tip), boundary_weight(tip, base, params))
     {
-        quadrics[end as usize].add_plane(axis * length, tip, weight);
+        quadrics[end as usize].add_plane(frame.u * length, tip, weight);
     }
 }
 
@@ -97,11 +97,34 @@ fn add_rim(
     let Some((weight, length)) = boundary_weight(a, b, params) else {
         return;
     };
-    if let Some(normal) = rim_normal(a, b, mesh.spheres[apex as usize]) {
+    if cone_frame(a, b).is_none() {
+        return;
+    }
+    if let Some(normal) = boundary_edge_normal([a, b], mesh.spheres[apex as usize]) {
         for v in ends {
             quadrics[v as usize].add_plane(normal * length, a, weight);
         }
     }
+}
+
+/// The tangent planes of a slab; none where the face is so thin that its plane is rounding noise.
+fn slab_planes(spheres: [Sphere; 3]) -> Option<SlabPlanes> {
+    let [a, b, c] = spheres.map(|m| m.centre);
+    let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+    // The smallest height is the doubled area over the longest side.
+    let doubled_area = (b - a).cross(c - a).length_squared();
+    if doubled_area <= ZERO_LENGTH * ZERO_LENGTH * longest {
+        return None;
+    }
+    SlabPlanes::new(spheres)
+}
+
+/// The frame of a cone; none where one ball holds the other or the axis is rounding noise.
+fn cone_frame(a: Sphere, b: Sphere) -> Option<ConeFrame> {
+    if a.centre.distance(b.centre) < ZERO_LENGTH {
+        return None;
+    }
+    Cone::new(a, b).frame()
 }
 
 /// Weight of a boundary plane and length of its normal.

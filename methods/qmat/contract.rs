@@ -1,14 +1,13 @@
 //! Algorithm 1 of the paper: the cheapest edge first, the merged sphere where its error is least.
 
-use medial::complex::collapse::{COINCIDENT, Candidate, CollapseComplex, CollapseQueue};
-use medial::complex::{MedialMesh, Sphere};
+use medial::complex::collapse::{Candidate, CollapseComplex, CollapseQueue};
+use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH, stability_ratio};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 use rayon::prelude::*;
 
 use super::accumulate::{Skipped, initial_quadrics};
 use super::params::QmatParams;
 use super::quadric::Quadric;
-use super::tangent::stability_ratio;
 
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 4096;
@@ -35,11 +34,20 @@ struct Tally {
     held_by_inversion: usize,
 }
 
-/// Why an edge is not collapsed.
+/// What is done with a popped candidate.
+enum Decision {
+    /// Collapse it to this sphere.
+    Collapse(Sphere),
+    /// It folds a face over at the optimum and costs more elsewhere: queue it at that cost.
+    Postpone(Candidate),
+    /// Leave it alone until its surroundings change.
+    Hold(Reason),
+}
+
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Held {
-    ByTopology,
-    ByInversion,
+enum Reason {
+    Topology,
+    Inversion,
 }
 
 impl Contraction {
@@ -75,16 +83,10 @@ impl Contraction {
             let Some(cheapest) = self.queue.pop(&self.complex) else {
                 break;
             };
-            match self.placement(cheapest.ends()) {
-                Ok(sphere) => self.merge(cheapest.ends(), sphere),
-                Err(held) => {
-                    match held {
-                        Held::ByTopology => self.tally.held_by_topology += 1,
-                        Held::ByInversion => self.tally.held_by_inversion += 1,
-                    }
-                    self.queue.park(cheapest);
-                    continue;
-                }
+            match self.decide(cheapest) {
+                Decision::Collapse(sphere) => self.merge(cheapest.ends(), sphere),
+                Decision::Postpone(dearer) => self.queue.push(dearer),
+                Decision::Hold(reason) => self.hold(cheapest, reason),
             }
             let done = self.tally.collapses - first;
             if done.is_multiple_of(REPORT_EVERY) {
@@ -94,22 +96,38 @@ impl Contraction {
         run.step(total, total)
     }
 
-    /// Steps 3 and 4: where the merged sphere goes, or why there is none.
-    fn placement(&mut self, [a, b]: [u32; 2]) -> Result<Sphere, Held> {
+    /// Steps 3 and 4: where the merged sphere goes, or why there is none for now.
+    fn decide(&mut self, candidate: Candidate) -> Decision {
+        let [a, b] = candidate.ends();
         let keep_topology = self.params.topology_from.applies(self.sphere_count());
         if keep_topology && !self.complex.link_condition(a, b) {
-            return Err(Held::ByTopology);
+            return Decision::Hold(Reason::Topology);
         }
         let (quadric, ends) = edge_quadric(&self.complex, &self.quadrics, [a, b]);
-        let best = minimise(&quadric, ends, self.params.singular_ratio);
-        if !self.complex.inverts(a, b, best.centre) {
-            return Ok(best);
+        let optimum = minimise(&quadric, ends, self.params.singular_ratio);
+        if !self.complex.inverts(a, b, optimum.centre) {
+            return Decision::Collapse(optimum);
+        }
+        let upright = by_error(&quadric, ends)
+            .into_iter()
+            .find(|&(_, sphere)| !self.complex.inverts(a, b, sphere.centre));
+        let Some((error, fallback)) = upright else {
+            return Decision::Hold(Reason::Inversion);
+        };
+        let dearer = priced(&self.complex, &self.params, [a, b], error);
+        if candidate.is_before(&dearer) {
+            return Decision::Postpone(dearer);
         }
         self.tally.fallbacks += 1;
-        by_error(&quadric, ends)
-            .into_iter()
-            .find(|sphere| !self.complex.inverts(a, b, sphere.centre))
-            .ok_or(Held::ByInversion)
+        Decision::Collapse(fallback)
+    }
+
+    fn hold(&mut self, candidate: Candidate, reason: Reason) {
+        match reason {
+            Reason::Topology => self.tally.held_by_topology += 1,
+            Reason::Inversion => self.tally.held_by_inversion += 1,
+        }
+        self.queue.park(candidate);
     }
 
     /// Step 5: the collapse, the sum of the quadrics, new costs for the edges of the merged sphere.
@@ -135,6 +153,13 @@ impl Contraction {
         tally.collapses += 1;
     }
 
+    /// Largest error of a sphere left, over the slabs it stands for.
+    #[cfg(test)]
+    pub(super) fn largest_error(&self) -> f64 {
+        let error = |v| self.quadrics[v as usize].value(self.complex.sphere(v));
+        self.complex.vertices().map(error).fold(0.0, f64::max)
+    }
+
     /// Counts of the whole run so far.
     pub(super) fn diagnose(&self, diagnostics: &mut Diagnostics) {
         let Self { skipped, tally, .. } = self;
@@ -152,10 +177,11 @@ impl Contraction {
         if edges.is_empty() {
             return "no edge is left, each sphere is a component of its own".to_owned();
         }
-        let mut by_topology = 0;
-        for &ends in &edges {
-            by_topology += usize::from(self.placement(ends) == Err(Held::ByTopology));
-        }
+        let by_topology = edges.iter().filter(|&&[a, b]| {
+            let keep_topology = self.params.topology_from.applies(self.complex.sphere_count());
+            keep_topology && !self.complex.link_condition(a, b)
+        });
+        let by_topology = by_topology.count();
         let by_inversion = edges.len() - by_topology;
         format!(
             "of the {} edges left {by_topology} would change the topology and {by_inversion} \
@@ -165,19 +191,25 @@ impl Contraction {
     }
 }
 
-/// The edge with its cost `(E + k) Γ²` (equation 8); equal costs are ordered by `E`.
+/// The edge at the cost of its best placement.
 fn candidate(
     complex: &CollapseComplex,
     quadrics: &[Quadric],
     params: &QmatParams,
     ends: [u32; 2],
 ) -> Candidate {
-    let (quadric, [a, b]) = edge_quadric(complex, quadrics, ends);
+    let (quadric, spheres) = edge_quadric(complex, quadrics, ends);
+    let best = minimise(&quadric, spheres, params.singular_ratio);
+    priced(complex, params, ends, quadric.value(best))
+}
+
+/// The edge with the cost `(E + k) Γ²` (equation 8); equal costs are ordered by `E`.
+fn priced(complex: &CollapseComplex, params: &QmatParams, ends: [u32; 2], error: f64) -> Candidate {
+    let [a, b] = ends.map(|v| complex.sphere(v));
     // Coincident centres go before everything else.
-    if a.centre.distance_squared(b.centre) < COINCIDENT * COINCIDENT {
+    if a.centre.distance_squared(b.centre) < ZERO_LENGTH * ZERO_LENGTH {
         return Candidate::new(complex, ends, 0.0, 0.0);
     }
-    let error = quadric.value(minimise(&quadric, [a, b], params.singular_ratio));
     let stability = stability_ratio(a, b);
     Candidate::new(complex, ends, (error + params.k) * stability * stability, error)
 }
@@ -193,22 +225,33 @@ fn edge_quadric(
     (quadric, [complex.sphere(a), complex.sphere(b)])
 }
 
-/// The sphere of least error (equation 6 and below): the minimiser, the midpoint when its radius
-/// would be negative, the best of three when there is no unique minimiser.
+/// The sphere of least error (equation 6 and below): the minimiser; the midpoint when its radius
+/// would be negative; the best of three when there is none, or none within reach.
 fn minimise(quadric: &Quadric, ends: [Sphere; 2], singular_ratio: f64) -> Sphere {
+    let midpoint = ends[0].lerp(ends[1], 0.5);
     match quadric.minimiser(singular_ratio) {
-        Some(sphere) if !(sphere.centre.is_finite() && sphere.radius.is_finite()) => {
-            by_error(quadric, ends)[0]
+        Some(sphere) if is_in_reach(sphere, midpoint, ends) => {
+            if sphere.radius < 0.0 {
+                midpoint
+            } else {
+                sphere
+            }
         }
-        Some(sphere) if sphere.radius >= 0.0 => sphere,
-        Some(_) => ends[0].lerp(ends[1], 0.5),
-        None => by_error(quadric, ends)[0],
+        _ => by_error(quadric, ends)[0].1,
     }
 }
 
-/// Both ends and the midpoint, the least error first.
-fn by_error(quadric: &Quadric, [a, b]: [Sphere; 2]) -> [Sphere; 3] {
+/// Whether a minimiser is no farther from the midpoint than the two balls extend; never for one
+/// that is not finite.
+fn is_in_reach(sphere: Sphere, midpoint: Sphere, [a, b]: [Sphere; 2]) -> bool {
+    let reach = a.centre.distance(b.centre) + a.radius.max(b.radius);
+    sphere.centre.distance_squared(midpoint.centre) <= reach * reach
+        && (sphere.radius - midpoint.radius).abs() <= reach
+}
+
+/// Both ends and the midpoint with their errors, the least first.
+fn by_error(quadric: &Quadric, [a, b]: [Sphere; 2]) -> [(f64, Sphere); 3] {
     let mut candidates = [a, b, a.lerp(b, 0.5)].map(|sphere| (quadric.value(sphere), sphere));
     candidates.sort_by(|x, y| x.0.total_cmp(&y.0));
-    candidates.map(|(_, sphere)| sphere)
+    candidates
 }

@@ -24,6 +24,8 @@
 //!
 //! - "Invertible" means that the smallest eigenvalue of `A` is above `singular_ratio` times the
 //!   largest: independent of scale and of how many quadrics were summed.
+//! - A placement off the optimum costs more than the edge was queued at. The edge goes back into
+//!   the queue at that cost, and is collapsed when nothing cheaper is left.
 //! - A minimiser with a negative radius is replaced by the midpoint of the edge.
 //! - Equal costs, in the main the zeros of contained spheres, are ordered by `E`, then by ids.
 //! - Centres closer than `1e-12` are one point: `Γ` and the cost are 0, and they go first.
@@ -34,13 +36,17 @@
 //!
 //! # Deviations from the paper
 //!
-//! None that is known.
+//! - A minimiser farther from the midpoint of its edge than the two balls extend, `d + max r`, is
+//!   not used, as if `A` were singular. It can pass for invertible where slabs are nearly parallel,
+//!   and then a single sphere lands across the shape: Bear at 500 spheres, 19 % of the diagonal
+//!   instead of 0.7 %.
 
 mod accumulate;
 mod contract;
 mod params;
 mod quadric;
-mod tangent;
+#[cfg(test)]
+mod quadric_tests;
 #[cfg(test)]
 mod tests;
 

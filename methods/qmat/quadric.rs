@@ -94,7 +94,9 @@ impl Quadric {
             if k == 0 {
                 largest = d;
             }
-            if d <= singular_ratio * largest || !(d > 0.0) {
+            // So written that a pivot that is not a number is not regular.
+            let regular = d > 0.0 && d > singular_ratio * largest;
+            if !regular {
                 return None;
             }
             for i in k + 1..4 {

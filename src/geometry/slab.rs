@@ -173,7 +173,7 @@ impl SlabFace {
         self.frame.apex[1] <= THIN * (self.frame.length + self.radius)
     }
 
-    fn planes(&self) -> SlabPlanes {
+    pub(super) fn planes(&self) -> SlabPlanes {
         let [gx, gy] = self.gradient;
         SlabPlanes {
             centre_normal: self.frame.normal,

@@ -18,6 +18,14 @@ pub struct SlabPlanes {
 }
 
 impl SlabPlanes {
+    /// The planes of three spheres alone, without preparing the slab for distance queries.
+    ///
+    /// `None` when there are none: collinear centres, or radii that grow as fast as the centres
+    /// move apart.
+    pub fn new(spheres: [Sphere; 3]) -> Option<Self> {
+        super::slab::SlabFace::new(spheres).map(|face| face.planes())
+    }
+
     /// Outward unit normals `-g + k N` and `-g - k N`. Ball `i` is touched at `c_i + r_i n`.
     pub fn normals(&self) -> [Vec3; 2] {
         let lift = self.rise * self.centre_normal;

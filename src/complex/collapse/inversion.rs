@@ -1,13 +1,14 @@
 //! The inversion test: whether a collapse folds a face over.
 
-use super::{COINCIDENT, CollapseComplex};
+use super::CollapseComplex;
 use crate::Vec3;
+use crate::complex::ZERO_LENGTH;
 
 impl CollapseComplex {
     /// Whether moving both ends of the edge `{a, b}` to `centre` turns some face that has exactly
     /// one of them by more than a right angle: normal after times normal before is negative.
     ///
-    /// A face that is thinner than [`COINCIDENT`] before has no normal and is not tested: what
+    /// A face that is thinner than [`ZERO_LENGTH`] before has no normal and is not tested: what
     /// rounding makes of it must not hold the collapse back. Lengths in units of the diagonal.
     ///
     /// Source: Garland, Heckbert 1997, *Surface simplification using quadric error metrics*,
@@ -33,5 +34,5 @@ impl CollapseComplex {
 /// Whether the smallest height of the triangle with sides `u`, `v` and `u x v = normal` is noise.
 fn is_thin(normal: Vec3, u: Vec3, v: Vec3) -> bool {
     let longest = u.length_squared().max(v.length_squared()).max((u - v).length_squared());
-    normal.length_squared() <= COINCIDENT * COINCIDENT * longest
+    normal.length_squared() <= ZERO_LENGTH * ZERO_LENGTH * longest
 }

@@ -43,14 +43,7 @@ pub use record::{Collapse, replay};
 
 use pool::{List, Pool};
 
-use super::MedialMesh;
-use crate::geometry::Sphere;
-
-/// Centres closer than this fraction of the bounding-box diagonal are one point.
-///
-/// Coincident circumcentres of cospherical samples differ by rounding only: their distance, their
-/// difference of radii, and the normals of faces this thin are noise.
-pub const COINCIDENT: f64 = 1e-12;
+use super::{MedialMesh, Sphere};
 
 /// A complex under edge collapse.
 ///

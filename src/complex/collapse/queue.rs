@@ -48,8 +48,10 @@ impl Candidate {
         complex.stamp(self.ends[0], self.ends[1]) == Some(self.stamp)
     }
 
+    /// Whether this candidate comes out of a queue before another: smaller cost, then smaller
+    /// second key, then smaller ids.
     #[inline]
-    fn is_before(&self, other: &Self) -> bool {
+    pub fn is_before(&self, other: &Self) -> bool {
         if self.cost != other.cost {
             return self.cost < other.cost;
         }

@@ -1,7 +1,6 @@
 //! The record of collapses, and any level of it made from the initial mesh.
 
-use super::super::MedialMesh;
-use crate::geometry::Sphere;
+use crate::complex::{MedialMesh, Sphere};
 
 /// One collapse, in the ids of the initial mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
