@@ -26,13 +26,15 @@
 use super::cells::{Cell, Face, INFINITE, MAX_CELLS, OPPOSITE, UNUSED};
 use super::error::TriangulationError;
 use crate::geometry::predicates::{
-    Filter, Metric, Sign, Site, approximate_orientation, in_conflict_given, sites_collinear,
+    Filter, Metric, Sign, Site, UNDERFLOW, approximate_orientation, in_conflict_given,
+    sites_collinear,
 };
 
-/// What is known of a cell while a conflict zone grows.
+/// What is known of a cell while a conflict zone grows: nothing, tested or about to be, and in
+/// conflict. The last two are bits, the second never without the first.
 const UNKNOWN: u8 = 0;
-const CONFLICT: u8 = 1;
-const OUTSIDE: u8 = 2;
+const TESTED: u8 = 1;
+const CONFLICT: u8 = 3;
 
 /// Local number of a vertex that is not on the boundary of the conflict zone.
 const ABSENT: u8 = u8::MAX;
@@ -146,6 +148,7 @@ impl<M: Metric> Builder<M> {
             }
         }
         self.find_conflict_zone(vertex, seed);
+        self.collect_walls();
         self.stellate(vertex)
     }
 
@@ -214,50 +217,85 @@ impl<M: Metric> Builder<M> {
         conflicts_given::<M>(self.filter, &self.cells, &self.sites, cell, site, det, bound)
     }
 
-    /// Marks and lists the cells in conflict with the site and the walls around them.
+    /// Marks and lists the cells in conflict with the site.
     ///
     /// Generation by generation: the neighbours of the last one are collected, then tested
     /// together, so that no test waits for the verdict on another.
     fn find_conflict_zone(&mut self, vertex: u32, seed: u32) {
-        let Self { cells, sites, state, zone, walls, front, filter, .. } = self;
-        let site = &sites[vertex as usize];
-        zone.clear();
-        zone.push(seed);
-        state[seed as usize] = CONFLICT;
+        self.zone.clear();
+        self.zone.push(seed);
+        self.state[seed as usize] = CONFLICT;
         let mut generation = 0;
-        while generation < zone.len() {
-            front.clear();
-            for &c in &zone[generation..] {
-                for n in cells[c as usize].n {
-                    let known = &mut state[n.cell() as usize];
-                    if *known == UNKNOWN {
-                        *known = OUTSIDE;
-                        front.push(Candidate { cell: n.cell(), det: 0.0, bound: 0.0 });
-                    }
-                }
-            }
-            generation = zone.len();
-            for candidate in front.iter_mut() {
-                (candidate.det, candidate.bound) =
-                    determinant::<M>(cells, sites, candidate.cell, site);
-            }
-            for &Candidate { cell, det, bound } in front.iter() {
-                if conflicts_given::<M>(*filter, cells, sites, cell, site, det, bound) {
-                    state[cell as usize] = CONFLICT;
-                    zone.push(cell);
-                }
+        while generation < self.zone.len() {
+            let front = self.collect_front(generation);
+            generation = self.zone.len();
+            self.test_front(vertex, front);
+        }
+    }
+
+    /// Collects the unknown neighbours of the zone from `generation` on; returns their number.
+    ///
+    /// Every neighbour is written, and counted if it was unknown: whether it is cannot be
+    /// predicted, and a wrong guess would cost more than the write.
+    fn collect_front(&mut self, generation: usize) -> usize {
+        let Self { cells, state, zone, front, .. } = self;
+        let most = 4 * (zone.len() - generation);
+        if front.len() < most {
+            front.resize(most, Candidate { cell: 0, det: 0.0, bound: 0.0 });
+        }
+        let mut count = 0;
+        for &c in &zone[generation..] {
+            for n in cells[c as usize].n {
+                let known = &mut state[n.cell() as usize];
+                front[count].cell = n.cell();
+                count += usize::from(*known == UNKNOWN);
+                *known |= TESTED;
             }
         }
+        count
+    }
+
+    /// Tests the first `count` candidates and appends those in conflict to the zone.
+    fn test_front(&mut self, vertex: u32, count: usize) {
+        let Self { cells, sites, state, zone, front, filter, .. } = self;
+        let site = &sites[vertex as usize];
+        let front = &mut front[..count];
+        for candidate in front.iter_mut() {
+            (candidate.det, candidate.bound) = determinant::<M>(cells, sites, candidate.cell, site);
+        }
+        let mut size = zone.len();
+        zone.resize(size + count, 0);
+        for &Candidate { cell, det, bound } in front.iter() {
+            let decided = det.abs() > bound + UNDERFLOW && !cells[cell as usize].is_infinite();
+            let conflict = if decided {
+                det > 0.0
+            } else {
+                conflicts_given::<M>(*filter, cells, sites, cell, site, det, bound)
+            };
+            zone[size] = cell;
+            size += usize::from(conflict);
+            state[cell as usize] |= u8::from(conflict) * CONFLICT;
+        }
+        zone.truncate(size);
+    }
+
+    /// Lists the facets between the conflict zone and the cells around it.
+    fn collect_walls(&mut self) {
+        let Self { cells, state, zone, walls, .. } = self;
+        let most = 4 * zone.len();
         walls.clear();
+        walls.resize(most, Wall { v: [0; 3], outside: Face::NONE });
+        let mut count = 0;
         for &c in zone.iter() {
             let cell = &cells[c as usize];
-            for (i, outside) in cell.n.into_iter().enumerate() {
-                if state[outside.cell() as usize] == OUTSIDE {
-                    let [a, b, c] = OPPOSITE[i];
-                    walls.push(Wall { v: [cell.v[a], cell.v[b], cell.v[c]], outside });
-                }
+            for i in 0..4 {
+                let outside = cell.n[i];
+                let [a, b, c] = OPPOSITE[i];
+                walls[count] = Wall { v: [cell.v[a], cell.v[b], cell.v[c]], outside };
+                count += usize::from(state[outside.cell() as usize] == TESTED);
             }
         }
+        walls.truncate(count);
     }
 
     /// Replaces the conflict zone by the cone of its walls from the site.
