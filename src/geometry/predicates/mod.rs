@@ -14,6 +14,7 @@
 mod circumsphere;
 mod exact;
 mod filter;
+mod lanes;
 mod perturb;
 mod wide;
 

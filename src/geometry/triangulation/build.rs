@@ -260,7 +260,14 @@ impl<M: Metric> Builder<M> {
         let Self { cells, sites, state, zone, front, filter, .. } = self;
         let site = &sites[vertex as usize];
         let front = &mut front[..count];
-        for candidate in front.iter_mut() {
+        let mut pairs = front.chunks_exact_mut(2);
+        for pair in &mut pairs {
+            let finite = |i: usize| sites_of(sites, finite_side(cells, pair[i].cell));
+            let [first, second] = Filter::lifted_determinants::<M>([finite(0), finite(1)], site);
+            (pair[0].det, pair[0].bound) = first;
+            (pair[1].det, pair[1].bound) = second;
+        }
+        for candidate in pairs.into_remainder() {
             (candidate.det, candidate.bound) = determinant::<M>(cells, sites, candidate.cell, site);
         }
         let mut size = zone.len();
