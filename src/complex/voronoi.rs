@@ -162,7 +162,8 @@ fn fan(polygon: &[u32]) -> Vec<[u32; 3]> {
 }
 
 /// The Delaunay triangulation of a convex planar polygon, or `None` where coincident or collinear
-/// vertices leave fewer than `n - 2` triangles; the caller then falls back to the fan.
+/// vertices give something else than `n - 2` triangles bounded by the polygon's sides; the caller
+/// then falls back to the fan.
 fn planar_delaunay(polygon: &[u32], spheres: &[Sphere]) -> Option<Vec<[u32; 3]>> {
     let centre = |v: u32| spheres[v as usize].centre;
     let origin = centre(polygon[0]);
@@ -185,5 +186,21 @@ fn planar_delaunay(polygon: &[u32], spheres: &[Sphere]) -> Option<Vec<[u32; 3]>>
         .inner_faces()
         .map(|face| face.vertices().map(|vertex| polygon[vertex.fix().index()]))
         .collect();
-    (triangles.len() + 2 == polygon.len()).then_some(triangles)
+    let fills = triangles.len() + 2 == polygon.len() && bounded_by(&triangles, polygon);
+    fills.then_some(triangles)
+}
+
+/// Whether the sides of a polygon are just the edges that have a single triangle.
+fn bounded_by(triangles: &[[u32; 3]], polygon: &[u32]) -> bool {
+    let ordered = |a: u32, b: u32| [a.min(b), a.max(b)];
+    let mut edges: Vec<[u32; 2]> = triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [ordered(a, b), ordered(b, c), ordered(a, c)])
+        .collect();
+    edges.sort_unstable();
+    let single = edges.chunk_by(|a, b| a == b).filter(|run| run.len() == 1).map(|run| run[0]);
+    let mut sides: Vec<[u32; 2]> =
+        (0..polygon.len()).map(|k| ordered(polygon[k], polygon[(k + 1) % polygon.len()])).collect();
+    sides.sort_unstable();
+    single.eq(sides)
 }
