@@ -2,4 +2,5 @@
 
 pub mod delaunay;
 pub mod predicates;
+pub mod regular;
 pub mod triangulation;
