@@ -87,7 +87,7 @@ fn mix(x: u64) -> u64 {
 }
 
 fn hash_point(p: Vec3) -> u64 {
-    p.to_array().iter().fold(1, |h, x| mix(h ^ x.to_bits()))
+    p.to_array().iter().fold(1, |h, x| mix(h ^ (x + 0.0).to_bits()))
 }
 
 fn make(name: &str) -> Option<Vec<[f64; 4]>> {
@@ -102,6 +102,10 @@ fn make(name: &str) -> Option<Vec<[f64; 4]>> {
         "box" => box_grid(n),
         "icosphere" => icosphere(n),
         "cylinder" => cylinder(n),
+        "plane" => plane(n),
+        "line" => line(n),
+        "moment" => moment(n),
+        "cluster" => cluster(n),
         _ => return None,
     };
     // Random balls of about the points' distance; on degenerate sets all of one weight.
@@ -220,5 +224,30 @@ fn cylinder(n: u32) -> Vec<Vec3> {
             let (sin, cos) = (f64::from(i % n) * step).sin_cos();
             Vec3::new(cos, sin, f64::from(i / n) * step)
         })
+        .collect()
+}
+
+/// A planar grid of `n^2` points and an apex on either side.
+fn plane(n: u32) -> Vec<Vec3> {
+    let grid = (0..n * n).map(|i| Vec3::new(f64::from(i % n), f64::from(i / n), 0.0) / 100.0);
+    grid.chain([Vec3::Z, -Vec3::Z]).collect()
+}
+
+/// `n` points of a line and two beside it.
+fn line(n: u32) -> Vec<Vec3> {
+    let on_line = (0..n).map(|i| Vec3::new(1.0, 2.0, 3.0) * f64::from(i) / 100.0);
+    on_line.chain([Vec3::Y, Vec3::Z]).collect()
+}
+
+/// `n` points of the moment curve, all pairs of which are edges.
+fn moment(n: u32) -> Vec<Vec3> {
+    (0..n).map(|i| f64::from(i) / f64::from(n)).map(|t| Vec3::new(t, t * t, t * t * t)).collect()
+}
+
+/// `n` points in clusters of very different size.
+fn cluster(n: u32) -> Vec<Vec3> {
+    let mut rng = Pcg64::seed_from_u64(5);
+    (0..n)
+        .map(|i| unit(&mut rng) * 10f64.powi(-((i % 8) as i32) * 2) + Vec3::splat(f64::from(i % 3)))
         .collect()
 }

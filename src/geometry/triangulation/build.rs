@@ -39,6 +39,9 @@ const CONFLICT: u8 = 3;
 /// Local number of a vertex that is not on the boundary of the conflict zone.
 const ABSENT: u8 = u8::MAX;
 
+/// A walk in rounded arithmetic may turn in a circle; after this many steps it goes on exactly.
+const MAX_ROUNDED_STEPS: usize = 256;
+
 /// Boundaries of up to this many vertices are linked through a square table.
 const TABLE: usize = 64;
 
@@ -75,6 +78,7 @@ pub(super) struct Builder<M> {
     local: Vec<u8>,
     rim: [u32; TABLE + 1],
     table: Box<[Face; TABLE * TABLE]>,
+    edges: Vec<(u64, Face)>,
     metric: std::marker::PhantomData<M>,
 }
 
@@ -101,6 +105,7 @@ impl<M: Metric> Builder<M> {
             local: vec![ABSENT; sites.len()],
             rim: [0; TABLE + 1],
             table: Box::new([Face::NONE; TABLE * TABLE]),
+            edges: Vec::new(),
             sites,
             metric: std::marker::PhantomData,
         };
@@ -162,7 +167,7 @@ impl<M: Metric> Builder<M> {
             c = self.cells[c as usize].n[3].cell();
         }
         let mut from = c;
-        for _ in 0..self.cells.len() {
+        for _ in 0..MAX_ROUNDED_STEPS {
             let cell = &self.cells[c as usize];
             if cell.is_infinite() {
                 break;
@@ -337,7 +342,7 @@ impl<M: Metric> Builder<M> {
         if self.walls.len() / 2 + 2 <= TABLE {
             self.link_by_table();
         } else {
-            self.link_by_sorting();
+            self.link_by_hashing();
         }
         Ok(())
     }
@@ -395,21 +400,31 @@ impl<M: Metric> Builder<M> {
         }
     }
 
-    /// The same for large conflict zones.
-    fn link_by_sorting(&mut self) {
-        let mut edges = Vec::with_capacity(3 * self.walls.len());
-        for (wall, &id) in self.walls.iter().zip(&self.zone) {
+    /// The same for large conflict zones, through a hash table of undirected edges.
+    fn link_by_hashing(&mut self) {
+        let Self { walls, edges, cells, zone, .. } = self;
+        // At most half full: there are three edges for every two walls.
+        let size = (3 * walls.len()).next_power_of_two();
+        edges.clear();
+        edges.resize(size, (0, Face::NONE));
+        for (wall, &id) in walls.iter().zip(zone.iter()) {
             let [a, b, c] = wall.v;
             for (i, (x, y)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
-                edges.push((x.min(y), x.max(y), Face::new(id, i + 1).0));
+                let face = Face::new(id, i + 1);
+                // Never zero, the mark of a free slot, since the ends differ.
+                let key = u64::from(x.min(y)) << 32 | u64::from(x.max(y));
+                let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % size;
+                while edges[slot].0 != 0 && edges[slot].0 != key {
+                    slot = (slot + 1) % size;
+                }
+                if edges[slot].0 == 0 {
+                    edges[slot] = (key, face);
+                } else {
+                    let twin = edges[slot].1;
+                    cells[face.cell() as usize].n[face.index()] = twin;
+                    cells[twin.cell() as usize].n[twin.index()] = face;
+                }
             }
-        }
-        edges.sort_unstable();
-        for pair in edges.chunks_exact(2) {
-            let (f, g) = (Face(pair[0].2), Face(pair[1].2));
-            debug_assert!(pair[0].0 == pair[1].0 && pair[0].1 == pair[1].1);
-            self.cells[f.cell() as usize].n[f.index()] = g;
-            self.cells[g.cell() as usize].n[g.index()] = f;
         }
     }
 }
