@@ -120,6 +120,45 @@ impl Grid {
     }
 }
 
+/// Differences that are exact as doubles, as integers, and their quantum; `None` if some
+/// difference is rounded or they span too many bits.
+///
+/// The usual case: neighbouring points differ by little, so that their differences are exact.
+#[inline]
+fn close_differences<const K: usize>(
+    points: [&[f64; 3]; K],
+    origin: &[f64; 3],
+) -> Option<([[i64; 3]; K], i32)> {
+    let mut d = [[0.0; 3]; K];
+    let mut reach = 0.0f64;
+    let mut exact = true;
+    for i in 0..K {
+        for k in 0..3 {
+            let (a, b) = (points[i][k], origin[k]);
+            let difference = a - b;
+            let virtual_b = a - difference;
+            let virtual_a = difference + virtual_b;
+            exact &= (a - virtual_a) + (virtual_b - b) == 0.0;
+            reach = reach.max(difference.abs());
+            d[i][k] = difference;
+        }
+    }
+    let quantum = highest_bit(reach).saturating_sub(narrow::BITS - 1);
+    if !exact || !(-960..=960).contains(&quantum) {
+        return None;
+    }
+    let scale = f64::from_bits(((1023 - quantum) as u64) << 52);
+    let mut integers = [[0; 3]; K];
+    for i in 0..K {
+        for k in 0..3 {
+            let scaled = d[i][k] * scale;
+            integers[i][k] = scaled as i64;
+            exact &= integers[i][k] as f64 == scaled;
+        }
+    }
+    exact.then_some((integers, quantum))
+}
+
 /// The common quantum of the points and their differences to `origin` in units of it.
 ///
 /// `quantum_cap` is an upper bound on the quantum, from weights; `i32::MAX` without.
@@ -128,6 +167,11 @@ fn differences<const K: usize>(
     origin: &[f64; 3],
     quantum_cap: i32,
 ) -> (Differences<K>, i32) {
+    if let Some((d, quantum)) = close_differences(points, origin)
+        && quantum <= quantum_cap
+    {
+        return (Differences::One(d), quantum);
+    }
     let mut quantum = quantum_cap;
     let mut top = i32::MIN;
     for p in points.iter().chain([&origin]) {
