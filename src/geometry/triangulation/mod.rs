@@ -15,6 +15,8 @@ mod error;
 mod freeze;
 mod order;
 mod query;
+mod stellate;
+mod zone;
 
 use cells::Cell;
 pub use check::Violation;
