@@ -2,8 +2,10 @@
 //! prints what `scripts/oracles/delaunay_cgal.cpp` prints for the same file.
 //!
 //! ```text
-//! delaunay_oracle make NAME FILE       one of the point sets below, 4 f64 for each point
-//! delaunay_oracle run FILE [REPEAT]    cells, an order-free hash of them, best CPU seconds, peak KiB
+//! delaunay_oracle make NAME FILE     one of the point sets below, 4 f64 for each point: x, y, z,
+//!                                    weight; `w:NAME` has weights
+//! delaunay_oracle run FILE [weighted]
+//!                                    cells, an order-free hash of them, CPU seconds, peak KiB
 //! ```
 #![allow(clippy::print_stdout)]
 
@@ -13,6 +15,8 @@ use std::time::Instant;
 
 use medial::Vec3;
 use medial::geometry::delaunay::Delaunay;
+use medial::geometry::regular::Regular;
+use medial::geometry::triangulation::Triangulation;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -24,40 +28,40 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let bytes: Vec<u8> = points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
             std::fs::write(file, bytes)?;
         }
-        ["run", file] => run(file, 1)?,
-        ["run", file, repeat] => run(file, repeat.parse()?)?,
-        _ => return Err("usage: delaunay_oracle make NAME FILE | run FILE [REPEAT]".into()),
+        ["run", file] => run(file, false)?,
+        ["run", file, "weighted"] => run(file, true)?,
+        _ => return Err("usage: delaunay_oracle make NAME FILE | run FILE [weighted]".into()),
     }
     Ok(())
 }
 
-fn run(file: &str, repeat: usize) -> Result<(), Box<dyn std::error::Error>> {
-    let points: Vec<Vec3> = std::fs::read(file)?
-        .chunks_exact(32)
-        .map(|c| {
-            let x = |k: usize| f64::from_le_bytes(c[8 * k..8 * k + 8].try_into().unwrap_or([0; 8]));
-            Vec3::new(x(0), x(1), x(2))
-        })
-        .collect();
+fn run(file: &str, weighted: bool) -> Result<(), Box<dyn std::error::Error>> {
+    let (points, weights) = read(file)?;
     let before = peak_kib();
-    let mut best = f64::INFINITY;
-    let mut result = None;
-    for _ in 0..repeat.max(1) {
-        drop(result.take());
-        let start = cpu_seconds();
-        let delaunay = Delaunay::new(&points)?;
-        best = best.min(cpu_seconds() - start);
-        result = Some(delaunay);
+    let start = cpu_seconds();
+    let report = |t: &Triangulation| {
+        let (seconds, peak) = (cpu_seconds() - start, peak_kib() - before);
+        let set = t.finite_cells().fold(0u64, |sum, c| {
+            let mut v = t.vertices(c).map(|v| hash_point(points[v.index()]));
+            v.sort_unstable();
+            sum.wrapping_add(v.into_iter().fold(0, |h, x| mix(h ^ x)))
+        });
+        println!("{} {set:016x} {seconds:.4} {peak}", t.finite_cell_count());
+    };
+    if weighted {
+        report(Regular::new(&points, &weights)?.triangulation());
+    } else {
+        report(Delaunay::new(&points)?.triangulation());
     }
-    let after = peak_kib();
-    let d = result.ok_or("no run")?;
-    let set = d.finite_cells().fold(0u64, |sum, c| {
-        let mut v = d.vertices(c).map(|v| hash_point(d.point(v)));
-        v.sort_unstable();
-        sum.wrapping_add(v.into_iter().fold(0, |h, x| mix(h ^ x)))
-    });
-    println!("{} {set:016x} {best:.4} {}", d.finite_cell_count(), after - before);
     Ok(())
+}
+
+fn read(file: &str) -> std::io::Result<(Vec<Vec3>, Vec<f64>)> {
+    let record = |c: &[u8]| {
+        let x = |k: usize| f64::from_le_bytes(c[8 * k..8 * k + 8].try_into().unwrap_or([0; 8]));
+        (Vec3::new(x(0), x(1), x(2)), x(3))
+    };
+    Ok(std::fs::read(file)?.chunks_exact(32).map(record).unzip())
 }
 
 /// CPU seconds of the main thread, which other work on the machine disturbs less than the clock.
@@ -83,10 +87,11 @@ fn mix(x: u64) -> u64 {
 }
 
 fn hash_point(p: Vec3) -> u64 {
-    p.to_array().iter().fold(1, |h, x| mix(h ^ x.to_bits()))
+    p.to_array().iter().fold(1, |h, x| mix(h ^ (x + 0.0).to_bits()))
 }
 
 fn make(name: &str) -> Option<Vec<[f64; 4]>> {
+    let (weighted, name) = name.strip_prefix("w:").map_or((false, name), |rest| (true, rest));
     let (kind, size) = name.split_once('-')?;
     let n = size.parse().ok()?;
     let points = match kind {
@@ -97,9 +102,28 @@ fn make(name: &str) -> Option<Vec<[f64; 4]>> {
         "box" => box_grid(n),
         "icosphere" => icosphere(n),
         "cylinder" => cylinder(n),
+        "plane" => plane(n),
+        "line" => line(n),
+        "moment" => moment(n),
+        "cluster" => cluster(n),
         _ => return None,
     };
-    Some(points.into_iter().map(|p| [p.x, p.y, p.z, 0.0]).collect())
+    // Random balls of about the points' distance; on degenerate sets all of one weight.
+    let mut rng = Pcg64::seed_from_u64(4);
+    let reach = match kind {
+        "cube" => f64::from(n).powf(-1.0 / 3.0),
+        "surface" | "sphere" => 2.0 * f64::from(n).powf(-0.5),
+        _ => 0.0,
+    };
+    let mut weight = || match (weighted, reach) {
+        (false, _) => 0.0,
+        (true, 0.0) => 0.1,
+        (true, _) => {
+            let radius = reach * rng.random::<f64>();
+            radius * radius
+        }
+    };
+    Some(points.into_iter().map(|p| [p.x, p.y, p.z, weight()]).collect())
 }
 
 fn unit(rng: &mut Pcg64) -> Vec3 {
@@ -200,5 +224,30 @@ fn cylinder(n: u32) -> Vec<Vec3> {
             let (sin, cos) = (f64::from(i % n) * step).sin_cos();
             Vec3::new(cos, sin, f64::from(i / n) * step)
         })
+        .collect()
+}
+
+/// A planar grid of `n^2` points and an apex on either side.
+fn plane(n: u32) -> Vec<Vec3> {
+    let grid = (0..n * n).map(|i| Vec3::new(f64::from(i % n), f64::from(i / n), 0.0) / 100.0);
+    grid.chain([Vec3::Z, -Vec3::Z]).collect()
+}
+
+/// `n` points of a line and two beside it.
+fn line(n: u32) -> Vec<Vec3> {
+    let on_line = (0..n).map(|i| Vec3::new(1.0, 2.0, 3.0) * f64::from(i) / 100.0);
+    on_line.chain([Vec3::Y, Vec3::Z]).collect()
+}
+
+/// `n` points of the moment curve, all pairs of which are edges.
+fn moment(n: u32) -> Vec<Vec3> {
+    (0..n).map(|i| f64::from(i) / f64::from(n)).map(|t| Vec3::new(t, t * t, t * t * t)).collect()
+}
+
+/// `n` points in clusters of very different size.
+fn cluster(n: u32) -> Vec<Vec3> {
+    let mut rng = Pcg64::seed_from_u64(5);
+    (0..n)
+        .map(|i| unit(&mut rng) * 10f64.powi(-((i % 8) as i32) * 2) + Vec3::splat(f64::from(i % 3)))
         .collect()
 }

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Compares medial's triangulation with CGAL's on the same points: number and set of cells, seconds,
-# memory. Runs alternate, and the best of each side counts. Exit codes: 0 all sets agree, 1 some
+# memory; names that begin with w: are weighted. Runs alternate, and the best of each side counts. Exit codes: 0 all sets agree, 1 some
 # differ, 77 CGAL is missing (Debian: libcgal-dev libtbb-dev libgmp-dev libmpfr-dev).
 #
 #   scripts/oracles/delaunay.sh [-r ROUNDS] [NAME ...]
@@ -10,7 +10,8 @@ cd "$(dirname "$0")/../.."
 rounds=3
 if [ "${1:-}" = -r ]; then rounds=$2; shift 2; fi
 sets=${*:-cube-100000 surface-100000 cube-1000000 surface-1000000 sphere-100000 \
-    lattice-30 box-100 box-128 icosphere-6 icosphere-7 cylinder-200}
+    lattice-30 box-100 box-128 icosphere-6 icosphere-7 cylinder-200 \
+    w:cube-100000 w:surface-100000 w:lattice-30 w:box-100 w:icosphere-6 w:cylinder-200}
 
 work=${CARGO_TARGET_DIR:-target}/oracles
 mkdir -p "$work"
@@ -26,16 +27,17 @@ cargo build --quiet --release --example delaunay_oracle
 ours=${CARGO_TARGET_DIR:-target}/release/examples/delaunay_oracle
 
 status=0
-printf '%-16s %9s %10s %10s %7s %9s %9s\n' points cells 'medial s' 'CGAL s' ratio 'medial MB' 'CGAL MB'
+printf '%-18s %9s %10s %10s %7s %9s %9s\n' points cells 'medial s' 'CGAL s' ratio 'medial MB' 'CGAL MB'
 for name in $sets; do
     file=$work/$name.f64
     "$ours" make "$name" "$file"
+    case $name in w:*) mode=weighted ;; *) mode= ;; esac
     : >"$work/a"
     : >"$work/b"
     i=0
     while [ $i -lt "$rounds" ]; do
-        "$ours" run "$file" >>"$work/a"
-        "$work/delaunay_cgal" "$file" >>"$work/b"
+        "$ours" run "$file" $mode >>"$work/a"
+        "$work/delaunay_cgal" "$file" 1 $mode >>"$work/b"
         i=$((i + 1))
     done
     sort -k3,3g "$work/a" | head -n 1 >"$work/a1"
@@ -48,7 +50,7 @@ for name in $sets; do
         status=1
     fi
     ratio=$(awk "BEGIN { printf \"%.2f\", $seconds_a / $seconds_b }")
-    printf '%-16s %9s %10s %10s %7s %9d %9d %s\n' "$name" "$cells_a" "$seconds_a" "$seconds_b" \
+    printf '%-18s %9s %10s %10s %7s %9d %9d %s\n' "$name" "$cells_a" "$seconds_a" "$seconds_b" \
         "$ratio" $((kib_a / 1024)) $((kib_b / 1024)) "$verdict"
     rm -f "$file"
 done

@@ -7,17 +7,17 @@
 //!
 //! | tier | differences below | words of the in-sphere determinant |
 //! |---|---|---|
-//! | 1 | 2^62 | 5 |
+//! | 1 | 2^61 | 5 |
 //! | 2 | 2^126 | 10 |
 //! | 3 | 2^1279, that is any two coordinates below 2^190 | 100 |
 //!
 //! Compared with floating-point expansions: no branch depends on the data beyond the choice of
 //! the tier, exact zeros cost no more than other values, and there is neither overflow nor
-//! underflow. Tier 1 takes some 100 ns where adaptive expansions take 1,000 to 5,000 ns on
+//! underflow. Tier 1 takes 50 to 200 ns where adaptive expansions take 1,000 to 5,000 ns on
 //! cospherical points.
 
-use super::Sign;
 use super::wide::Wide;
+use super::{Sign, narrow};
 
 /// A double as `mantissa * 2^exponent`.
 #[derive(Clone, Copy)]
@@ -49,7 +49,7 @@ pub(crate) fn lowest_bit(x: f64) -> i32 {
 
 /// One more than the exponent of the highest set bit of `x`; `i32::MIN` for zero.
 #[inline]
-fn highest_bit(x: f64) -> i32 {
+pub(crate) fn highest_bit(x: f64) -> i32 {
     let p = parts(x);
     if p.mantissa == 0 { i32::MIN } else { p.exponent + 64 - p.mantissa.leading_zeros() as i32 }
 }
@@ -89,15 +89,89 @@ enum Differences<const K: usize> {
     Any([[Wide<20>; 3]; K]),
 }
 
+/// A grid of coordinates whose differences are narrow: multiples of the reciprocal of its scale.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    scale: f64,
+}
+
+impl Grid {
+    /// The grid of coordinates that are multiples of `2^quantum` and below `2^top`, if differences
+    /// on it are narrow.
+    pub(super) fn new(quantum: i32, top: i32) -> Option<Self> {
+        let narrow = top - quantum < narrow::BITS && (-960..=960).contains(&quantum);
+        narrow.then(|| Self { scale: f64::from_bits(((1023 - quantum) as u64) << 52) })
+    }
+
+    #[inline(always)]
+    fn differences<const K: usize>(
+        self,
+        points: [&[f64; 3]; K],
+        origin: &[f64; 3],
+    ) -> [[i64; 3]; K] {
+        let mut d = [[0; 3]; K];
+        for k in 0..3 {
+            let o = (origin[k] * self.scale) as i64;
+            for i in 0..K {
+                d[i][k] = (points[i][k] * self.scale) as i64 - o;
+            }
+        }
+        d
+    }
+}
+
+/// Differences that are exact as doubles, as integers, and their quantum; `None` if some
+/// difference is rounded or they span too many bits.
+///
+/// The usual case: neighbouring points differ by little, so that their differences are exact.
+#[inline]
+fn close_differences<const K: usize>(
+    points: [&[f64; 3]; K],
+    origin: &[f64; 3],
+) -> Option<([[i64; 3]; K], i32)> {
+    let mut d = [[0.0; 3]; K];
+    let mut reach = 0.0f64;
+    let mut exact = true;
+    for i in 0..K {
+        for k in 0..3 {
+            let (a, b) = (points[i][k], origin[k]);
+            let difference = a - b;
+            let virtual_b = a - difference;
+            let virtual_a = difference + virtual_b;
+            exact &= (a - virtual_a) + (virtual_b - b) == 0.0;
+            reach = reach.max(difference.abs());
+            d[i][k] = difference;
+        }
+    }
+    let quantum = highest_bit(reach).saturating_sub(narrow::BITS - 1);
+    if !exact || !(-960..=960).contains(&quantum) {
+        return None;
+    }
+    let scale = f64::from_bits(((1023 - quantum) as u64) << 52);
+    let mut integers = [[0; 3]; K];
+    for i in 0..K {
+        for k in 0..3 {
+            let scaled = d[i][k] * scale;
+            integers[i][k] = scaled as i64;
+            exact &= integers[i][k] as f64 == scaled;
+        }
+    }
+    exact.then_some((integers, quantum))
+}
+
 /// The common quantum of the points and their differences to `origin` in units of it.
 ///
 /// `quantum_cap` is an upper bound on the quantum, from weights; `i32::MAX` without.
-#[inline]
 fn differences<const K: usize>(
     points: [&[f64; 3]; K],
     origin: &[f64; 3],
     quantum_cap: i32,
 ) -> (Differences<K>, i32) {
+    if let Some((d, quantum)) = close_differences(points, origin)
+        && quantum <= quantum_cap
+    {
+        return (Differences::One(d), quantum);
+    }
     let mut quantum = quantum_cap;
     let mut top = i32::MIN;
     for p in points.iter().chain([&origin]) {
@@ -109,18 +183,10 @@ fn differences<const K: usize>(
     if top == i32::MIN {
         return (Differences::One([[0; 3]; K]), quantum.min(0));
     }
-    let bits = top - quantum;
-    if bits <= 61 && (-960..=960).contains(&quantum) {
-        let scale = f64::from_bits(((1023 - quantum) as u64) << 52);
-        let o = origin.map(|x| (x * scale) as i64);
-        let mut d = [[0; 3]; K];
-        for i in 0..K {
-            for k in 0..3 {
-                d[i][k] = (points[i][k] * scale) as i64 - o[k];
-            }
-        }
-        return (Differences::One(d), quantum);
+    if let Some(grid) = Grid::new(quantum, top) {
+        return (Differences::One(grid.differences(points, origin)), quantum);
     }
+    let bits = top - quantum;
     if bits > 125 {
         let o = origin.map(|x| to_wide::<20>(x, quantum));
         let d = points.map(|p| [0, 1, 2].map(|k| to_wide::<20>(p[k], quantum).sub(o[k])));
@@ -135,7 +201,7 @@ fn differences<const K: usize>(
             reach |= wide[i][k].unsigned_abs();
         }
     }
-    if reach >> 62 == 0 {
+    if reach >> narrow::BITS == 0 {
         (Differences::One(wide.map(|p| p.map(|x| x as i64))), quantum)
     } else {
         (Differences::Two(wide), quantum)
@@ -163,12 +229,19 @@ fn det3<const D: usize, const D2: usize, const D3: usize>(
     bc.mul::<D, D3>(a[2]).add(ca.mul(b[2])).add(ab.mul(c[2]))
 }
 
-/// The sign of `det(b - a, c - a, d - a)`.
-pub(super) fn orient3d(a: &[f64; 3], b: &[f64; 3], c: &[f64; 3], d: &[f64; 3]) -> Sign {
+/// The sign of `det(b - a, c - a, d - a)`; `grid` is one that all four points lie on, if known.
+pub(super) fn orient3d(
+    a: &[f64; 3],
+    b: &[f64; 3],
+    c: &[f64; 3],
+    d: &[f64; 3],
+    grid: Option<Grid>,
+) -> Sign {
+    if let Some(grid) = grid {
+        return narrow::det3_sign(&grid.differences([b, c, d], a));
+    }
     match differences([b, c, d], a, i32::MAX).0 {
-        Differences::One(d) => {
-            det3::<1, 2, 3>(&d.map(|p| p.map(|x| Wide::from_i128(x.into())))).sign()
-        }
+        Differences::One(d) => narrow::det3_sign(&d),
         Differences::Two(d) => det3::<2, 4, 6>(&widen(&d)).sign(),
         Differences::Any(d) => det3::<20, 40, 60>(&d).sign(),
     }
@@ -215,13 +288,14 @@ fn in_sphere_det<const D: usize, const D2: usize, const D3: usize, const D5: usi
     inside.sign()
 }
 
-/// The power test without weights: see [`power_test`].
-pub(super) fn in_sphere(p: [&[f64; 3]; 4], e: &[f64; 3]) -> Sign {
+/// The power test without weights, see [`power_test`]; `grid` is one that all five points lie on,
+/// if known.
+pub(super) fn in_sphere(p: [&[f64; 3]; 4], e: &[f64; 3], grid: Option<Grid>) -> Sign {
+    if let Some(grid) = grid {
+        return narrow::lifted_sign(&grid.differences(p, e), &[0; 4]);
+    }
     match differences(p, e, i32::MAX).0 {
-        Differences::One(d) => {
-            let d = d.map(|p| p.map(|x| Wide::from_i128(x.into())));
-            in_sphere_det::<1, 2, 3, 5>(&d, &[Wide::ZERO; 4])
-        }
+        Differences::One(d) => narrow::lifted_sign(&d, &[0; 4]),
         Differences::Two(d) => in_sphere_det::<2, 4, 6, 10>(&widen(&d), &[Wide::ZERO; 4]),
         Differences::Any(d) => in_sphere_det::<20, 40, 60, 100>(&d, &[Wide::ZERO; 4]),
     }
@@ -241,20 +315,17 @@ pub(super) fn power_test(p: [(&[f64; 3], f64); 4], e: (&[f64; 3], f64)) -> Sign 
     let cap = if cap == i32::MAX { cap } else { cap.div_euclid(2) };
     let (d, quantum) = differences(p.map(|q| q.0), e.0, cap);
     let unit = 2 * quantum;
-    let narrow = |limit: i32| top == i32::MIN || top - unit <= limit;
+    let below = |limit: i32| top == i32::MIN || top - unit <= limit;
     let offset = |w: f64| to_i128(e.1, unit) - to_i128(w, unit);
     let offset4 = |w: f64| to_wide::<4>(e.1, unit).sub(to_wide(w, unit));
     let offset40 = |w: f64| to_wide::<40>(e.1, unit).sub(to_wide(w, unit));
     match d {
-        Differences::One(d) if narrow(122) => {
-            let d = d.map(|p| p.map(|x| Wide::from_i128(x.into())));
-            in_sphere_det::<1, 2, 3, 5>(&d, &weights.map(|w| Wide::from_i128(offset(w))))
-        }
-        Differences::One(d) if narrow(250) => {
+        Differences::One(d) if below(122) => narrow::lifted_sign(&d, &weights.map(offset)),
+        Differences::One(d) if below(250) => {
             let d = d.map(|p| p.map(|x| Wide::from_i128(x.into())));
             in_sphere_det::<2, 4, 6, 10>(&d, &weights.map(offset4))
         }
-        Differences::Two(d) if narrow(250) => {
+        Differences::Two(d) if below(250) => {
             in_sphere_det::<2, 4, 6, 10>(&widen(&d), &weights.map(offset4))
         }
         Differences::One(d) => {

@@ -16,6 +16,7 @@
 //! with an absolute error below `2^-1074` each, which [`UNDERFLOW`] covers when `M <= 1` and the slack
 //! of the constants when `M > 1`.
 
+use super::exact::Grid;
 use super::lanes::{Pair, Real};
 use super::{Sign, exact};
 
@@ -79,15 +80,17 @@ pub(crate) struct Filter {
     /// every intermediate value is a small multiple of a power of the common quantum.
     exact_orientation: f64,
     exact_power: f64,
+    /// The grid of the exact stage.
+    grid: Option<Grid>,
 }
 
 impl Filter {
     /// The filter that knows nothing of the sites.
-    pub(crate) const ANY: Self = Self { exact_orientation: -1.0, exact_power: -1.0 };
+    pub(crate) const ANY: Self = Self { exact_orientation: -1.0, exact_power: -1.0, grid: None };
 
-    /// The filter for sites whose coordinates are multiples of `2^quantum` and whose weights are
-    /// multiples of its square.
-    pub(crate) fn with_quantum(quantum: i32) -> Self {
+    /// The filter for sites whose coordinates are multiples of `2^quantum` and below `2^top`, and
+    /// whose weights are multiples of its square.
+    pub(crate) fn of_grid(quantum: i32, top: i32) -> Self {
         // Multiples of q^5 up to 2^53 q^5 are exact; q^5 itself must be a normal number.
         if !(-180..=180).contains(&quantum) {
             return Self::ANY;
@@ -96,6 +99,7 @@ impl Filter {
         Self {
             exact_orientation: ORIENTATION_BOUND * largest(3),
             exact_power: IN_SPHERE_BOUND / 12.0 * largest(5),
+            grid: Grid::new(quantum, top),
         }
     }
 
@@ -111,18 +115,14 @@ impl Filter {
             + c1[2].abs() * (dxby.abs() + dybx.abs())
             + d1[2].abs() * (bxcy.abs() + bycx.abs());
         let bound = ORIENTATION_BOUND * permanent;
-        if det.abs() > bound + UNDERFLOW {
+        if det.abs() > bound + UNDERFLOW || bound <= self.exact_orientation {
             return Sign::of(det);
         }
         // Points in a plane across an axis need no arithmetic.
         if (0..3).any(|k| b1[k] == 0.0 && c1[k] == 0.0 && d1[k] == 0.0) {
             return Sign::Zero;
         }
-        let reach = [b1, c1, d1].iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-        if 6.0 * ORIENTATION_BOUND * reach * reach * reach <= self.exact_orientation {
-            return Sign::of(det);
-        }
-        exact::orient3d(a, b, c, d)
+        exact::orient3d(a, b, c, d, self.grid)
     }
 
     /// The sign of the power test of `e` against the orthosphere of four sites.
@@ -144,7 +144,7 @@ impl Filter {
         if det.abs() > bound + UNDERFLOW || bound <= self.exact_power {
             Sign::of(det)
         } else {
-            exact_power_test::<M>(cell, e)
+            exact_power_test::<M>(cell, e, self.grid)
         }
     }
 
@@ -213,10 +213,10 @@ fn lifted_determinant<R: Real, M: Metric>(
 
 #[cold]
 #[inline(never)]
-fn exact_power_test<M: Metric>(s: [&Site; 4], e: &Site) -> Sign {
-    if M::WEIGHTED {
+fn exact_power_test<M: Metric>(s: [&Site; 4], e: &Site, grid: Option<Grid>) -> Sign {
+    if M::WEIGHTED && s.iter().any(|s| s.w != e.w) {
         exact::power_test(s.map(|s| (&s.p, s.w)), (&e.p, e.w))
     } else {
-        exact::in_sphere(s.map(|s| &s.p), &e.p)
+        exact::in_sphere(s.map(|s| &s.p), &e.p, grid)
     }
 }

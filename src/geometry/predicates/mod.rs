@@ -15,12 +15,13 @@ mod circumsphere;
 mod exact;
 mod filter;
 mod lanes;
+mod narrow;
 mod perturb;
 mod wide;
 
 pub use circumsphere::{circumsphere, orthosphere};
 pub(crate) use exact::collinear as sites_collinear;
-pub(crate) use exact::lowest_bit;
+pub(crate) use exact::{highest_bit, lowest_bit};
 pub(crate) use filter::{
     Filter, Metric, Site, UNDERFLOW, Unweighted, Weighted, approximate_orientation,
 };

@@ -45,24 +45,21 @@ pub(crate) fn in_conflict_given<M: Metric>(
 #[cold]
 #[inline(never)]
 fn perturbed(filter: Filter, cell: [&Site; 4], e: &Site) -> bool {
-    // The five sites are visited in descending order; `e` ends the search. Sites at or above the
-    // last one visited are done with.
-    let mut last: Option<&Site> = None;
-    loop {
-        let mut largest = 4;
-        let mut top = e;
-        for (i, &s) in cell.iter().enumerate() {
-            let left = last.is_none_or(|l| precedes(&s.p, &l.p));
-            if left & precedes(&top.p, &s.p) {
-                (largest, top) = (i, s);
+    // Only vertices above the query matter, in descending order; the query ends the search.
+    let mut above = [0; 4];
+    let mut count = 0;
+    for (i, s) in cell.iter().enumerate() {
+        above[count] = i;
+        count += usize::from(precedes(&e.p, &s.p));
+    }
+    for rank in 0..count {
+        for i in rank + 1..count {
+            if precedes(&cell[above[rank]].p, &cell[above[i]].p) {
+                above.swap(rank, i);
             }
         }
-        if largest == 4 {
-            return false;
-        }
-        last = Some(top);
         let mut replaced = cell;
-        replaced[largest] = e;
+        replaced[above[rank]] = e;
         let [a, b, c, d] = replaced;
         match filter.orient3d(&a.p, &b.p, &c.p, &d.p) {
             Sign::Positive => return true,
@@ -70,6 +67,7 @@ fn perturbed(filter: Filter, cell: [&Site; 4], e: &Site) -> bool {
             Sign::Zero => {}
         }
     }
+    false
 }
 
 /// Whether `a` is lexicographically smaller, without branches.

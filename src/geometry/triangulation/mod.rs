@@ -2,7 +2,8 @@
 //!
 //! A triangulation of points in space is kept as that of a topological 3-sphere: every facet of
 //! the convex hull is closed by an *infinite* cell with the vertex [`VertexId::INFINITE`], so that
-//! every cell has four neighbours. [`super::delaunay::Delaunay`] builds it.
+//! every cell has four neighbours. [`super::delaunay::Delaunay`] and
+//! [`super::regular::Regular`] build it.
 //!
 //! Vertex ids are indices of the input points. Cell ids count finite cells first, then infinite
 //! ones, in an order that depends on the input alone.
@@ -14,13 +15,15 @@ mod error;
 mod freeze;
 mod order;
 mod query;
+mod stellate;
+mod zone;
 
 use cells::Cell;
 pub use check::Violation;
 pub use error::TriangulationError;
 pub use query::{EdgeRing, Facet};
 
-use super::predicates::{Filter, Metric, Site, lowest_bit};
+use super::predicates::{Filter, Metric, Site, highest_bit, lowest_bit};
 use build::Builder;
 
 /// A vertex: the index of an input point, or the vertex at infinity.
@@ -84,7 +87,7 @@ pub(super) fn triangulate<M: Metric>(sites: &[Site]) -> Result<Triangulated, Tri
         let distinct = ids.len();
         return Err(TriangulationError::TooFewPoints { points: sites.len(), distinct });
     }
-    let filter = Filter::with_quantum(common_quantum::<M>(sites));
+    let filter = filter_of::<M>(sites);
     let dummy = Site { p: [f64::NAN; 3], w: f64::NAN };
     let ordered =
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
@@ -93,16 +96,19 @@ pub(super) fn triangulate<M: Metric>(sites: &[Site]) -> Result<Triangulated, Tri
     Ok(Triangulated { triangulation, repeated, filter })
 }
 
-/// The largest `q` such that all coordinates are multiples of `2^q` and all weights of `2^(2 q)`.
-fn common_quantum<M: Metric>(sites: &[Site]) -> i32 {
-    let mut quantum = i32::MAX;
+/// The filter of the coarsest grid that holds all sites.
+fn filter_of<M: Metric>(sites: &[Site]) -> Filter {
+    let (mut quantum, mut top) = (i32::MAX, i32::MIN);
+    // Only differences of weights matter.
+    let weights_differ = sites.iter().any(|s| s.w != sites[0].w);
     for s in sites {
         for x in s.p {
             quantum = quantum.min(lowest_bit(x));
+            top = top.max(highest_bit(x));
         }
-        if M::WEIGHTED && s.w != 0.0 {
+        if M::WEIGHTED && weights_differ && s.w != 0.0 {
             quantum = quantum.min(lowest_bit(s.w).div_euclid(2));
         }
     }
-    quantum
+    Filter::of_grid(quantum, top)
 }

@@ -1,0 +1,92 @@
+//! The predicates call by call, and triangulations of random and degenerate points.
+
+#![allow(missing_docs)]
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use medial::Vec3;
+use medial::geometry::delaunay::Delaunay;
+use medial::geometry::predicates::{circumsphere, in_sphere, orient3d};
+use medial::geometry::regular::Regular;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+fn random_unit(rng: &mut Pcg64) -> Vec3 {
+    Vec3::new(rng.random(), rng.random(), rng.random())
+}
+
+fn directions(n: usize) -> Vec<Vec3> {
+    let mut rng = Pcg64::seed_from_u64(1);
+    (0..n).map(|_| (2.0 * random_unit(&mut rng) - Vec3::ONE).normalize_or(Vec3::X)).collect()
+}
+
+fn cube(n: usize) -> Vec<Vec3> {
+    let mut rng = Pcg64::seed_from_u64(2);
+    (0..n).map(|_| random_unit(&mut rng)).collect()
+}
+
+fn surface(n: usize) -> Vec<Vec3> {
+    let bump = |u: Vec3| u * (1.0 + 0.25 * (3.0 * u.x).sin() * (4.0 * u.y).cos());
+    directions(n).into_iter().map(bump).collect()
+}
+
+fn lattice(n: u32, step: f64) -> Vec<Vec3> {
+    (0..n * n * n)
+        .map(|i| [i % n, i / n % n, i / n / n])
+        .map(|c| Vec3::from(c.map(|x| f64::from(x) * step)))
+        .collect()
+}
+
+fn predicates(c: &mut Criterion) {
+    let mut group = c.benchmark_group("predicates");
+    let corner = |i: u32| Vec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2));
+    let sphere = directions(8);
+    let sets: [(&str, Vec<Vec3>); 3] = [
+        ("easy", cube(8)),
+        ("lattice", (0..8).map(|i| corner(i) / 10.0).collect()),
+        ("cospherical", sphere),
+    ];
+    for (name, p) in &sets {
+        group.bench_function(BenchmarkId::new("in_sphere", name), |b| {
+            b.iter(|| in_sphere(p[0], p[1], p[2], p[4], black_box(p[7])));
+        });
+        group.bench_function(BenchmarkId::new("orient3d", name), |b| {
+            b.iter(|| orient3d(p[0], p[1], p[2], black_box(p[3])));
+        });
+        group.bench_function(BenchmarkId::new("circumsphere", name), |b| {
+            b.iter(|| circumsphere([p[0], p[1], p[2], black_box(p[4])]));
+        });
+    }
+    group.finish();
+}
+
+fn triangulations(c: &mut Criterion) {
+    let mut group = c.benchmark_group("delaunay");
+    group.sample_size(10);
+    let sets = [
+        ("cube", cube(20_000)),
+        ("surface", surface(20_000)),
+        ("sphere", directions(10_000)),
+        ("lattice", lattice(20, 1.0)),
+        ("lattice in steps of 0.01", lattice(20, 0.01)),
+    ];
+    for (name, points) in &sets {
+        group.throughput(Throughput::Elements(points.len() as u64));
+        group.bench_function(*name, |b| b.iter(|| Delaunay::new(points).map(|d| d.cell_count())));
+    }
+    group.finish();
+    let mut group = c.benchmark_group("regular");
+    group.sample_size(10);
+    let points = cube(20_000);
+    let mut rng = Pcg64::seed_from_u64(3);
+    let weights: Vec<f64> = points.iter().map(|_| 1e-3 * rng.random::<f64>()).collect();
+    group.throughput(Throughput::Elements(points.len() as u64));
+    group.bench_function("cube", |b| {
+        b.iter(|| Regular::new(&points, &weights).map(|r| r.cell_count()));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, predicates, triangulations);
+criterion_main!(benches);
