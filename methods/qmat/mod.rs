@@ -49,6 +49,7 @@ mod quadric;
 mod quadric_tests;
 #[cfg(test)]
 mod tests;
+mod unlock;
 
 use std::sync::Arc;
 
@@ -173,7 +174,7 @@ impl Prepared {
             work = Work::Anew;
         }
         self.asked = true;
-        self.contraction.run_to(target, &self.run)?;
+        self.contraction.run_to(&self.initial, target, &self.run)?;
         Ok(work)
     }
 

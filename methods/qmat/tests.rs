@@ -14,7 +14,7 @@ fn params() -> QmatParams {
 
 fn contract(mesh: &MedialMesh, params: QmatParams, target: usize) -> (MedialMesh, Contraction) {
     let mut contraction = Contraction::new(mesh, params);
-    contraction.run_to(target, &RunContext::default()).unwrap();
+    contraction.run_to(mesh, target, &RunContext::default()).unwrap();
     let result = contraction.to_mesh();
     result.check().unwrap();
     (result, contraction)

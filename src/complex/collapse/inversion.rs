@@ -5,21 +5,22 @@ use crate::Vec3;
 use crate::complex::ZERO_LENGTH;
 
 impl CollapseComplex {
-    /// Whether moving both ends of the edge `{a, b}` to `centre` turns some face that has exactly
-    /// one of them by more than a right angle: normal after times normal before is negative.
+    /// A side `{p, q}` whose face folds over when both ends of the edge `{a, b}` move to `centre`:
+    /// the face has exactly one of the ends, and its normal after times its normal before is
+    /// negative. While none of the four was part of a collapse it stays folded.
     ///
     /// A face that is thinner than [`ZERO_LENGTH`] before has no normal and is not tested: what
     /// rounding makes of it must not hold the collapse back. Lengths in units of the diagonal.
     ///
     /// Source: Garland, Heckbert 1997, *Surface simplification using quadric error metrics*,
     /// <https://doi.org/10.1145/258734.258849>, section 3.7. Cost: the faces of both ends.
-    pub fn inverts(&self, a: u32, b: u32, centre: Vec3) -> bool {
-        self.inverts_at(a, b, centre) || self.inverts_at(b, a, centre)
+    pub fn folded_side(&self, a: u32, b: u32, centre: Vec3) -> Option<[u32; 2]> {
+        self.folded_at(a, b, centre).or_else(|| self.folded_at(b, a, centre))
     }
 
-    fn inverts_at(&self, moved: u32, other: u32, to: Vec3) -> bool {
+    fn folded_at(&self, moved: u32, other: u32, to: Vec3) -> Option<[u32; 2]> {
         let from = self.sphere(moved).centre;
-        self.opposite_sides(moved).iter().any(|&[p, q]| {
+        let folds = |&&[p, q]: &&[u32; 2]| {
             if p == other || q == other {
                 return false;
             }
@@ -27,7 +28,8 @@ impl CollapseComplex {
             let before = (p - from).cross(q - from);
             let after = (p - to).cross(q - to);
             before.dot(after) < 0.0 && !is_thin(before, p - from, q - from)
-        })
+        };
+        self.opposite_sides(moved).iter().find(folds).copied()
     }
 }
 

@@ -51,8 +51,7 @@ impl Candidate {
         complex.stamp(self.ends[0], self.ends[1]) == Some(self.stamp)
     }
 
-    /// Whether this candidate comes out of a queue before another: smaller cost, then smaller
-    /// second key, then smaller ids.
+    /// Whether this candidate comes out of a queue before another; see [`Candidate::order`].
     #[inline]
     pub fn is_before(&self, other: &Self) -> bool {
         if self.cost != other.cost {
@@ -61,7 +60,9 @@ impl Candidate {
         self.order(other) == Ordering::Less
     }
 
-    fn order(&self, other: &Self) -> Ordering {
+    /// The order in which candidates come out of a queue: smaller cost, then smaller second key,
+    /// then smaller ids.
+    pub fn order(&self, other: &Self) -> Ordering {
         let keys = self.cost.total_cmp(&other.cost).then(self.tie.total_cmp(&other.tie));
         keys.then(self.ends.cmp(&other.ends))
     }
@@ -121,17 +122,16 @@ impl CollapseQueue {
         }
     }
 
-    /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of its ends.
-    pub fn park(&mut self, candidate: Candidate) {
-        self.parked.insert(candidate);
+    /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of
+    /// `obstacles`: the vertices without a change at which it would be rejected again.
+    pub fn park(&mut self, candidate: Candidate, obstacles: &[u32]) {
+        self.parked.insert(candidate, obstacles);
     }
 
-    /// Queues what is parked at `v` and still current, because the surroundings of `v` changed.
+    /// Queues what is parked at `v` and still current. To be called for both ends of an edge that
+    /// was collapsed.
     #[inline]
     pub fn wake(&mut self, complex: &CollapseComplex, v: u32) {
-        if self.parked.is_empty() {
-            return;
-        }
         while let Some(candidate) = self.parked.take(v) {
             if candidate.is_current(complex) {
                 self.push(candidate);
@@ -218,71 +218,90 @@ impl CollapseQueue {
     }
 }
 
-/// Rejected candidates, listed at both of their ends.
+/// Rejected candidates, listed at each of their obstacles.
 #[derive(Clone, Debug, Default)]
 struct Parked {
-    /// First place of the list of each vertex, by id; grown on demand.
+    /// First node of the list of each vertex, by id; grown on demand.
     heads: Vec<u32>,
-    slots: Vec<Slot>,
-    free: Vec<u32>,
-    waiting: usize,
+    nodes: Slab<Node>,
+    candidates: Slab<Waiting>,
 }
 
-/// A parked candidate. Its place in the list of `ends[e]` has the number `2 * slot + e`.
 #[derive(Clone, Copy, Debug)]
-struct Slot {
-    candidate: Candidate,
-    next: [u32; 2],
-    /// Whether it was not yet woken from its other end.
-    waiting: bool,
-    /// Lists that still hold it.
-    listed: u8,
+struct Node {
+    waiting: u32,
+    next: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    /// `None` once it was woken from one of its obstacles.
+    candidate: Option<Candidate>,
+    /// Lists that still name it.
+    lists: u32,
 }
 
 impl Parked {
-    fn is_empty(&self) -> bool {
-        self.waiting == 0
+    fn insert(&mut self, candidate: Candidate, obstacles: &[u32]) {
+        let lists = obstacles.len() as u32;
+        if lists == 0 {
+            return;
+        }
+        let waiting = self.candidates.insert(Waiting { candidate: Some(candidate), lists });
+        for &v in obstacles {
+            if self.heads.len() <= v as usize {
+                self.heads.resize(v as usize + 1, NONE);
+            }
+            let head = &mut self.heads[v as usize];
+            *head = self.nodes.insert(Node { waiting, next: *head });
+        }
     }
 
-    fn insert(&mut self, candidate: Candidate) {
-        let largest = candidate.ends[1] as usize;
-        if self.heads.len() <= largest {
-            self.heads.resize(largest + 1, NONE);
-        }
-        let next = candidate.ends.map(|end| self.heads[end as usize]);
-        let slot = Slot { candidate, next, waiting: true, listed: 2 };
-        let index = match self.free.pop() {
-            Some(index) => {
-                self.slots[index as usize] = slot;
-                index
-            }
-            None => {
-                self.slots.push(slot);
-                (self.slots.len() - 1) as u32
-            }
-        };
-        for (place, end) in (2 * index..).zip(candidate.ends) {
-            self.heads[end as usize] = place;
-        }
-        self.waiting += 1;
-    }
-
-    /// A waiting candidate of `v`, taken out of its list.
+    /// A candidate of `v` that still waits, taken out of its list.
     fn take(&mut self, v: u32) -> Option<Candidate> {
         let head = self.heads.get_mut(v as usize)?;
         while *head != NONE {
-            let index = *head / 2;
-            let slot = &mut self.slots[index as usize];
-            *head = slot.next[(*head % 2) as usize];
-            slot.listed -= 1;
-            if slot.listed == 0 {
-                self.free.push(index);
+            let Node { waiting, next } = self.nodes.remove(*head);
+            *head = next;
+            let entry = &mut self.candidates.items[waiting as usize];
+            let candidate = entry.candidate.take();
+            entry.lists -= 1;
+            if entry.lists == 0 {
+                self.candidates.remove(waiting);
             }
-            if std::mem::take(&mut slot.waiting) {
-                self.waiting -= 1;
-                return Some(slot.candidate);
+            if candidate.is_some() {
+                return candidate;
             }
         }
         None
+    }
+}
+
+/// Items with stable indices; those of removed items are used again.
+#[derive(Clone, Debug)]
+struct Slab<T> {
+    items: Vec<T>,
+    free: Vec<u32>,
+}
+
+impl<T> Default for Slab<T> {
+    fn default() -> Self {
+        Self { items: Vec::new(), free: Vec::new() }
+    }
+}
+
+impl<T: Copy> Slab<T> {
+    fn insert(&mut self, item: T) -> u32 {
+        if let Some(index) = self.free.pop() {
+            self.items[index as usize] = item;
+            return index;
+        }
+        self.items.push(item);
+        (self.items.len() - 1) as u32
+    }
+
+    fn remove(&mut self, index: u32) -> T {
+        self.free.push(index);
+        self.items[index as usize]
     }
 }
