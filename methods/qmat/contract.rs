@@ -43,8 +43,45 @@ pub(super) enum Decision {
     Postpone(Candidate),
     /// Collapsing it would change the topology, as long as these vertices stay as they are.
     Hold([u32; 2]),
-    /// Each placement folds a face over, as long as these vertices stay as they are.
-    Fold([[u32; 2]; 4]),
+    /// Each placement folds one of these faces over, as long as they stay as they are.
+    Fold(Folded),
+}
+
+/// Faces that hold back the placements of an edge; often one holds back all four.
+#[derive(Default)]
+pub(super) struct Folded {
+    faces: [[u32; 3]; 4],
+    count: usize,
+}
+
+impl Folded {
+    /// Whether a placement folds a face over: one that is known, or else one that is added.
+    fn holds(&mut self, complex: &CollapseComplex, [a, b]: [u32; 2], sphere: Sphere) -> bool {
+        let known = &self.faces[..self.count];
+        if known.iter().any(|&face| complex.folds(face, sphere.centre)) {
+            return true;
+        }
+        let Some(face) = complex.folded_face(a, b, sphere.centre) else {
+            return false;
+        };
+        self.faces[self.count] = face;
+        self.count += 1;
+        true
+    }
+
+    /// The corners other than the ends of the edge, each once.
+    fn obstacles(&self) -> ([u32; 8], usize) {
+        let (mut obstacles, mut count) = ([0; 8], 0);
+        for &[_, p, q] in &self.faces[..self.count] {
+            for v in [p, q] {
+                if !obstacles[..count].contains(&v) {
+                    obstacles[count] = v;
+                    count += 1;
+                }
+            }
+        }
+        (obstacles, count)
+    }
 }
 
 impl Contraction {
@@ -113,9 +150,10 @@ impl Contraction {
                     self.tally.held_by_topology += 1;
                     self.queue.park(cheapest, &obstacle);
                 }
-                Decision::Fold(sides) => {
+                Decision::Fold(faces) => {
                     self.tally.held_by_inversion += 1;
-                    self.queue.park(cheapest, sides.as_flattened());
+                    let (obstacles, count) = faces.obstacles();
+                    self.queue.park(cheapest, &obstacles[..count]);
                 }
             }
             let done = self.tally.collapses - first;
@@ -129,7 +167,7 @@ impl Contraction {
     /// Steps 3 and 4: where the merged sphere goes, or what holds the edge back.
     fn decide(&mut self, candidate: Candidate) -> Decision {
         let [a, b] = candidate.ends();
-        if self.params.topology_from.applies(self.sphere_count())
+        if self.keeps_topology()
             && let Some(obstacle) = self.complex.link_obstacle(a, b)
         {
             return Decision::Hold(obstacle);
@@ -137,19 +175,22 @@ impl Contraction {
         self.place(candidate)
     }
 
+    /// Whether a collapse has to keep the topology now.
+    pub(super) fn keeps_topology(&self) -> bool {
+        self.params.topology_from.applies(self.sphere_count())
+    }
+
     /// Step 4: where the merged sphere goes.
     pub(super) fn place(&self, candidate: Candidate) -> Decision {
         let [a, b] = candidate.ends();
         let (quadric, ends) = edge_quadric(&self.complex, &self.quadrics, [a, b]);
-        let folded = |sphere: Sphere| self.complex.folded_side(a, b, sphere.centre);
         let optimum = minimise(&quadric, ends, self.params.singular_ratio);
-        let Some(side) = folded(optimum) else {
+        let mut faces = Folded::default();
+        if !faces.holds(&self.complex, [a, b], optimum) {
             return Decision::Collapse(optimum);
-        };
-        let mut sides = [side; 4];
-        for (index, (error, sphere)) in by_error(&quadric, ends).into_iter().enumerate() {
-            if let Some(side) = folded(sphere) {
-                sides[index] = side;
+        }
+        for (error, sphere) in by_error(&quadric, ends) {
+            if faces.holds(&self.complex, [a, b], sphere) {
                 continue;
             }
             let dearer = priced(&self.complex, &self.params, [a, b], error);
@@ -158,7 +199,7 @@ impl Contraction {
             }
             return Decision::Collapse(sphere);
         }
-        Decision::Fold(sides)
+        Decision::Fold(faces)
     }
 
     /// Step 5: the collapse, the sum of the quadrics, new costs for the edges of the merged sphere.
@@ -208,14 +249,14 @@ impl Contraction {
         if edges.is_empty() {
             return "no edge is left, each sphere is a component of its own".to_owned();
         }
-        let keep_topology = self.params.topology_from.applies(self.sphere_count());
+        let keeps_topology = self.keeps_topology();
         let by_topology =
-            edges.iter().filter(|&&[a, b]| keep_topology && !self.complex.link_condition(a, b));
+            edges.iter().filter(|&&[a, b]| keeps_topology && !self.complex.link_condition(a, b));
         let by_topology = by_topology.count();
         let by_inversion = edges.len() - by_topology;
         format!(
-            "of the {} edges left {by_topology} would change the topology and {by_inversion} \
-             would fold a face over",
+            "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \
+             and {by_inversion} would fold a face over",
             edges.len()
         )
     }

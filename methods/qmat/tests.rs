@@ -109,7 +109,7 @@ fn coincident_centres_go_first_and_keep_loops() {
     }
     let (stuck, mut contraction) = contract(&initial, all, 1);
     assert_eq!(stuck, three);
-    assert!(contraction.why_stopped().contains("3 would change the topology"));
+    assert!(contraction.why_stopped().contains("holds back 3 of the 3 edges"));
     let never = QmatParams { topology_from: TopologyFrom::Never, ..params() };
     assert_eq!(contract(&initial, never, 1).0.spheres.len(), 1);
 }

@@ -18,7 +18,7 @@ impl Contraction {
     /// The cheapest edge whose collapse violates the link condition but not the topology of
     /// `initial`, and where its merged sphere goes. `None` when there is none.
     pub(super) fn unlock(&mut self, initial: &MedialMesh) -> Option<([u32; 2], Sphere)> {
-        if self.sphere_count() > SMALL {
+        if self.sphere_count() > SMALL || !self.keeps_topology() {
             return None;
         }
         let goal = betti(initial);

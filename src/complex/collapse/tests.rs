@@ -118,7 +118,7 @@ fn link_condition_sees_holes_and_voids() {
 }
 
 fn folds(complex: &CollapseComplex, a: u32, b: u32, centre: Vec3) -> bool {
-    complex.folded_side(a, b, centre).is_some()
+    complex.folded_face(a, b, centre).is_some()
 }
 
 #[test]
