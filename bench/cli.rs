@@ -126,9 +126,10 @@ pub enum Dual {
 /// How results are measured.
 #[derive(Clone, Debug, Args)]
 pub struct MeasureArguments {
-    /// Surface samples for the error, beside the mesh's vertices; as many on the reconstruction.
-    #[arg(long, value_name = "N", default_value_t = medial::metrics::JudgeOptions::default().samples)]
-    pub samples: usize,
+    /// Surface samples for the error, beside the mesh's vertices; as many on the reconstruction
+    /// [default: 50000, `compare` 10000].
+    #[arg(long, value_name = "N")]
+    pub samples: Option<usize>,
 }
 
 /// A mesh argument: a file, or `builtin:ID[:RESOLUTION]`.

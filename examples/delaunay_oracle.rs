@@ -93,7 +93,7 @@ fn make(name: &str) -> Option<Vec<[f64; 4]>> {
         "cube" => cube(n),
         "surface" => surface(n),
         "sphere" => sphere(n),
-        "lattice" => lattice(n, |x| f64::from(x)),
+        "lattice" => lattice(n, f64::from),
         "box" => box_grid(n),
         "icosphere" => icosphere(n),
         "cylinder" => cylinder(n),

@@ -85,7 +85,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         counts.faces,
         shape.samples().len()
     ));
-    print_line(&format!("  Betti numbers {betti:?}, the solid's {expected:?}"));
+    let demanded =
+        expected.map_or_else(String::new, |expected| format!(", the solid's {expected:?}"));
+    print_line(&format!("  Betti numbers {betti:?}{demanded}"));
     for warning in warnings {
         print_line(&format!("  warning: {warning}"));
     }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use medial::metrics::JudgeOptions;
 use medial::simplifier::{Level, MedialSimplifier, Params};
 use medial_reports::{Header, Initial, Journal, Record, Status, write_report};
 use serde_json::json;
@@ -16,6 +17,10 @@ use crate::run::{
 
 /// Name of the append-only list of records in the folder of the results.
 pub const RESULTS: &str = "results.jsonl";
+
+/// How a comparison measures unless told otherwise: coarser than `evaluate`, since it measures
+/// hundreds of results. Sample counts are in every record.
+const QUICK: JudgeOptions = JudgeOptions { samples: 10_000, volume_depth: 6, seed: 0 };
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -94,7 +99,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             }
         };
         progress.at(&format!("{}: initial medial mesh", input.name));
-        let judge_options = judge_options(&arguments.measure, arguments.substrate.seed);
+        let judge_options = judge_options(&arguments.measure, QUICK, arguments.substrate.seed)?;
         let judge = shape.judge(input.axis.as_ref(), judge_options).map_err(Failure::input)?;
         let initial =
             shape.view().initial().ok().map(|mesh| Initial::of(&mesh, judge.truth().betti));

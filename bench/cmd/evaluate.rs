@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use medial::complex;
-use medial::metrics::Evaluation;
+use medial::metrics::{Evaluation, JudgeOptions};
 use medial::shape::ShapeOptions;
 
 use super::{Exit, Failure, judge_options, percent, print_json, print_line};
@@ -34,7 +34,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let input = Input::load(&source).map_err(Failure::input)?;
     let loaded = complex::read(&arguments.axis).map_err(Failure::input)?;
     let shape = input.shape(ShapeOptions::default()).map_err(Failure::input)?;
-    let options = judge_options(&arguments.measure, arguments.seed);
+    let options = judge_options(&arguments.measure, JudgeOptions::default(), arguments.seed)?;
     let judge = shape.judge(input.axis.as_ref(), options).map_err(Failure::input)?;
     let to_normal = shape.normalisation();
     let mesh = loaded.mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));

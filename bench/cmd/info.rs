@@ -3,7 +3,7 @@
 use clap::Args;
 use medial::surface::{self, SurfaceReport};
 
-use super::{Exit, Failure, print_json, print_line};
+use super::{Exit, Failure, note, print_json, print_line};
 use crate::cli::{Global, MeshArgument};
 use crate::run::{Input, InputError, Source};
 
@@ -42,7 +42,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     match refusal {
         None => Ok(Exit::Done),
-        Some(_) if global.json => Ok(Exit::Input),
+        Some(error) if global.json => {
+            note(global, &format!("medial: {error}"));
+            Ok(Exit::Input)
+        }
         Some(error) => Err(Failure::input(error)),
     }
 }

@@ -134,8 +134,20 @@ pub fn shape_options(arguments: &SubstrateArguments) -> Result<ShapeOptions, Fai
 }
 
 /// The options of the judge from the command line.
-pub fn judge_options(arguments: &MeasureArguments, seed: u64) -> JudgeOptions {
-    JudgeOptions { samples: arguments.samples, seed, ..JudgeOptions::default() }
+///
+/// # Errors
+/// When no sample is asked for.
+pub fn judge_options(
+    arguments: &MeasureArguments,
+    defaults: JudgeOptions,
+    seed: u64,
+) -> Result<JudgeOptions, Failure> {
+    match arguments.samples {
+        Some(0) => Err(Failure::usage("--samples 0: ask for at least one sample")),
+        samples => {
+            Ok(JudgeOptions { samples: samples.unwrap_or(defaults.samples), seed, ..defaults })
+        }
+    }
 }
 
 /// Parameters from `key=value` words.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use medial::complex;
+use medial::metrics::JudgeOptions;
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified, SimplifyError, Work};
 use medial_reports::{Simplify, Stages, Status};
@@ -101,9 +102,8 @@ fn simplify(
                 "--max-error {bound}: a positive fraction of the diagonal"
             )));
         }
-        let judge = shape
-            .judge(input.axis.as_ref(), judge_options(&arguments.measure, seed))
-            .map_err(Failure::input)?;
+        let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
+        let judge = shape.judge(input.axis.as_ref(), options).map_err(Failure::input)?;
         let initial = shape.initial().map_err(Failure::input)?.spheres.len();
         let found =
             search_error(simplification.as_mut(), &judge, initial, bound).map_err(failure)?;

@@ -334,6 +334,6 @@ fn save(
     std::fs::create_dir_all(out.join(&folder))?;
     let back = measure.shape.normalisation();
     let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
-    complex::write(&out.join(&artifact), &mesh)?;
+    complex::write(out.join(&artifact), &mesh)?;
     Ok(artifact)
 }

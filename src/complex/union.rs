@@ -104,14 +104,21 @@ impl MedialUnion {
     pub fn new(mesh: &MedialMesh) -> Result<Self, UnionError> {
         mesh.check()?;
         let sphere = |v: u32| mesh.spheres[v as usize];
-        let mut isolated = vec![true; mesh.spheres.len()];
+        // Spheres that need no part of their own: ends of proper cones, and those that lie in a
+        // neighbour, whose own parts are then nearer everywhere.
+        let mut covered = vec![false; mesh.spheres.len()];
         let mut parts = Vec::with_capacity(mesh.edges.len() + mesh.faces.len());
         for (e, &ends) in (0..).zip(&mesh.edges) {
-            for v in ends {
-                isolated[v as usize] = false;
-            }
             let [a, b] = ends.map(sphere);
-            parts.push((Primitive::Edge(e), Shape::Cone(Cone::new(a, b)), bounds(&[a, b])));
+            let cone = Cone::new(a, b);
+            if let Some(larger) = cone.larger() {
+                covered[ends[1 - larger] as usize] = true;
+                continue;
+            }
+            for v in ends {
+                covered[v as usize] = true;
+            }
+            parts.push((Primitive::Edge(e), Shape::Cone(cone), bounds(&[a, b])));
         }
         for (f, corners) in (0..).zip(&mesh.faces) {
             let corners = corners.map(sphere);
@@ -120,8 +127,8 @@ impl MedialUnion {
                 parts.push((Primitive::Face(f), Shape::Slab(face), bounds(&corners)));
             }
         }
-        let lone = (0..).zip(&mesh.spheres).filter(|&(v, _): &(u32, _)| isolated[v as usize]);
-        parts.extend(lone.map(|(v, &m)| (Primitive::Sphere(v), Shape::Sphere(m), bounds(&[m]))));
+        let alone = (0..).zip(&mesh.spheres).filter(|&(v, _): &(u32, _)| !covered[v as usize]);
+        parts.extend(alone.map(|(v, &m)| (Primitive::Sphere(v), Shape::Sphere(m), bounds(&[m]))));
         Self::over(&parts, ball_box(&mesh.spheres))
     }
 

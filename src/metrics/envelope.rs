@@ -37,7 +37,7 @@ pub struct EnvelopeOptions {
 
 /// The run proper makes at most this many candidates for each sample asked: beyond, nearly all of
 /// the patches' area is buried, and fewer samples than asked are returned.
-const MOST_CANDIDATES: f64 = 40.0;
+const MOST_CANDIDATES: f64 = 10.0;
 
 /// The golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;

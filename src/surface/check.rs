@@ -36,11 +36,14 @@ pub(super) fn orient_and_examine(repaired: Repaired) -> Examined {
     report.warnings.splice(0..0, warnings);
     let mut shells = Vec::new();
     if fault.is_none() {
-        shells = evidence.shells();
-        fault = evidence.flat_shell(&shells);
-        if fault.is_none() {
-            evidence.add_solid(&mut report, &shells);
+        match evidence.shells() {
+            Ok(found) => shells = found,
+            Err(too_many) => fault = Some(too_many),
         }
+    }
+    fault = fault.or_else(|| evidence.flat_shell(&shells));
+    if fault.is_none() {
+        evidence.add_solid(&mut report, &shells);
     }
     let wrong: Vec<bool> = shells.iter().map(|s| fault.is_none() && !s.is_right()).collect();
     repairs.extend(orient::repairs(&turned, &wrong, &shells, &topology.component));
@@ -70,7 +73,7 @@ pub(super) fn examine_unrepaired(mesh: &TriMesh) -> Result<SurfaceReport, Fault>
     if let Some(face) = topology.first_inconsistent {
         return Err(Fault::Inconsistent { face: face as usize });
     }
-    let shells = evidence.shells();
+    let shells = evidence.shells()?;
     if let Some(fault) = evidence.flat_shell(&shells) {
         return Err(fault);
     }
@@ -145,7 +148,7 @@ impl Evidence<'_> {
     /// Why the mesh bounds no solid, as far as adjacency tells.
     fn structural_fault(&self) -> Option<Fault> {
         let t = self.topology;
-        if Normalisation::of(self.mesh).is_none() {
+        if !Normalisation::of(self.mesh).is_some_and(|n| n.diagonal.is_normal()) {
             return Some(Fault::Extent { diagonal: raw_diagonal(self.mesh) });
         }
         let name = |edge: [u32; 2]| edge.map(|v| self.name(v));
@@ -165,8 +168,10 @@ impl Evidence<'_> {
         doubled.or(open).or(pinched)
     }
 
-    fn shells(&self) -> Vec<Shell> {
-        orient::shells(self.unit, &self.points, &self.mesh.faces, self.topology, &self.found)
+    fn shells(&self) -> Result<Vec<Shell>, Fault> {
+        let shells =
+            orient::shells(self.unit, &self.points, &self.mesh.faces, self.topology, &self.found);
+        shells.map_err(|_| Fault::TooManyNested { components: self.topology.first_face.len() })
     }
 
     fn flat_shell(&self, shells: &[Shell]) -> Option<Fault> {
@@ -251,10 +256,6 @@ impl Evidence<'_> {
             report.warnings.push(format!(
                 "{n} of components that meet; the expected Betti numbers count each by itself"
             ));
-        }
-        if shells.len() > orient::MOST_SHELLS {
-            let n = shells.len();
-            report.warnings.push(format!("{n} components are too many to look for cavities"));
         }
     }
 }

@@ -51,19 +51,16 @@ pub(super) fn eliminate(points: &[Vec3], normals: &[Vec3], area: f64, count: usi
     let mut left = points.len();
     while left > count {
         let Some(Heaviest { weight: recorded, sample }) = heap.pop() else { break };
-        // An entry is stale if the weight fell since; the sample has a newer entry.
-        if !kept[sample as usize] || recorded != weights[sample as usize] {
+        let current = weights[sample as usize];
+        // Weights only fall, so an entry is an upper bound until it is brought up to date.
+        if recorded != current {
+            heap.push(Heaviest { weight: current, sample });
             continue;
         }
         kept[sample as usize] = false;
         left -= 1;
         for &(other, distance) in neighbours.of(sample as usize) {
-            let share = weight(f64::from(distance));
-            if kept[other as usize] && share > 0.0 {
-                let weight_left = weights[other as usize] - share;
-                weights[other as usize] = weight_left;
-                heap.push(Heaviest { weight: weight_left, sample: other });
-            }
+            weights[other as usize] -= weight(f64::from(distance));
         }
     }
     (0..points.len() as u32).filter(|&i| kept[i as usize]).collect()

@@ -61,6 +61,14 @@ impl fmt::Display for Place {
     }
 }
 
+/// A place in front of a sentence that names the element, so that binary files do not say it twice.
+fn before(at: &Place) -> String {
+    match at {
+        Place::Element(..) => String::new(),
+        place => format!("{place}: "),
+    }
+}
+
 /// A vertex as the user can find it: by number and by position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexName {
@@ -113,7 +121,7 @@ pub enum Fault {
         holds: String,
     },
     /// A coordinate is not a number or infinite.
-    #[error("{at}: vertex {vertex} has the coordinate {value}, which is not finite")]
+    #[error("{}vertex {vertex} has the coordinate {value}, which is not finite", before(.at))]
     Coordinate {
         /// Where.
         at: Place,
@@ -123,7 +131,7 @@ pub enum Fault {
         value: f64,
     },
     /// A face names a vertex that does not exist.
-    #[error("{at}: face {face} names the vertex {index} of {}", counted(*.vertices, "vertex"))]
+    #[error("{}face {face} names the vertex {index} of {}", before(.at), counted(*.vertices, "vertex"))]
     Index {
         /// Where.
         at: Place,
@@ -135,7 +143,7 @@ pub enum Fault {
         vertices: usize,
     },
     /// A face with fewer than three corners.
-    #[error("{at}: face {face} has {}; three are the least", counted(*.corners, "corner"))]
+    #[error("{}face {face} has {}; three are the least", before(.at), counted(*.corners, "corner"))]
     TooFewCorners {
         /// Where.
         at: Place,
@@ -146,8 +154,9 @@ pub enum Fault {
     },
     /// A polygon so intricate that cutting it into triangles takes too long.
     #[error(
-        "{at}: face {face} with {corners} corners is too intricate to triangulate; \
-         export the surface as triangles"
+        "{}face {face} with {corners} corners is too intricate to triangulate; \
+         export the surface as triangles",
+        before(.at)
     )]
     Polygon {
         /// Where.
@@ -171,8 +180,10 @@ pub enum Fault {
         /// Number of vertices.
         vertices: usize,
     },
-    /// The bounding box has no size, or one that overflows.
-    #[error("the bounding box has the diagonal {diagonal}, which is not positive and finite")]
+    /// The bounding box has no size, or one that overflows or has lost digits to underflow.
+    #[error(
+        "the bounding box has the diagonal {diagonal:?}; move and scale the surface to about 1"
+    )]
     Extent {
         /// Its diagonal, in the unit of the file.
         diagonal: f64,
@@ -231,6 +242,12 @@ pub enum Fault {
         face: usize,
         /// Number of its faces.
         faces: usize,
+    },
+    /// So many components around one another that it takes too long to tell solid from cavity.
+    #[error("{components} components lie too densely around one another to tell their nesting")]
+    TooManyNested {
+        /// Number of components.
+        components: usize,
     },
     /// Only from [`crate::surface::validate`]: a face that names a vertex twice.
     #[error("face {face} names a vertex twice")]

@@ -91,8 +91,14 @@ impl InsideTest {
     ///
     /// Typically `O(log F)`.
     pub fn winding_number(&self, p: Vec3) -> Option<i32> {
+        self.winding_of_scaled(self.unit.forward(p))
+    }
+
+    /// The same for a point that is scaled already.
+    #[inline]
+    pub(super) fn winding_of_scaled(&self, p: Vec3) -> Option<i32> {
         let mut winding = Some(0);
-        self.crossings(self.unit.forward(p), |_, crossing| match crossing {
+        self.crossings(p, |_, crossing| match crossing {
             Crossing::Above(sign) => {
                 winding = winding.map(|w| w + sign);
                 ControlFlow::Continue(())

@@ -16,6 +16,7 @@ mod error;
 mod inside;
 mod intersect;
 mod mesh;
+mod nesting;
 mod orient;
 mod predicates;
 mod read;
@@ -75,6 +76,15 @@ fn as_message<S: serde::Serializer>(
 ///
 /// # Cost
 /// `O(n log n)` time; memory below 16 MB plus 100 times the size of the file.
+///
+/// ```no_run
+/// let medial::surface::Loaded { mesh, report } = medial::surface::read("bunny.ply")?;
+/// for repair in &report.repairs {
+///     println!("{repair}");
+/// }
+/// println!("{} triangles, genus {:?}", mesh.faces.len(), report.genus);
+/// # Ok::<(), medial::surface::SurfaceError>(())
+/// ```
 pub fn read(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
     let path = path.as_ref();
     load(path).and_then(accept).map_err(|fault| in_file(path, fault))
@@ -104,6 +114,17 @@ pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
 ///
 /// # Errors
 /// As [`inspect`], without the name of a file.
+///
+/// ```
+/// use medial::surface::{Fault, Format, inspect_bytes};
+///
+/// let triangle = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+/// let inspection = inspect_bytes(triangle, Format::Off)?;
+/// assert_eq!(inspection.report.boundary_edges, 3);
+/// let refused = inspection.refused.map(|error| error.fault);
+/// assert!(matches!(refused, Some(Fault::Open { edges: 3, .. })));
+/// # Ok::<(), medial::surface::SurfaceError>(())
+/// ```
 pub fn inspect_bytes(bytes: &[u8], format: Format) -> Result<Inspection, SurfaceError> {
     let examined = examine(bytes, format)?;
     Ok(Inspection { report: examined.report, refused: examined.fault.map(SurfaceError::from) })
@@ -114,6 +135,21 @@ pub fn inspect_bytes(bytes: &[u8], format: Format) -> Result<Inspection, Surface
 ///
 /// # Errors
 /// The first reason why the mesh does not bound a solid.
+///
+/// # Cost
+/// `O(F log F)`, most of it for the self-intersections.
+///
+/// ```
+/// use medial::{Vec3, surface::{self, TriMesh}};
+///
+/// let tetrahedron = TriMesh {
+///     vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
+///     faces: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+/// };
+/// let report = surface::validate(&tetrahedron)?;
+/// assert_eq!(report.expected_betti, Some([1, 0, 0]));
+/// # Ok::<(), surface::SurfaceError>(())
+/// ```
 pub fn validate(mesh: &TriMesh) -> Result<SurfaceReport, SurfaceError> {
     Ok(check::examine_unrepaired(mesh)?)
 }

@@ -4,14 +4,10 @@
 //! 1. Within a component all faces follow the first one (breadth over common edges).
 //! 2. A component is turned by the sign of the volume it encloses. A volume within its own
 //!    rounding error counts as none and is refused.
-//! 3. A component is a cavity if an odd number of components contains it. One contains another if
-//!    a vertex of the other has a winding number other than zero with respect to it, and the two
-//!    do not meet. Components that meet merely overlap, so each stays outward.
+//! 3. A component is a cavity if it lies in an odd number of others (see [`super::nesting`]).
 
-use std::ops::ControlFlow;
-
-use super::inside::{Crossing, InsideTest};
 use super::intersect::Intersections;
+use super::nesting::{self, Parts, TooManyNested};
 use super::predicates::Unit;
 use super::report::Repair;
 use super::topology::Topology;
@@ -52,12 +48,14 @@ pub(super) fn shells(
     faces: &[[u32; 3]],
     topology: &Topology,
     intersections: &Intersections,
-) -> Vec<Shell> {
+) -> Result<Vec<Shell>, TooManyNested> {
     let mut shells = volumes(points, faces, topology);
-    if shells.len() > 1 && shells.len() <= MOST_SHELLS {
-        measure_depths(unit, points, faces, topology, intersections, &mut shells);
+    let parts = Parts { unit, points, faces, component: &topology.component };
+    let depths = nesting::depths(&parts, &topology.first_face, &intersections.components)?;
+    for (shell, depth) in shells.iter_mut().zip(depths) {
+        shell.depth = depth;
     }
-    shells
+    Ok(shells)
 }
 
 /// Exchanges two corners of the faces that are marked.
@@ -101,9 +99,6 @@ pub(super) fn repairs(
     all.into_iter().filter(|r| r.count() > 0).collect()
 }
 
-/// Beyond this many components nesting is not examined: every ray may cross all of them.
-pub(super) const MOST_SHELLS: usize = 20_000;
-
 fn volumes(points: &[Vec3], faces: &[[u32; 3]], topology: &Topology) -> Vec<Shell> {
     let origins: Vec<Vec3> =
         topology.first_face.iter().map(|&face| points[faces[face as usize][0] as usize]).collect();
@@ -145,41 +140,5 @@ impl Sum {
 
     pub(super) fn value(self) -> f64 {
         self.sum + self.lost
-    }
-}
-
-fn measure_depths(
-    unit: Unit,
-    points: &[Vec3],
-    faces: &[[u32; 3]],
-    topology: &Topology,
-    intersections: &Intersections,
-    shells: &mut [Shell],
-) {
-    let test = InsideTest::of_scaled(unit, points, faces);
-    // Windings around one point by component, with the list of those touched.
-    let mut winding = vec![0; shells.len()];
-    let mut touched = Vec::new();
-    for (shell, &face) in topology.first_face.iter().enumerate() {
-        let point = points[faces[face as usize][0] as usize];
-        test.crossings(point, |face, crossing| {
-            // The point lies on its own component and on those that meet it, which do not count.
-            if let Crossing::Above(sign) = crossing {
-                let other = topology.component[face as usize];
-                winding[other as usize] += sign;
-                touched.push(other);
-            }
-            ControlFlow::Continue(())
-        });
-        touched.sort_unstable();
-        touched.dedup();
-        for other in touched.drain(..) {
-            let around = std::mem::take(&mut winding[other as usize]) != 0;
-            let pair = [other.min(shell as u32), other.max(shell as u32)];
-            let meets = intersections.components.binary_search(&pair).is_ok();
-            if around && other as usize != shell && !meets {
-                shells[shell].depth += 1;
-            }
-        }
     }
 }

@@ -170,6 +170,8 @@ fn times_power(mut value: f64, mut power: i32) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -196,5 +198,33 @@ mod tests {
             assert_eq!(projection_axis(rotated), Some((axis, Sign::Positive)));
         }
         assert_eq!(projection_axis([a, b, b * 2.0]), None);
+    }
+
+    proptest! {
+        /// Against integers of 128 bits, near degeneracy: points of a line or plane, moved a step.
+        #[test]
+        fn signs_agree_with_integers(
+            base in prop::array::uniform3(prop::array::uniform3(-1_000_000_i64..1_000_000)),
+            weights in prop::array::uniform2(-3_i64..4),
+            step in prop::array::uniform3(-1_i64..2),
+        ) {
+            let [a, b, c] = base;
+            let d: [i64; 3] = std::array::from_fn(|k| {
+                a[k] + weights[0] * (b[k] - a[k]) + weights[1] * (c[k] - a[k]) + step[k]
+            });
+            let row = |p: [i64; 3]| -> [i128; 3] { std::array::from_fn(|k| i128::from(p[k] - d[k])) };
+            let [x, y, z] = [a, b, c].map(row);
+            let det = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
+                + x[2] * (y[0] * z[1] - y[1] * z[0]);
+            let float = |p: [i64; 3]| Vec3::from_array(p.map(|v| v as f64 * 2_f64.powi(-24)));
+            let sign = orient3d(float(a), float(b), float(c), float(d));
+            prop_assert_eq!(sign.value(), det.signum() as i32);
+
+            let e: [i64; 3] = std::array::from_fn(|k| a[k] + weights[0] * (b[k] - a[k]) + step[k]);
+            let [u, v] = [a, b].map(|p| [p[0] - e[0], p[1] - e[1]].map(i128::from));
+            let area = u[0] * v[1] - u[1] * v[0];
+            let flat = |p| project(float(p), 2);
+            prop_assert_eq!(orient2d(flat(a), flat(b), flat(e)).value(), area.signum() as i32);
+        }
     }
 }

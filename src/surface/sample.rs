@@ -120,6 +120,15 @@ const CANDIDATES: usize = 5;
 ///
 /// # Cost
 /// `O(F + n log F)`, blue noise `O(F + n log n)`.
+///
+/// ```
+/// use medial::{Vec3, surface::{Sampling, TriMesh, sample}};
+///
+/// let triangle = TriMesh { vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y], faces: vec![[0, 1, 2]] };
+/// let sampling: Sampling = "blue:100".parse()?;
+/// assert_eq!(sample(&triangle, &sampling).len(), 100);
+/// # Ok::<(), medial::surface::ParseSamplingError>(())
+/// ```
 pub fn sample(mesh: &TriMesh, sampling: &Sampling) -> Vec<Vec3> {
     match *sampling {
         Sampling::MeshVertices => mesh.vertices.clone(),
@@ -176,7 +185,8 @@ impl<'a> Areas<'a> {
     }
 
     /// Uniform points with their faces: a face by its share of the area, then the point
-    /// `(1 - sqrt u) a + sqrt u (1 - v) b + sqrt u v c`.
+    /// `(1 - sqrt u) a + sqrt u (1 - v) b + sqrt u v c`, written with differences from `a`, so that
+    /// faces in planes across an axis get points exactly in these planes.
     fn points(&mut self, count: usize, seed: u64) -> Vec<(Vec3, u32)> {
         let total = self.total();
         if total.is_nan() || total <= 0.0 {
@@ -191,7 +201,7 @@ impl<'a> Areas<'a> {
             let face = self.up_to.partition_point(|&sum| sum <= share).min(last);
             let (root, v) = (unit().sqrt(), unit());
             let [a, b, c] = self.mesh.triangle(face);
-            (a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v), face as u32)
+            (a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v), face as u32)
         };
         (0..count).map(point).collect()
     }

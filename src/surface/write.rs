@@ -20,6 +20,12 @@ use super::read::Format;
 /// # Errors
 /// When the extension is unknown or `.stl` (single precision would move vertices), or the file
 /// cannot be written.
+///
+/// ```no_run
+/// let loaded = medial::surface::read("scan.stl")?;
+/// medial::surface::write("repaired.ply", &loaded.mesh)?;
+/// # Ok::<(), medial::surface::SurfaceError>(())
+/// ```
 pub fn write(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), SurfaceError> {
     let path = path.as_ref();
     let written = Format::of(path).and_then(|format| replace(path, mesh, format));

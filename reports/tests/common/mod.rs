@@ -52,7 +52,7 @@ pub fn ok(mesh: &str, method: &str, count: usize, shape: usize, rank: usize) -> 
         0.2 * (rank + 1) as f64 * (2.0 - count as f64 / 1000.0),
     );
     let spheres = count as u64;
-    let genus = if shape % 4 == 0 { 3 } else { 0 };
+    let genus = if shape.is_multiple_of(4) { 3 } else { 0 };
     let right = rank == 0 || noise(shape, rank, 99) > 0.4;
     let mut record = asked(mesh, method, count, Status::Ok);
     record.simplify.reached = Some(count);

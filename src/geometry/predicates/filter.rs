@@ -16,6 +16,7 @@
 //! with an absolute error below `2^-1074` each, which [`UNDERFLOW`] covers when `M <= 1` and the slack
 //! of the constants when `M > 1`.
 
+use super::lanes::{Pair, Real};
 use super::{Sign, exact};
 
 /// A point with its weight; the weight of a Delaunay site is zero and never read.
@@ -150,34 +151,64 @@ impl Filter {
     /// The determinant of the power test in double precision, and a bound on its error beside
     /// [`UNDERFLOW`].
     #[inline(always)]
-    pub(crate) fn lifted_determinant<M: Metric>([a, b, c, d]: [&Site; 4], e: &Site) -> (f64, f64) {
-        let (ap, bp, cp, dp) = (sub(&a.p, &e.p), sub(&b.p, &e.p), sub(&c.p, &e.p), sub(&d.p, &e.p));
-        let ab = ap[0] * bp[1] - bp[0] * ap[1];
-        let bc = bp[0] * cp[1] - cp[0] * bp[1];
-        let cd = cp[0] * dp[1] - dp[0] * cp[1];
-        let da = dp[0] * ap[1] - ap[0] * dp[1];
-        let ac = ap[0] * cp[1] - cp[0] * ap[1];
-        let bd = bp[0] * dp[1] - dp[0] * bp[1];
-        let abc = ap[2] * bc - bp[2] * ac + cp[2] * ab;
-        let bcd = bp[2] * cd - cp[2] * bd + dp[2] * bc;
-        let cda = cp[2] * da + dp[2] * ac + ap[2] * cd;
-        let dab = dp[2] * ab + ap[2] * bd + bp[2] * da;
-        let norm2 = |p: &[f64; 3]| p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-        let (mut al, mut bl, mut cl, mut dl) = (norm2(&ap), norm2(&bp), norm2(&cp), norm2(&dp));
-        let reach2 = al.max(bl).max(cl.max(dl));
-        let mut lift = reach2;
-        if M::WEIGHTED {
-            let offsets = [e.w - a.w, e.w - b.w, e.w - c.w, e.w - d.w];
-            al += offsets[0];
-            bl += offsets[1];
-            cl += offsets[2];
-            dl += offsets[3];
-            let w = offsets.map(f64::abs);
-            lift += w[0].max(w[1]).max(w[2].max(w[3]));
-        }
-        let det = (al * bcd - bl * cda) + (cl * dab - dl * abc);
-        (det, IN_SPHERE_BOUND * (reach2 * reach2.sqrt()) * lift)
+    pub(crate) fn lifted_determinant<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
+        lifted_determinant::<f64, M>(cell.map(|s| (s.p, s.w)), (e.p, e.w))
     }
+
+    /// The same for two cells at once.
+    #[inline(always)]
+    pub(crate) fn lifted_determinants<M: Metric>(
+        [a, b]: [[&Site; 4]; 2],
+        e: &Site,
+    ) -> [(f64, f64); 2] {
+        let pair = |i: usize| {
+            let (s, t) = (a[i], b[i]);
+            let x = |k: usize| Pair::new([s.p[k], t.p[k]]);
+            ([x(0), x(1), x(2)], Pair::new([s.w, t.w]))
+        };
+        let p = e.p.map(Pair::splat);
+        let (det, bound) = lifted_determinant::<Pair, M>(
+            [pair(0), pair(1), pair(2), pair(3)],
+            (p, Pair::splat(e.w)),
+        );
+        let (det, bound) = (det.to_array(), bound.to_array());
+        [(det[0], bound[0]), (det[1], bound[1])]
+    }
+}
+
+/// The lifted determinant of four weighted points relative to a fifth, and its error bound, for
+/// one cell or in lanes.
+#[inline(always)]
+fn lifted_determinant<R: Real, M: Metric>(
+    [a, b, c, d]: [([R; 3], R); 4],
+    e: ([R; 3], R),
+) -> (R, R) {
+    let relative = |p: [R; 3]| [p[0] - e.0[0], p[1] - e.0[1], p[2] - e.0[2]];
+    let (ap, bp, cp, dp) = (relative(a.0), relative(b.0), relative(c.0), relative(d.0));
+    let ab = ap[0] * bp[1] - bp[0] * ap[1];
+    let bc = bp[0] * cp[1] - cp[0] * bp[1];
+    let cd = cp[0] * dp[1] - dp[0] * cp[1];
+    let da = dp[0] * ap[1] - ap[0] * dp[1];
+    let ac = ap[0] * cp[1] - cp[0] * ap[1];
+    let bd = bp[0] * dp[1] - dp[0] * bp[1];
+    let abc = ap[2] * bc - bp[2] * ac + cp[2] * ab;
+    let bcd = bp[2] * cd - cp[2] * bd + dp[2] * bc;
+    let cda = cp[2] * da + dp[2] * ac + ap[2] * cd;
+    let dab = dp[2] * ab + ap[2] * bd + bp[2] * da;
+    let norm2 = |p: [R; 3]| p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+    let (mut al, mut bl, mut cl, mut dl) = (norm2(ap), norm2(bp), norm2(cp), norm2(dp));
+    let reach2 = al.max(bl).max(cl.max(dl));
+    let mut lift = reach2;
+    if M::WEIGHTED {
+        let (aw, bw, cw, dw) = (e.1 - a.1, e.1 - b.1, e.1 - c.1, e.1 - d.1);
+        al = al + aw;
+        bl = bl + bw;
+        cl = cl + cw;
+        dl = dl + dw;
+        lift = lift + aw.abs().max(bw.abs()).max(cw.abs().max(dw.abs()));
+    }
+    let det = (al * bcd - bl * cda) + (cl * dab - dl * abc);
+    (det, R::splat(IN_SPHERE_BOUND) * (reach2 * reach2.sqrt()) * lift)
 }
 
 #[cold]

@@ -14,13 +14,16 @@
 mod circumsphere;
 mod exact;
 mod filter;
+mod lanes;
 mod perturb;
 mod wide;
 
 pub use circumsphere::{circumsphere, orthosphere};
 pub(crate) use exact::collinear as sites_collinear;
 pub(crate) use exact::lowest_bit;
-pub(crate) use filter::{Filter, Metric, Site, Unweighted, Weighted, approximate_orientation};
+pub(crate) use filter::{
+    Filter, Metric, Site, UNDERFLOW, Unweighted, Weighted, approximate_orientation,
+};
 pub(crate) use perturb::{in_conflict, in_conflict_given, lexicographic};
 
 use crate::Vec3;

@@ -45,20 +45,22 @@ pub(crate) fn in_conflict_given<M: Metric>(
 #[cold]
 #[inline(never)]
 fn perturbed(filter: Filter, cell: [&Site; 4], e: &Site) -> bool {
-    // What is left of the five sites in descending order; `e` ends the search.
-    let mut left = [true; 4];
+    // The five sites are visited in descending order; `e` ends the search. Sites at or above the
+    // last one visited are done with.
+    let mut last: Option<&Site> = None;
     loop {
         let mut largest = 4;
-        for i in (0..4).filter(|&i| left[i]) {
-            let top = if largest == 4 { e } else { cell[largest] };
-            if lexicographic(&cell[i].p, &top.p).is_gt() {
-                largest = i;
+        let mut top = e;
+        for (i, &s) in cell.iter().enumerate() {
+            let left = last.is_none_or(|l| precedes(&s.p, &l.p));
+            if left & precedes(&top.p, &s.p) {
+                (largest, top) = (i, s);
             }
         }
         if largest == 4 {
             return false;
         }
-        left[largest] = false;
+        last = Some(top);
         let mut replaced = cell;
         replaced[largest] = e;
         let [a, b, c, d] = replaced;
@@ -68,6 +70,14 @@ fn perturbed(filter: Filter, cell: [&Site; 4], e: &Site) -> bool {
             Sign::Zero => {}
         }
     }
+}
+
+/// Whether `a` is lexicographically smaller, without branches.
+#[inline(always)]
+fn precedes(a: &[f64; 3], b: &[f64; 3]) -> bool {
+    let z = (a[1] == b[1]) & (a[2] < b[2]);
+    let y = (a[0] == b[0]) & ((a[1] < b[1]) | z);
+    (a[0] < b[0]) | y
 }
 
 /// Lexicographic order of positions, none of which has a coordinate of -0.0.

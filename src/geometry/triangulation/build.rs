@@ -26,13 +26,15 @@
 use super::cells::{Cell, Face, INFINITE, MAX_CELLS, OPPOSITE, UNUSED};
 use super::error::TriangulationError;
 use crate::geometry::predicates::{
-    Filter, Metric, Sign, Site, approximate_orientation, in_conflict_given, sites_collinear,
+    Filter, Metric, Sign, Site, UNDERFLOW, approximate_orientation, in_conflict_given,
+    sites_collinear,
 };
 
-/// What is known of a cell while a conflict zone grows.
+/// What is known of a cell while a conflict zone grows: nothing, tested or about to be, and in
+/// conflict. The last two are bits, the second never without the first.
 const UNKNOWN: u8 = 0;
-const CONFLICT: u8 = 1;
-const OUTSIDE: u8 = 2;
+const TESTED: u8 = 1;
+const CONFLICT: u8 = 3;
 
 /// Local number of a vertex that is not on the boundary of the conflict zone.
 const ABSENT: u8 = u8::MAX;
@@ -46,6 +48,8 @@ const TABLE: usize = 64;
 struct Wall {
     v: [u32; 3],
     outside: Face,
+    /// Numbers of the vertices among those of all walls.
+    local: [u8; 3],
 }
 
 /// A cell beside the conflict zone, and what decides whether it belongs to it.
@@ -69,8 +73,8 @@ pub(super) struct Builder<M> {
     walls: Vec<Wall>,
     front: Vec<Candidate>,
     local: Vec<u8>,
-    rim: Vec<u32>,
-    table: Box<[Face]>,
+    rim: [u32; TABLE + 1],
+    table: Box<[Face; TABLE * TABLE]>,
     metric: std::marker::PhantomData<M>,
 }
 
@@ -95,8 +99,8 @@ impl<M: Metric> Builder<M> {
             walls: Vec::new(),
             front: Vec::new(),
             local: vec![ABSENT; sites.len()],
-            rim: Vec::new(),
-            table: vec![Face::NONE; TABLE * TABLE].into(),
+            rim: [0; TABLE + 1],
+            table: Box::new([Face::NONE; TABLE * TABLE]),
             sites,
             metric: std::marker::PhantomData,
         };
@@ -146,6 +150,7 @@ impl<M: Metric> Builder<M> {
             }
         }
         self.find_conflict_zone(vertex, seed);
+        self.collect_walls();
         self.stellate(vertex)
     }
 
@@ -214,72 +219,100 @@ impl<M: Metric> Builder<M> {
         conflicts_given::<M>(self.filter, &self.cells, &self.sites, cell, site, det, bound)
     }
 
-    /// Marks and lists the cells in conflict with the site and the walls around them.
+    /// Marks and lists the cells in conflict with the site.
     ///
     /// Generation by generation: the neighbours of the last one are collected, then tested
     /// together, so that no test waits for the verdict on another.
     fn find_conflict_zone(&mut self, vertex: u32, seed: u32) {
-        let Self { cells, sites, state, zone, walls, front, filter, .. } = self;
-        let site = &sites[vertex as usize];
-        zone.clear();
-        zone.push(seed);
-        state[seed as usize] = CONFLICT;
+        self.zone.clear();
+        self.zone.push(seed);
+        self.state[seed as usize] = CONFLICT;
         let mut generation = 0;
-        while generation < zone.len() {
-            front.clear();
-            for &c in &zone[generation..] {
-                for n in cells[c as usize].n {
-                    let known = &mut state[n.cell() as usize];
-                    if *known == UNKNOWN {
-                        *known = OUTSIDE;
-                        front.push(Candidate { cell: n.cell(), det: 0.0, bound: 0.0 });
-                    }
-                }
-            }
-            generation = zone.len();
-            for candidate in front.iter_mut() {
-                (candidate.det, candidate.bound) =
-                    determinant::<M>(cells, sites, candidate.cell, site);
-            }
-            for &Candidate { cell, det, bound } in front.iter() {
-                if conflicts_given::<M>(*filter, cells, sites, cell, site, det, bound) {
-                    state[cell as usize] = CONFLICT;
-                    zone.push(cell);
-                }
+        while generation < self.zone.len() {
+            let front = self.collect_front(generation);
+            generation = self.zone.len();
+            self.test_front(vertex, front);
+        }
+    }
+
+    /// Collects the unknown neighbours of the zone from `generation` on; returns their number.
+    ///
+    /// Every neighbour is written, and counted if it was unknown: whether it is cannot be
+    /// predicted, and a wrong guess would cost more than the write.
+    fn collect_front(&mut self, generation: usize) -> usize {
+        let Self { cells, state, zone, front, .. } = self;
+        let most = 4 * (zone.len() - generation);
+        if front.len() < most {
+            front.resize(most, Candidate { cell: 0, det: 0.0, bound: 0.0 });
+        }
+        let mut count = 0;
+        for &c in &zone[generation..] {
+            for n in cells[c as usize].n {
+                let known = &mut state[n.cell() as usize];
+                front[count].cell = n.cell();
+                count += usize::from(*known == UNKNOWN);
+                *known |= TESTED;
             }
         }
+        count
+    }
+
+    /// Tests the first `count` candidates and appends those in conflict to the zone.
+    fn test_front(&mut self, vertex: u32, count: usize) {
+        let Self { cells, sites, state, zone, front, filter, .. } = self;
+        let site = &sites[vertex as usize];
+        let front = &mut front[..count];
+        let mut pairs = front.chunks_exact_mut(2);
+        for pair in &mut pairs {
+            let finite = |i: usize| sites_of(sites, finite_side(cells, pair[i].cell));
+            let [first, second] = Filter::lifted_determinants::<M>([finite(0), finite(1)], site);
+            (pair[0].det, pair[0].bound) = first;
+            (pair[1].det, pair[1].bound) = second;
+        }
+        for candidate in pairs.into_remainder() {
+            (candidate.det, candidate.bound) = determinant::<M>(cells, sites, candidate.cell, site);
+        }
+        let mut size = zone.len();
+        zone.resize(size + count, 0);
+        for &Candidate { cell, det, bound } in front.iter() {
+            let decided = det.abs() > bound + UNDERFLOW && !cells[cell as usize].is_infinite();
+            let conflict = if decided {
+                det > 0.0
+            } else {
+                conflicts_given::<M>(*filter, cells, sites, cell, site, det, bound)
+            };
+            zone[size] = cell;
+            size += usize::from(conflict);
+            state[cell as usize] |= u8::from(conflict) * CONFLICT;
+        }
+        zone.truncate(size);
+    }
+
+    /// Lists the facets between the conflict zone and the cells around it.
+    fn collect_walls(&mut self) {
+        let Self { cells, state, zone, walls, .. } = self;
+        let most = 4 * zone.len();
         walls.clear();
+        walls.resize(most, Wall { v: [0; 3], outside: Face::NONE, local: [ABSENT; 3] });
+        let mut count = 0;
         for &c in zone.iter() {
             let cell = &cells[c as usize];
-            for (i, outside) in cell.n.into_iter().enumerate() {
-                if state[outside.cell() as usize] == OUTSIDE {
-                    let [a, b, c] = OPPOSITE[i];
-                    walls.push(Wall { v: [cell.v[a], cell.v[b], cell.v[c]], outside });
-                }
+            for i in 0..4 {
+                let outside = cell.n[i];
+                let [a, b, c] = OPPOSITE[i];
+                walls[count] =
+                    Wall { v: [cell.v[a], cell.v[b], cell.v[c]], outside, local: [ABSENT; 3] };
+                count += usize::from(state[outside.cell() as usize] == TESTED);
             }
         }
+        walls.truncate(count);
     }
 
     /// Replaces the conflict zone by the cone of its walls from the site.
     fn stellate(&mut self, vertex: u32) -> Result<(), TriangulationError> {
-        if self.cells.len() + self.walls.len() > MAX_CELLS {
-            let points = self.sites.len() - 1;
-            return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
-        }
-        self.number_rim();
-        let mut reused = 0;
-        for w in 0..self.walls.len() {
-            let id = if reused < self.zone.len() {
-                reused += 1;
-                self.zone[reused - 1]
-            } else if let Some(id) = self.free.pop() {
-                id
-            } else {
-                self.state.push(UNKNOWN);
-                self.cells.push(Cell { v: [UNUSED; 4], n: [Face::NONE; 4] });
-                self.cells.len() as u32 - 1
-            };
-            let wall = &mut self.walls[w];
+        self.allocate()?;
+        let Self { cells, state, zone, walls, .. } = self;
+        for (wall, &id) in walls.iter_mut().zip(zone.iter()) {
             // The vertex at infinity goes last.
             if wall.v[0] == INFINITE {
                 wall.v.rotate_left(1);
@@ -288,72 +321,84 @@ impl<M: Metric> Builder<M> {
             }
             let [a, b, c] = wall.v;
             let outside = wall.outside;
-            self.cells[id as usize] =
-                Cell { v: [vertex, a, b, c], n: [outside, Face::NONE, Face::NONE, Face::NONE] };
-            self.state[id as usize] = UNKNOWN;
-            self.cells[outside.cell() as usize].n[outside.index()] = Face::new(id, 0);
-            self.state[outside.cell() as usize] = UNKNOWN;
-            wall.outside = Face::new(id, 0);
-            self.last = id;
+            cells[id as usize] = Cell { v: [vertex, a, b, c], n: [outside; 4] };
+            state[id as usize] = UNKNOWN;
+            cells[outside.cell() as usize].n[outside.index()] = Face::new(id, 0);
+            state[outside.cell() as usize] = UNKNOWN;
         }
-        for &id in &self.zone[reused..] {
+        self.last = self.zone[self.walls.len() - 1];
+        for &id in &self.zone[self.walls.len()..] {
             self.cells[id as usize].v[0] = UNUSED;
             self.state[id as usize] = UNKNOWN;
             self.free.push(id);
         }
-        if self.rim.len() <= TABLE {
+        // The walls are a triangulated sphere: by Euler's relation it has two more vertices than
+        // half its triangles.
+        if self.walls.len() / 2 + 2 <= TABLE {
             self.link_by_table();
         } else {
             self.link_by_sorting();
         }
-        for &v in &self.rim {
-            self.local[v as usize] = ABSENT;
+        Ok(())
+    }
+
+    /// Extends the zone by records until there is one for each wall.
+    fn allocate(&mut self) -> Result<(), TriangulationError> {
+        while self.zone.len() < self.walls.len() {
+            let id = if let Some(id) = self.free.pop() {
+                id
+            } else if self.cells.len() < MAX_CELLS {
+                self.state.push(UNKNOWN);
+                self.cells.push(Cell { v: [UNUSED; 4], n: [Face::NONE; 4] });
+                self.cells.len() as u32 - 1
+            } else {
+                let points = self.sites.len() - 1;
+                return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
+            };
+            self.zone.push(id);
         }
         Ok(())
     }
 
-    /// Numbers the vertices of the walls from zero, as far as the table reaches.
-    fn number_rim(&mut self) {
-        self.rim.clear();
-        for wall in &self.walls {
-            for v in wall.v {
-                if self.local[v as usize] == ABSENT && self.rim.len() <= TABLE {
-                    self.local[v as usize] = self.rim.len() as u8;
-                    self.rim.push(v);
-                }
-            }
-        }
-    }
-
-    /// Two new cells share a facet where their walls share an edge; each directed edge belongs to
-    /// one wall.
+    /// Links new cells with each other: two share a facet where their walls share an edge, and
+    /// each directed edge belongs to one wall.
+    ///
+    /// Vertices of the walls are numbered, and a table of their pairs filled and read; it need not
+    /// be cleared, since exactly the edges that are read have been written.
     fn link_by_table(&mut self) {
-        let Self { walls, local, table, cells, .. } = self;
-        for wall in walls.iter() {
-            let id = wall.outside.cell();
-            let [a, b, c] = wall.v;
-            let [a, b, c] =
-                [local[a as usize], local[b as usize], local[c as usize]].map(usize::from);
-            table[b * TABLE + c] = Face::new(id, 1);
-            table[c * TABLE + a] = Face::new(id, 2);
-            table[a * TABLE + b] = Face::new(id, 3);
+        let Self { walls, local, rim, table, cells, zone, .. } = self;
+        let at = |a: u8, b: u8| (usize::from(a) * TABLE + usize::from(b)) % (TABLE * TABLE);
+        let mut count = 0;
+        for (wall, &id) in walls.iter_mut().zip(zone.iter()) {
+            for (v, number) in wall.v.into_iter().zip(&mut wall.local) {
+                let known = &mut local[v as usize];
+                let fresh = *known == ABSENT;
+                *known = if fresh { count as u8 } else { *known };
+                *number = *known;
+                rim[count] = v;
+                count += usize::from(fresh);
+            }
+            let [a, b, c] = wall.local;
+            table[at(b, c)] = Face::new(id, 1);
+            table[at(c, a)] = Face::new(id, 2);
+            table[at(a, b)] = Face::new(id, 3);
         }
-        for wall in walls.iter() {
-            let [a, b, c] = wall.v;
-            let [a, b, c] =
-                [local[a as usize], local[b as usize], local[c as usize]].map(usize::from);
-            let n = &mut cells[wall.outside.cell() as usize].n;
-            n[1] = table[c * TABLE + b];
-            n[2] = table[a * TABLE + c];
-            n[3] = table[b * TABLE + a];
+        for (wall, &id) in walls.iter().zip(zone.iter()) {
+            let [a, b, c] = wall.local;
+            let n = &mut cells[id as usize].n;
+            n[1] = table[at(c, b)];
+            n[2] = table[at(a, c)];
+            n[3] = table[at(b, a)];
+        }
+        for &v in &rim[..count] {
+            local[v as usize] = ABSENT;
         }
     }
 
     /// The same for large conflict zones.
     fn link_by_sorting(&mut self) {
         let mut edges = Vec::with_capacity(3 * self.walls.len());
-        for wall in &self.walls {
-            let id = wall.outside.cell();
+        for (wall, &id) in self.walls.iter().zip(&self.zone) {
             let [a, b, c] = wall.v;
             for (i, (x, y)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
                 edges.push((x.min(y), x.max(y), Face::new(id, i + 1).0));

@@ -1,26 +1,19 @@
-//! PLY, the polygon file format of Stanford: text, and binary of either byte order.
-//!
-//! - Needed are `element vertex` with the properties `x, y, z` and `element face` with a list
-//!   `vertex_indices` (or `vertex_index`); other elements and properties are passed over.
-//! - In a text file every element has a line of its own, as the format says; a line with too few
-//!   or too many values is an error.
-//! - Bytes or lines after the last element give a warning.
-//! - Triangle strips (`element tristrips`) are refused.
+//! The header of a PLY file.
 
-use super::off::checked_index;
-use super::text::{Cursor, quote};
+use super::super::text::quote;
 use crate::surface::error::{Fault, Place};
-use crate::surface::soup::PolygonSoup;
 
+/// How values are stored.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Encoding {
+pub(super) enum Encoding {
     Text,
     LittleEndian,
     BigEndian,
 }
 
+/// The types of the format, under both of their names.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Scalar {
+pub(super) enum Scalar {
     I8,
     U8,
     I16,
@@ -46,7 +39,7 @@ impl Scalar {
         })
     }
 
-    fn size(self) -> usize {
+    pub fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -55,12 +48,12 @@ impl Scalar {
         }
     }
 
-    fn is_integer(self) -> bool {
+    pub fn is_integer(self) -> bool {
         !matches!(self, Self::F32 | Self::F64)
     }
 
     /// The value in these `size()` bytes. Exact: every type of the format fits a double.
-    fn decode(self, bytes: &[u8], encoding: Encoding) -> f64 {
+    pub fn decode(self, bytes: &[u8], encoding: Encoding) -> f64 {
         let mut b = [0; 8];
         let n = bytes.len();
         b[..n].copy_from_slice(bytes);
@@ -82,7 +75,7 @@ impl Scalar {
 
 /// What a property means for the surface.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Role {
+pub(super) enum Role {
     /// The coordinate with this number.
     Coordinate(usize),
     /// The corners of a face.
@@ -90,215 +83,41 @@ enum Role {
     Passed,
 }
 
-struct Property {
+/// A property, or a list of them.
+pub(super) struct Property {
     /// Type of the length, for a list.
-    length: Option<Scalar>,
-    scalar: Scalar,
-    role: Role,
+    pub length: Option<Scalar>,
+    pub scalar: Scalar,
+    pub role: Role,
 }
 
+/// What an element means for the surface.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     Vertex,
     Face,
     Other,
 }
 
-struct Element {
-    kind: Kind,
-    count: usize,
-    properties: Vec<Property>,
+/// An element with the rows it announces.
+pub(super) struct Element {
+    pub kind: Kind,
+    pub count: usize,
+    pub properties: Vec<Property>,
 }
 
-/// Parses a PLY file.
-pub(super) fn parse(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
-    let (encoding, elements, data) = parse_header(bytes)?;
-    let mut rows = Rows { encoding, bytes, at: data.at, text: data };
-    let announced = elements.iter().find(|e| e.kind == Kind::Vertex).map_or(0, |e| e.count);
-    let mut soup = PolygonSoup::default();
-    for element in &elements {
-        check_room(element, &rows)?;
-        // An element without properties takes no room, so its count could be anything.
-        let count = if element.properties.is_empty() { 0 } else { element.count };
-        for row in 0..count {
-            parse_row(&mut rows, element, row, announced, &mut soup)?;
-        }
-    }
-    if let Some(rest) = rows.rest() {
-        soup.warnings.push(format!("{rest} after the last element are ignored"));
-    }
-    Ok(soup)
+/// The header, and where the data begin.
+pub(super) struct Header {
+    pub encoding: Encoding,
+    pub elements: Vec<Element>,
+    /// First byte of the data.
+    pub end: usize,
+    /// Line of that byte.
+    pub line: usize,
 }
 
-/// A header that announces more than can follow is refused before memory is reserved for it.
-fn check_room(element: &Element, rows: &Rows<'_>) -> Result<(), Fault> {
-    let size = |p: &Property| match (rows.encoding, p.length) {
-        (Encoding::Text, _) => 2,
-        (_, Some(length)) => length.size(),
-        (_, None) => p.scalar.size(),
-    };
-    let least: usize = element.properties.iter().map(size).sum();
-    let room = rows.room() + usize::from(rows.encoding == Encoding::Text);
-    if element.count.checked_mul(least).is_none_or(|needed| needed > room) {
-        let what = match element.kind {
-            Kind::Vertex => "vertices",
-            Kind::Face => "faces",
-            Kind::Other => "elements",
-        };
-        let holds = format!("only {} bytes more", rows.room());
-        return Err(Fault::Count { what, announced: element.count as u64, holds });
-    }
-    Ok(())
-}
-
-fn parse_row(
-    rows: &mut Rows<'_>,
-    element: &Element,
-    row: usize,
-    vertices: usize,
-    soup: &mut PolygonSoup,
-) -> Result<(), Fault> {
-    let name = ["vertex", "face", "element"][element.kind as usize];
-    rows.begin(name, row)?;
-    let mut xyz = [0.0; 3];
-    for property in &element.properties {
-        let length = match property.length {
-            None => 1,
-            Some(scalar) => {
-                let length = rows.value(scalar, name, row)?;
-                if !(length >= 0.0 && length.fract() == 0.0) {
-                    let expected = "the length of a list".to_owned();
-                    let found = length.to_string();
-                    return Err(Fault::Syntax { at: rows.place(name, row), expected, found });
-                }
-                length as usize
-            }
-        };
-        if property.role == Role::Passed && rows.encoding != Encoding::Text {
-            rows.skip(length, property.scalar, name, row)?;
-            continue;
-        }
-        for _ in 0..length {
-            let value = rows.value(property.scalar, name, row)?;
-            match property.role {
-                Role::Coordinate(axis) => xyz[axis] = value,
-                Role::Corners => {
-                    let at = rows.place(name, row);
-                    soup.corners.push(checked_index(value as i64, vertices, at, row)?);
-                }
-                Role::Passed => {}
-            }
-        }
-    }
-    let line = rows.end()?;
-    match element.kind {
-        Kind::Vertex => soup.push_vertex(xyz, || rows.place(name, row)),
-        Kind::Face => soup.end_polygon(line),
-        Kind::Other => Ok(()),
-    }
-}
-
-/// The data after the header, as text or as bytes.
-struct Rows<'a> {
-    encoding: Encoding,
-    bytes: &'a [u8],
-    at: usize,
-    text: Data<'a>,
-}
-
-impl Rows<'_> {
-    fn room(&self) -> usize {
-        match self.encoding {
-            Encoding::Text => self.text.cursor.bytes_left(),
-            _ => self.bytes.len() - self.at,
-        }
-    }
-
-    fn place(&self, name: &'static str, row: usize) -> Place {
-        match self.encoding {
-            Encoding::Text => Place::Line(self.text.cursor.line()),
-            _ => Place::Element(name, row),
-        }
-    }
-
-    fn begin(&mut self, name: &'static str, row: usize) -> Result<(), Fault> {
-        if self.encoding == Encoding::Text && !self.text.cursor.skip_empty_lines() {
-            return Err(self.text.cursor.expected(format!("{name} {row}"), None));
-        }
-        Ok(())
-    }
-
-    fn value(&mut self, scalar: Scalar, name: &'static str, row: usize) -> Result<f64, Fault> {
-        if self.encoding == Encoding::Text {
-            let token = self.text.cursor.token_on_line();
-            let value = token.and_then(|t| match scalar.is_integer() {
-                true => t.integer().map(|i| i as f64),
-                false => t.number(),
-            });
-            let kind = if scalar.is_integer() { "an integer" } else { "a number" };
-            return value.ok_or_else(|| {
-                self.text.cursor.expected(format!("{kind} of {name} {row}"), token)
-            });
-        }
-        let end = self.at + scalar.size();
-        let bytes = self.bytes.get(self.at..end).ok_or_else(|| cut_off(name, row))?;
-        self.at = end;
-        Ok(scalar.decode(bytes, self.encoding))
-    }
-
-    /// Passes over values of a binary file.
-    fn skip(
-        &mut self,
-        length: usize,
-        scalar: Scalar,
-        name: &'static str,
-        row: usize,
-    ) -> Result<(), Fault> {
-        let size = length.checked_mul(scalar.size()).filter(|&size| size <= self.room());
-        self.at += size.ok_or_else(|| cut_off(name, row))?;
-        Ok(())
-    }
-
-    /// Ends a row; a text row has to end with its line, whose number is returned.
-    fn end(&mut self) -> Result<Option<usize>, Fault> {
-        if self.encoding != Encoding::Text {
-            return Ok(None);
-        }
-        let line = self.text.cursor.line();
-        let more = self.text.cursor.token_on_line();
-        if more.is_some() {
-            let expected = "the end of the line (no more properties are declared)";
-            return Err(self.text.cursor.expected(expected, more));
-        }
-        Ok(Some(line))
-    }
-
-    fn rest(&mut self) -> Option<String> {
-        match self.encoding {
-            Encoding::Text if self.text.cursor.skip_empty_lines() => {
-                Some(format!("line {} and more", self.text.cursor.line()))
-            }
-            Encoding::Text => None,
-            _ => (self.room() > 0).then(|| format!("{} bytes", self.room())),
-        }
-    }
-}
-
-fn cut_off(name: &str, row: usize) -> Fault {
-    Fault::Syntax {
-        at: Place::End,
-        expected: format!("the rest of {name} {row}"),
-        found: "nothing more".into(),
-    }
-}
-
-/// Where the data begin.
-struct Data<'a> {
-    at: usize,
-    cursor: Cursor<'a>,
-}
-
-fn parse_header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, Data<'_>), Fault> {
+/// Parses everything up to `end_header`.
+pub(super) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
     let mut header = HeaderLines::new(bytes);
     let first = header.next().unwrap_or_default();
     if first.trim_ascii_end() != b"ply" {
@@ -329,8 +148,7 @@ fn parse_header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, Data<'_>), Faul
     let encoding =
         encoding.ok_or_else(|| header.unexpected("a format line before it", b"end_header"))?;
     check_elements(&header, &elements)?;
-    let cursor = Cursor::continue_at(bytes, header.at, header.line + 1);
-    Ok((encoding, elements, Data { at: header.at, cursor }))
+    Ok(Header { encoding, elements, end: header.at, line: header.line + 1 })
 }
 
 /// Whether the header describes a surface at all.

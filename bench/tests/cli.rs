@@ -1,0 +1,363 @@
+//! The command as its users meet it: what it prints, what it writes, how it ends.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn medial(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("medial").expect("the binary is built");
+    command.args(arguments);
+    command
+}
+
+/// Runs the command and returns its exit code and both outputs.
+fn run(arguments: &[&str]) -> (i32, String, String) {
+    let output = medial(arguments).output().expect("the command starts");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
+}
+
+/// Runs the command with `--json` and returns its exit code and the one object it prints.
+fn json(arguments: &[&str]) -> (i32, Value) {
+    let (code, stdout, stderr) = run(&[arguments, &["--json"]].concat());
+    assert_eq!(stdout.lines().count(), 1, "one line of JSON: {stdout}\n{stderr}");
+    let object: Value = serde_json::from_str(&stdout).expect("JSON");
+    assert!(object["warnings"].is_array() && object["version"].is_string(), "{object}");
+    (code, object)
+}
+
+fn text_path(path: &Path) -> &str {
+    path.to_str().expect("a UTF-8 path")
+}
+
+/// Seconds and sizes that differ from run to run become `#`.
+fn without_timings(text: &str) -> String {
+    let words = text.split(' ').map(|word| {
+        let number = word.trim_end_matches(['s', ',']);
+        if number.contains('.') && number.parse::<f64>().is_ok() { "#" } else { word }
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn help_names_every_verb() {
+    let (code, stdout, _) = run(&["--help"]);
+    assert_eq!(code, 0);
+    insta::assert_snapshot!(stdout);
+}
+
+#[test]
+fn methods_and_their_parameters() {
+    insta::assert_snapshot!("methods", run(&["methods"]).1);
+    insta::assert_snapshot!("methods_qmat", run(&["methods", "qmat"]).1);
+    insta::assert_snapshot!("methods_angle", run(&["methods", "angle"]).1);
+    let (code, _, stderr) = run(&["methods", "nothing"]);
+    assert_eq!(code, 2);
+    insta::assert_snapshot!("methods_unknown", stderr);
+}
+
+#[test]
+fn datasets_are_listed() {
+    insta::assert_snapshot!(run(&["datasets", "list"]).1);
+}
+
+#[test]
+fn info_on_a_built_in_shape() {
+    let (code, stdout, _) = run(&["info", "builtin:torus"]);
+    assert_eq!(code, 0);
+    insta::assert_snapshot!(stdout);
+    let (_, object) = json(&["info", "builtin:torus"]);
+    for key in [
+        "vertices",
+        "faces",
+        "components",
+        "genus",
+        "closed",
+        "manifold",
+        "oriented",
+        "self_intersecting",
+        "degenerate_faces",
+        "diagonal",
+        "repairs",
+    ] {
+        assert!(!object[key].is_null(), "{key} is missing in {object}");
+    }
+}
+
+#[test]
+fn info_describes_a_mesh_that_it_refuses() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("open.off");
+    fs::write(&path, "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n")
+        .expect("written");
+    let (code, object) = json(&["info", text_path(&path)]);
+    assert_eq!(code, 1);
+    assert_eq!(object["closed"], false);
+    assert_eq!(object["boundary_edges"], 3);
+    assert!(
+        object["reason"].as_str().is_some_and(|reason| reason.contains("open.off")),
+        "{object}"
+    );
+}
+
+#[test]
+fn axis_simplify_evaluate_convert() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name);
+    let (mesh, axis, simple, ply) =
+        (at("box.off"), at("axis.ma"), at("simple.ma"), at("simple.ply"));
+    let [mesh, axis, simple, ply] = [&mesh, &axis, &simple, &ply].map(|path| text_path(path));
+    assert_eq!(run(&["datasets", "make", "box", "-o", mesh]).0, 0);
+
+    let (code, object) = json(&["axis", mesh, "-o", axis]);
+    assert_eq!(code, 0);
+    for key in [
+        "spheres",
+        "edges",
+        "faces",
+        "isolated",
+        "euler",
+        "betti",
+        "expected_betti",
+        "samples",
+        "sampling",
+        "seed",
+        "seconds",
+        "cpu_seconds",
+        "peak_bytes",
+    ] {
+        assert!(object.get(key).is_some(), "{key} is missing in {object}");
+    }
+    for stage in ["read", "delaunay", "inside", "extract", "total"] {
+        assert!(object["seconds"][stage].is_f64(), "{stage} is missing in {object}");
+    }
+    assert_eq!(object["betti"], object["expected_betti"]);
+
+    for method in ["qmat", "angle", "lambda"] {
+        let (code, object) =
+            json(&["simplify", mesh, "--method", method, "--spheres", "60", "-o", simple]);
+        assert_eq!(code, 0, "{object}");
+        assert_eq!(object["status"], "ok");
+        assert_eq!(object["spheres"], 60);
+        assert_eq!(object["level"]["spheres"], 60);
+        let (code, object) = json(&["evaluate", mesh, simple, "--samples", "2000"]);
+        assert_eq!(code, 0);
+        for key in [
+            "epsilon",
+            "epsilon_union",
+            "reverse",
+            "hausdorff",
+            "mean",
+            "rms",
+            "p95",
+            "p99",
+            "reverse_mean",
+            "spheres_only",
+            "volume_error",
+            "quality",
+            "spikes",
+            "betti",
+            "euler",
+            "expected_betti",
+            "counts",
+            "diagonal",
+            "samples",
+            "seed",
+        ] {
+            assert!(object.get(key).is_some(), "{key} is missing in {object}");
+        }
+        let number = |key: &str| object[key].as_f64().expect("a number");
+        assert_eq!(number("hausdorff"), number("epsilon_union").max(number("reverse")));
+    }
+
+    let from_file = ["simplify", mesh, "--method", "qmat", "--spheres", "60", "--initial", axis];
+    assert_eq!(json(&from_file).1["spheres"], 60);
+    assert_eq!(run(&["convert", simple, ply]).0, 0);
+    assert_eq!(run(&["convert", ply, axis]).0, 0);
+    assert_eq!(fs::read(axis).expect("read"), fs::read(simple).expect("read"));
+    assert_eq!(run(&["convert", mesh, simple]).0, 2, "a surface is no medial mesh");
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let dir = tempfile::tempdir().expect("a folder");
+    for method in ["qmat", "angle", "lambda"] {
+        let written = ["1", "2"].map(|threads| {
+            let path = dir.path().join(format!("{method}-{threads}.ma"));
+            let (code, ..) = run(&[
+                "simplify",
+                "builtin:blob",
+                "--method",
+                method,
+                "--spheres",
+                "100",
+                "--threads",
+                threads,
+                "-o",
+                text_path(&path),
+            ]);
+            assert_eq!(code, 0);
+            fs::read(path).expect("written")
+        });
+        assert_eq!(written[0], written[1], "{method}");
+    }
+}
+
+#[test]
+fn compare_leaves_a_row_for_every_run() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("report");
+    let (code, stdout, stderr) = run(&[
+        "compare",
+        "builtin:box",
+        "builtin:capsule",
+        "--spheres",
+        "100,50",
+        "--samples",
+        "1000",
+        "--out",
+        text_path(&out),
+    ]);
+    assert_eq!(code, 0, "{stderr}");
+    insta::assert_snapshot!("compare_summary_heads", heads(&stdout));
+    let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
+    assert_eq!(lines.lines().count(), 2 * 3 * 2);
+    for line in lines.lines() {
+        let record: Value = serde_json::from_str(line).expect("a record");
+        assert_eq!(record["status"], "ok", "{record}");
+        assert!(record["evaluate"]["hausdorff"].is_f64(), "{record}");
+        let artifact = out.join(record["artifact"].as_str().expect("an artifact"));
+        assert!(artifact.exists(), "{}", artifact.display());
+    }
+    for file in ["index.html", "results.csv", "tables/summary.md", "tables/summary.tex"] {
+        assert!(out.join(file).exists(), "{file}");
+    }
+    assert_eq!(run(&["report", text_path(&out)]).0, 0);
+}
+
+/// The summary without its numbers.
+fn heads(stdout: &str) -> String {
+    let line = |line: &str| line.split_whitespace().next().unwrap_or_default().to_owned();
+    stdout
+        .lines()
+        .take_while(|text| !text.contains("page:"))
+        .map(line)
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+#[test]
+fn a_refused_mesh_and_an_unsupported_level_are_rows() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (out, bad) = (dir.path().join("report"), dir.path().join("bad.off"));
+    fs::write(&bad, "OFF\n1 0 0\n0 0 0\n").expect("written");
+    let (code, object) = json(&[
+        "compare",
+        text_path(&bad),
+        "builtin:sphere",
+        "--published",
+        "--spheres",
+        "20",
+        "--samples",
+        "500",
+        "--out",
+        text_path(&out),
+        "--methods",
+        "angle",
+    ]);
+    assert_eq!(code, 3);
+    assert_eq!(object["status"]["refused"], 2);
+    assert_eq!(object["status"]["unsupported"], 1);
+    assert_eq!(object["status"]["ok"], 1);
+    let (code, _) = json(&["compare", text_path(&bad), "--out", text_path(&out)]);
+    assert_eq!(code, 5, "nothing was measured");
+}
+
+#[test]
+fn wrong_words_end_in_usage() {
+    let cases: [&[&str]; 8] = [
+        &["compare", "builtin:nothing", "--methods", "nothing"],
+        &["compare", "--spheres", "0"],
+        &["compare", "--set", "qmat.k"],
+        &["simplify", "builtin:box", "--method", "qmat", "--spheres", "5", "--set", "no=1"],
+        &["simplify", "builtin:box", "--method", "angle", "--level", "999"],
+        &["axis", "builtin:box", "--sampling", "red:5"],
+        &["axis", "builtin:box:x"],
+        &["info", "builtin:box", "--threads", "0"],
+    ];
+    for arguments in cases {
+        let (code, _, stderr) = run(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {stderr}");
+    }
+    let (code, _, stderr) = run(&["simplify", "no-such-file.off", "--method", "qmat"]);
+    assert_eq!(code, 1);
+    assert!(stderr.contains("no-such-file.off"), "{stderr}");
+}
+
+#[test]
+fn max_error_is_met() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("x.ma");
+    let (code, object) = json(&[
+        "simplify",
+        "builtin:capsule",
+        "--method",
+        "qmat",
+        "--max-error",
+        "0.02",
+        "--samples",
+        "3000",
+        "-o",
+        text_path(&path),
+    ]);
+    assert_eq!(code, 0, "{object}");
+    let (_, evaluation) =
+        json(&["evaluate", "builtin:capsule", text_path(&path), "--samples", "3000"]);
+    assert!(evaluation["hausdorff"].as_f64().expect("a number") <= 0.02, "{evaluation}");
+    assert!(object["spheres"].as_u64().expect("a count") < 200, "{object}");
+}
+
+#[test]
+fn printed_results() {
+    let (_, stdout, _) =
+        run(&["simplify", "builtin:capsule", "--method", "qmat", "--spheres", "20"]);
+    insta::assert_snapshot!("simplify", without_timings(&stdout));
+    let (_, stdout, _) = run(&["axis", "builtin:capsule"]);
+    insta::assert_snapshot!("axis", without_timings(&stdout));
+}
+
+#[allow(clippy::print_stderr, reason = "a skipped check must say so")]
+/// Where the meshes that cannot be redistributed are, if they are.
+fn shared_meshes() -> Option<PathBuf> {
+    let folder = std::env::var_os("MEDIAL_MESHES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
+        PathBuf::from,
+    );
+    if folder.join("bear.off").exists() {
+        return Some(folder);
+    }
+    eprintln!("skipped: no meshes in {}", folder.display());
+    None
+}
+
+#[test]
+fn published_counts_and_errors_on_real_meshes() {
+    let Some(folder) = shared_meshes() else { return };
+    for (file, spheres) in [("bear.off", 34_703_i64), ("dolphin.off", 54_241)] {
+        let mesh = folder.join(file);
+        let (_, object) = json(&["axis", text_path(&mesh)]);
+        let counted = object["spheres"].as_i64().expect("a count");
+        assert!((counted - spheres).abs() <= 5, "{file}: {counted}, published {spheres}");
+        assert_eq!(object["betti"], serde_json::json!([1, 0, 0]), "{file}");
+    }
+    let dir = tempfile::tempdir().expect("a folder");
+    let (mesh, axis) = (folder.join("bear.off"), dir.path().join("bear.ma"));
+    let (mesh, axis) = (text_path(&mesh), text_path(&axis));
+    json(&["simplify", mesh, "--method", "qmat", "--spheres", "100", "-o", axis]);
+    let (_, object) = json(&["evaluate", mesh, axis]);
+    let hausdorff = object["hausdorff"].as_f64().expect("a number");
+    assert!(hausdorff <= 0.0155, "{hausdorff}");
+    assert_eq!(object["betti"], serde_json::json!([1, 0, 0]));
+}

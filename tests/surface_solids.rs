@@ -1,0 +1,220 @@
+//! From faces in any order and orientation to solids: orientation, cavities, invariants.
+
+mod surface_shapes;
+
+use medial::Vec3;
+use medial::surface::{self, Fault, Format, Loaded, Repair, TriMesh};
+use proptest::prelude::*;
+use surface_shapes::*;
+
+fn read(mesh: &TriMesh) -> Loaded {
+    surface::read_bytes(to_off(mesh).as_bytes(), Format::Off).unwrap()
+}
+
+fn shell(radius: f64) -> TriMesh {
+    cuboid(Vec3::splat(-radius), Vec3::splat(radius))
+}
+
+#[test]
+fn shells_alternate_between_solid_and_cavity() {
+    let nested: Vec<TriMesh> = (1..=5).rev().map(|r| shell(f64::from(r))).collect();
+    let expected = 1000.0 - 512.0 + 216.0 - 64.0 + 8.0;
+    for turned in 0..32 {
+        let parts: Vec<TriMesh> = nested
+            .iter()
+            .enumerate()
+            .map(
+                |(i, part)| {
+                    if turned >> i & 1 == 1 { inverted(part.clone()) } else { part.clone() }
+                },
+            )
+            .collect();
+        let Loaded { mesh, report } = read(&joined(&parts));
+        assert_eq!(report.volume, Some(expected));
+        assert_eq!(report.expected_betti, Some([3, 0, 2]));
+        let wrong = |cavity: bool| {
+            (0..5).filter(|i| (i % 2 == 1) == cavity && (turned >> i & 1 == 1) != cavity).count()
+        };
+        let mut repairs = Vec::new();
+        if wrong(false) > 0 {
+            repairs.push(Repair::TurnedOutward { components: wrong(false) });
+        }
+        if wrong(true) > 0 {
+            repairs.push(Repair::TurnedInward { components: wrong(true) });
+        }
+        assert_eq!(report.repairs, repairs);
+        let test = surface::InsideTest::new(&mesh);
+        for (x, inside) in
+            [(0.5, true), (1.5, false), (2.5, true), (3.5, false), (4.5, true), (5.5, false)]
+        {
+            assert_eq!(test.winding_number(Vec3::splat(x)), Some(i32::from(inside)), "{x}");
+        }
+        assert!(surface::validate(&joined(&parts)).is_ok() == repairs.is_empty());
+    }
+}
+
+#[test]
+fn overlapping_parts_stay_outward_and_touching_cavities_inward() {
+    let other = cuboid(Vec3::splat(0.5), Vec3::splat(3.0));
+    let overlapping = read(&joined(&[shell(1.0), inverted(other)]));
+    assert_eq!(overlapping.report.repairs, [Repair::TurnedOutward { components: 1 }]);
+    assert_eq!(overlapping.report.expected_betti, Some([2, 0, 0]));
+    assert!(overlapping.report.self_intersecting && overlapping.report.warnings.len() == 2);
+
+    // An octahedron that touches the wall of the box from within, in the middle of faces.
+    let octahedron = sphere(0);
+    let touching = read(&joined(&[inverted(octahedron.clone()), shell(1.0)]));
+    assert_eq!(touching.report.expected_betti, Some([1, 0, 1]));
+    assert!((touching.report.volume.unwrap() - (8.0 - 4.0 / 3.0)).abs() < 1e-14);
+    // And one that touches it from outside.
+    let outside = moved(octahedron, |v| v + Vec3::new(2.0, 0.25, 0.125));
+    assert_eq!(read(&joined(&[outside, shell(1.0)])).report.expected_betti, Some([2, 0, 0]));
+}
+
+#[test]
+fn genus_is_that_of_the_solid() {
+    let ring = torus(12, 6);
+    let inner = moved(torus(12, 6), |v| {
+        Vec3::new(0.0, 0.0, 0.0) + v * Vec3::new(0.1, 0.1, 0.1) + Vec3::X * 2.0
+    });
+    let report = read(&joined(&[ring, inner])).report;
+    assert_eq!((report.components, report.genus, report.euler), (2, Some(2), 0));
+    assert_eq!(report.expected_betti, Some([1, 2, 1]));
+}
+
+#[test]
+fn validation_repairs_nothing() {
+    let refused = |edit: &dyn Fn(&mut TriMesh)| {
+        let mut mesh = joined(&[shell(2.0), inverted(shell(1.0))]);
+        assert!(surface::validate(&mesh).is_ok());
+        edit(&mut mesh);
+        surface::validate(&mesh).unwrap_err().fault
+    };
+    assert!(matches!(
+        refused(&|m| m.faces[3][1] = m.faces[3][0]),
+        Fault::RepeatedCorner { face: 3 }
+    ));
+    assert!(matches!(refused(&|m| m.faces[3][1] = 16), Fault::Index { face: 3, index: 16, .. }));
+    assert!(matches!(
+        refused(&|m| m.faces.push(m.faces[5])),
+        Fault::DuplicateFace { first: 5, second: 24 }
+    ));
+    assert!(matches!(refused(&|m| m.vertices.push(Vec3::X)), Fault::Unreferenced { vertex: 16 }));
+    assert!(matches!(
+        refused(&|m| m.vertices[9].y = f64::NAN),
+        Fault::Coordinate { vertex: 9, .. }
+    ));
+    assert!(matches!(refused(&|m| m.faces[7].swap(0, 1)), Fault::Inconsistent { .. }));
+    assert!(matches!(refused(&|m| *m = inverted(m.clone())), Fault::WrongWay { face: 0 }));
+    let inner_out = |m: &mut TriMesh| m.faces[12..].iter_mut().for_each(|f| f.swap(0, 1));
+    assert!(matches!(refused(&inner_out), Fault::WrongWay { face: 12 }));
+    assert!(matches!(refused(&|m| m.faces.clear()), Fault::NoFaces { .. }));
+    assert!(matches!(refused(&|m| m.faces.truncate(23)), Fault::Open { edges: 3, .. }));
+}
+
+#[test]
+fn inspection_reports_what_reading_refuses() {
+    let mut open = cube();
+    open.faces.truncate(10);
+    let inspection = surface::inspect_bytes(to_off(&open).as_bytes(), Format::Off).unwrap();
+    assert!(matches!(inspection.refused.as_ref().unwrap().fault, Fault::Open { edges: 4, .. }));
+    let json = serde_json::to_value(&inspection).unwrap();
+    for (key, value) in [
+        ("vertices", 8.into()),
+        ("faces", 10.into()),
+        ("components", 1.into()),
+        ("closed", false.into()),
+        ("manifold", true.into()),
+        ("oriented", true.into()),
+        ("self_intersecting", false.into()),
+        ("degenerate_faces", 0.into()),
+        ("diagonal", 3_f64.sqrt().into()),
+        ("genus", serde_json::Value::Null),
+        ("repairs", serde_json::json!([])),
+        ("warnings", serde_json::json!([])),
+    ] {
+        assert_eq!(json[key], value, "{key}");
+    }
+    assert!(json["refused"].as_str().unwrap().starts_with("the surface is open: 4 edges"));
+}
+
+#[test]
+fn files_are_written_whole_and_read_back_the_same() {
+    let folder = std::env::temp_dir().join(format!("medial-surface-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let mesh = moved(torus(9, 5), |v| v / 3.0 + Vec3::new(1e-7, 1e9, -1e-3));
+    for name in ["a.off", "b.obj", "C.PLY"] {
+        let path = folder.join(name);
+        surface::write(&path, &mesh).unwrap();
+        surface::write(&path, &mesh).unwrap();
+        let loaded = surface::read(&path).unwrap();
+        assert_eq!(loaded.mesh, mesh, "{name}");
+        assert_eq!(loaded.report.repairs, []);
+    }
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 3, "no temporary file stays");
+    for (path, message) in [
+        (folder.join("d.stl"), "STL holds single precision only"),
+        (folder.join("d.xyz"), "unknown extension \"xyz\""),
+        (folder.join("none").join("d.off"), "cannot be written"),
+    ] {
+        let error = surface::write(&path, &mesh).unwrap_err().to_string();
+        assert!(
+            error.starts_with(&path.display().to_string()) && error.contains(message),
+            "{error}"
+        );
+    }
+    for (path, message) in [
+        (folder.join("missing.off"), "cannot be read"),
+        (folder.with_extension("off"), "cannot be read"),
+        (folder.clone(), "unknown extension"),
+    ] {
+        let error = surface::read(&path).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+    std::fs::create_dir(folder.join("e.off")).unwrap();
+    let error = surface::read(folder.join("e.off")).unwrap_err().to_string();
+    assert!(error.contains("not a regular file"), "{error}");
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Faces in any order, rotation and orientation, vertices in any order: the same solid.
+    #[test]
+    fn order_and_orientation_of_faces_do_not_matter(
+        order in Just((0..240_u32).collect::<Vec<_>>()).prop_shuffle(),
+        numbers in Just((0..62_u32).collect::<Vec<_>>()).prop_shuffle(),
+        turns in prop::collection::vec(0..6_usize, 240),
+    ) {
+        let rock = moved(sphere(2), |v| v * (2.0 + 0.3 * (5.0 * v.x).sin() + v.y));
+        let mesh = joined(&[rock, moved(torus(8, 7), |v| v * 5.0)]);
+        let expected = read(&mesh).report;
+        prop_assert_eq!((mesh.faces.len(), mesh.vertices.len()), (240, 122));
+        let number = |v: u32| numbers.get(v as usize).copied().unwrap_or(v);
+        let mut vertices = mesh.vertices.clone();
+        for v in 0..122 {
+            vertices[number(v) as usize] = mesh.vertices[v as usize];
+        }
+        let faces = order.iter().zip(&turns).map(|(&face, &turn)| {
+            let mut face = mesh.faces[face as usize].map(number);
+            face.rotate_left(turn % 3);
+            if turn >= 3 {
+                face.swap(0, 1);
+            }
+            face
+        });
+        let shuffled = TriMesh { vertices, faces: faces.collect() };
+        let loaded = read(&shuffled);
+        let turned = shuffled.faces.iter().zip(&loaded.mesh.faces).filter(|(a, b)| a != b).count();
+        let reported: usize = loaded.report.repairs.iter().map(Repair::count).sum();
+        prop_assert_eq!(turned, turns.iter().filter(|&&turn| turn >= 3).count());
+        prop_assert!(reported == turned || loaded.report.repairs.len() > 1);
+        let mut same = loaded.report.clone();
+        same.repairs = expected.repairs.clone();
+        let close = |a: Option<f64>, b: Option<f64>| (a.unwrap() / b.unwrap() - 1.0).abs() < 1e-13;
+        prop_assert!(close(same.volume, expected.volume) && close(same.area, expected.area));
+        (same.volume, same.area) = (expected.volume, expected.area);
+        prop_assert_eq!(same, expected);
+    }
+}
