@@ -29,25 +29,59 @@ pub(super) struct Contraction {
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     collapses: usize,
-    fallbacks: usize,
+    postponed: usize,
     held_by_topology: usize,
+    unlocked: usize,
     held_by_inversion: usize,
 }
 
 /// What is done with a popped candidate.
-enum Decision {
+pub(super) enum Decision {
     /// Collapse it to this sphere.
     Collapse(Sphere),
     /// It folds a face over at the optimum and costs more elsewhere: queue it at that cost.
     Postpone(Candidate),
-    /// Leave it alone until its surroundings change.
-    Hold(Reason),
+    /// Collapsing it would change the topology, as long as these vertices stay as they are.
+    Hold([u32; 2]),
+    /// Each placement folds one of these faces over, as long as they stay as they are.
+    Fold(Folded),
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Reason {
-    Topology,
-    Inversion,
+/// Faces that hold back the placements of an edge; often one holds back all four.
+#[derive(Default)]
+pub(super) struct Folded {
+    faces: [[u32; 3]; 4],
+    count: usize,
+}
+
+impl Folded {
+    /// Whether a placement folds a face over: one that is known, or else one that is added.
+    fn holds(&mut self, complex: &CollapseComplex, [a, b]: [u32; 2], sphere: Sphere) -> bool {
+        let known = &self.faces[..self.count];
+        if known.iter().any(|&face| complex.folds(face, sphere.centre)) {
+            return true;
+        }
+        let Some(face) = complex.folded_face(a, b, sphere.centre) else {
+            return false;
+        };
+        self.faces[self.count] = face;
+        self.count += 1;
+        true
+    }
+
+    /// The corners other than the ends of the edge, each once.
+    fn obstacles(&self) -> ([u32; 8], usize) {
+        let (mut obstacles, mut count) = ([0; 8], 0);
+        for &[_, p, q] in &self.faces[..self.count] {
+            for v in [p, q] {
+                if !obstacles[..count].contains(&v) {
+                    obstacles[count] = v;
+                    count += 1;
+                }
+            }
+        }
+        (obstacles, count)
+    }
 }
 
 impl Contraction {
@@ -70,23 +104,57 @@ impl Contraction {
         self.complex.sphere_count()
     }
 
+    /// The complex as it is now.
+    pub(super) fn complex(&self) -> &CollapseComplex {
+        &self.complex
+    }
+
+    /// All edges left, the cheapest first.
+    pub(super) fn sorted_candidates(&self) -> Vec<Candidate> {
+        let edges = self.complex.edges();
+        let mut all: Vec<_> = edges
+            .map(|ends| candidate(&self.complex, &self.quadrics, &self.params, ends))
+            .collect();
+        all.sort_by(Candidate::order);
+        all
+    }
+
     /// The mesh as it is now.
     pub(super) fn to_mesh(&self) -> MedialMesh {
         self.complex.to_mesh()
     }
 
     /// Steps 3 to 5, until at most `target` spheres are left or no edge may be collapsed.
-    pub(super) fn run_to(&mut self, target: usize, run: &RunContext) -> Result<(), SimplifyError> {
+    pub(super) fn run_to(
+        &mut self,
+        initial: &MedialMesh,
+        target: usize,
+        run: &RunContext,
+    ) -> Result<(), SimplifyError> {
         let total = self.sphere_count().saturating_sub(target);
         let first = self.tally.collapses;
         while self.sphere_count() > target {
             let Some(cheapest) = self.queue.pop(&self.complex) else {
-                break;
+                let Some((ends, sphere)) = self.unlock(initial) else { break };
+                self.tally.unlocked += 1;
+                self.merge(ends, sphere);
+                continue;
             };
             match self.decide(cheapest) {
                 Decision::Collapse(sphere) => self.merge(cheapest.ends(), sphere),
-                Decision::Postpone(dearer) => self.queue.push(dearer),
-                Decision::Hold(reason) => self.hold(cheapest, reason),
+                Decision::Postpone(dearer) => {
+                    self.tally.postponed += 1;
+                    self.queue.push(dearer);
+                }
+                Decision::Hold(obstacle) => {
+                    self.tally.held_by_topology += 1;
+                    self.queue.park(cheapest, &obstacle);
+                }
+                Decision::Fold(faces) => {
+                    self.tally.held_by_inversion += 1;
+                    let (obstacles, count) = faces.obstacles();
+                    self.queue.park(cheapest, &obstacles[..count]);
+                }
             }
             let done = self.tally.collapses - first;
             if done.is_multiple_of(REPORT_EVERY) {
@@ -96,38 +164,42 @@ impl Contraction {
         run.step(total, total)
     }
 
-    /// Steps 3 and 4: where the merged sphere goes, or why there is none for now.
+    /// Steps 3 and 4: where the merged sphere goes, or what holds the edge back.
     fn decide(&mut self, candidate: Candidate) -> Decision {
         let [a, b] = candidate.ends();
-        let keep_topology = self.params.topology_from.applies(self.sphere_count());
-        if keep_topology && !self.complex.link_condition(a, b) {
-            return Decision::Hold(Reason::Topology);
+        if self.keeps_topology()
+            && let Some(obstacle) = self.complex.link_obstacle(a, b)
+        {
+            return Decision::Hold(obstacle);
         }
-        let (quadric, ends) = edge_quadric(&self.complex, &self.quadrics, [a, b]);
-        let optimum = minimise(&quadric, ends, self.params.singular_ratio);
-        if !self.complex.inverts(a, b, optimum.centre) {
-            return Decision::Collapse(optimum);
-        }
-        let upright = by_error(&quadric, ends)
-            .into_iter()
-            .find(|&(_, sphere)| !self.complex.inverts(a, b, sphere.centre));
-        let Some((error, fallback)) = upright else {
-            return Decision::Hold(Reason::Inversion);
-        };
-        let dearer = priced(&self.complex, &self.params, [a, b], error);
-        if candidate.is_before(&dearer) {
-            return Decision::Postpone(dearer);
-        }
-        self.tally.fallbacks += 1;
-        Decision::Collapse(fallback)
+        self.place(candidate)
     }
 
-    fn hold(&mut self, candidate: Candidate, reason: Reason) {
-        match reason {
-            Reason::Topology => self.tally.held_by_topology += 1,
-            Reason::Inversion => self.tally.held_by_inversion += 1,
+    /// Whether a collapse has to keep the topology now.
+    pub(super) fn keeps_topology(&self) -> bool {
+        self.params.topology_from.applies(self.sphere_count())
+    }
+
+    /// Step 4: where the merged sphere goes.
+    pub(super) fn place(&self, candidate: Candidate) -> Decision {
+        let [a, b] = candidate.ends();
+        let (quadric, ends) = edge_quadric(&self.complex, &self.quadrics, [a, b]);
+        let optimum = minimise(&quadric, ends, self.params.singular_ratio);
+        let mut faces = Folded::default();
+        if !faces.holds(&self.complex, [a, b], optimum) {
+            return Decision::Collapse(optimum);
         }
-        self.queue.park(candidate);
+        for (error, sphere) in by_error(&quadric, ends) {
+            if faces.holds(&self.complex, [a, b], sphere) {
+                continue;
+            }
+            let dearer = priced(&self.complex, &self.params, [a, b], error);
+            if candidate.is_before(&dearer) {
+                return Decision::Postpone(dearer);
+            }
+            return Decision::Collapse(sphere);
+        }
+        Decision::Fold(faces)
     }
 
     /// Step 5: the collapse, the sum of the quadrics, new costs for the edges of the merged sphere.
@@ -147,9 +219,8 @@ impl Contraction {
             let candidates: Vec<_> = around.par_iter().map(renewed).collect();
             candidates.into_iter().for_each(|candidate| queue.push(candidate));
         }
-        for &v in around {
-            queue.wake(complex, v);
-        }
+        queue.wake(complex, kept);
+        queue.wake(complex, removed);
         tally.collapses += 1;
     }
 
@@ -166,8 +237,9 @@ impl Contraction {
         diagnostics.count("slabs_without_tangent_planes", skipped.slabs);
         diagnostics.count("cones_without_tangent_planes", skipped.cones);
         diagnostics.count("collapses", tally.collapses);
-        diagnostics.count("placed_off_the_optimum_to_avoid_inversion", tally.fallbacks);
+        diagnostics.count("postponed_to_avoid_inversion", tally.postponed);
         diagnostics.count("rejected_by_link_condition", tally.held_by_topology);
+        diagnostics.count("taken_against_link_condition", tally.unlocked);
         diagnostics.count("rejected_by_inversion", tally.held_by_inversion);
     }
 
@@ -177,15 +249,14 @@ impl Contraction {
         if edges.is_empty() {
             return "no edge is left, each sphere is a component of its own".to_owned();
         }
-        let by_topology = edges.iter().filter(|&&[a, b]| {
-            let keep_topology = self.params.topology_from.applies(self.complex.sphere_count());
-            keep_topology && !self.complex.link_condition(a, b)
-        });
+        let keeps_topology = self.keeps_topology();
+        let by_topology =
+            edges.iter().filter(|&&[a, b]| keeps_topology && !self.complex.link_condition(a, b));
         let by_topology = by_topology.count();
         let by_inversion = edges.len() - by_topology;
         format!(
-            "of the {} edges left {by_topology} would change the topology and {by_inversion} \
-             would fold a face over",
+            "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \
+             and {by_inversion} would fold a face over",
             edges.len()
         )
     }
@@ -206,12 +277,19 @@ fn candidate(
 /// The edge with the cost `(E + k) Γ²` (equation 8); equal costs are ordered by `E`.
 fn priced(complex: &CollapseComplex, params: &QmatParams, ends: [u32; 2], error: f64) -> Candidate {
     let [a, b] = ends.map(|v| complex.sphere(v));
-    // Coincident centres go before everything else.
-    if a.centre.distance_squared(b.centre) < ZERO_LENGTH * ZERO_LENGTH {
-        return Candidate::new(complex, ends, 0.0, 0.0);
+    if are_coincident(a, b) {
+        // Before everything else, and the smaller stars first: clusters that grow evenly rarely
+        // violate the link condition, one hub that swallows its neighbours soon does.
+        let [m, n] = ends.map(|v| complex.neighbours(v).len());
+        return Candidate::new(complex, ends, 0.0, -1.0 / (m + n) as f64);
     }
     let stability = stability_ratio(a, b);
     Candidate::new(complex, ends, (error + params.k) * stability * stability, error)
+}
+
+/// Whether two centres are one point up to rounding.
+fn are_coincident(a: Sphere, b: Sphere) -> bool {
+    a.centre.distance_squared(b.centre) < ZERO_LENGTH * ZERO_LENGTH
 }
 
 /// `E` of an edge: the sum over its ends (equation 5).

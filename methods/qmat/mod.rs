@@ -24,15 +24,22 @@
 //!
 //! - "Invertible" means that the smallest eigenvalue of `A` is above `singular_ratio` times the
 //!   largest: independent of scale and of how many quadrics were summed.
-//! - A placement off the optimum costs more than the edge was queued at. The edge goes back into
-//!   the queue at that cost, and is collapsed when nothing cheaper is left.
 //! - A minimiser with a negative radius is replaced by the midpoint of the edge.
+//! - A placement off the optimum costs more than the edge was queued at. The edge goes back into
+//!   the queue at that cost, and is collapsed when nothing cheaper is left. Taken at once, such
+//!   placements raise the mean error at 100 spheres by a sixth on Bear and Dolphin.
 //! - Equal costs, in the main the zeros of contained spheres, are ordered by `E`, then by ids.
-//! - Centres closer than `1e-12` are one point: `Γ` and the cost are 0, and they go first.
+//! - Centres closer than `1e-12` are one point: `Γ` and the cost are 0, and they go first, small
+//!   stars before large ones.
 //! - A face whose balls have no common outer tangent plane, or whose centres are collinear, adds
 //!   no slab, and a lone edge with one ball inside the other no cone. Both are counted.
-//! - A rejected edge comes back when a sphere next to it changes.
-//! - The link condition is that of Dey et al. in full, for holes and for voids.
+//! - A rejected edge comes back when what held it back is part of a collapse.
+//! - The link condition is that of Dey et al. in full, for holes and for voids. It is sufficient,
+//!   not necessary: when it holds back all that is left, at 500 spheres or fewer, an edge whose
+//!   collapse brings the Betti numbers no farther from those of the initial mesh is taken. Without
+//!   this a sampled sphere stops at some 30 spheres, around voids closed before `η`.
+//! - `boundary=legacy` follows the authors' code in the weight and the length of the normals of the
+//!   boundary planes, and in nothing else.
 //!
 //! # Deviations from the paper
 //!
@@ -49,6 +56,7 @@ mod quadric;
 mod quadric_tests;
 #[cfg(test)]
 mod tests;
+mod unlock;
 
 use std::sync::Arc;
 
@@ -173,7 +181,7 @@ impl Prepared {
             work = Work::Anew;
         }
         self.asked = true;
-        self.contraction.run_to(target, &self.run)?;
+        self.contraction.run_to(&self.initial, target, &self.run)?;
         Ok(work)
     }
 

@@ -137,10 +137,14 @@ impl Quadric {
     #[cold]
     fn eigenvalue_ratio(&self) -> f64 {
         let mut m = self.matrix();
+        // Off-diagonal entries of this size move no eigenvalue by more.
+        let negligible = 1e-20 * (m[0][0] + m[1][1] + m[2][2] + m[3][3]);
         for _sweep in 0..12 {
             for p in 0..3 {
                 for q in p + 1..4 {
-                    rotate(&mut m, p, q);
+                    if m[p][q].abs() > negligible {
+                        rotate(&mut m, p, q);
+                    }
                 }
             }
         }
@@ -186,12 +190,9 @@ fn pivot(m: &mut [[f64; 4]; 4], x: &mut [f64; 4], order: &mut [usize; 4], k: usi
 
 /// Zeroes the entry `(p, q)` of a symmetric matrix by a rotation.
 fn rotate(m: &mut [[f64; 4]; 4], p: usize, q: usize) {
-    if m[p][q] == 0.0 {
-        return;
-    }
     let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-    let tangent = theta.signum() / (theta.abs() + theta.hypot(1.0));
-    let cosine = 1.0 / tangent.hypot(1.0);
+    let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
     let sine = tangent * cosine;
     for i in 0..4 {
         let (x, y) = (m[i][p], m[i][q]);

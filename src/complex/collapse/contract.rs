@@ -9,7 +9,7 @@ impl CollapseComplex {
     ///
     /// Edges and faces that become equal are merged. Faces with both ends vanish; an edge that
     /// loses its last face stays as a lone edge unless it is merged. Nothing is tested here:
-    /// [`CollapseComplex::link_condition`] and [`CollapseComplex::inverts`] are the caller's.
+    /// [`CollapseComplex::link_condition`] and [`CollapseComplex::folded_face`] are the caller's.
     /// Cheapest when `removed` has the smaller star. Cost: the stars of both ends and the lists of
     /// the neighbours of `removed`.
     ///

@@ -5,29 +5,35 @@ use crate::Vec3;
 use crate::complex::ZERO_LENGTH;
 
 impl CollapseComplex {
-    /// Whether moving both ends of the edge `{a, b}` to `centre` turns some face that has exactly
-    /// one of them by more than a right angle: normal after times normal before is negative.
+    /// A face `[v, p, q]` that folds over when both ends of the edge `{a, b}` move to `centre`,
+    /// where `v` is the one end that the face has; see [`CollapseComplex::folds`].
     ///
-    /// A face that is thinner than [`ZERO_LENGTH`] before has no normal and is not tested: what
-    /// rounding makes of it must not hold the collapse back. Lengths in units of the diagonal.
-    ///
-    /// Source: Garland, Heckbert 1997, *Surface simplification using quadric error metrics*,
-    /// <https://doi.org/10.1145/258734.258849>, section 3.7. Cost: the faces of both ends.
-    pub fn inverts(&self, a: u32, b: u32, centre: Vec3) -> bool {
-        self.inverts_at(a, b, centre) || self.inverts_at(b, a, centre)
+    /// While none of `a`, `b`, `p`, `q` was part of a collapse it goes on folding.
+    /// Cost: the faces of both ends.
+    pub fn folded_face(&self, a: u32, b: u32, centre: Vec3) -> Option<[u32; 3]> {
+        let folded_at = |moved: u32, other: u32| {
+            let sides = self.opposite_sides(moved).iter();
+            let mut faces = sides.filter(|&&[p, q]| p != other && q != other);
+            let folded = faces.find(|&&[p, q]| self.folds([moved, p, q], centre));
+            folded.map(|&[p, q]| [moved, p, q])
+        };
+        folded_at(a, b).or_else(|| folded_at(b, a))
     }
 
-    fn inverts_at(&self, moved: u32, other: u32, to: Vec3) -> bool {
-        let from = self.sphere(moved).centre;
-        self.opposite_sides(moved).iter().any(|&[p, q]| {
-            if p == other || q == other {
-                return false;
-            }
-            let [p, q] = [self.sphere(p).centre, self.sphere(q).centre];
-            let before = (p - from).cross(q - from);
-            let after = (p - to).cross(q - to);
-            before.dot(after) < 0.0 && !is_thin(before, p - from, q - from)
-        })
+    /// Whether a face `[v, p, q]` folds over when `v` moves to `centre`: its normal after times its
+    /// normal before is negative.
+    ///
+    /// A face that is thinner than [`ZERO_LENGTH`] before has no normal and never folds: what
+    /// rounding makes of it must not hold a collapse back. Lengths in units of the diagonal.
+    ///
+    /// Source: Garland, Heckbert 1997, *Surface simplification using quadric error metrics*,
+    /// <https://doi.org/10.1145/258734.258849>, section 3.7.
+    #[inline]
+    pub fn folds(&self, face: [u32; 3], centre: Vec3) -> bool {
+        let [from, p, q] = face.map(|v| self.sphere(v).centre);
+        let before = (p - from).cross(q - from);
+        let after = (p - centre).cross(q - centre);
+        before.dot(after) < 0.0 && !is_thin(before, p - from, q - from)
     }
 }
 

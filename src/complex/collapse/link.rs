@@ -15,13 +15,23 @@ impl CollapseComplex {
     /// Source: Dey, Edelsbrunner, Guha, Nekhayev 1999, *Topology preserving edge contraction*,
     /// Publ. Inst. Math. 66. Cost: the two links.
     pub fn link_condition(&mut self, a: u32, b: u32) -> bool {
+        self.link_obstacle(a, b).is_none()
+    }
+
+    /// What violates the link condition of `{a, b}`: `[c, c]` for a vertex that fails T1, `[c, d]`
+    /// for an edge that fails T2. While neither was part of a collapse, nor `a` and `b`, the
+    /// condition stays violated. Cost: the two links.
+    pub fn link_obstacle(&mut self, a: u32, b: u32) -> Option<[u32; 2]> {
         self.find_shared(a, b);
-        if !self.shared.is_empty() {
-            return false;
+        if let Some(&side) = self.shared.first() {
+            return Some(side);
         }
-        let common = self.neighbours(b).iter().filter(|&&c| self.marks.contains(c)).count();
-        // The third vertices of the faces at the edge are among the common neighbours, each once.
-        let faces = self.opposite_sides(b).iter().filter(|side| side.contains(&a)).count();
-        common == faces
+        // Unmark the third vertices of the faces at the edge: a common neighbour left is a hole.
+        let sides = self.side_pool.get(self.sides[b as usize]);
+        for &[p, q] in sides.iter().filter(|side| side.contains(&a)) {
+            self.marks.remove(if p == a { q } else { p });
+        }
+        let hole = self.neighbours(b).iter().find(|&&c| self.marks.contains(c));
+        hole.map(|&c| [c, c])
     }
 }

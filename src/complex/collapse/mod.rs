@@ -5,10 +5,10 @@
 //!
 //! 1. [`CollapseComplex::from_mesh`]; a [`Candidate`] for each edge into the queue.
 //! 2. [`CollapseQueue::pop`] the cheapest candidate that is still current.
-//! 3. Where wanted, [`CollapseComplex::link_condition`] and [`CollapseComplex::inverts`]; a
-//!    candidate that fails is parked with [`CollapseQueue::park`] until its surroundings change.
+//! 3. Where wanted, [`CollapseComplex::link_obstacle`] and [`CollapseComplex::folded_face`]; a
+//!    candidate that fails is parked with [`CollapseQueue::park`] at what holds it back.
 //! 4. [`CollapseComplex::collapse`]; new candidates for the edges of the merged sphere;
-//!    [`CollapseQueue::wake`] for its neighbours.
+//!    [`CollapseQueue::wake`] for both ends.
 //! 5. [`CollapseComplex::to_mesh`].
 //!
 //! # Representation
@@ -249,6 +249,11 @@ impl Marks {
     #[inline]
     fn insert(&mut self, v: u32) {
         self.of_vertex[v as usize] = self.current;
+    }
+
+    #[inline]
+    fn remove(&mut self, v: u32) {
+        self.of_vertex[v as usize] = self.current.wrapping_sub(1);
     }
 
     #[inline]

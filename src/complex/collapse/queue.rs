@@ -4,8 +4,11 @@ use std::cmp::Ordering;
 
 use super::CollapseComplex;
 
-/// Below this length a heap is never compacted.
-const COMPACT_FROM: usize = 4096;
+/// Candidates up to this number are all kept in the heap.
+const FEW: usize = 1024;
+
+/// Share of the far candidates that the heap takes when it has run empty.
+const SHARE: usize = 8;
 
 /// Absent index of a parked candidate.
 const NONE: u32 = u32::MAX;
@@ -48,69 +51,87 @@ impl Candidate {
         complex.stamp(self.ends[0], self.ends[1]) == Some(self.stamp)
     }
 
-    /// Whether this candidate comes out of a queue before another: smaller cost, then smaller
-    /// second key, then smaller ids.
+    /// Whether this candidate comes out of a queue before another; see [`Candidate::order`].
     #[inline]
     pub fn is_before(&self, other: &Self) -> bool {
         if self.cost != other.cost {
             return self.cost < other.cost;
         }
-        self.tie.total_cmp(&other.tie).then(self.ends.cmp(&other.ends)) == Ordering::Less
+        self.order(other) == Ordering::Less
+    }
+
+    /// The order in which candidates come out of a queue: smaller cost, then smaller second key,
+    /// then smaller ids.
+    pub fn order(&self, other: &Self) -> Ordering {
+        let keys = self.cost.total_cmp(&other.cost).then(self.tie.total_cmp(&other.tie));
+        keys.then(self.ends.cmp(&other.ends))
     }
 }
 
 /// A priority queue of candidates: smallest cost first, then the second key, then the ids.
 ///
-/// Out-of-date candidates stay inside until they are popped or outnumber the current ones. Equal
-/// contents come out in the same order whatever the history.
+/// Only the cheapest candidates are in a heap, small enough for the cache; the others wait in no
+/// order. When the heap has run empty it takes the cheapest share of them, and those out of date
+/// are dropped then. Most candidates are out of date before their turn comes, so most are never
+/// sorted at all. Equal contents come out in the same order whatever the history.
 #[derive(Clone, Debug, Default)]
 pub struct CollapseQueue {
     /// Four children a node: the candidates of one family lie in two cache lines.
-    heap: Vec<Candidate>,
+    near: Vec<Candidate>,
+    /// Candidates not before `bound`.
+    far: Vec<Candidate>,
+    /// Nothing in `near` is behind it; `None` when `far` is empty.
+    bound: Option<Candidate>,
     parked: Parked,
 }
 
 impl CollapseQueue {
     /// A queue of the given candidates. Cost `O(n)`.
     pub fn from_candidates(candidates: Vec<Candidate>) -> Self {
-        let mut queue = Self { heap: candidates, parked: Parked::default() };
-        queue.heapify();
+        let mut queue = Self { far: candidates, ..Self::default() };
+        queue.refill();
         queue
     }
 
     /// Adds a candidate.
     #[inline]
     pub fn push(&mut self, candidate: Candidate) {
-        self.heap.push(candidate);
-        self.sift_up(self.heap.len() - 1);
+        if self.bound.is_none_or(|bound| candidate.is_before(&bound)) {
+            self.near.push(candidate);
+            self.sift_up(self.near.len() - 1);
+        } else {
+            self.far.push(candidate);
+        }
     }
 
     /// Takes the first candidate that is still current.
     pub fn pop(&mut self, complex: &CollapseComplex) -> Option<Candidate> {
         // Large stars add a candidate an edge at each collapse; without this they fill the memory.
-        if self.heap.len() > COMPACT_FROM.max(4 * complex.edge_count()) {
-            self.heap.retain(|candidate| candidate.is_current(complex));
-            self.heapify();
+        if self.near.len() + self.far.len() > FEW.max(4 * complex.edge_count()) {
+            self.drop_outdated(complex);
         }
         loop {
-            let first = self.pop_any()?;
+            if self.near.is_empty() {
+                self.far.retain(|candidate| candidate.is_current(complex));
+                self.refill();
+            }
+            let first = self.pop_near()?;
             if first.is_current(complex) {
                 return Some(first);
             }
         }
     }
 
-    /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of its ends.
-    pub fn park(&mut self, candidate: Candidate) {
-        self.parked.insert(candidate);
+    /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of
+    /// `obstacles`: the vertices without a change at which it would be rejected again.
+    pub fn park(&mut self, candidate: Candidate, obstacles: &[u32]) {
+        self.parked.insert(candidate, obstacles);
     }
 
-    /// Queues what is parked at `v` and still current, because the surroundings of `v` changed.
+    /// Queues what is parked at `v` and still current. To be called for both ends of an edge that
+    /// was collapsed.
     #[inline]
     pub fn wake(&mut self, complex: &CollapseComplex, v: u32) {
-        if self.parked.is_empty() {
-            return;
-        }
         while let Some(candidate) = self.parked.take(v) {
             if candidate.is_current(complex) {
                 self.push(candidate);
@@ -118,38 +139,63 @@ impl CollapseQueue {
         }
     }
 
-    fn pop_any(&mut self) -> Option<Candidate> {
-        let last = self.heap.pop()?;
-        let Some(first) = self.heap.first().copied() else {
+    fn drop_outdated(&mut self, complex: &CollapseComplex) {
+        self.near.retain(|candidate| candidate.is_current(complex));
+        self.far.retain(|candidate| candidate.is_current(complex));
+        self.heapify();
+    }
+
+    /// Moves the cheapest share of the far candidates into the empty heap.
+    fn refill(&mut self) {
+        self.bound = None;
+        if self.far.len() <= FEW {
+            std::mem::swap(&mut self.near, &mut self.far);
+        } else {
+            let share = FEW.max(self.far.len() / SHARE);
+            let (_, &mut bound, _) = self.far.select_nth_unstable_by(share, Candidate::order);
+            // The cheapest are in front; the last ones take their places.
+            self.near.extend_from_slice(&self.far[..share]);
+            let left = self.far.len() - share;
+            let moved = left.min(share);
+            self.far.copy_within(share + left - moved.., 0);
+            self.far.truncate(left);
+            self.bound = Some(bound);
+        }
+        self.heapify();
+    }
+
+    fn pop_near(&mut self) -> Option<Candidate> {
+        let last = self.near.pop()?;
+        let Some(first) = self.near.first().copied() else {
             return Some(last);
         };
-        self.heap[0] = last;
+        self.near[0] = last;
         self.sift_down(0);
         Some(first)
     }
 
     fn heapify(&mut self) {
-        for index in (0..self.heap.len().div_ceil(4)).rev() {
+        for index in (0..self.near.len().div_ceil(4)).rev() {
             self.sift_down(index);
         }
     }
 
     #[inline]
     fn sift_up(&mut self, mut index: usize) {
-        let moving = self.heap[index];
+        let moving = self.near[index];
         while index > 0 {
             let parent = (index - 1) / 4;
-            if !moving.is_before(&self.heap[parent]) {
+            if !moving.is_before(&self.near[parent]) {
                 break;
             }
-            self.heap[index] = self.heap[parent];
+            self.near[index] = self.near[parent];
             index = parent;
         }
-        self.heap[index] = moving;
+        self.near[index] = moving;
     }
 
     fn sift_down(&mut self, mut index: usize) {
-        let heap = self.heap.as_mut_slice();
+        let heap = self.near.as_mut_slice();
         let moving = heap[index];
         loop {
             let first = 4 * index + 1;
@@ -172,71 +218,90 @@ impl CollapseQueue {
     }
 }
 
-/// Rejected candidates, listed at both of their ends.
+/// Rejected candidates, listed at each of their obstacles.
 #[derive(Clone, Debug, Default)]
 struct Parked {
-    /// First place of the list of each vertex, by id; grown on demand.
+    /// First node of the list of each vertex, by id; grown on demand.
     heads: Vec<u32>,
-    slots: Vec<Slot>,
-    free: Vec<u32>,
-    waiting: usize,
+    nodes: Slab<Node>,
+    candidates: Slab<Waiting>,
 }
 
-/// A parked candidate. Its place in the list of `ends[e]` has the number `2 * slot + e`.
 #[derive(Clone, Copy, Debug)]
-struct Slot {
-    candidate: Candidate,
-    next: [u32; 2],
-    /// Whether it was not yet woken from its other end.
-    waiting: bool,
-    /// Lists that still hold it.
-    listed: u8,
+struct Node {
+    waiting: u32,
+    next: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    /// `None` once it was woken from one of its obstacles.
+    candidate: Option<Candidate>,
+    /// Lists that still name it.
+    lists: u32,
 }
 
 impl Parked {
-    fn is_empty(&self) -> bool {
-        self.waiting == 0
+    fn insert(&mut self, candidate: Candidate, obstacles: &[u32]) {
+        let lists = obstacles.len() as u32;
+        if lists == 0 {
+            return;
+        }
+        let waiting = self.candidates.insert(Waiting { candidate: Some(candidate), lists });
+        for &v in obstacles {
+            if self.heads.len() <= v as usize {
+                self.heads.resize(v as usize + 1, NONE);
+            }
+            let head = &mut self.heads[v as usize];
+            *head = self.nodes.insert(Node { waiting, next: *head });
+        }
     }
 
-    fn insert(&mut self, candidate: Candidate) {
-        let largest = candidate.ends[1] as usize;
-        if self.heads.len() <= largest {
-            self.heads.resize(largest + 1, NONE);
-        }
-        let next = candidate.ends.map(|end| self.heads[end as usize]);
-        let slot = Slot { candidate, next, waiting: true, listed: 2 };
-        let index = match self.free.pop() {
-            Some(index) => {
-                self.slots[index as usize] = slot;
-                index
-            }
-            None => {
-                self.slots.push(slot);
-                (self.slots.len() - 1) as u32
-            }
-        };
-        for (place, end) in (2 * index..).zip(candidate.ends) {
-            self.heads[end as usize] = place;
-        }
-        self.waiting += 1;
-    }
-
-    /// A waiting candidate of `v`, taken out of its list.
+    /// A candidate of `v` that still waits, taken out of its list.
     fn take(&mut self, v: u32) -> Option<Candidate> {
         let head = self.heads.get_mut(v as usize)?;
         while *head != NONE {
-            let index = *head / 2;
-            let slot = &mut self.slots[index as usize];
-            *head = slot.next[(*head % 2) as usize];
-            slot.listed -= 1;
-            if slot.listed == 0 {
-                self.free.push(index);
+            let Node { waiting, next } = self.nodes.remove(*head);
+            *head = next;
+            let entry = &mut self.candidates.items[waiting as usize];
+            let candidate = entry.candidate.take();
+            entry.lists -= 1;
+            if entry.lists == 0 {
+                self.candidates.remove(waiting);
             }
-            if std::mem::take(&mut slot.waiting) {
-                self.waiting -= 1;
-                return Some(slot.candidate);
+            if candidate.is_some() {
+                return candidate;
             }
         }
         None
+    }
+}
+
+/// Items with stable indices; those of removed items are used again.
+#[derive(Clone, Debug)]
+struct Slab<T> {
+    items: Vec<T>,
+    free: Vec<u32>,
+}
+
+impl<T> Default for Slab<T> {
+    fn default() -> Self {
+        Self { items: Vec::new(), free: Vec::new() }
+    }
+}
+
+impl<T: Copy> Slab<T> {
+    fn insert(&mut self, item: T) -> u32 {
+        if let Some(index) = self.free.pop() {
+            self.items[index as usize] = item;
+            return index;
+        }
+        self.items.push(item);
+        (self.items.len() - 1) as u32
+    }
+
+    fn remove(&mut self, index: u32) -> T {
+        self.free.push(index);
+        self.items[index as usize]
     }
 }

@@ -1,0 +1,91 @@
+//! Q-MAT on the medial meshes of sampled solids.
+
+use medial::complex::betti;
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError, Work,
+};
+use medial::surface;
+use medial_methods::qmat::Qmat;
+
+fn shape(id: &str, resolution: u32) -> Shape {
+    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
+    let mesh = built_in.mesh(resolution);
+    let report = surface::validate(&mesh).expect("built-in shapes are solids");
+    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+fn prepare<'s>(shape: &'s Shape, params: &[(&str, &str)]) -> Box<dyn Simplification + 's> {
+    let mut all = Params::none();
+    for (key, value) in params {
+        all.set(key, value);
+    }
+    Qmat::new().prepare(shape, &all, &RunContext::default()).expect("prepared")
+}
+
+fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified {
+    simplification.at(Level::Spheres(count)).expect("a count")
+}
+
+#[test]
+fn a_sampled_sphere_becomes_one_sphere() {
+    // Radius 1 and bounding-box diagonal sqrt(12); the published result is 3e-7 off.
+    let shape = shape("sphere", 40);
+    let result = spheres(prepare(&shape, &[]).as_mut(), 1);
+    assert_eq!(result.mesh.spheres.len(), 1);
+    let sphere = result.mesh.spheres[0];
+    let scale = shape.normalisation().diagonal;
+    assert!((sphere.radius * scale - 1.0).abs() < 1e-6, "{sphere:?}");
+    assert!(shape.normalisation().backward(sphere.centre).length() < 1e-6, "{sphere:?}");
+}
+
+#[test]
+fn topology_is_kept_at_every_level() {
+    for (id, resolution, smallest) in [("torus", 26, 3), ("hollow-sphere", 20, 4)] {
+        let shape = shape(id, resolution);
+        let initial = shape.initial().expect("an initial medial mesh");
+        let expected = medial_datasets::find(id).expect("in the catalogue").expected_betti;
+        assert_eq!(betti(&initial), expected, "{id}: too coarse a sample for this test");
+        let mut simplification = prepare(&shape, &[("topology_from", "all")]);
+        let mut count = initial.spheres.len();
+        while count > 1 {
+            count = if count > 60 { count * 9 / 10 } else { count - 1 };
+            let result = spheres(simplification.as_mut(), count);
+            assert_eq!(betti(&result.mesh), expected, "{id} at {count}");
+            let reached = result.mesh.spheres.len();
+            assert!(reached >= smallest, "{id}: {reached} spheres cannot hold this topology");
+            assert_eq!(reached > count, !result.diagnostics.warnings.is_empty(), "{id} at {count}");
+        }
+    }
+}
+
+#[test]
+fn levels_continue_start_anew_and_say_what_they_cannot_do() {
+    let shape = shape("capsule", 24);
+    let initial = shape.initial().expect("an initial medial mesh");
+    let mut simplification = prepare(&shape, &[]);
+    let works = [200, 80, 80, 120].map(|count| {
+        let result = spheres(simplification.as_mut(), count);
+        assert_eq!(result.mesh.spheres.len(), count);
+        result.work
+    });
+    assert_eq!(works, [Work::Anew, Work::Continued, Work::Continued, Work::Anew]);
+    let all = spheres(simplification.as_mut(), initial.spheres.len());
+    assert_eq!((&all.mesh, all.diagnostics.warnings.len()), (&*initial, 0));
+    let more = spheres(simplification.as_mut(), initial.spheres.len() + 1);
+    assert_eq!((&more.mesh, more.diagnostics.warnings.len()), (&*initial, 1));
+    let published = simplification.at(Level::Published).expect("the count of Table II");
+    assert_eq!(published.mesh.spheres.len(), 100);
+    let native = simplification.at(Level::Native(0.5));
+    assert!(matches!(native, Err(SimplifyError::Unsupported { .. })));
+}
+
+#[test]
+fn a_cancelled_run_ends_as_cancelled() {
+    let shape = shape("capsule", 24);
+    let run = RunContext::default();
+    let mut simplification = Qmat::new().prepare(&shape, &Params::none(), &run).expect("prepared");
+    run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+    let cancelled = simplification.at(Level::Spheres(10));
+    assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));
+}
