@@ -64,7 +64,7 @@ proptest! {
         prop_assert_eq!(quadric.minimiser(1e-10), None);
     }
 
-    /// A cone's quadric is the closed form of METHODOLOGY.md's section on Q-MAT, whatever the
+    /// A cone's quadric does not depend on where the first of its four planes is, whatever the
     /// frame: `A = [4s²uuᵀ + 2(1-s²)(I-uuᵀ), -4su; -4suᵀ, 4]`, null along the cone.
     #[test]
     fn cone_quadrics_do_not_depend_on_the_frame(a in sphere(), b in sphere(), at in sphere()) {
