@@ -130,8 +130,10 @@ fn absolute(mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
+/// Largest of some distances; not a number if one is not, so that it cannot pass for a small error.
 fn largest(values: &[f64]) -> f64 {
-    values.iter().copied().fold(0.0, f64::max)
+    let larger = |a: f64, b: f64| if a.is_nan() || b <= a { a } else { b };
+    values.iter().copied().fold(0.0, larger)
 }
 
 /// Samples of a surface: the area-uniform ones first, then the vertices of its faces.
@@ -159,6 +161,9 @@ impl SurfaceSamples {
 
 /// `count` points, uniform by area and stratified along the list of triangles; `None` when there
 /// is no area or it is not finite.
+///
+/// Stratified, unlike the independent points of [`crate::surface::Sampling::AreaUniform`]: their
+/// means scatter less, and small parts are not left out by chance.
 pub(super) fn sample_triangles(
     triangles: &[[Vec3; 3]],
     count: usize,
