@@ -36,9 +36,9 @@ pub fn enclosing_ball(points: &[Vec3]) -> (Vec3, f64) {
         if ball.contains(&[far]) {
             return (ball.centre, ball.radius);
         }
-        let mut determining = ball.support;
-        determining.push(far);
-        let grown = by_enumeration(&determining);
+        let mut determining = [far; 5];
+        determining[..ball.size].copy_from_slice(&ball.support[..ball.size]);
+        let grown = by_enumeration(&determining[..=ball.size]);
         if grown.radius <= ball.radius {
             // Rounding: the exchange no longer grows the ball. Cover the rest.
             return (grown.centre, far.distance(grown.centre).max(grown.radius));
@@ -51,7 +51,9 @@ pub fn enclosing_ball(points: &[Vec3]) -> (Vec3, f64) {
 struct Ball {
     centre: Vec3,
     radius: f64,
-    support: Vec<Vec3>,
+    support: [Vec3; 4],
+    /// Number of points in `support`.
+    size: usize,
 }
 
 impl Ball {
@@ -101,13 +103,13 @@ fn by_enumeration(points: &[Vec3]) -> Ball {
             }
         }
     }
-    let support = support[..size].iter().map(|&i| points[i]).collect();
+    let support = support.map(|i| points.get(i).copied().unwrap_or_default());
     // Rounding can refuse every candidate of a flat set; a ball around the centroid encloses it.
     let (centre, radius) = best.unwrap_or_else(|| {
         let centre = points.iter().sum::<Vec3>() / n.max(1) as f64;
         (centre, points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max))
     });
-    Ball { centre, radius, support }
+    Ball { centre, radius, support, size }
 }
 
 fn contains_all((centre, radius): (Vec3, f64), points: &[Vec3]) -> bool {
