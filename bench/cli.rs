@@ -92,12 +92,16 @@ fn run(verb: Verb, global: &Global) -> Result<cmd::Exit, cmd::Failure> {
     }
 }
 
+/// More threads than this serve nobody and can exhaust the system.
+const MOST_THREADS: usize = 1024;
+
 fn set_threads(threads: Option<usize>) -> Result<(), cmd::Failure> {
     let Some(threads) = threads else {
         return Ok(());
     };
-    if threads == 0 {
-        return Err(cmd::Failure::usage("--threads 0: ask for at least one thread"));
+    if !(1..=MOST_THREADS).contains(&threads) {
+        let message = format!("--threads {threads}: ask for 1 to {MOST_THREADS} threads");
+        return Err(cmd::Failure::usage(message));
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     pool.map_err(|error| cmd::Failure::usage(format!("--threads {threads}: {error}")))

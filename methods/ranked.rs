@@ -69,7 +69,7 @@ impl Ranked {
         let Scale { name, range, inclusive, .. } = &self.scale;
         if !range.contains(&level) {
             return Err(SimplifyError::Level(format!(
-                "{name} = {level} is outside {} to {}",
+                "{name} = {level:?} is outside {} to {}",
                 range.start(),
                 range.end()
             )));
@@ -100,7 +100,10 @@ impl Simplification for Ranked {
         }
         let mesh = self.mesh.induced(&keep);
         if mesh.spheres.is_empty() {
-            diagnostics.warn(format!("no sphere passes {} = {native}", self.scale.name));
+            let largest = self.order.first().map_or(0.0, |&s| self.value[s as usize]);
+            let name = self.scale.name;
+            diagnostics
+                .warn(format!("no sphere passes {name} = {native}: the largest is {largest}"));
         }
         Ok(Simplified {
             mesh,

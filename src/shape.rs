@@ -253,7 +253,10 @@ impl Shape {
         let built = self.store.medial.get(options.sampling, || {
             let mesh = voronoi_medial_mesh(&delaunay, &cells, &self.samples(), options.dual);
             if mesh.spheres.is_empty() {
-                return Err(ShapeError::EmptyMedialMesh);
+                return Err(match cells.in_guard_band {
+                    0 => ShapeError::EmptyMedialMesh,
+                    centres => ShapeError::BelowResolution { centres },
+                });
             }
             Ok(Arc::new(mesh))
         });
@@ -407,4 +410,14 @@ pub enum ShapeError {
          sample more densely, for example --sampling blue:20000"
     )]
     EmptyMedialMesh,
+    /// The inside of the shape holds Voronoi vertices, but all too close to the surface.
+    #[error(
+        "the initial medial mesh is empty: the circumcentres inside the surface ({centres}) are \
+         all within a billionth of its diagonal of it; what is so thin or small beside the whole \
+         cannot be resolved: put parts that are far apart into files of their own"
+    )]
+    BelowResolution {
+        /// Number of these circumcentres.
+        centres: usize,
+    },
 }

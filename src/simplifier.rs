@@ -133,10 +133,24 @@ impl Params {
     ///
     /// # Errors
     /// [`SimplifyError::Parameter`] with serde's message when a key is unknown or a value is of
-    /// the wrong type.
+    /// the wrong type; it names the key.
     pub fn typed<T: DeserializeOwned>(&self) -> Result<T, SimplifyError> {
-        serde_json::from_value(serde_json::Value::Object(self.0.clone()))
-            .map_err(|error| SimplifyError::Parameter(error.to_string()))
+        let parse = |map: &serde_json::Map<String, serde_json::Value>| {
+            serde_json::from_value::<T>(serde_json::Value::Object(map.clone()))
+                .map_err(|error| error.to_string())
+        };
+        parse(&self.0).map_err(|message| {
+            // Serde does not say which key a wrong value belongs to: the one that fails alone too.
+            let fails_alone = |&(key, value): &(&String, &serde_json::Value)| {
+                let alone = serde_json::Map::from_iter([(key.clone(), value.clone())]);
+                parse(&alone).is_err_and(|error| error == message)
+            };
+            let named = match self.0.iter().find(fails_alone) {
+                Some((key, value)) => format!("{key} = {value}: {message}"),
+                None => message,
+            };
+            SimplifyError::Parameter(named)
+        })
     }
 }
 

@@ -7,7 +7,7 @@ use medial::complex;
 use medial::metrics;
 use serde_json::json;
 
-use super::{Exit, Failure, print_json, print_line, shape_options};
+use super::{Exit, Failure, check_output, counted, print_json, print_line, shape_options};
 use crate::cli::{Global, MeshArgument, SubstrateArguments};
 use crate::run::{Input, Source, Stopwatch, peak_bytes};
 
@@ -30,10 +30,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let options = shape_options(&arguments.substrate)?;
+    check_output(arguments.output.as_deref())?;
     let (input, read) = Stopwatch::time(|| Input::load(&source));
-    let input = input.map_err(Failure::input)?;
-    let shape = input.shape(options).map_err(Failure::input)?;
-    let mesh = shape.voronoi().map_err(Failure::input)?;
+    let input = input?;
+    let shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
+    let mesh = shape.voronoi().map_err(|error| Failure::of(&source, error))?;
     let (betti, _) = Stopwatch::time(|| complex::betti(&mesh));
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
@@ -78,11 +79,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     print_line(&format!(
-        "{}: {} spheres, {} edges, {} faces from {} samples in {total:.2} s",
+        "{}: {}, {}, {} from {} samples in {total:.2} s",
         input.name,
-        counts.spheres,
-        counts.edges,
-        counts.faces,
+        counted(counts.spheres, "sphere"),
+        counted(counts.edges, "edge"),
+        counted(counts.faces, "face"),
         shape.samples().len()
     ));
     let demanded =

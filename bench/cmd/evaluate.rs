@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use medial::complex;
 use medial::metrics::{Evaluation, JudgeOptions};
 use medial::shape::ShapeOptions;
 
-use super::{Exit, Failure, judge_options, percent, print_json, print_line};
+use super::{
+    Exit, Failure, counted, judge_options, medial_mesh_for, percent, print_json, print_line,
+};
 use crate::cli::{Global, MeasureArguments, MeshArgument};
 use crate::run::{Input, Source};
 
@@ -31,18 +32,18 @@ pub struct Arguments {
 /// When the surface or the medial mesh is refused.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
-    let input = Input::load(&source).map_err(Failure::input)?;
-    let loaded = complex::read(&arguments.axis).map_err(Failure::input)?;
-    let shape = input.shape(ShapeOptions::default()).map_err(Failure::input)?;
     let options = judge_options(&arguments.measure, JudgeOptions::default(), arguments.seed)?;
-    let judge = shape.judge(input.axis.as_ref(), options).map_err(Failure::input)?;
+    let input = Input::load(&source)?;
+    let shape =
+        input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
+    let (mesh, mut warnings) = medial_mesh_for(&arguments.axis, &shape)?;
+    let judge =
+        shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
     let to_normal = shape.normalisation();
-    let mesh = loaded.mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
-    if mesh.spheres.is_empty() {
-        return Err(Failure::input(format!("{}: no sphere", arguments.axis.display())));
-    }
-    let evaluation = judge.evaluate(&mesh).map_err(Failure::input)?;
-    let mut warnings = loaded.notes;
+    let mesh = mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
+    let evaluation = judge
+        .evaluate(&mesh)
+        .map_err(|error| Failure::input(format!("{}: {error}", arguments.axis.display())))?;
     warnings.extend(input.report.warnings);
     if global.json {
         print_json(&evaluation, &warnings);
@@ -59,8 +60,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 pub fn print_evaluation(evaluation: &Evaluation) {
     let Evaluation { distances, quality, counts, .. } = evaluation;
     print_line(&format!(
-        "{} spheres, {} edges ({} without a face), {} faces",
-        counts.spheres, counts.edges, counts.lone_edges, counts.faces
+        "{}, {} ({} without a face), {}",
+        counted(counts.spheres, "sphere"),
+        counted(counts.edges, "edge"),
+        counts.lone_edges,
+        counted(counts.faces, "face")
     ));
     let or_dash = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2}"));
     let betti = match evaluation.expected_betti {

@@ -5,7 +5,7 @@ use medial::surface::{self, SurfaceReport};
 
 use super::{Exit, Failure, note, print_json, print_line};
 use crate::cli::{Global, MeshArgument};
-use crate::run::{Input, InputError, Source};
+use crate::run::{Input, Source};
 
 /// Arguments of `info`.
 #[derive(Debug, Args)]
@@ -25,11 +25,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             let inspection = surface::inspect(path).map_err(Failure::input)?;
             (inspection.report, inspection.refused)
         }
-        Source::BuiltIn { .. } => match Input::load(&source) {
-            Ok(input) => (input.report, None),
-            Err(InputError::Surface(error)) => return Err(Failure::input(error)),
-            Err(error) => return Err(Failure::usage(error)),
-        },
+        Source::BuiltIn { .. } => (Input::load(&source)?.report, None),
     };
     if global.json {
         let mut object = serde_json::to_value(&report).map_err(Failure::input)?;

@@ -4,14 +4,16 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
+use medial::complex::{self, MedialMesh};
 use medial::metrics::JudgeOptions;
-use medial::shape::ShapeOptions;
+use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::Params;
 use medial::surface::Sampling;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::cli::{Dual, Global, MeasureArguments, SubstrateArguments};
+use crate::run::{InputError, Source};
 
 pub mod axis;
 pub mod compare;
@@ -65,6 +67,22 @@ impl Failure {
     /// The command line is wrong.
     pub fn usage(message: impl ToString) -> Self {
         Self { code: Exit::Usage, message: message.to_string() }
+    }
+
+    /// The user's input is wrong, and the message does not name it by itself.
+    pub fn of(source: &Source, message: impl ToString) -> Self {
+        Self::input(format!("{source}: {}", message.to_string()))
+    }
+}
+
+impl From<InputError> for Failure {
+    fn from(error: InputError) -> Self {
+        match error {
+            InputError::Read { .. } | InputError::Surface(_) => Self::input(error),
+            InputError::NoSuchShape(_)
+            | InputError::Resolution(_)
+            | InputError::OutOfRange { .. } => Self::usage(error),
+        }
     }
 }
 
@@ -137,18 +155,79 @@ pub fn shape_options(arguments: &SubstrateArguments) -> Result<ShapeOptions, Fai
 /// The options of the judge from the command line.
 ///
 /// # Errors
-/// When no sample is asked for.
+/// When no sample is asked for, or more than fit into memory.
 pub fn judge_options(
     arguments: &MeasureArguments,
     defaults: JudgeOptions,
     seed: u64,
 ) -> Result<JudgeOptions, Failure> {
-    match arguments.samples {
-        Some(0) => Err(Failure::usage("--samples 0: ask for at least one sample")),
-        samples => {
-            Ok(JudgeOptions { samples: samples.unwrap_or(defaults.samples), seed, ..defaults })
+    let samples = arguments.samples.unwrap_or(defaults.samples);
+    if !(1..=MOST_SAMPLES).contains(&samples) {
+        let message = format!("--samples {samples}: ask for 1 to {MOST_SAMPLES} samples");
+        return Err(Failure::usage(message));
+    }
+    Ok(JudgeOptions { samples, seed, ..defaults })
+}
+
+/// More samples than this are taken for a slip.
+const MOST_SAMPLES: usize = 10_000_000;
+
+/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it: next to its
+/// spheres the whole surface is less than a rounding error.
+const LARGEST_SPHERE: f64 = 1e12;
+
+/// Reads a medial mesh that was made for a shape: the mesh in input units, and what was repaired.
+///
+/// # Errors
+/// When it cannot be read, has no sphere, or cannot belong to the shape.
+pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<(MedialMesh, Vec<String>), Failure> {
+    let loaded = complex::read(path).map_err(Failure::input)?;
+    if loaded.mesh.spheres.is_empty() {
+        return Err(Failure::input(format!("{}: no sphere", path.display())));
+    }
+    let to_normal = shape.normalisation();
+    for (id, sphere) in loaded.mesh.spheres.iter().enumerate() {
+        let centre = to_normal.forward(sphere.centre);
+        let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
+        // An overflow gives a size that is infinite or not a number.
+        if size.is_nan() || size > LARGEST_SPHERE {
+            return Err(Failure::input(format!(
+                "{}: sphere {id} reaches {size:.1e} diagonals of the surface away from it: the \
+                 medial mesh is in other units, or of another surface",
+                path.display()
+            )));
         }
     }
+    Ok((loaded.mesh, loaded.notes))
+}
+
+/// Refuses an output that could not be written anyway, before the work for it is done.
+///
+/// # Errors
+/// When the extension is none of a medial mesh, or the folder does not exist.
+pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
+    let Some(path) = output else { return Ok(()) };
+    let known = ["ma", "ply", "obj"];
+    let extension = extension(path);
+    if !known.contains(&extension.as_str()) {
+        return Err(Failure::input(format!(
+            "{}: the extension {extension:?} is not one of .ma, .ply, .obj",
+            path.display()
+        )));
+    }
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        Some(folder) if !folder.is_dir() => Err(Failure::input(format!(
+            "{}: there is no folder {}; make it first",
+            path.display(),
+            folder.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// A number with its noun, such as `1 sphere` or `3 faces`.
+pub fn counted(number: u64, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
 /// Parameters from `key=value` words.

@@ -28,7 +28,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     if journaled.records.is_empty() {
         return Err(Failure {
             code: Exit::NothingMeasured,
-            message: format!("{}: no record in {RESULTS}", arguments.dir.display()),
+            message: match warnings.first() {
+                None => format!("{}: no record in {RESULTS}", arguments.dir.display()),
+                Some(first) => {
+                    format!("{}: no readable record in {RESULTS}; {first}", arguments.dir.display())
+                }
+            },
         });
     }
     let mut header = read_header(&arguments.dir).unwrap_or_else(|_| header_of(&journaled.records));

@@ -8,11 +8,26 @@ use medial::metrics::JudgeOptions;
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified, SimplifyError, Work};
 use medial_reports::{Simplify, Stages, Status};
+use serde::Serialize;
 
 use super::methods::unknown_method;
-use super::{Exit, Failure, judge_options, params, percent, print_json, print_line, shape_options};
+use super::{
+    Exit, Failure, check_output, counted, judge_options, medial_mesh_for, params, percent,
+    print_json, print_line, shape_options,
+};
 use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes, search_error};
+
+/// What a search over sphere counts found, for the answer to `--max-error`.
+#[derive(Debug, Serialize)]
+struct Search {
+    /// The bound, a fraction of the diagonal.
+    bound: f64,
+    /// The error of the result.
+    hausdorff: f64,
+    /// Number of sphere counts that were tried.
+    tried: usize,
+}
 
 /// Arguments of `simplify`.
 #[derive(Debug, Args)]
@@ -55,25 +70,38 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let method =
         medial_methods::find(&arguments.method).ok_or_else(|| unknown_method(&arguments.method))?;
     let options = shape_options(&arguments.substrate)?;
-    let input = Input::load(&source).map_err(Failure::input)?;
-    let mut shape = input.shape(options).map_err(Failure::input)?;
+    check_output(arguments.output.as_deref())?;
+    check_bound(arguments)?;
+    let input = Input::load(&source)?;
+    let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
     if let Some(path) = &arguments.initial {
-        let loaded = complex::read(path).map_err(Failure::input)?;
-        warnings.extend(loaded.notes);
-        shape = shape.with_initial(&loaded.mesh);
+        let (initial, notes) = medial_mesh_for(path, &shape)?;
+        warnings.extend(notes);
+        shape = shape.with_initial(&initial);
     }
-    let (simplified, simplify) = simplify(arguments, method.as_ref(), &input, &shape)?;
-    simplified.mesh.check().map_err(Failure::input)?;
+    let (simplified, simplify, search) = simplify(arguments, method.as_ref(), &input, &shape)
+        .map_err(|error| match error {
+            Error::Method(error) => failure(&source, error),
+            Error::Other(failure) => failure,
+        })?;
+    simplified.mesh.check().map_err(|error| Failure::of(&source, error))?;
+    if simplified.mesh.spheres.is_empty() {
+        return Err(Failure::of(&source, nothing_left(&simplified)));
+    }
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = simplified.mesh.transformed(back.diagonal, |p| back.backward(p));
         complex::write(output, &mesh).map_err(Failure::input)?;
     }
     if global.json {
-        print_json(&simplify, &warnings);
+        let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
+        if let Some(search) = &search {
+            object["max_error"] = serde_json::to_value(search).map_err(Failure::input)?;
+        }
+        print_json(&object, &warnings);
     } else {
-        print_result(&simplify, arguments);
+        print_result(&simplify, search.as_ref(), arguments);
         for warning in simplify.warnings.iter().chain(&warnings) {
             print_line(&format!("  warning: {warning}"));
         }
@@ -81,41 +109,65 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
+/// A method that does not answer, or anything else that went wrong.
+enum Error {
+    Method(SimplifyError),
+    Other(Failure),
+}
+
+impl From<SimplifyError> for Error {
+    fn from(error: SimplifyError) -> Self {
+        Self::Method(error)
+    }
+}
+
+impl From<Failure> for Error {
+    fn from(failure: Failure) -> Self {
+        Self::Other(failure)
+    }
+}
+
+fn check_bound(arguments: &Arguments) -> Result<(), Failure> {
+    match arguments.max_error {
+        Some(bound) if !(bound.is_finite() && bound > 0.0) => {
+            let message = format!("--max-error {bound}: a positive fraction of the diagonal");
+            Err(Failure::usage(message))
+        }
+        Some(_) => judge_options(&arguments.measure, JudgeOptions::default(), 0).map(|_| ()),
+        None => Ok(()),
+    }
+}
+
+/// Why a result has no sphere. That is no success: there is nothing to write.
+fn nothing_left(simplified: &Simplified) -> String {
+    let why = simplified.diagnostics.warnings.join("; ");
+    format!("the result has no sphere ({why}); ask for a finer level")
+}
+
 fn simplify(
     arguments: &Arguments,
     method: &dyn MedialSimplifier,
     input: &Input,
     shape: &Shape,
-) -> Result<(Simplified, Simplify), Failure> {
+) -> Result<(Simplified, Simplify, Option<Search>), Error> {
     let params = params(&arguments.set)?;
     let seed = arguments.substrate.seed;
     let run = RunContext::with_seed(seed);
     let (prepared, mut prepare) = Stopwatch::time(|| method.prepare(shape, &params, &run));
-    let mut simplification = prepared.map_err(failure)?;
+    let mut simplification = prepared?;
     let spent = shape.spent();
     prepare.seconds = (prepare.seconds - spent.seconds).max(0.0);
     prepare.cpu_seconds = (prepare.cpu_seconds - spent.cpu_seconds).max(0.0);
-    let mut notes = Vec::new();
+    let mut search = None;
     let (answer, lap) = if let Some(bound) = arguments.max_error {
-        if bound.is_nan() || bound <= 0.0 {
-            return Err(Failure::usage(format!(
-                "--max-error {bound}: a positive fraction of the diagonal"
-            )));
-        }
         let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
-        let judge = shape.judge(input.axis.as_ref(), options).map_err(Failure::input)?;
-        let initial = shape.initial().map_err(Failure::input)?.spheres.len();
-        let found =
-            search_error(simplification.as_mut(), &judge, initial, bound).map_err(failure)?;
-        notes.push(format!(
-            "Hausdorff error {} with {} spheres, found in {} trials",
-            percent(found.hausdorff),
-            found.simplified.mesh.spheres.len(),
-            found.tried
-        ));
+        let judge = shape.judge(input.axis.as_ref(), options).map_err(SimplifyError::from)?;
+        let initial = shape.initial().map_err(SimplifyError::from)?.spheres.len();
+        let found = search_error(simplification.as_mut(), &judge, initial, bound)?;
+        search = Some(Search { bound, hausdorff: found.hausdorff, tried: found.tried });
         // The seconds are those of the level found, asked alone.
         let count = found.simplified.mesh.spheres.len();
-        let mut alone = method.prepare(shape, &params, &run).map_err(failure)?;
+        let mut alone = method.prepare(shape, &params, &run)?;
         Stopwatch::time(|| alone.at(Level::Spheres(count)))
     } else {
         let level = match (arguments.spheres, arguments.level) {
@@ -125,12 +177,11 @@ fn simplify(
         };
         Stopwatch::time(|| simplification.at(level))
     };
-    let simplified = answer.map_err(failure)?;
+    let simplified = answer?;
     debug_assert!(simplified.work == Work::Anew || lap.seconds >= 0.0);
     let mut record = describe(arguments, shape, &simplified, prepare, lap);
     record.params = params;
-    record.warnings.extend(notes);
-    Ok((simplified, record))
+    Ok((simplified, record, search))
 }
 
 fn describe(
@@ -166,30 +217,37 @@ fn describe(
     }
 }
 
-fn failure(error: SimplifyError) -> Failure {
+fn failure(source: &Source, error: SimplifyError) -> Failure {
     match error {
         SimplifyError::Unsupported { .. } => {
             Failure { code: Exit::SomeFailed, message: error.to_string() }
         }
         SimplifyError::Parameter(_) | SimplifyError::Level(_) => Failure::usage(error),
-        _ => Failure::input(error),
+        _ => Failure::of(source, error),
     }
 }
 
-fn print_result(simplify: &Simplify, arguments: &Arguments) {
+fn print_result(simplify: &Simplify, search: Option<&Search>, arguments: &Arguments) {
     let seconds = simplify.seconds.unwrap_or_default();
     print_line(&format!(
-        "{}: {} spheres, {} edges, {} faces; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
+        "{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
         simplify.method,
-        simplify.spheres.unwrap_or(0),
-        simplify.edges.unwrap_or(0),
-        simplify.faces.unwrap_or(0),
+        counted(simplify.spheres.unwrap_or(0) as u64, "sphere"),
+        counted(simplify.edges.unwrap_or(0) as u64, "edge"),
+        counted(simplify.faces.unwrap_or(0) as u64, "face"),
         seconds.substrate,
         seconds.prepare,
         seconds.simplify
     ));
     if let Some(level) = simplify.native_level {
         print_line(&format!("  native level {level}"));
+    }
+    if let Some(search) = search {
+        print_line(&format!(
+            "  Hausdorff error {}, the fewest of {} tried",
+            percent(search.hausdorff),
+            counted(search.tried as u64, "count")
+        ));
     }
     if let Some(output) = &arguments.output {
         print_line(&format!("  written: {}", output.display()));

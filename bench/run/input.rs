@@ -3,7 +3,7 @@
 use std::fmt;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError, ShapeOptions};
@@ -62,6 +62,20 @@ impl Source {
             Self::BuiltIn { id, resolution: Some(resolution) } => format!("{id}-{resolution}"),
         }
     }
+
+    /// A longer name where [`Source::name`] is not unique: with the extension (depth 1), and with
+    /// the folder that holds the file (depth 2). For a built-in shape as it is written.
+    pub fn long_name(&self, depth: usize) -> String {
+        let Self::File(path) = self else { return self.to_string() };
+        let parts: Vec<_> = path
+            .components()
+            .filter_map(|part| match part {
+                Component::Normal(name) => Some(name.to_string_lossy()),
+                _ => None,
+            })
+            .collect();
+        parts[parts.len().saturating_sub(depth)..].join("/")
+    }
 }
 
 impl fmt::Display for Source {
@@ -98,11 +112,12 @@ impl Input {
     pub fn load(source: &Source) -> Result<Self, InputError> {
         match source {
             Source::File(path) => {
+                // First, since it refuses what is no regular file and would never end.
+                let loaded = surface::read(path)?;
                 let bytes = fs::read(path)
                     .map_err(|error| InputError::Read { path: path.clone(), error })?;
                 let hash = hex_digest(&bytes);
                 drop(bytes);
-                let loaded = surface::read(path)?;
                 Ok(Self {
                     name: source.name(),
                     dataset: None,

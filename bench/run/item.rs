@@ -14,7 +14,7 @@ use medial::simplifier::{
 use medial_reports::{Initial, Record, Repetition, Simplify, Stages, Status};
 use serde::{Deserialize, Serialize};
 
-use super::{Input, Lap, Provenance, Source, Stopwatch, peak_bytes};
+use super::{Input, Lap, Provenance, Stopwatch, peak_bytes};
 
 /// One method on one input at some levels. Plain data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -127,9 +127,9 @@ pub fn run_item(
         .collect()
 }
 
-/// The records of an item whose input was refused: one for each level, each with the reason.
+/// The records of an item whose input, here by its name, was refused: one for each level, each with the reason.
 pub fn refused_records(
-    source: &Source,
+    name: &str,
     item: &Item,
     reason: &str,
     provenance: &Provenance,
@@ -140,7 +140,7 @@ pub fn refused_records(
             Simplify { params: item.params.clone(), version: provenance.version.clone(), ..asked };
         Record {
             reason: Some(reason.to_owned()),
-            ..blank_record(source.name(), simplify, provenance)
+            ..blank_record(name.to_owned(), simplify, provenance)
         }
     };
     item.levels.iter().map(record).collect()

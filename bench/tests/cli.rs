@@ -317,6 +317,8 @@ fn max_error_is_met() {
         json(&["evaluate", "builtin:capsule", text_path(&path), "--samples", "3000"]);
     assert!(evaluation["hausdorff"].as_f64().expect("a number") <= 0.02, "{evaluation}");
     assert!(object["spheres"].as_u64().expect("a count") < 200, "{object}");
+    assert!(object["max_error"]["hausdorff"].as_f64().expect("a number") <= 0.02, "{object}");
+    assert!(object["max_error"]["tried"].is_u64() && object["warnings"] == serde_json::json!([]));
 }
 
 #[test]
@@ -360,4 +362,102 @@ fn published_counts_and_errors_on_real_meshes() {
     let hausdorff = object["hausdorff"].as_f64().expect("a number");
     assert!(hausdorff <= 0.0155, "{hausdorff}");
     assert_eq!(object["betti"], serde_json::json!([1, 0, 0]));
+}
+
+/// A cube of 8 vertices at `x0 .. x0 + side`.
+fn cube_off(x0: f64, side: f64) -> String {
+    let corner = |i: u32| {
+        let c = |bit: u32| side * f64::from(i >> bit & 1);
+        format!("{} {} {}\n", x0 + c(0), c(1), c(2))
+    };
+    let quads = "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n";
+    format!("OFF\n8 6 0\n{}{quads}", (0..8).map(corner).collect::<String>())
+}
+
+#[test]
+fn meshes_of_one_name_stay_apart() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    for (folder, side) in [("a", 1.0), ("b", 2.0)] {
+        fs::create_dir(at(folder)).expect("made");
+        fs::write(at(&format!("{folder}/x.off")), cube_off(0.0, side)).expect("written");
+    }
+    let (a, b, out) = (at("a/x.off"), at("b/x.off"), at("out"));
+    let common = ["--methods", "qmat,qmat", "--spheres", "2", "--samples", "100", "--out", &out];
+    let (code, object) = json(&[&["compare", &a, &b, &a], &common[..]].concat());
+    assert_eq!((code, &object["records"]), (0, &2.into()), "{object}");
+    let records = fs::read_to_string(at("out/results.jsonl")).expect("results");
+    let artifact = |line: &str| {
+        let record: Value = serde_json::from_str(line).expect("a record");
+        at(&format!("out/{}", record["artifact"].as_str().expect("an artifact")))
+    };
+    let artifacts: Vec<String> = records.lines().map(artifact).collect();
+    let written = artifacts.iter().map(|path| fs::read(path).expect("written"));
+    let written: Vec<Vec<u8>> = written.collect();
+    assert_ne!(written[0], written[1]);
+
+    // A wrong word costs no earlier result; another run leaves none of it.
+    for wrong in [["--samples", "0"], ["--set", "qmat.k=x"], ["--repeat", "0"]] {
+        assert_eq!(run(&[&["compare", &a, "--out", &out], &wrong[..]].concat()).0, 2, "{wrong:?}");
+        assert_eq!(fs::read_to_string(at("out/results.jsonl")).expect("results"), records);
+    }
+    assert_eq!(json(&[&["compare", "builtin:sphere:8"], &common[..]].concat()).0, 0);
+    assert!(artifacts.iter().all(|path| !Path::new(path).exists()), "{artifacts:?}");
+}
+
+#[test]
+fn nothing_is_no_success() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (axis, empty, far) = (at("x.ma"), at("empty.ma"), at("far.off"));
+    for (method, level) in [("lambda", "1"), ("angle", "180")] {
+        let words = ["simplify", "builtin:sphere:8", "-m", method, "--level", level, "-o", &axis];
+        let (code, _, stderr) = run(&words);
+        assert_eq!(code, 1, "{stderr}");
+        assert!(stderr.contains("no sphere") && !Path::new(&axis).exists(), "{stderr}");
+    }
+    fs::write(&empty, "0 0 0\n").expect("written");
+    let (code, _, stderr) = run(&["simplify", "builtin:box", "-m", "angle", "--initial", &empty]);
+    assert!(code == 1 && stderr.contains("empty.ma"), "{stderr}");
+
+    // Two cubes that are far smaller than a billionth of the distance between them.
+    let pair = cube_off(0.0, 1.0).replace("8 6 0", "16 12 0");
+    let (header, rest) = pair.split_at("OFF\n16 12 0\n".len());
+    let second = cube_off(1e12, 1.0);
+    let lines = |text: &str, skip: usize, take: usize| {
+        text.lines().skip(skip).take(take).map(|line| format!("{line}\n")).collect::<String>()
+    };
+    let moved = lines(&second, 10, 6).lines().fold(String::new(), |text, line| {
+        let corners = line.split(' ').skip(1).map(|i| i.parse::<u32>().expect("an index") + 8);
+        text + "4 " + &corners.map(|i| i.to_string()).collect::<Vec<_>>().join(" ") + "\n"
+    });
+    let (ours, theirs) = (lines(rest, 0, 8), lines(&second, 2, 8));
+    fs::write(&far, format!("{header}{ours}{theirs}{}{moved}", lines(rest, 8, 6)))
+        .expect("written");
+    let (code, _, stderr) = run(&["axis", &far]);
+    assert!(code == 1 && stderr.contains("far.off") && stderr.contains("billionth"), "{stderr}");
+}
+
+#[test]
+fn absurd_requests_are_refused_at_once() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (ball, huge, nowhere) = (at("ball.ma"), at("huge.ma"), at("no/such/folder/x.ma"));
+    fs::write(&ball, "1 0 0\nv 0 0 0 1\n").expect("written");
+    fs::write(&huge, "1 0 0\nv 0 0 0 1e200\n").expect("written");
+    let mesh = "builtin:sphere:8";
+    let cases: [(&[&str], i32, &str); 8] = [
+        (&["info", mesh, "--threads", "100000"], 2, "1024"),
+        (&["evaluate", mesh, &ball, "--samples", "99999999999"], 2, "10000000"),
+        (&["evaluate", mesh, &huge], 1, "huge.ma: sphere 0"),
+        (&["simplify", mesh, "-m", "qmat", "-o", &nowhere], 1, "there is no folder"),
+        (&["simplify", mesh, "-m", "qmat", "-o", "x.xyz"], 1, "\"xyz\" is not one of"),
+        (&["simplify", mesh, "-m", "qmat", "--max-error", "inf"], 2, "inf"),
+        (&["simplify", mesh, "-m", "qmat", "--set", "k=x"], 2, "k = \"x\""),
+        (&["simplify", "builtin:nothing", "-m", "qmat"], 2, "`nothing`"),
+    ];
+    for (arguments, expected, part) in cases {
+        let (code, _, stderr) = run(arguments);
+        assert!(code == expected && stderr.contains(part), "{arguments:?}: {code}, {stderr}");
+    }
 }

@@ -262,5 +262,7 @@ impl Evidence<'_> {
 
 /// The diagonal of a bounding box without size, or one that overflows.
 fn raw_diagonal(mesh: &TriMesh) -> f64 {
-    mesh.bounding_box().map_or(0.0, |(lo, hi)| (hi - lo).length())
+    // The normalisation does not underflow where squares do; it has no answer for an overflow.
+    let plain = || mesh.bounding_box().map_or(0.0, |(lo, hi)| (hi - lo).length());
+    Normalisation::of(mesh).map_or_else(plain, |n| n.diagonal)
 }

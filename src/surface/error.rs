@@ -180,6 +180,16 @@ pub enum Fault {
         /// Number of vertices.
         vertices: usize,
     },
+    /// Every face has corners at the same position.
+    #[error(
+        "no face is left of {}: each has corners at the same position; if that is not meant, the \
+         surface is too small for its distance from the origin: move it there before writing it",
+        counted(*.faces, "face")
+    )]
+    Collapsed {
+        /// Number of faces.
+        faces: usize,
+    },
     /// The bounding box has no size, or one that overflows or has lost digits to underflow.
     #[error(
         "the bounding box has the diagonal {diagonal:?}; move and scale the surface to about 1"

@@ -107,7 +107,7 @@ fn build(soup: &PolygonSoup, unit: Unit, welds: &[u32]) -> Result<Repaired, Faul
         }
     }
     if faces.is_empty() {
-        return Err(Fault::NoFaces { vertices: soup.vertices.len() });
+        return Err(Fault::Collapsed { faces: soup.len() });
     }
     let warnings = first_crossing.map(|first| {
         format!(
