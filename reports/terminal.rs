@@ -70,5 +70,7 @@ fn write_row(text: &mut String, row: &SeriesSummary, label: &str, width: usize) 
         let _ = write!(text, "{cell:>width$}");
     }
     // Means over other meshes than the rest cannot be read beside them.
-    text.push_str(if row.compared { "\n" } else { "  (own meshes)\n" });
+    // A row without any result is averaged over nothing, not over its own meshes.
+    let own = !row.compared && row.mean(&HAUSDORFF).is_some();
+    text.push_str(if own { "  (own meshes)\n" } else { "\n" });
 }

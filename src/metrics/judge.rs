@@ -140,8 +140,12 @@ impl Judge {
         let (lo, hi) = union.bounding_box();
         let extent = (hi - lo).length();
         if !(0.5..=2.0).contains(&extent) {
+            let times = match extent {
+                0.001..1000.0 => format!("{extent:.3}"),
+                _ => format!("{extent:.1e}"),
+            };
             misfits.push(format!(
-                "the union's bounding box has {extent:.3} times the diagonal of the surface's: \
+                "the union's bounding box has {times} times the diagonal of the surface's: \
                  is the medial mesh in other units?"
             ));
         }
