@@ -24,6 +24,7 @@ pub mod info;
 pub mod methods;
 pub mod report;
 pub mod simplify;
+pub mod triangulate;
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,6 +6,8 @@
 
 mod input;
 mod item;
+mod npy;
+mod npy_header;
 mod progress;
 mod provenance;
 mod search;
@@ -13,6 +15,8 @@ mod stopwatch;
 
 pub use input::{Input, InputError, Source};
 pub use item::{Item, Measure, RunOptions, refused_records, run_item};
+pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells};
+pub use npy_header::HeaderError;
 pub use progress::Progress;
 pub use provenance::{Provenance, hex_digest, peak_bytes};
 pub use search::{Found, search_error};

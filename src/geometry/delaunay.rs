@@ -79,6 +79,11 @@ impl Delaunay {
         &self.triangulation
     }
 
+    /// The combinatorial triangulation alone.
+    pub fn into_triangulation(self) -> Triangulation {
+        self.triangulation
+    }
+
     /// The position of a finite vertex.
     ///
     /// # Panics

@@ -82,6 +82,11 @@ impl Regular {
         &self.triangulation
     }
 
+    /// The combinatorial triangulation alone.
+    pub fn into_triangulation(self) -> Triangulation {
+        self.triangulation
+    }
+
     /// The position of a finite vertex.
     ///
     /// # Panics
