@@ -176,11 +176,6 @@ impl MedialUnion {
         Ok(Self { tree, shapes, primitives, balls, slack })
     }
 
-    /// Number of primitives that are evaluated.
-    pub fn primitive_count(&self) -> usize {
-        self.shapes.len()
-    }
-
     /// Smallest and largest corner of an axis-parallel box around the union.
     pub fn bounding_box(&self) -> (Vec3, Vec3) {
         let Bounds { lo, hi } = self.balls;

@@ -73,11 +73,6 @@ impl CellSpheres {
         Self { inside: inside.collect(), in_guard_band: near.iter().filter(|&&near| near).count() }
     }
 
-    /// Number of cells centred inside.
-    pub fn inside_count(&self) -> usize {
-        self.inside.iter().flatten().count()
-    }
-
     fn is_inside(&self, cell: CellId) -> bool {
         // Finite cells come first; infinite ones are beyond the list.
         self.inside.get(cell.index()).is_some_and(Option::is_some)

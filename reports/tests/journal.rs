@@ -1,0 +1,68 @@
+//! `results.jsonl`: what was written reads back, and an interrupted write costs one line.
+
+#[allow(dead_code)]
+mod common;
+
+use std::fs;
+
+use common::{asked, comparison, ok};
+use medial_reports::{Journal, JournalError, Status, read_records, write_records};
+use proptest::prelude::*;
+
+#[test]
+fn records_read_back_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("results.jsonl");
+    let records = comparison(&["bear", "dolphin"], &["qmat", "angle"], &[500, 100]);
+    let mut journal = Journal::open(&path).unwrap();
+    records.iter().for_each(|record| journal.append(record).unwrap());
+    let read = read_records(&path).unwrap();
+    assert_eq!((read.records.as_slice(), read.bad_lines.len()), (records.as_slice(), 0));
+    write_records(&path, &records[1..]).unwrap();
+    assert_eq!(read_records(&path).unwrap().records, records[1..]);
+}
+
+#[test]
+fn a_number_that_json_cannot_carry_is_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("results.jsonl");
+    let mut journal = Journal::open(&path).unwrap();
+    for value in [f64::NAN, f64::INFINITY] {
+        let mut record = ok("bear", "qmat", 100, 0, 0);
+        record.evaluate.as_mut().unwrap().distances.mean = value;
+        assert!(matches!(journal.append(&record), Err(JournalError::Unreadable { .. })));
+    }
+    assert_eq!(fs::read(&path).unwrap(), b"");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Wherever a crash cuts the file off, complete lines survive, the torn one is reported, and
+    /// the next record has a line of its own.
+    #[test]
+    fn a_torn_line_costs_one_record(cut in 0.0..1.0f64) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results.jsonl");
+        let records: Vec<_> =
+            [300, 200, 100].map(|count| asked("bear", "qmat", count, Status::Failed)).into();
+        write_records(&path, &records).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        let kept = &bytes[..(cut * bytes.len() as f64) as usize];
+        fs::write(&path, kept).unwrap();
+        // A line that lacks only its line break is complete.
+        let ends: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i] == b'\n').collect();
+        let complete = ends.iter().filter(|&&end| end <= kept.len()).count();
+        let torn = !kept.is_empty() && kept.last() != Some(&b'\n') && !ends.contains(&kept.len());
+
+        let read = read_records(&path).unwrap();
+        prop_assert_eq!(&read.records[..], &records[..complete]);
+        prop_assert_eq!(read.bad_lines.iter().filter(|line| line.torn).count(), usize::from(torn));
+        prop_assert_eq!(read.bad_lines.len(), usize::from(torn));
+        let last = ok("plane", "angle", 100, 1, 1);
+        Journal::open(&path).unwrap().append(&last).unwrap();
+        let read = read_records(&path).unwrap();
+        prop_assert_eq!(read.records.last(), Some(&last));
+        prop_assert_eq!(read.records.len(), complete + 1);
+    }
+}

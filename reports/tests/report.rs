@@ -1,0 +1,165 @@
+//! A report as a whole: what is in the folder, what the numbers in it are, what cannot spoil it.
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use common::{SHAPES, comparison, failed, header, ok};
+use medial_reports::{Record, Status, read_header, summary_text, write_report};
+
+const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
+const COUNTS: [usize; 3] = [500, 200, 100];
+
+/// Every file below a folder, by relative path.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().to_string_lossy().into_owned();
+                all.insert(name, fs::read(&path).unwrap());
+            }
+        }
+    }
+    all
+}
+
+fn report_of(records: &[Record]) -> BTreeMap<String, Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    let written = write_report(folder.path(), records, &header(&METHODS)).unwrap();
+    let all = files(folder.path());
+    assert_eq!(written.len(), all.len(), "what is there is what is said to be written");
+    assert_eq!(written.last(), Some(&folder.path().join("index.html")));
+    all
+}
+
+fn text<'a>(files: &'a BTreeMap<String, Vec<u8>>, name: &str) -> &'a str {
+    std::str::from_utf8(&files[name]).unwrap()
+}
+
+#[test]
+fn the_same_records_give_the_same_bytes() {
+    let records = comparison(&SHAPES[..4], &METHODS, &COUNTS);
+    let files = report_of(&records);
+    assert_eq!(files, report_of(&records));
+    for name in ["results.csv", "header.json", "tables/summary.md", "tables/summary.tex"] {
+        assert!(!files[name].is_empty(), "{name}");
+    }
+    for mesh in &SHAPES[..4] {
+        assert!(files.contains_key(&format!("tables/mesh-{mesh}.md")), "{mesh}");
+    }
+    let plots: Vec<&String> = files.keys().filter(|name| name.ends_with(".svg")).collect();
+    assert!(plots.len() > 4, "{plots:?}");
+    for plot in plots {
+        assert!(text(&files, plot).trim_end().ends_with("</svg>"), "{plot} is cut off");
+    }
+}
+
+#[test]
+fn every_record_is_a_row_of_the_csv_with_its_numbers() {
+    let records = comparison(&SHAPES[..6], &METHODS, &COUNTS);
+    let files = report_of(&records);
+    let mut reader = csv::Reader::from_reader(&files["results.csv"][..]);
+    let names = reader.headers().unwrap().clone();
+    let column =
+        |name: &str| names.iter().position(|n| n == name).unwrap_or_else(|| panic!("{name}"));
+    let [mesh, method, status, hausdorff] = ["mesh", "method", "status", "hausdorff"].map(column);
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), records.len());
+    let mut found: Vec<[&str; 4]> =
+        rows.iter().map(|row| [mesh, method, status, hausdorff].map(|k| &row[k])).collect();
+    let numbers: Vec<String> = records
+        .iter()
+        .map(|r| {
+            r.evaluate.as_ref().map_or_else(String::new, |e| e.distances.hausdorff.to_string())
+        })
+        .collect();
+    let mut expected: Vec<[&str; 4]> = records
+        .iter()
+        .zip(&numbers)
+        .map(|(r, number)| [&r.mesh, &r.simplify.method, r.status.key(), number.as_str()])
+        .collect();
+    found.sort_unstable();
+    expected.sort_unstable();
+    assert_eq!(found, expected);
+    assert!(found.iter().any(|row| row[2] == "panicked" && row[3].is_empty()));
+}
+
+#[test]
+fn no_method_gains_by_failing() {
+    // Both are equal where both have a result; one fails on the mesh that is hard for the other.
+    let mut records = vec![
+        ok("easy", "qmat", 100, 0, 0),
+        ok("hard", "qmat", 100, 1, 0),
+        ok("easy", "angle", 100, 0, 0),
+        failed("hard", "angle", 100, Status::Panicked, "index out of bounds"),
+    ];
+    let set = |record: &mut Record, hausdorff: f64| {
+        record.evaluate.as_mut().unwrap().distances.hausdorff = hausdorff;
+    };
+    set(&mut records[0], 0.0123);
+    set(&mut records[1], 0.5);
+    set(&mut records[2], 0.0123);
+    let files = report_of(&records);
+    let summary = text(&files, "tables/summary.md");
+    let rows: Vec<&str> = summary
+        .lines()
+        .filter(|line| line.contains("| qmat") || line.contains("| angle"))
+        .collect();
+    assert!(rows.len() >= 2, "{summary}");
+    // Over the one mesh that both have; with the hard one, qmat's mean would be near 7.84 %.
+    assert!(rows.iter().take(2).all(|row| row.contains("1.23")), "{rows:?}");
+    assert!(!summary.contains("7.84"), "{summary}");
+    assert!(text(&files, "index.html").contains("index out of bounds"));
+}
+
+#[test]
+fn names_from_files_stay_text() {
+    let hostile = "<script>alert(1)</script>|a\\b_c%&/../x";
+    let mut record = ok(hostile, "qmat", 100, 0, 0);
+    record.simplify.warnings.push("</script><img src=x onerror=alert(2)>".to_owned());
+    let files = report_of(&[record, failed(hostile, "angle", 100, Status::Failed, "<b>no</b>")]);
+    let page = text(&files, "index.html");
+    for forbidden in ["<script>alert", "<img src=x", "<b>no</b>"] {
+        assert!(!page.contains(forbidden), "{forbidden}");
+    }
+    for (name, bytes) in &files {
+        assert!(name.split('/').all(|part| part != ".."), "{name} leaves the folder");
+        if name.ends_with(".svg") {
+            assert!(!String::from_utf8_lossy(bytes).contains("<script>"), "{name}");
+        }
+    }
+}
+
+#[test]
+fn numbers_of_an_earlier_report_do_not_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |records: &[Record]| write_report(folder.path(), records, &header(&METHODS));
+    write(&[ok("bear", "qmat", 100, 0, 0), ok("plane", "qmat", 100, 1, 0)]).unwrap();
+    fs::write(folder.path().join("results.jsonl"), "the runner's").unwrap();
+    fs::write(folder.path().join("tables/mine.md"), "the user's").unwrap();
+    assert!(folder.path().join("tables/mesh-plane.md").exists());
+    write(&[ok("bear", "qmat", 100, 0, 0)]).unwrap();
+    let left = files(folder.path());
+    assert!(left.keys().all(|name| !name.contains("plane")), "{:?}", left.keys());
+    assert_eq!(left["results.jsonl"], b"the runner's");
+    assert_eq!(left["tables/mine.md"], b"the user's");
+    assert_eq!(read_header(folder.path()).unwrap(), header(&METHODS));
+}
+
+#[test]
+fn nothing_measured_is_said() {
+    let records = [failed("bear", "qmat", 100, Status::TimedOut, "no result within 300 s")];
+    for records in [&records[..], &[]] {
+        let files = report_of(records);
+        assert!(text(&files, "index.html").to_lowercase().contains("nothing was measured"));
+    }
+    assert_eq!(summary_text(&[]), "");
+    assert!(summary_text(&records).contains("0/1"), "{}", summary_text(&records));
+}
