@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         warnings.push(format!(
             "the medial mesh has Betti numbers {betti:?}, the solid {expected:?}: the samples are too \
              coarse somewhere, or parts touch; try --sampling blue:{}",
-            4 * shape.samples().len()
+            (4 * shape.samples().len()).min(1_000_000)
         ));
     }
     if global.json {

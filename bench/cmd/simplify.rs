@@ -192,7 +192,10 @@ fn describe(
     lap: Lap,
 ) -> Simplify {
     let used = shape.used();
-    let sum = |part: fn(&medial::shape::Cost) -> f64| used.iter().map(|(_, cost)| part(cost)).sum();
+    // From +0: the sum of nothing is -0 otherwise, and prints so.
+    let sum = |part: fn(&medial::shape::Cost) -> f64| {
+        used.iter().fold(0.0, |sum, (_, cost)| sum + part(cost))
+    };
     let mesh = &simplified.mesh;
     Simplify {
         seed: arguments.substrate.seed,
