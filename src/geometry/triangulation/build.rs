@@ -34,9 +34,6 @@ use crate::geometry::predicates::{
 /// A walk in rounded arithmetic may turn in a circle; after this many steps it goes on exactly.
 const MAX_ROUNDED_STEPS: usize = 256;
 
-/// Rounds of at least this many sites are inserted in two parts.
-const DIVIDED_ROUND: u32 = 1 << 14;
-
 /// What became of a site.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
@@ -73,18 +70,20 @@ pub(super) struct Builder<'s, M> {
 impl<'s, M: Metric> Builder<'s, M> {
     /// Triangulates distinct sites; `sites[0]` is a dummy, and 1 to 4 are affinely independent.
     ///
-    /// `rounds` are the ends of the rounds of insertion.
+    /// `rounds` are the ends of the rounds of insertion; those of at least `divided_round` sites are
+    /// divided.
     pub(super) fn build(
         sites: &'s [Site],
         rounds: &[u32],
+        divided_round: u32,
         filter: Filter,
     ) -> Result<Self, TriangulationError> {
-        let alone = rounds.iter().take_while(|&&end| end < DIVIDED_ROUND).last();
+        let alone = rounds.iter().take_while(|&&end| end < divided_round).last();
         let mut builder = Self::new(sites, filter, alone.map_or(sites.len(), |&n| n as usize));
         builder.start();
         let mut start = 5;
         for &end in rounds {
-            if end.saturating_sub(start) < DIVIDED_ROUND {
+            if end.saturating_sub(start) < divided_round {
                 builder.insert_all(start..end)?;
             } else {
                 builder.insert_divided(start..end)?;

@@ -51,11 +51,12 @@ const DIRECTIONS: [Vec3; 13] = [
     Vec3::new(-1.0, 1.0, 1.0),
 ];
 
-/// If more than this fraction of the sites would be deferred, the round is not divided.
-const MOST_DEFERRED: (u32, u32) = (1, 2);
+/// If more than this fraction of the sites would be deferred, the round is not divided; in unit
+/// tests it always is.
+const MOST_DEFERRED: (u32, u32) = if cfg!(test) { (1, 1) } else { (1, 2) };
 
 /// For one of so many sites a cell near it is noted before the division.
-const HINT_STRIDE: usize = 64;
+const HINT_STRIDE: usize = 256;
 
 /// The cuts to choose from, each direction with both kinds of centres.
 const CUTS: usize = 2 * DIRECTIONS.len();
@@ -123,20 +124,20 @@ impl<'s, M: Metric> Builder<'s, M> {
         self.insert_all(deferred)
     }
 
-    /// The cut that the conflict zones of the fewest sites straddle, if it is good enough.
+    /// The cut for which the fewest sites would be deferred, if these are not too many.
     fn choose_cut(&mut self, range: &Range<u32>) -> Option<Cut> {
         let cuts = self.halving_cuts(range);
         let stride = range.len().div_ceil(TRIED_SITES);
-        let (mut straddling, mut tried) = ([0; CUTS], 0);
+        let (mut deferred, mut tried) = ([0; CUTS], 0);
         for vertex in range.clone().step_by(stride) {
-            let straddled = self.straddled_cuts(vertex, &cuts);
-            for (i, count) in straddling.iter_mut().enumerate() {
-                *count += straddled >> i & 1;
+            let unsuitable = self.unsuitable_cuts(vertex, &cuts);
+            for (i, count) in deferred.iter_mut().enumerate() {
+                *count += unsuitable >> i & 1;
             }
             tried += 1;
         }
-        let best = (0..CUTS).min_by_key(|&i| straddling[i])?;
-        (MOST_DEFERRED.1 * straddling[best] <= MOST_DEFERRED.0 * tried).then_some(cuts[best])
+        let best = (0..CUTS).min_by_key(|&i| deferred[i])?;
+        (MOST_DEFERRED.1 * deferred[best] <= MOST_DEFERRED.0 * tried).then_some(cuts[best])
     }
 
     /// The cuts to choose from: each direction halves the sites.
@@ -156,28 +157,31 @@ impl<'s, M: Metric> Builder<'s, M> {
         })
     }
 
-    /// One bit for each cut that separates the cells that an insertion reads or replaces.
-    fn straddled_cuts(&mut self, vertex: u32, cuts: &[Cut; CUTS]) -> u32 {
+    /// One bit for each cut for which a site would be deferred: the cells that its insertion reads
+    /// or replaces are not all in the part of its side.
+    fn unsuitable_cuts(&mut self, vertex: u32, cuts: &[Cut; CUTS]) -> u32 {
         let Some(seed) = self.locate(vertex) else { return 0 };
         self.last = seed;
         if !self.find_conflict_zone(vertex, seed) {
             return 0;
         }
+        let parts = |point: &dyn Fn(usize) -> Vec3| {
+            let bit = |(i, cut): (usize, &Cut)| u32::from(cut.is_below(point(i))) << i;
+            cuts.iter().enumerate().map(bit).sum::<u32>()
+        };
+        let side = parts(&|_| Vec3::from_array(self.sites[vertex as usize].p));
         let (mut all, mut any) = (u32::MAX, 0);
         for &c in &self.zone {
             for n in self.cells[c as usize].n {
                 let cell = decisive(&self.cells, n.cell());
                 let centres = Centre::BOTH.map(|centre| centre.of(cell, self.sites));
-                let below = |(i, cut): (usize, &Cut)| {
-                    u32::from(cut.is_below(centres[i / DIRECTIONS.len()])) << i
-                };
-                let parts = cuts.iter().enumerate().map(below).sum::<u32>();
+                let parts = parts(&|i| centres[i / DIRECTIONS.len()]);
                 all &= parts;
                 any |= parts;
             }
         }
         self.forget_zone();
-        any & !all
+        (side | any) & !(side & all)
     }
 
     /// Step 1 of the head; returns also the place of every cell.
@@ -245,6 +249,9 @@ impl<'s, M: Metric> Builder<'s, M> {
             return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
         }
         *self = first.builder;
+        if self.last == FRONTIER {
+            self.last = second.builder.last + offset;
+        }
         let moved = |cell: &Cell| Cell { v: cell.v, n: cell.n.map(|n| n.moved(offset)) };
         self.cells.par_extend(second.builder.cells[1..].par_iter().map(moved));
         self.state.resize(self.cells.len(), UNKNOWN);

@@ -17,6 +17,8 @@ mod freeze;
 mod order;
 mod query;
 mod stellate;
+#[cfg(test)]
+mod tests;
 mod zone;
 
 use cells::Cell;
@@ -72,6 +74,9 @@ pub struct Triangulation {
     incident: Vec<CellId>,
 }
 
+/// Rounds of at least this many sites are inserted in two parts.
+const DIVIDED_ROUND: u32 = 1 << 14;
+
 /// A triangulation of sites, with what did not become a vertex.
 pub(super) struct Triangulated {
     pub(super) triangulation: Triangulation,
@@ -82,6 +87,14 @@ pub(super) struct Triangulated {
 
 /// Triangulates finite sites of admissible size, in any number and position.
 pub(super) fn triangulate<M: Metric>(sites: &[Site]) -> Result<Triangulated, TriangulationError> {
+    triangulate_dividing::<M>(sites, DIVIDED_ROUND)
+}
+
+/// The same with rounds of insertion divided from this size on.
+fn triangulate_dividing<M: Metric>(
+    sites: &[Site],
+    divided_round: u32,
+) -> Result<Triangulated, TriangulationError> {
     if sites.len() >= cells::MAX_CELLS {
         return Err(TriangulationError::TooLarge { points: sites.len(), limit: cells::MAX_CELLS });
     }
@@ -95,7 +108,7 @@ pub(super) fn triangulate<M: Metric>(sites: &[Site]) -> Result<Triangulated, Tri
     let mut ordered =
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
     build::bring_independent_to_front(&mut ordered, &mut ids)?;
-    let cells = Builder::<M>::build(&ordered, &rounds, filter)?.cells;
+    let cells = Builder::<M>::build(&ordered, &rounds, divided_round, filter)?.cells;
     let triangulation = freeze::freeze(cells, &ids, sites.len());
     Ok(Triangulated { triangulation, repeated, filter })
 }
