@@ -18,10 +18,10 @@
 //! - Attali and Montanvert, and Foskey et al., filter the facets of a Voronoi diagram and of a
 //!   grid. This variant filters Voronoi vertices, so that it can be asked for a number of spheres
 //!   like every other method.
-//! - A sphere of radius zero has no angle; it gets `S = 0` and goes first.
+//! - A sphere that touches the boundary at its own centre (radius zero), or in fewer than two points,
+//!   has no angle; it gets `S = 0` and goes first.
 
-use medial::Vec3;
-use medial::complex::Sphere;
+use medial::geometry::separation_angle;
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext, Simplification,
@@ -92,7 +92,7 @@ impl MedialSimplifier for AngleFilter {
             .par_iter()
             .enumerate()
             .map(|(sphere, &s)| {
-                contacts.with(sphere, |points| separation_angle(s, points)).to_degrees()
+                contacts.with(sphere, |points| separation_angle(s.centre, points)).to_degrees()
             })
             .collect();
         let scale = Scale {
@@ -104,22 +104,4 @@ impl MedialSimplifier for AngleFilter {
         };
         Ok(Box::new(Ranked::new(mesh, value, scale, diagnostics)))
     }
-}
-
-/// Separation angle `S` of a sphere, in radians, from its contact points: the largest angle
-/// between two of them, seen from the centre. Zero for fewer than two points or a zero radius.
-///
-/// The points are taken to lie on the sphere: rounding, or contacts found with a tolerance, clamp
-/// the arcsine's argument to 1.
-pub fn separation_angle(sphere: Sphere, contacts: &[Vec3]) -> f64 {
-    if sphere.radius <= 0.0 {
-        return 0.0;
-    }
-    let mut widest = 0.0_f64;
-    for (i, p) in contacts.iter().enumerate() {
-        for q in &contacts[i + 1..] {
-            widest = widest.max(p.distance_squared(*q));
-        }
-    }
-    2.0 * (widest.sqrt() / (2.0 * sphere.radius)).min(1.0).asin()
 }

@@ -14,12 +14,16 @@
 //! Lengths are in units of the input's bounding-box diagonal wherever a [`shape::Shape`] is
 //! involved, and in the unit of the arguments everywhere else.
 
+mod atomic;
 pub mod complex;
+mod disjoint;
 pub mod geometry;
 pub mod metrics;
 pub mod shape;
 pub mod simplifier;
 pub mod surface;
+
+pub use atomic::write_atomically;
 
 /// A point or a vector in space, double precision.
 pub type Vec3 = glam::DVec3;

@@ -13,7 +13,9 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 
 use crate::Vec3;
-use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, voronoi_medial_mesh};
+use crate::complex::{
+    CellSpheres, ComplexError, DualTriangulation, MedialMesh, voronoi_medial_mesh,
+};
 use crate::geometry::{BvhError, Delaunay, TriangleBvh, TriangulationError};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::simplifier::Diagnostics;
@@ -92,7 +94,7 @@ struct Store {
     normalisation: Normalisation,
     report: SurfaceReport,
     options: ShapeOptions,
-    given: Option<Arc<MedialMesh>>,
+    given: Option<Result<Arc<MedialMesh>, ShapeError>>,
     samples: Cache<Sampling, Arc<[Vec3]>>,
     delaunay: Cache<Sampling, Arc<Delaunay>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
@@ -135,6 +137,7 @@ impl Shape {
     }
 
     /// The shape with an initial medial mesh from elsewhere, in input units, in place of its own.
+    /// [`Shape::initial`] refuses one without a sphere, and one that is not valid once normalised.
     ///
     /// # Panics
     /// If another view on the same store exists.
@@ -142,7 +145,11 @@ impl Shape {
         let store = Arc::get_mut(&mut self.store).expect("the only view");
         let to_normal = store.normalisation;
         let mesh = initial.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
-        store.given = Some(Arc::new(mesh));
+        store.given = Some(match mesh.check() {
+            Ok(()) if mesh.spheres.is_empty() => Err(ShapeError::EmptyInitial),
+            Ok(()) => Ok(Arc::new(mesh)),
+            Err(error) => Err(ShapeError::Initial(error)),
+        });
         self
     }
 
@@ -257,16 +264,17 @@ impl Shape {
     /// given one, or the Voronoi medial mesh.
     ///
     /// # Errors
-    /// As [`Shape::voronoi`].
+    /// As [`Shape::voronoi`]; when the given mesh has no sphere or is not valid.
     pub fn initial(&self) -> Result<Arc<MedialMesh>, ShapeError> {
         match &self.store.given {
-            Some(given) => Ok(Arc::clone(given)),
+            Some(given) => given.clone(),
             None => self.voronoi(),
         }
     }
 
     /// The contact points of each sphere of a medial mesh of this shape: those that it carries, or
-    /// all samples within `(1 + 1e-3) r` of the centre, which is then said in `diagnostics`.
+    /// the samples nearest to the centre, to within a thousandth, where they are within
+    /// `(1 + 1e-3) r`; which is then said in `diagnostics`.
     ///
     /// # Errors
     /// Never at present; reserved for samplings that can fail.
@@ -283,8 +291,8 @@ impl Shape {
         self.note(Substrate::Contacts, Use { cost, built_here: true });
         let empty = sets.empty_sets();
         diagnostics.warn(format!(
-            "the initial medial mesh has no contact points: they were taken to be all samples \
-             within 1.001 radii of a centre ({empty} spheres have fewer than two)"
+            "the initial medial mesh has no contact points: they were taken to be the samples \
+             nearest to a centre, to within 0.1 % ({empty} spheres have fewer than two)"
         ));
         Ok(sets)
     }
@@ -387,6 +395,12 @@ pub enum ShapeError {
     /// The surface has no bounding-volume tree.
     #[error("the surface: {0}")]
     Tree(#[from] BvhError),
+    /// The medial mesh to start from has no sphere.
+    #[error("the initial medial mesh has no sphere")]
+    EmptyInitial,
+    /// The medial mesh to start from is not valid in units of the surface's diagonal.
+    #[error("the initial medial mesh, divided by the diagonal of the surface: {0}")]
+    Initial(ComplexError),
     /// The inside of the shape holds no Voronoi vertex.
     #[error(
         "the initial medial mesh is empty: no circumcentre of the samples lies inside the surface; \

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use medial::Vec3;
-use medial::complex::{MedialMesh, MedialUnion};
+use medial::complex::{MedialMesh, MedialUnion, UnionError};
 use medial::geometry::{Sphere, TriangleBvh};
 use medial::metrics::{
     AxisOptions, DistanceOptions, Distances, EnvelopeOptions, MetricError, VolumeOptions,
@@ -277,6 +277,9 @@ fn what_cannot_be_measured_is_refused() {
     assert!(matches!(distances(&surface, &bvh, &empty, &options), Err(MetricError::Union(_))));
     let flat = TriMesh { vertices: vec![Vec3::ZERO; 3], faces: vec![[0, 1, 2]] };
     assert_eq!(distances(&flat, &bvh, &axis, &options), Err(MetricError::NoArea));
+    let far = complex(&[(Vec3::ZERO, 1.0), (Vec3::X * 1e200, 1.0)], &[[0, 1]], &[]);
+    let refused = distances(&surface, &bvh, &far, &options);
+    assert_eq!(refused, Err(MetricError::Union(UnionError::TooLarge { sphere: 1 })));
     let none = DistanceOptions { surface_samples: 0, ..options };
     assert!(matches!(distances(&surface, &bvh, &axis, &none), Err(MetricError::NoSamples(_))));
     let none = DistanceOptions { envelope_samples: 0, ..options };

@@ -49,6 +49,7 @@ fn text_and_back() {
         "blue:x",
         "red:5",
         "blue:99999999999",
+        "blue:1000001",
     ] {
         assert!(text.parse::<Sampling>().is_err(), "{text}");
     }

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use medial::complex::write_atomically;
+use medial::write_atomically;
 
 use super::npy_header::{Element, Header, HeaderError, header_length, parse_header};
 

@@ -79,7 +79,7 @@ fn add_tip(quadrics: &mut [Quadric], mesh: &MedialMesh, end: u32, other: u32, pa
     let [tip, base] = [end, other].map(|v| mesh.spheres[v as usize]);
     // Without an axis the stability ratio is 0, and so is the weight.
     if let (Some(frame), Some((weight, length))) =
-        (cone_frame(base, tip), boundary_weight(tip, base, params))
+        (cone_frame(base, tip), k_boundary(tip, base, params))
     {
         quadrics[end as usize].add_plane(frame.u * length, tip, weight);
     }
@@ -94,7 +94,7 @@ fn add_rim(
     params: &QmatParams,
 ) {
     let [a, b] = ends.map(|v| mesh.spheres[v as usize]);
-    let Some((weight, length)) = boundary_weight(a, b, params) else {
+    let Some((weight, length)) = k_boundary(a, b, params) else {
         return;
     };
     if cone_frame(a, b).is_none() {
@@ -128,9 +128,9 @@ fn cone_frame(a: Sphere, b: Sphere) -> Option<ConeFrame> {
 }
 
 /// Weight of a boundary plane and length of its normal.
-fn boundary_weight(a: Sphere, b: Sphere, params: &QmatParams) -> Option<(f64, f64)> {
+fn k_boundary(a: Sphere, b: Sphere, params: &QmatParams) -> Option<(f64, f64)> {
     let stability = stability_ratio(a, b);
-    let weight = params.boundary_weight * stability * stability;
+    let weight = params.k_boundary * stability * stability;
     match params.boundary {
         Boundary::Paper => Some((weight, 1.0)),
         Boundary::Legacy => Some((0.1 * weight, a.centre.distance(b.centre))),

@@ -26,8 +26,9 @@
 //!   largest: independent of scale and of how many quadrics were summed.
 //! - A minimiser with a negative radius is replaced by the midpoint of the edge.
 //! - A placement off the optimum costs more than the edge was queued at. The edge goes back into
-//!   the queue at that cost, and is collapsed when nothing cheaper is left. Taken at once, such
-//!   placements raise the mean error at 100 spheres by a sixth on Bear and Dolphin.
+//!   the queue at that cost, and is collapsed when nothing cheaper is left. Over twelve meshes this
+//!   lowered the Hausdorff distance at 100 spheres by 12 % and the mean error by 3 % (geometric
+//!   means), against taking such placements at once; single meshes go either way.
 //! - Equal costs, in the main the zeros of contained spheres, are ordered by `E`, then by ids.
 //! - Centres closer than `1e-12` are one point: `Γ` and the cost are 0, and they go first, small
 //!   stars before large ones.
@@ -37,16 +38,18 @@
 //! - The link condition is that of Dey et al. in full, for holes and for voids. It is sufficient,
 //!   not necessary: when it holds back all that is left, at 500 spheres or fewer, an edge whose
 //!   collapse brings the Betti numbers no farther from those of the initial mesh is taken. Without
-//!   this a sampled sphere stops at some 30 spheres, around voids closed before `η`.
+//!   this a geodesic sphere of 1,692 samples stopped at 36 to 107 spheres, depending on how its
+//!   coordinates were rounded: before `η` unchecked collapses make voids, which are then kept.
 //! - `boundary=legacy` follows the authors' code in the weight and the length of the normals of the
 //!   boundary planes, and in nothing else.
 //!
 //! # Deviations from the paper
 //!
 //! - A minimiser farther from the midpoint of its edge than the two balls extend, `d + max r`, is
-//!   not used, as if `A` were singular. It can pass for invertible where slabs are nearly parallel,
-//!   and then a single sphere lands across the shape: Bear at 500 spheres, 19 % of the diagonal
-//!   instead of 0.7 %.
+//!   not used, as if `A` were singular. `A` can pass for invertible where slabs are nearly parallel,
+//!   and then a single sphere lands far outside the shape: Max Planck with `boundary=legacy` at 500
+//!   spheres, a Hausdorff distance of 202 % of the diagonal instead of 1.5 %. With the default
+//!   parameters it changed nothing on the twelve meshes that were compared.
 
 mod accumulate;
 mod contract;

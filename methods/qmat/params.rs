@@ -13,7 +13,7 @@ pub struct QmatParams {
     /// How stable boundaries are kept from shrinking.
     pub boundary: Boundary,
     /// `k'` of section 4.4, the weight of the boundary planes; a pure number.
-    pub boundary_weight: f64,
+    pub k_boundary: f64,
     /// From which sphere count on a collapse has to keep the topology.
     pub topology_from: TopologyFrom,
     /// Ratio of the smallest to the largest eigenvalue at which a quadric counts as singular.
@@ -25,7 +25,7 @@ impl Default for QmatParams {
         Self {
             k: 1e-5,
             boundary: Boundary::Paper,
-            boundary_weight: 0.1,
+            k_boundary: 0.1,
             topology_from: TopologyFrom::Spheres(200),
             singular_ratio: 1e-10,
         }
@@ -104,7 +104,7 @@ impl From<TopologyFrom> for TopologyWord {
 
 impl QmatParams {
     pub(super) fn validate(self) -> Result<Self, SimplifyError> {
-        let at_least_zero = [("k", self.k), ("boundary_weight", self.boundary_weight)];
+        let at_least_zero = [("k", self.k), ("k_boundary", self.k_boundary)];
         for (name, value) in at_least_zero {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(SimplifyError::Parameter(format!("{name} = {value} is negative")));
@@ -136,8 +136,8 @@ impl QmatParams {
                 "planes that keep stable boundaries from shrinking (section 4.4)",
             ),
             info(
-                "boundary_weight",
-                defaults.boundary_weight.to_string(),
+                "k_boundary",
+                defaults.k_boundary.to_string(),
                 "pure number",
                 "weight k' of the boundary planes",
             ),

@@ -83,7 +83,7 @@ impl Figure {
             .bold_line_style(GRID.stroke_width(RESOLUTION as u32))
             .light_line_style(TRANSPARENT)
             .axis_style(INK.stroke_width(RESOLUTION as u32))
-            .set_all_tick_mark_size(0)
+            .set_all_tick_mark_size(4 * RESOLUTION)
             .x_labels(x.ticks.len())
             .y_labels(y.ticks.len())
             .label_style(font(12, INK))

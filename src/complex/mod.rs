@@ -1,7 +1,6 @@
 //! The medial mesh: a simplicial complex of dimension at most two on medial spheres.
 
 pub mod collapse;
-mod disjoint;
 mod formats;
 mod incidence;
 mod mesh;
@@ -11,10 +10,7 @@ mod topology;
 mod union;
 mod voronoi;
 
-pub use disjoint::DisjointSets;
-pub use formats::{
-    LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write, write_atomically,
-};
+pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
 pub use incidence::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};
 pub use stability::{ZERO_LENGTH, stability_ratio};
@@ -22,4 +18,5 @@ pub use topology::{betti, euler};
 pub use union::{MedialUnion, NearestPrimitive, Primitive, UnionError};
 pub use voronoi::{CellSpheres, DualTriangulation, voronoi_medial_mesh};
 
+pub use crate::disjoint::DisjointSets;
 pub use crate::geometry::Sphere;

@@ -21,9 +21,9 @@
 //! cubic in the number of independent seam cycles in the worst case.
 
 use super::MedialMesh;
-use super::disjoint::DisjointSets;
 use super::incidence::Incidence;
 use super::reduction::rank;
+use crate::disjoint::DisjointSets;
 
 /// Betti numbers `[b0, b1, b2]` over `Z_2` of a medial mesh in canonical form: components,
 /// independent loops, voids.

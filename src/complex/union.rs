@@ -66,6 +66,9 @@ pub struct NearestPrimitive {
     pub primitive: Primitive,
 }
 
+/// Coordinates and radii beyond this would overflow when squared.
+const LARGEST: f64 = 1e150;
+
 /// Why a medial mesh has no union.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnionError {
@@ -75,6 +78,15 @@ pub enum UnionError {
     /// The mesh breaks its own rules.
     #[error(transparent)]
     Invalid(#[from] ComplexError),
+    /// A sphere is too large or too far away for distances to it to be computed.
+    #[error(
+        "sphere {sphere} has a coordinate or radius above 1e150 units: is the medial mesh in the \
+         unit of the surface?"
+    )]
+    TooLarge {
+        /// Index of the sphere.
+        sphere: usize,
+    },
 }
 
 #[derive(Clone, Debug)]
@@ -100,9 +112,14 @@ impl MedialUnion {
     /// The union of all primitives of a mesh. Cost `O(n log n)`.
     ///
     /// # Errors
-    /// When the mesh has no spheres, or breaks a rule of [`MedialMesh::check`].
+    /// When the mesh has no spheres, breaks a rule of [`MedialMesh::check`], or has a sphere whose
+    /// squares would overflow.
     pub fn new(mesh: &MedialMesh) -> Result<Self, UnionError> {
         mesh.check()?;
+        let too_large = |m: &Sphere| m.centre.abs().max_element() > LARGEST || m.radius > LARGEST;
+        if let Some(sphere) = mesh.spheres.iter().position(too_large) {
+            return Err(UnionError::TooLarge { sphere });
+        }
         let sphere = |v: u32| mesh.spheres[v as usize];
         // Spheres that need no part of their own: ends of proper cones, and those that lie in a
         // neighbour, whose own parts are then nearer everywhere.

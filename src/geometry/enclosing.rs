@@ -36,9 +36,9 @@ pub fn enclosing_ball(points: &[Vec3]) -> (Vec3, f64) {
         if ball.contains(&[far]) {
             return (ball.centre, ball.radius);
         }
-        let mut determining = ball.support;
-        determining.push(far);
-        let grown = by_enumeration(&determining);
+        let mut determining = [far; 5];
+        determining[..ball.size].copy_from_slice(&ball.support[..ball.size]);
+        let grown = by_enumeration(&determining[..=ball.size]);
         if grown.radius <= ball.radius {
             // Rounding: the exchange no longer grows the ball. Cover the rest.
             return (grown.centre, far.distance(grown.centre).max(grown.radius));
@@ -51,7 +51,9 @@ pub fn enclosing_ball(points: &[Vec3]) -> (Vec3, f64) {
 struct Ball {
     centre: Vec3,
     radius: f64,
-    support: Vec<Vec3>,
+    support: [Vec3; 4],
+    /// Number of points in `support`.
+    size: usize,
 }
 
 impl Ball {
@@ -101,13 +103,13 @@ fn by_enumeration(points: &[Vec3]) -> Ball {
             }
         }
     }
-    let support = support[..size].iter().map(|&i| points[i]).collect();
+    let support = support.map(|i| points.get(i).copied().unwrap_or_default());
     // Rounding can refuse every candidate of a flat set; a ball around the centroid encloses it.
     let (centre, radius) = best.unwrap_or_else(|| {
         let centre = points.iter().sum::<Vec3>() / n.max(1) as f64;
         (centre, points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max))
     });
-    Ball { centre, radius, support }
+    Ball { centre, radius, support, size }
 }
 
 fn contains_all((centre, radius): (Vec3, f64), points: &[Vec3]) -> bool {
@@ -181,6 +183,48 @@ mod tests {
             let iterated = by_iteration(&points);
             prop_assert!(radius <= iterated * (1.0 + 1e-9) + 1e-12, "{radius} over {iterated}");
             prop_assert!(radius >= iterated * 0.999 - 1e-12, "{radius} under {iterated}");
+        }
+
+        /// What the filter by enclosing balls rests on: on the Voronoi facet, edge and vertex dual
+        /// to an edge, a triangle and a tetrahedron the radius grows, up to that of the circumball,
+        /// which it reaches just where the circumcentre lies within.
+        #[test]
+        fn grows_along_incidence_up_to_the_circumball(points in points(4..5)) {
+            let [p, q, r, s] = [0, 1, 2, 3].map(|i| points[i]);
+            let [of_edge, of_triangle, of_tetrahedron] =
+                [&points[..2], &points[..3], &points[..]].map(|dual| enclosing_ball(dual).1);
+            prop_assert!((of_edge - p.distance(q) / 2.0).abs() < 1e-15);
+            prop_assert!(of_edge <= of_triangle * (1.0 + 1e-12));
+            prop_assert!(of_triangle <= of_tetrahedron * (1.0 + 1e-12));
+
+            // The circumradius where no angle is obtuse, else half of the longest side.
+            let squared = [p.distance_squared(q), q.distance_squared(r), r.distance_squared(p)];
+            let longest = squared.into_iter().fold(0.0, f64::max);
+            let obtuse = squared.iter().sum::<f64>() <= 2.0 * longest;
+            let doubled_area = (q - p).cross(r - p).length();
+            let product: f64 = squared.iter().map(|x| x.sqrt()).product();
+            let expected =
+                if obtuse { longest.sqrt() / 2.0 } else { product / (2.0 * doubled_area) };
+            prop_assert!((of_triangle - expected).abs() <= 1e-9 * (1.0 + expected));
+
+            // How deep the circumcentre lies below each side, from its barycentric coordinates.
+            let [a, b, c] = [q - p, r - p, s - p];
+            let normals = [b.cross(c), c.cross(a), a.cross(b), (b - a).cross(c - a)];
+            let det = a.dot(normals[0]);
+            prop_assume!(det.abs() > 1e-3);
+            let sides = [a, b, c].into_iter().zip(normals);
+            let offset: Vec3 = sides.map(|(v, n)| v.length_squared() / (2.0 * det) * n).sum();
+            let [u, v, w] = [0, 1, 2].map(|k| offset.dot(normals[k]) / det);
+            let weights = [u, v, w, 1.0 - u - v - w];
+            let depths = [0, 1, 2, 3].map(|k| weights[k] * det.abs() / normals[k].length());
+            let depth = depths.into_iter().fold(f64::INFINITY, f64::min);
+            let circumradius = offset.length();
+            prop_assert!(of_tetrahedron <= circumradius * (1.0 + 1e-9));
+            if depth >= 0.0 {
+                prop_assert!(of_tetrahedron >= circumradius * (1.0 - 1e-9));
+            } else if depth < -1e-4 * circumradius {
+                prop_assert!(of_tetrahedron < circumradius * (1.0 - 1e-9));
+            }
         }
     }
 }

@@ -79,7 +79,7 @@ pub struct TriangleQuality {
     pub below_10: Option<f64>,
     /// The same below 1 degree.
     pub below_1: Option<f64>,
-    /// Triangles of zero area, counted here and in no mean or share.
+    /// Triangles of a height below 1e-12, counted here and in no mean or share.
     pub zero_area: u64,
 }
 
@@ -90,9 +90,10 @@ pub struct Spikes {
     pub by_ratio: Vec<RatioSpikes>,
     /// Edges without a face that end in a sphere with no other edge.
     pub dangling_edges: u64,
-    /// Faces with two boundary edges and a smallest angle below 10 degrees.
+    /// Faces with two or three boundary edges and a smallest angle below 10 degrees.
     pub fins: u64,
-    /// Boundary spheres whose ball sticks out of a larger neighbour's by less than 0.001.
+    /// Boundary spheres whose ball sticks out of that of a neighbour at least as large by less than
+    /// 0.001.
     pub idle_spheres: u64,
     /// Spheres with a separation angle below 20 degrees, where contact points are known.
     pub angle_spikes: Option<u64>,

@@ -29,6 +29,7 @@ use super::{RatioSpikes, Spikes};
 use crate::complex::{
     Contacts, DisjointSets, Incidence, MedialMesh, Sphere, ZERO_LENGTH, stability_ratio,
 };
+use crate::geometry::separation_angle;
 
 /// The thresholds `tau` on the stability ratio.
 pub const RATIO_THRESHOLDS: [f64; 3] = [0.05, 0.1, 0.2];
@@ -164,16 +165,11 @@ fn is_idle_beside(ball: Sphere, neighbour: Sphere) -> bool {
 /// Measure 6. A sphere without radius touches everywhere at its centre and subtends nothing.
 fn angle_spikes(mesh: &MedialMesh, contacts: &Contacts) -> u64 {
     let is_spike = |(sphere, samples): (&Sphere, &[u32; 4])| {
-        sphere.radius >= ZERO_LENGTH && separation_angle(sphere, samples, contacts) < SPIKE_ANGLE
+        let points = samples.map(|id| contacts.samples[id as usize]);
+        sphere.radius >= ZERO_LENGTH
+            && separation_angle(sphere.centre, &points).to_degrees() < SPIKE_ANGLE
     };
     mesh.spheres.iter().zip(&contacts.of_sphere).filter(|&pair| is_spike(pair)).count() as u64
-}
-
-/// Largest angle between two contact points seen from the centre, in degrees.
-fn separation_angle(sphere: &Sphere, samples: &[u32; 4], contacts: &Contacts) -> f64 {
-    let directions = samples.map(|id| contacts.samples[id as usize] - sphere.centre);
-    let pairs = (0..4).flat_map(|i| (i + 1..4).map(move |j| (i, j)));
-    pairs.map(|(i, j)| directions[i].angle_between(directions[j]).to_degrees()).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

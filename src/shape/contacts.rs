@@ -3,20 +3,20 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use rstar::RTree;
 use rstar::primitives::GeomWithData;
+use rstar::{PointDistance, RTree};
 
 use crate::Vec3;
 use crate::complex::{Contacts, MedialMesh};
 
-/// How far beyond the radius a sample still counts as touched.
+/// How far beyond the nearest one a sample still counts as touched.
 const REACH: f64 = 1.0 + 1e-3;
 
 /// For each sphere of a medial mesh the boundary samples that it touches.
 pub struct ContactSets {
     samples: Arc<[Vec3]>,
     /// `ids[start[i]..start[i + 1]]` are the contacts of sphere `i`, ascending where searched.
-    start: Vec<u32>,
+    start: Vec<usize>,
     ids: Vec<u32>,
 }
 
@@ -25,12 +25,19 @@ impl ContactSets {
     pub(super) fn known(contacts: &Contacts) -> Self {
         Self {
             samples: Arc::clone(&contacts.samples),
-            start: (0..=contacts.of_sphere.len() as u32).map(|i| 4 * i).collect(),
+            start: (0..=contacts.of_sphere.len()).map(|i| 4 * i).collect(),
             ids: contacts.of_sphere.iter().flatten().copied().collect(),
         }
     }
 
-    /// All samples within `(1 + 1e-3) r` of each centre. Cost `O((n + m) log m + output)`.
+    /// For each sphere the samples within `(1 + 1e-3) d` of its centre, where `d` is the distance
+    /// of the nearest one: the closest boundary points, by which papers define the contacts. None
+    /// where even the nearest is beyond `(1 + 1e-3) r`, so that the sphere touches nothing.
+    ///
+    /// For a sphere with no sample inside these are all samples within `(1 + 1e-3) r`. One that
+    /// sticks out of the surface holds samples by the thousands, which it does not touch.
+    ///
+    /// Cost `O((n + m) log m + output)`.
     pub(super) fn search(mesh: &MedialMesh, samples: &Arc<[Vec3]>) -> Self {
         let points = samples.iter().enumerate();
         let tree = RTree::bulk_load(
@@ -40,8 +47,10 @@ impl ContactSets {
             .spheres
             .par_iter()
             .map(|s| {
-                let reach = s.radius * REACH;
-                let near = tree.locate_within_distance(s.centre.to_array(), reach * reach);
+                let centre = s.centre.to_array();
+                let nearest = tree.nearest_neighbor(centre).map(|point| point.distance_2(&centre));
+                let reach = s.radius.min(nearest.map_or(0.0, f64::sqrt)) * REACH;
+                let near = tree.locate_within_distance(centre, reach * reach);
                 let mut ids: Vec<u32> = near.map(|point| point.data).collect();
                 ids.sort_unstable();
                 ids
@@ -49,7 +58,7 @@ impl ContactSets {
             .collect();
         let mut start = vec![0];
         for ids in &found {
-            start.push(start[start.len() - 1] + ids.len() as u32);
+            start.push(start[start.len() - 1] + ids.len());
         }
         Self { samples: Arc::clone(samples), start, ids: found.concat() }
     }
@@ -66,11 +75,36 @@ impl ContactSets {
 
     /// The sample ids of a sphere's contacts.
     pub fn ids(&self, sphere: usize) -> &[u32] {
-        &self.ids[self.start[sphere] as usize..self.start[sphere + 1] as usize]
+        &self.ids[self.start[sphere]..self.start[sphere + 1]]
     }
 
     /// Number of spheres with fewer than two contacts.
     pub fn empty_sets(&self) -> usize {
         self.start.windows(2).filter(|w| w[1] - w[0] < 2).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::complex::Sphere;
+
+    #[test]
+    fn searched_contacts_are_the_nearest_samples() {
+        // Two walls at distance 2, one sample for each unit of area.
+        let wall =
+            |z: f64| (0..100).map(move |k| Vec3::new(f64::from(k % 10), f64::from(k / 10), z));
+        let samples: Arc<[Vec3]> = wall(-1.0).chain(wall(1.0)).collect();
+        let at = |x: f64, radius: f64| Sphere::new(Vec3::new(x, 5.0, 0.0), radius);
+        // Inscribed; sticking out by far; too small to touch; nearest to two samples of each wall.
+        let spheres = vec![at(5.0, 1.0), at(5.0, 4.0), at(5.0, 0.5), at(4.5, 1.25_f64.sqrt())];
+        let mesh = MedialMesh { spheres, ..MedialMesh::default() };
+        let sets = ContactSets::search(&mesh, &samples);
+        assert_eq!(sets.ids(0), [55, 155]);
+        assert_eq!(sets.ids(1), [55, 155]);
+        assert!(sets.ids(2).is_empty());
+        assert_eq!(sets.ids(3), [54, 55, 154, 155]);
+        assert_eq!(sets.empty_sets(), 1);
+        assert_eq!(sets.with(0, <[Vec3]>::to_vec), [samples[55], samples[155]]);
     }
 }

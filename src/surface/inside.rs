@@ -20,12 +20,11 @@
 
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
-
 use super::boxes::{BoxTree, bounds};
 use super::mesh::TriMesh;
 use super::predicates::{Point2, Sign, Unit, orient2d, orient3d, project, projection_axis};
 use crate::Vec3;
+use crate::geometry::in_morton_order;
 
 /// Where a point lies with respect to a closed surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -122,26 +121,7 @@ impl InsideTest {
 
     /// [`Self::side`] of many points, in parallel and in an order that suits the cache.
     pub fn sides(&self, points: &[Vec3]) -> Vec<Side> {
-        let mut order: Vec<(u64, u32)> =
-            (0..points.len() as u32).map(|i| (self.cell(points[i as usize]), i)).collect();
-        order.par_sort_unstable();
-        let sorted: Vec<Side> =
-            order.par_iter().map(|&(_, i)| self.side(points[i as usize])).collect();
-        let mut sides = vec![Side::Outside; points.len()];
-        for ((_, i), side) in order.into_iter().zip(sorted) {
-            sides[i as usize] = side;
-        }
-        sides
-    }
-
-    /// Position along a Z-order curve over the bounding box.
-    fn cell(&self, p: Vec3) -> u64 {
-        let cell = (self.unit.forward(p) - self.lo) / (self.hi - self.lo) * 1024.0;
-        // The cast saturates, and takes a quotient of zeros as zero.
-        (0..10).fold(0, |code, bit| {
-            let [x, y, z] = cell.to_array().map(|c| ((c as u64).min(1023) >> bit) & 1);
-            code | (x | y << 1 | z << 2) << (3 * bit)
-        })
+        in_morton_order(points, |(): &mut (), p| self.side(p))
     }
 
     /// Reports every face that is above the scaled point `p`, or holds it.

@@ -44,12 +44,14 @@ pub enum Sampling {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{0:?} is no sampling; use vertices, uniform:COUNT or blue:COUNT, with an optional :SEED, \
-     and a count from 1 to 10000000"
+     and a count from 1 to 10000000, of blue noise to 1000000"
 )]
 pub struct ParseSamplingError(String);
 
 /// More samples than this are surely a slip of the finger.
 const MOST: usize = 10_000_000;
+/// Elimination takes some two kilobytes for each sample of blue noise.
+const MOST_BLUE: usize = 1_000_000;
 
 impl FromStr for Sampling {
     type Err = ParseSamplingError;
@@ -66,7 +68,7 @@ impl FromStr for Sampling {
         match kind {
             _ if parts.next().is_some() || !(1..=MOST).contains(&count) => Err(error()),
             Some("uniform") => Ok(Self::AreaUniform { count, seed }),
-            Some("blue") => Ok(Self::BlueNoise { count, seed }),
+            Some("blue") if count <= MOST_BLUE => Ok(Self::BlueNoise { count, seed }),
             _ => Err(error()),
         }
     }

@@ -4,6 +4,8 @@
 //! the same vertices are neighbours if no third one is; they agree on the orientation if they run
 //! in opposite directions.
 
+use crate::disjoint::DisjointSets;
+
 /// Adjacency, defects and components of a triangle mesh, whatever its defects.
 #[derive(Debug)]
 pub(super) struct Topology {
@@ -46,8 +48,8 @@ impl Topology {
             component: Vec::new(),
             first_face: Vec::new(),
         };
-        let mut fans = Partition::new(3 * faces.len());
-        let mut parts = Partition::new(faces.len());
+        let mut fans = DisjointSets::singletons(3 * faces.len());
+        let mut parts = DisjointSets::singletons(faces.len());
         topology.pair_half_edges(faces, &mut fans, &mut parts);
         topology.count_fans(vertices, faces, &mut fans);
         topology.number_components(faces.len(), &mut parts);
@@ -59,7 +61,12 @@ impl Topology {
         self.nonmanifold_edges == 0 && self.nonmanifold_vertices == 0
     }
 
-    fn pair_half_edges(&mut self, faces: &[[u32; 3]], fans: &mut Partition, parts: &mut Partition) {
+    fn pair_half_edges(
+        &mut self,
+        faces: &[[u32; 3]],
+        fans: &mut DisjointSets,
+        parts: &mut DisjointSets,
+    ) {
         let mut sides: Vec<(u32, u32, u32)> = (0..3 * faces.len() as u32)
             .map(|h| {
                 let (a, b) = ends(faces, h);
@@ -98,11 +105,11 @@ impl Topology {
         }
     }
 
-    fn count_fans(&mut self, vertices: usize, faces: &[[u32; 3]], fans: &mut Partition) {
+    fn count_fans(&mut self, vertices: usize, faces: &[[u32; 3]], fans: &mut DisjointSets) {
         const SEVERAL: u32 = u32::MAX - 1;
         let mut fan_of = vec![NONE; vertices];
         for (corner, &vertex) in faces.as_flattened().iter().enumerate() {
-            let fan = fans.root(corner as u32);
+            let fan = fans.find(corner as u32);
             let known = &mut fan_of[vertex as usize];
             if *known == NONE {
                 *known = fan;
@@ -115,10 +122,10 @@ impl Topology {
         self.first_nonmanifold_vertex = first.map(|v| v as u32);
     }
 
-    fn number_components(&mut self, faces: usize, parts: &mut Partition) {
+    fn number_components(&mut self, faces: usize, parts: &mut DisjointSets) {
         let mut number = vec![NONE; faces];
         for face in 0..faces as u32 {
-            let root = parts.root(face) as usize;
+            let root = parts.find(face) as usize;
             if number[root] == NONE {
                 number[root] = self.first_face.len() as u32;
                 self.first_face.push(face);
@@ -173,31 +180,6 @@ fn corner_at(faces: &[[u32; 3]], half_edge: u32, vertex: u32) -> u32 {
     let start = ends(faces, half_edge).0 == vertex;
     let (face, k) = (half_edge / 3, half_edge % 3);
     if start { half_edge } else { 3 * face + (k + 1) % 3 }
-}
-
-/// Union-find whose roots are the smallest members.
-struct Partition {
-    parent: Vec<u32>,
-}
-
-impl Partition {
-    fn new(len: usize) -> Self {
-        Self { parent: (0..len as u32).collect() }
-    }
-
-    fn root(&mut self, mut item: u32) -> u32 {
-        while self.parent[item as usize] != item {
-            let grandparent = self.parent[self.parent[item as usize] as usize];
-            self.parent[item as usize] = grandparent;
-            item = grandparent;
-        }
-        item
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b) as usize] = a.min(b);
-    }
 }
 
 #[cfg(test)]

@@ -1,17 +1,15 @@
 //! Writes OFF, OBJ and PLY as text: all or nothing.
 //!
-//! The content goes to a new file beside the target, which takes the target's name only when it
-//! is complete. Coordinates are the shortest decimals (at most 17 digits) that read back as the
+//! Coordinates are the shortest decimals (at most 17 digits) that read back as the
 //! same double.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::io::{self, Write};
+use std::path::Path;
 
 use super::error::{Fault, SurfaceError};
 use super::mesh::TriMesh;
 use super::read::Format;
+use crate::atomic::write_atomically;
 
 /// Writes a mesh in the format that the extension tells: `.off`, `.obj` or `.ply`.
 ///
@@ -37,39 +35,12 @@ fn replace(path: &Path, mesh: &TriMesh, format: Format) -> Result<(), Fault> {
         let why = "STL holds single precision only; write .off, .obj or .ply";
         return Err(Fault::Unsupported(why.into()));
     }
-    let io = |error: io::Error| Fault::Io(format!("cannot be written: {error}"));
-    let (file, temporary) = create_beside(path).map_err(io)?;
-    let written = write_all(file, mesh, format).and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|error| {
-        // The first error matters; that the leftover may stay behind does not.
-        let _ = fs::remove_file(&temporary);
-        io(error)
-    })
-}
-
-/// A new file in the folder of `path`.
-fn create_beside(path: &Path) -> io::Result<(File, PathBuf)> {
-    static NEXT: AtomicU32 = AtomicU32::new(0);
-    loop {
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let mut name = path.file_name().unwrap_or_default().to_owned();
-        name.push(format!(".{}-{number}.tmp", std::process::id()));
-        let temporary = path.with_file_name(name);
-        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-            created => return Ok((created?, temporary)),
-        }
-    }
-}
-
-fn write_all(file: File, mesh: &TriMesh, format: Format) -> io::Result<()> {
-    let mut out = BufWriter::new(file);
-    write_to(&mut out, mesh, format)?;
-    out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+    write_atomically(path, |out| write_to(out, mesh, format))
+        .map_err(|error| Fault::Io(format!("cannot be written: {error}")))
 }
 
 /// The text of a mesh in a format other than STL.
-fn write_to(out: &mut impl Write, mesh: &TriMesh, format: Format) -> io::Result<()> {
+fn write_to(out: &mut dyn Write, mesh: &TriMesh, format: Format) -> io::Result<()> {
     let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
     let (vertex_word, face_word, base) = match format {
         Format::Obj => ("v ", "f", 1),

@@ -9,7 +9,6 @@
 //! Coordinates are in the file's own unit both ways; who normalises them converts. Numbers are
 //! written with 17 significant digits, so that what is read back is bit for bit what was written.
 
-mod atomic;
 mod canonical;
 mod error;
 mod ma;
@@ -21,12 +20,12 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
-pub use atomic::write_atomically;
 pub use error::{MaError, MaErrorKind};
 pub use ma::parse_ma;
 pub use ply::parse_ply;
 
 use super::MedialMesh;
+use crate::atomic::write_atomically;
 
 /// A medial mesh from a file, in canonical form, and what had to be done to bring it there.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,6 +11,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// A reader never sees half a file, and a failed write leaves the old file as it was. A symbolic
 /// link is followed; a target that is no regular file (such as `/dev/stdout`) is written directly.
 ///
+/// ```no_run
+/// medial::write_atomically("spheres.txt", |out| writeln!(out, "0 0 0 1"))?;
+/// # Ok::<(), std::io::Error>(())
+/// ```
+///
 /// # Errors
 /// When the folder does not exist or is not writable, or `content` fails.
 pub fn write_atomically(
@@ -19,11 +24,14 @@ pub fn write_atomically(
 ) -> io::Result<()> {
     let path = path.as_ref();
     if fs::metadata(path).is_ok_and(|target| !target.is_file()) {
-        return fill(OpenOptions::new().write(true).open(path)?, content);
+        return fill(&OpenOptions::new().write(true).open(path)?, content);
     }
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let (file, temporary) = create_beside(&target)?;
-    let written = fill(file, content).and_then(|()| fs::rename(&temporary, &target));
+    // On the disk before the name: after a crash the name must not stand for an empty file.
+    let written = fill(&file, content)
+        .and_then(|()| file.sync_all())
+        .and_then(|()| fs::rename(&temporary, &target));
     if written.is_err() {
         // The first error is the one to report; what is left behind is only a stray file.
         let _ = fs::remove_file(&temporary);
@@ -31,7 +39,7 @@ pub fn write_atomically(
     written
 }
 
-fn fill(file: File, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+fn fill(file: &File, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let mut out = BufWriter::new(file);
     content(&mut out)?;
     out.flush()
