@@ -5,12 +5,13 @@
 //! delaunay_oracle make NAME FILE     one of the point sets below, 4 f64 for each point: x, y, z,
 //!                                    weight; `w:NAME` has weights
 //! delaunay_oracle run FILE [weighted]
-//!                                    cells, an order-free hash of them, CPU seconds, peak KiB
+//!                                    cells, an order-free hash of them, seconds, peak KiB; with
+//!                                    RAYON_NUM_THREADS=1 CPU seconds, which other work on the
+//!                                    machine disturbs less, else seconds by the clock
 //! ```
 #![allow(clippy::print_stdout)]
 
 use std::collections::HashMap;
-use std::sync::OnceLock;
 use std::time::Instant;
 
 use medial::Vec3;
@@ -38,9 +39,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn run(file: &str, weighted: bool) -> Result<(), Box<dyn std::error::Error>> {
     let (points, weights) = read(file)?;
     let before = peak_kib();
-    let start = cpu_seconds();
+    let (start, clock) = (cpu_seconds(), Instant::now());
     let report = |t: &Triangulation| {
-        let (seconds, peak) = (cpu_seconds() - start, peak_kib() - before);
+        let one = rayon::current_num_threads() == 1;
+        let seconds = if one { cpu_seconds() - start } else { clock.elapsed().as_secs_f64() };
+        let peak = peak_kib() - before;
         let set = t.finite_cells().fold(0u64, |sum, c| {
             let mut v = t.vertices(c).map(|v| hash_point(points[v.index()]));
             v.sort_unstable();
@@ -64,14 +67,9 @@ fn read(file: &str) -> std::io::Result<(Vec<Vec3>, Vec<f64>)> {
     Ok(std::fs::read(file)?.chunks_exact(32).map(record).unzip())
 }
 
-/// CPU seconds of the main thread, which other work on the machine disturbs less than the clock.
+/// CPU seconds of all threads.
 fn cpu_seconds() -> f64 {
-    static START: OnceLock<Instant> = OnceLock::new();
-    let nanoseconds: Option<f64> = std::fs::read_to_string("/proc/self/schedstat")
-        .ok()
-        .and_then(|s| s.split_whitespace().next()?.parse().ok());
-    nanoseconds
-        .map_or_else(|| START.get_or_init(Instant::now).elapsed().as_secs_f64(), |ns| ns * 1e-9)
+    cpu_time::ProcessTime::try_now().map_or(0.0, |t| t.as_duration().as_secs_f64())
 }
 
 fn peak_kib() -> u64 {

@@ -165,6 +165,29 @@ fn ten_thousand_small_inputs_are_valid_or_refused() {
 }
 
 #[test]
+fn cells_and_their_order_do_not_depend_on_the_number_of_threads() {
+    let mut rng = Pcg64::seed_from_u64(8);
+    let random: Vec<Vec3> = (0..30_000).map(|_| unit(&mut rng)).collect();
+    let sphere = random.iter().map(|p| p.normalize_or(Vec3::X)).collect();
+    for points in [random, sphere, cylinder(170, 170)] {
+        let built = [1, 2, 3, 7].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.expect("threads").install(|| Delaunay::new(&points).expect("they span space"))
+        });
+        let [one, others @ ..] = &built;
+        for other in others {
+            assert_eq!(one.cell_count(), other.cell_count());
+            for cell in one.cells() {
+                assert_eq!(one.vertices(cell), other.vertices(cell));
+                assert_eq!(one.neighbours(cell), other.neighbours(cell));
+            }
+        }
+        one.check_combinatorics().expect("combinatorially valid");
+        one.check_geometry().expect("Delaunay");
+    }
+}
+
+#[test]
 fn a_lattice_is_cut_into_positive_cells() {
     let n = 30;
     let d = check(&lattice(n, 1.0));

@@ -23,10 +23,10 @@
 //! facet's plane, if its finite neighbour is, since the sphere through three coplanar points meets
 //! the plane in their circle, perturbed alike.
 
-use super::cells::{Cell, Face, INFINITE, OPPOSITE};
+use super::cells::{Cell, FRONTIER, Face, INFINITE, OPPOSITE};
 use super::error::TriangulationError;
 use super::stellate::{ABSENT, TABLE};
-use super::zone::{Candidate, UNKNOWN, Wall};
+use super::zone::{Candidate, FOREIGN, UNKNOWN, Wall};
 use crate::geometry::predicates::{
     Filter, Metric, Sign, Site, approximate_orientation, sites_collinear,
 };
@@ -34,10 +34,24 @@ use crate::geometry::predicates::{
 /// A walk in rounded arithmetic may turn in a circle; after this many steps it goes on exactly.
 const MAX_ROUNDED_STEPS: usize = 256;
 
-/// A triangulation that grows.
-pub(super) struct Builder<M> {
+/// What became of a site.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// It is a vertex, or hidden.
+    Done,
+    /// The walk to it met the frontier: nothing was changed.
+    Unreached,
+    /// Its conflict zone met the frontier: nothing was changed.
+    Straddling,
+}
+
+/// A triangulation that grows, or the part of one that grows apart from the rest.
+///
+/// Record 0 is the *frontier*: it stands for all cells of other parts, looks infinite, so that
+/// walks end at it, and is marked [`FOREIGN`], so that conflict zones that reach it are given up.
+pub(super) struct Builder<'s, M> {
     /// Sites by vertex, in the order of insertion; the first is a dummy for the vertex at infinity.
-    pub(super) sites: Vec<Site>,
+    pub(super) sites: &'s [Site],
     pub(super) cells: Vec<Cell>,
     pub(super) filter: Filter,
     pub(super) state: Vec<u8>,
@@ -50,30 +64,44 @@ pub(super) struct Builder<M> {
     pub(super) rim: [u32; TABLE + 1],
     pub(super) table: Box<[Face; TABLE * TABLE]>,
     pub(super) edges: Vec<(u64, Face)>,
-    metric: std::marker::PhantomData<M>,
+    metric: std::marker::PhantomData<fn() -> M>,
 }
 
-impl<M: Metric> Builder<M> {
-    /// Triangulates distinct sites; `sites[0]` is a dummy, and the order of the others may change
-    /// to bring four independent ones to the front, in `ids` alike.
+impl<'s, M: Metric> Builder<'s, M> {
+    /// Triangulates distinct sites; `sites[0]` is a dummy, and 1 to 4 are affinely independent.
+    ///
+    /// `rounds` are the ends of the rounds of insertion; those of at least `divided_round` sites are
+    /// divided.
     pub(super) fn build(
-        mut sites: Vec<Site>,
-        ids: &mut [u32],
+        sites: &'s [Site],
+        rounds: &[u32],
+        divided_round: u32,
         filter: Filter,
     ) -> Result<Self, TriangulationError> {
-        bring_independent_to_front(&mut sites, ids)?;
-        // Surfaces need up to 8 cells for each site. Reserved memory that is not touched costs
-        // nothing, while growing would hold two copies for a moment; without it, growth it is.
-        let (mut cells, mut state) = (Vec::new(), Vec::new());
-        let expected = 9 * sites.len() + 64;
-        let _ = cells.try_reserve_exact(expected);
-        let _ = state.try_reserve_exact(expected);
+        let alone = rounds.iter().take_while(|&&end| end < divided_round).last();
+        let mut builder = Self::new(sites, filter, alone.map_or(sites.len(), |&n| n as usize));
+        builder.start();
+        let mut start = 5;
+        for &end in rounds {
+            if end.saturating_sub(start) < divided_round {
+                builder.insert_all(start..end)?;
+            } else {
+                builder.insert_divided(start..end)?;
+            }
+            start = end.max(start);
+        }
+        Ok(builder)
+    }
+
+    /// A builder with no cell but the frontier, and room for so many sites.
+    pub(super) fn new(sites: &'s [Site], filter: Filter, expected: usize) -> Self {
         let mut builder = Self {
-            cells,
+            sites,
+            cells: Vec::new(),
             filter,
-            state,
+            state: Vec::new(),
             free: Vec::new(),
-            last: 0,
+            last: FRONTIER,
             zone: Vec::new(),
             walls: Vec::new(),
             front: Vec::new(),
@@ -81,38 +109,59 @@ impl<M: Metric> Builder<M> {
             rim: [0; TABLE + 1],
             table: Box::new([Face::NONE; TABLE * TABLE]),
             edges: Vec::new(),
-            sites,
             metric: std::marker::PhantomData,
         };
-        builder.start();
-        for vertex in 5..builder.sites.len() as u32 {
-            builder.insert(vertex)?;
+        builder.reserve(expected);
+        builder.cells.push(Cell::FRONTIER);
+        builder.state.push(FOREIGN);
+        builder
+    }
+
+    /// Makes room for the cells of so many further sites.
+    ///
+    /// Surfaces need up to 8 cells for each site. Reserved memory that is not touched costs
+    /// nothing, while growing would hold two copies for a moment; without it, growth it is.
+    pub(super) fn reserve(&mut self, sites: usize) {
+        let expected = 9 * sites + 64;
+        let _ = self.cells.try_reserve_exact(expected);
+        let _ = self.state.try_reserve_exact(expected);
+    }
+
+    /// Inserts sites in this order.
+    pub(super) fn insert_all(
+        &mut self,
+        vertices: impl IntoIterator<Item = u32>,
+    ) -> Result<(), TriangulationError> {
+        for vertex in vertices {
+            let outcome = self.insert(vertex)?;
+            debug_assert_eq!(outcome, Outcome::Done, "a whole triangulation has no frontier");
         }
-        Ok(builder)
+        Ok(())
     }
 
     /// The first cell and its four infinite neighbours.
     fn start(&mut self) {
-        let s = &self.sites;
+        let s = self.sites;
         let positive = self.filter.orient3d(&s[1].p, &s[2].p, &s[3].p, &s[4].p) == Sign::Positive;
         let v = if positive { [1, 2, 3, 4] } else { [1, 2, 4, 3] };
         self.cells.push(Cell { v, n: [Face::NONE; 4] });
         for i in 0..4 {
             let f = OPPOSITE[i].map(|k| v[k]);
             self.cells.push(Cell { v: [f[0], f[1], f[2], INFINITE], n: [Face::NONE; 4] });
-            self.cells[0].n[i] = Face::new(i as u32 + 1, 3);
-            self.cells[i + 1].n[3] = Face::new(0, i);
+            self.cells[1].n[i] = Face::new(i as u32 + 2, 3);
+            self.cells[i + 2].n[3] = Face::new(1, i);
         }
-        for i in 1..5u32 {
-            for j in (1..5u32).filter(|&j| j != i) {
-                // Infinite cell `i` lacks vertex `v[i - 1]`: its neighbour opposite to `v[j - 1]`
+        for i in 2..6u32 {
+            for j in (2..6u32).filter(|&j| j != i) {
+                // Infinite cell `i` lacks vertex `v[i - 2]`: its neighbour opposite to `v[j - 2]`
                 // is cell `j`.
-                let a = self.position(i, v[j as usize - 1]);
-                let b = self.position(j, v[i as usize - 1]);
+                let a = self.position(i, v[j as usize - 2]);
+                let b = self.position(j, v[i as usize - 2]);
                 self.cells[i as usize].n[a] = Face::new(j, b);
             }
         }
-        self.state.resize(5, UNKNOWN);
+        self.state.resize(6, UNKNOWN);
+        self.last = 1;
     }
 
     fn position(&self, cell: u32, vertex: u32) -> usize {
@@ -120,22 +169,37 @@ impl<M: Metric> Builder<M> {
         v.iter().position(|&x| x == vertex).expect("the cell has the vertex")
     }
 
-    fn insert(&mut self, vertex: u32) -> Result<(), TriangulationError> {
-        let mut seed = self.walk_approximately(vertex);
-        if !self.conflicts(seed, vertex) {
-            seed = self.walk_exactly(vertex, seed);
-            if !self.conflicts(seed, vertex) {
-                debug_assert!(M::WEIGHTED, "the cell that contains a site is in conflict with it");
-                return Ok(());
-            }
+    /// Inserts a site, unless that would reach beyond the frontier.
+    pub(super) fn insert(&mut self, vertex: u32) -> Result<Outcome, TriangulationError> {
+        let Some(seed) = self.locate(vertex) else {
+            debug_assert!(M::WEIGHTED, "the cell that contains a site is in conflict with it");
+            return Ok(Outcome::Done);
+        };
+        if seed == FRONTIER {
+            return Ok(Outcome::Unreached);
         }
-        self.find_conflict_zone(vertex, seed);
+        if !self.find_conflict_zone(vertex, seed) {
+            return Ok(Outcome::Straddling);
+        }
         self.collect_walls();
-        self.stellate(vertex)
+        self.stellate(vertex)?;
+        Ok(Outcome::Done)
+    }
+
+    /// A cell in conflict with a site, or the frontier where the walk to it ended there; none for
+    /// a hidden site.
+    #[inline(always)]
+    pub(super) fn locate(&self, vertex: u32) -> Option<u32> {
+        let near = self.walk_approximately(vertex);
+        if near == FRONTIER || self.conflicts(near, vertex) {
+            return Some(near);
+        }
+        let seed = self.walk_exactly(vertex, near);
+        (seed == FRONTIER || self.conflicts(seed, vertex)).then_some(seed)
     }
 
     /// Walks towards the site in rounded arithmetic, for a bounded number of steps.
-    fn walk_approximately(&self, vertex: u32) -> u32 {
+    pub(super) fn walk_approximately(&self, vertex: u32) -> u32 {
         let p = &self.sites[vertex as usize].p;
         let mut c = self.last;
         if self.cells[c as usize].is_infinite() {
@@ -165,8 +229,8 @@ impl<M: Metric> Builder<M> {
         c
     }
 
-    /// Walks to the cell that contains the site, or to an infinite cell that it is strictly beyond
-    /// the facet of.
+    /// Walks to the cell that contains the site, to an infinite cell that it is strictly beyond the
+    /// facet of, or to the frontier.
     ///
     /// Visibility walks end in Delaunay and regular triangulations, because they climb the power
     /// of the site.
@@ -195,7 +259,7 @@ impl<M: Metric> Builder<M> {
 }
 
 /// Swaps the first four affinely independent sites into places 1 to 4.
-fn bring_independent_to_front(
+pub(super) fn bring_independent_to_front(
     sites: &mut [Site],
     ids: &mut [u32],
 ) -> Result<(), TriangulationError> {

@@ -6,6 +6,9 @@ pub(super) const INFINITE: u32 = 0;
 /// In the first vertex of a record that no cell uses.
 pub(super) const UNUSED: u32 = u32::MAX;
 
+/// The record that stands for cells of other parts, see [`super::build::Builder`].
+pub(super) const FRONTIER: u32 = 0;
+
 /// The most cells that a [`Face`] can name.
 pub(super) const MAX_CELLS: usize = 1 << 30;
 
@@ -31,6 +34,12 @@ impl Face {
         self.0 >> 2
     }
 
+    /// The same facet when cells are renumbered by an offset.
+    #[inline(always)]
+    pub(super) fn moved(self, offset: u32) -> Self {
+        Self(self.0.wrapping_add(offset << 2))
+    }
+
     #[inline(always)]
     pub(super) fn index(self) -> usize {
         (self.0 & 3) as usize
@@ -48,6 +57,10 @@ pub(super) struct Cell {
 }
 
 impl Cell {
+    /// The record of the frontier: unused, and infinite.
+    pub(super) const FRONTIER: Self =
+        Self { v: [UNUSED, INFINITE, INFINITE, INFINITE], n: [Face::NONE; 4] };
+
     #[inline(always)]
     pub(super) fn is_infinite(&self) -> bool {
         self.v[3] == INFINITE

@@ -4,6 +4,8 @@
 //!    from the end to the front; their neighbours are told.
 //! 2. Vertices are renamed to the indices of the input.
 
+use rayon::prelude::*;
+
 use super::Triangulation;
 use super::cells::{Cell, Face, INFINITE, UNUSED};
 use super::{CellId, VertexId};
@@ -14,18 +16,17 @@ pub(super) fn freeze(mut cells: Vec<Cell>, ids: &[u32], points: usize) -> Triang
     let used = gather(&mut cells, |cell| cell.v[0] != UNUSED);
     cells.truncate(used);
     let finite = gather(&mut cells, |cell| !cell.is_infinite());
+    let rename = |v: u32| match v {
+        INFINITE => VertexId::INFINITE.0,
+        site => ids[site as usize - 1],
+    };
+    cells.par_iter_mut().for_each(|cell| cell.v = cell.v.map(rename));
     let mut incident = vec![CellId::NONE; points];
-    for (c, cell) in cells.iter_mut().enumerate() {
-        for v in &mut cell.v {
-            if *v == INFINITE {
-                *v = VertexId::INFINITE.0;
-                continue;
-            }
-            *v = ids[*v as usize - 1];
-            let first = &mut incident[*v as usize];
-            if *first == CellId::NONE {
-                *first = CellId(c as u32);
-            }
+    // Backwards, so that the first cell is what remains; infinite ones have the last vertex at
+    // infinity.
+    for (c, cell) in cells.iter().enumerate().rev() {
+        for &v in &cell.v[..if c < finite { 4 } else { 3 }] {
+            incident[v as usize] = CellId(c as u32);
         }
     }
     let vertices = incident.iter().filter(|&&c| c != CellId::NONE).count();

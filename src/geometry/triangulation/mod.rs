@@ -6,22 +6,27 @@
 //! [`super::regular::Regular`] build it.
 //!
 //! Vertex ids are indices of the input points. Cell ids count finite cells first, then infinite
-//! ones, in an order that depends on the input alone.
+//! ones, in an order that depends on the input alone, not on the number of threads that build it.
 
 mod build;
 mod cells;
 mod check;
+mod divide;
 mod error;
 mod freeze;
 mod order;
 mod query;
 mod stellate;
+#[cfg(test)]
+mod tests;
 mod zone;
 
 use cells::Cell;
 pub use check::Violation;
 pub use error::TriangulationError;
 pub use query::{EdgeRing, Facet};
+
+use rayon::prelude::*;
 
 use super::predicates::{Filter, Metric, Site, highest_bit, lowest_bit};
 use build::Builder;
@@ -69,6 +74,9 @@ pub struct Triangulation {
     incident: Vec<CellId>,
 }
 
+/// Rounds of at least this many sites are inserted in two parts.
+const DIVIDED_ROUND: u32 = 1 << 14;
+
 /// A triangulation of sites, with what did not become a vertex.
 pub(super) struct Triangulated {
     pub(super) triangulation: Triangulation,
@@ -79,36 +87,45 @@ pub(super) struct Triangulated {
 
 /// Triangulates finite sites of admissible size, in any number and position.
 pub(super) fn triangulate<M: Metric>(sites: &[Site]) -> Result<Triangulated, TriangulationError> {
+    triangulate_dividing::<M>(sites, DIVIDED_ROUND)
+}
+
+/// The same with rounds of insertion divided from this size on.
+fn triangulate_dividing<M: Metric>(
+    sites: &[Site],
+    divided_round: u32,
+) -> Result<Triangulated, TriangulationError> {
     if sites.len() >= cells::MAX_CELLS {
         return Err(TriangulationError::TooLarge { points: sites.len(), limit: cells::MAX_CELLS });
     }
-    let order::Order { inserted: mut ids, repeated } = order::insertion_order(sites);
+    let order::Order { inserted: mut ids, rounds, repeated } = order::insertion_order(sites);
     if ids.len() < 4 {
         let distinct = ids.len();
         return Err(TriangulationError::TooFewPoints { points: sites.len(), distinct });
     }
     let filter = filter_of::<M>(sites);
     let dummy = Site { p: [f64::NAN; 3], w: f64::NAN };
-    let ordered =
+    let mut ordered =
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
-    let cells = Builder::<M>::build(ordered, &mut ids, filter)?.cells;
+    build::bring_independent_to_front(&mut ordered, &mut ids)?;
+    let cells = Builder::<M>::build(&ordered, &rounds, divided_round, filter)?.cells;
     let triangulation = freeze::freeze(cells, &ids, sites.len());
     Ok(Triangulated { triangulation, repeated, filter })
 }
 
 /// The filter of the coarsest grid that holds all sites.
 fn filter_of<M: Metric>(sites: &[Site]) -> Filter {
-    let (mut quantum, mut top) = (i32::MAX, i32::MIN);
     // Only differences of weights matter.
     let weights_differ = sites.iter().any(|s| s.w != sites[0].w);
-    for s in sites {
-        for x in s.p {
-            quantum = quantum.min(lowest_bit(x));
-            top = top.max(highest_bit(x));
-        }
+    let bits = |s: &Site| {
+        let mut quantum = s.p.map(lowest_bit).into_iter().min().unwrap_or(i32::MAX);
+        let top = s.p.map(highest_bit).into_iter().max().unwrap_or(i32::MIN);
         if M::WEIGHTED && weights_differ && s.w != 0.0 {
             quantum = quantum.min(lowest_bit(s.w).div_euclid(2));
         }
-    }
+        (quantum, top)
+    };
+    let widest = |a: (i32, i32), b: (i32, i32)| (a.0.min(b.0), a.1.max(b.1));
+    let (quantum, top) = sites.par_iter().map(bits).reduce(|| (i32::MAX, i32::MIN), widest);
     Filter::of_grid(quantum, top)
 }

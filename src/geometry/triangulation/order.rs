@@ -15,6 +15,8 @@
 
 use std::cmp::Ordering;
 
+use rayon::prelude::*;
+
 use crate::geometry::predicates::{Site, lexicographic};
 
 /// Bits of a Hilbert index for each axis.
@@ -113,9 +115,9 @@ fn hilbert_sort(sites: &[Site], indices: &mut [u32]) {
         indices.sort_unstable_by(|&i, &j| by_position(sites, i, j));
         return;
     }
-    let mut keyed: Vec<(u64, u32)> =
-        indices.iter().map(|&i| (grid.index(&sites[i as usize]), i)).collect();
-    keyed.sort_unstable();
+    let key = |&i: &u32| (grid.index(&sites[i as usize]), i);
+    let mut keyed: Vec<(u64, u32)> = indices.par_iter().map(key).collect();
+    keyed.par_sort_unstable();
     for (slot, &(_, i)) in indices.iter_mut().zip(&keyed) {
         *slot = i;
     }
@@ -139,6 +141,8 @@ fn by_position(sites: &[Site], i: u32, j: u32) -> Ordering {
 pub(crate) struct Order {
     /// Indices of the sites to insert.
     pub(crate) inserted: Vec<u32>,
+    /// For each round the number of sites inserted after it, and one more.
+    pub(crate) rounds: Vec<u32>,
     /// Pairs (site, the kept site at the same position), ascending.
     pub(crate) repeated: Vec<(u32, u32)>,
 }
@@ -149,7 +153,8 @@ pub(crate) fn insertion_order(sites: &[Site]) -> Order {
     let mut sorted: Vec<u32> = (0..sites.len() as u32).collect();
     hilbert_sort(sites, &mut sorted);
     let repeated = remove_repeated(sites, &mut sorted);
-    Order { inserted: into_rounds(sorted), repeated }
+    let (inserted, rounds) = into_rounds(sorted);
+    Order { inserted, rounds, repeated }
 }
 
 fn remove_repeated(sites: &[Site], sorted: &mut Vec<u32>) -> Vec<(u32, u32)> {
@@ -179,14 +184,16 @@ fn remove_repeated(sites: &[Site], sorted: &mut Vec<u32>) -> Vec<(u32, u32)> {
     repeated
 }
 
-/// Splits a sequence stably into rounds of growing size.
-fn into_rounds(sorted: Vec<u32>) -> Vec<u32> {
+/// Splits a sequence stably into rounds of growing size; returns also where each ends, counted
+/// from one.
+fn into_rounds(sorted: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
     let mut rounds = 1u32;
     while sorted.len() >> (3 * rounds) > SMALLEST_ROUND {
         rounds += 1;
     }
     if rounds == 1 {
-        return sorted;
+        let end = sorted.len() as u32 + 1;
+        return (sorted, vec![end]);
     }
     // Round 0 is the last: a site descends one round for every three zero bits of its hash.
     let round = |i: u32| (splitmix(u64::from(i)).trailing_zeros() / 3).min(rounds - 1);
@@ -203,7 +210,9 @@ fn into_rounds(sorted: Vec<u32>) -> Vec<u32> {
         ordered[*slot] = i;
         *slot += 1;
     }
-    ordered
+    // Each start has moved to the end of its round.
+    let ends = starts[..rounds as usize].iter().map(|&end| end as u32 + 1).collect();
+    (ordered, ends)
 }
 
 /// Steele, Lea, Flood: *Fast splittable pseudorandom number generators*, OOPSLA 2014.

@@ -12,7 +12,7 @@ pub(super) const ABSENT: u8 = u8::MAX;
 /// Boundaries of up to this many vertices are linked through a square table.
 pub(super) const TABLE: usize = 64;
 
-impl<M: Metric> Builder<M> {
+impl<M: Metric> Builder<'_, M> {
     /// Replaces the conflict zone by the cone of its walls from the site.
     pub(super) fn stellate(&mut self, vertex: u32) -> Result<(), TriangulationError> {
         self.allocate()?;

@@ -1,7 +1,7 @@
 //! Step 3 of the construction (`build.rs`): the conflict zone of a site, and its walls.
 
 use super::build::Builder;
-use super::cells::{Cell, Face, INFINITE, OPPOSITE};
+use super::cells::{Cell, FRONTIER, Face, INFINITE, OPPOSITE};
 use super::stellate::ABSENT;
 use crate::geometry::predicates::{Filter, Metric, Sign, Site, UNDERFLOW, in_conflict_given};
 
@@ -10,6 +10,9 @@ use crate::geometry::predicates::{Filter, Metric, Sign, Site, UNDERFLOW, in_conf
 pub(super) const UNKNOWN: u8 = 0;
 pub(super) const TESTED: u8 = 1;
 pub(super) const CONFLICT: u8 = 3;
+
+/// The mark of the frontier: never to be tested.
+pub(super) const FOREIGN: u8 = 5;
 
 /// A facet of the boundary of the conflict zone: its vertices, counter-clockwise from outside, and
 /// the facet as a face of the cell outside.
@@ -29,7 +32,7 @@ pub(super) struct Candidate {
     pub(super) bound: f64,
 }
 
-impl<M: Metric> Builder<M> {
+impl<M: Metric> Builder<'_, M> {
     #[inline(always)]
     pub(super) fn conflicts(&self, cell: u32, vertex: u32) -> bool {
         let site = &self.sites[vertex as usize];
@@ -40,39 +43,58 @@ impl<M: Metric> Builder<M> {
     /// Marks and lists the cells in conflict with the site.
     ///
     /// Generation by generation: the neighbours of the last one are collected, then tested
-    /// together, so that no test waits for the verdict on another.
-    pub(super) fn find_conflict_zone(&mut self, vertex: u32, seed: u32) {
+    /// together, so that no test waits for the verdict on another. Returns false, with no cell
+    /// marked, if the zone reaches the frontier.
+    pub(super) fn find_conflict_zone(&mut self, vertex: u32, seed: u32) -> bool {
         self.zone.clear();
         self.zone.push(seed);
         self.state[seed as usize] = CONFLICT;
         let mut generation = 0;
         while generation < self.zone.len() {
-            let front = self.collect_front(generation);
+            let Some(front) = self.collect_front(generation) else {
+                self.forget_zone();
+                return false;
+            };
             generation = self.zone.len();
             self.test_front(vertex, front);
         }
+        true
     }
 
-    /// Collects the unknown neighbours of the zone from `generation` on; returns their number.
+    /// Takes back all marks.
+    pub(super) fn forget_zone(&mut self) {
+        let Self { cells, state, zone, .. } = self;
+        for &c in zone.iter() {
+            state[c as usize] = UNKNOWN;
+            for n in cells[c as usize].n {
+                state[n.cell() as usize] = UNKNOWN;
+            }
+        }
+        state[FRONTIER as usize] = FOREIGN;
+    }
+
+    /// Collects the unknown neighbours of the zone from `generation` on; returns their number,
+    /// nothing if the frontier is among them.
     ///
     /// Every neighbour is written, and counted if it was unknown: whether it is cannot be
     /// predicted, and a wrong guess would cost more than the write.
-    fn collect_front(&mut self, generation: usize) -> usize {
+    fn collect_front(&mut self, generation: usize) -> Option<usize> {
         let Self { cells, state, zone, front, .. } = self;
         let most = 4 * (zone.len() - generation);
         if front.len() < most {
             front.resize(most, Candidate { cell: 0, det: 0.0, bound: 0.0 });
         }
-        let mut count = 0;
+        let (mut count, mut met) = (0, UNKNOWN);
         for &c in &zone[generation..] {
             for n in cells[c as usize].n {
                 let known = &mut state[n.cell() as usize];
+                met |= *known;
                 front[count].cell = n.cell();
                 count += usize::from(*known == UNKNOWN);
                 *known |= TESTED;
             }
         }
-        count
+        (met & FOREIGN & !TESTED == 0).then_some(count)
     }
 
     /// Tests the first `count` candidates and appends those in conflict to the zone.

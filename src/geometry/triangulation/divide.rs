@@ -1,0 +1,358 @@
+//! A round of insertions in two parts, side by side.
+//!
+//! 1. A plane *cuts* the cells of the earlier rounds into two parts by their centres. Each part is
+//!    copied into a builder of its own, in which the frontier stands for the cells of the other.
+//! 2. Each part inserts the sites on its side of the plane. A site whose conflict zone touches the
+//!    frontier is deferred, so cells at the frontier stay as they are, and neither part can notice
+//!    the other. So is a site that a walk, and another one from a second place, does not reach.
+//! 3. The parts are put together along the frontier, and the deferred sites are inserted.
+//!
+//! The parts are the same whatever the number of threads, and so is the result, to the order of
+//! cells: a single thread grows one part after the other. Since the perturbed triangulation is
+//! unique, the set of cells is that of any order of insertion.
+//!
+//! The plane halves the sites. Of 13 directions, and of two kinds of centres, those are taken that
+//! the fewest conflict zones of a sample of the sites straddle. Orthocentres suit samples
+//! of surfaces: there the conflict zone of a site consists of the cells whose orthocentres are about
+//! its Voronoi cell, a thin prism that reaches to the medial axis on both sides of the surface,
+//! while the cells themselves reach across the solid. Centroids suit points on a common sphere.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::build::{Builder, Outcome};
+use super::cells::{Cell, FRONTIER, Face, MAX_CELLS, UNUSED};
+use super::error::TriangulationError;
+use super::zone::UNKNOWN;
+use crate::Vec3;
+use crate::geometry::predicates::{Metric, Site};
+
+/// About so many sites are tried on all cuts.
+const TRIED_SITES: usize = 512;
+
+/// About so many sites are looked at to halve them.
+const SAMPLED_SITES: usize = 4096;
+
+/// Directions of planes, up to sign: axes, and diagonals of the faces and of the body of a cube.
+const DIRECTIONS: [Vec3; 13] = [
+    Vec3::new(1.0, 0.0, 0.0),
+    Vec3::new(0.0, 1.0, 0.0),
+    Vec3::new(0.0, 0.0, 1.0),
+    Vec3::new(1.0, 1.0, 0.0),
+    Vec3::new(1.0, -1.0, 0.0),
+    Vec3::new(1.0, 0.0, 1.0),
+    Vec3::new(1.0, 0.0, -1.0),
+    Vec3::new(0.0, 1.0, 1.0),
+    Vec3::new(0.0, 1.0, -1.0),
+    Vec3::new(1.0, 1.0, 1.0),
+    Vec3::new(1.0, 1.0, -1.0),
+    Vec3::new(1.0, -1.0, 1.0),
+    Vec3::new(-1.0, 1.0, 1.0),
+];
+
+/// If more than this fraction of the sites would be deferred, the round is not divided; in unit
+/// tests it always is.
+const MOST_DEFERRED: (u32, u32) = if cfg!(test) { (1, 1) } else { (1, 2) };
+
+/// For one of so many sites a cell near it is noted before the division.
+const HINT_STRIDE: usize = 256;
+
+/// The cuts to choose from, each direction with both kinds of centres.
+const CUTS: usize = 2 * DIRECTIONS.len();
+
+/// What decides on the part of a cell.
+#[derive(Clone, Copy, Debug)]
+enum Centre {
+    Orthocentre,
+    Centroid,
+}
+
+/// A plane; the first part is below it.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    direction: Vec3,
+    at: f64,
+    centre: Centre,
+}
+
+/// Where a cell is after the division: its part, and its record there.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Place(u32);
+
+impl Place {
+    /// Of records that no cell uses.
+    const NOWHERE: Self = Self(u32::MAX);
+
+    fn new(part: usize, record: u32) -> Self {
+        Self((part as u32) << 31 | record)
+    }
+
+    fn part(self) -> usize {
+        (self.0 >> 31) as usize
+    }
+
+    fn record(self) -> u32 {
+        self.0 & (u32::MAX >> 1)
+    }
+}
+
+/// Cells that grow apart from the others, and where they meet them.
+struct Part<'s, M> {
+    builder: Builder<'s, M>,
+    /// The sites on its side of the cut; once it has grown, those that were deferred.
+    sites: Vec<u32>,
+    /// Where to go on after a walk has met the frontier, see [`Builder::hints`].
+    hints: Vec<u32>,
+    /// Its facets on the frontier, each with the same facet before the division as seen from the
+    /// other part.
+    frontier: Vec<(Face, Face)>,
+}
+
+impl<'s, M: Metric> Builder<'s, M> {
+    /// Inserts sites in two parts, or one after the other where no plane separates them well.
+    pub(super) fn insert_divided(&mut self, range: Range<u32>) -> Result<(), TriangulationError> {
+        let Some(cut) = self.choose_cut(&range) else {
+            self.reserve(range.len());
+            return self.insert_all(range);
+        };
+        let (mut parts, places) = self.divide(cut, &range);
+        let [first, second] = &mut parts;
+        let (one, other) = rayon::join(|| first.grow(), || second.grow());
+        one.and(other)?;
+        let deferred = self.unite(parts, &places)?;
+        self.insert_all(deferred)
+    }
+
+    /// The cut for which the fewest sites would be deferred, if these are not too many.
+    fn choose_cut(&mut self, range: &Range<u32>) -> Option<Cut> {
+        let cuts = self.halving_cuts(range);
+        let stride = range.len().div_ceil(TRIED_SITES);
+        let (mut deferred, mut tried) = ([0; CUTS], 0);
+        for vertex in range.clone().step_by(stride) {
+            let unsuitable = self.unsuitable_cuts(vertex, &cuts);
+            for (i, count) in deferred.iter_mut().enumerate() {
+                *count += unsuitable >> i & 1;
+            }
+            tried += 1;
+        }
+        let best = (0..CUTS).min_by_key(|&i| deferred[i])?;
+        (MOST_DEFERRED.1 * deferred[best] <= MOST_DEFERRED.0 * tried).then_some(cuts[best])
+    }
+
+    /// The cuts to choose from: each direction halves the sites.
+    fn halving_cuts(&self, range: &Range<u32>) -> [Cut; CUTS] {
+        let sites = &self.sites[range.start as usize..range.end as usize];
+        let stride = sites.len().div_ceil(SAMPLED_SITES);
+        let at = DIRECTIONS.map(|direction| {
+            let height = |s: &Site| direction.dot(Vec3::from_array(s.p));
+            let mut heights: Vec<f64> = sites.iter().step_by(stride).map(height).collect();
+            let middle = heights.len() / 2;
+            *heights.select_nth_unstable_by(middle, f64::total_cmp).1
+        });
+        std::array::from_fn(|i| {
+            let k = i % DIRECTIONS.len();
+            let centre = Centre::BOTH[i / DIRECTIONS.len()];
+            Cut { direction: DIRECTIONS[k], at: at[k], centre }
+        })
+    }
+
+    /// One bit for each cut for which a site would be deferred: the cells that its insertion reads
+    /// or replaces are not all in the part of its side.
+    fn unsuitable_cuts(&mut self, vertex: u32, cuts: &[Cut; CUTS]) -> u32 {
+        let Some(seed) = self.locate(vertex) else { return 0 };
+        self.last = seed;
+        if !self.find_conflict_zone(vertex, seed) {
+            return 0;
+        }
+        let parts = |point: &dyn Fn(usize) -> Vec3| {
+            let bit = |(i, cut): (usize, &Cut)| u32::from(cut.is_below(point(i))) << i;
+            cuts.iter().enumerate().map(bit).sum::<u32>()
+        };
+        let side = parts(&|_| Vec3::from_array(self.sites[vertex as usize].p));
+        let (mut all, mut any) = (u32::MAX, 0);
+        for &c in &self.zone {
+            for n in self.cells[c as usize].n {
+                let cell = decisive(&self.cells, n.cell());
+                let centres = Centre::BOTH.map(|centre| centre.of(cell, self.sites));
+                let parts = parts(&|i| centres[i / DIRECTIONS.len()]);
+                all &= parts;
+                any |= parts;
+            }
+        }
+        self.forget_zone();
+        (side | any) & !(side & all)
+    }
+
+    /// Step 1 of the head; returns also the place of every cell.
+    fn divide(&mut self, cut: Cut, range: &Range<u32>) -> ([Part<'s, M>; 2], Vec<Place>) {
+        let (places, counts) = self.places(cut);
+        let parts = [0, 1].map(|part| {
+            let position = |v: u32| Vec3::from_array(self.sites[v as usize].p);
+            let here = |v: &u32| cut.is_below(position(*v)) == (part == 0);
+            let sites: Vec<u32> = range.clone().filter(here).collect();
+            let mut builder = Self::new(self.sites, self.filter, 0);
+            let hints = self.hints(part, &sites, &places);
+            builder.last = counts[part].min(1);
+            // The first part will take in the second.
+            let room = if part == 0 { range.end as usize } else { sites.len() };
+            builder.reserve(room + counts[part] as usize / 8);
+            Part { builder, sites, hints, frontier: Vec::new() }
+        });
+        let cells = std::mem::take(&mut self.cells);
+        let [mut first, mut second] = parts;
+        rayon::join(|| first.copy(0, &cells, &places), || second.copy(1, &cells, &places));
+        ([first, second], places)
+    }
+
+    /// The place of every cell, and how many there are in each part.
+    fn places(&self, cut: Cut) -> (Vec<Place>, [u32; 2]) {
+        let cells = &self.cells;
+        let part_of = |c: usize| {
+            if cells[c].v[0] == UNUSED {
+                return Place::NOWHERE;
+            }
+            let centre = cut.centre.of(decisive(cells, c as u32), self.sites);
+            Place::new(usize::from(!cut.is_below(centre)), 0)
+        };
+        let mut places: Vec<Place> = (0..cells.len()).into_par_iter().map(part_of).collect();
+        let mut counts = [0; 2];
+        for place in places.iter_mut().filter(|p| **p != Place::NOWHERE) {
+            let part = place.part();
+            counts[part] += 1;
+            *place = Place::new(part, counts[part]);
+        }
+        (places, counts)
+    }
+
+    /// For every so many sites of a part a record of it near the first of them, or the frontier.
+    fn hints(&mut self, part: usize, sites: &[u32], places: &[Place]) -> Vec<u32> {
+        let hint = |&vertex: &u32| {
+            self.last = self.walk_approximately(vertex);
+            let place = places[self.last as usize];
+            if place.part() == part { place.record() } else { FRONTIER }
+        };
+        sites.iter().step_by(HINT_STRIDE).map(hint).collect()
+    }
+
+    /// Step 3 of the head; returns the deferred sites.
+    fn unite(
+        &mut self,
+        parts: [Part<'s, M>; 2],
+        places: &[Place],
+    ) -> Result<Vec<u32>, TriangulationError> {
+        let [first, second] = parts;
+        // The second part's records follow the first's, without its frontier.
+        let offset = first.builder.cells.len() as u32 - 1;
+        if first.builder.cells.len() + second.builder.cells.len() > MAX_CELLS {
+            let points = self.sites.len() - 1;
+            return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
+        }
+        *self = first.builder;
+        if self.last == FRONTIER {
+            self.last = second.builder.last + offset;
+        }
+        let moved = |cell: &Cell| Cell { v: cell.v, n: cell.n.map(|n| n.moved(offset)) };
+        self.cells.par_extend(second.builder.cells[1..].par_iter().map(moved));
+        self.state.resize(self.cells.len(), UNKNOWN);
+        self.free.extend(second.builder.free.iter().map(|id| id + offset));
+        for (part, frontier) in [&first.frontier, &second.frontier].into_iter().enumerate() {
+            for &(face, before) in frontier {
+                let face = if part == 0 { face } else { face.moved(offset) };
+                let place = places[before.cell() as usize];
+                let other = Face::new(place.record(), before.index());
+                let other = if place.part() == 0 { other } else { other.moved(offset) };
+                self.cells[face.cell() as usize].n[face.index()] = other;
+            }
+        }
+        let mut deferred = [first.sites, second.sites].concat();
+        deferred.sort_unstable();
+        Ok(deferred)
+    }
+}
+
+impl<M: Metric> Part<'_, M> {
+    /// Copies its cells.
+    fn copy(&mut self, part: usize, cells: &[Cell], places: &[Place]) {
+        let builder = &mut self.builder;
+        for (cell, place) in cells.iter().zip(places) {
+            if place.part() != part || *place == Place::NOWHERE {
+                continue;
+            }
+            let mut copy = *cell;
+            for (i, n) in copy.n.iter_mut().enumerate() {
+                let beyond = places[n.cell() as usize];
+                if beyond.part() == part {
+                    *n = Face::new(beyond.record(), n.index());
+                } else {
+                    self.frontier.push((Face::new(place.record(), i), *n));
+                    *n = Face::new(FRONTIER, 0);
+                }
+            }
+            builder.cells.push(copy);
+        }
+        builder.state.resize(builder.cells.len(), UNKNOWN);
+    }
+
+    /// Step 2 of the head.
+    fn grow(&mut self) -> Result<(), TriangulationError> {
+        let Self { builder, sites, hints, .. } = self;
+        if builder.last == FRONTIER {
+            // The part has no cell.
+            return Ok(());
+        }
+        let mut deferred = 0;
+        for i in 0..sites.len() {
+            let mut outcome = builder.insert(sites[i])?;
+            let hint = hints[i / HINT_STRIDE];
+            // Records are used again near where they were, so that the hint's is still close.
+            if outcome == Outcome::Unreached && builder.cells[hint as usize].v[0] != UNUSED {
+                builder.last = hint;
+                outcome = builder.insert(sites[i])?;
+            }
+            if outcome != Outcome::Done {
+                sites[deferred] = sites[i];
+                deferred += 1;
+            }
+        }
+        sites.truncate(deferred);
+        Ok(())
+    }
+}
+
+impl Cut {
+    /// Whether a point is below the plane; so it is where rounding leaves no answer.
+    fn is_below(self, point: Vec3) -> bool {
+        let height = self.direction.dot(point);
+        height < self.at || height.is_nan()
+    }
+}
+
+impl Centre {
+    const BOTH: [Self; 2] = [Self::Orthocentre, Self::Centroid];
+
+    fn of(self, cell: &Cell, sites: &[Site]) -> Vec3 {
+        let s = cell.v.map(|v| &sites[v as usize]);
+        match self {
+            Self::Centroid => s.iter().map(|s| 0.25 * Vec3::from_array(s.p)).sum(),
+            Self::Orthocentre => approximate_orthocentre(s),
+        }
+    }
+}
+
+/// The finite cell that decides about conflicts with a cell: itself, or the neighbour of an
+/// infinite one, which is always in the same part.
+fn decisive(cells: &[Cell], cell: u32) -> &Cell {
+    let record = &cells[cell as usize];
+    if record.is_infinite() { &cells[record.n[3].cell() as usize] } else { record }
+}
+
+/// The orthocentre of four sites in plain double precision.
+fn approximate_orthocentre(s: [&Site; 4]) -> Vec3 {
+    let [a, b, c, d] = s.map(|s| Vec3::from_array(s.p));
+    let [u, v, w] = [b - a, c - a, d - a];
+    let lift = |e: Vec3, site: &Site| e.length_squared() + (s[0].w - site.w);
+    let (vw, wu, uv) = (v.cross(w), w.cross(u), u.cross(v));
+    let scaled = lift(u, s[1]) * vw + lift(v, s[2]) * wu + lift(w, s[3]) * uv;
+    a + scaled / (2.0 * u.dot(vw))
+}
