@@ -36,8 +36,8 @@ impl<M: Metric> Builder<'_, M> {
     #[inline(always)]
     pub(super) fn conflicts(&self, cell: u32, vertex: u32) -> bool {
         let site = &self.sites[vertex as usize];
-        let (det, bound) = determinant::<M>(&self.cells, &self.sites, cell, site);
-        conflicts_given::<M>(self.filter, &self.cells, &self.sites, cell, site, det, bound)
+        let (det, bound) = determinant::<M>(&self.cells, self.sites, cell, site);
+        conflicts_given::<M>(self.filter, &self.cells, self.sites, cell, site, det, bound)
     }
 
     /// Marks and lists the cells in conflict with the site.
