@@ -1,17 +1,34 @@
 #!/bin/sh
 # Compares medial's triangulation with CGAL's on the same points: number and set of cells, seconds,
-# memory; names that begin with w: are weighted. Runs alternate, and the best of each side counts. Exit codes: 0 all sets agree, 1 some
-# differ, 77 CGAL is missing (Debian: libcgal-dev libtbb-dev libgmp-dev libmpfr-dev).
+# memory above the input; names that begin with w: are weighted. Runs alternate, and the best of
+# each side counts: CPU seconds of one thread, or with -p seconds by the clock of two threads, for
+# CGAL under its Parallel_tag. Exit codes: 0 all sets agree, 1 some differ, 77 CGAL is missing
+# (Debian: libcgal-dev libtbb-dev libgmp-dev libmpfr-dev).
 #
-#   scripts/oracles/delaunay.sh [-r ROUNDS] [NAME ...]
+#   scripts/oracles/delaunay.sh [-p] [-r ROUNDS] [NAME ...]
 set -eu
 cd "$(dirname "$0")/../.."
 
 rounds=3
-if [ "${1:-}" = -r ]; then rounds=$2; shift 2; fi
-sets=${*:-cube-100000 surface-100000 cube-1000000 surface-1000000 sphere-100000 \
-    lattice-30 box-100 box-128 icosphere-6 icosphere-7 cylinder-200 \
-    w:cube-100000 w:surface-100000 w:lattice-30 w:box-100 w:icosphere-6 w:cylinder-200}
+threads=1
+while getopts pr: option; do
+    case $option in
+        p) threads=2 ;;
+        r) rounds=$OPTARG ;;
+        *) exit 2 ;;
+    esac
+done
+shift $((OPTIND - 1))
+export RAYON_NUM_THREADS=$threads
+if [ $threads = 2 ]; then
+    default="cube-1000000 surface-1000000"
+else
+    default="cube-100000 surface-100000 cube-1000000 surface-1000000 sphere-100000 \
+        lattice-30 box-100 box-128 icosphere-6 icosphere-7 cylinder-200 \
+        w:cube-100000 w:surface-100000 w:cube-1000000 w:lattice-30 w:box-100 w:icosphere-6 \
+        w:cylinder-200"
+fi
+sets=${*:-$default}
 
 work=${CARGO_TARGET_DIR:-target}/oracles
 mkdir -p "$work"
@@ -32,12 +49,14 @@ for name in $sets; do
     file=$work/$name.f64
     "$ours" make "$name" "$file"
     case $name in w:*) mode=weighted ;; *) mode= ;; esac
+    cgal_mode=$mode
+    if [ $threads = 2 ]; then cgal_mode=parallel; fi
     : >"$work/a"
     : >"$work/b"
     i=0
     while [ $i -lt "$rounds" ]; do
         "$ours" run "$file" $mode >>"$work/a"
-        "$work/delaunay_cgal" "$file" 1 $mode >>"$work/b"
+        "$work/delaunay_cgal" "$file" 1 $cgal_mode >>"$work/b"
         i=$((i + 1))
     done
     sort -k3,3g "$work/a" | head -n 1 >"$work/a1"
