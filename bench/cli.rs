@@ -54,6 +54,8 @@ pub enum Verb {
     Methods(cmd::methods::Arguments),
     /// List or write the built-in shapes.
     Datasets(cmd::datasets::Arguments),
+    /// Repeat tables and figures of the papers, published values beside ours.
+    Paper(cmd::paper::Arguments),
     /// Rebuild the report of a folder of results.
     Report(cmd::report::Arguments),
     /// Say what this machine lacks for oracles and baselines.
@@ -86,6 +88,7 @@ fn run(verb: Verb, global: &Global) -> Result<cmd::Exit, cmd::Failure> {
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
         Verb::Methods(arguments) => cmd::methods::run(&arguments, global),
         Verb::Datasets(arguments) => cmd::datasets::run(&arguments, global),
+        Verb::Paper(arguments) => cmd::paper::run(&arguments, global),
         Verb::Report(arguments) => cmd::report::run(&arguments, global),
         Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
         Verb::Completions(arguments) => cmd::completions::run(&arguments),

@@ -10,6 +10,7 @@
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
 //! | `terminal` | the summary in plain text |
+//! | [`published`] | tables and figures of the papers as data, and ours beside them |
 //! | `page` | the self-contained `index.html` |
 //! | `write` | [`write_report`], all of it into one folder |
 
@@ -19,6 +20,7 @@ mod journal;
 mod metric;
 mod page;
 mod plots;
+pub mod published;
 mod record;
 mod summary;
 mod tables;

@@ -14,6 +14,8 @@ use medial::metrics::Evaluation;
 use medial::simplifier::{Level, Params};
 use serde::{Deserialize, Serialize};
 
+use crate::text::{counted, megabytes};
+
 /// What became of one item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -286,4 +288,15 @@ pub struct Machine {
     pub os: String,
     /// Main memory, in bytes.
     pub memory: u64,
+}
+
+impl fmt::Display for Machine {
+    /// Processor, cores, memory and system, as far as known.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let cores = (self.cores > 0).then(|| counted(self.cores, "core", "cores"));
+        let memory = (self.memory > 0).then(|| format!("{} MB", megabytes(self.memory)));
+        let parts = [Some(self.cpu.clone()), cores, memory, Some(self.os.clone())];
+        let known: Vec<String> = parts.into_iter().flatten().filter(|p| !p.is_empty()).collect();
+        f.write_str(&known.join(", "))
+    }
 }

@@ -24,6 +24,7 @@ pub mod doctor;
 pub mod evaluate;
 pub mod info;
 pub mod methods;
+pub mod paper;
 pub mod report;
 pub mod simplify;
 pub mod triangulate;

@@ -10,6 +10,7 @@ mod npy;
 mod npy_header;
 mod progress;
 mod provenance;
+mod reproduce;
 mod search;
 mod stopwatch;
 
@@ -19,5 +20,6 @@ pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells};
 pub use npy_header::HeaderError;
 pub use progress::Progress;
 pub use provenance::{Provenance, hex_digest, peak_bytes};
+pub use reproduce::Reproducer;
 pub use search::{Found, search_error};
 pub use stopwatch::{Lap, Stopwatch};

@@ -15,7 +15,7 @@ use crate::plots::Plot;
 use crate::record::Machine;
 use crate::summary::CountSummary;
 use crate::tables::Table;
-use crate::text::{counted, escape_html, megabytes};
+use crate::text::{counted, escape_html};
 
 /// Everything that the page is made of.
 pub(crate) struct Page<'a> {
@@ -92,7 +92,8 @@ impl Page<'_> {
             facts.push(format!("medial {}", self.header.version));
         }
         let recorded = || comparison.entries.first().map(|entry| &entry.record.machine);
-        facts.extend(self.header.machine.as_ref().or_else(recorded).and_then(machine));
+        let machine = self.header.machine.as_ref().or_else(recorded).map(Machine::to_string);
+        facts.extend(machine.filter(|text| !text.is_empty()));
         let facts: Vec<String> =
             facts.iter().map(|fact| format!("<li>{}</li>", escape_html(fact))).collect();
         let mut html = format!("<header>\n<h1>{}</h1>\n", escape_html(title));
@@ -143,22 +144,4 @@ impl Page<'_> {
         }
         html
     }
-}
-
-/// Processor, cores, memory and system in one line.
-fn machine(machine: &Machine) -> Option<String> {
-    let mut parts = Vec::new();
-    if !machine.cpu.is_empty() {
-        parts.push(machine.cpu.clone());
-    }
-    if machine.cores > 0 {
-        parts.push(counted(machine.cores, "core", "cores"));
-    }
-    if machine.memory > 0 {
-        parts.push(format!("{} MB", megabytes(machine.memory)));
-    }
-    if !machine.os.is_empty() {
-        parts.push(machine.os.clone());
-    }
-    (!parts.is_empty()).then(|| parts.join(", "))
 }
