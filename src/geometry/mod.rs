@@ -1,10 +1,13 @@
-//! Exact predicates, Delaunay triangulation, bounding-volume trees, distances to medial primitives.
+//! Exact predicates, Delaunay and regular triangulations, dual complexes, poles, bounding-volume
+//! trees, distances to medial primitives.
 
 mod bvh;
 mod cone;
 pub mod delaunay;
+pub mod dual_complex;
 mod enclosing;
 mod planar_frame;
+pub mod poles;
 pub mod predicates;
 pub mod regular;
 mod separation;
@@ -12,12 +15,15 @@ mod slab;
 mod sphere;
 mod tangent_planes;
 pub mod triangulation;
+pub mod union_boundary;
 
 pub(crate) use bvh::{Bounds, Node, Plan, Search, Tree, in_morton_order};
 pub use bvh::{BvhError, Closest, Feature, TriangleBvh};
 pub use cone::Cone;
 pub use delaunay::Delaunay;
+pub use dual_complex::DualComplex;
 pub use enclosing::enclosing_ball;
+pub use poles::{PolarBall, Pole, Poles, SamplePoles};
 pub use regular::Regular;
 pub use separation::separation_angle;
 pub use slab::Slab;
@@ -25,3 +31,4 @@ pub(crate) use slab::SlabFace;
 pub use sphere::{HullFoot, Sphere};
 pub use tangent_planes::{ConeFrame, SlabPlanes, boundary_edge_normal};
 pub use triangulation::{CellId, TriangulationError, VertexId};
+pub use union_boundary::{MergedVertices, UnionBoundary, UnionVertex, shared_sample};

@@ -105,6 +105,11 @@ impl Regular {
         self.sites[vertex.index()].w
     }
 
+    #[inline]
+    pub(super) fn site(&self, vertex: VertexId) -> &Site {
+        &self.sites[vertex.index()]
+    }
+
     /// The number of input points, hidden and repeated ones included.
     pub fn point_count(&self) -> usize {
         self.sites.len()

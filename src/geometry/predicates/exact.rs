@@ -70,7 +70,7 @@ fn to_i128(x: f64, quantum: i32) -> i128 {
 }
 
 /// `x / 2^quantum` for any exponents.
-fn to_wide<const N: usize>(x: f64, quantum: i32) -> Wide<N> {
+pub(super) fn to_wide<const N: usize>(x: f64, quantum: i32) -> Wide<N> {
     let p = parts(x);
     let shift = p.exponent - quantum;
     if p.mantissa == 0 {
@@ -83,7 +83,7 @@ fn to_wide<const N: usize>(x: f64, quantum: i32) -> Wide<N> {
 }
 
 /// Differences of `K` points to an origin as integers, in the narrowest tier that holds them.
-enum Differences<const K: usize> {
+pub(super) enum Differences<const K: usize> {
     One([[i64; 3]; K]),
     Two([[i128; 3]; K]),
     Any([[Wide<20>; 3]; K]),
@@ -162,7 +162,7 @@ fn close_differences<const K: usize>(
 /// The common quantum of the points and their differences to `origin` in units of it.
 ///
 /// `quantum_cap` is an upper bound on the quantum, from weights; `i32::MAX` without.
-fn differences<const K: usize>(
+pub(super) fn differences<const K: usize>(
     points: [&[f64; 3]; K],
     origin: &[f64; 3],
     quantum_cap: i32,
@@ -209,13 +209,16 @@ fn differences<const K: usize>(
 }
 
 #[inline]
-fn widen<const K: usize, const N: usize>(d: &[[i128; 3]; K]) -> [[Wide<N>; 3]; K] {
+pub(super) fn widen<const K: usize, const N: usize>(d: &[[i128; 3]; K]) -> [[Wide<N>; 3]; K] {
     d.map(|p| p.map(Wide::from_i128))
 }
 
 /// `a.x b.y - b.x a.y`, of twice the width.
 #[inline]
-fn minor<const D: usize, const D2: usize>(a: &[Wide<D>; 3], b: &[Wide<D>; 3]) -> Wide<D2> {
+pub(super) fn minor<const D: usize, const D2: usize>(
+    a: &[Wide<D>; 3],
+    b: &[Wide<D>; 3],
+) -> Wide<D2> {
     a[0].mul::<D, D2>(b[1]).sub(b[0].mul(a[1]))
 }
 

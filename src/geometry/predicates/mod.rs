@@ -17,6 +17,8 @@ mod filter;
 mod lanes;
 mod narrow;
 mod perturb;
+mod power_exact;
+mod power_size;
 mod wide;
 
 pub use circumsphere::{circumsphere, orthosphere};
@@ -26,6 +28,10 @@ pub(crate) use filter::{
     Filter, Metric, Site, UNDERFLOW, Unweighted, Weighted, approximate_orientation,
 };
 pub(crate) use perturb::{in_conflict, in_conflict_given, lexicographic};
+pub(crate) use power_size::{
+    edge_clearance, edge_size, tetrahedron_size, triangle_clearance, triangle_size,
+    vertex_clearance,
+};
 
 use crate::Vec3;
 

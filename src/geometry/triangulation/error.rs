@@ -33,6 +33,14 @@ pub enum TriangulationError {
         /// Its weight.
         weight: f64,
     },
+    /// A ball's radius is negative, infinite, or not a number.
+    #[error("ball {index} has the unusable radius {radius:e}")]
+    Radius {
+        /// Index of the first such ball.
+        index: usize,
+        /// Its radius.
+        radius: f64,
+    },
     /// There is not one weight for each point.
     #[error("{points} points but {weights} weights")]
     WeightCount {
