@@ -11,8 +11,8 @@ use medial::complex::{MedialMesh, Sphere};
 use crate::catalogue::KnownAxis;
 use crate::geodesic::unit_sphere;
 use crate::shapes::{
-    BOX_HALF, CAVITY, CORE_HALF, ELLIPSOID, PAIR_BALL, PAIR_CAPSULE, PLATE_HALF, ROD_APEX,
-    ROD_HALF, ROD_RADIUS, ROUNDING, TORUS,
+    BOX_HALF, CAVITY, COIL, CORE_HALF, ELLIPSOID, PAIR_BALL, PAIR_CAPSULE, PLATE_HALF, ROD_APEX,
+    ROD_HALF, ROD_RADIUS, ROUNDING, TORUS, coil_centre, coil_length,
 };
 
 /// Rings of a triangulated disc, and vertices that each has more than the one inside it.
@@ -189,6 +189,21 @@ pub(crate) fn torus() -> KnownAxis {
     });
     let edges = (0..CIRCLE_EDGES).map(|i| [i, (i + 1) % CIRCLE_EDGES]).collect();
     known(spheres.collect(), edges, vec![], sagitta(major, CIRCLE_EDGES))
+}
+
+/// The centre line of the pipe: its curvature is below one over the pipe's radius, and its turns
+/// are farther apart than two of those.
+pub(crate) fn coil() -> KnownAxis {
+    let (radius, pitch, turns, pipe) = COIL;
+    let (length, last) = (coil_length(), 2 * CIRCLE_EDGES);
+    let at = |i: u32| coil_centre(length * (f64::from(i) / f64::from(last) - 0.5));
+    let spheres = (0..=last).map(|i| Sphere::new(at(i), pipe)).collect();
+    let edges = (0..last).map(|i| [i, i + 1]).collect();
+    // The circle that osculates the helix has the radius R + (P / 2 pi)^2 / R.
+    let rise = pitch / TAU;
+    let osculating = radius + rise * rise / radius;
+    let sides = TAU * osculating / (turns * (TAU * radius).hypot(pitch)) * f64::from(last);
+    known(spheres, edges, vec![], sagitta(osculating, sides as u32))
 }
 
 /// The sphere halfway between outer surface and cavity.

@@ -183,6 +183,17 @@ pub fn catalogue() -> Vec<BuiltIn> {
             diagonal: shapes::torus_diagonal(),
         },
         BuiltIn {
+            id: "coil",
+            title: "Coiled pipe",
+            summary: "Two turns of a pipe with round ends and a narrow gap; its axis is a helix.",
+            expected_betti: [1, 0, 0],
+            default_resolution: 34,
+            min_resolution: 28,
+            generate: shapes::coil,
+            known_axis: Some(axes::coil),
+            diagonal: shapes::coil_diagonal(),
+        },
+        BuiltIn {
             id: "hollow-sphere",
             title: "Hollow sphere",
             summary: "Between spheres of radii 1 and 0.5; its axis is the sphere of radius 0.75.",

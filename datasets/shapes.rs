@@ -1,5 +1,7 @@
 //! The built-in shapes: dimensions, and a generator for each that takes the target edge length.
 
+use std::f64::consts::TAU;
+
 use medial::Vec3;
 use medial::surface::TriMesh;
 
@@ -34,6 +36,8 @@ pub(crate) const PAIR_BALL: (Vec3, f64) = (Vec3::new(-1.0, 0.0, 0.0), 0.6);
 pub(crate) const PAIR_CAPSULE: (Vec3, f64, f64) = (Vec3::new(0.5, 0.0, 0.0), 0.5, 0.3);
 /// Radii of the torus.
 pub(crate) const TORUS: (f64, f64) = (1.0, 0.4);
+/// The coil: radius of its turns, height of one, number of turns, radius of the pipe.
+pub(crate) const COIL: (f64, f64, f64, f64) = (1.0, 0.8, 2.0, 0.35);
 /// Radius of the cavity of the hollow sphere.
 pub(crate) const CAVITY: f64 = 0.5;
 
@@ -77,6 +81,12 @@ pub(crate) fn pair_diagonal() -> f64 {
 pub(crate) fn torus_diagonal() -> f64 {
     let (major, minor) = TORUS;
     diagonal_of(Vec3::new(major + minor, major + minor, minor))
+}
+
+pub(crate) fn coil_diagonal() -> f64 {
+    let (radius, pitch, turns, pipe) = COIL;
+    let wide = radius + pipe;
+    diagonal_of(Vec3::new(wide, wide, pitch * turns / 2.0 + pipe))
 }
 
 pub(crate) fn sphere(edge: f64) -> TriMesh {
@@ -136,6 +146,41 @@ pub(crate) fn bracket(edge: f64) -> TriMesh {
     boundary(&ticks, |p| p.x < BRACKET_THICKNESS || p.z < BRACKET_THICKNESS, |p| p)
 }
 
+/// A capsule bent along a helix: sections stay in the planes normal to it, and its ends straight.
+pub(crate) fn coil(edge: f64) -> TriMesh {
+    let (_, _, _, pipe) = COIL;
+    let half = coil_length() / 2.0;
+    mapped(capsule_of(half, pipe, edge), |p| {
+        let along = p.z.clamp(-half, half);
+        let [tangent, normal, binormal] = coil_frame(along);
+        coil_centre(along) + tangent * (p.z - along) + normal * p.x + binormal * p.y
+    })
+}
+
+/// Length of the coil's centre line.
+pub(crate) fn coil_length() -> f64 {
+    let (radius, pitch, turns, _) = COIL;
+    turns * (TAU * radius).hypot(pitch)
+}
+
+/// The point of the coil's centre line at an arc length from its middle.
+pub(crate) fn coil_centre(along: f64) -> Vec3 {
+    let (radius, pitch, _, _) = COIL;
+    let turn = along / (TAU * radius).hypot(pitch);
+    let (sin, cos) = (TAU * turn).sin_cos();
+    Vec3::new(radius * cos, radius * sin, pitch * turn)
+}
+
+/// Tangent, normal and binormal there.
+fn coil_frame(along: f64) -> [Vec3; 3] {
+    let (radius, pitch, _, _) = COIL;
+    let speed = (TAU * radius).hypot(pitch);
+    let (sin, cos) = (TAU * along / speed).sin_cos();
+    let tangent = Vec3::new(-TAU * radius * sin, TAU * radius * cos, pitch) / speed;
+    let normal = Vec3::new(-cos, -sin, 0.0);
+    [tangent, normal, tangent.cross(normal)]
+}
+
 /// A cylinder of the given half length and radius with a hemisphere at each end.
 fn capsule_of(half: f64, radius: f64, edge: f64) -> TriMesh {
     let quarter = std::f64::consts::FRAC_PI_2;
@@ -149,7 +194,7 @@ fn capsule_of(half: f64, radius: f64, edge: f64) -> TriMesh {
 
 /// Parts of a cylinder as long as the sides of its rings.
 fn stacks(half: f64, radius: f64, cap_steps: u32) -> u32 {
-    let side = std::f64::consts::TAU * radius / f64::from(SECTORS * cap_steps);
+    let side = TAU * radius / f64::from(SECTORS * cap_steps);
     parts(2.0 * half, side, 1)
 }
 

@@ -43,12 +43,29 @@ fn depth(id: &str, p: Vec3) -> f64 {
             ball.max(in_capsule(p - Vec3::new(0.5, 0.0, 0.0), 0.5, 0.3))
         }
         "torus" => 0.4 - (rho - 1.0).hypot(p.z),
+        "coil" => in_coil(p),
         "hollow-sphere" => (1.0 - p.length()).min(p.length() - 0.5),
         "double-torus" => in_blend(double_torus_field()),
         "frame" => in_blend(frame_field()),
         "blob" => in_blend(blob_field()),
         other => panic!("{other} has no depth function"),
     }
+}
+
+/// By brute force over the turns of the helix, then by ternary search about the best.
+fn in_coil(p: Vec3) -> f64 {
+    let at = |turn: f64| {
+        let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
+        p.distance(Vec3::new(cos, sin, 0.8 * turn))
+    };
+    let steps = (-400..=400).map(|i| f64::from(i) / 400.0);
+    let best = steps.min_by(|&a, &b| at(a).total_cmp(&at(b))).unwrap();
+    let (mut lo, mut hi) = ((best - 0.0025).max(-1.0), (best + 0.0025).min(1.0));
+    for _ in 0..100 {
+        let third = (hi - lo) / 3.0;
+        if at(lo + third) < at(hi - third) { hi -= third } else { lo += third }
+    }
+    0.35 - at(lo)
 }
 
 /// By brute force over the angles of the surface, then by a pattern search from the best.
@@ -162,7 +179,7 @@ fn default_meshes_have_a_few_thousand_vertices_with_edges_as_announced() {
 fn the_catalogue_is_consistent() {
     let shapes = catalogue();
     let mut ids: Vec<_> = shapes.iter().map(|shape| shape.id).collect();
-    assert_eq!(shapes.iter().filter(|shape| shape.axis().is_some()).count(), 10);
+    assert_eq!(shapes.iter().filter(|shape| shape.axis().is_some()).count(), 11);
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), shapes.len());

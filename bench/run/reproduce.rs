@@ -3,13 +3,19 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use medial::metrics::{Judge, JudgeOptions};
+use medial::metrics::{Judge, JudgeOptions, union_betti};
 use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::RunContext;
 use medial::surface::{self, Sampling};
 use medial_reports::published::{Exhibit, ReproducedRow, Row, RowInput, Run};
 use medial_reports::{Initial, Record};
+use serde_json::{Value, json};
 
 use super::{Input, Item, Measure, Provenance, RunOptions, Source, run_item};
+
+/// Distance between the balls that stand for the primitives where the topology of a union is asked,
+/// as a fraction of the diagonal.
+const BALL_SPACING: f64 = 0.004;
 
 /// Repeats rows, and keeps the input of the last one: rows often share it.
 pub struct Reproducer {
@@ -105,23 +111,31 @@ fn fill(
     ready: &Ready,
     provenance: &Provenance,
 ) {
-    let mut records: BTreeMap<&str, Option<Record>> = BTreeMap::new();
+    let mut records: BTreeMap<&str, Option<(Record, Value)>> = BTreeMap::new();
     for column in &exhibit.columns {
         let name = column.run.as_str();
         if !records.contains_key(name) {
-            let record = exhibit.run(row, name).and_then(|run| one_run(run, ready, provenance));
+            let run = exhibit.run(row, name);
+            let record = run.and_then(|run| {
+                let record = one_run(run, ready, provenance)?;
+                let mut value = json!(record);
+                if exhibit.needs_union() {
+                    value["union"] = json!({ "betti": union_betti_of(run, ready) });
+                }
+                Some((record, value))
+            });
             if record.is_none() {
                 reproduced.remarks.push(format!("{name}: medial has no such method"));
             }
             records.insert(name, record);
         }
-        let Some(record) = &records[name] else { continue };
+        let Some((_, record)) = &records[name] else { continue };
         if let Some(value) = column.read(record) {
             reproduced.ours.insert(column.key.clone(), value);
         }
     }
     for (name, record) in records {
-        let Some(record) = record else { continue };
+        let Some((record, _)) = record else { continue };
         let why = record.reason.iter().map(|reason| format!("{name}: {reason}"));
         let warnings = record.simplify.warnings.iter().map(|w| format!("{name}: {w}"));
         reproduced.remarks.extend(why.chain(warnings));
@@ -136,4 +150,13 @@ fn one_run(run: &Run, ready: &Ready, provenance: &Provenance) -> Option<Record> 
     let measure = Measure { input, shape, judge, initial: Some(*initial) };
     let options = RunOptions { seed: 0, repeat: 1, out: None };
     run_item(method.as_ref(), &item, &measure, &options, provenance).pop()
+}
+
+/// The Betti numbers of the union after a run. The run is repeated, since records keep no mesh.
+fn union_betti_of(run: &Run, ready: &Ready) -> Option<[u64; 3]> {
+    let method = medial_methods::find(&run.method)?;
+    let view = ready.shape.view();
+    let mut prepared = method.prepare(&view, &run.params, &RunContext::default()).ok()?;
+    let simplified = prepared.at(run.level).ok()?;
+    union_betti(&simplified.mesh, BALL_SPACING).ok()
 }

@@ -1,7 +1,7 @@
 //! Figures of the papers as data: what was published, on which model, and how it is repeated.
 //!
 //! Each file `*.json` beside this one is an [`Exhibit`]: a table or a figure of a paper. Its rows name
-//! models and published values; its columns say which number of a [`Record`] belongs beside them.
+//! models and published values; its columns say which number of a [`Record`](crate::Record) belongs beside them.
 //! The runner fills in ours ([`Reproduction`]), and [`Reproduction::verdicts`] says which claims
 //! hold.
 
@@ -12,8 +12,7 @@ use std::collections::BTreeMap;
 
 use medial::simplifier::{Level, Params};
 use serde::{Deserialize, Serialize};
-
-use crate::Record;
+use serde_json::Value;
 
 pub use reproduction::{ReproducedRow, Reproduction, Verdict};
 
@@ -70,7 +69,8 @@ pub struct Column {
     pub unit: String,
     /// The run that the number is taken from.
     pub run: String,
-    /// Places in the [`Record`], as JSON pointers; their values are added.
+    /// Places in the [`Record`](crate::Record), as JSON pointers; their values are added. Beside the
+    /// record's own there is `/union/betti`, the Betti numbers of the union of the primitives.
     pub of: Vec<String>,
     /// Factor from the record's unit to this column's.
     #[serde(default = "one")]
@@ -205,6 +205,11 @@ impl Exhibit {
         row.runs.get(name).or_else(|| self.runs.get(name))
     }
 
+    /// Whether any column asks for the topology of the union.
+    pub fn needs_union(&self) -> bool {
+        self.columns.iter().flat_map(|c| &c.of).any(|place| place.starts_with("/union"))
+    }
+
     /// Whether any column needs more than counts and seconds.
     pub fn needs_evaluation(&self) -> bool {
         self.columns.iter().flat_map(|c| &c.of).any(|place| place.starts_with("/evaluate"))
@@ -251,9 +256,8 @@ impl Exhibit {
 }
 
 impl Column {
-    /// The number in a record, if all its parts are there.
-    pub fn read(&self, record: &Record) -> Option<f64> {
-        let record = serde_json::to_value(record).ok()?;
+    /// The number in a record as JSON, if all its parts are there.
+    pub fn read(&self, record: &Value) -> Option<f64> {
         let parts = self.of.iter().map(|place| record.pointer(place)?.as_f64());
         parts.sum::<Option<f64>>().map(|sum| sum * self.scale)
     }
@@ -273,6 +277,7 @@ pub fn published() -> Vec<Exhibit> {
         include_str!("qmat-figure-14.json"),
         include_str!("qmat-figure-15.json"),
         include_str!("qmat-figure-16.json"),
+        include_str!("qmat-figure-20.json"),
         include_str!("pmat-table-1.json"),
     ];
     let read = |text: &&str| serde_json::from_str(text).expect("a published table is well formed");

@@ -26,6 +26,7 @@ use super::Distances;
 use super::envelope::{EnvelopeOptions, sample_envelope};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
+use crate::geometry::TriangulationError;
 use crate::geometry::{BvhError, TriangleBvh};
 use crate::surface::TriMesh;
 
@@ -64,6 +65,20 @@ pub enum MetricError {
     /// Too few samples were asked for.
     #[error("at least one sample is needed, {0} asks for none")]
     NoSamples(&'static str),
+    /// Balls on the primitives need a distance between them.
+    #[error("a spacing of {0} is not positive")]
+    Spacing(f64),
+    /// The balls on the primitives would not fit into memory.
+    #[error("{count:.0} balls would be needed, at most {most} are taken: choose a wider spacing")]
+    TooManyBalls {
+        /// Balls at the spacing that was asked.
+        count: f64,
+        /// The limit.
+        most: usize,
+    },
+    /// The balls on the primitives cannot be triangulated.
+    #[error(transparent)]
+    Triangulation(#[from] TriangulationError),
 }
 
 /// Distances between the surface `surface`, whose faces are in `bvh`, and the union of the

@@ -10,6 +10,7 @@ mod hausdorff;
 mod judge;
 mod quality;
 mod spikes;
+mod union_topology;
 mod volume;
 
 pub use axis_distance::{AxisOptions, axis_distance};
@@ -22,4 +23,5 @@ pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{Judge, JudgeOptions, Truth};
 pub use quality::triangle_quality;
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
+pub use union_topology::union_betti;
 pub use volume::{VolumeOptions, enclosed_volume, volume_error};
