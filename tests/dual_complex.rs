@@ -475,15 +475,11 @@ fn polar_balls_of_an_ellipsoid_meet_in_samples() {
     });
     let at_sample = |p: &&Vec3| samples.iter().any(|s| s.distance(**p) < 1e-7);
     let keyed = merged.points().iter().filter(at_sample).count();
-    println!(
-        "{} balls, {:?}, {} vertices, {} coincident, {} points, {keyed} at samples, clamped {}",
-        balls.len(),
-        complex.counts(),
-        boundary.vertices().len(),
-        boundary.coincident().len(),
-        merged.points().len(),
-        boundary.clamped(),
-    );
+    assert_eq!(boundary.clamped(), 0);
+    // Three polar balls and more meet in most of the samples, and nearly all groups are there.
+    assert!(keyed > samples.len() * 2 / 3, "{keyed}");
+    let merged_away = boundary.vertices().len() - merged.points().len();
+    assert!(merged_away > samples.len(), "{merged_away}");
     for grow in [1.002, 1.1] {
         let grown = inner.iter().map(|b| Sphere::new(b.sphere.centre, grow * b.sphere.radius));
         assert_eq!(checked(&grown.collect::<Vec<_>>()).betti(), [1, 0, 0], "grown by {grow}");
