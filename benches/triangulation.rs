@@ -9,6 +9,7 @@ use medial::Vec3;
 use medial::geometry::delaunay::Delaunay;
 use medial::geometry::predicates::{circumsphere, in_sphere, orient3d};
 use medial::geometry::regular::Regular;
+use medial::geometry::{CellId, DualComplex, Poles, Sphere, UnionBoundary};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -88,5 +89,51 @@ fn triangulations(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, predicates, triangulations);
+/// The union of balls: its dual complex, the vertices of its boundary, and the poles of samples,
+/// each without the triangulation that it starts from.
+fn unions(c: &mut Criterion) {
+    let samples = surface(20_000);
+    let delaunay = Delaunay::new(&samples).expect("spans space");
+    let mut group = c.benchmark_group("poles");
+    group.sample_size(20);
+    group.throughput(Throughput::Elements(samples.len() as u64));
+    group.bench_function("surface", |b| b.iter(|| Poles::new(&delaunay).balls().len()));
+    group.finish();
+    let poles = Poles::new(&delaunay);
+    let inner = poles.inner_balls(|cell| {
+        delaunay.circumsphere(cell).is_some_and(|(centre, _)| centre.length() < 0.7)
+    });
+    let points = cube(20_000);
+    let mut rng = Pcg64::seed_from_u64(4);
+    let random: Vec<_> =
+        points.iter().map(|&p| Sphere::new(p, 0.04 * rng.random::<f64>())).collect();
+    let grid = lattice(27, 1.0);
+    let sets: [(&str, Vec<Sphere>); 4] = [
+        ("cube", random),
+        ("inner poles", inner.iter().map(|b| b.sphere).collect()),
+        (
+            "inner poles grown by 1.1",
+            inner.iter().map(|b| Sphere::new(b.sphere.centre, 1.1 * b.sphere.radius)).collect(),
+        ),
+        ("lattice", grid.into_iter().map(|p| Sphere::new(p, 0.75)).collect()),
+    ];
+    for (name, balls) in &sets {
+        let points: Vec<Vec3> = balls.iter().map(|b| b.centre).collect();
+        let weights: Vec<f64> = balls.iter().map(|b| b.radius * b.radius).collect();
+        let regular = Regular::new(&points, &weights).expect("spans space");
+        let complex = DualComplex::new(&regular);
+        for part in ["dual complex", "union boundary"] {
+            let mut group = c.benchmark_group(part);
+            group.sample_size(20);
+            group.throughput(Throughput::Elements(balls.len() as u64));
+            group.bench_function(*name, |b| match part {
+                "dual complex" => b.iter(|| DualComplex::new(&regular).contains(CellId(0))),
+                _ => b.iter(|| UnionBoundary::new(&complex).vertices().len()),
+            });
+            group.finish();
+        }
+    }
+}
+
+criterion_group!(benches, predicates, triangulations, unions);
 criterion_main!(benches);

@@ -207,12 +207,15 @@ impl DualComplex<'_> {
     /// The edges, each once, from the cell with the smallest id around it, in the order of
     /// [`finite_edges`](super::triangulation::Triangulation::finite_edges) but without its cost.
     pub fn edges(&self) -> impl Iterator<Item = (CellEdge, Class)> + '_ {
-        self.regular.finite_cells().flat_map(move |cell| {
-            let bits = self.edges[cell.index()];
-            PAIRS.into_iter().enumerate().filter_map(move |(k, (i, j))| {
-                Some(((cell, i, j), Class::of_bits(bits >> (2 * k))?))
-            })
-        })
+        self.regular.finite_cells().flat_map(|cell| self.edges_of(cell))
+    }
+
+    /// The edges that a finite cell is the first of.
+    pub(super) fn edges_of(&self, cell: CellId) -> impl Iterator<Item = (CellEdge, Class)> + '_ {
+        let bits = self.edges[cell.index()];
+        // Most cells are the first of no edge.
+        let pairs = PAIRS.into_iter().enumerate().take(if bits == 0 { 0 } else { PAIRS.len() });
+        pairs.filter_map(move |(k, (i, j))| Some(((cell, i, j), Class::of_bits(bits >> (2 * k))?)))
     }
 
     /// The vertices, ascending.

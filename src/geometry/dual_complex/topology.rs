@@ -2,7 +2,7 @@
 //!
 //! C. J. A. Delfinado, H. Edelsbrunner: *An incremental algorithm for Betti numbers of simplicial
 //! complexes on the 3-sphere*, Computer Aided Geometric Design 12 (1995),
-//! <https://doi.org/10.1016/0167-8396(94)00016-Y>: by Alexander duality the voids of a complex in
+//! <https://doi.org/10.1016/0167-8396(95)00016-Y>: by Alexander duality the voids of a complex in
 //! the 3-sphere are the components of its complement but one.
 
 use super::{DualComplex, VertexId};

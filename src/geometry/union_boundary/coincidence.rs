@@ -1,5 +1,7 @@
 //! Step 2: which points are one, exactly.
 
+use rayon::prelude::*;
+
 use crate::geometry::dual_complex::{CellEdge, Class, DualComplex};
 use crate::geometry::predicates::{Sign, orient3d, tetrahedron_size, triangle_clearance};
 use crate::geometry::triangulation::{CellId, Facet, VertexId};
@@ -8,30 +10,40 @@ use crate::geometry::triangulation::{CellId, Facet, VertexId};
 ///
 /// `sides` holds for each facet with a vertex on the side of its cell the index of the vertex.
 pub(super) fn coincident(complex: &DualComplex<'_>, mut sides: Vec<(Facet, u32)>) -> Vec<[u32; 2]> {
+    let cells = (0..complex.regular().finite_cell_count() as u32).into_par_iter();
+    let of_cell = |walls: &mut Vec<Wall>, cell| {
+        let mut points = Vec::new();
+        for (edge, _) in complex.edges_of(CellId(cell)).filter(|e| e.1 == Class::Regular) {
+            find_walls(complex, edge, walls);
+            points.extend(arcs(complex, walls).filter(|&[a, b]| is_point(complex, a, b)));
+        }
+        points
+    };
+    let points: Vec<[Facet; 2]> =
+        cells.with_min_len(1 << 10).map_init(Vec::new, of_cell).flatten_iter().collect();
+    if points.is_empty() {
+        return Vec::new();
+    }
     sides.sort_unstable();
     let vertex_at = |facet: Facet| {
         let found = sides.binary_search_by_key(&facet, |s| s.0).ok()?;
         Some(sides[found].1)
     };
-    let mut pairs = Vec::new();
-    let mut walls = Vec::new();
-    for (edge, _) in complex.edges().filter(|e| e.1 == Class::Regular) {
-        find_walls(complex, edge, &mut walls);
-        for k in 0..walls.len() {
-            let (start, end) = (walls[k].after, walls[(k + 1) % walls.len()].before);
-            if walls.len() < 2 || complex.contains(start.cell) || !is_point(complex, start, end) {
-                continue;
-            }
-            if let (Some(a), Some(b)) = (vertex_at(start), vertex_at(end))
-                && a != b
-            {
-                pairs.push([a.min(b), a.max(b)]);
-            }
-        }
-    }
+    let ends = points.into_iter().filter_map(|[a, b]| Some([vertex_at(a)?, vertex_at(b)?]));
+    let mut pairs: Vec<[u32; 2]> =
+        ends.filter(|[a, b]| a != b).map(|[a, b]| [a.min(b), a.max(b)]).collect();
     pairs.sort_unstable();
     pairs.dedup();
     pairs
+}
+
+/// The gaps between two different triangles at an edge, as these triangles seen from the gap.
+fn arcs<'a>(
+    complex: &'a DualComplex<'_>,
+    walls: &'a [Wall],
+) -> impl Iterator<Item = [Facet; 2]> + 'a {
+    let pairs = (0..walls.len()).map(|k| [walls[k].after, walls[(k + 1) % walls.len()].before]);
+    pairs.filter(|[start, _]| walls.len() > 1 && !complex.contains(start.cell))
 }
 
 /// A triangle of the complex at an edge, as seen from the two cells that it separates.
@@ -69,19 +81,19 @@ fn is_point(complex: &DualComplex<'_>, start: Facet, end: Facet) -> bool {
         |of: [VertexId; 3], other: [VertexId; 3]| of.into_iter().find(|v| !other.contains(v));
     let (Some(c), Some(d)) = (apex(f, g), apex(g, f)) else { return false };
     let sites = |t: [VertexId; 3]| t.map(|v| regular.site(v));
-    let [p, q, r] = f.map(|v| regular.point(v));
-    if orient3d(p, q, r, regular.point(d)) == Sign::Zero {
-        return triangle_clearance(sites(f), regular.site(d)) == Sign::Zero;
-    }
     let [s, t, u] = sites(f);
+    // Where the four centres are in one plane this is zero if and only if the four balls have a
+    // point of equal powers, and so the points of the two triangles are the same.
+    if tetrahedron_size([s, t, u, regular.site(d)]) != Sign::Zero {
+        return false;
+    }
     // The orthocentre of all four is on a triangle's side of the fourth if the clearance from that
     // is positive, and in its plane if that is zero.
     let is_on_gap_side = |triangle: [VertexId; 3], fourth: VertexId| {
         let [p, q, r] = triangle.map(|v| regular.point(v));
         let clearance = triangle_clearance(sites(triangle), regular.site(fourth));
-        clearance == Sign::Zero || clearance == orient3d(p, q, r, regular.point(fourth))
+        let side = orient3d(p, q, r, regular.point(fourth));
+        clearance == Sign::Zero || side == Sign::Zero || clearance == side
     };
-    tetrahedron_size([s, t, u, regular.site(d)]) == Sign::Zero
-        && is_on_gap_side(f, d)
-        && is_on_gap_side(g, c)
+    is_on_gap_side(f, d) && is_on_gap_side(g, c)
 }

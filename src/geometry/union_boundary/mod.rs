@@ -3,7 +3,7 @@
 //! D. Attali, A. Montanvert: *Computing and simplifying 2D and 3D continuous skeletons*, Computer
 //! Vision and Image Understanding 67 (1997), <https://doi.org/10.1006/cviu.1997.0536>; N. Amenta,
 //! R. K. Kolluri: *The medial axis of a union of balls*, Computational Geometry 20 (2001),
-//! <https://doi.org/10.1016/S0925-7721(01)00017-7>.
+//! <https://doi.org/10.1016/S0925-7721(01)00033-5>.
 //!
 //! With the dual complex `K` of the balls:
 //!
@@ -25,9 +25,11 @@ mod merge;
 
 pub use merge::{MergedVertices, shared_sample};
 
+use rayon::prelude::*;
+
 use super::dual_complex::{Class, DualComplex};
 use super::predicates::{Sign, Site, triangle_size};
-use super::triangulation::{Facet, VertexId};
+use super::triangulation::Facet;
 use crate::Vec3;
 
 /// A point where three spheres meet on the boundary of the union.
@@ -72,11 +74,21 @@ pub struct UnionBoundary {
 impl UnionBoundary {
     /// The vertices in the order of [`DualComplex::triangles`]. Linear in the triangulation.
     pub fn new(complex: &DualComplex<'_>) -> Self {
-        let mut boundary =
-            Self { vertices: Vec::new(), quality: Vec::new(), coincident: Vec::new(), clamped: 0 };
-        let sides = boundary.collect(complex);
-        boundary.coincident = coincidence::coincident(complex, sides);
-        boundary
+        let (facets, sides) = facets_with_vertices(complex);
+        let regular = complex.regular();
+        let meet = |&facet: &Facet| {
+            let triangle = regular.facet_vertices(facet);
+            let meeting = Meeting::of(triangle.map(|v| regular.site(v)));
+            let (position, balls) = (meeting.position(), triangle.map(|v| v.0));
+            (UnionVertex { position, balls, facet }, meeting.sine2, meeting.height2 < 0.0)
+        };
+        let found: Vec<_> = facets.par_iter().with_min_len(1 << 10).map(meet).collect();
+        Self {
+            vertices: found.iter().map(|f| f.0).collect(),
+            quality: found.iter().map(|f| f.1).collect(),
+            coincident: coincidence::coincident(complex, sides),
+            clamped: found.iter().filter(|f| f.2).count(),
+        }
     }
 
     /// The vertices; those of one triangle follow each other.
@@ -98,48 +110,36 @@ impl UnionBoundary {
     pub fn clamped(&self) -> usize {
         self.clamped
     }
+}
 
-    /// Step 1; returns for each facet that has a vertex on the side of its cell the index of
-    /// the vertex.
-    fn collect(&mut self, complex: &DualComplex<'_>) -> Vec<(Facet, u32)> {
-        let regular = complex.regular();
-        let mut sides = Vec::new();
-        for (facet, class) in complex.triangles() {
-            let mirror = regular.mirror(facet);
-            match class {
-                Class::Interior => {}
-                Class::Regular => {
-                    let inner = if complex.contains(facet.cell) { facet } else { mirror };
-                    self.push(complex, inner, &mut sides);
-                }
-                Class::Singular => {
-                    self.push(complex, mirror, &mut sides);
-                    let sites = regular.facet_vertices(facet).map(|v| regular.site(v));
-                    if triangle_size(sites) == Sign::Zero {
-                        sides.push((mirror, self.vertices.len() as u32 - 1));
-                    } else {
-                        self.push(complex, facet, &mut sides);
-                    }
+/// Step 1: the triangles' sides with a vertex, as the facets of the cells on the other side; and
+/// for each facet that has a vertex on the side of its own cell the index of that vertex.
+fn facets_with_vertices(complex: &DualComplex<'_>) -> (Vec<Facet>, Vec<(Facet, u32)>) {
+    let regular = complex.regular();
+    let (mut facets, mut sides) = (Vec::new(), Vec::new());
+    for (facet, class) in complex.triangles() {
+        let mirror = regular.mirror(facet);
+        let mut push = |inner: Facet, outer: Facet| {
+            sides.push((outer, facets.len() as u32));
+            facets.push(inner);
+        };
+        match class {
+            Class::Interior => {}
+            Class::Regular if complex.contains(facet.cell) => push(facet, mirror),
+            Class::Regular => push(mirror, facet),
+            Class::Singular => {
+                push(mirror, facet);
+                let sites = regular.facet_vertices(facet).map(|v| regular.site(v));
+                if triangle_size(sites) == Sign::Zero {
+                    // The spheres touch in a point of the plane: one vertex for both sides.
+                    sides.push((mirror, facets.len() as u32 - 1));
+                } else {
+                    push(facet, mirror);
                 }
             }
         }
-        sides
     }
-
-    /// Adds the vertex on the outer side of `facet`.
-    fn push(&mut self, complex: &DualComplex<'_>, facet: Facet, sides: &mut Vec<(Facet, u32)>) {
-        let regular = complex.regular();
-        let triangle = regular.facet_vertices(facet);
-        let meeting = Meeting::of(triangle.map(|v| regular.site(v)));
-        self.clamped += usize::from(meeting.height2 < 0.0);
-        sides.push((regular.mirror(facet), self.vertices.len() as u32));
-        self.quality.push(meeting.sine2);
-        self.vertices.push(UnionVertex {
-            position: meeting.position(),
-            balls: triangle.map(|v: VertexId| v.0),
-            facet,
-        });
-    }
+    (facets, sides)
 }
 
 /// Three spheres and where they meet.
