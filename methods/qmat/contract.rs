@@ -169,6 +169,7 @@ impl Contraction {
         let [a, b] = candidate.ends();
         if self.keeps_topology()
             && let Some(obstacle) = self.complex.link_obstacle(a, b)
+            && !self.complex.keeps_homotopy(a, b)
         {
             return Decision::Hold(obstacle);
         }
@@ -251,7 +252,7 @@ impl Contraction {
         }
         let keeps_topology = self.keeps_topology();
         let by_topology =
-            edges.iter().filter(|&&[a, b]| keeps_topology && !self.complex.link_condition(a, b));
+            edges.iter().filter(|&&[a, b]| keeps_topology && !self.complex.keeps_homotopy(a, b));
         let by_topology = by_topology.count();
         let by_inversion = edges.len() - by_topology;
         format!(
