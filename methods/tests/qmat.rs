@@ -1,5 +1,7 @@
 //! Q-MAT on the medial meshes of sampled solids.
 
+use std::path::{Path, PathBuf};
+
 use medial::complex::betti;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{
@@ -55,6 +57,37 @@ fn topology_is_kept_at_every_level() {
             let reached = result.mesh.spheres.len();
             assert!(reached >= smallest, "{id}: {reached} spheres cannot hold this topology");
             assert_eq!(reached > count, !result.diagnostics.warnings.is_empty(), "{id} at {count}");
+        }
+    }
+}
+
+#[test]
+fn topology_is_kept_at_every_level_of_real_meshes() {
+    let folder = std::env::var_os("MEDIAL_MESHES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
+        PathBuf::from,
+    );
+    let Ok(entries) = std::fs::read_dir(&folder) else {
+        eprintln!("skipped: no meshes in {}", folder.display());
+        return;
+    };
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut surfaces: Vec<PathBuf> =
+        paths.filter(|path| path.extension().is_some_and(|e| e == "off" || e == "obj")).collect();
+    surfaces.sort();
+    for path in surfaces {
+        let loaded = surface::read(&path).expect("a solid");
+        let shape = Shape::new("mesh", &loaded.mesh, loaded.report, ShapeOptions::default());
+        let shape = shape.expect("an extent");
+        let initial = shape.initial().expect("an initial medial mesh");
+        // Not that of the solid where the samples are too coarse for it.
+        let expected = betti(&initial);
+        let mut simplification = prepare(&shape, &[("topology_from", "all")]);
+        let mut count = initial.spheres.len();
+        while count > 4 {
+            count /= 4;
+            let result = spheres(simplification.as_mut(), count);
+            assert_eq!(betti(&result.mesh), expected, "{} at {count}", path.display());
         }
     }
 }
