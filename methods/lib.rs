@@ -6,15 +6,18 @@
 use medial::simplifier::MedialSimplifier;
 
 pub mod angle;
+pub mod dey_zhao;
 pub mod lambda;
 pub mod qmat;
 mod ranked;
+mod ranked_facets;
 
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
     vec![
         Box::new(angle::AngleFilter::new()),
         Box::new(lambda::LambdaMedialAxis::new()),
+        Box::new(dey_zhao::DeyZhao::new()),
         Box::new(qmat::Qmat::new()),
     ]
 }

@@ -29,6 +29,22 @@ pub(crate) struct Scale {
     pub no_published: &'static str,
 }
 
+impl Scale {
+    /// Refuses a level that means nothing.
+    pub(crate) fn check(&self, level: f64) -> Result<(), SimplifyError> {
+        let Self { name, range, .. } = self;
+        if range.contains(&level) {
+            return Ok(());
+        }
+        let (least, most) = (range.start(), range.end());
+        let message = match *most {
+            f64::MAX => format!("{name} = {level:?} is below {least}, or no number"),
+            _ => format!("{name} = {level:?} is outside {least} to {most}"),
+        };
+        Err(SimplifyError::Level(message))
+    }
+}
+
 impl Ranked {
     /// Ranks the spheres of `mesh`. `value` holds native units.
     pub(crate) fn new(
@@ -66,17 +82,10 @@ impl Ranked {
     }
 
     fn by_level(&self, level: f64) -> Result<(usize, f64, Diagnostics), SimplifyError> {
-        let Scale { name, range, inclusive, .. } = &self.scale;
-        if !range.contains(&level) {
-            return Err(SimplifyError::Level(format!(
-                "{name} = {level:?} is outside {} to {}",
-                range.start(),
-                range.end()
-            )));
-        }
+        self.scale.check(level)?;
         let kept = |&s: &u32| {
             let value = self.value[s as usize];
-            value > level || (*inclusive && value == level)
+            value > level || (self.scale.inclusive && value == level)
         };
         Ok((self.order.partition_point(kept), level, self.prepared.clone()))
     }

@@ -275,6 +275,11 @@ impl Shape {
         }
     }
 
+    /// Whether [`Shape::initial`] is a given mesh, which need not be part of a Voronoi diagram.
+    pub fn has_given_initial(&self) -> bool {
+        self.store.given.is_some()
+    }
+
     /// The contact points of each sphere of a medial mesh of this shape: those that it carries, or
     /// the samples nearest to the centre, to within a thousandth, where they are within
     /// `(1 + 1e-3) r`; which is then said in `diagnostics`.

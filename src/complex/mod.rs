@@ -9,6 +9,7 @@ mod stability;
 mod topology;
 mod union;
 mod voronoi;
+mod voronoi_facets;
 
 pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
 pub use incidence::Incidence;
@@ -17,6 +18,7 @@ pub use stability::{ZERO_LENGTH, stability_ratio};
 pub use topology::{betti, euler};
 pub use union::{MedialUnion, NearestPrimitive, Primitive, UnionError};
 pub use voronoi::{CellSpheres, DualTriangulation, voronoi_medial_mesh};
+pub use voronoi_facets::VoronoiFacets;
 
 pub use crate::disjoint::DisjointSets;
 pub use crate::geometry::Sphere;

@@ -19,8 +19,7 @@ use serde::{Deserialize, Serialize};
 use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
 use crate::Vec3;
-use crate::complex::{Contacts, MedialMesh, Sphere};
-use crate::geometry::triangulation::Triangulation;
+use crate::complex::{Contacts, MedialMesh, Sphere, VoronoiFacets};
 use crate::geometry::{CellId, Delaunay, TriangleBvh};
 use crate::surface::{InsideTest, Side};
 
@@ -49,14 +48,7 @@ pub struct CellSpheres {
 impl CellSpheres {
     /// Computes and classifies the circumcentre of every finite cell, in parallel.
     pub fn classify(delaunay: &Delaunay, inside: &InsideTest, surface: &TriangleBvh) -> Self {
-        let cells = delaunay.triangulation();
-        let spheres: Vec<Option<Sphere>> = (0..cells.finite_cell_count() as u32)
-            .into_par_iter()
-            .map(|cell| {
-                let (centre, radius) = delaunay.circumsphere(CellId(cell))?;
-                (centre.is_finite() && radius.is_finite()).then_some(Sphere::new(centre, radius))
-            })
-            .collect();
+        let spheres = delaunay.circumspheres();
         let centres: Vec<Vec3> = spheres.iter().flatten().map(|s| s.centre).collect();
         let sides = inside.sides(&centres);
         let near: Vec<bool> = centres
@@ -73,9 +65,21 @@ impl CellSpheres {
         Self { inside: inside.collect(), in_guard_band: near.iter().filter(|&&near| near).count() }
     }
 
-    fn is_inside(&self, cell: CellId) -> bool {
+    /// Whether the circumcentre of a cell is inside; never for infinite cells.
+    pub fn is_inside(&self, cell: CellId) -> bool {
         // Finite cells come first; infinite ones are beyond the list.
         self.inside.get(cell.index()).is_some_and(Option::is_some)
+    }
+
+    /// For each of so many cells the sphere of the Voronoi medial mesh that it is, or the largest
+    /// id.
+    pub(super) fn sphere_ids(&self, cells: usize) -> Vec<u32> {
+        let mut ids = vec![u32::MAX; cells];
+        let inside = self.inside.iter().enumerate().filter(|(_, sphere)| sphere.is_some());
+        for (sphere, (cell, _)) in (0..).zip(inside) {
+            ids[cell] = sphere;
+        }
+        ids
     }
 }
 
@@ -89,10 +93,7 @@ pub fn voronoi_medial_mesh(
 ) -> MedialMesh {
     let triangulation = delaunay.triangulation();
     let kept: Vec<CellId> = triangulation.finite_cells().filter(|&c| cells.is_inside(c)).collect();
-    let mut sphere_of_cell = vec![u32::MAX; triangulation.cell_count()];
-    for (sphere, cell) in kept.iter().enumerate() {
-        sphere_of_cell[cell.index()] = sphere as u32;
-    }
+    let sphere_of_cell = cells.sphere_ids(triangulation.cell_count());
     let spheres: Vec<Sphere> = cells.inside.iter().flatten().copied().collect();
     let sphere = |cell: CellId| sphere_of_cell[cell.index()];
 
@@ -102,15 +103,8 @@ pub fn voronoi_medial_mesh(
             .filter(move |&other| other > cell && cells.is_inside(other))
             .map(move |other| [sphere(cell), sphere(other)])
     });
-    let faces = kept.par_iter().flat_map_iter(|&cell| {
-        let polygons = EDGES_OF_CELL.into_iter().filter_map(move |(i, j)| {
-            let ring = dual_polygon(triangulation, cells, cell, i, j)?;
-            Some(ring.into_iter().map(sphere).collect::<Vec<u32>>())
-        });
-        polygons.flat_map(|polygon| triangulate(&polygon, &spheres, dual))
-    });
-    let (edges, faces) = (edges.collect(), faces.collect());
-    let mut mesh = MedialMesh::from_simplices(spheres, edges, faces)
+    let faces = VoronoiFacets::new(delaunay, cells).triangles(&spheres, dual);
+    let mut mesh = MedialMesh::from_simplices(spheres, edges.collect(), faces)
         .expect("circumspheres are finite and ids in range");
     mesh.contacts = Some(Contacts {
         samples: Arc::clone(samples),
@@ -119,29 +113,12 @@ pub fn voronoi_medial_mesh(
     mesh
 }
 
-/// The six edges of a tetrahedron, as pairs of vertex positions.
-const EDGES_OF_CELL: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-
-/// The cells around edge `(i, j)` of `cell` in rotational order, starting with `cell`, if `cell` is
-/// the smallest of them (each edge is dualised once) and all are finite and inside.
-fn dual_polygon(
-    triangulation: &Triangulation,
-    cells: &CellSpheres,
-    cell: CellId,
-    i: usize,
-    j: usize,
-) -> Option<Vec<CellId>> {
-    let mut ring = Vec::with_capacity(8);
-    for other in triangulation.edge_ring(cell, i, j) {
-        if other < cell || !cells.is_inside(other) {
-            return None;
-        }
-        ring.push(other);
-    }
-    Some(ring)
-}
-
-fn triangulate(polygon: &[u32], spheres: &[Sphere], dual: DualTriangulation) -> Vec<[u32; 3]> {
+/// A dual polygon, given by its spheres in rotational order, in triangles.
+pub(super) fn triangulated(
+    polygon: &[u32],
+    spheres: &[Sphere],
+    dual: DualTriangulation,
+) -> Vec<[u32; 3]> {
     match dual {
         DualTriangulation::Fan => fan(polygon),
         DualTriangulation::Delaunay if polygon.len() == 3 => fan(polygon),

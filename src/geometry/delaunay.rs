@@ -6,6 +6,9 @@
 
 use std::ops::Deref;
 
+use rayon::prelude::*;
+
+use super::Sphere;
 use super::predicates::{
     Filter, MAX_COORDINATE, Sign, Site, Unweighted, circumsphere, lexicographic,
 };
@@ -121,6 +124,19 @@ impl Delaunay {
     #[inline]
     pub fn circumsphere(&self, cell: CellId) -> Option<(Vec3, f64)> {
         circumsphere(self.vertices(cell).map(|v| self.point(v)))
+    }
+
+    /// The circumspheres of all finite cells, in parallel; `None` where centre or radius is not
+    /// representable.
+    pub fn circumspheres(&self) -> Vec<Option<Sphere>> {
+        (0..self.finite_cell_count() as u32)
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|cell| {
+                let (centre, radius) = self.circumsphere(CellId(cell))?;
+                (centre.is_finite() && radius.is_finite()).then_some(Sphere::new(centre, radius))
+            })
+            .collect()
     }
 
     /// Where a position is; `hint` is a cell near it, if one is known.

@@ -23,7 +23,7 @@ pub use cone::Cone;
 pub use delaunay::Delaunay;
 pub use dual_complex::DualComplex;
 pub use enclosing::enclosing_ball;
-pub use poles::{PolarBall, Pole, Poles, SamplePoles};
+pub use poles::{PolarBall, Pole, Poles, SamplePoles, first_poles};
 pub use regular::Regular;
 pub use separation::separation_angle;
 pub use slab::Slab;

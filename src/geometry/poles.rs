@@ -21,8 +21,6 @@
 //! Ties go to the cell with the smallest id. Cospherical samples have several cells with one
 //! circumcentre, up to rounding; which of them is named as the pole follows from the rounded radii.
 
-use rayon::prelude::*;
-
 use super::triangulation::{CellId, VertexId};
 use super::{Delaunay, Sphere};
 use crate::Vec3;
@@ -86,15 +84,9 @@ impl Poles {
     ///
     /// Linear in the number of cells.
     pub fn new(delaunay: &Delaunay) -> Self {
-        let spheres: Vec<Option<Sphere>> = (0..delaunay.finite_cell_count() as u32)
-            .into_par_iter()
-            .map(|cell| {
-                let (centre, radius) = delaunay.circumsphere(CellId(cell))?;
-                (centre.is_finite() && radius.is_finite()).then_some(Sphere::new(centre, radius))
-            })
-            .collect();
-        let mut samples = vec![SamplePoles::default(); delaunay.point_count()];
-        find_first_poles(delaunay, &spheres, &mut samples);
+        let spheres = delaunay.circumspheres();
+        let first = first_poles(delaunay, &spheres).into_iter();
+        let mut samples: Vec<_> = first.map(|first| SamplePoles { first, second: None }).collect();
         find_second_poles(delaunay, &spheres, &mut samples);
         for &(repeated, kept) in delaunay.duplicates() {
             samples[repeated.index()] = samples[kept.index()];
@@ -137,21 +129,24 @@ impl Poles {
     }
 }
 
-/// Step 1.
-fn find_first_poles(delaunay: &Delaunay, spheres: &[Option<Sphere>], samples: &mut [SamplePoles]) {
-    let mut farthest = vec![f64::NEG_INFINITY; samples.len()];
+/// The first poles alone (step 1), of all samples, from the circumspheres of all finite cells, see
+/// [`Delaunay::circumspheres`]. Repeated samples have none.
+pub fn first_poles(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Vec<Option<Pole>> {
+    let mut first = vec![None; delaunay.point_count()];
+    let mut farthest = vec![f64::NEG_INFINITY; first.len()];
     for cell in delaunay.finite_cells() {
         let Some(sphere) = spheres[cell.index()] else { continue };
         for v in delaunay.vertices(cell).map(VertexId::index) {
             if sphere.radius > farthest[v] {
                 farthest[v] = sphere.radius;
-                samples[v].first = Some(Pole::Vertex(cell));
+                first[v] = Some(Pole::Vertex(cell));
             }
         }
     }
     for (v, direction) in unbounded_directions(delaunay) {
-        samples[v.index()].first = Some(Pole::Infinite(direction));
+        first[v.index()] = Some(Pole::Infinite(direction));
     }
+    first
 }
 
 /// The hull's vertices, ascending, with the average direction of their cells' unbounded edges.
