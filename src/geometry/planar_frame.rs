@@ -175,7 +175,7 @@ impl PlanarFrame {
 ///
 /// The normal of a needle is a small difference of large products; a plain cross product would
 /// turn it by as much as the triangle is thin.
-fn accurate_cross(u: Vec3, v: Vec3) -> Vec3 {
+pub(super) fn accurate_cross(u: Vec3, v: Vec3) -> Vec3 {
     Vec3::new(
         difference_of_products(u.y, v.z, u.z, v.y),
         difference_of_products(u.z, v.x, u.x, v.z),

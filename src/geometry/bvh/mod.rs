@@ -12,14 +12,22 @@
 //! therefore start each query from its neighbour's answer, in any chunks, on any number of threads.
 
 mod build;
+mod expansion;
 mod morton;
 mod search;
+mod solid_angle;
 mod triangles;
+mod winding;
 
 pub(crate) use build::Plan;
 pub(crate) use morton::in_morton_order;
 pub(crate) use search::Search;
 pub use triangles::{BvhError, Closest, Feature, TriangleBvh};
+pub use winding::{Winding, WindingTree};
+
+use triangles::check_corners;
+
+use std::ops::Range;
 
 use crate::Vec3;
 
@@ -79,6 +87,20 @@ impl Tree {
     /// For each place in leaf order the original index of the item.
     pub fn order(&self) -> &[u32] {
         &self.order
+    }
+
+    /// For each node the places of the items below it.
+    pub fn ranges(&self) -> Vec<Range<usize>> {
+        let mut ranges = vec![0..0; self.nodes.len()];
+        // Children follow their parents, and the left one has the smaller places.
+        for (index, node) in self.nodes.iter().enumerate().rev() {
+            let first = node.first as usize;
+            ranges[index] = match node.count {
+                0 => ranges[first].start..ranges[first + 1].end,
+                count => first..first + count as usize,
+            };
+        }
+        ranges
     }
 
     /// Box of everything.

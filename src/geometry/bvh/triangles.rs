@@ -83,6 +83,20 @@ pub enum BvhError {
     },
 }
 
+/// That there are triangles, whose corners can be squared.
+pub(super) fn check_corners(triangles: &[[Vec3; 3]]) -> Result<(), BvhError> {
+    if triangles.is_empty() {
+        return Err(BvhError::Empty);
+    }
+    for (face, corners) in triangles.iter().enumerate() {
+        let fits = |corner: &&Vec3| corner.abs().max_element() <= LARGEST && !corner.is_nan();
+        if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
+            return Err(BvhError::Corner { face, corner });
+        }
+    }
+    Ok(())
+}
+
 impl TriangleBvh {
     /// A tree over the faces of a mesh. Cost `O(n log n)`.
     ///
@@ -101,15 +115,7 @@ impl TriangleBvh {
     /// # Errors
     /// When there are none, or a corner is not finite.
     pub fn from_triangles(triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
-        if triangles.is_empty() {
-            return Err(BvhError::Empty);
-        }
-        for (face, corners) in triangles.iter().enumerate() {
-            let fits = |corner: &&Vec3| corner.abs().max_element() <= LARGEST && !corner.is_nan();
-            if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
-                return Err(BvhError::Corner { face, corner });
-            }
-        }
+        check_corners(triangles)?;
         let boxes: Vec<_> = triangles.iter().map(|&t| (Bounds::of_points(t), 0.0)).collect();
         let tree = Tree::build(&boxes, Plan { max_leaf: 4, padding: 0.0 });
         let corners: Vec<_> = tree.order().iter().map(|&f| triangles[f as usize]).collect();
@@ -161,10 +167,19 @@ impl TriangleBvh {
 
     /// The distances of many queries, in their order, in parallel.
     pub fn distance_batch(&self, points: &[Vec3]) -> Vec<f64> {
+        self.distance_batch_with(points, |_, distance| distance)
+    }
+
+    /// What `finish` makes of many queries and their distances.
+    pub(crate) fn distance_batch_with(
+        &self,
+        points: &[Vec3],
+        finish: impl Fn(Vec3, f64) -> f64 + Sync,
+    ) -> Vec<f64> {
         in_morton_order(points, |last: &mut u32, p| {
             let search = self.nearest(Nearest::starting(self, p, *last as usize));
             *last = search.place as u32;
-            search.squared.sqrt()
+            finish(p, search.squared.sqrt())
         })
     }
 
