@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use medial::Vec3;
 use medial::geometry::{BvhError, SignedDistance, TriangleBvh, WindingTree};
-use medial::surface::{InsideTest, Side, TriMesh};
+use medial::surface::{GeneralisedWinding, InsideTest, Side, TriMesh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -75,6 +75,8 @@ fn closed_surfaces_have_integer_winding_numbers() {
     mesh.vertices.extend(cavity.vertices.iter().map(|&v| shrink(v)));
     mesh.faces.extend(cavity.faces.iter().map(|&[a, b, c]| [a + first, c + first, b + first]));
     let test = InsideTest::new(&mesh);
+    let generalised = GeneralisedWinding::new(&mesh);
+    assert_eq!(generalised.boundary_edges(), 0);
     let coarse = WindingTree::new(&mesh).unwrap();
     let fine = coarse.clone().with_tolerance(1e-5);
     let mut rng = Pcg64::seed_from_u64(1);
@@ -84,6 +86,7 @@ fn closed_surfaces_have_integer_winding_numbers() {
         let exact = test.winding_number(p).unwrap();
         seen[exact as usize] += 1;
         let exact = f64::from(exact);
+        assert_eq!(generalised.number(p), Some(exact));
         assert!((coarse.winding_number_by_sum(p) - exact).abs() < 1e-11);
         assert!((coarse.winding_number(p) - exact).abs() <= WindingTree::TOLERANCE);
         assert!((fine.winding_number(p) - exact).abs() <= 1e-5);
@@ -121,6 +124,8 @@ fn an_open_hemisphere_has_its_closed_form() {
     let n = 40;
     let mesh = hemisphere(n, 20);
     let tree = WindingTree::new(&mesh).unwrap().with_tolerance(1e-6);
+    let by_boundary = GeneralisedWinding::new(&mesh);
+    assert_eq!(by_boundary.boundary_edges(), n as usize);
     for height in [-3.0, -0.5, -1e-3, 1e-3, 0.5, 0.9, 2.0] {
         let eye = Vec3::Z * height;
         let corner = |k: u32| {
@@ -134,6 +139,7 @@ fn an_open_hemisphere_has_its_closed_form() {
         let exact = if height > 0.0 { inside - bottom } else { bottom };
         assert!((tree.winding_number_by_sum(eye) - exact).abs() < 1e-12, "at {height}");
         assert!((tree.winding_number(eye) - exact).abs() <= 1e-6);
+        assert!((by_boundary.number(eye).unwrap() - exact).abs() < 1e-12);
     }
     assert!((tree.winding_number_by_sum(Vec3::ZERO) - 0.5).abs() < 1e-14);
 }
@@ -201,7 +207,7 @@ fn any_threads_give_the_same_bytes() {
             [
                 bits(winding.winding_number_batch(&points)),
                 bits(SignedDistance::closed(&tree, &test).batch(&points)),
-                bits(SignedDistance::open(&tree, &winding).batch(&points)),
+                bits(SignedDistance::soup(&tree, &winding).batch(&points)),
             ]
         })
     };
@@ -240,8 +246,10 @@ fn holes_are_bridged() {
     let mut mesh = torus(60, 40);
     mesh.faces.drain(100..130);
     let tree = TriangleBvh::new(&mesh).unwrap();
-    let winding = WindingTree::new(&mesh).unwrap();
+    let winding = GeneralisedWinding::new(&mesh);
     let distance = SignedDistance::open(&tree, &winding);
+    let expanded = WindingTree::new(&mesh).unwrap();
+    let approximate = SignedDistance::soup(&tree, &expanded);
     let mut rng = Pcg64::seed_from_u64(7);
     for _ in 0..1000 {
         let p = vector(&mut rng) * Vec3::new(1.4, 1.4, 0.4);
@@ -251,7 +259,59 @@ fn holes_are_bridged() {
         let near_hole = mesh.vertices[40..120].iter().any(|v| v.distance(p) < 0.15);
         if smooth.abs() > 0.005 && !near_hole {
             assert_eq!(found < 0.0, smooth < 0.0, "{found} for {smooth} at {p}");
+            assert_eq!(found, approximate.at(p));
         }
+    }
+}
+
+/// Crossings and walls against the sum of all solid angles: on an open mesh, on a soup without
+/// shared vertices, and at points straight below and above vertices and edges, and below everything.
+#[test]
+fn one_ray_and_the_boundary_give_the_sum() {
+    let mut rng = Pcg64::seed_from_u64(8);
+    let mut holed = torus(24, 16);
+    holed.faces.drain(50..90);
+    holed.faces.drain(300..301);
+    let mut crooked = hemisphere(12, 5);
+    // One face turned over, one twice.
+    crooked.faces[7].swap(0, 1);
+    crooked.faces.push(crooked.faces[40]);
+    let separate = soup(60, &mut rng);
+    let vertices = separate.iter().flatten().copied().collect();
+    let separate =
+        TriMesh { vertices, faces: (0..60).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect() };
+    let lattice = TriMesh {
+        vertices: (0..27)
+            .map(|k| Vec3::new((k % 3) as f64, (k / 3 % 3) as f64, (k / 9) as f64))
+            .collect(),
+        faces: (0..40).map(|_| [(); 3].map(|()| rng.random_range(0..27))).collect(),
+    };
+    for (mesh, edges) in [(holed, None), (crooked, None), (separate, Some(180)), (lattice, None)] {
+        let winding = GeneralisedWinding::new(&mesh);
+        assert_eq!(winding.boundary_edges(), edges.unwrap_or(winding.boundary_edges()));
+        let tree = WindingTree::new(&mesh).unwrap();
+        let mut points: Vec<Vec3> = (0..600).map(|_| vector(&mut rng) * 1.5).collect();
+        for f in 0..mesh.faces.len() {
+            let [a, b, c] = mesh.triangle(f);
+            for height in [-7.0, -0.25, 0.75, 9.0] {
+                points.extend([a, (a + b) * 0.5, (a + b + c) / 3.0].map(|v| v + Vec3::Z * height));
+            }
+        }
+        let surface = TriangleBvh::new(&mesh).unwrap();
+        let mut told = 0;
+        for (&p, number) in points.iter().zip(winding.numbers(&points)) {
+            assert_eq!(number, winding.number(p));
+            // Beside a boundary edge both sides round.
+            let near =
+                mesh.faces.iter().flatten().any(|&v| mesh.vertices[v as usize].distance(p) < 1e-3);
+            let Some(number) = number.filter(|_| !near) else { continue };
+            if surface.closest(p).distance > 1e-6 {
+                let sum = tree.winding_number_by_sum(p);
+                assert!((number - sum).abs() < 1e-9, "{number} for {sum} at {p}");
+                told += 1;
+            }
+        }
+        assert!(told > 800, "{told} of {}", points.len());
     }
 }
 

@@ -6,12 +6,12 @@
 //! pseudonormal*, 2005, doi:10.1109/TVCG.2005.49), but
 //!
 //! - for closed surfaces off the exact integer winding number of [`InsideTest`], or
-//! - for surfaces with holes and for soups off the generalised winding number of [`WindingTree`],
-//!   above 1/2 inside.
+//! - for surfaces with holes off the generalised winding number of [`GeneralisedWinding`], and for
+//!   soups off that of [`WindingTree`]: above 1/2 inside.
 
 use super::bvh::{TriangleBvh, WindingTree};
 use crate::Vec3;
-use crate::surface::{InsideTest, Side};
+use crate::surface::{GeneralisedWinding, InsideTest, Side};
 
 /// Signed distances of points to one surface: negative inside, zero on it, positive outside, in the
 /// unit of the surface.
@@ -42,22 +42,28 @@ pub struct SignedDistance<'a> {
 
 #[derive(Clone, Copy, Debug)]
 enum SideTest<'a> {
-    Exact(&'a InsideTest),
-    Winding(&'a WindingTree),
+    Crossings(&'a InsideTest),
+    Boundary(&'a GeneralisedWinding),
+    Expansion(&'a WindingTree),
 }
 
 impl<'a> SignedDistance<'a> {
     /// For a closed, consistently oriented surface. The sign is exact: overlapping parts are
     /// inside, cavities outside.
     pub fn closed(tree: &'a TriangleBvh, inside: &'a InsideTest) -> Self {
-        Self { tree, side: SideTest::Exact(inside) }
+        Self { tree, side: SideTest::Crossings(inside) }
     }
 
-    /// For a surface with holes, or a soup. The sign jumps where the winding number passes through
-    /// 1/2, which in a hole is away from the surface; where the winding number is within the
-    /// tree's tolerance of 1/2 it is not told reliably.
-    pub fn open(tree: &'a TriangleBvh, winding: &'a WindingTree) -> Self {
-        Self { tree, side: SideTest::Winding(winding) }
+    /// For a surface with holes. The sign jumps where the winding number passes through 1/2, which
+    /// in a hole is away from the surface.
+    pub fn open(tree: &'a TriangleBvh, winding: &'a GeneralisedWinding) -> Self {
+        Self { tree, side: SideTest::Boundary(winding) }
+    }
+
+    /// For a soup of triangles. As [`open`](Self::open), but where the winding number is within the
+    /// tree's tolerance of 1/2 the sign is not told reliably.
+    pub fn soup(tree: &'a TriangleBvh, winding: &'a WindingTree) -> Self {
+        Self { tree, side: SideTest::Expansion(winding) }
     }
 
     /// The signed distance of `p`. A query that is not finite gets a distance that is not.
@@ -73,10 +79,11 @@ impl<'a> SignedDistance<'a> {
 
     #[inline]
     fn signed(&self, p: Vec3, distance: f64) -> f64 {
+        let above_half = |number: f64| if number > 0.5 { Side::Inside } else { Side::Outside };
         let side = match self.side {
-            SideTest::Exact(test) => test.side(p),
-            SideTest::Winding(tree) if tree.winding_number(p) > 0.5 => Side::Inside,
-            SideTest::Winding(_) => Side::Outside,
+            SideTest::Crossings(test) => test.side(p),
+            SideTest::Boundary(winding) => winding.number(p).map_or(Side::On, above_half),
+            SideTest::Expansion(tree) => above_half(tree.winding_number(p)),
         };
         match side {
             // From zero, so that no zero is negative.

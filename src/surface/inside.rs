@@ -131,12 +131,22 @@ impl InsideTest {
 
     /// Reports every face that is above the scaled point `p`, or holds it.
     #[inline]
-    pub(super) fn crossings(
+    pub(super) fn crossings(&self, p: Vec3, report: impl FnMut(u32, Crossing) -> ControlFlow<()>) {
+        // Below everything a closed surface is crossed as often upward as downward.
+        if p.z >= self.bounds.lo.z {
+            self.crossings_from_below(p, report);
+        }
+    }
+
+    /// The same, also for points below a surface that is not closed.
+    #[inline]
+    pub(super) fn crossings_from_below(
         &self,
         p: Vec3,
         mut report: impl FnMut(u32, Crossing) -> ControlFlow<()>,
     ) {
-        if !(p.cmpge(self.bounds.lo).all() && p.cmple(self.bounds.hi).all()) {
+        let Bounds { lo, hi } = self.bounds;
+        if !(lo.x <= p.x && p.x <= hi.x && lo.y <= p.y && p.y <= hi.y && p.z <= hi.z) {
             return;
         }
         let in_column = |lo: Vec3, hi: Vec3| {
@@ -196,7 +206,7 @@ fn crossed_by_column([a, b, c]: [Vec3; 3], p: Vec3) -> i32 {
 
 /// Sign of `orient2d(a, b, p)` for `p` moved by `(e, e^2)`; zero only if `a = b`.
 #[inline]
-fn perturbed_turn(a: Point2, b: Point2, p: Point2) -> Sign {
+pub(super) fn perturbed_turn(a: Point2, b: Point2, p: Point2) -> Sign {
     match orient2d(a, b, p) {
         Sign::Zero if a[1] != b[1] => Sign::of(a[1] - b[1]),
         Sign::Zero => Sign::of(b[0] - a[0]),

@@ -186,7 +186,7 @@ impl WideTree {
 
 impl WideTree {
     /// Shows the leaves whose boxes, rounded outward, reach above `p` or to it along `z`, and have
-    /// `x` and `y` of `p`. `p` is in the box of everything.
+    /// `x` and `y` of `p`.
     #[inline]
     pub fn above(&self, p: Vec3, mut visit: impl FnMut(Range<u32>) -> ControlFlow<()>) {
         // Moving, scaling and rounding keep the order of coordinates, ties included.

@@ -129,8 +129,8 @@ impl WindingTree {
         let mut beta = FIRST_BETA;
         while self.tolerance > 0.0 && beta < LAST_BETA {
             let winding = self.winding_beyond(p, beta);
-            // Also true for an error that is not a number: there is nothing to refine.
-            if !(winding.error > self.tolerance) {
+            // An error that is not a number leaves nothing to refine.
+            if winding.error <= self.tolerance || winding.error.is_nan() {
                 return winding;
             }
             // The error falls at least with the third power, and a little more is asked for.
