@@ -1,4 +1,5 @@
-//! Closest points on a mesh and distances to a union of medial primitives, queries a second.
+//! Queries a second: closest points on a mesh, inside tests, winding numbers, signed distances, and
+//! distances to a union of medial primitives, also of one whose balls nearly coincide.
 
 use std::f64::consts::{PI, TAU};
 use std::hint::black_box;
@@ -6,12 +7,12 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion};
-use medial::geometry::{Sphere, TriangleBvh};
-use medial::surface::TriMesh;
+use medial::geometry::{SignedDistance, Sphere, TriangleBvh, WindingTree};
+use medial::surface::{GeneralisedWinding, InsideTest, TriMesh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Radii of the bumpy torus that both benches are made of.
+/// Radius of the ring of the bumpy torus that the meshes are made of.
 const RING: f64 = 1.0;
 
 fn tube(u: f64, v: f64) -> f64 {
@@ -88,6 +89,53 @@ fn closest_point(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// 5,000 balls that nearly coincide, like the initial medial mesh of a sphere.
+fn cloud() -> MedialMesh {
+    let mut rng = Pcg64::seed_from_u64(3);
+    let spread = 1e-6;
+    let mut offset = || spread * (rng.random::<f64>() - 0.5);
+    let spheres = (0..5000)
+        .map(|_| Sphere::new(Vec3::new(offset(), offset(), offset()), 0.3 + offset()))
+        .collect();
+    MedialMesh { spheres, ..MedialMesh::default() }
+}
+
+fn sidedness(criterion: &mut Criterion) {
+    let mesh = torus(224, 224);
+    let mut holed = mesh.clone();
+    holed.faces.drain(1000..1100);
+    let (tree, inside) =
+        (TriangleBvh::new(&mesh).expect("the torus has faces"), InsideTest::new(&mesh));
+    let expansions = WindingTree::new(&mesh).expect("the torus has faces");
+    let boundary = GeneralisedWinding::new(&holed);
+    let mut rng = Pcg64::seed_from_u64(4);
+    let half = Vec3::new(1.4, 1.4, 0.4);
+    let points: Vec<Vec3> = (0..100_000)
+        .map(|_| half * (2.0 * Vec3::new(rng.random(), rng.random(), rng.random()) - 1.0))
+        .collect();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    let mut group = criterion.benchmark_group("sidedness, one thread");
+    group.sample_size(10).throughput(Throughput::Elements(points.len() as u64));
+    group.bench_function("inside test", |b| {
+        b.iter(|| one.install(|| inside.sides(black_box(&points))));
+    });
+    group.bench_function("winding number, holes", |b| {
+        b.iter(|| one.install(|| boundary.numbers(black_box(&points))));
+    });
+    group.bench_function("signed distance", |b| {
+        let distance = SignedDistance::closed(&tree, &inside);
+        b.iter(|| one.install(|| distance.batch(black_box(&points))));
+    });
+    group.throughput(Throughput::Elements(points.len() as u64 / 10));
+    for tolerance in [0.1, WindingTree::TOLERANCE] {
+        let tree = expansions.clone().with_tolerance(tolerance);
+        group.bench_function(BenchmarkId::new("winding number, expansions", tolerance), |b| {
+            b.iter(|| one.install(|| tree.winding_number_batch(black_box(&points[..10_000]))));
+        });
+    }
+    group.finish();
+}
+
 fn union_distance(criterion: &mut Criterion) {
     let union = MedialUnion::new(&sheet()).expect("the strip has spheres");
     let mut rng = Pcg64::seed_from_u64(2);
@@ -103,8 +151,17 @@ fn union_distance(criterion: &mut Criterion) {
     group.bench_function("unsigned nearest", |b| {
         b.iter(|| union.unsigned_nearest_batch(black_box(&points)));
     });
+    let cloud = MedialUnion::new(&cloud()).expect("the cloud has spheres");
+    let around: Vec<Vec3> = points[..100_000].iter().map(|p| 0.2999 * p.normalize()).collect();
+    group.throughput(Throughput::Elements(around.len() as u64));
+    group.bench_function("signed, coincident", |b| {
+        b.iter(|| cloud.signed_batch(black_box(&around)));
+    });
+    group.bench_function("unsigned nearest, coincident", |b| {
+        b.iter(|| cloud.unsigned_nearest_batch(black_box(&around)));
+    });
     group.finish();
 }
 
-criterion_group!(benches, closest_point, union_distance);
+criterion_group!(benches, closest_point, sidedness, union_distance);
 criterion_main!(benches);

@@ -26,6 +26,7 @@ mod sample;
 mod soup;
 mod topology;
 mod triangulate;
+mod winding;
 mod write;
 
 use std::path::Path;
@@ -38,6 +39,7 @@ pub use mesh::{Normalisation, TriMesh};
 pub use read::Format;
 pub use report::{Repair, SurfaceReport};
 pub use sample::{ParseSamplingError, Sampling, sample};
+pub use winding::GeneralisedWinding;
 pub use write::write;
 
 /// A surface that bounds a solid: closed, manifold, oriented outward, with positive volume.
