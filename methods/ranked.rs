@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use medial::complex::MedialMesh;
-use medial::simplifier::{Diagnostics, Level, Simplification, Simplified, SimplifyError, Work};
+use medial::simplifier::{Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work};
 
 /// An initial medial mesh with a value for each sphere; larger values are kept longer.
 pub(crate) struct Ranked {
@@ -111,6 +111,7 @@ impl Simplification for Ranked {
             native_level: Some(native),
             work: Work::Anew,
             diagnostics,
+            extras: Extras::default(),
         })
     }
 }
