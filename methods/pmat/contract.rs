@@ -68,13 +68,15 @@ pub(super) fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>,
     let mut queue = LazyHeap::from_items(candidates);
     let mut graph = Graph::new(mesh);
     let mut steps = Vec::with_capacity(total);
-    while let Some(cheapest) = queue.pop(|edge: &Candidate| graph.has(edge.ends)) {
-        let [removed, kept] = absorbed_first(cheapest.ends, |v| spheres[v as usize].radius);
-        let survivor = spheres[kept as usize];
-        graph.absorb(removed, kept, |neighbour| {
-            let ends = [kept, neighbour];
-            queue.push(Candidate::new(ends, [survivor, spheres[neighbour as usize]]));
+    let mut left = Bits::ones(total);
+    while let Some(cheapest) = queue.pop(|edge: &Candidate| edge.ends.iter().all(|&v| left.has(v)))
+    {
+        let [removed, kept] = absorbed_first(cheapest.ends, |v| graph.sphere(v).radius);
+        let survivor = graph.sphere(kept);
+        graph.absorb(removed, kept, |neighbour, sphere| {
+            queue.push(Candidate::new([kept, neighbour], [survivor, sphere]));
         });
+        left.clear(removed);
         steps.push(Step { removed, kept, cost: cheapest.key.cost() });
         if steps.len().is_multiple_of(REPORT_EVERY) {
             run.step(steps.len(), total)?;
@@ -84,20 +86,42 @@ pub(super) fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>,
     Ok(steps)
 }
 
+/// A set of spheres that fits into the cache. An edge stays one as long as both ends are left.
+struct Bits(Vec<u64>);
+
+impl Bits {
+    fn ones(len: usize) -> Self {
+        Self(vec![u64::MAX; len.div_ceil(64)])
+    }
+
+    #[inline]
+    fn has(&self, v: u32) -> bool {
+        self.0[v as usize / 64] >> (v % 64) & 1 == 1
+    }
+
+    #[inline]
+    fn clear(&mut self, v: u32) {
+        self.0[v as usize / 64] &= !(1 << (v % 64));
+    }
+}
+
 /// The edges of the spheres that are left.
 struct Graph {
     nodes: Vec<Node>,
-    /// Segment `v` began as the list of sphere `v`.
-    segments: Vec<Segment>,
     entries: Vec<u32>,
 }
 
+/// A sphere: all that is read of a neighbour, in one line of the cache.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 struct Node {
+    sphere: Sphere,
     /// The sphere that absorbed this one, or one that absorbed that; itself while it is left.
     parent: u32,
     /// The sphere at whose absorption this one was last met as a neighbour.
     met_by: u32,
+    /// What began as the list of this sphere.
+    segment: Segment,
 }
 
 /// Part of a list.
@@ -105,45 +129,44 @@ struct Node {
 struct Segment {
     start: u32,
     len: u32,
+    /// The sphere whose segment goes on with the list.
     next: u32,
-    /// The last segment, in the first one of a list.
+    /// That of the last segment, in the first one of a list.
     last: u32,
 }
 
-/// Absent index of a segment.
+/// Absent id of a sphere.
 const NONE: u32 = u32::MAX;
 
 impl Graph {
     fn new(mesh: &MedialMesh) -> Self {
         let total = 2 * mesh.edges.len();
         assert!(u32::try_from(total).is_ok(), "more than 2^32 incidences");
-        let mut segments: Vec<_> = (0..mesh.spheres.len() as u32)
-            .map(|v| Segment { start: 0, len: 0, next: NONE, last: v })
-            .collect();
+        let mut degrees = vec![0; mesh.spheres.len()];
         for &v in mesh.edges.as_flattened() {
-            segments[v as usize].len += 1;
+            degrees[v as usize] += 1;
         }
         let mut start = 0;
-        for segment in &mut segments {
-            segment.start = start;
-            start += std::mem::take(&mut segment.len);
-        }
+        let node = |((v, &sphere), degree)| {
+            let segment = Segment { start, len: 0, next: NONE, last: v };
+            start += degree;
+            Node { sphere, parent: v, met_by: NONE, segment }
+        };
+        let mut nodes: Vec<_> = (0..).zip(&mesh.spheres).zip(degrees).map(node).collect();
         let mut entries = vec![0; total];
         for &[a, b] in &mesh.edges {
             for [v, neighbour] in [[a, b], [b, a]] {
-                let segment = &mut segments[v as usize];
+                let segment = &mut nodes[v as usize].segment;
                 entries[(segment.start + segment.len) as usize] = neighbour;
                 segment.len += 1;
             }
         }
-        let node = |v: u32| Node { parent: v, met_by: NONE };
-        Self { nodes: (0..mesh.spheres.len() as u32).map(node).collect(), segments, entries }
+        Self { nodes, entries }
     }
 
-    /// Whether both ends of what was once an edge are left: then it still is one.
     #[inline]
-    fn has(&self, ends: [u32; 2]) -> bool {
-        ends.iter().all(|&v| self.nodes[v as usize].parent == v)
+    fn sphere(&self, v: u32) -> Sphere {
+        self.nodes[v as usize].sphere
     }
 
     /// The sphere that a sphere is now part of.
@@ -163,7 +186,7 @@ impl Graph {
     /// Collapses the edge between two spheres and calls `visit` with each other neighbour of the
     /// removed one, once: new neighbours of the kept one, and some that it had already.
     #[inline]
-    fn absorb(&mut self, removed: u32, kept: u32, mut visit: impl FnMut(u32)) {
+    fn absorb(&mut self, removed: u32, kept: u32, mut visit: impl FnMut(u32, Sphere)) {
         for v in [removed, kept] {
             self.nodes[v as usize].met_by = removed;
         }
@@ -172,7 +195,7 @@ impl Graph {
         let (mut target, mut written) = (removed, 0);
         let mut source = removed;
         while source != NONE {
-            let Segment { start, len, next, .. } = self.segments[source as usize];
+            let Segment { start, len, next, .. } = self.nodes[source as usize].segment;
             for index in start..start + len {
                 let neighbour = self.find(self.entries[index as usize]);
                 let node = &mut self.nodes[neighbour as usize];
@@ -180,20 +203,20 @@ impl Graph {
                     continue;
                 }
                 node.met_by = removed;
-                visit(neighbour);
-                while written == self.segments[target as usize].len {
-                    (target, written) = (self.segments[target as usize].next, 0);
+                visit(neighbour, node.sphere);
+                while written == self.nodes[target as usize].segment.len {
+                    (target, written) = (self.nodes[target as usize].segment.next, 0);
                 }
-                let place = self.segments[target as usize].start + written;
+                let place = self.nodes[target as usize].segment.start + written;
                 self.entries[place as usize] = neighbour;
                 written += 1;
             }
             source = next;
         }
-        let end = &mut self.segments[target as usize];
+        let end = &mut self.nodes[target as usize].segment;
         (end.len, end.next) = (written, NONE);
-        let tail = self.segments[kept as usize].last;
-        self.segments[tail as usize].next = removed;
-        self.segments[kept as usize].last = target;
+        let tail = self.nodes[kept as usize].segment.last;
+        self.nodes[tail as usize].segment.next = removed;
+        self.nodes[kept as usize].segment.last = target;
     }
 }

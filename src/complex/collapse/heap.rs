@@ -2,10 +2,10 @@
 
 use std::cmp::Ordering;
 
-/// Items up to this number are all kept in the heap.
-const FEW: usize = 1024;
+/// The heap is filled with about so many items at a time, few enough for the cache.
+const NEAR: usize = 1 << 12;
 
-/// Share of the far items that the heap takes when it has run empty.
+/// Share of a group that is taken from it when its turn comes.
 const SHARE: usize = 8;
 
 /// What a [`LazyHeap`] holds: small, copied about, in a total order.
@@ -22,50 +22,67 @@ pub trait Prioritised: Copy {
 
 /// A priority queue that sorts late and forgets early.
 ///
-/// Only the first items are in a heap, small enough for the cache; the others wait in no order.
-/// When the heap has run empty it takes the first share of them, and those out of date are dropped
-/// then, so most are never sorted at all. Items that are equal in order must be equal in every
+/// Only the first items are in a heap; the others wait in groups, one behind the other, in no order
+/// within a group. When the heap has run empty the next group is looked at: items out of date are
+/// dropped, and what does not come soon is split off into groups of its own, as quicksort would.
+/// So most items are never sorted at all. Items that are equal in order must be equal in every
 /// respect: then equal contents come out in the same order whatever the history.
 #[derive(Clone, Debug)]
 pub struct LazyHeap<T> {
     /// Four children a node: the items of one family lie close together.
     near: Vec<T>,
-    /// Items not before `bound`.
-    far: Vec<T>,
-    /// Nothing in `near` is behind it; `None` when `far` is empty.
-    bound: Option<T>,
+    /// The next group last.
+    far: Vec<Group<T>>,
+    /// Number of items in the groups.
+    waiting: usize,
     /// With more items than this those out of date are dropped, to save memory.
     most: usize,
 }
 
+/// Items that wait.
+#[derive(Clone, Debug)]
+struct Group<T> {
+    items: Vec<T>,
+    /// None of the items is before this one; all that are not in this group or a later one are.
+    from: T,
+}
+
 impl<T> Default for LazyHeap<T> {
     fn default() -> Self {
-        Self { near: Vec::new(), far: Vec::new(), bound: None, most: FEW }
+        Self { near: Vec::new(), far: Vec::new(), waiting: 0, most: NEAR }
     }
 }
 
 impl<T: Prioritised> LazyHeap<T> {
     /// A queue of the given items. Cost `O(n)`.
     pub fn from_items(items: Vec<T>) -> Self {
-        let mut queue = Self { far: items, ..Self::default() };
-        queue.refill();
+        let mut queue = Self::default();
+        queue.refill(items);
+        queue.note_size();
         queue
     }
 
     /// Adds an item.
     #[inline]
     pub fn push(&mut self, item: T) {
-        if self.bound.is_none_or(|bound| item.is_before(&bound)) {
-            self.near.push(item);
-            self.sift_up(self.near.len() - 1);
-        } else {
-            self.far.push(item);
+        match self.far.last() {
+            Some(next) if !item.is_before(&next.from) => self.push_far(item),
+            _ => {
+                self.near.push(item);
+                self.sift_up(self.near.len() - 1);
+            }
         }
+    }
+
+    fn push_far(&mut self, item: T) {
+        let group = self.far.partition_point(|group| item.is_before(&group.from));
+        self.far[group].items.push(item);
+        self.waiting += 1;
     }
 
     /// Number of items, those out of date that were not met yet included.
     pub fn len(&self) -> usize {
-        self.near.len() + self.far.len()
+        self.near.len() + self.waiting
     }
 
     /// Whether nothing is queued.
@@ -75,48 +92,49 @@ impl<T: Prioritised> LazyHeap<T> {
 
     /// Takes the first item that is still current. An item that was out of date once must stay
     /// so. Never more than a constant and three times as many items are queued as were current
-    /// when they were last looked through.
+    /// when all were last looked through.
     pub fn pop(&mut self, is_current: impl Fn(&T) -> bool) -> Option<T> {
         if self.len() > self.most {
-            self.near.retain(&is_current);
-            self.far.retain(&is_current);
-            self.heapify();
-            self.note_size();
+            self.drop_outdated(&is_current);
         }
         loop {
-            if self.near.is_empty() {
-                self.far.retain(&is_current);
-                self.refill();
+            while let Some(first) = self.pop_near() {
+                if is_current(&first) {
+                    return Some(first);
+                }
             }
-            let first = self.pop_near()?;
-            if is_current(&first) {
-                return Some(first);
-            }
+            let mut group = self.far.pop()?.items;
+            self.waiting -= group.len();
+            group.retain(&is_current);
+            self.refill(group);
         }
+    }
+
+    fn drop_outdated(&mut self, is_current: &impl Fn(&T) -> bool) {
+        self.near.retain(is_current);
+        self.heapify();
+        for group in &mut self.far {
+            group.items.retain(is_current);
+        }
+        self.waiting = self.far.iter().map(|group| group.items.len()).sum();
+        self.note_size();
     }
 
     fn note_size(&mut self) {
-        self.most = FEW + 3 * self.len();
+        self.most = NEAR + 3 * self.len();
     }
 
-    /// Moves the first share of the far items into the empty heap.
-    fn refill(&mut self) {
-        self.bound = None;
-        if self.far.len() <= FEW {
-            std::mem::swap(&mut self.near, &mut self.far);
-        } else {
-            let share = FEW.max(self.far.len() / SHARE);
-            let (_, &mut bound, _) = self.far.select_nth_unstable_by(share, T::order);
-            // The first are in front; the last ones take their places.
-            self.near.extend_from_slice(&self.far[..share]);
-            let left = self.far.len() - share;
-            let moved = left.min(share);
-            self.far.copy_within(share + left - moved.., 0);
-            self.far.truncate(left);
-            self.bound = Some(bound);
+    /// Makes the first of `items` the heap, which is empty, and the others the next groups.
+    fn refill(&mut self, mut items: Vec<T>) {
+        while items.len() > NEAR {
+            let share = (NEAR / 2).max(items.len() / SHARE);
+            let (_, &mut from, _) = items.select_nth_unstable_by(share, T::order);
+            let group = items.split_off(share);
+            self.waiting += group.len();
+            self.far.push(Group { items: group, from });
         }
+        self.near = items;
         self.heapify();
-        self.note_size();
     }
 
     fn pop_near(&mut self) -> Option<T> {

@@ -1,24 +1,31 @@
 //! The simplices of one dimension, of all stages.
 
-use super::super::pool::{List, Pool};
-use super::{HierarchyError, NEVER, Step};
+use super::HierarchyError;
 
-/// So many simplices have 32-bit ids, and so have the places where they wait, blocks that are not
-/// full included.
-const MOST: u32 = 1 << 29;
+/// Simplices of one dimension are numbered with 32 bits; far below the end, since they take some
+/// 20 bytes each.
+const MOST: usize = 1 << 30;
 
-/// All simplices with `K` vertices that exist at some stage, each with the stages at which it does.
+/// Absent id.
+const NONE: u32 = u32::MAX;
+
+/// A simplex that never lives: of rank 0, and not initial.
+fn nothing<const K: usize>() -> [u32; K] {
+    [0; K]
+}
+
+/// All simplices with `K` vertices that exist at some stage.
 ///
-/// A simplex dies when the first of its vertices is removed, and is then replaced by its image: by
-/// one that was there already, by a new one, or, where the kept vertex was its own, by one of lower
-/// dimension. A vertex never comes back, so each simplex lives through one interval of stages.
+/// A vertex goes by its *rank*, the number of vertices that are removed before it. So a simplex,
+/// its ranks ascending, begins with the vertex that is removed first, and lives up to the stage of
+/// that number. Then its image replaces it: one that was there already, a new one, or, where the
+/// kept vertex was its own, one of lower dimension. A vertex never comes back, so each simplex
+/// lives through one interval of stages.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layer<const K: usize> {
-    /// The initial simplices, then all others in the order of their births. A simplex that arises
-    /// while it exists already is listed again, as one that never lives.
+    /// The initial simplices in the order of their deaths, then all others in that of their
+    /// births. One that arises while it exists already is replaced by [`nothing`].
     simplices: Vec<[u32; K]>,
-    /// First stage at which each is gone; [`NEVER`], or 0 for one that never lives.
-    death: Vec<u32>,
     /// Of the simplices, the first `born[t]` were born up to stage `t`.
     born: Vec<u32>,
     /// Those that ever live, in the order of their deaths, the survivors last.
@@ -38,216 +45,206 @@ pub(super) struct Moved {
     pub(super) vanished: u32,
 }
 
-impl<const K: usize> Layer<K>
-where
-    [u32; K]: Default,
-{
-    /// The layer of a complex under `steps`, and what each step did to it. `removed_at` holds for
-    /// each vertex the first stage without it. Cost: the simplices at the removed vertices, sorted
-    /// at each.
+impl<const K: usize> Layer<K> {
+    /// The layer of a complex when the vertices of ranks 0, 1, ... are collapsed into those of the
+    /// ranks `kept`, and what each of these steps did to it. `ranks` are those of all vertices.
+    /// Cost: the simplices at the removed vertices when they are removed, sorted at each.
     pub(super) fn new(
         initial: &[[u32; K]],
-        steps: &[Step],
-        removed_at: &[u32],
+        ranks: &[u32],
+        kept: &[u32],
     ) -> Result<(Self, Vec<Moved>), HierarchyError> {
-        let mut builder = Builder::new(initial, steps.len(), removed_at)?;
-        for (stage, &step) in (1..).zip(steps) {
-            builder.take(stage, step)?;
+        let mut builder = Builder::new(initial, ranks, kept.len())?;
+        for (removed, &kept) in (0..).zip(kept) {
+            builder.take(removed, kept)?;
         }
-        Ok(builder.finish(initial.len()))
+        Ok(builder.finish())
     }
-}
 
-impl<const K: usize> Layer<K> {
     /// Number of simplices at a stage.
     pub(super) fn count(&self, stage: usize) -> usize {
         self.count[stage] as usize
     }
 
-    /// Calls `visit` with every simplex of a stage, in the order of birth or of death. Cost: the
-    /// simplices born up to the stage, or those that die after it, whichever are fewer.
-    pub(super) fn for_each(&self, stage: usize, mut visit: impl FnMut([u32; K])) {
-        let (born, died) = (self.born[stage] as usize, self.died[stage] as usize);
-        if born <= self.by_death.len() - died {
-            let lives = |&(_, &death): &(_, &u32)| death as usize > stage;
-            self.simplices[..born].iter().zip(&self.death).filter(lives).for_each(|(&s, _)| visit(s));
-        } else {
-            let ids = self.by_death[died..].iter().map(|&id| id as usize);
-            ids.filter(|&id| id < born).for_each(|id| visit(self.simplices[id]));
-        }
+    /// Calls `visit` with every simplex of a stage. Cost: those, and the births up to the stage or
+    /// the deaths after it, whichever are fewer.
+    pub(super) fn for_each(&self, stage: usize, visit: impl FnMut([u32; K])) {
+        let deaths = self.died[stage] as usize..self.by_death.len();
+        self.for_each_of(0..self.born[stage] as usize, deaths, stage..usize::MAX, visit);
     }
 
     /// Calls `visit` with every simplex of stage `fine` that is not one of the later stage
-    /// `coarse`. Cost: the deaths between them, or the births up to `fine`, whichever are fewer.
-    pub(super) fn for_each_dying(
-        &self,
-        fine: usize,
-        coarse: usize,
-        mut visit: impl FnMut([u32; K]),
-    ) {
-        let born = self.born[fine] as usize;
-        let dying = self.died[fine] as usize..self.died[coarse] as usize;
-        if born <= dying.len() {
-            let between = (fine + 1) as u32..=coarse as u32;
-            let dies = |&(_, death): &(_, &u32)| between.contains(death);
-            self.simplices[..born].iter().zip(&self.death).filter(dies).for_each(|(&s, _)| visit(s));
-        } else {
-            let ids = self.by_death[dying].iter().map(|&id| id as usize);
-            ids.filter(|&id| id < born).for_each(|id| visit(self.simplices[id]));
-        }
+    /// `coarse`. Cost: those, and the deaths between them or the births up to `fine`.
+    pub(super) fn for_each_dying(&self, fine: usize, coarse: usize, visit: impl FnMut([u32; K])) {
+        let deaths = self.died[fine] as usize..self.died[coarse] as usize;
+        self.for_each_of(0..self.born[fine] as usize, deaths, fine..coarse, visit);
     }
 
     /// Calls `visit` with every simplex of stage `coarse` that is not one of the earlier stage
-    /// `fine`. Cost: the births between them, or the deaths after `coarse`, whichever are fewer.
-    pub(super) fn for_each_arising(
+    /// `fine`. Cost: those, and the births between them or the deaths after `coarse`.
+    pub(super) fn for_each_arising(&self, fine: usize, coarse: usize, visit: impl FnMut([u32; K])) {
+        let births = self.born[fine] as usize..self.born[coarse] as usize;
+        let deaths = self.died[coarse] as usize..self.by_death.len();
+        self.for_each_of(births, deaths, coarse..usize::MAX, visit);
+    }
+
+    /// Calls `visit` with the simplices that have ids in `births`, and their first vertices in
+    /// `ranks`; these are all among `deaths` of the list by death.
+    fn for_each_of(
         &self,
-        fine: usize,
-        coarse: usize,
+        births: std::ops::Range<usize>,
+        deaths: std::ops::Range<usize>,
+        ranks: std::ops::Range<usize>,
         mut visit: impl FnMut([u32; K]),
     ) {
-        let arising = self.born[fine] as usize..self.born[coarse] as usize;
-        let later = &self.by_death[self.died[coarse] as usize..];
-        if arising.len() <= later.len() {
-            let (simplices, deaths) = (&self.simplices[arising.clone()], &self.death[arising]);
-            let lives = |&(_, &death): &(_, &u32)| death as usize > coarse;
-            simplices.iter().zip(deaths).filter(lives).for_each(|(&s, _)| visit(s));
+        // Initial simplices lie in the order of their deaths: they are a slice.
+        let initial = self.born[0] as usize;
+        let among = &self.simplices[births.start.min(initial)..births.end.min(initial)];
+        let before = |rank: usize| among.partition_point(|s| (s[0] as usize) < rank);
+        among[before(ranks.start)..before(ranks.end)].iter().for_each(|&s| visit(s));
+        let births = births.start.max(initial)..births.end.max(initial);
+        if births.len() <= deaths.len() {
+            let later = self.simplices[births].iter();
+            later.filter(|s| ranks.contains(&(s[0] as usize))).for_each(|&s| visit(s));
         } else {
-            let ids = later.iter().map(|&id| id as usize).filter(|id| arising.contains(id));
-            ids.for_each(|id| visit(self.simplices[id]));
+            let ids = self.by_death[deaths].iter().map(|&id| id as usize);
+            ids.filter(|id| births.contains(id)).for_each(|id| visit(self.simplices[id]));
         }
     }
 }
 
-/// A layer while it is made: each simplex waits at that of its vertices that is removed first.
-struct Builder<'a, const K: usize> {
+/// A layer while it is made: each simplex waits at its first vertex.
+struct Builder<const K: usize> {
     layer: Layer<K>,
-    /// Stage of birth of each simplex.
-    birth: Vec<u32>,
-    removed_at: &'a [u32],
-    /// The other vertices of each waiting simplex, ascending, then its id.
-    waiting: Pool<[u32; K]>,
-    lists: Vec<List>,
+    /// Of the initial simplices, those from `start[r]` to `start[r + 1]` wait at rank `r`.
+    start: Vec<u32>,
+    /// The simplex born last that waits at each rank.
+    last: Vec<u32>,
+    /// Of each born simplex, the one before it that waits at the same rank, and the step that
+    /// made it.
+    previous: Vec<(u32, u32)>,
     moved: Vec<Moved>,
-    /// What waits at the vertex that is being removed; kept to save allocations.
+    /// What waits at the vertex that is being removed: the other vertices, then the id. Kept to
+    /// save allocations.
     here: Vec<[u32; K]>,
 }
 
-impl<'a, const K: usize> Builder<'a, K>
-where
-    [u32; K]: Default,
-{
-    fn new(
-        initial: &[[u32; K]],
-        steps: usize,
-        removed_at: &'a [u32],
-    ) -> Result<Self, HierarchyError> {
-        let mut capacities = vec![0; removed_at.len()];
-        for simplex in initial {
-            capacities[simplex[first_removed(simplex, removed_at)] as usize] += 1;
-        }
-        let (waiting, lists) = Pool::with_capacities(&capacities);
-        // Where each step moves half of a star, as it does in a sheet, twice as many are born.
-        let expected = 3 * initial.len();
-        let mut builder = Self {
-            layer: Layer {
-                simplices: Vec::with_capacity(expected),
-                death: Vec::with_capacity(expected),
-                born: Vec::with_capacity(steps + 1),
-                by_death: Vec::with_capacity(expected),
-                died: Vec::with_capacity(steps + 1),
-                count: Vec::with_capacity(steps + 1),
-            },
-            birth: Vec::with_capacity(expected),
-            removed_at,
-            waiting,
-            lists,
-            moved: vec![Moved::default(); steps],
-            here: Vec::new(),
-        };
-        for &simplex in initial {
-            builder.add(simplex, 0)?;
-        }
-        builder.end_stage();
-        Ok(builder)
-    }
-
-    fn add(&mut self, simplex: [u32; K], stage: u32) -> Result<(), HierarchyError> {
-        let id = self.layer.simplices.len() as u32;
-        if id == MOST {
+impl<const K: usize> Builder<K> {
+    fn new(initial: &[[u32; K]], ranks: &[u32], steps: usize) -> Result<Self, HierarchyError> {
+        if initial.len() > MOST {
             return Err(HierarchyError::TooManySimplices);
         }
-        let first = first_removed(&simplex, self.removed_at);
-        let owner = simplex[first] as usize;
-        self.layer.simplices.push(simplex);
-        self.layer.death.push(self.removed_at[owner]);
-        self.birth.push(stage);
-        let mut entry = simplex;
-        entry.copy_within(first + 1.., first);
-        entry[K - 1] = id;
-        self.waiting.push(&mut self.lists[owner], entry);
-        Ok(())
+        let ranked = |simplex: &[u32; K]| {
+            let mut simplex = simplex.map(|v| ranks[v as usize]);
+            simplex.sort_unstable();
+            simplex
+        };
+        let mut start = vec![0_u32; ranks.len() + 1];
+        for simplex in initial {
+            start[ranked(simplex)[0] as usize + 1] += 1;
+        }
+        for rank in 0..ranks.len() {
+            start[rank + 1] += start[rank];
+        }
+        // Half of each star is born anew in a sheet.
+        let mut simplices = Vec::with_capacity(initial.len() * 5 / 2);
+        simplices.resize(initial.len(), nothing());
+        let mut place = start.clone();
+        for simplex in initial {
+            let simplex = ranked(simplex);
+            let place = &mut place[simplex[0] as usize];
+            simplices[*place as usize] = simplex;
+            *place += 1;
+        }
+        let mut layer = Layer {
+            by_death: Vec::with_capacity(simplices.capacity()),
+            simplices,
+            born: Vec::with_capacity(steps + 1),
+            died: Vec::with_capacity(steps + 1),
+            count: Vec::with_capacity(steps + 1),
+        };
+        layer.end_stage();
+        let (last, moved) = (vec![NONE; ranks.len()], vec![Moved::default(); steps]);
+        Ok(Self { layer, start, last, previous: Vec::new(), moved, here: Vec::new() })
     }
 
     /// One step: the simplices at the removed vertex die, their images are born.
-    fn take(&mut self, stage: u32, step: Step) -> Result<(), HierarchyError> {
-        self.open(step.removed);
-        let mut vanished = 0;
+    fn take(&mut self, removed: u32, kept: u32) -> Result<(), HierarchyError> {
+        self.open(removed);
         for index in 0..self.here.len() {
-            let entry = self.here[index];
-            if !self.dies_here(index) {
+            if self.is_repeated(index) {
                 continue;
             }
-            let mut image = entry;
-            if entry[..K - 1].contains(&step.kept) {
-                vanished += 1;
+            let mut image = self.here[index];
+            self.layer.by_death.push(image[K - 1]);
+            if image[..K - 1].contains(&kept) {
+                self.moved[removed as usize].vanished += 1;
                 continue;
             }
-            image[K - 1] = step.kept;
+            image[K - 1] = kept;
             image.sort_unstable();
-            self.add(image, stage)?;
+            self.add(image, removed)?;
         }
-        self.moved[stage as usize - 1].vanished = vanished;
-        self.end_stage();
+        self.layer.end_stage();
         Ok(())
     }
 
-    /// Takes what waits at a vertex, equal simplices side by side, the earliest born first.
-    fn open(&mut self, vertex: u32) {
-        let list = &mut self.lists[vertex as usize];
-        self.here.clear();
-        self.here.extend_from_slice(self.waiting.get(*list));
-        self.waiting.release(list);
-        self.here.sort_unstable();
+    fn add(&mut self, simplex: [u32; K], step: u32) -> Result<(), HierarchyError> {
+        let id = self.layer.simplices.len();
+        if id >= MOST {
+            return Err(HierarchyError::TooManySimplices);
+        }
+        self.layer.simplices.push(simplex);
+        let last = &mut self.last[simplex[0] as usize];
+        self.previous.push((*last, step));
+        *last = id as u32;
+        Ok(())
     }
 
-    /// Lists a simplex that was opened as the next to die, or as merged when it came second.
-    fn dies_here(&mut self, index: usize) -> bool {
-        let id = self.here[index][K - 1];
-        if index > 0 && self.here[index - 1][..K - 1] == self.here[index][..K - 1] {
-            self.layer.death[id as usize] = 0;
-            // Initial simplices are distinct, so this one was born by a step.
-            self.moved[self.birth[id as usize] as usize - 1].merged += 1;
+    /// Takes what waits at a rank, equal simplices side by side, the earliest born first.
+    fn open(&mut self, rank: u32) {
+        let Self { layer, start, last, previous, here, .. } = self;
+        let simplices = &layer.simplices;
+        let entry = |id: u32| {
+            let mut entry = simplices[id as usize];
+            entry.copy_within(1.., 0);
+            entry[K - 1] = id;
+            entry
+        };
+        here.clear();
+        here.extend((start[rank as usize]..start[rank as usize + 1]).map(entry));
+        let mut id = last[rank as usize];
+        while id != NONE {
+            here.push(entry(id));
+            id = previous[id as usize - layer.born[0] as usize].0;
+        }
+        here.sort_unstable();
+    }
+
+    /// Whether an opened simplex is equal to the one before; then it merged when it was born.
+    fn is_repeated(&mut self, index: usize) -> bool {
+        let here = &self.here;
+        if index == 0 || here[index - 1][..K - 1] != here[index][..K - 1] {
             return false;
         }
-        self.layer.by_death.push(id);
+        // Initial simplices are distinct, so this one was made by a step.
+        let id = here[index][K - 1] as usize;
+        let (_, step) = self.previous[id - self.layer.born[0] as usize];
+        self.moved[step as usize].merged += 1;
+        self.layer.simplices[id] = nothing();
         true
     }
 
-    fn end_stage(&mut self) {
-        self.layer.born.push(self.layer.simplices.len() as u32);
-        self.layer.died.push(self.layer.by_death.len() as u32);
-    }
-
-    fn finish(mut self, initial: usize) -> (Layer<K>, Vec<Moved>) {
-        for vertex in 0..self.removed_at.len() {
-            if self.removed_at[vertex] == NEVER {
-                self.open(vertex as u32);
-                for index in 0..self.here.len() {
-                    self.dies_here(index);
+    fn finish(mut self) -> (Layer<K>, Vec<Moved>) {
+        for rank in self.moved.len()..self.last.len() {
+            self.open(rank as u32);
+            for index in 0..self.here.len() {
+                if !self.is_repeated(index) {
+                    self.layer.by_death.push(self.here[index][K - 1]);
                 }
             }
         }
-        let mut count = initial as u32;
+        let mut count = self.layer.born[0];
         self.layer.count.push(count);
         for moved in &self.moved {
             count -= moved.merged + moved.vanished;
@@ -257,14 +254,9 @@ where
     }
 }
 
-/// Position of the vertex that is removed first; the first one where none is.
-#[inline]
-fn first_removed<const K: usize>(simplex: &[u32; K], removed_at: &[u32]) -> usize {
-    let mut first = 0;
-    for position in 1..K {
-        if removed_at[simplex[position] as usize] < removed_at[simplex[first] as usize] {
-            first = position;
-        }
+impl<const K: usize> Layer<K> {
+    fn end_stage(&mut self) {
+        self.born.push(self.simplices.len() as u32);
+        self.died.push(self.by_death.len() as u32);
     }
-    first
 }

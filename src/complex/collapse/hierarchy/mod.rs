@@ -9,15 +9,13 @@
 //!
 //! A removed vertex never comes back, and two vertices of an edge share it until one of them is
 //! removed. So every sphere, edge and face, initial or made by a collapse, exists in one interval
-//! of stages. A [`Hierarchy`] stores each of them once, in the order of their births, with its
-//! stage of death, and their ids in the order of their deaths. The simplices of stage `t` are those
-//! born by then that die later:
+//! of stages. A [`Hierarchy`] stores each of them once, in the order of their births, and their ids
+//! in the order of their deaths. The simplices of stage `t` are those born by then that die later:
 //!
-//! - they are found by a scan of the births up to `t`, or of the deaths after `t`, whichever is
-//!   shorter; in a mesh of bounded degree both are in proportion to the finer and the coarser side,
-//!   so that the cost is in proportion to the mesh of stage `t` itself;
-//! - the simplices that come and go between two stages are found by a scan of the births and
-//!   deaths between them, forward and backward alike.
+//! - they are found by a scan of the births up to `t`, or of the deaths after `t`, whichever are
+//!   fewer. In a mesh of bounded degree that is in proportion to the simplices of stage `t`;
+//! - those that come and go between two stages are found by a scan of the births and deaths
+//!   between them, forward and backward alike, or by one as above where that is shorter.
 //!
 //! A [`Stage`] is a view and costs nothing; nothing has to be replayed to reach it, so there is no
 //! state that could go astray: each stage is the same bits from wherever it is asked.
@@ -35,9 +33,6 @@ pub use stage::{Change, Stage};
 
 use crate::complex::MedialMesh;
 use layer::Layer;
-
-/// Stage of death of what is left at the last stage.
-const NEVER: u32 = u32::MAX;
 
 /// One collapse of an edge into one of its ends, in the ids of the initial mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,10 +66,10 @@ pub struct Step {
 pub struct Hierarchy {
     initial: Arc<MedialMesh>,
     steps: Vec<Step>,
-    /// Of each vertex the first stage without it, or [`NEVER`].
-    removed_at: Vec<u32>,
-    /// Vertices in the order of their removal, then those that are left, ascending.
-    by_removal: Vec<u32>,
+    /// Of each vertex how many are removed before it; those that are never removed are last.
+    ranks: Vec<u32>,
+    /// The vertices by rank.
+    by_rank: Vec<u32>,
     edges: Layer<2>,
     faces: Layer<3>,
     /// Steps that violate the link condition, ascending.
@@ -109,7 +104,7 @@ pub enum HierarchyError {
         step: usize,
     },
     /// More edges or faces arise than can be numbered.
-    #[error("more than 2^29 edges or faces arise: spheres with very large stars are collapsed")]
+    #[error("more than 2^30 edges or faces arise: spheres with very large stars are collapsed")]
     TooManySimplices,
 }
 
@@ -122,10 +117,11 @@ impl Hierarchy {
     /// When a step is not the collapse of an edge of its stage.
     pub fn new(initial: Arc<MedialMesh>, steps: Vec<Step>) -> Result<Self, HierarchyError> {
         debug_assert_eq!(initial.check(), Ok(()));
-        let removed_at = removal_stages(initial.spheres.len(), &steps)?;
+        let (ranks, by_rank) = rank_by_removal(initial.spheres.len(), &steps)?;
+        let kept: Vec<u32> = steps.iter().map(|step| ranks[step.kept as usize]).collect();
         let (edges, faces) = rayon::join(
-            || Layer::new(&initial.edges, &steps, &removed_at),
-            || Layer::new(&initial.faces, &steps, &removed_at),
+            || Layer::new(&initial.edges, &ranks, &kept),
+            || Layer::new(&initial.faces, &ranks, &kept),
         );
         let ((edges, moved_edges), (faces, moved_faces)) = (edges?, faces?);
         if let Some(step) = moved_edges.iter().position(|moved| moved.vanished != 1) {
@@ -139,10 +135,7 @@ impl Hierarchy {
             edges.merged != faces.vanished || faces.merged > 0
         };
         let against_link = (0..steps.len() as u32).filter(violates).collect();
-        let mut by_removal = Vec::with_capacity(removed_at.len());
-        by_removal.extend(steps.iter().map(|step| step.removed));
-        by_removal.extend((0..).zip(&removed_at).filter(|&(_, &at)| at == NEVER).map(|(v, _)| v));
-        Ok(Self { initial, steps, removed_at, by_removal, edges, faces, against_link })
+        Ok(Self { initial, steps, ranks, by_rank, edges, faces, against_link })
     }
 
     /// The mesh of stage 0.
@@ -183,12 +176,17 @@ impl Hierarchy {
     }
 }
 
-/// Of each vertex the first stage without it.
-fn removal_stages(vertices: usize, steps: &[Step]) -> Result<Vec<u32>, HierarchyError> {
-    let mut removed_at = vec![NEVER; vertices];
+/// The vertices in the order of their removal, those that are left last, and the place of each.
+fn rank_by_removal(
+    vertices: usize,
+    steps: &[Step],
+) -> Result<(Vec<u32>, Vec<u32>), HierarchyError> {
+    const LEFT: u32 = u32::MAX;
+    let mut ranks = vec![LEFT; vertices];
+    let mut by_rank = Vec::with_capacity(vertices);
     for (step, &Step { removed, kept, cost }) in steps.iter().enumerate() {
         for vertex in [removed, kept] {
-            if removed_at.get(vertex as usize) != Some(&NEVER) {
+            if ranks.get(vertex as usize) != Some(&LEFT) {
                 return Err(HierarchyError::Vertex { step, vertex });
             }
         }
@@ -198,7 +196,14 @@ fn removal_stages(vertices: usize, steps: &[Step]) -> Result<Vec<u32>, Hierarchy
         if cost.is_nan() {
             return Err(HierarchyError::Cost { step });
         }
-        removed_at[removed as usize] = step as u32 + 1;
+        ranks[removed as usize] = step as u32;
+        by_rank.push(removed);
     }
-    Ok(removed_at)
+    for vertex in 0..vertices {
+        if ranks[vertex] == LEFT {
+            ranks[vertex] = by_rank.len() as u32;
+            by_rank.push(vertex as u32);
+        }
+    }
+    Ok((ranks, by_rank))
 }

@@ -24,7 +24,7 @@ impl<'h> Stage<'h> {
 
     /// Number of spheres. Cost `O(1)`, as of the other counts.
     pub fn sphere_count(&self) -> usize {
-        self.hierarchy.removed_at.len() - self.stage
+        self.hierarchy.ranks.len() - self.stage
     }
 
     /// Number of edges.
@@ -39,35 +39,37 @@ impl<'h> Stage<'h> {
 
     /// Whether a sphere of the initial mesh is left.
     pub fn has_sphere(&self, vertex: u32) -> bool {
-        self.hierarchy.removed_at[vertex as usize] as usize > self.stage
+        self.hierarchy.ranks[vertex as usize] as usize >= self.stage
     }
 
     /// The spheres left, ascending. Cost: `k log k` for `k` of them.
     pub fn spheres(&self) -> Vec<u32> {
-        let Hierarchy { removed_at, by_removal, .. } = self.hierarchy;
+        let Hierarchy { ranks, by_rank, .. } = self.hierarchy;
         let count = self.sphere_count();
         // Sorting few costs less than passing over all.
-        if count < removed_at.len() / 16 {
-            let mut left = by_removal[self.stage..].to_vec();
+        if count < ranks.len() / 16 {
+            let mut left = by_rank[self.stage..].to_vec();
             left.sort_unstable();
             return left;
         }
         let mut left = Vec::with_capacity(count);
-        left.extend((0..removed_at.len() as u32).filter(|&v| self.has_sphere(v)));
+        left.extend((0..ranks.len() as u32).filter(|&v| self.has_sphere(v)));
         left
     }
 
     /// The edges, as ascending pairs, in no particular but a deterministic order.
     pub fn edges(&self) -> Vec<[u32; 2]> {
         let mut edges = Vec::with_capacity(self.edge_count());
-        self.hierarchy.edges.for_each(self.stage, |edge| edges.push(edge));
+        let named = |edge| edges.push(self.hierarchy.named(edge));
+        self.hierarchy.edges.for_each(self.stage, named);
         edges
     }
 
     /// The faces, as ascending triples, in no particular but a deterministic order.
     pub fn faces(&self) -> Vec<[u32; 3]> {
         let mut faces = Vec::with_capacity(self.face_count());
-        self.hierarchy.faces.for_each(self.stage, |face| faces.push(face));
+        let named = |face| faces.push(self.hierarchy.named(face));
+        self.hierarchy.faces.for_each(self.stage, named);
         faces
     }
 
@@ -80,43 +82,54 @@ impl<'h> Stage<'h> {
             let (spheres, edges, faces) = (spheres.clone(), edges.clone(), faces.clone());
             return MedialMesh { spheres, edges, faces, contacts: None };
         }
+        let Hierarchy { initial, ranks, edges, faces, .. } = self.hierarchy;
         let left = self.spheres();
-        let mut new = vec![0; self.hierarchy.removed_at.len()];
+        let mut new = vec![0; ranks.len()];
         for (place, &vertex) in (0..).zip(&left) {
-            new[vertex as usize] = place;
+            new[ranks[vertex as usize] as usize] = place;
         }
-        let new = |vertex: u32| new[vertex as usize];
-        let initial = &self.hierarchy.initial.spheres;
         let (edges, faces) = rayon::join(
-            || in_order(self.edge_count(), left.len(), |visit| {
-                self.hierarchy.edges.for_each(self.stage, |edge| visit(edge.map(new)));
-            }),
-            || in_order(self.face_count(), left.len(), |visit| {
-                self.hierarchy.faces.for_each(self.stage, |face| visit(face.map(new)));
-            }),
+            || {
+                let mut all = Vec::with_capacity(self.edge_count());
+                edges.for_each(self.stage, |edge| all.push(renumbered(edge, &new)));
+                in_order(&all, left.len())
+            },
+            || {
+                let mut all = Vec::with_capacity(self.face_count());
+                faces.for_each(self.stage, |face| all.push(renumbered(face, &new)));
+                in_order(&all, left.len())
+            },
         );
-        let spheres = left.iter().map(|&vertex| initial[vertex as usize]).collect();
+        let spheres = left.iter().map(|&vertex| initial.spheres[vertex as usize]).collect();
         MedialMesh { spheres, edges, faces, contacts: None }
     }
 }
 
+impl Hierarchy {
+    /// A simplex of a layer in the ids of the initial mesh.
+    fn named<const K: usize>(&self, simplex: [u32; K]) -> [u32; K] {
+        renumbered(simplex, &self.by_rank)
+    }
+}
+
+#[inline]
+fn renumbered<const K: usize>(simplex: [u32; K], new: &[u32]) -> [u32; K] {
+    let mut simplex = simplex.map(|v| new[v as usize]);
+    simplex.sort_unstable();
+    simplex
+}
+
 /// Simplices in lexicographic order: dealt out by their first vertices, then sorted at each.
-fn in_order<const K: usize>(
-    count: usize,
-    vertices: usize,
-    for_each: impl Fn(&mut dyn FnMut([u32; K])),
-) -> Vec<[u32; K]> {
-    let mut simplices = Vec::with_capacity(count);
-    for_each(&mut |simplex| simplices.push(simplex));
+fn in_order<const K: usize>(simplices: &[[u32; K]], vertices: usize) -> Vec<[u32; K]> {
     let mut places = vec![0_u32; vertices + 1];
-    for simplex in &simplices {
+    for simplex in simplices {
         places[simplex[0] as usize + 1] += 1;
     }
     for vertex in 0..vertices {
         places[vertex + 1] += places[vertex];
     }
     let mut sorted = vec![[0; K]; simplices.len()];
-    for &simplex in &simplices {
+    for &simplex in simplices {
         let place = &mut places[simplex[0] as usize];
         sorted[*place as usize] = simplex;
         *place += 1;
@@ -159,7 +172,7 @@ impl<'h> Change<'h> {
     }
 
     fn spheres_between(&self) -> &'h [u32] {
-        &self.hierarchy.by_removal[self.fine..self.coarse]
+        &self.hierarchy.by_rank[self.fine..self.coarse]
     }
 
     /// The edges that go.
@@ -184,24 +197,24 @@ impl<'h> Change<'h> {
 
     /// The edges of the finer stage alone, or of the coarser one.
     fn edges(&self, of_fine: bool) -> Vec<[u32; 2]> {
-        let layer = &self.hierarchy.edges;
-        let mut edges = Vec::new();
+        let (layer, mut edges) = (&self.hierarchy.edges, Vec::new());
+        let named = |edge| edges.push(self.hierarchy.named(edge));
         if of_fine {
-            layer.for_each_dying(self.fine, self.coarse, |edge| edges.push(edge));
+            layer.for_each_dying(self.fine, self.coarse, named);
         } else {
-            layer.for_each_arising(self.fine, self.coarse, |edge| edges.push(edge));
+            layer.for_each_arising(self.fine, self.coarse, named);
         }
         edges
     }
 
     /// The faces of the finer stage alone, or of the coarser one.
     fn faces(&self, of_fine: bool) -> Vec<[u32; 3]> {
-        let layer = &self.hierarchy.faces;
-        let mut faces = Vec::new();
+        let (layer, mut faces) = (&self.hierarchy.faces, Vec::new());
+        let named = |face| faces.push(self.hierarchy.named(face));
         if of_fine {
-            layer.for_each_dying(self.fine, self.coarse, |face| faces.push(face));
+            layer.for_each_dying(self.fine, self.coarse, named);
         } else {
-            layer.for_each_arising(self.fine, self.coarse, |face| faces.push(face));
+            layer.for_each_arising(self.fine, self.coarse, named);
         }
         faces
     }
