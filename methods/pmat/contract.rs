@@ -109,6 +109,8 @@ impl Bits {
 struct Graph {
     nodes: Vec<Node>,
     entries: Vec<u32>,
+    /// What [`Graph::look_ahead`] found; kept to save allocations.
+    ahead: Vec<u32>,
 }
 
 /// A sphere: all that is read of a neighbour, in one line of the cache.
@@ -161,7 +163,7 @@ impl Graph {
                 segment.len += 1;
             }
         }
-        Self { nodes, entries }
+        Self { nodes, entries, ahead: Vec::new() }
     }
 
     #[inline]
@@ -183,6 +185,15 @@ impl Graph {
         }
     }
 
+    /// One step from each entry of a segment towards the sphere that it is now part of. The steps
+    /// do not depend on each other, so the memory is waited for once and not once for each.
+    #[inline]
+    fn look_ahead(&mut self, start: u32, len: u32) {
+        self.ahead.clear();
+        let entries = &self.entries[start as usize..(start + len) as usize];
+        self.ahead.extend(entries.iter().map(|&v| self.nodes[v as usize].parent));
+    }
+
     /// Collapses the edge between two spheres and calls `visit` with each other neighbour of the
     /// removed one, once: new neighbours of the kept one, and some that it had already.
     #[inline]
@@ -196,8 +207,9 @@ impl Graph {
         let mut source = removed;
         while source != NONE {
             let Segment { start, len, next, .. } = self.nodes[source as usize].segment;
-            for index in start..start + len {
-                let neighbour = self.find(self.entries[index as usize]);
+            self.look_ahead(start, len);
+            for index in 0..len as usize {
+                let neighbour = self.find(self.ahead[index]);
                 let node = &mut self.nodes[neighbour as usize];
                 if node.met_by == removed {
                     continue;
