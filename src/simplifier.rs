@@ -33,6 +33,12 @@ pub trait MedialSimplifier: Send + Sync {
         run: &RunContext,
     ) -> Result<Box<dyn Simplification + 's>, SimplifyError>;
 
+    /// Whether the answers carry a hierarchy in [`Extras`] that [`MedialSimplifier::resume`] can go
+    /// on from.
+    fn has_hierarchy(&self) -> bool {
+        false
+    }
+
     /// The levels of a hierarchy that an earlier run of this method gave in [`Extras`], in place
     /// of [`MedialSimplifier::prepare`].
     ///

@@ -129,6 +129,10 @@ impl MedialSimplifier for Pmat {
         Ok(Box::new(Levels::new(Arc::new(hierarchy))))
     }
 
+    fn has_hierarchy(&self) -> bool {
+        true
+    }
+
     fn resume(
         &self,
         hierarchy: Arc<Hierarchy>,

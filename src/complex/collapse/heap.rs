@@ -190,3 +190,62 @@ impl<T: Prioritised> LazyHeap<T> {
         heap[index] = moving;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+
+    impl Prioritised for (u32, u32) {
+        fn order(&self, other: &Self) -> Ordering {
+            self.cmp(other)
+        }
+    }
+
+    /// Against a sorted set, with far more items than the heap takes at a time, most of which are
+    /// out of date when their turn comes, and many new ones before those that wait.
+    #[test]
+    fn items_come_out_in_order_and_only_current_ones() {
+        let mut random = Pcg64::seed_from_u64(3);
+        let items: Vec<_> = (0..40_000).map(|id| (random.random_range(0..9_000_u32), id)).collect();
+        let mut expected: std::collections::BTreeSet<_> = items.iter().copied().collect();
+        let mut queue = LazyHeap::from_items(items);
+        let mut outdated = vec![false; 200_000];
+        for id in 40_000.. {
+            for _ in 0..random.random_range(0..4) {
+                let gone = random.random_range(0..id) as usize;
+                outdated[gone] = true;
+            }
+            if (id as usize) < outdated.len() && random.random_bool(0.7) {
+                let item = (random.random_range(0..9_000), id);
+                expected.insert(item);
+                queue.push(item);
+            }
+            let popped = queue.pop(|item| !outdated[item.1 as usize]);
+            let first = std::iter::from_fn(|| expected.pop_first());
+            let first = first.skip_while(|item| outdated[item.1 as usize]).next();
+            assert_eq!(popped, first);
+            if popped.is_none() {
+                break;
+            }
+            assert!(id < 200_000 || !queue.is_empty() || expected.is_empty());
+        }
+        assert!(queue.is_empty());
+    }
+
+    /// What is out of date does not pile up.
+    #[test]
+    fn the_memory_is_bounded() {
+        let mut queue = LazyHeap::default();
+        queue.push((0, 0));
+        for id in 0..1_000_000_u32 {
+            assert_eq!(queue.pop(|item| item.1 == id), Some((0, id)));
+            // Far behind what is current, so that it is never popped.
+            (0..4).for_each(|extra| queue.push((1_000 + extra, id)));
+            queue.push((0, id + 1));
+            assert!(queue.len() < 3 * NEAR, "{}", queue.len());
+        }
+    }
+}

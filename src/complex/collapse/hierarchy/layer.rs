@@ -1,5 +1,7 @@
 //! The simplices of one dimension, of all stages.
 
+use std::ops::Range;
+
 use super::HierarchyError;
 
 /// Simplices of one dimension are numbered with 32 bits; far below the end, since they take some
@@ -66,50 +68,53 @@ impl<const K: usize> Layer<K> {
         self.count[stage] as usize
     }
 
-    /// Calls `visit` with every simplex of a stage. Cost: those, and the births up to the stage or
-    /// the deaths after it, whichever are fewer.
-    pub(super) fn for_each(&self, stage: usize, visit: impl FnMut([u32; K])) {
+    /// The simplices of a stage. Cost: those, and the births up to the stage or the deaths after
+    /// it, whichever are fewer.
+    pub(super) fn at(&self, stage: usize) -> impl Iterator<Item = [u32; K]> + '_ {
         let deaths = self.died[stage] as usize..self.by_death.len();
-        self.for_each_of(0..self.born[stage] as usize, deaths, stage..usize::MAX, visit);
+        self.select(0..self.born[stage] as usize, deaths, stage..usize::MAX)
     }
 
-    /// Calls `visit` with every simplex of stage `fine` that is not one of the later stage
-    /// `coarse`. Cost: those, and the deaths between them or the births up to `fine`.
-    pub(super) fn for_each_dying(&self, fine: usize, coarse: usize, visit: impl FnMut([u32; K])) {
+    /// The simplices of stage `fine` that are not of the later stage `coarse`. Cost: those, and
+    /// the deaths between them or the births up to `fine`, whichever are fewer.
+    pub(super) fn dying(&self, fine: usize, coarse: usize) -> impl Iterator<Item = [u32; K]> + '_ {
         let deaths = self.died[fine] as usize..self.died[coarse] as usize;
-        self.for_each_of(0..self.born[fine] as usize, deaths, fine..coarse, visit);
+        self.select(0..self.born[fine] as usize, deaths, fine..coarse)
     }
 
-    /// Calls `visit` with every simplex of stage `coarse` that is not one of the earlier stage
-    /// `fine`. Cost: those, and the births between them or the deaths after `coarse`.
-    pub(super) fn for_each_arising(&self, fine: usize, coarse: usize, visit: impl FnMut([u32; K])) {
+    /// The simplices of stage `coarse` that are not of the earlier stage `fine`. Cost: those, and
+    /// the births between them or the deaths after `coarse`, whichever are fewer.
+    pub(super) fn arising(
+        &self,
+        fine: usize,
+        coarse: usize,
+    ) -> impl Iterator<Item = [u32; K]> + '_ {
         let births = self.born[fine] as usize..self.born[coarse] as usize;
         let deaths = self.died[coarse] as usize..self.by_death.len();
-        self.for_each_of(births, deaths, coarse..usize::MAX, visit);
+        self.select(births, deaths, coarse..usize::MAX)
     }
 
-    /// Calls `visit` with the simplices that have ids in `births`, and their first vertices in
-    /// `ranks`; these are all among `deaths` of the list by death.
-    fn for_each_of(
+    /// The simplices with ids in `births` whose first vertices have ranks in `firsts`: initial
+    /// ones, then others. The ids of all of them are among `deaths` of the list by death, and
+    /// every id there that is in `births` is one of theirs.
+    fn select(
         &self,
-        births: std::ops::Range<usize>,
-        deaths: std::ops::Range<usize>,
-        ranks: std::ops::Range<usize>,
-        mut visit: impl FnMut([u32; K]),
-    ) {
+        births: Range<usize>,
+        deaths: Range<usize>,
+        firsts: Range<usize>,
+    ) -> impl Iterator<Item = [u32; K]> + '_ {
         // Initial simplices lie in the order of their deaths: they are a slice.
         let initial = self.born[0] as usize;
         let among = &self.simplices[births.start.min(initial)..births.end.min(initial)];
         let before = |rank: usize| among.partition_point(|s| (s[0] as usize) < rank);
-        among[before(ranks.start)..before(ranks.end)].iter().for_each(|&s| visit(s));
+        let slice = &among[before(firsts.start)..before(firsts.end)];
         let births = births.start.max(initial)..births.end.max(initial);
-        if births.len() <= deaths.len() {
-            let later = self.simplices[births].iter();
-            later.filter(|s| ranks.contains(&(s[0] as usize))).for_each(|&s| visit(s));
-        } else {
-            let ids = self.by_death[deaths].iter().map(|&id| id as usize);
-            ids.filter(|id| births.contains(id)).for_each(|id| visit(self.simplices[id]));
-        }
+        let by_birth = births.len() <= deaths.len();
+        let later = if by_birth { &self.simplices[births.clone()] } else { &[] };
+        let ids = if by_birth { &[] } else { &self.by_death[deaths] };
+        let later = later.iter().filter(move |s| firsts.contains(&(s[0] as usize)));
+        let ids = ids.iter().map(|&id| id as usize).filter(move |id| births.contains(id));
+        slice.iter().chain(later).chain(ids.map(|id| &self.simplices[id])).copied()
     }
 }
 

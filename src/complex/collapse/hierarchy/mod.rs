@@ -58,8 +58,11 @@ pub struct Step {
 /// let path = MedialMesh::from_simplices(spheres, vec![[0, 1], [1, 2]], vec![])?;
 /// let step = Step { removed: 1, kept: 0, cost: 1.0 };
 /// let hierarchy = Hierarchy::new(Arc::new(path), vec![step])?;
-/// assert_eq!(hierarchy.stage(1).edges(), [[0, 2]]);
-/// assert_eq!(hierarchy.change(1, 0).edges_added(), [[0, 1], [1, 2]]);
+/// // Rank 0 is sphere 1, which is removed first.
+/// assert_eq!(hierarchy.by_rank(), [1, 0, 2]);
+/// assert_eq!(hierarchy.change(0, 1).edges_removed().collect::<Vec<_>>(), [[0, 1], [0, 2]]);
+/// assert_eq!(hierarchy.change(0, 1).edges_added().collect::<Vec<_>>(), [[1, 2]]);
+/// assert_eq!(hierarchy.stage(1).to_mesh().edges, [[0, 1]]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -146,6 +149,14 @@ impl Hierarchy {
     /// The collapses, first to last: step `t` leads from stage `t` to stage `t + 1`.
     pub fn steps(&self) -> &[Step] {
         &self.steps
+    }
+
+    /// The index of each sphere in the initial mesh, by its *rank*: the number of spheres that are
+    /// removed before it. Those that are never removed come last, by index. The spheres of stage
+    /// `t` are those of rank `t` and more, so that whoever keeps spheres in this order has every
+    /// stage as a suffix.
+    pub fn by_rank(&self) -> &[u32] {
+        &self.by_rank
     }
 
     /// The stage with the fewest spheres: the number of steps.

@@ -1,9 +1,11 @@
 //! Views on a hierarchy: one stage, and what lies between two.
 
+use std::ops::Range;
+
 use super::Hierarchy;
 use crate::complex::MedialMesh;
 
-/// The mesh after a number of collapses. Ids are those of the initial mesh.
+/// The mesh after a number of collapses, its vertices named by their ranks.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'h> {
     hierarchy: &'h Hierarchy,
@@ -24,7 +26,7 @@ impl<'h> Stage<'h> {
 
     /// Number of spheres. Cost `O(1)`, as of the other counts.
     pub fn sphere_count(&self) -> usize {
-        self.hierarchy.ranks.len() - self.stage
+        self.hierarchy.by_rank.len() - self.stage
     }
 
     /// Number of edges.
@@ -37,99 +39,84 @@ impl<'h> Stage<'h> {
         self.hierarchy.faces.count(self.stage)
     }
 
-    /// Whether a sphere of the initial mesh is left.
-    pub fn has_sphere(&self, vertex: u32) -> bool {
-        self.hierarchy.ranks[vertex as usize] as usize >= self.stage
+    /// The ranks of the spheres. Cost `O(1)`.
+    pub fn spheres(&self) -> Range<u32> {
+        self.stage as u32..self.hierarchy.by_rank.len() as u32
     }
 
-    /// The spheres left, ascending. Cost: `k log k` for `k` of them.
-    pub fn spheres(&self) -> Vec<u32> {
-        let Hierarchy { ranks, by_rank, .. } = self.hierarchy;
-        let count = self.sphere_count();
-        // Sorting few costs less than passing over all.
-        if count < ranks.len() / 16 {
-            let mut left = by_rank[self.stage..].to_vec();
-            left.sort_unstable();
-            return left;
-        }
-        let mut left = Vec::with_capacity(count);
-        left.extend((0..ranks.len() as u32).filter(|&v| self.has_sphere(v)));
-        left
+    /// The edges, as ascending pairs of ranks, in no particular but a deterministic order. Cost:
+    /// in proportion to their number, for degrees that are bounded in the mean.
+    pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
+        self.hierarchy.edges.at(self.stage)
     }
 
-    /// The edges, as ascending pairs, in no particular but a deterministic order.
-    pub fn edges(&self) -> Vec<[u32; 2]> {
-        let mut edges = Vec::with_capacity(self.edge_count());
-        let named = |edge| edges.push(self.hierarchy.named(edge));
-        self.hierarchy.edges.for_each(self.stage, named);
-        edges
+    /// The faces, as ascending triples of ranks, in no particular but a deterministic order. Cost
+    /// as of the edges.
+    pub fn faces(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
+        self.hierarchy.faces.at(self.stage)
     }
 
-    /// The faces, as ascending triples, in no particular but a deterministic order.
-    pub fn faces(&self) -> Vec<[u32; 3]> {
-        let mut faces = Vec::with_capacity(self.face_count());
-        let named = |face| faces.push(self.hierarchy.named(face));
-        self.hierarchy.faces.for_each(self.stage, named);
-        faces
-    }
-
-    /// The stage as a mesh of its own, in canonical form, without contacts; the spheres keep their
-    /// order. Bit for bit that of [`super::super::replay`]. Cost: `k log d` for `k` simplices at
-    /// the stage and degrees up to `d`.
+    /// The stage as a mesh of its own, in canonical form, without contacts; the spheres keep the
+    /// order that they have in the initial mesh. Bit for bit that of
+    /// [`replay`](super::super::replay). Cost: `O(k log d)` for `k` simplices at the stage and
+    /// degrees up to `d`; two threads are used where there are.
     pub fn to_mesh(&self) -> MedialMesh {
+        let Hierarchy { initial, edges, faces, by_rank, .. } = self.hierarchy;
         if self.stage == 0 {
-            let MedialMesh { spheres, edges, faces, .. } = self.hierarchy.initial.as_ref();
+            let MedialMesh { spheres, edges, faces, .. } = initial.as_ref();
             let (spheres, edges, faces) = (spheres.clone(), edges.clone(), faces.clone());
             return MedialMesh { spheres, edges, faces, contacts: None };
         }
-        let Hierarchy { initial, ranks, edges, faces, .. } = self.hierarchy;
-        let left = self.spheres();
-        let mut new = vec![0; ranks.len()];
-        for (place, &vertex) in (0..).zip(&left) {
-            new[ranks[vertex as usize] as usize] = place;
+        let left = self.in_initial_order();
+        let mut new = vec![0; by_rank.len()];
+        for (place, &(_, rank)) in (0..).zip(&left) {
+            new[rank as usize] = place;
         }
         let (edges, faces) = rayon::join(
-            || {
-                let mut all = Vec::with_capacity(self.edge_count());
-                edges.for_each(self.stage, |edge| all.push(renumbered(edge, &new)));
-                in_order(&all, left.len())
-            },
-            || {
-                let mut all = Vec::with_capacity(self.face_count());
-                faces.for_each(self.stage, |face| all.push(renumbered(face, &new)));
-                in_order(&all, left.len())
-            },
+            || in_order(edges.at(self.stage), self.edge_count(), left.len(), &new),
+            || in_order(faces.at(self.stage), self.face_count(), left.len(), &new),
         );
-        let spheres = left.iter().map(|&vertex| initial.spheres[vertex as usize]).collect();
+        let spheres = left.iter().map(|&(vertex, _)| initial.spheres[vertex as usize]).collect();
         MedialMesh { spheres, edges, faces, contacts: None }
     }
-}
 
-impl Hierarchy {
-    /// A simplex of a layer in the ids of the initial mesh.
-    fn named<const K: usize>(&self, simplex: [u32; K]) -> [u32; K] {
-        renumbered(simplex, &self.by_rank)
+    /// Indices in the initial mesh and ranks of the spheres, by ascending index.
+    fn in_initial_order(&self) -> Vec<(u32, u32)> {
+        let Hierarchy { ranks, by_rank, .. } = self.hierarchy;
+        let mut left = Vec::with_capacity(self.sphere_count());
+        // Sorting few costs less than passing over all.
+        if self.sphere_count() < ranks.len() / 16 {
+            left.extend(self.spheres().map(|rank| (by_rank[rank as usize], rank)));
+            left.sort_unstable();
+        } else {
+            let all = (0..).zip(ranks.iter().copied());
+            left.extend(all.filter(|&(_, rank)| rank as usize >= self.stage));
+        }
+        left
     }
 }
 
-#[inline]
-fn renumbered<const K: usize>(simplex: [u32; K], new: &[u32]) -> [u32; K] {
-    let mut simplex = simplex.map(|v| new[v as usize]);
-    simplex.sort_unstable();
-    simplex
-}
-
-/// Simplices in lexicographic order: dealt out by their first vertices, then sorted at each.
-fn in_order<const K: usize>(simplices: &[[u32; K]], vertices: usize) -> Vec<[u32; K]> {
+/// Simplices, their ranks replaced by new numbers, in lexicographic order: dealt out by their first
+/// vertices, then sorted at each.
+fn in_order<const K: usize>(
+    simplices: impl Iterator<Item = [u32; K]>,
+    count: usize,
+    vertices: usize,
+    new: &[u32],
+) -> Vec<[u32; K]> {
+    let mut renumbered = Vec::with_capacity(count);
     let mut places = vec![0_u32; vertices + 1];
     for simplex in simplices {
+        let mut simplex = simplex.map(|rank| new[rank as usize]);
+        simplex.sort_unstable();
         places[simplex[0] as usize + 1] += 1;
+        renumbered.push(simplex);
     }
     for vertex in 0..vertices {
         places[vertex + 1] += places[vertex];
     }
-    let mut sorted = vec![[0; K]; simplices.len()];
-    for &simplex in simplices {
+    let mut sorted = vec![[0; K]; renumbered.len()];
+    for simplex in renumbered {
         let place = &mut places[simplex[0] as usize];
         sorted[*place as usize] = simplex;
         *place += 1;
@@ -143,9 +130,9 @@ fn in_order<const K: usize>(simplices: &[[u32; K]], vertices: usize) -> Vec<[u32
     sorted
 }
 
-/// What comes and goes on the way from one stage to another, in either direction. Each list is
-/// in a deterministic order, in the ids of the initial mesh, and costs in proportion to what the
-/// collapses between the stages change, or to the finer stage, whichever is less.
+/// What comes and goes on the way from one stage to another, in either direction, vertices named
+/// by their ranks. The lists are in no particular but a deterministic order. Cost: in proportion
+/// to what the collapses between the stages change, or to the finer stage, whichever is less.
 #[derive(Clone, Copy, Debug)]
 pub struct Change<'h> {
     hierarchy: &'h Hierarchy,
@@ -161,61 +148,53 @@ impl<'h> Change<'h> {
         Self { hierarchy, fine: from.min(to), coarse: from.max(to), backward: from > to }
     }
 
-    /// The spheres that go, in the order of the collapses.
-    pub fn spheres_removed(&self) -> &'h [u32] {
-        if self.backward { &[] } else { self.spheres_between() }
+    /// The ranks of the spheres that go, in the order of the collapses.
+    pub fn spheres_removed(&self) -> Range<u32> {
+        self.spheres(!self.backward)
     }
 
-    /// The spheres that come, the one that was removed last at the end.
-    pub fn spheres_added(&self) -> &'h [u32] {
-        if self.backward { self.spheres_between() } else { &[] }
-    }
-
-    fn spheres_between(&self) -> &'h [u32] {
-        &self.hierarchy.by_rank[self.fine..self.coarse]
+    /// The ranks of the spheres that come; that which was removed first comes last.
+    pub fn spheres_added(&self) -> std::iter::Rev<Range<u32>> {
+        self.spheres(self.backward).rev()
     }
 
     /// The edges that go.
-    pub fn edges_removed(&self) -> Vec<[u32; 2]> {
+    pub fn edges_removed(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
         self.edges(!self.backward)
     }
 
     /// The edges that come.
-    pub fn edges_added(&self) -> Vec<[u32; 2]> {
+    pub fn edges_added(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
         self.edges(self.backward)
     }
 
     /// The faces that go.
-    pub fn faces_removed(&self) -> Vec<[u32; 3]> {
+    pub fn faces_removed(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
         self.faces(!self.backward)
     }
 
     /// The faces that come.
-    pub fn faces_added(&self) -> Vec<[u32; 3]> {
+    pub fn faces_added(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
         self.faces(self.backward)
     }
 
-    /// The edges of the finer stage alone, or of the coarser one.
-    fn edges(&self, of_fine: bool) -> Vec<[u32; 2]> {
-        let (layer, mut edges) = (&self.hierarchy.edges, Vec::new());
-        let named = |edge| edges.push(self.hierarchy.named(edge));
-        if of_fine {
-            layer.for_each_dying(self.fine, self.coarse, named);
-        } else {
-            layer.for_each_arising(self.fine, self.coarse, named);
-        }
-        edges
+    /// The spheres that only the finer stage has, or only the coarser one.
+    fn spheres(&self, of_fine: bool) -> Range<u32> {
+        let end = if of_fine { self.coarse } else { self.fine };
+        self.fine as u32..end as u32
     }
 
-    /// The faces of the finer stage alone, or of the coarser one.
-    fn faces(&self, of_fine: bool) -> Vec<[u32; 3]> {
-        let (layer, mut faces) = (&self.hierarchy.faces, Vec::new());
-        let named = |face| faces.push(self.hierarchy.named(face));
-        if of_fine {
-            layer.for_each_dying(self.fine, self.coarse, named);
-        } else {
-            layer.for_each_arising(self.fine, self.coarse, named);
-        }
-        faces
+    fn edges(&self, of_fine: bool) -> impl Iterator<Item = [u32; 2]> + 'h {
+        let (layer, Self { fine, coarse, .. }) = (&self.hierarchy.edges, *self);
+        let dying = of_fine.then(|| layer.dying(fine, coarse));
+        let arising = (!of_fine).then(|| layer.arising(fine, coarse));
+        dying.into_iter().flatten().chain(arising.into_iter().flatten())
+    }
+
+    fn faces(&self, of_fine: bool) -> impl Iterator<Item = [u32; 3]> + 'h {
+        let (layer, Self { fine, coarse, .. }) = (&self.hierarchy.faces, *self);
+        let dying = of_fine.then(|| layer.dying(fine, coarse));
+        let arising = (!of_fine).then(|| layer.arising(fine, coarse));
+        dying.into_iter().flatten().chain(arising.into_iter().flatten())
     }
 }
