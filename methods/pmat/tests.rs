@@ -177,7 +177,7 @@ fn random_mesh() -> impl Strategy<Value = MedialMesh> {
             let spheres = places.into_iter().map(|(c, r)| {
                 let centre = Vec3::from(c.map(f64::from));
                 Sphere::new(
-                    centre + bend * centre.sin().zxy(),
+                    centre + bend * Vec3::new(centre.z, centre.x, centre.y).map(f64::sin),
                     f64::from(r) / 4.0 + bend * centre.y.cos().abs(),
                 )
             });

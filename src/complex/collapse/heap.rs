@@ -230,7 +230,6 @@ mod tests {
             if popped.is_none() {
                 break;
             }
-            assert!(id < 200_000 || !queue.is_empty() || expected.is_empty());
         }
         assert!(queue.is_empty());
     }
