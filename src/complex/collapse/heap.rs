@@ -224,8 +224,8 @@ mod tests {
                 queue.push(item);
             }
             let popped = queue.pop(|item| !outdated[item.1 as usize]);
-            let first = std::iter::from_fn(|| expected.pop_first());
-            let first = first.skip_while(|item| outdated[item.1 as usize]).next();
+            let mut rest = std::iter::from_fn(|| expected.pop_first());
+            let first = rest.find(|item| !outdated[item.1 as usize]);
             assert_eq!(popped, first);
             if popped.is_none() {
                 break;

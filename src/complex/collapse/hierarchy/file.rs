@@ -134,7 +134,13 @@ impl Hierarchy {
     /// When the file cannot be read, or does not hold a hierarchy; see [`Hierarchy::parse`].
     pub fn read(path: impl AsRef<Path>) -> Result<(Self, String), HierarchyFileError> {
         let (path, name) = (path.as_ref(), path.as_ref().display().to_string());
-        match fs::read(path) {
+        // What is no regular file may never end.
+        let is_endless = fs::metadata(path).is_ok_and(|target| !target.is_file());
+        let bytes = match is_endless {
+            true => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file")),
+            false => fs::read(path),
+        };
+        match bytes {
             Ok(bytes) => Self::parse(&bytes, &name),
             Err(error) => Err(HierarchyFileError { file: name, offset: 0, kind: error.into() }),
         }

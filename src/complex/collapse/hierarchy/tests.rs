@@ -182,14 +182,13 @@ fn every_damaged_byte_and_every_cut_is_found() {
             damaged[place] ^= bit;
             let error = Hierarchy::parse(&damaged, "x").unwrap_err();
             assert!(error.offset <= place as u64, "{error} for byte {place}");
-            let in_header = place < 32;
             let expected = match error.kind {
                 Kind::Signature => place < 8,
                 Kind::Version(_) => (8..12).contains(&place),
                 Kind::Checksum { part } => place >= 8 && (part == "header") == (place < 36),
                 _ => false,
             };
-            assert!(expected, "{error} for byte {place}, {in_header}");
+            assert!(expected, "{error} for byte {place}");
         }
         let error = Hierarchy::parse(&bytes[..place], "x").unwrap_err();
         assert!(matches!(error.kind, Kind::Length { .. }), "{error} for {place} bytes");
@@ -243,5 +242,7 @@ fn files_are_written_and_read() {
     assert_eq!(Hierarchy::read(&file).unwrap(), (path(), "label".to_owned()));
     let missing = Hierarchy::read(folder.join("missing")).unwrap_err();
     assert!(missing.to_string().contains("missing: "), "{missing}");
+    let no_file = Hierarchy::read(&folder).unwrap_err().to_string();
+    assert!(no_file.ends_with("not a regular file"), "{no_file}");
     std::fs::remove_dir_all(folder).unwrap();
 }
