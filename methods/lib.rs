@@ -8,6 +8,7 @@ use medial::simplifier::MedialSimplifier;
 pub mod angle;
 pub mod dey_zhao;
 pub mod lambda;
+pub mod pmat;
 pub mod qmat;
 mod ranked;
 mod ranked_facets;
@@ -19,6 +20,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(lambda::LambdaMedialAxis::new()),
         Box::new(dey_zhao::DeyZhao::new()),
         Box::new(qmat::Qmat::new()),
+        Box::new(pmat::Pmat::new()),
     ]
 }
 

@@ -4,7 +4,9 @@
 use std::sync::Arc;
 
 use medial::complex::MedialMesh;
-use medial::simplifier::{Diagnostics, Level, Simplification, Simplified, SimplifyError, Work};
+use medial::simplifier::{
+    Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work,
+};
 
 /// An initial medial mesh with a value for each sphere; larger values are kept longer.
 pub(crate) struct Ranked {
@@ -120,6 +122,7 @@ impl Simplification for Ranked {
             native_level: Some(native),
             work: Work::Anew,
             diagnostics,
+            extras: Extras::default(),
         })
     }
 }

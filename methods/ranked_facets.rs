@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use medial::complex::{DualTriangulation, MedialMesh, VoronoiFacets};
 use medial::shape::Shape;
-use medial::simplifier::{Diagnostics, Level, Simplification, Simplified, SimplifyError, Work};
+use medial::simplifier::{
+    Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work,
+};
 
 use crate::ranked::Scale;
 
@@ -130,6 +132,7 @@ impl Simplification for RankedFacets {
             native_level: Some(native),
             work: Work::Anew,
             diagnostics,
+            extras: Extras::default(),
         })
     }
 }

@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::complex::collapse::Hierarchy;
 use crate::complex::{ComplexError, MedialMesh};
 use crate::shape::{Shape, ShapeError};
 
@@ -31,6 +32,29 @@ pub trait MedialSimplifier: Send + Sync {
         params: &Params,
         run: &RunContext,
     ) -> Result<Box<dyn Simplification + 's>, SimplifyError>;
+
+    /// Whether the answers carry a hierarchy in [`Extras`] that [`MedialSimplifier::resume`] can go
+    /// on from.
+    fn has_hierarchy(&self) -> bool {
+        false
+    }
+
+    /// The levels of a hierarchy that an earlier run of this method gave in [`Extras`], in place
+    /// of [`MedialSimplifier::prepare`].
+    ///
+    /// # Errors
+    /// [`SimplifyError::Unsupported`] when the method has no hierarchy,
+    /// [`SimplifyError::Hierarchy`] when this one is not of this method,
+    /// [`SimplifyError::Parameter`] as in [`MedialSimplifier::prepare`].
+    fn resume(
+        &self,
+        hierarchy: Arc<Hierarchy>,
+        params: &Params,
+    ) -> Result<Box<dyn Simplification>, SimplifyError> {
+        let _ = (hierarchy, params);
+        let why = format!("{} has no hierarchy to go on from", self.info().title);
+        Err(SimplifyError::Unsupported { why })
+    }
 }
 
 /// One shape, prepared once, asked for many levels.
@@ -218,6 +242,16 @@ pub struct Simplified {
     pub work: Work,
     /// Why fewer or more spheres than asked were returned, rejected collapses, and the like.
     pub diagnostics: Diagnostics,
+    /// What only some methods have.
+    pub extras: Extras,
+}
+
+/// What some methods give beside the medial mesh, each `None` where a method has no such thing.
+#[derive(Clone, Debug, Default)]
+pub struct Extras {
+    /// All levels of the method at once. [`MedialSimplifier::resume`] of the same method goes on
+    /// from it without the shape.
+    pub hierarchy: Option<Arc<Hierarchy>>,
 }
 
 /// How the work of one level relates to earlier levels; decides what counts into its seconds.
@@ -272,6 +306,9 @@ pub enum SimplifyError {
     /// The method returned a complex that is not valid.
     #[error("invalid output: {0}")]
     InvalidOutput(#[from] ComplexError),
+    /// A hierarchy cannot be built, or is not one of the method that was asked to go on from it.
+    #[error("hierarchy: {0}")]
+    Hierarchy(String),
     /// The run was cancelled.
     #[error("cancelled")]
     Cancelled,

@@ -22,6 +22,7 @@ pub mod convert;
 pub mod datasets;
 pub mod doctor;
 pub mod evaluate;
+pub mod hierarchy;
 pub mod info;
 pub mod methods;
 pub mod paper;
@@ -216,6 +217,14 @@ pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
             path.display()
         )));
     }
+    check_folder(path)
+}
+
+/// Refuses a file in a folder that does not exist.
+///
+/// # Errors
+/// When the folder does not exist.
+pub fn check_folder(path: &Path) -> Result<(), Failure> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         Some(folder) if !folder.is_dir() => Err(Failure::input(format!(
             "{}: there is no folder {}; make it first",

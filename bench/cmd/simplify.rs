@@ -6,14 +6,17 @@ use clap::Args;
 use medial::complex;
 use medial::metrics::JudgeOptions;
 use medial::shape::Shape;
-use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified, SimplifyError, Work};
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError, Work,
+};
 use medial_reports::{Simplify, Stages, Status};
 use serde::Serialize;
 
+use super::hierarchy::{self, Loaded, Origin};
 use super::methods::unknown_method;
 use super::{
-    Exit, Failure, check_output, counted, judge_options, medial_mesh_for, params, percent,
-    print_json, print_line, shape_options,
+    Exit, Failure, check_folder, check_output, counted, judge_options, medial_mesh_for, params,
+    percent, print_json, print_line, shape_options,
 };
 use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes, search_error};
@@ -55,6 +58,13 @@ pub struct Arguments {
     /// The result (.ma, .ply, .obj), in the units of the surface.
     #[arg(short, long)]
     output: Option<PathBuf>,
+    /// Write all levels into a file, for `--hierarchy`; for methods that have them.
+    #[arg(long, value_name = "FILE")]
+    save_hierarchy: Option<PathBuf>,
+    /// Take the level from such a file, made from the same mesh by the same method, instead of
+    /// computing it.
+    #[arg(long, value_name = "FILE")]
+    hierarchy: Option<PathBuf>,
     #[command(flatten)]
     substrate: SubstrateArguments,
     #[command(flatten)]
@@ -72,6 +82,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let options = shape_options(&arguments.substrate)?;
     check_output(arguments.output.as_deref())?;
     check_bound(arguments)?;
+    check_hierarchy(arguments, method.as_ref())?;
     let input = Input::load(&source)?;
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
@@ -80,8 +91,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         warnings.extend(notes);
         shape = shape.with_initial(&initial);
     }
-    let (simplified, simplify, search) = simplify(arguments, method.as_ref(), &input, &shape)
-        .map_err(|error| match error {
+    let params = params(&arguments.set)?;
+    let given = arguments.initial.is_some();
+    let origin = Origin::new(&arguments.method, &params, &input, &shape, given);
+    let loaded = arguments.hierarchy.as_deref();
+    let loaded = loaded.map(|path| hierarchy::load(path, &origin, &shape)).transpose()?;
+    let start = Start { method: method.as_ref(), params, shape: &shape, loaded };
+    let (simplified, simplify, search) =
+        simplify(arguments, &start, &input).map_err(|error| match error {
             Error::Method(error) => failure(&source, error),
             Error::Other(failure) => failure,
         })?;
@@ -93,6 +110,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let back = shape.normalisation();
         let mesh = simplified.mesh.transformed(back.diagonal, |p| back.backward(p));
         complex::write(output, &mesh).map_err(Failure::input)?;
+    }
+    if let (Some(path), Some(all)) = (&arguments.save_hierarchy, &simplified.extras.hierarchy) {
+        hierarchy::save(path, all, &origin)?;
     }
     if global.json {
         let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
@@ -144,30 +164,69 @@ fn nothing_left(simplified: &Simplified) -> String {
     format!("the result has no sphere ({why}); ask for a finer level")
 }
 
+/// What a method starts from.
+struct Start<'a> {
+    method: &'a dyn MedialSimplifier,
+    params: Params,
+    shape: &'a Shape,
+    loaded: Option<Loaded>,
+}
+
+impl<'a> Start<'a> {
+    fn simplification(&self, run: &RunContext) -> Result<Box<dyn Simplification + 'a>, Error> {
+        let Self { method, params, shape, loaded } = self;
+        match loaded {
+            Some(loaded) => Ok(loaded.resume(*method, params)?),
+            None => Ok(method.prepare(shape, params, run)?),
+        }
+    }
+
+    /// Number of spheres that the method starts from.
+    fn spheres(&self) -> Result<usize, SimplifyError> {
+        Ok(match &self.loaded {
+            Some(loaded) => loaded.hierarchy.initial().spheres.len(),
+            None => self.shape.initial()?.spheres.len(),
+        })
+    }
+}
+
+fn check_hierarchy(arguments: &Arguments, method: &dyn MedialSimplifier) -> Result<(), Failure> {
+    let asked =
+        [("--hierarchy", &arguments.hierarchy), ("--save-hierarchy", &arguments.save_hierarchy)];
+    if let Some((option, _)) = asked.iter().find(|(_, path)| path.is_some())
+        && !method.has_hierarchy()
+    {
+        let id = method.info().id;
+        return Err(Failure::usage(format!("{option}: {id} has no hierarchy of levels")));
+    }
+    arguments.save_hierarchy.as_deref().map_or(Ok(()), check_folder)
+}
+
 fn simplify(
     arguments: &Arguments,
-    method: &dyn MedialSimplifier,
+    start: &Start<'_>,
     input: &Input,
-    shape: &Shape,
 ) -> Result<(Simplified, Simplify, Option<Search>), Error> {
-    let params = params(&arguments.set)?;
+    let Start { shape, loaded, .. } = start;
     let seed = arguments.substrate.seed;
     let run = RunContext::with_seed(seed);
-    let (prepared, mut prepare) = Stopwatch::time(|| method.prepare(shape, &params, &run));
+    let (prepared, mut prepare) = Stopwatch::time(|| start.simplification(&run));
     let mut simplification = prepared?;
     let spent = shape.spent();
     prepare.seconds = (prepare.seconds - spent.seconds).max(0.0);
     prepare.cpu_seconds = (prepare.cpu_seconds - spent.cpu_seconds).max(0.0);
+    if let Some(loaded) = loaded {
+        prepare += loaded.read;
+    }
     let mut search = None;
     let (answer, lap) = if let Some(bound) = arguments.max_error {
         let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
         let judge = shape.judge(input.axis.as_ref(), options).map_err(SimplifyError::from)?;
-        let initial = shape.initial().map_err(SimplifyError::from)?.spheres.len();
-        let found = search_error(simplification.as_mut(), &judge, initial, bound)?;
+        let found = search_error(simplification.as_mut(), &judge, start.spheres()?, bound)?;
         search = Some(Search { bound, hausdorff: found.hausdorff, tried: found.tried });
         // The seconds are those of the level found, asked alone.
         let count = found.simplified.mesh.spheres.len();
-        let mut alone = method.prepare(shape, &params, &run)?;
+        let mut alone = start.simplification(&run)?;
         Stopwatch::time(|| alone.at(Level::Spheres(count)))
     } else {
         let level = match (arguments.spheres, arguments.level) {
@@ -180,7 +239,7 @@ fn simplify(
     let simplified = answer?;
     debug_assert!(simplified.work == Work::Anew || lap.seconds >= 0.0);
     let mut record = describe(arguments, shape, &simplified, prepare, lap);
-    record.params = params;
+    record.params.clone_from(&start.params);
     Ok((simplified, record, search))
 }
 
@@ -254,5 +313,8 @@ fn print_result(simplify: &Simplify, search: Option<&Search>, arguments: &Argume
     }
     if let Some(output) = &arguments.output {
         print_line(&format!("  written: {}", output.display()));
+    }
+    if let Some(path) = &arguments.save_hierarchy {
+        print_line(&format!("  written: {} with all levels", path.display()));
     }
 }

@@ -155,6 +155,11 @@ impl Input {
         })
     }
 
+    /// SHA-256 of the surface itself, whatever the format of its file.
+    pub fn surface_hash(&self) -> String {
+        hex_digest(&surface_bytes(&self.mesh))
+    }
+
     /// The shape, normalised, with nothing built yet.
     ///
     /// # Errors

@@ -70,7 +70,9 @@ impl From<SimplifyError> for Failure {
             SimplifyError::Unsupported { .. } => Status::Unsupported,
             SimplifyError::Parameter(_) | SimplifyError::Level(_) => Status::Refused,
             SimplifyError::InvalidOutput(_) => Status::InvalidOutput,
-            SimplifyError::Shape(_) | SimplifyError::Cancelled => Status::Failed,
+            SimplifyError::Shape(_) | SimplifyError::Hierarchy(_) | SimplifyError::Cancelled => {
+                Status::Failed
+            }
         };
         Self { status, reason: error.to_string() }
     }

@@ -52,6 +52,7 @@ fn help_names_every_verb() {
 fn methods_and_their_parameters() {
     insta::assert_snapshot!("methods", run(&["methods"]).1);
     insta::assert_snapshot!("methods_qmat", run(&["methods", "qmat"]).1);
+    insta::assert_snapshot!("methods_pmat", run(&["methods", "pmat"]).1);
     insta::assert_snapshot!("methods_angle", run(&["methods", "angle"]).1);
     let (code, _, stderr) = run(&["methods", "nothing"]);
     assert_eq!(code, 2);
@@ -135,7 +136,7 @@ fn axis_simplify_evaluate_convert() {
     }
     assert_eq!(object["betti"], object["expected_betti"]);
 
-    for method in ["qmat", "angle", "lambda"] {
+    for method in ["qmat", "pmat", "angle", "lambda"] {
         let (code, object) =
             json(&["simplify", mesh, "--method", method, "--spheres", "60", "-o", simple]);
         assert_eq!(code, 0, "{object}");
@@ -183,7 +184,7 @@ fn axis_simplify_evaluate_convert() {
 #[test]
 fn threads_change_no_byte() {
     let dir = tempfile::tempdir().expect("a folder");
-    for method in ["qmat", "angle", "lambda"] {
+    for method in ["qmat", "pmat", "angle", "lambda"] {
         let written = ["1", "2"].map(|threads| {
             let path = dir.path().join(format!("{method}-{threads}.ma"));
             let (code, ..) = run(&[
@@ -223,7 +224,7 @@ fn compare_leaves_a_row_for_every_run() {
     assert_eq!(code, 0, "{stderr}");
     insta::assert_snapshot!("compare_summary_heads", heads(&stdout));
     let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
-    assert_eq!(lines.lines().count(), 2 * 3 * 2);
+    assert_eq!(lines.lines().count(), 2 * medial_methods::registry().len() * 2);
     for line in lines.lines() {
         let record: Value = serde_json::from_str(line).expect("a record");
         assert_eq!(record["status"], "ok", "{record}");
@@ -294,6 +295,63 @@ fn wrong_words_end_in_usage() {
     let (code, _, stderr) = run(&["simplify", "no-such-file.off", "--method", "qmat"]);
     assert_eq!(code, 1);
     assert!(stderr.contains("no-such-file.off"), "{stderr}");
+}
+
+#[test]
+fn hierarchies_are_saved_and_taken_from_a_file() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (all, computed, loaded) = (at("all.hierarchy"), at("computed.ma"), at("loaded.ma"));
+    let pmat =
+        |mesh: &str, more: &[&str]| json(&[&["simplify", mesh, "-m", "pmat"], more].concat());
+    let mesh = "builtin:torus:20";
+    assert_eq!(pmat(mesh, &["--save-hierarchy", &all]).0, 0);
+    for level in [["--spheres", "40"], ["--level", "1.5"], ["--max-error", "0.05"]] {
+        let level = [&level[..], &["--samples", "500"]].concat();
+        let first = pmat(mesh, &[&level[..], &["-o", &computed]].concat());
+        let again = pmat(mesh, &[&level[..], &["-o", &loaded, "--hierarchy", &all]].concat());
+        assert_eq!((first.0, again.0), (0, 0), "{again:?}");
+        assert_eq!(first.1["native_level"], again.1["native_level"]);
+        assert_eq!(first.1["diagnostics"], again.1["diagnostics"]);
+        assert_eq!(fs::read(&computed).expect("written"), fs::read(&loaded).expect("written"));
+        // Nothing was built for it; a search still measures against the surface.
+        assert_eq!(again.1["substrates"], serde_json::json!({}), "{again:?}");
+    }
+    let other = at("other.hierarchy");
+    let given = ["--initial", &computed, "--spheres", "5"];
+    assert_eq!(pmat(mesh, &[&given[..], &["--save-hierarchy", &other]].concat()).0, 0);
+    assert_eq!(pmat(mesh, &[&given[..], &["--hierarchy", &other]].concat()).0, 0);
+    let cut = at("cut.hierarchy");
+    let bytes = fs::read(&all).expect("written");
+    fs::write(&cut, &bytes[..bytes.len() - 7]).expect("written");
+    let cases: [(&str, &[&str], i32, &str); 8] = [
+        (
+            "builtin:torus:21",
+            &["--hierarchy", &all],
+            1,
+            "all.hierarchy: it was made from another surface",
+        ),
+        (
+            mesh,
+            &["--hierarchy", &all, "--sampling", "blue:300"],
+            1,
+            "with --sampling vertices, not blue:300",
+        ),
+        (mesh, &["--hierarchy", &all, "--initial", &computed], 1, "without --initial"),
+        (mesh, &["--hierarchy", &other], 1, "made with --initial"),
+        (mesh, &["--hierarchy", &cut], 1, &format!("cut.hierarchy, byte {}: ", bytes.len() - 7)),
+        (mesh, &["--hierarchy", &computed], 1, "signature"),
+        (mesh, &["--hierarchy", "no-such-file"], 1, "no-such-file"),
+        (mesh, &["--save-hierarchy", "no/such/folder/x"], 1, "there is no folder"),
+    ];
+    for (mesh, more, expected, part) in cases {
+        let (code, object) = pmat(mesh, more);
+        let error = object["error"].as_str().expect("an error");
+        assert!(code == expected && error.contains(part), "{more:?}: {code}, {error}");
+    }
+    let (code, _, stderr) = run(&["simplify", mesh, "-m", "qmat", "--save-hierarchy", &all]);
+    assert!(code == 2 && stderr.contains("no hierarchy"), "{code}, {stderr}");
+    assert_eq!(fs::read(&all).expect("untouched"), bytes);
 }
 
 #[test]

@@ -69,7 +69,7 @@ use std::sync::Arc;
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Level, MedialSimplifier, MethodInfo, Params, RunContext, Simplification,
+    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, Params, RunContext, Simplification,
     Simplified, SimplifyError, Work,
 };
 
@@ -175,7 +175,8 @@ impl Simplification for Prepared {
         }
         let mesh = self.contraction.to_mesh();
         mesh.check()?;
-        Ok(Simplified { mesh, asked: level, native_level: None, work, diagnostics })
+        let extras = Extras::default();
+        Ok(Simplified { mesh, asked: level, native_level: None, work, diagnostics, extras })
     }
 }
 
@@ -204,7 +205,8 @@ impl Prepared {
             ));
         }
         let mesh = MedialMesh::clone(&self.initial);
-        Simplified { mesh, asked, native_level: None, work: Work::Anew, diagnostics }
+        let (work, extras) = (Work::Anew, Extras::default());
+        Simplified { mesh, asked, native_level: None, work, diagnostics, extras }
     }
 
     fn published_warning(&self) -> String {

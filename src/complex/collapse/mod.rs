@@ -29,6 +29,8 @@
 
 mod check;
 mod contract;
+mod heap;
+mod hierarchy;
 mod inversion;
 mod link;
 mod pool;
@@ -38,6 +40,10 @@ mod record;
 mod tests;
 
 pub use check::CollapseError;
+pub use heap::{LazyHeap, Prioritised};
+pub use hierarchy::{
+    Change, Hierarchy, HierarchyError, HierarchyFileError, HierarchyFileErrorKind, Stage, Step,
+};
 pub use queue::{Candidate, CollapseQueue};
 pub use record::{Collapse, replay};
 

@@ -2,13 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::CollapseComplex;
-
-/// Candidates up to this number are all kept in the heap.
-const FEW: usize = 1024;
-
-/// Share of the far candidates that the heap takes when it has run empty.
-const SHARE: usize = 8;
+use super::{CollapseComplex, LazyHeap, Prioritised};
 
 /// Absent index of a parked candidate.
 const NONE: u32 = u32::MAX;
@@ -68,58 +62,40 @@ impl Candidate {
     }
 }
 
+impl Prioritised for Candidate {
+    #[inline]
+    fn is_before(&self, other: &Self) -> bool {
+        Self::is_before(self, other)
+    }
+
+    fn order(&self, other: &Self) -> Ordering {
+        Self::order(self, other)
+    }
+}
+
 /// A priority queue of candidates: smallest cost first, then the second key, then the ids.
-///
-/// Only the cheapest candidates are in a heap, small enough for the cache; the others wait in no
-/// order. When the heap has run empty it takes the cheapest share of them, and those out of date
-/// are dropped then. Most candidates are out of date before their turn comes, so most are never
-/// sorted at all. Equal contents come out in the same order whatever the history.
+/// Equal contents come out in the same order whatever the history.
 #[derive(Clone, Debug, Default)]
 pub struct CollapseQueue {
-    /// Four children a node: the candidates of one family lie in two cache lines.
-    near: Vec<Candidate>,
-    /// Candidates not before `bound`.
-    far: Vec<Candidate>,
-    /// Nothing in `near` is behind it; `None` when `far` is empty.
-    bound: Option<Candidate>,
+    heap: LazyHeap<Candidate>,
     parked: Parked,
 }
 
 impl CollapseQueue {
     /// A queue of the given candidates. Cost `O(n)`.
     pub fn from_candidates(candidates: Vec<Candidate>) -> Self {
-        let mut queue = Self { far: candidates, ..Self::default() };
-        queue.refill();
-        queue
+        Self { heap: LazyHeap::from_items(candidates), ..Self::default() }
     }
 
     /// Adds a candidate.
     #[inline]
     pub fn push(&mut self, candidate: Candidate) {
-        if self.bound.is_none_or(|bound| candidate.is_before(&bound)) {
-            self.near.push(candidate);
-            self.sift_up(self.near.len() - 1);
-        } else {
-            self.far.push(candidate);
-        }
+        self.heap.push(candidate);
     }
 
     /// Takes the first candidate that is still current.
     pub fn pop(&mut self, complex: &CollapseComplex) -> Option<Candidate> {
-        // Large stars add a candidate an edge at each collapse; without this they fill the memory.
-        if self.near.len() + self.far.len() > FEW.max(4 * complex.edge_count()) {
-            self.drop_outdated(complex);
-        }
-        loop {
-            if self.near.is_empty() {
-                self.far.retain(|candidate| candidate.is_current(complex));
-                self.refill();
-            }
-            let first = self.pop_near()?;
-            if first.is_current(complex) {
-                return Some(first);
-            }
-        }
+        self.heap.pop(|candidate| candidate.is_current(complex))
     }
 
     /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of
@@ -137,84 +113,6 @@ impl CollapseQueue {
                 self.push(candidate);
             }
         }
-    }
-
-    fn drop_outdated(&mut self, complex: &CollapseComplex) {
-        self.near.retain(|candidate| candidate.is_current(complex));
-        self.far.retain(|candidate| candidate.is_current(complex));
-        self.heapify();
-    }
-
-    /// Moves the cheapest share of the far candidates into the empty heap.
-    fn refill(&mut self) {
-        self.bound = None;
-        if self.far.len() <= FEW {
-            std::mem::swap(&mut self.near, &mut self.far);
-        } else {
-            let share = FEW.max(self.far.len() / SHARE);
-            let (_, &mut bound, _) = self.far.select_nth_unstable_by(share, Candidate::order);
-            // The cheapest are in front; the last ones take their places.
-            self.near.extend_from_slice(&self.far[..share]);
-            let left = self.far.len() - share;
-            let moved = left.min(share);
-            self.far.copy_within(share + left - moved.., 0);
-            self.far.truncate(left);
-            self.bound = Some(bound);
-        }
-        self.heapify();
-    }
-
-    fn pop_near(&mut self) -> Option<Candidate> {
-        let last = self.near.pop()?;
-        let Some(first) = self.near.first().copied() else {
-            return Some(last);
-        };
-        self.near[0] = last;
-        self.sift_down(0);
-        Some(first)
-    }
-
-    fn heapify(&mut self) {
-        for index in (0..self.near.len().div_ceil(4)).rev() {
-            self.sift_down(index);
-        }
-    }
-
-    #[inline]
-    fn sift_up(&mut self, mut index: usize) {
-        let moving = self.near[index];
-        while index > 0 {
-            let parent = (index - 1) / 4;
-            if !moving.is_before(&self.near[parent]) {
-                break;
-            }
-            self.near[index] = self.near[parent];
-            index = parent;
-        }
-        self.near[index] = moving;
-    }
-
-    fn sift_down(&mut self, mut index: usize) {
-        let heap = self.near.as_mut_slice();
-        let moving = heap[index];
-        loop {
-            let first = 4 * index + 1;
-            if first >= heap.len() {
-                break;
-            }
-            let mut least = first;
-            for child in first + 1..heap.len().min(first + 4) {
-                if heap[child].is_before(&heap[least]) {
-                    least = child;
-                }
-            }
-            if !heap[least].is_before(&moving) {
-                break;
-            }
-            heap[index] = heap[least];
-            index = least;
-        }
-        heap[index] = moving;
     }
 }
 

@@ -199,7 +199,7 @@ fn out_of_date_candidates_are_dropped_and_parked_ones_come_back_once() {
 }
 
 /// A random complex with lone edges, isolated vertices and non-manifold edges.
-fn random_mesh(seed: u64) -> MedialMesh {
+pub(super) fn random_mesh(seed: u64) -> MedialMesh {
     let mut random = Pcg64::seed_from_u64(seed);
     let vertices = random.random_range(3..14_u32);
     let spheres = (0..vertices)

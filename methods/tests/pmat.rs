@@ -1,0 +1,139 @@
+//! PMAT on the medial meshes of sampled solids, and what a hierarchy is good for.
+
+use std::sync::Arc;
+
+use medial::complex::collapse::{Collapse, CollapseComplex};
+use medial::complex::collapse::{Hierarchy, Step, replay};
+use medial::complex::{MedialMesh, betti};
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError, Work,
+};
+use medial::surface;
+use medial_methods::pmat::Pmat;
+
+fn shape(id: &str, resolution: u32) -> Shape {
+    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
+    let mesh = built_in.mesh(resolution);
+    let report = surface::validate(&mesh).expect("built-in shapes are solids");
+    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+fn prepare(shape: &Shape) -> Box<dyn Simplification + '_> {
+    Pmat::new().prepare(shape, &Params::none(), &RunContext::default()).expect("prepared")
+}
+
+fn hierarchy(shape: &Shape) -> Arc<Hierarchy> {
+    let end = prepare(shape).at(Level::Published).expect("the end");
+    end.extras.hierarchy.expect("PMAT has a hierarchy")
+}
+
+#[test]
+fn levels_are_those_of_the_collapse_engine() {
+    let shape = shape("bracket", 8);
+    let hierarchy = hierarchy(&shape);
+    let initial = hierarchy.initial();
+    let record = |step: &Step| {
+        let sphere = initial.spheres[step.kept as usize];
+        Collapse { kept: step.kept, removed: step.removed, sphere }
+    };
+    let record: Vec<_> = hierarchy.steps().iter().map(record).collect();
+    let last = hierarchy.last_stage();
+    for stage in [last, 1, last / 2, last - 3, last / 3, 0] {
+        assert_eq!(hierarchy.stage(stage).to_mesh(), replay(initial, &record[..stage]), "{stage}");
+    }
+    let mut complex = CollapseComplex::from_mesh(initial);
+    for (stage, collapse) in record.iter().enumerate() {
+        let view = hierarchy.stage(stage);
+        let counts = [view.sphere_count(), view.edge_count(), view.face_count()];
+        assert_eq!(counts, [complex.sphere_count(), complex.edge_count(), complex.face_count()]);
+        complex.collapse(collapse.kept, collapse.removed, collapse.sphere);
+    }
+}
+
+#[test]
+fn a_sampled_torus_keeps_its_loop_down_to_few_spheres() {
+    let shape = shape("torus", 26);
+    let mut simplification = prepare(&shape);
+    let at_100 = simplification.at(Level::Spheres(100)).expect("a count");
+    assert_eq!(betti(&at_100.mesh)[0], 1);
+    let end = simplification.at(Level::Published).expect("the end");
+    assert_eq!((end.mesh.spheres.len(), betti(&end.mesh)), (1, [1, 0, 0]));
+    assert!(end.diagnostics.warnings[0].contains("leaves the scale to the user"));
+}
+
+#[test]
+fn levels_are_asked_in_any_order() {
+    let shape = shape("capsule", 24);
+    let initial = shape.initial().expect("an initial medial mesh").spheres.len();
+    let mut simplification = prepare(&shape);
+    for count in [50, 400, 2, 120] {
+        let level = simplification.at(Level::Spheres(count)).expect("a count");
+        assert_eq!((level.mesh.spheres.len(), level.work), (count, Work::Anew));
+        assert!(level.native_level.is_none_or(|scale| scale >= 1.0));
+    }
+    let more = simplification.at(Level::Spheres(initial + 1)).expect("a count");
+    assert_eq!((more.mesh.spheres.len(), more.diagnostics.warnings.len()), (initial, 1));
+    let mut last = usize::MAX;
+    for scale in [1.0, 1.1, 1.5, 2.0, 4.0, 1e6] {
+        let level = simplification.at(Level::Native(scale)).expect("a scale");
+        assert!(level.mesh.spheres.len() <= last, "s = {scale}");
+        assert_eq!(level.native_level.map(|used| used <= scale), Some(true));
+        last = level.mesh.spheres.len();
+    }
+    for senseless in [0.99, f64::INFINITY, f64::NAN] {
+        let refused = simplification.at(Level::Native(senseless));
+        assert!(matches!(refused, Err(SimplifyError::Level(_))), "s = {senseless}");
+    }
+}
+
+#[test]
+fn one_thread_and_two_build_the_same_hierarchy() {
+    let built = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let mut bytes = Vec::new();
+        let hierarchy = pool.install(|| hierarchy(&shape("bracket", 8)));
+        hierarchy.write_to(&mut bytes, "").expect("into memory");
+        bytes
+    });
+    assert_eq!(built[0], built[1]);
+}
+
+#[test]
+fn a_hierarchy_is_resumed_where_it_is_of_this_method() {
+    let shape = shape("capsule", 24);
+    let built = hierarchy(&shape);
+    let resume =
+        |hierarchy: &Arc<Hierarchy>| Pmat::new().resume(Arc::clone(hierarchy), &Params::none());
+    let mut resumed = resume(&built).expect("its own");
+    for level in [Level::Spheres(70), Level::Native(1.5), Level::Published] {
+        let [here, there] =
+            [&mut resumed, &mut prepare(&shape)].map(|s| s.at(level).expect("a level"));
+        assert_eq!(here.mesh, there.mesh);
+        assert_eq!(here.native_level, there.native_level);
+        assert_eq!(here.diagnostics, there.diagnostics);
+    }
+    let other = |steps: Vec<Step>| {
+        let initial: Arc<MedialMesh> = Arc::clone(built.initial());
+        Arc::new(Hierarchy::new(initial, steps).expect("collapses of edges"))
+    };
+    let mut dearer = built.steps().to_vec();
+    dearer[7].cost += 1.0;
+    let short = built.steps()[..9].to_vec();
+    for (steps, part) in [(dearer, "step 7"), (short, "edges are left")] {
+        let refused = resume(&other(steps)).err().expect("refused").to_string();
+        assert!(refused.contains(part), "{refused}");
+    }
+    let qmat = medial_methods::find("qmat").expect("registered");
+    let unsupported = qmat.resume(built, &Params::none()).err();
+    assert!(matches!(unsupported, Some(SimplifyError::Unsupported { .. })));
+}
+
+#[test]
+fn a_cancelled_run_ends_as_cancelled() {
+    let shape = shape("capsule", 24);
+    let run = RunContext::default();
+    run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+    let cancelled = Pmat::new().prepare(&shape, &Params::none(), &run);
+    assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));
+}

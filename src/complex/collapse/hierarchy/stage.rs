@@ -1,0 +1,200 @@
+//! Views on a hierarchy: one stage, and what lies between two.
+
+use std::ops::Range;
+
+use super::Hierarchy;
+use crate::complex::MedialMesh;
+
+/// The mesh after a number of collapses, its vertices named by their ranks.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage<'h> {
+    hierarchy: &'h Hierarchy,
+    stage: usize,
+}
+
+impl<'h> Stage<'h> {
+    pub(super) fn new(hierarchy: &'h Hierarchy, stage: usize) -> Self {
+        let last = hierarchy.last_stage();
+        assert!(stage <= last, "stage {stage} of {last}");
+        Self { hierarchy, stage }
+    }
+
+    /// Number of collapses up to here.
+    pub fn index(&self) -> usize {
+        self.stage
+    }
+
+    /// Number of spheres. Cost `O(1)`, as of the other counts.
+    pub fn sphere_count(&self) -> usize {
+        self.hierarchy.by_rank.len() - self.stage
+    }
+
+    /// Number of edges.
+    pub fn edge_count(&self) -> usize {
+        self.hierarchy.edges.count(self.stage)
+    }
+
+    /// Number of faces.
+    pub fn face_count(&self) -> usize {
+        self.hierarchy.faces.count(self.stage)
+    }
+
+    /// The ranks of the spheres. Cost `O(1)`.
+    pub fn spheres(&self) -> Range<u32> {
+        self.stage as u32..self.hierarchy.by_rank.len() as u32
+    }
+
+    /// The edges, as ascending pairs of ranks, in no particular but a deterministic order. Cost:
+    /// in proportion to their number, for degrees that are bounded in the mean.
+    pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
+        self.hierarchy.edges.at(self.stage)
+    }
+
+    /// The faces, as ascending triples of ranks, in no particular but a deterministic order. Cost
+    /// as of the edges.
+    pub fn faces(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
+        self.hierarchy.faces.at(self.stage)
+    }
+
+    /// The stage as a mesh of its own, in canonical form, without contacts; the spheres keep the
+    /// order that they have in the initial mesh. Bit for bit that of
+    /// [`replay`](super::super::replay). Cost: `O(k log d)` for `k` simplices at the stage and
+    /// degrees up to `d`; two threads are used where there are.
+    pub fn to_mesh(&self) -> MedialMesh {
+        let Hierarchy { initial, edges, faces, by_rank, .. } = self.hierarchy;
+        if self.stage == 0 {
+            let MedialMesh { spheres, edges, faces, .. } = initial.as_ref();
+            let (spheres, edges, faces) = (spheres.clone(), edges.clone(), faces.clone());
+            return MedialMesh { spheres, edges, faces, contacts: None };
+        }
+        let left = self.in_initial_order();
+        let mut new = vec![0; by_rank.len()];
+        for (place, &(_, rank)) in (0..).zip(&left) {
+            new[rank as usize] = place;
+        }
+        let (edges, faces) = rayon::join(
+            || in_order(edges.at(self.stage), self.edge_count(), left.len(), &new),
+            || in_order(faces.at(self.stage), self.face_count(), left.len(), &new),
+        );
+        let spheres = left.iter().map(|&(vertex, _)| initial.spheres[vertex as usize]).collect();
+        MedialMesh { spheres, edges, faces, contacts: None }
+    }
+
+    /// Indices in the initial mesh and ranks of the spheres, by ascending index.
+    fn in_initial_order(&self) -> Vec<(u32, u32)> {
+        let Hierarchy { ranks, by_rank, .. } = self.hierarchy;
+        let mut left = Vec::with_capacity(self.sphere_count());
+        // Sorting few costs less than passing over all.
+        if self.sphere_count() < ranks.len() / 16 {
+            left.extend(self.spheres().map(|rank| (by_rank[rank as usize], rank)));
+            left.sort_unstable();
+        } else {
+            let all = (0..).zip(ranks.iter().copied());
+            left.extend(all.filter(|&(_, rank)| rank as usize >= self.stage));
+        }
+        left
+    }
+}
+
+/// Simplices, their ranks replaced by new numbers, in lexicographic order: dealt out by their first
+/// vertices, then sorted at each.
+fn in_order<const K: usize>(
+    simplices: impl Iterator<Item = [u32; K]>,
+    count: usize,
+    vertices: usize,
+    new: &[u32],
+) -> Vec<[u32; K]> {
+    let mut renumbered = Vec::with_capacity(count);
+    let mut places = vec![0_u32; vertices + 1];
+    for simplex in simplices {
+        let mut simplex = simplex.map(|rank| new[rank as usize]);
+        simplex.sort_unstable();
+        places[simplex[0] as usize + 1] += 1;
+        renumbered.push(simplex);
+    }
+    for vertex in 0..vertices {
+        places[vertex + 1] += places[vertex];
+    }
+    let mut sorted = vec![[0; K]; renumbered.len()];
+    for simplex in renumbered {
+        let place = &mut places[simplex[0] as usize];
+        sorted[*place as usize] = simplex;
+        *place += 1;
+    }
+    // Each place has moved on to where the next vertex began.
+    let mut start = 0;
+    for &end in &places[..vertices] {
+        sorted[start..end as usize].sort_unstable();
+        start = end as usize;
+    }
+    sorted
+}
+
+/// What comes and goes on the way from one stage to another, in either direction, vertices named
+/// by their ranks. The lists are in no particular but a deterministic order. Cost: in proportion
+/// to what the collapses between the stages change, or to the finer stage, whichever is less.
+#[derive(Clone, Copy, Debug)]
+pub struct Change<'h> {
+    hierarchy: &'h Hierarchy,
+    fine: usize,
+    coarse: usize,
+    backward: bool,
+}
+
+impl<'h> Change<'h> {
+    pub(super) fn new(hierarchy: &'h Hierarchy, from: usize, to: usize) -> Self {
+        let last = hierarchy.last_stage();
+        assert!(from.max(to) <= last, "stages {from} and {to} of {last}");
+        Self { hierarchy, fine: from.min(to), coarse: from.max(to), backward: from > to }
+    }
+
+    /// The ranks of the spheres that go, in the order of the collapses.
+    pub fn spheres_removed(&self) -> Range<u32> {
+        self.spheres(!self.backward)
+    }
+
+    /// The ranks of the spheres that come; that which was removed first comes last.
+    pub fn spheres_added(&self) -> std::iter::Rev<Range<u32>> {
+        self.spheres(self.backward).rev()
+    }
+
+    /// The edges that go.
+    pub fn edges_removed(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
+        self.edges(!self.backward)
+    }
+
+    /// The edges that come.
+    pub fn edges_added(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
+        self.edges(self.backward)
+    }
+
+    /// The faces that go.
+    pub fn faces_removed(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
+        self.faces(!self.backward)
+    }
+
+    /// The faces that come.
+    pub fn faces_added(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
+        self.faces(self.backward)
+    }
+
+    /// The spheres that only the finer stage has, or only the coarser one.
+    fn spheres(&self, of_fine: bool) -> Range<u32> {
+        let end = if of_fine { self.coarse } else { self.fine };
+        self.fine as u32..end as u32
+    }
+
+    fn edges(&self, of_fine: bool) -> impl Iterator<Item = [u32; 2]> + 'h {
+        let (layer, Self { fine, coarse, .. }) = (&self.hierarchy.edges, *self);
+        let dying = of_fine.then(|| layer.dying(fine, coarse));
+        let arising = (!of_fine).then(|| layer.arising(fine, coarse));
+        dying.into_iter().flatten().chain(arising.into_iter().flatten())
+    }
+
+    fn faces(&self, of_fine: bool) -> impl Iterator<Item = [u32; 3]> + 'h {
+        let (layer, Self { fine, coarse, .. }) = (&self.hierarchy.faces, *self);
+        let dying = of_fine.then(|| layer.dying(fine, coarse));
+        let arising = (!of_fine).then(|| layer.arising(fine, coarse));
+        dying.into_iter().flatten().chain(arising.into_iter().flatten())
+    }
+}

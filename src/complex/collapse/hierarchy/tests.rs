@@ -1,0 +1,248 @@
+//! Every stage against [`replay`] and the engine; files against what can happen to them.
+
+use std::collections::BTreeSet;
+
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::super::tests::random_mesh;
+use super::super::{Collapse, CollapseComplex, replay};
+use super::*;
+use crate::complex::Sphere;
+
+/// Random collapses of a random mesh into either end, the record of the engine, and how many
+/// violate the link condition up to each stage.
+fn random_steps(seed: u64) -> (Arc<MedialMesh>, Vec<Step>, Vec<Collapse>, Vec<usize>) {
+    let initial = random_mesh(seed);
+    let mut random = Pcg64::seed_from_u64(seed ^ 7);
+    let mut complex = CollapseComplex::from_mesh(&initial).recording();
+    let (mut steps, mut violations) = (Vec::new(), vec![0]);
+    let most = random.random_range(0..initial.spheres.len());
+    while complex.edge_count() > 0 && steps.len() < most {
+        let edges: Vec<_> = complex.edges().collect();
+        let [mut removed, mut kept] = edges[random.random_range(0..edges.len())];
+        if random.random_bool(0.5) {
+            std::mem::swap(&mut removed, &mut kept);
+        }
+        let violates = !complex.link_condition(removed, kept);
+        violations.push(violations[steps.len()] + usize::from(violates));
+        complex.collapse(kept, removed, complex.sphere(kept));
+        steps.push(Step { removed, kept, cost: random.random_range(0.0..2.0) });
+    }
+    (Arc::new(initial), steps, complex.record().to_vec(), violations)
+}
+
+/// The simplices of a stage, and what a change makes of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Simplices {
+    spheres: BTreeSet<u32>,
+    edges: BTreeSet<[u32; 2]>,
+    faces: BTreeSet<[u32; 3]>,
+}
+
+impl Simplices {
+    fn of(stage: Stage<'_>) -> Self {
+        let all = Self {
+            spheres: stage.spheres().collect(),
+            edges: stage.edges().collect(),
+            faces: stage.faces().collect(),
+        };
+        let counts = [all.spheres.len(), all.edges.len(), all.faces.len()];
+        assert_eq!(counts, [stage.sphere_count(), stage.edge_count(), stage.face_count()]);
+        let listed = [stage.spheres().len(), stage.edges().count(), stage.faces().count()];
+        assert_eq!(counts, listed, "a simplex is listed twice");
+        all
+    }
+
+    fn apply(&mut self, change: &Change<'_>) {
+        apply(&mut self.spheres, change.spheres_removed(), change.spheres_added());
+        apply(&mut self.edges, change.edges_removed(), change.edges_added());
+        apply(&mut self.faces, change.faces_removed(), change.faces_added());
+    }
+}
+
+fn apply<T: Ord + std::fmt::Debug>(
+    to: &mut BTreeSet<T>,
+    removed: impl Iterator<Item = T>,
+    added: impl Iterator<Item = T>,
+) {
+    for simplex in removed {
+        assert!(to.remove(&simplex), "{simplex:?} goes but was not there");
+    }
+    for simplex in added {
+        assert!(!to.contains(&simplex), "{simplex:?} comes but was there");
+        to.insert(simplex);
+    }
+}
+
+fn path() -> Hierarchy {
+    let sphere = |i: u32| Sphere::new(crate::Vec3::new(f64::from(i), 0.0, 0.0), 0.25);
+    let mesh = MedialMesh::from_simplices(
+        (0..5).map(sphere).collect(),
+        vec![[3, 4]],
+        vec![[0, 1, 2], [1, 2, 3]],
+    );
+    let step = |removed, kept, cost| Step { removed, kept, cost };
+    let steps = vec![step(1, 2, 0.5), step(4, 3, f64::INFINITY), step(3, 2, 1.5)];
+    Hierarchy::new(Arc::new(mesh.unwrap()), steps).unwrap()
+}
+
+#[test]
+fn a_small_hierarchy_by_hand() {
+    let hierarchy = path();
+    assert_eq!(hierarchy.by_rank(), [1, 4, 3, 0, 2]);
+    let meshes: Vec<_> = (0..=3).map(|t| hierarchy.stage(t).to_mesh()).collect();
+    assert_eq!(meshes[0], **hierarchy.initial());
+    assert_eq!(meshes[1].edges, [[0, 1], [1, 2], [2, 3]]);
+    assert_eq!(meshes[2].edges, [[0, 1], [1, 2]]);
+    assert_eq!(meshes[3].edges, [[0, 1]]);
+    assert!(meshes[1..].iter().all(|mesh| mesh.faces.is_empty()));
+    assert_eq!(hierarchy.violations_until(3), 0);
+}
+
+#[test]
+fn what_is_no_collapse_of_an_edge_is_refused() {
+    let initial = path().initial().clone();
+    let step = |removed, kept| Step { removed, kept, cost: 1.0 };
+    let refused = |steps: &[Step]| Hierarchy::new(initial.clone(), steps.to_vec()).unwrap_err();
+    assert_eq!(refused(&[step(5, 0)]), HierarchyError::Vertex { step: 0, vertex: 5 });
+    assert_eq!(refused(&[step(0, 4)]), HierarchyError::Edge { step: 0, removed: 0, kept: 4 });
+    assert_eq!(refused(&[step(2, 2)]), HierarchyError::Edge { step: 0, removed: 2, kept: 2 });
+    let gone = [step(0, 1), step(2, 0)];
+    assert_eq!(refused(&gone), HierarchyError::Vertex { step: 1, vertex: 0 });
+    let nan = [Step { cost: f64::NAN, ..step(0, 1) }];
+    assert_eq!(refused(&nan), HierarchyError::Cost { step: 0 });
+}
+
+proptest! {
+    /// Each stage is bit for bit what the engine had then, whatever was asked before.
+    #[test]
+    fn stages_are_those_of_the_engine(seed in any::<u64>()) {
+        let (initial, steps, record, violations) = random_steps(seed);
+        let hierarchy = Hierarchy::new(Arc::clone(&initial), steps.clone()).unwrap();
+        for stage in (0..=steps.len()).rev() {
+            let mesh = hierarchy.stage(stage).to_mesh();
+            mesh.check().unwrap();
+            prop_assert_eq!(&mesh, &replay(&initial, &record[..stage]));
+            prop_assert_eq!(hierarchy.violations_until(stage), violations[stage]);
+        }
+    }
+
+    /// From any stage to any other by what comes and goes between them; there and back is nothing.
+    #[test]
+    fn changes_lead_from_stage_to_stage(seed in any::<u64>()) {
+        let (initial, steps, ..) = random_steps(seed);
+        let hierarchy = Hierarchy::new(initial, steps).unwrap();
+        let stages: Vec<_> =
+            (0..=hierarchy.last_stage()).map(|t| Simplices::of(hierarchy.stage(t))).collect();
+        for (from, start) in stages.iter().enumerate() {
+            for (to, end) in stages.iter().enumerate() {
+                let mut way = start.clone();
+                way.apply(&hierarchy.change(from, to));
+                prop_assert_eq!(&way, end, "from {} to {}", from, to);
+                way.apply(&hierarchy.change(to, from));
+                prop_assert_eq!(&way, start, "from {} to {} and back", from, to);
+            }
+        }
+    }
+
+    #[test]
+    fn files_hold_all_of_it(seed in any::<u64>(), label in ".{0,20}") {
+        let (initial, steps, ..) = random_steps(seed);
+        let hierarchy = Hierarchy::new(initial, steps).unwrap();
+        let mut bytes = Vec::new();
+        hierarchy.write_to(&mut bytes, &label).unwrap();
+        prop_assert_eq!(Hierarchy::parse(&bytes, "x").unwrap(), (hierarchy, label));
+    }
+
+    /// Noise is refused, and so is a file with noise behind a valid beginning.
+    #[test]
+    fn noise_is_refused(noise in prop::collection::vec(any::<u8>(), 0..400), keep in 0..60_usize) {
+        let mut bytes = bytes_of(&path());
+        bytes.truncate(keep);
+        bytes.extend(noise);
+        prop_assert!(Hierarchy::parse(&bytes, "x").is_err());
+    }
+}
+
+fn bytes_of(hierarchy: &Hierarchy) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    hierarchy.write_to(&mut bytes, "a label").unwrap();
+    bytes
+}
+
+#[test]
+fn every_damaged_byte_and_every_cut_is_found() {
+    use HierarchyFileErrorKind as Kind;
+    let bytes = bytes_of(&path());
+    for place in 0..bytes.len() {
+        for bit in [0x01, 0x80] {
+            let mut damaged = bytes.clone();
+            damaged[place] ^= bit;
+            let error = Hierarchy::parse(&damaged, "x").unwrap_err();
+            assert!(error.offset <= place as u64, "{error} for byte {place}");
+            let expected = match error.kind {
+                Kind::Signature => place < 8,
+                Kind::Version(_) => (8..12).contains(&place),
+                Kind::Checksum { part } => place >= 8 && (part == "header") == (place < 36),
+                _ => false,
+            };
+            assert!(expected, "{error} for byte {place}");
+        }
+        let error = Hierarchy::parse(&bytes[..place], "x").unwrap_err();
+        assert!(matches!(error.kind, Kind::Length { .. }), "{error} for {place} bytes");
+        assert_eq!(error.offset, place as u64);
+        assert!(error.to_string().starts_with(&format!("x, byte {place}: ")), "{error}");
+    }
+    let longer = [&bytes[..], &[0]].concat();
+    let error = Hierarchy::parse(&longer, "x").unwrap_err();
+    assert!(matches!(error.kind, Kind::Length { .. }) && error.offset == bytes.len() as u64);
+}
+
+/// The bytes with another number at `place`, and the checksum of its part made to fit.
+fn forged(place: usize, number: &[u8], part: std::ops::Range<usize>) -> Vec<u8> {
+    let mut bytes = bytes_of(&path());
+    bytes[place..place + number.len()].copy_from_slice(number);
+    let checksum = crc32fast::hash(&bytes[part.clone()]).to_le_bytes();
+    bytes[part.end..part.end + 4].copy_from_slice(&checksum);
+    bytes
+}
+
+#[test]
+fn forged_files_are_refused_at_the_place() {
+    let lying = forged(16, &u32::MAX.to_le_bytes(), 0..32);
+    let error = Hierarchy::parse(&lying, "x").unwrap_err();
+    assert!(error.to_string().contains("the header announces 137438953"), "{error}");
+    // Header 36, label 7 + 4, spheres 5 * 32 + 4, edges 6 * 8 + 4, faces 2 * 12 + 4, steps 3 * 16.
+    let (spheres, edges, faces) = (47, 211, 263);
+    let steps = 291;
+    assert_eq!(bytes_of(&path()).len(), steps + 48 + 4);
+    let nan = f64::NAN.to_le_bytes();
+    let cases: [(usize, &[u8], std::ops::Range<usize>, usize); 6] = [
+        (38, &[0xff], 36..43, 38),
+        (spheres + 32 + 8, &nan, spheres..spheres + 160, spheres + 32),
+        (edges + 8, &[9], edges..edges + 48, edges + 8),
+        (faces + 12, &[0], faces..faces + 24, faces + 12),
+        (steps + 16, &[1], steps..steps + 48, steps + 16),
+        (steps + 32 + 8, &nan, steps..steps + 48, steps + 32),
+    ];
+    for (place, number, part, offset) in cases {
+        let error = Hierarchy::parse(&forged(place, number, part), "x").unwrap_err();
+        assert_eq!(error.offset, offset as u64, "{error}");
+    }
+}
+
+#[test]
+fn files_are_written_and_read() {
+    let folder = std::env::temp_dir().join(format!("medial-hierarchy-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("path.hierarchy");
+    path().write(&file, "label").unwrap();
+    assert_eq!(Hierarchy::read(&file).unwrap(), (path(), "label".to_owned()));
+    let missing = Hierarchy::read(folder.join("missing")).unwrap_err();
+    assert!(missing.to_string().contains("missing: "), "{missing}");
+    let no_file = Hierarchy::read(&folder).unwrap_err().to_string();
+    assert!(no_file.ends_with("not a regular file"), "{no_file}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
