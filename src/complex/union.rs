@@ -331,7 +331,8 @@ impl Measure for Unsigned {
     /// largest.
     #[inline]
     fn bound(node: &Node, p: Vec3) -> f64 {
-        signed_bound(node, p).max(depth_bound(node, p)).max(0.0)
+        let outside = signed_bound(node, p);
+        if outside > 0.0 { outside } else { depth_bound(node, p).max(0.0) }
     }
 }
 

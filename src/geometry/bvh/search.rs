@@ -36,7 +36,9 @@ impl Tree {
             if node.count > 0 {
                 search.visit(first..first + node.count as usize);
             } else {
-                let bounds = [first, first + 1].map(|child| search.bound(&self.nodes[child]));
+                // Not by `map`, which is not inlined here.
+                let bounds =
+                    [search.bound(&self.nodes[first]), search.bound(&self.nodes[first + 1])];
                 let near = usize::from(bounds[1] < bounds[0]);
                 let limit = search.limit();
                 if bounds[near] <= limit {
