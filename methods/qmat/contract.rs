@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::accumulate::{Skipped, initial_quadrics};
 use super::params::QmatParams;
 use super::quadric::Quadric;
+use super::unlock::Cluster;
 
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 4096;
@@ -135,13 +136,15 @@ impl Contraction {
         let first = self.tally.collapses;
         while self.sphere_count() > target {
             let Some(cheapest) = self.queue.pop(&self.complex) else {
-                let Some((ends, sphere)) = self.unlock(initial) else { break };
-                self.tally.unlocked += 1;
-                self.merge(ends, sphere);
+                let Some(Cluster { first, others, sphere }) = self.unlock(initial) else { break };
+                self.tally.unlocked += others.len();
+                others.iter().fold(first, |kept, &v| self.merge([kept, v], sphere));
                 continue;
             };
             match self.decide(cheapest) {
-                Decision::Collapse(sphere) => self.merge(cheapest.ends(), sphere),
+                Decision::Collapse(sphere) => {
+                    self.merge(cheapest.ends(), sphere);
+                }
                 Decision::Postpone(dearer) => {
                     self.tally.postponed += 1;
                     self.queue.push(dearer);
@@ -203,8 +206,9 @@ impl Contraction {
         Decision::Fold(faces)
     }
 
-    /// Step 5: the collapse, the sum of the quadrics, new costs for the edges of the merged sphere.
-    fn merge(&mut self, [a, b]: [u32; 2], sphere: Sphere) {
+    /// Step 5: the collapse, the sum of the quadrics, new costs for the edges of the merged sphere,
+    /// whose id is returned.
+    fn merge(&mut self, [a, b]: [u32; 2], sphere: Sphere) -> u32 {
         let Self { params, complex, quadrics, queue, tally, .. } = self;
         let degree = |v| complex.neighbours(v).len();
         // The smaller star is renamed, so that a large one is not rewritten for each small one.
@@ -223,6 +227,7 @@ impl Contraction {
         queue.wake(complex, kept);
         queue.wake(complex, removed);
         tally.collapses += 1;
+        kept
     }
 
     /// Largest error of a sphere left, over the slabs it stands for.
@@ -289,7 +294,7 @@ fn priced(complex: &CollapseComplex, params: &QmatParams, ends: [u32; 2], error:
 }
 
 /// Whether two centres are one point up to rounding.
-fn are_coincident(a: Sphere, b: Sphere) -> bool {
+pub(super) fn are_coincident(a: Sphere, b: Sphere) -> bool {
     a.centre.distance_squared(b.centre) < ZERO_LENGTH * ZERO_LENGTH
 }
 

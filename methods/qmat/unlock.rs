@@ -5,36 +5,82 @@
 //! taken when it brings them no farther from those of the initial mesh. So a void that was closed
 //! off before the topology was watched can be filled again, and a knot of spheres in which each
 //! edge violates the condition in two ways that cancel can be contracted.
+//!
+//! Spheres whose centres are one point up to rounding can be such a knot that no single edge
+//! undoes. They are contracted together, on the same terms: as points in space they are one.
+
+use std::collections::HashSet;
 
 use medial::complex::collapse::{Candidate, Collapse, replay};
 use medial::complex::{MedialMesh, Sphere, betti};
 
-use super::contract::{Contraction, Decision};
+use super::contract::{Contraction, Decision, are_coincident};
 
 /// Spheres up to which Betti numbers are computed for single collapses.
 const SMALL: usize = 500;
 
+/// Spheres that become one: the others are merged into the first in their order, each of which then
+/// shares an edge with it.
+pub(super) struct Cluster {
+    pub first: u32,
+    pub others: Vec<u32>,
+    pub sphere: Sphere,
+}
+
 impl Contraction {
     /// The cheapest edge whose collapse violates the link condition but not the topology of
-    /// `initial`, and where its merged sphere goes. `None` when there is none.
-    pub(super) fn unlock(&mut self, initial: &MedialMesh) -> Option<([u32; 2], Sphere)> {
+    /// `initial`, else the first such cluster of coincident spheres. `None` when there is neither.
+    pub(super) fn unlock(&mut self, initial: &MedialMesh) -> Option<Cluster> {
         if self.sphere_count() > SMALL || !self.keeps_topology() {
             return None;
         }
         let goal = betti(initial);
         let mesh = self.to_mesh();
         let ids: Vec<u32> = self.complex().vertices().collect();
+        let place = |id: u32| ids.partition_point(|&other| other < id) as u32;
         let now = difference(betti(&mesh), goal);
-        for candidate in self.sorted_candidates() {
-            let Some(sphere) = self.placement_whatever_the_topology(candidate) else { continue };
-            let [removed, kept] =
-                candidate.ends().map(|v| ids.partition_point(|&id| id < v) as u32);
-            let after = replay(&mesh, &[Collapse { kept, removed, sphere }]);
-            if difference(betti(&after), goal) <= now {
-                return Some((candidate.ends(), sphere));
+        let keeps = |cluster: &Cluster| {
+            let kept = place(cluster.first);
+            let collapse = |&v: &u32| Collapse { kept, removed: place(v), sphere: cluster.sphere };
+            let collapses: Vec<Collapse> = cluster.others.iter().map(collapse).collect();
+            difference(betti(&replay(&mesh, &collapses)), goal) <= now
+        };
+        let edges = self.sorted_candidates().into_iter().filter_map(|candidate| {
+            let [first, other] = candidate.ends();
+            let sphere = self.placement_whatever_the_topology(candidate)?;
+            Some(Cluster { first, others: vec![other], sphere })
+        });
+        edges.chain(self.coincident_clusters()).find(keeps)
+    }
+
+    /// The connected sets of three and more spheres whose centres are one point, in the order of
+    /// their smallest ids.
+    fn coincident_clusters(&self) -> Vec<Cluster> {
+        let complex = self.complex();
+        let mut seen = HashSet::new();
+        let mut clusters = Vec::new();
+        for first in complex.vertices() {
+            if !seen.insert(first) {
+                continue;
+            }
+            let mut members = vec![first];
+            let mut next = 0;
+            while next < members.len() {
+                let v = members[next];
+                next += 1;
+                // Lists of neighbours are in no particular but a deterministic order.
+                for &w in complex.neighbours(v) {
+                    if are_coincident(complex.sphere(v), complex.sphere(w)) && seen.insert(w) {
+                        members.push(w);
+                    }
+                }
+            }
+            if members.len() > 2 {
+                let others = members.split_off(1);
+                clusters.push(Cluster { first, others, sphere: complex.sphere(first) });
             }
         }
-        None
+        clusters
     }
 
     /// Where the merged sphere of an edge goes, if anywhere without folding a face over.
