@@ -73,6 +73,17 @@ impl ContactSets {
         read(&points)
     }
 
+    /// Number of spheres.
+    #[allow(clippy::len_without_is_empty)]
+    pub fn len(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// The boundary samples that the ids of [`ContactSets::ids`] name.
+    pub fn samples(&self) -> &Arc<[Vec3]> {
+        &self.samples
+    }
+
     /// The sample ids of a sphere's contacts.
     pub fn ids(&self, sphere: usize) -> &[u32] {
         &self.ids[self.start[sphere]..self.start[sphere + 1]]
