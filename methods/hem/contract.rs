@@ -200,7 +200,7 @@ impl Contraction {
     /// The link condition for the edge, the inversion test for each direction.
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
-        if !self.complex.link_condition(a, b) {
+        if !self.complex.keeps_homotopy(a, b) {
             self.tally.held_by_topology += 1;
             edge.bar(0);
             edge.bar(1);
@@ -299,7 +299,7 @@ impl Contraction {
         if edges.is_empty() {
             return "no edge is left, each sphere is a component of its own".to_owned();
         }
-        let by_topology = edges.iter().filter(|&&[a, b]| !self.complex.link_condition(a, b));
+        let by_topology = edges.iter().filter(|&&[a, b]| !self.complex.keeps_homotopy(a, b));
         let by_topology = by_topology.count();
         let by_inversion = edges.len() - by_topology;
         format!(
