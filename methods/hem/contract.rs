@@ -1,18 +1,14 @@
 //! The contraction: the edge of smallest Hausdorff error first, the survivor stays where it is.
 
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
-use std::sync::Arc;
-
-use medial::Vec3;
 use medial::complex::MedialMesh;
 use medial::complex::collapse::{Candidate, Collapse, CollapseComplex, CollapseQueue};
-use medial::shape::ContactSets;
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 use rayon::prelude::*;
 
-use super::edge::{Edge, Ground};
+use super::edge::{Edge, Ground, NONE};
+use super::edges::{Edges, ascending};
 use super::params::{HemParams, Inside};
+use super::samples::SampleLists;
 use super::star::Star;
 
 /// Collapses between two reports of progress.
@@ -25,9 +21,7 @@ const JOB: usize = 4096;
 pub(super) struct Contraction {
     inside: Inside,
     complex: CollapseComplex,
-    samples: Arc<[Vec3]>,
-    /// For each sphere the ids of its samples, ascending.
-    lists: Vec<Vec<u32>>,
+    samples: SampleLists,
     edges: Edges,
     queue: CollapseQueue,
     star: Star,
@@ -35,9 +29,6 @@ pub(super) struct Contraction {
     largest: f64,
     tally: Tally,
 }
-
-/// Edges by their ends, ascending. Never iterated.
-type Edges = HashMap<[u32; 2], Edge, BuildHasherDefault<EndsHasher>>;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +42,6 @@ pub(super) enum Stop {
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     evaluations: usize,
-    refinements: usize,
     held_by_topology: usize,
     held_by_inversion: usize,
 }
@@ -70,18 +60,11 @@ struct Change {
 
 impl Contraction {
     /// Step 1: the samples of each sphere and the errors of all edges.
-    pub(super) fn new(mesh: &MedialMesh, contacts: &ContactSets, params: HemParams) -> Self {
-        let lists = (0..mesh.spheres.len()).map(|v| {
-            let mut list = contacts.ids(v).to_vec();
-            list.sort_unstable();
-            list.dedup();
-            list
-        });
+    pub(super) fn new(mesh: &MedialMesh, samples: SampleLists, params: HemParams) -> Self {
         let mut contraction = Self {
             inside: params.inside,
             complex: CollapseComplex::from_mesh(mesh).recording(),
-            samples: Arc::clone(contacts.samples()),
-            lists: lists.collect(),
+            samples,
             edges: Edges::default(),
             queue: CollapseQueue::default(),
             star: Star::new(mesh.spheres.len()),
@@ -94,13 +77,13 @@ impl Contraction {
 
     fn evaluate_all(&mut self, all: &[[u32; 2]]) {
         let ground = self.ground();
-        let vertices = self.lists.len();
+        let vertices = self.samples.spheres();
         let jobs: Vec<(Vec<Edge>, u64)> = all
             .par_chunks(JOB)
             .map(|chunk| {
                 let mut star = Star::new(vertices);
                 let evaluated = chunk.iter().map(|&ends| {
-                    let mut edge = Edge::unknown(u32::MAX);
+                    let mut edge = Edge::unknown(NONE);
                     edge.evaluate(&ground, ends, f64::INFINITY, &mut star);
                     edge.queued = edge.key(ground.complex, ends);
                     edge
@@ -120,7 +103,7 @@ impl Contraction {
     }
 
     fn ground(&self) -> Ground<'_> {
-        ground(&self.complex, &self.samples, &self.lists, self.inside)
+        Ground { complex: &self.complex, samples: &self.samples, inside: self.inside }
     }
 
     /// Number of spheres left.
@@ -141,6 +124,18 @@ impl Contraction {
     /// The collapses so far.
     pub(super) fn record(&self) -> &[Collapse] {
         self.complex.record()
+    }
+
+    /// What is known of an edge.
+    #[cfg(test)]
+    pub(super) fn known(&self, ends: [u32; 2]) -> Option<Edge> {
+        self.edges.get(&ends).copied()
+    }
+
+    /// The samples as they are assigned now.
+    #[cfg(test)]
+    pub(super) fn samples(&self) -> &SampleLists {
+        &self.samples
     }
 
     /// Steps 2 to 4, until told to stop or no edge may be collapsed.
@@ -184,11 +179,13 @@ impl Contraction {
 
     /// Bars the directions that fail a test, evaluates the others, and queues the edge again.
     fn refine(&mut self, ends: [u32; 2], mut edge: Edge) {
-        self.tally.refinements += 1;
-        self.bar(ends, &mut edge);
-        if !edge.is_barred() {
+        if !edge.tested {
+            self.bar(ends, &mut edge);
+        }
+        if edge.is_open() {
             let cutoff = self.queue.peek(&self.complex).map_or(f64::INFINITY, |next| next.cost());
-            let ground = ground(&self.complex, &self.samples, &self.lists, self.inside);
+            let ground =
+                Ground { complex: &self.complex, samples: &self.samples, inside: self.inside };
             edge.evaluate(&ground, ends, cutoff, &mut self.star);
             self.tally.evaluations += 1;
         }
@@ -200,6 +197,7 @@ impl Contraction {
     /// The link condition for the edge, the inversion test for each direction.
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
+        edge.tested = true;
         if !self.complex.keeps_homotopy(a, b) {
             self.tally.held_by_topology += 1;
             edge.bar(0);
@@ -220,8 +218,7 @@ impl Contraction {
         let change = self.take_apart(ends[survivor], ends[1 - survivor]);
         let Change { kept, removed, .. } = change;
         self.complex.collapse(kept, removed, self.complex.sphere(kept));
-        let gone = std::mem::take(&mut self.lists[removed as usize]);
-        self.lists[kept as usize] = merged(&self.lists[kept as usize], &gone);
+        self.samples.assign(removed, kept);
         let all = self.complex.neighbours(kept).len();
         for index in 0..all {
             let other = self.complex.neighbours(kept)[index];
@@ -257,17 +254,17 @@ impl Contraction {
     /// An edge of the survivor: its star gained that of the removed vertex. The queue has dropped
     /// it, because the collapse moved the stamp of the survivor.
     fn renew_at_survivor(&mut self, change: &Change, other: u32) {
-        let Self { complex, samples, lists, edges, queue, star, .. } = self;
-        let ground = ground(complex, samples, lists, self.inside);
+        let Self { complex, samples, edges, queue, star, inside, .. } = self;
+        let ground = Ground { complex, samples, inside: *inside };
         let ends = ascending(change.kept, other);
         let edge = edges.entry(ends).or_insert_with(|| {
             // It was an edge of the removed vertex, and had witnesses then.
             let place = change.around.binary_search(&other).expect("a neighbour of one of both");
-            let mut edge = Edge::unknown(u32::MAX);
+            let mut edge = Edge::unknown(NONE);
             edge.sound(&ground, ends, change.witnesses[place], star);
             edge
         });
-        let added = change.around.iter().map(|&x| [x, u32::MAX]);
+        let added = change.around.iter().map(|&x| [x, NONE]);
         let added = added.chain(change.sides.iter().copied());
         let added = added.filter(|simplex| !simplex.contains(&other));
         star.distances += edge.renew(&ground, ends, change.removed, added);
@@ -278,8 +275,8 @@ impl Contraction {
     /// Another edge of a neighbour of the removed vertex: simplices of its star have the survivor
     /// now where they had the removed vertex.
     fn renew_beside(&mut self, change: &Change, [v, other]: [u32; 2]) {
-        let Self { complex, samples, lists, edges, queue, star, .. } = self;
-        let ground = ground(complex, samples, lists, self.inside);
+        let Self { complex, samples, edges, queue, star, inside, .. } = self;
+        let ground = Ground { complex, samples, inside: *inside };
         let ends = ascending(v, other);
         let edge = edges.get_mut(&ends).expect("every edge is stored");
         let is_end = |x: u32| x == v || x == other;
@@ -288,7 +285,7 @@ impl Contraction {
             (false, true) => Some([change.kept, x]),
             _ => None,
         });
-        let added = std::iter::once([change.kept, u32::MAX]).chain(opposite);
+        let added = std::iter::once([change.kept, NONE]).chain(opposite);
         star.distances += edge.renew(&ground, ends, change.removed, added);
         enqueue(queue, complex, ends, edge);
     }
@@ -311,13 +308,13 @@ impl Contraction {
 
     /// Counts of the whole run so far.
     pub(super) fn diagnose(&self, diagnostics: &mut Diagnostics) {
-        let Self { tally, lists, star, .. } = self;
+        let Self { tally, samples, star, .. } = self;
         diagnostics.count("collapses", self.record().len());
         diagnostics.count("evaluations", tally.evaluations);
         diagnostics.count("rejected_by_link_condition", tally.held_by_topology);
         diagnostics.count("rejected_by_inversion", tally.held_by_inversion);
         diagnostics.count("primitive_distances", star.distances as usize);
-        diagnostics.count("assigned_samples", lists.iter().map(Vec::len).sum());
+        diagnostics.count("assigned_samples", samples.assigned());
     }
 }
 
@@ -327,58 +324,5 @@ fn enqueue(queue: &mut CollapseQueue, complex: &CollapseComplex, ends: [u32; 2],
     if !edge.is_barred() && key < edge.queued {
         edge.queued = key;
         queue.push(Candidate::new(complex, ends, key.0, key.1));
-    }
-}
-
-fn ground<'a>(
-    complex: &'a CollapseComplex,
-    samples: &'a [Vec3],
-    lists: &'a [Vec<u32>],
-    inside: Inside,
-) -> Ground<'a> {
-    Ground { complex, samples, lists, inside }
-}
-
-fn ascending(a: u32, b: u32) -> [u32; 2] {
-    [a.min(b), a.max(b)]
-}
-
-/// The union of two ascending lists.
-fn merged(a: &[u32], b: &[u32]) -> Vec<u32> {
-    let mut union = Vec::with_capacity(a.len() + b.len());
-    let (mut a, mut b) = (a, b);
-    while let ([x, ..], [y, ..]) = (a, b) {
-        union.push(*x.min(y));
-        let (skip_a, skip_b) = (usize::from(x <= y), usize::from(y <= x));
-        (a, b) = (&a[skip_a..], &b[skip_b..]);
-    }
-    union.extend_from_slice(a);
-    union.extend_from_slice(b);
-    union
-}
-
-/// Hash of two ids: multiply and mix.
-#[derive(Default)]
-struct EndsHasher(u64);
-
-impl Hasher for EndsHasher {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.write_u32(u32::from(byte));
-        }
-    }
-
-    #[inline]
-    fn write_u32(&mut self, id: u32) {
-        let mixed = (self.0 ^ u64::from(id)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        self.0 = mixed ^ (mixed >> 29);
-    }
-
-    fn write_usize(&mut self, _length: usize) {
-        // Of an array: always the same.
     }
 }

@@ -19,19 +19,19 @@
 //! to the witness cannot be nearer ([`super::star`]), so most are not even built.
 
 use medial::Vec3;
-use medial::complex::Sphere;
 use medial::complex::collapse::CollapseComplex;
 use medial::geometry::{Cone, SlabFace};
 
 use super::params::Inside;
+use super::samples::SampleLists;
 use super::star::{Nearest, ROUNDING, Star, excess_of};
 
 /// Absent index.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// Errors below this are rounding, in units of the diagonal, and count as zero: equal costs are
 /// ordered by the size of the stars.
-const NOISE: f64 = 1e-14;
+pub(super) const NOISE: f64 = 1e-14;
 
 /// One direction of an edge.
 #[derive(Clone, Copy, Debug)]
@@ -64,18 +64,14 @@ pub(super) struct Edge {
     pub into: [Directed; 2],
     /// Cost and second key of the candidate in the queue; infinite when there is none.
     pub queued: (f64, f64),
+    /// Whether both directions passed the tests, or are barred.
+    pub tested: bool,
 }
 
 impl Directed {
     /// Nothing known but a sample to begin with.
     pub(super) fn unknown(witness: u32) -> Self {
-        Self {
-            witness,
-            signed: 0.0,
-            towards: Vec3::X,
-            nearest: [u32::MAX; 2],
-            state: State::AtLeast,
-        }
+        Self { witness, signed: 0.0, towards: Vec3::X, nearest: [NONE; 2], state: State::AtLeast }
     }
 
     /// Lower bound of the error, the error itself when exact.
@@ -84,6 +80,12 @@ impl Directed {
             State::Barred => f64::INFINITY,
             _ => self.signed.abs(),
         }
+    }
+
+    /// What is known of the error, barred or not.
+    #[cfg(test)]
+    pub(super) fn bound(&self) -> f64 {
+        self.signed.abs()
     }
 
     fn set(&mut self, star: &Star, witness: u32, p: Vec3, nearest: &Nearest, state: State) {
@@ -105,17 +107,18 @@ impl Directed {
 #[derive(Clone, Copy)]
 pub(super) struct Ground<'a> {
     pub complex: &'a CollapseComplex,
-    /// All samples.
-    pub samples: &'a [Vec3],
-    /// For each sphere the ids of its samples, ascending.
-    pub lists: &'a [Vec<u32>],
+    pub samples: &'a SampleLists,
     pub inside: Inside,
 }
 
 impl Edge {
     /// An edge of which nothing is known.
     pub(super) fn unknown(witness: u32) -> Self {
-        Self { into: [Directed::unknown(witness); 2], queued: (f64::INFINITY, f64::INFINITY) }
+        Self {
+            into: [Directed::unknown(witness); 2],
+            queued: (f64::INFINITY, f64::INFINITY),
+            tested: false,
+        }
     }
 
     /// The smaller of both errors, or a lower bound of it.
@@ -135,17 +138,22 @@ impl Edge {
         (0.0, -1.0 / (m + n) as f64)
     }
 
-    /// Which end survives (0 or 1) at the smaller error, when that is known exactly. The smaller id
-    /// survives in a tie.
+    /// Which end survives (0 or 1) at the smaller error, when that is known exactly and the direction
+    /// passed the tests. The smaller id survives in a tie.
     pub(super) fn decided(&self) -> Option<usize> {
         let [a, b] = self.into.map(|d| d.error());
         let better = usize::from(b < a);
-        (self.into[better].state == State::Exact).then_some(better)
+        (self.tested && self.into[better].state == State::Exact).then_some(better)
     }
 
     /// Whether no direction is left.
     pub(super) fn is_barred(&self) -> bool {
         self.into.iter().all(|d| d.state == State::Barred)
+    }
+
+    /// Whether the error of some direction is not known.
+    pub(super) fn is_open(&self) -> bool {
+        self.into.iter().any(|d| d.state == State::AtLeast)
     }
 
     /// Marks a direction as failing its tests, until [`Edge::renew`].
@@ -163,6 +171,7 @@ impl Edge {
         gone: u32,
         added: impl Iterator<Item = [u32; 2]> + Clone,
     ) -> u64 {
+        self.tested = false;
         let mut distances = 0;
         for (directed, hub) in self.into.iter_mut().zip(ends) {
             directed.state = State::AtLeast;
@@ -208,8 +217,8 @@ impl Edge {
         for (directed, end) in self.into.iter_mut().zip(ends) {
             star.set_hub(ground.complex.sphere(end));
             *directed = Directed::unknown(witnesses[0]);
-            for witness in witnesses.into_iter().filter(|&w| w != u32::MAX) {
-                directed.raise(star, witness, ground.samples[witness as usize], ground.inside);
+            for witness in witnesses.into_iter().filter(|&w| w != NONE) {
+                directed.raise(star, witness, ground.samples.point(witness), ground.inside);
             }
         }
     }
@@ -223,11 +232,11 @@ impl Directed {
         limit: f64,
         star: &mut Star,
     ) {
-        let first = Some(self.witness).filter(|&w| w != u32::MAX);
-        *self = Self { state: State::Exact, ..Self::unknown(u32::MAX) };
-        let [removed, kept] = [removed, kept].map(|v| ground.lists[v as usize].iter().copied());
+        let first = Some(self.witness).filter(|&w| w != NONE);
+        *self = Self { state: State::Exact, ..Self::unknown(NONE) };
+        let [removed, kept] = [removed, kept].map(|v| ground.samples.of(v).iter().copied());
         for id in first.into_iter().chain(removed).chain(kept) {
-            let p = ground.samples[id as usize];
+            let p = ground.samples.point(id);
             let floor = self.error();
             let nearest = star.nearest(p, floor, ground.inside);
             if nearest.signed.abs() > floor {
@@ -258,17 +267,17 @@ impl Directed {
             return 0;
         }
         let mut tests = 0;
-        let p = ground.samples[self.witness as usize];
+        let p = ground.samples.point(self.witness);
         let hub = ground.complex.sphere(hub);
         let hub_excess = excess_of(&hub, p, self.towards);
         for [x, y] in added {
             let limit = ROUNDING - self.signed;
-            let [m, n] = [x, y].map(|v| ground.complex.sphere(if v == u32::MAX { x } else { v }));
+            let [m, n] = [x, y].map(|v| ground.complex.sphere(if v == NONE { x } else { v }));
             let rim = excess_of(&m, p, self.towards).max(excess_of(&n, p, self.towards));
             if rim.max(hub_excess) <= limit {
                 continue;
             }
-            let single = y == u32::MAX;
+            let single = y == NONE;
             if single {
                 tests += 1;
                 self.lower(Cone::new(hub, m).signed_distance(p), [x, y], ground.inside);

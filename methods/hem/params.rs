@@ -1,6 +1,6 @@
 //! The parameters of HEM.
 
-use medial::simplifier::{ParamInfo, SimplifyError};
+use medial::simplifier::ParamInfo;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of HEM.
@@ -24,10 +24,6 @@ pub enum Inside {
 }
 
 impl HemParams {
-    pub(super) fn validate(self) -> Result<Self, SimplifyError> {
-        Ok(self)
-    }
-
     pub(super) fn describe() -> Vec<ParamInfo> {
         vec![ParamInfo {
             name: "inside",

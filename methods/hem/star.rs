@@ -44,8 +44,8 @@ pub(super) struct Star {
     /// Excess of each link vertex.
     excess: Vec<f64>,
     /// Number of the query that last evaluated the cone to each link vertex.
-    tested: Vec<u32>,
-    query: u32,
+    tested: Vec<u64>,
+    query: u64,
     cones: Built<Cone>,
     faces: Built<Option<SlabFace>>,
     rims: Built<Cone>,
@@ -134,15 +134,14 @@ impl Star {
     fn deepest(&mut self, p: Vec3, floor: f64) -> Nearest {
         let mut best = self.at_hub(p);
         self.query += 1;
-        let mut towards = best.towards(p);
+        let mut hub = self.measure_excess(p, best.towards(p));
         for _ in 0..ROUNDS {
-            let Some(k) = self.largest_excess(p, towards, limit(best.signed, floor)) else { break };
+            let Some(k) = self.largest_excess(limit(best.signed, floor)) else { break };
             self.tested[k] = self.query;
             if best.improve(self.cone(k).nearest_centre(p), [k as u32, NONE]) {
-                towards = best.towards(p);
+                hub = self.measure_excess(p, best.towards(p));
             }
         }
-        let hub = self.measure_excess(p, towards);
         for k in 0..self.link.len() {
             let limit = limit(best.signed, floor);
             if self.tested[k] != self.query && (hub > limit || self.excess[k] > limit) {
@@ -212,11 +211,10 @@ impl Star {
     }
 
     /// The link vertex of largest excess beyond `limit`, of those whose cone is not yet evaluated.
-    fn largest_excess(&self, p: Vec3, towards: Vec3, limit: f64) -> Option<usize> {
+    fn largest_excess(&self, limit: f64) -> Option<usize> {
         let (mut largest, mut place) = (limit, None);
-        for (k, m) in self.spheres.iter().enumerate() {
-            let excess = excess_of(m, p, towards);
-            if excess > largest && self.tested[k] != self.query {
+        for (k, (&excess, &tested)) in self.excess.iter().zip(&self.tested).enumerate() {
+            if excess > largest && tested != self.query {
                 (largest, place) = (excess, Some(k));
             }
         }

@@ -74,8 +74,7 @@ impl ContactSets {
     }
 
     /// Number of spheres.
-    #[allow(clippy::len_without_is_empty)]
-    pub fn len(&self) -> usize {
+    pub fn spheres(&self) -> usize {
         self.start.len() - 1
     }
 
