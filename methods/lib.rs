@@ -7,6 +7,7 @@ use medial::simplifier::MedialSimplifier;
 
 pub mod angle;
 pub mod dey_zhao;
+pub mod hem;
 pub mod lambda;
 pub mod pmat;
 pub mod qmat;
@@ -21,6 +22,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(dey_zhao::DeyZhao::new()),
         Box::new(qmat::Qmat::new()),
         Box::new(pmat::Pmat::new()),
+        Box::new(hem::Hem::new()),
     ]
 }
 

@@ -94,8 +94,11 @@ impl Slab {
 }
 
 /// The part of a slab between its two tangent triangles, without the cones of its sides.
+///
+/// For whoever evaluates the cones anyway: the distance to the slab is the least of the three cones'
+/// and of this part's, where it has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SlabFace {
+pub struct SlabFace {
     frame: PlanarFrame,
     /// Radius at the origin of the frame.
     radius: f64,
@@ -108,7 +111,8 @@ pub(crate) struct SlabFace {
 }
 
 impl SlabFace {
-    /// `None` when no two planes touch all three balls from outside.
+    /// `None` when no two planes touch all three balls from outside: the slab is the union of its
+    /// three cones.
     pub fn new(spheres: [Sphere; 3]) -> Option<Self> {
         let (frame, first) = PlanarFrame::new(spheres.map(|m| m.centre));
         if frame.is_flat() {
@@ -142,6 +146,20 @@ impl SlabFace {
         }
         let distance = (dx * dx + dy * dy + height * height).sqrt();
         Some(distance - self.radius_at(x, y))
+    }
+
+    /// As [`SlabFace::signed_distance`], with the centre of the sphere that attains it.
+    #[inline]
+    pub fn nearest_centre(&self, p: Vec3) -> Option<(f64, Vec3)> {
+        let [x, y, height] = self.frame.local(p);
+        let ahead = height.abs() * self.lead;
+        let [dx, dy] = [ahead * self.gradient[0], ahead * self.gradient[1]];
+        let (x, y) = (x + dx, y + dy);
+        if !self.frame.contains(x, y) {
+            return None;
+        }
+        let distance = (dx * dx + dy * dy + height * height).sqrt();
+        Some((distance - self.radius_at(x, y), self.frame.point(x, y)))
     }
 
     #[inline]

@@ -73,6 +73,16 @@ impl ContactSets {
         read(&points)
     }
 
+    /// Number of spheres.
+    pub fn spheres(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// The boundary samples that the ids of [`ContactSets::ids`] name.
+    pub fn samples(&self) -> &Arc<[Vec3]> {
+        &self.samples
+    }
+
     /// The sample ids of a sphere's contacts.
     pub fn ids(&self, sphere: usize) -> &[u32] {
         &self.ids[self.start[sphere]..self.start[sphere + 1]]

@@ -98,6 +98,15 @@ impl CollapseQueue {
         self.heap.pop(|candidate| candidate.is_current(complex))
     }
 
+    /// The first candidate that is still current, left in its place: what the next
+    /// [`CollapseQueue::pop`] will take.
+    pub fn peek(&mut self, complex: &CollapseComplex) -> Option<Candidate> {
+        let first = self.pop(complex)?;
+        // It came from the front of the heap, so it is before `bound` if there is one.
+        self.push(first);
+        Some(first)
+    }
+
     /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of
     /// `obstacles`: the vertices without a change at which it would be rejected again.
     pub fn park(&mut self, candidate: Candidate, obstacles: &[u32]) {

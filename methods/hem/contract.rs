@@ -1,0 +1,328 @@
+//! The contraction: the edge of smallest Hausdorff error first, the survivor stays where it is.
+
+use medial::complex::MedialMesh;
+use medial::complex::collapse::{Candidate, Collapse, CollapseComplex, CollapseQueue};
+use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use rayon::prelude::*;
+
+use super::edge::{Edge, Ground, NONE};
+use super::edges::{Edges, ascending};
+use super::params::{HemParams, Inside};
+use super::samples::SampleLists;
+use super::star::Star;
+
+/// Collapses between two reports of progress.
+const REPORT_EVERY: usize = 256;
+
+/// Edges of a parallel job: each job has scratch of the size of the complex.
+const JOB: usize = 4096;
+
+/// A medial mesh under contraction.
+pub(super) struct Contraction {
+    inside: Inside,
+    complex: CollapseComplex,
+    samples: SampleLists,
+    edges: Edges,
+    queue: CollapseQueue,
+    star: Star,
+    /// Largest error of a collapse so far.
+    largest: f64,
+    tally: Tally,
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Stop {
+    /// At a number of spheres.
+    Spheres(usize),
+    /// Before the first collapse of a larger error.
+    Error(f64),
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    evaluations: usize,
+    held_by_topology: usize,
+    held_by_inversion: usize,
+}
+
+/// The vertices whose star a collapse changes, as they were before.
+struct Change {
+    kept: u32,
+    removed: u32,
+    /// Neighbours of the removed vertex but the kept one.
+    around: Vec<u32>,
+    /// Sides opposite the removed vertex.
+    sides: Vec<[u32; 2]>,
+    /// The witnesses of the edges that vanish, in the order of `around`.
+    witnesses: Vec<[u32; 2]>,
+}
+
+impl Contraction {
+    /// Step 1: the samples of each sphere and the errors of all edges.
+    pub(super) fn new(mesh: &MedialMesh, samples: SampleLists, params: HemParams) -> Self {
+        let mut contraction = Self {
+            inside: params.inside,
+            complex: CollapseComplex::from_mesh(mesh).recording(),
+            samples,
+            edges: Edges::default(),
+            queue: CollapseQueue::default(),
+            star: Star::new(mesh.spheres.len()),
+            largest: 0.0,
+            tally: Tally::default(),
+        };
+        contraction.evaluate_all(&mesh.edges);
+        contraction
+    }
+
+    fn evaluate_all(&mut self, all: &[[u32; 2]]) {
+        let ground = self.ground();
+        let vertices = self.samples.spheres();
+        let jobs: Vec<(Vec<Edge>, u64)> = all
+            .par_chunks(JOB)
+            .map(|chunk| {
+                let mut star = Star::new(vertices);
+                let evaluated = chunk.iter().map(|&ends| {
+                    let mut edge = Edge::unknown(NONE);
+                    edge.evaluate(&ground, ends, f64::INFINITY, &mut star);
+                    edge.queued = edge.key(ground.complex, ends);
+                    edge
+                });
+                (evaluated.collect(), star.distances)
+            })
+            .collect();
+        let edges = jobs.iter().flat_map(|(edges, _)| edges);
+        let candidates = all.iter().zip(edges.clone()).map(|(&ends, edge)| {
+            Candidate::new(ground.complex, ends, edge.queued.0, edge.queued.1)
+        });
+        let queue = CollapseQueue::from_candidates(candidates.collect());
+        let edges = all.iter().copied().zip(edges.copied()).collect();
+        self.star.distances += jobs.iter().map(|(_, distances)| distances).sum::<u64>();
+        (self.queue, self.edges) = (queue, edges);
+        self.tally.evaluations += all.len();
+    }
+
+    fn ground(&self) -> Ground<'_> {
+        Ground { complex: &self.complex, samples: &self.samples, inside: self.inside }
+    }
+
+    /// Number of spheres left.
+    pub(super) fn sphere_count(&self) -> usize {
+        self.complex.sphere_count()
+    }
+
+    /// Largest error of a collapse so far.
+    pub(super) fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    /// The mesh as it is now.
+    pub(super) fn to_mesh(&self) -> MedialMesh {
+        self.complex.to_mesh()
+    }
+
+    /// The collapses so far.
+    pub(super) fn record(&self) -> &[Collapse] {
+        self.complex.record()
+    }
+
+    /// What is known of an edge.
+    #[cfg(test)]
+    pub(super) fn known(&self, ends: [u32; 2]) -> Option<Edge> {
+        self.edges.get(&ends).copied()
+    }
+
+    /// The samples as they are assigned now.
+    #[cfg(test)]
+    pub(super) fn samples(&self) -> &SampleLists {
+        &self.samples
+    }
+
+    /// Steps 2 to 4, until told to stop or no edge may be collapsed.
+    pub(super) fn run_to(&mut self, stop: Stop, run: &RunContext) -> Result<(), SimplifyError> {
+        let target = if let Stop::Spheres(target) = stop { target } else { 1 };
+        let bound = if let Stop::Error(bound) = stop { bound } else { f64::INFINITY };
+        let total = self.sphere_count().saturating_sub(target);
+        let first = self.record().len();
+        while self.sphere_count() > target {
+            let Some((cheapest, survivor)) = self.cheapest(bound) else { break };
+            self.collapse(cheapest.ends(), survivor);
+            self.largest = self.largest.max(cheapest.cost());
+            let done = self.record().len() - first;
+            if done.is_multiple_of(REPORT_EVERY) {
+                run.step(done, total)?;
+            }
+        }
+        run.step(total, total)
+    }
+
+    /// Step 2: the edge of smallest error, if that is within the bound, and which end survives.
+    fn cheapest(&mut self, bound: f64) -> Option<(Candidate, usize)> {
+        loop {
+            let candidate = self.queue.pop(&self.complex)?;
+            let ends = candidate.ends();
+            let edge = self.edges[&ends];
+            if edge.queued.0.total_cmp(&candidate.cost()).is_ne() {
+                continue;
+            }
+            if candidate.cost() > bound {
+                self.queue.push(candidate);
+                return None;
+            }
+            let now = edge.key(&self.complex, ends);
+            if let Some(survivor) = edge.decided().filter(|_| now == edge.queued) {
+                return Some((candidate, survivor));
+            }
+            self.refine(ends, edge);
+        }
+    }
+
+    /// Bars the directions that fail a test, evaluates the others, and queues the edge again.
+    fn refine(&mut self, ends: [u32; 2], mut edge: Edge) {
+        if !edge.tested {
+            self.bar(ends, &mut edge);
+        }
+        if edge.is_open() {
+            let cutoff = self.queue.peek(&self.complex).map_or(f64::INFINITY, |next| next.cost());
+            let ground =
+                Ground { complex: &self.complex, samples: &self.samples, inside: self.inside };
+            edge.evaluate(&ground, ends, cutoff, &mut self.star);
+            self.tally.evaluations += 1;
+        }
+        edge.queued = (f64::INFINITY, f64::INFINITY);
+        enqueue(&mut self.queue, &self.complex, ends, &mut edge);
+        self.edges.insert(ends, edge);
+    }
+
+    /// The link condition for the edge, the inversion test for each direction.
+    fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
+        let [a, b] = ends;
+        edge.tested = true;
+        if !self.complex.keeps_homotopy(a, b) {
+            self.tally.held_by_topology += 1;
+            edge.bar(0);
+            edge.bar(1);
+            return;
+        }
+        for (survivor, kept) in ends.into_iter().enumerate() {
+            let centre = self.complex.sphere(kept).centre;
+            if self.complex.folded_face(a, b, centre).is_some() {
+                self.tally.held_by_inversion += 1;
+                edge.bar(survivor);
+            }
+        }
+    }
+
+    /// Steps 3 and 4: the collapse, the samples, the edges whose stars it changes.
+    fn collapse(&mut self, ends: [u32; 2], survivor: usize) {
+        let change = self.take_apart(ends[survivor], ends[1 - survivor]);
+        let Change { kept, removed, .. } = change;
+        self.complex.collapse(kept, removed, self.complex.sphere(kept));
+        self.samples.assign(removed, kept);
+        let all = self.complex.neighbours(kept).len();
+        for index in 0..all {
+            let other = self.complex.neighbours(kept)[index];
+            self.renew_at_survivor(&change, other);
+        }
+        for &v in &change.around {
+            for index in 0..self.complex.neighbours(v).len() {
+                let other = self.complex.neighbours(v)[index];
+                // An edge between two neighbours of the removed vertex is renewed once.
+                if other != kept && (v < other || change.around.binary_search(&other).is_err()) {
+                    self.renew_beside(&change, [v, other]);
+                }
+            }
+        }
+    }
+
+    /// What a collapse changes; the edges of the removed vertex are forgotten.
+    fn take_apart(&mut self, kept: u32, removed: u32) -> Change {
+        let mut around = self.complex.neighbours(removed).to_vec();
+        around.retain(|&v| v != kept);
+        around.sort_unstable();
+        let mut sides = self.complex.opposite_sides(removed).to_vec();
+        sides.retain(|side| !side.contains(&kept));
+        self.edges.remove(&ascending(kept, removed));
+        let witnesses = around.iter().map(|&v| {
+            let edge = self.edges.remove(&ascending(v, removed)).expect("every edge is stored");
+            edge.into.map(|directed| directed.witness)
+        });
+        let witnesses = witnesses.collect();
+        Change { kept, removed, around, sides, witnesses }
+    }
+
+    /// An edge of the survivor: its star gained that of the removed vertex. The queue has dropped
+    /// it, because the collapse moved the stamp of the survivor.
+    fn renew_at_survivor(&mut self, change: &Change, other: u32) {
+        let Self { complex, samples, edges, queue, star, inside, .. } = self;
+        let ground = Ground { complex, samples, inside: *inside };
+        let ends = ascending(change.kept, other);
+        let edge = edges.entry(ends).or_insert_with(|| {
+            // It was an edge of the removed vertex, and had witnesses then.
+            let place = change.around.binary_search(&other).expect("a neighbour of one of both");
+            let mut edge = Edge::unknown(NONE);
+            edge.sound(&ground, ends, change.witnesses[place], star);
+            edge
+        });
+        let added = change.around.iter().map(|&x| [x, NONE]);
+        let added = added.chain(change.sides.iter().copied());
+        let added = added.filter(|simplex| !simplex.contains(&other));
+        star.distances += edge.renew(&ground, ends, change.removed, added);
+        edge.queued = (f64::INFINITY, f64::INFINITY);
+        enqueue(queue, complex, ends, edge);
+    }
+
+    /// Another edge of a neighbour of the removed vertex: simplices of its star have the survivor
+    /// now where they had the removed vertex.
+    fn renew_beside(&mut self, change: &Change, [v, other]: [u32; 2]) {
+        let Self { complex, samples, edges, queue, star, inside, .. } = self;
+        let ground = Ground { complex, samples, inside: *inside };
+        let ends = ascending(v, other);
+        let edge = edges.get_mut(&ends).expect("every edge is stored");
+        let is_end = |x: u32| x == v || x == other;
+        let opposite = change.sides.iter().filter_map(|&[x, y]| match (is_end(x), is_end(y)) {
+            (true, false) => Some([change.kept, y]),
+            (false, true) => Some([change.kept, x]),
+            _ => None,
+        });
+        let added = std::iter::once([change.kept, NONE]).chain(opposite);
+        star.distances += edge.renew(&ground, ends, change.removed, added);
+        enqueue(queue, complex, ends, edge);
+    }
+
+    /// Why no further edge may be collapsed, for the user.
+    pub(super) fn why_stopped(&mut self) -> String {
+        let edges: Vec<_> = self.complex.edges().collect();
+        if edges.is_empty() {
+            return "no edge is left, each sphere is a component of its own".to_owned();
+        }
+        let by_topology = edges.iter().filter(|&&[a, b]| !self.complex.keeps_homotopy(a, b));
+        let by_topology = by_topology.count();
+        let by_inversion = edges.len() - by_topology;
+        format!(
+            "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \
+             and {by_inversion} would fold a face over",
+            edges.len()
+        )
+    }
+
+    /// Counts of the whole run so far.
+    pub(super) fn diagnose(&self, diagnostics: &mut Diagnostics) {
+        let Self { tally, samples, star, .. } = self;
+        diagnostics.count("collapses", self.record().len());
+        diagnostics.count("evaluations", tally.evaluations);
+        diagnostics.count("rejected_by_link_condition", tally.held_by_topology);
+        diagnostics.count("rejected_by_inversion", tally.held_by_inversion);
+        diagnostics.count("primitive_distances", star.distances as usize);
+        diagnostics.count("assigned_samples", samples.assigned());
+    }
+}
+
+/// Queues an edge where it comes earlier than it is queued.
+fn enqueue(queue: &mut CollapseQueue, complex: &CollapseComplex, ends: [u32; 2], edge: &mut Edge) {
+    let key = edge.key(complex, ends);
+    if !edge.is_barred() && key < edge.queued {
+        edge.queued = key;
+        queue.push(Candidate::new(complex, ends, key.0, key.1));
+    }
+}

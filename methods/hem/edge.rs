@@ -1,0 +1,306 @@
+//! What is known of the two directed contraction errors of an edge.
+//!
+//! The error `e(i -> j)` is the largest distance of the samples `B_i` and `B_j` to the hypothetical
+//! star of `j`. Known of it is the distance of one sample, the *witness*, hence a lower bound; when
+//! the edge is the cheapest one left, all samples are asked ([`Edge::evaluate`]).
+//!
+//! # Why the bound can be kept without looking at the star again
+//!
+//! A collapse elsewhere takes primitives from the star and adds some. Let `s` be the witness's least
+//! signed distance.
+//! - `s >= 0`: afterwards it is at least the least of `s` and the distances to the added ones. If
+//!   that is negative, the witness lies inside an added primitive, at least so deep.
+//! - `s < 0`, and the primitive that holds the witness is still there: it is at least so deep.
+//!   Otherwise nothing is known, and the bound is 0.
+//! - With [`Inside::Surface`] the least distance to a surface is at least the least of the old one
+//!   and of those to the added primitives, whatever was taken away.
+//!
+//! An added primitive whose balls have no excess in the direction from the old nearest primitive
+//! to the witness cannot be nearer ([`super::star`]), so most are not even built.
+
+use medial::Vec3;
+use medial::complex::collapse::CollapseComplex;
+use medial::geometry::{Cone, SlabFace};
+
+use super::params::Inside;
+use super::samples::SampleLists;
+use super::star::{Nearest, ROUNDING, Star, excess_of};
+
+/// Absent index.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Errors below this are rounding, in units of the diagonal, and count as zero: equal costs are
+/// ordered by the size of the stars.
+pub(super) const NOISE: f64 = 1e-14;
+
+/// One direction of an edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Directed {
+    /// The sample that the bound is from.
+    pub witness: u32,
+    /// Its signed distance; of unknown sign, hence 0, when nothing is known.
+    signed: f64,
+    /// Unit vector from its nearest primitive.
+    towards: Vec3,
+    /// Vertices of its nearest primitive beside the survivor.
+    nearest: [u32; 2],
+    state: State,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// The error is at least the distance of the witness.
+    AtLeast,
+    /// The distance of the witness is the error.
+    Exact,
+    /// The direction fails the link condition or the inversion test.
+    Barred,
+}
+
+/// An edge in the queue.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge {
+    /// Into the smaller id, into the larger.
+    pub into: [Directed; 2],
+    /// Cost and second key of the candidate in the queue; infinite when there is none.
+    pub queued: (f64, f64),
+    /// Whether both directions passed the tests, or are barred.
+    pub tested: bool,
+}
+
+impl Directed {
+    /// Nothing known but a sample to begin with.
+    pub(super) fn unknown(witness: u32) -> Self {
+        Self { witness, signed: 0.0, towards: Vec3::X, nearest: [NONE; 2], state: State::AtLeast }
+    }
+
+    /// Lower bound of the error, the error itself when exact.
+    pub(super) fn error(&self) -> f64 {
+        match self.state {
+            State::Barred => f64::INFINITY,
+            _ => self.signed.abs(),
+        }
+    }
+
+    /// What is known of the error, barred or not.
+    #[cfg(test)]
+    pub(super) fn bound(&self) -> f64 {
+        self.signed.abs()
+    }
+
+    fn set(&mut self, star: &Star, witness: u32, p: Vec3, nearest: &Nearest, state: State) {
+        let towards = nearest.towards(p);
+        let vertices = star.vertices(nearest);
+        *self = Self { witness, signed: nearest.signed, towards, nearest: vertices, state };
+    }
+
+    /// Takes over a sample of larger distance as the witness of a star that was gathered.
+    fn raise(&mut self, star: &mut Star, witness: u32, p: Vec3, inside: Inside) {
+        let nearest = star.nearest(p, 0.0, inside);
+        if nearest.signed.abs() > self.signed.abs() {
+            self.set(star, witness, p, &nearest, State::AtLeast);
+        }
+    }
+}
+
+/// What every evaluation reads.
+#[derive(Clone, Copy)]
+pub(super) struct Ground<'a> {
+    pub complex: &'a CollapseComplex,
+    pub samples: &'a SampleLists,
+    pub inside: Inside,
+}
+
+impl Edge {
+    /// An edge of which nothing is known.
+    pub(super) fn unknown(witness: u32) -> Self {
+        Self {
+            into: [Directed::unknown(witness); 2],
+            queued: (f64::INFINITY, f64::INFINITY),
+            tested: false,
+        }
+    }
+
+    /// The smaller of both errors, or a lower bound of it.
+    pub(super) fn error(&self) -> f64 {
+        self.into[0].error().min(self.into[1].error())
+    }
+
+    /// Cost and second key: errors of mere rounding are zero, and then small stars go first.
+    /// Clusters that grow evenly rarely violate the link condition, one hub that swallows its
+    /// neighbours soon does.
+    pub(super) fn key(&self, complex: &CollapseComplex, ends: [u32; 2]) -> (f64, f64) {
+        let error = self.error();
+        if error >= NOISE {
+            return (error, 0.0);
+        }
+        let [m, n] = ends.map(|v| complex.neighbours(v).len());
+        (0.0, -1.0 / (m + n) as f64)
+    }
+
+    /// Which end survives (0 or 1) at the smaller error, when that is known exactly and the direction
+    /// passed the tests. The smaller id survives in a tie.
+    pub(super) fn decided(&self) -> Option<usize> {
+        let [a, b] = self.into.map(|d| d.error());
+        let better = usize::from(b < a);
+        (self.tested && self.into[better].state == State::Exact).then_some(better)
+    }
+
+    /// Whether no direction is left.
+    pub(super) fn is_barred(&self) -> bool {
+        self.into.iter().all(|d| d.state == State::Barred)
+    }
+
+    /// Whether the error of some direction is not known.
+    pub(super) fn is_open(&self) -> bool {
+        self.into.iter().any(|d| d.state == State::AtLeast)
+    }
+
+    /// Marks a direction as failing its tests, until [`Edge::renew`].
+    pub(super) fn bar(&mut self, survivor: usize) {
+        self.into[survivor].state = State::Barred;
+    }
+
+    /// After a collapse beside it: primitives with `gone` left the star, and others came: a cone for
+    /// each of `added`, by its link vertex, or with two a slab and its rim. What was exact is a bound
+    /// now, and what was barred is to be tested again. Returns the number of distances computed.
+    pub(super) fn renew(
+        &mut self,
+        ground: &Ground<'_>,
+        ends: [u32; 2],
+        gone: u32,
+        added: impl Iterator<Item = [u32; 2]> + Clone,
+    ) -> u64 {
+        self.tested = false;
+        let mut distances = 0;
+        for (directed, hub) in self.into.iter_mut().zip(ends) {
+            directed.state = State::AtLeast;
+            distances += directed.renew(ground, hub, gone, added.clone());
+        }
+        distances
+    }
+
+    /// Errors of the directions that are not barred: all samples, as long as the error does not
+    /// exceed `cutoff` (then it is a bound above it) or that of the other direction.
+    pub(super) fn evaluate(
+        &mut self,
+        ground: &Ground<'_>,
+        ends: [u32; 2],
+        cutoff: f64,
+        star: &mut Star,
+    ) {
+        star.gather(ground.complex, ends);
+        let first = usize::from(self.into[1].error() < self.into[0].error());
+        // Up to the noise all errors have the same cost.
+        let mut limit = cutoff.max(NOISE);
+        for survivor in [first, 1 - first] {
+            if self.into[survivor].state != State::AtLeast {
+                continue;
+            }
+            star.set_hub(ground.complex.sphere(ends[survivor]));
+            self.into[survivor].evaluate(ground, [ends[1 - survivor], ends[survivor]], limit, star);
+            if self.into[survivor].state == State::Exact {
+                limit = limit.min(self.into[survivor].error());
+            }
+        }
+    }
+
+    /// The better of two witnesses in each direction, of the star that the edge has now.
+    pub(super) fn sound(
+        &mut self,
+        ground: &Ground<'_>,
+        ends: [u32; 2],
+        witnesses: [u32; 2],
+        star: &mut Star,
+    ) {
+        star.gather(ground.complex, ends);
+        for (directed, end) in self.into.iter_mut().zip(ends) {
+            star.set_hub(ground.complex.sphere(end));
+            *directed = Directed::unknown(witnesses[0]);
+            for witness in witnesses.into_iter().filter(|&w| w != NONE) {
+                directed.raise(star, witness, ground.samples.point(witness), ground.inside);
+            }
+        }
+    }
+}
+
+impl Directed {
+    fn evaluate(
+        &mut self,
+        ground: &Ground<'_>,
+        [removed, kept]: [u32; 2],
+        limit: f64,
+        star: &mut Star,
+    ) {
+        let first = Some(self.witness).filter(|&w| w != NONE);
+        *self = Self { state: State::Exact, ..Self::unknown(NONE) };
+        let [removed, kept] = [removed, kept].map(|v| ground.samples.of(v).iter().copied());
+        for id in first.into_iter().chain(removed).chain(kept) {
+            let p = ground.samples.point(id);
+            let floor = self.error();
+            let nearest = star.nearest(p, floor, ground.inside);
+            if nearest.signed.abs() > floor {
+                self.set(star, id, p, &nearest, State::Exact);
+                if self.error() > limit {
+                    self.state = State::AtLeast;
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Keeps the bound valid; see [`Edge::renew`].
+    fn renew(
+        &mut self,
+        ground: &Ground<'_>,
+        hub: u32,
+        gone: u32,
+        added: impl Iterator<Item = [u32; 2]>,
+    ) -> u64 {
+        if self.signed < 0.0 {
+            if self.nearest.contains(&gone) {
+                self.signed = 0.0;
+            }
+            return 0;
+        }
+        if self.signed == 0.0 {
+            return 0;
+        }
+        let mut tests = 0;
+        let p = ground.samples.point(self.witness);
+        let hub = ground.complex.sphere(hub);
+        let hub_excess = excess_of(&hub, p, self.towards);
+        for [x, y] in added {
+            let limit = ROUNDING - self.signed;
+            let [m, n] = [x, y].map(|v| ground.complex.sphere(if v == NONE { x } else { v }));
+            let rim = excess_of(&m, p, self.towards).max(excess_of(&n, p, self.towards));
+            if rim.max(hub_excess) <= limit {
+                continue;
+            }
+            let single = y == NONE;
+            if single {
+                tests += 1;
+                self.lower(Cone::new(hub, m).signed_distance(p), [x, y], ground.inside);
+            } else {
+                tests += 2;
+                if let Some(s) = SlabFace::new([hub, m, n]).and_then(|f| f.signed_distance(p)) {
+                    self.lower(s, [x, y], ground.inside);
+                }
+                if rim > limit {
+                    self.lower(Cone::new(m, n).signed_distance(p), [x, y], ground.inside);
+                }
+            }
+            if self.signed <= 0.0 {
+                break;
+            }
+        }
+        tests
+    }
+
+    fn lower(&mut self, signed: f64, vertices: [u32; 2], inside: Inside) {
+        let signed = if inside == Inside::Surface { signed.abs() } else { signed };
+        if signed < self.signed {
+            (self.signed, self.nearest) = (signed, vertices);
+        }
+    }
+}

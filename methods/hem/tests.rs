@@ -1,0 +1,326 @@
+//! The contraction against the oracle, and on complexes made by hand.
+
+use medial::Vec3;
+use medial::complex::collapse::CollapseComplex;
+use medial::complex::{MedialMesh, Sphere, betti};
+use medial::shape::ShapeOptions;
+use medial::simplifier::{Params, RunContext};
+use proptest::prelude::*;
+use rayon::prelude::*;
+
+use super::contract::{Contraction, Stop};
+use super::edge::{Edge, Ground};
+use super::model::Model;
+use super::star::Star;
+use super::*;
+
+const READINGS: [Inside; 2] = [Inside::Depth, Inside::Surface];
+
+/// More than the distances can be rounded.
+const CLOSE: f64 = 1e-12;
+
+/// What a random model is made of; simplices and lists with repetitions.
+type Parts =
+    (Vec<([f64; 3], f64)>, Vec<Vec<u32>>, Vec<Vec<u32>>, Vec<[f64; 3]>, Vec<Vec<u32>>, bool);
+
+const VERTICES: usize = 11;
+
+fn parts() -> impl Strategy<Value = Parts> {
+    let ids = |n: usize| {
+        prop::sample::subsequence((0..VERTICES as u32).collect::<Vec<_>>(), n).prop_shuffle()
+    };
+    let place = || prop::array::uniform3(0.0..1.0f64);
+    (
+        prop::collection::vec((place(), 0.0..0.4f64), VERTICES),
+        prop::collection::vec(ids(2), 0..8),
+        prop::collection::vec(ids(3), 4..26),
+        prop::collection::vec(place(), 24),
+        prop::collection::vec(prop::collection::vec(0..24_u32, 0..6), VERTICES),
+        prop::bool::weighted(0.2),
+    )
+}
+
+/// A complex without any geometric order, samples anywhere, spheres in spheres; with `coarse`
+/// coordinates full of coincident, contained and collinear ones.
+fn model((spheres, edges, faces, points, lists, coarse): Parts, inside: Inside) -> Model {
+    let round = |x: f64| if coarse { (4.0 * x).round() / 4.0 } else { x };
+    let spheres: Vec<Sphere> =
+        spheres.iter().map(|&(c, r)| Sphere::new(c.map(round).into(), round(r))).collect();
+    let edges = edges.iter().map(|e| [e[0], e[1]]).collect();
+    let faces = faces.iter().map(|f| [f[0], f[1], f[2]]).collect();
+    let mesh = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
+    Model::new(&mesh, points.into_iter().map(Vec3::from).collect(), &lists, inside)
+}
+
+fn contraction(model: &Model) -> Contraction {
+    Contraction::new(&model.mesh(), model.sample_lists(), HemParams { inside: model.inside })
+}
+
+/// Every edge of a complex with its own evaluation in full against the oracle.
+fn assert_errors_agree(model: &Model, complex: &CollapseComplex, samples: &SampleLists) {
+    let ground = Ground { complex, samples, inside: model.inside };
+    let mut star = Star::new(model.spheres.len());
+    for ends in model.edges() {
+        let mut edge = Edge::unknown(u32::MAX);
+        edge.evaluate(&ground, ends, f64::INFINITY, &mut star);
+        let expected = [model.error(ends[1], ends[0]), model.error(ends[0], ends[1])];
+        for (survivor, expected) in expected.into_iter().enumerate() {
+            let error = edge.into[survivor].error();
+            // The dearer direction may stop where it exceeds the other.
+            let stopped = error > expected.min(edge.into[1 - survivor].error()) - CLOSE;
+            let is_dearer = expected > edge.into[1 - survivor].error() + CLOSE;
+            let agrees = (error - expected).abs() < CLOSE || is_dearer && stopped;
+            assert!(agrees && error < expected + CLOSE, "{ends:?} {survivor}: {error} {expected}");
+        }
+    }
+}
+
+/// What the contraction knows of each edge is never above the truth, and the queue never later.
+fn assert_bounds_hold(model: &Model, contraction: &Contraction) {
+    let mut complex = CollapseComplex::from_mesh(&model.mesh());
+    for ends in model.edges() {
+        let edge = contraction.known(ends).expect("every edge is known");
+        let truth = [model.error(ends[1], ends[0]), model.error(ends[0], ends[1])];
+        for (directed, truth) in edge.into.iter().zip(truth) {
+            assert!(directed.bound() <= truth + CLOSE, "{ends:?}: {directed:?} above {truth}");
+        }
+        if let Some((cost, _, _, _)) = model.choice(&mut complex, ends) {
+            assert!(
+                edge.queued.0 <= cost + CLOSE,
+                "{ends:?} queued at {:?} of {cost}",
+                edge.queued
+            );
+        }
+    }
+}
+
+/// Follows the contraction to its end, one collapse after another, with all checks.
+fn follow(mut model: Model, checks_each: bool) -> usize {
+    let mut contraction = contraction(&model);
+    let touched = model.sample_lists().touched();
+    let mut assigned = usize::MAX;
+    loop {
+        let samples = contraction.samples();
+        assert_eq!(samples.touched(), touched, "samples were lost");
+        assert!(samples.assigned() <= assigned, "samples were repeated");
+        assigned = samples.assigned();
+        for (v, list) in model.lists.iter().enumerate() {
+            assert!(list.iter().eq(samples.of(v as u32)), "list of {v}");
+        }
+        if checks_each {
+            assert_bounds_hold(&model, &contraction);
+        }
+        let expected = model.cheapest();
+        let done = contraction.record().len();
+        let target = contraction.sphere_count() - 1;
+        contraction.run_to(Stop::Spheres(target), &RunContext::default()).unwrap();
+        let Some(&taken) = contraction.record().get(done) else {
+            assert!(expected.is_none() || target == 0, "{expected:?} was left");
+            return contraction.sphere_count();
+        };
+        let (cost, _, ends, survivor) = expected.expect("nothing may be collapsed");
+        if [taken.kept, taken.removed] != [ends[survivor], ends[1 - survivor]] {
+            let error = model.error(taken.removed, taken.kept);
+            assert!(error <= cost + CLOSE, "{taken:?} at {error}, not {ends:?} at {cost}");
+        }
+        assert_eq!(taken.sphere, model.spheres[taken.kept as usize], "the survivor moved");
+        model.collapse(taken.removed, taken.kept);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    /// Full evaluation after random collapses, whatever they do to the topology.
+    #[test]
+    fn errors_are_those_of_the_oracle(
+        parts in parts(), picks in prop::collection::vec((any::<prop::sample::Index>(), any::<bool>()), 0..7),
+    ) {
+        for inside in READINGS {
+            let mut model = model(parts.clone(), inside);
+            let mut complex = CollapseComplex::from_mesh(&model.mesh());
+            let mut samples = model.sample_lists();
+            for (pick, turn) in &picks {
+                assert_errors_agree(&model, &complex, &samples);
+                let edges = model.edges();
+                if edges.is_empty() {
+                    break;
+                }
+                let [a, b] = *pick.get(&edges);
+                let [kept, removed] = if *turn { [a, b] } else { [b, a] };
+                complex.collapse(kept, removed, complex.sphere(kept));
+                samples.assign(removed, kept);
+                model.collapse(removed, kept);
+            }
+            assert_errors_agree(&model, &complex, &samples);
+        }
+    }
+
+    /// The lazy order is the order of full evaluation after each collapse.
+    #[test]
+    fn the_order_is_that_of_the_oracle(parts in parts()) {
+        for inside in READINGS {
+            follow(model(parts.clone(), inside), true);
+        }
+    }
+}
+
+fn shape(id: &str, resolution: u32, noise: f64) -> Shape {
+    let mesh = medial_datasets::find(id).unwrap().mesh(resolution);
+    let mesh = medial_datasets::add_noise(&mesh, noise, 7);
+    let report = medial::surface::validate(&mesh).unwrap();
+    Shape::new(id, &mesh, report, ShapeOptions::default()).unwrap()
+}
+
+fn model_of(shape: &Shape, inside: Inside) -> Model {
+    let mesh = shape.initial().unwrap();
+    let contacts = shape.contacts(&mesh, &mut Diagnostics::default()).unwrap();
+    let lists: Vec<_> = (0..mesh.spheres.len()).map(|v| contacts.ids(v).to_vec()).collect();
+    Model::new(&mesh, contacts.samples().to_vec(), &lists, inside)
+}
+
+#[test]
+fn the_order_is_that_of_the_oracle_on_solids() {
+    for (id, resolution) in [("bracket", 3), ("capsule", 5), ("rod", 5)] {
+        let shape = shape(id, resolution, 2e-3);
+        READINGS.into_par_iter().for_each(|inside| {
+            follow(model_of(&shape, inside), id == "capsule");
+        });
+    }
+}
+
+/// A chain of equal spheres along the x-axis, each with a ring of samples that it touches.
+fn chain(count: u32) -> Model {
+    let spheres = (0..count)
+        .map(|i| Sphere::new(Vec3::new(f64::from(i) / f64::from(count - 1), 0.0, 0.0), 0.1));
+    let spheres: Vec<_> = spheres.collect();
+    let edges = (1..count).map(|i| [i - 1, i]).collect();
+    let points = spheres
+        .iter()
+        .flat_map(|m| [Vec3::Y, Vec3::Z, -Vec3::Y, -Vec3::Z].map(|n| m.centre + m.radius * n));
+    let mut points: Vec<_> = points.collect();
+    points.extend([Vec3::new(-0.1, 0.0, 0.0), Vec3::new(1.1, 0.0, 0.0)]);
+    let mut lists: Vec<Vec<u32>> = (0..count).map(|i| (4 * i..4 * i + 4).collect()).collect();
+    lists[0].push(4 * count);
+    lists[count as usize - 1].push(4 * count + 1);
+    let mesh = MedialMesh::from_simplices(spheres, edges, vec![]).unwrap();
+    Model::new(&mesh, points, &lists, Inside::Depth)
+}
+
+fn run(model: &Model, stop: Stop) -> Contraction {
+    let mut contraction = contraction(model);
+    contraction.run_to(stop, &RunContext::default()).unwrap();
+    contraction
+}
+
+#[test]
+fn a_straight_chain_is_free_but_for_its_ends() {
+    let model = chain(9);
+    let two = run(&model, Stop::Spheres(2));
+    assert!(two.largest() < 1e-15);
+    assert_eq!(two.to_mesh().spheres, [model.spheres[0], model.spheres[8]]);
+    // The last collapse leaves the far end at the length of the chain.
+    let one = run(&model, Stop::Spheres(1));
+    assert!((one.largest() - 1.0).abs() < 1e-15, "{}", one.largest());
+    assert_eq!(run(&model, Stop::Error(0.999)).to_mesh(), two.to_mesh());
+    assert_eq!(run(&model, Stop::Error(1.001)).to_mesh(), one.to_mesh());
+}
+
+#[test]
+fn directed_errors_by_hand() {
+    // Radii 2 and 1 at distance 4; a sample on the far pole of each.
+    let spheres = vec![Sphere::new(Vec3::ZERO, 2.0), Sphere::new(4.0 * Vec3::X, 1.0)];
+    let mesh = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![]).unwrap();
+    let points = vec![-2.0 * Vec3::X, 5.0 * Vec3::X];
+    for inside in READINGS {
+        let model = Model::new(&mesh, points.clone(), &[vec![0], vec![1]], inside);
+        let contraction = contraction(&model);
+        let [into_large, into_small] = contraction.known([0, 1]).unwrap().into;
+        // Into the large one the small pole is 5 - 2 away; into the small one 6 - 1.
+        assert!((into_large.error() - 3.0).abs() < 1e-15);
+        // The dearer direction stops early at best.
+        assert!(into_small.error() > 3.0 && into_small.error() < 5.0 + 1e-15);
+        assert_eq!((model.error(1, 0), model.error(0, 1)), (3.0, 5.0));
+    }
+}
+
+#[test]
+fn spheres_without_samples_vanish_first_and_contained_ones_cost_nothing() {
+    // A large ball, one inside it, and one apart that touches nothing.
+    let spheres = [(0.0, 1.0), (0.3, 0.5), (1.6, 0.2), (3.0, 1.0)];
+    let spheres = spheres.map(|(x, r)| Sphere::new(x * Vec3::X, r)).to_vec();
+    let edges = vec![[0, 1], [0, 2], [2, 3]];
+    let mesh = MedialMesh::from_simplices(spheres, edges, vec![]).unwrap();
+    let points = vec![-Vec3::X, Vec3::new(0.0, 1.0, 0.0), 4.0 * Vec3::X, Vec3::new(3.0, 1.0, 0.0)];
+    let model = Model::new(&mesh, points, &[vec![0, 1], vec![], vec![], vec![2, 3]], Inside::Depth);
+    let contraction = run(&model, Stop::Error(1e-9));
+    assert_eq!(contraction.to_mesh().spheres, [model.spheres[0], model.spheres[3]]);
+    assert!(contraction.largest() < 1e-15);
+}
+
+#[test]
+fn readings_differ_inside() {
+    // The sample lies on the sphere of 0 and is buried in the cone to 1.
+    let spheres = vec![Sphere::new(Vec3::ZERO, 1.0), Sphere::new(2.0 * Vec3::X, 1.0)];
+    let third = Sphere::new(Vec3::new(0.1, 0.0, 0.0), 0.9);
+    let mesh =
+        MedialMesh::from_simplices([spheres, vec![third]].concat(), vec![[0, 1], [0, 2]], vec![]);
+    let (mesh, points) = (mesh.unwrap(), vec![Vec3::X]);
+    let depth = Model::new(&mesh, points.clone(), &[vec![0], vec![], vec![]], Inside::Depth);
+    let mut surface = depth.clone();
+    surface.inside = Inside::Surface;
+    let error = |model: &Model| contraction(model).known([0, 2]).unwrap().into[0].error();
+    assert!((error(&depth) - 1.0).abs() < 1e-15, "in the middle of the capsule");
+    assert!(error(&surface) < 1e-15, "on the sphere");
+    let all =
+        |model: &Model| bound::sample_error(&model.mesh(), &model.points, model.inside).unwrap();
+    assert!((all(&depth) - 1.0).abs() < 1e-15 && all(&surface) < 1e-15);
+}
+
+#[test]
+fn the_topology_is_kept_to_the_end() {
+    // A band of quads closed to a ring: a circle up to homotopy, which needs three vertices.
+    let n = 12;
+    let angle = |i: u32| f64::from(i) / f64::from(n) * std::f64::consts::TAU;
+    let ring = (0..2 * n).map(|v| {
+        let (sin, cos) = angle(v / 2).sin_cos();
+        let rim = 1.0 + 0.2 * f64::from(v % 2);
+        Sphere::new(Vec3::new(rim * cos, rim * sin, 0.03 * sin), 0.1 + 0.01 * cos)
+    });
+    let faces = (0..n).flat_map(|i| {
+        let [a, b, c, d] = [2 * i, 2 * i + 1, (2 * i + 2) % (2 * n), (2 * i + 3) % (2 * n)];
+        [[a, b, c], [b, c, d]]
+    });
+    let mesh = MedialMesh::from_simplices(ring.collect(), vec![], faces.collect()).unwrap();
+    let points: Vec<_> = mesh.spheres.iter().map(|m| m.centre + m.radius * Vec3::Z).collect();
+    let lists: Vec<_> = (0..2 * n).map(|v| vec![v]).collect();
+    let mut contraction = run(&Model::new(&mesh, points, &lists, Inside::Depth), Stop::Spheres(1));
+    let left = contraction.to_mesh();
+    assert_eq!(betti(&left), [1, 1, 0]);
+    assert!(left.spheres.len() <= 4 && left.spheres.len() >= 3, "{}", left.spheres.len());
+    assert!(contraction.why_stopped().contains("edges left"));
+}
+
+#[test]
+fn a_level_within_the_bound_is_found() {
+    let within = |good: &'static [usize]| move |t: usize| Ok(good.contains(&t));
+    assert_eq!(last_within(0, within(&[])).unwrap(), 0);
+    assert_eq!(last_within(9, within(&[9])).unwrap(), 9);
+    assert_eq!(last_within(9, within(&[1, 2, 3, 4, 5])).unwrap(), 5);
+    assert_eq!(last_within(9, within(&[])).unwrap(), 0);
+}
+
+#[test]
+fn parameters_are_typed() {
+    let typed = |key: &str, value: &str| {
+        let mut params = Params::none();
+        params.set(key, value);
+        params.typed::<HemParams>()
+    };
+    assert_eq!(typed("inside", "depth").unwrap(), HemParams::default());
+    assert_eq!(typed("inside", "surface").unwrap().inside, Inside::Surface);
+    for (key, value) in [("inside", "both"), ("outside", "depth")] {
+        let error = typed(key, value).unwrap_err().to_string();
+        assert!(error.starts_with("parameter: "), "{error}");
+    }
+}
