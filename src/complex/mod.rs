@@ -8,6 +8,7 @@ mod reduction;
 mod stability;
 mod topology;
 mod union;
+pub mod union_axis;
 mod voronoi;
 
 pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
@@ -16,6 +17,7 @@ pub use mesh::{ComplexError, Contacts, MedialMesh};
 pub use stability::{ZERO_LENGTH, stability_ratio};
 pub use topology::{betti, euler};
 pub use union::{MedialUnion, NearestPrimitive, Primitive, UnionError};
+pub use union_axis::{AxisFacet, AxisTally, UnionAxis};
 pub use voronoi::{CellSpheres, DualTriangulation, voronoi_medial_mesh};
 
 pub use crate::disjoint::DisjointSets;
