@@ -9,6 +9,8 @@ pub mod angle;
 pub mod lambda;
 pub mod qmat;
 mod ranked;
+pub mod sat;
+pub mod sat_pairwise;
 
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
@@ -16,6 +18,8 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(angle::AngleFilter::new()),
         Box::new(lambda::LambdaMedialAxis::new()),
         Box::new(qmat::Qmat::new()),
+        Box::new(sat::Sat::new()),
+        Box::new(sat_pairwise::SatPairwise::new()),
     ]
 }
 

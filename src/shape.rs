@@ -22,8 +22,10 @@ use crate::simplifier::Diagnostics;
 use crate::surface::{InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, sample};
 
 mod contacts;
+mod inner_balls;
 
 pub use contacts::ContactSets;
+pub use inner_balls::InnerBalls;
 
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
 pub struct Shape {
@@ -59,6 +61,8 @@ pub enum Substrate {
     Inside,
     /// Voronoi medial mesh.
     MedialMesh,
+    /// Poles of the samples, and the polar balls inside.
+    Poles,
     /// Bounding-volume tree of the surface.
     SurfaceTree,
     /// Contact points of a medial mesh that came without them.
@@ -73,6 +77,7 @@ impl Substrate {
             Self::Delaunay => "delaunay",
             Self::Inside => "inside",
             Self::MedialMesh => "medial_mesh",
+            Self::Poles => "poles",
             Self::SurfaceTree => "surface_tree",
             Self::Contacts => "contacts",
         }
@@ -99,6 +104,7 @@ struct Store {
     delaunay: Cache<Sampling, Arc<Delaunay>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
     medial: Cache<Sampling, Arc<MedialMesh>>,
+    balls: Cache<Sampling, Arc<InnerBalls>>,
     tree: Cache<(), Arc<TriangleBvh>>,
 }
 
@@ -131,6 +137,7 @@ impl Shape {
             delaunay: Cache::default(),
             cells: Cache::default(),
             medial: Cache::default(),
+            balls: Cache::default(),
             tree: Cache::default(),
         };
         Ok(Self { store: Arc::new(store), used: Mutex::default() })
@@ -253,14 +260,33 @@ impl Shape {
         let built = self.store.medial.get(options.sampling, || {
             let mesh = voronoi_medial_mesh(&delaunay, &cells, &self.samples(), options.dual);
             if mesh.spheres.is_empty() {
-                return Err(match cells.in_guard_band {
-                    0 => ShapeError::EmptyMedialMesh,
-                    centres => ShapeError::BelowResolution { centres },
-                });
+                return Err(ShapeError::of_nothing_inside(&cells));
             }
             Ok(Arc::new(mesh))
         });
         self.take(Substrate::MedialMesh, built)
+    }
+
+    /// The balls whose union stands for the shape, in normalised units: the spheres of the given
+    /// medial mesh, or the inner polar balls of the samples.
+    ///
+    /// # Errors
+    /// When the samples do not span space, or no pole lies inside the surface; when the given mesh has
+    /// no sphere or is not valid.
+    pub fn inner_balls(&self) -> Result<Arc<InnerBalls>, ShapeError> {
+        if let Some(given) = &self.store.given {
+            return given.as_ref().map(|m| Arc::new(InnerBalls::of_mesh(m))).map_err(Clone::clone);
+        }
+        let delaunay = self.delaunay()?;
+        let cells = self.cells()?;
+        let built = self.store.balls.get(self.store.options.sampling, || {
+            let balls = InnerBalls::of_poles(&delaunay, &cells, &self.samples());
+            if balls.spheres.is_empty() {
+                return Err(ShapeError::of_nothing_inside(&cells));
+            }
+            Ok(Arc::new(balls))
+        });
+        self.take(Substrate::Poles, built)
     }
 
     /// The medial mesh that every simplifier of this shape starts from, in normalised units: the
@@ -420,4 +446,13 @@ pub enum ShapeError {
         /// Number of these circumcentres.
         centres: usize,
     },
+}
+
+impl ShapeError {
+    fn of_nothing_inside(cells: &CellSpheres) -> Self {
+        match cells.in_guard_band {
+            0 => Self::EmptyMedialMesh,
+            centres => Self::BelowResolution { centres },
+        }
+    }
 }

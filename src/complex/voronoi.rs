@@ -73,7 +73,8 @@ impl CellSpheres {
         Self { inside: inside.collect(), in_guard_band: near.iter().filter(|&&near| near).count() }
     }
 
-    fn is_inside(&self, cell: CellId) -> bool {
+    /// Whether a cell is centred inside; never an infinite one.
+    pub fn is_inside(&self, cell: CellId) -> bool {
         // Finite cells come first; infinite ones are beyond the list.
         self.inside.get(cell.index()).is_some_and(Option::is_some)
     }

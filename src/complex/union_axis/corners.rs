@@ -3,6 +3,7 @@
 use super::NONE;
 use crate::Vec3;
 use crate::complex::Contacts;
+use crate::geometry::dual_complex::Class;
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{
     CellId, Delaunay, DualComplex, Sphere, TriangulationError, UnionBoundary, VertexId,
@@ -58,6 +59,16 @@ impl Corners {
             let Facet { cell, opposite } = regular.mirror(vertex.facet);
             at[4 * cell.index() + opposite] = corner;
             with_balls.extend(vertex.balls.map(|ball| (corner, ball)));
+        }
+        // Spheres that touch in a point of a singular triangle's plane have it on both sides.
+        for (facet, _) in complex.triangles().filter(|f| f.1 == Class::Singular) {
+            let [one, other] =
+                [facet, regular.mirror(facet)].map(|f| 4 * f.cell.index() + f.opposite);
+            if at[one] == NONE {
+                at[one] = at[other];
+            } else if at[other] == NONE {
+                at[other] = at[one];
+            }
         }
         with_balls.sort_unstable();
         with_balls.dedup();

@@ -123,7 +123,8 @@ fn trace(sides: &[Side]) -> (Vec<Polygon>, bool) {
                     polygons.push(Polygon { between, vertices: cycle, ..Polygon::default() });
                 }
             }
-            let free = (at..sides.len()).take_while(|&k| sides[k].from == here).find(|&k| !taken[k]);
+            let free =
+                (at..sides.len()).take_while(|&k| sides[k].from == here).find(|&k| !taken[k]);
             let Some(next) = free else { break };
             taken[next] = true;
             on_path[at] = path.len() as u32;
@@ -144,8 +145,8 @@ fn without_opposites(sides: &[Side]) -> Vec<Side> {
     for run in sides.chunk_by(|a, b| a == b) {
         let side = run[0];
         let opposite = Side { from: side.to, to: side.from, ..side };
-        let others = sides.partition_point(|s| *s <= opposite)
-            - sides.partition_point(|s| *s < opposite);
+        let others =
+            sides.partition_point(|s| *s <= opposite) - sides.partition_point(|s| *s < opposite);
         left.extend(std::iter::repeat_n(side, run.len().saturating_sub(others)));
     }
     left

@@ -76,9 +76,8 @@ fn find_walls(complex: &DualComplex<'_>, (cell, i, j): CellEdge, walls: &mut Vec
         let next = ring[(k + 1) % ring.len()];
         let v = regular.vertices(cell);
         let neighbours = regular.neighbours(cell);
-        let leads_on = |&opposite: &usize| {
-            !ends.contains(&v[opposite]) && neighbours[opposite] == next
-        };
+        let leads_on =
+            |&opposite: &usize| !ends.contains(&v[opposite]) && neighbours[opposite] == next;
         let Some(opposite) = (0..4).find(leads_on) else { continue };
         let before = Facet { cell, opposite };
         if complex.facet_class(before).is_some() {
