@@ -25,8 +25,8 @@
 //! - Step 5 is off by default. The authors' tool removes sheets below 30 degrees at scales above 1;
 //!   `sat_angle=30` asks for it. It removes facets one by one, so that a sheet can go in part.
 //! - Step 6 does not undo the factor of step 2, neither does the tool: a result at scale 1 is 0.2 %
-//!   larger than the union of polar balls. `radius_factor=1` and `jitter=0` leave the balls as they
-//!   are; corners at samples are then identified by the samples at scale 1.
+//!   larger than the union of polar balls. Without step 2 (`radius_factor=1`, `jitter=0`) rounding
+//!   decides which polar balls meet at scale 1, and the result is torn; a warning says so.
 //! - A number of spheres is met by a search on `s`. A scale has the count it has: the result is the
 //!   largest count at most as large as asked that the search meets, to 1 %, and is reported. Every
 //!   request is answered anew, so that its seconds are those of this request alone.
@@ -38,7 +38,7 @@ mod sheets;
 #[cfg(test)]
 mod tests;
 
-use medial::complex::{AxisTally, Contacts, MedialMesh, Sphere, UnionAxis, betti};
+use medial::complex::{AxisTally, MedialMesh, Sphere, UnionAxis, betti};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
     Diagnostics, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
@@ -103,16 +103,13 @@ impl MedialSimplifier for Sat {
         let balls = shape.inner_balls()?;
         run.step(0, balls.spheres.len())?;
         let spheres = perturb::perturbed(&balls.spheres, &params, run.seed);
-        // Balls that were moved no longer pass through their samples.
-        let contacts = balls.contacts.clone().filter(|_| params.leaves_balls());
-        Ok(Box::new(Prepared { spheres, contacts, params, run: run.clone() }))
+        Ok(Box::new(Prepared { spheres, params, run: run.clone() }))
     }
 }
 
 /// The balls of one shape, perturbed.
 struct Prepared {
     spheres: Vec<Sphere>,
-    contacts: Option<Contacts>,
     params: SatParams,
     run: RunContext,
 }
@@ -134,11 +131,7 @@ impl Prepared {
             balls.iter().map(|b| Sphere::new(b.centre, b.radius * factor)).collect()
         };
         let grown = resized(&self.spheres, scale);
-        let axis = match &self.contacts {
-            Some(contacts) if scale == 1.0 => UnionAxis::of_balls_through(&grown, contacts),
-            _ => UnionAxis::of_balls(&grown),
-        };
-        let axis = axis.map_err(ShapeError::from)?;
+        let axis = UnionAxis::of_balls(&grown).map_err(ShapeError::from)?;
         let (mut mesh, removed_facets) = sheets::filtered(&axis, self.params.sat_angle);
         mesh.spheres = resized(&mesh.spheres, 1.0 / scale);
         let (tally, union_betti) = (*axis.tally(), axis.union_betti());

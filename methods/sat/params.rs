@@ -41,11 +41,6 @@ impl SatParams {
         Ok(self)
     }
 
-    /// Whether the balls are left as they are.
-    pub(super) fn leaves_balls(&self) -> bool {
-        self.radius_factor == 1.0 && self.jitter == 0.0
-    }
-
     pub(super) fn describe() -> Vec<ParamInfo> {
         let defaults = Self::default();
         let info = |name, default: f64, unit, help| {

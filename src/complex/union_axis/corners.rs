@@ -2,12 +2,10 @@
 
 use super::NONE;
 use crate::Vec3;
-use crate::complex::Contacts;
 use crate::geometry::dual_complex::Class;
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{
     CellId, Delaunay, DualComplex, Sphere, TriangulationError, UnionBoundary, VertexId,
-    shared_sample,
 };
 
 /// The corners of a union of balls and their Delaunay triangulation.
@@ -28,28 +26,10 @@ impl Corners {
     pub(super) fn of(
         complex: &DualComplex<'_>,
         balls: &[Sphere],
-        contacts: Option<&Contacts>,
     ) -> Result<Self, TriangulationError> {
         let boundary = UnionBoundary::new(complex);
-        let sample_of = |v: &crate::geometry::UnionVertex| {
-            let contacts = contacts?;
-            shared_sample(
-                v,
-                |b| balls[b as usize].centre,
-                |b| contacts.of_sphere[b as usize],
-                |s| contacts.samples[s as usize],
-            )
-        };
-        let keys: Vec<Option<u32>> = boundary.vertices().iter().map(sample_of).collect();
-        let merged = boundary.merge(sample_of);
-        let mut points = merged.points().to_vec();
-        if let Some(contacts) = contacts {
-            for (key, &point) in keys.iter().zip(merged.point_of()) {
-                if let Some(sample) = key {
-                    points[point as usize] = contacts.samples[*sample as usize];
-                }
-            }
-        }
+        let merged = boundary.merge(|_| None);
+        let points = merged.points().to_vec();
         let same = same_position(&points);
         let regular = complex.regular();
         let mut at = vec![NONE; 4 * regular.cell_count()];

@@ -32,6 +32,13 @@
 //! random position there was none among 1,500 unions. Where balls touch in single points, or many
 //! spheres meet in one corner, parts of the axis can coincide and are then taken for one: 12 of 400
 //! unions of balls on small lattices have other Betti numbers than their axis, none once perturbed.
+//! [`UnionAxis::union_betti`] tells.
+//!
+//! Polar balls as they are, which meet in samples by construction but only up to rounding, are beyond
+//! this: their dual complex is decided by rounding, and their other corners are where spheres nearly
+//! touch. The polar balls of a smooth solid of 2,500 samples gave Betti numbers (146, 42, 16), and
+//! (12, 129, 91) with the samples in place of the corners there, instead of (1, 0, 0). With radii times
+//! 1.002 and centres moved by `1e-4 r` no facet was open on any solid tried.
 //!
 //! Deviations from the papers
 //!
@@ -45,7 +52,7 @@ mod facets;
 mod sectors;
 mod sides;
 
-use super::{Contacts, MedialMesh};
+use super::MedialMesh;
 use crate::Vec3;
 use crate::geometry::dual_complex::Class;
 use crate::geometry::{CellId, DualComplex, Sphere, TriangulationError};
@@ -117,28 +124,8 @@ impl UnionAxis {
     /// # Errors
     /// A centre or radius that is not finite or too large; a negative radius.
     pub fn of_balls(balls: &[Sphere]) -> Result<Self, TriangulationError> {
-        Self::build(balls, None)
-    }
-
-    /// The same for balls through known samples, such as polar balls: corners in which balls meet by
-    /// construction, but only up to rounding, are the samples.
-    ///
-    /// # Errors
-    /// As [`UnionAxis::of_balls`].
-    ///
-    /// # Panics
-    /// If there are not as many contacts as balls.
-    pub fn of_balls_through(
-        balls: &[Sphere],
-        contacts: &Contacts,
-    ) -> Result<Self, TriangulationError> {
-        assert_eq!(balls.len(), contacts.of_sphere.len(), "one set of contacts for each ball");
-        Self::build(balls, Some(contacts))
-    }
-
-    fn build(balls: &[Sphere], contacts: Option<&Contacts>) -> Result<Self, TriangulationError> {
         let complex = DualComplex::of_balls(balls)?;
-        let corners = Corners::of(&complex, balls, contacts)?;
+        let corners = Corners::of(&complex, balls)?;
         let sectors = sectors::of(&complex, &corners);
         let mut tally = AxisTally {
             balls: complex.vertices().count(),
