@@ -97,7 +97,7 @@ impl MedialSimplifier for SatPairwise {
 #[cfg(test)]
 mod tests {
     use medial::Vec3;
-    use medial::complex::Sphere;
+    use medial::complex::{Sphere, UnionAxis};
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
 
@@ -121,6 +121,31 @@ mod tests {
             assert_eq!(critical_scales(&balls), expected);
             assert_eq!((expected[0], expected[n + 1]), (0.0, f64::MAX));
         }
+    }
+
+    #[test]
+    fn what_it_removes_the_transform_removes_too_and_more() {
+        let mut rng = Pcg64::seed_from_u64(52);
+        let (mut here, mut there) = (0, 0);
+        for _ in 0..100 {
+            let mut x = || rng.random_range(0.0..1.0);
+            let balls: Vec<Sphere> =
+                (0..40).map(|_| Sphere::new(Vec3::new(x(), x(), x()), 0.3 * x())).collect();
+            let critical = critical_scales(&balls);
+            for scale in [1.0, 1.3, 2.0] {
+                let grown: Vec<Sphere> =
+                    balls.iter().map(|b| Sphere::new(b.centre, scale * b.radius)).collect();
+                let axis = UnionAxis::of_balls(&grown).expect("balls");
+                let is_centre = |i: usize| axis.balls().binary_search(&(i as u32)).is_ok();
+                for (i, &at) in critical.iter().enumerate() {
+                    // Off the scale itself, which rounding decides.
+                    assert!(at >= scale * (1.0 - 1e-9) || !is_centre(i));
+                    here += u32::from(at < scale);
+                    there += u32::from(!is_centre(i));
+                }
+            }
+        }
+        assert!(here > 1_000 && there > here + 500, "{here} {there}");
     }
 
     #[test]

@@ -157,7 +157,6 @@ impl Simplification for Prepared {
         };
         scaled.diagnose(self.spheres.len(), &mut diagnostics);
         let Scaled { scale, mesh, .. } = scaled;
-        mesh.check()?;
         let native_level = Some(scale);
         Ok(Simplified { mesh, asked: level, native_level, work: Work::Anew, diagnostics })
     }

@@ -1,5 +1,7 @@
 //! SAT on sampled solids: what scale 1 leaves, the scale at which a gap closes, real meshes.
 
+#![allow(clippy::print_stderr)] // A skipped test says so.
+
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
@@ -33,7 +35,7 @@ fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
 fn shared_meshes() -> Vec<PathBuf> {
     let folder = std::env::var("MEDIAL_MESHES").unwrap_or_else(|_| "../shared/meshes".into());
     let Ok(files) = std::fs::read_dir(&folder) else {
-        println!("skipped: no meshes in {folder}");
+        eprintln!("skipped: no meshes in {folder}");
         return Vec::new();
     };
     let mut files: Vec<PathBuf> = files.flatten().map(|f| f.path()).collect();
@@ -210,7 +212,6 @@ fn shared_meshes_have_valid_axes_for_any_number_of_threads() {
         });
         assert_eq!(results[0].mesh, results[1].mesh, "{name}");
         results[0].mesh.check().expect("a valid complex");
-        println!("{name} {:?} {:?}", betti(&results[0].mesh), results[0].diagnostics);
         assert!(results[0].diagnostics.warnings.is_empty(), "{name} {:?}", results[0].diagnostics);
     }
 }

@@ -29,7 +29,7 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
-    /// The sides, not ordered.
+    /// The sides, in no particular direction.
     pub(super) fn edges(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
         let v = &self.vertices;
         (0..v.len()).map(move |k| [v[k], v[(k + 1) % v.len()]])
@@ -91,7 +91,9 @@ pub(super) fn voronoi_sides(
 
 /// Joins the sides of each facet to polygons.
 pub(super) fn close_up(sides: &mut [Side], tally: &mut AxisTally) -> Vec<Polygon> {
-    sides.par_sort_unstable();
+    let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
+    // In the order of the fields.
+    sides.par_sort_unstable_by_key(|s| (pair(s.corners[0], s.corners[1]), pair(s.from, s.to)));
     let facets: Vec<&[Side]> = sides.chunk_by(|a, b| a.corners == b.corners).collect();
     let traced: Vec<(Vec<Polygon>, bool)> =
         facets.par_iter().with_min_len(1 << 9).map(|sides| trace(sides)).collect();

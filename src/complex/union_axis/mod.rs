@@ -52,6 +52,8 @@ mod facets;
 mod sectors;
 mod sides;
 
+use rayon::prelude::*;
+
 use super::MedialMesh;
 use crate::Vec3;
 use crate::geometry::dual_complex::Class;
@@ -177,11 +179,14 @@ impl UnionAxis {
         for polygon in &mut polygons {
             polygon.corners = polygon.between.map(|c| corners.point(c));
         }
-        edges.extend(polygons.iter().flat_map(Polygon::edges));
+        // The other sides are Voronoi edges.
+        let is_ball = |v: u32| (v as usize) < of_ball.len();
+        let along_balls = polygons.iter().flat_map(Polygon::edges);
+        edges.extend(along_balls.filter(|&[a, b]| is_ball(a) && is_ball(b)));
         for edge in &mut edges {
             edge.sort_unstable();
         }
-        edges.sort_unstable();
+        edges.par_sort_unstable_by_key(|&[a, b]| u64::from(a) << 32 | u64::from(b));
         edges.dedup();
         let union_betti = complex.betti();
         Self { spheres, balls: of_ball, edges, polygons, union_betti, tally }
@@ -234,10 +239,10 @@ impl UnionAxis {
         let kept = self.polygons.iter().enumerate().filter(|(i, _)| facet(*i));
         let polygons: Vec<&Polygon> = kept.map(|(_, p)| p).collect();
         let kept = self.edges.iter().enumerate().filter(|(i, _)| edge(*i));
-        let mut edges: Vec<[u32; 2]> = kept.map(|(_, e)| *e).collect();
-        edges.extend(polygons.iter().flat_map(|p| p.edges()));
+        let edges: Vec<[u32; 2]> = kept.map(|(_, e)| *e).collect();
         let mut keep: Vec<bool> = (0..self.spheres.len()).map(sphere).collect();
-        for &v in edges.iter().flatten() {
+        let of_polygons = polygons.iter().flat_map(|p| &p.vertices);
+        for &v in edges.iter().flatten().chain(of_polygons) {
             keep[v as usize] = true;
         }
         let faces = polygons.iter().flat_map(|p| p.fan()).collect();
