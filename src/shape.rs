@@ -13,18 +13,18 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 
 use crate::Vec3;
-use crate::complex::{
-    CellSpheres, ComplexError, DualTriangulation, MedialMesh, voronoi_medial_mesh,
-};
-use crate::geometry::{BvhError, Delaunay, TriangleBvh, TriangulationError};
+use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, voronoi_medial_mesh};
+use crate::geometry::{Delaunay, TriangleBvh};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::simplifier::Diagnostics;
 use crate::surface::{InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, sample};
 
 mod contacts;
+mod error;
 mod inner_balls;
 
 pub use contacts::ContactSets;
+pub use error::ShapeError;
 pub use inner_balls::InnerBalls;
 
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
@@ -410,49 +410,4 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Cost) {
     let cost =
         Cost { seconds: wall.elapsed().as_secs_f64(), cpu_seconds: cpu.elapsed().as_secs_f64() };
     (value, cost)
-}
-
-/// Why a substrate could not be built.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ShapeError {
-    /// The bounding box is empty, flat to a point, or not finite.
-    #[error("the surface has no extent: its bounding-box diagonal is zero or not finite")]
-    Extent,
-    /// The samples cannot be triangulated.
-    #[error("triangulating the boundary samples: {0}")]
-    Triangulation(#[from] TriangulationError),
-    /// The surface has no bounding-volume tree.
-    #[error("the surface: {0}")]
-    Tree(#[from] BvhError),
-    /// The medial mesh to start from has no sphere.
-    #[error("the initial medial mesh has no sphere")]
-    EmptyInitial,
-    /// The medial mesh to start from is not valid in units of the surface's diagonal.
-    #[error("the initial medial mesh, divided by the diagonal of the surface: {0}")]
-    Initial(ComplexError),
-    /// The inside of the shape holds no Voronoi vertex.
-    #[error(
-        "the initial medial mesh is empty: no circumcentre of the samples lies inside the surface; \
-         sample more densely, for example --sampling blue:20000"
-    )]
-    EmptyMedialMesh,
-    /// The inside of the shape holds Voronoi vertices, but all too close to the surface.
-    #[error(
-        "the initial medial mesh is empty: the circumcentres inside the surface ({centres}) are \
-         all within a billionth of its diagonal of it; what is so thin or small beside the whole \
-         cannot be resolved: put parts that are far apart into files of their own"
-    )]
-    BelowResolution {
-        /// Number of these circumcentres.
-        centres: usize,
-    },
-}
-
-impl ShapeError {
-    fn of_nothing_inside(cells: &CellSpheres) -> Self {
-        match cells.in_guard_band {
-            0 => Self::EmptyMedialMesh,
-            centres => Self::BelowResolution { centres },
-        }
-    }
 }

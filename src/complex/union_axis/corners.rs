@@ -1,5 +1,7 @@
 //! Step 1: the vertices of the boundary, each once, with the balls that meet there.
 
+use rayon::prelude::*;
+
 use super::NONE;
 use crate::Vec3;
 use crate::geometry::dual_complex::Class;
@@ -31,41 +33,16 @@ impl Corners {
         let merged = boundary.merge(|_| None);
         let points = merged.points().to_vec();
         let same = same_position(&points);
-        let regular = complex.regular();
-        let mut at = vec![NONE; 4 * regular.cell_count()];
-        let mut with_balls = Vec::with_capacity(3 * boundary.vertices().len());
-        for (vertex, &point) in boundary.vertices().iter().zip(merged.point_of()) {
-            let corner = same[point as usize];
-            let Facet { cell, opposite } = regular.mirror(vertex.facet);
-            at[4 * cell.index() + opposite] = corner;
-            with_balls.extend(vertex.balls.map(|ball| (corner, ball)));
-        }
-        // Spheres that touch in a point of a singular triangle's plane have it on both sides.
-        for (facet, _) in complex.triangles().filter(|f| f.1 == Class::Singular) {
-            let [one, other] =
-                [facet, regular.mirror(facet)].map(|f| 4 * f.cell.index() + f.opposite);
-            if at[one] == NONE {
-                at[one] = at[other];
-            } else if at[other] == NONE {
-                at[other] = at[one];
-            }
-        }
-        with_balls.sort_unstable();
-        with_balls.dedup();
-        let mut start = vec![0; points.len() + 1];
-        for &(corner, _) in &with_balls {
-            start[corner as usize + 1] += 1;
-        }
-        for i in 0..points.len() {
-            start[i + 1] += start[i];
-        }
+        let of_vertex = merged.point_of().iter().map(|&point| same[point as usize]);
+        let of_vertex: Vec<u32> = of_vertex.collect();
+        let (start, meeting) = balls_of_corners(&boundary, &of_vertex, points.len());
         let delaunay = match complex.tetrahedra().next() {
             Some(_) => Some(spanning(&points, balls)?),
             None => None,
         };
+        let at = corners_of_sides(complex, &boundary, &of_vertex);
         let centres = balls.iter().map(|b| b.centre).collect();
-        let balls = with_balls.into_iter().map(|pair| pair.1).collect();
-        Ok(Self { points, start, balls, at, centres, delaunay })
+        Ok(Self { points, start, balls: meeting, at, centres, delaunay })
     }
 
     /// The number of different corners.
@@ -117,6 +94,52 @@ impl Corners {
         let radius = p.iter().map(|q| q.distance(centre)).fold(f64::INFINITY, f64::min);
         (Sphere::new(centre, radius), found != Some(centre))
     }
+}
+
+/// The balls of each corner, as starts of runs and the runs.
+fn balls_of_corners(
+    boundary: &UnionBoundary,
+    of_vertex: &[u32],
+    corners: usize,
+) -> (Vec<u32>, Vec<u32>) {
+    let with_corners = boundary.vertices().iter().zip(of_vertex);
+    let mut pairs: Vec<u64> = with_corners
+        .flat_map(|(v, &corner)| v.balls.map(|b| u64::from(corner) << 32 | u64::from(b)))
+        .collect();
+    pairs.par_sort_unstable();
+    pairs.dedup();
+    let mut start = vec![0; corners + 1];
+    for pair in &pairs {
+        start[(pair >> 32) as usize + 1] += 1;
+    }
+    for i in 0..corners {
+        start[i + 1] += start[i];
+    }
+    (start, pairs.into_iter().map(|pair| pair as u32).collect())
+}
+
+/// For each facet of each cell the corner of its triangle on the side of the cell.
+fn corners_of_sides(
+    complex: &DualComplex<'_>,
+    boundary: &UnionBoundary,
+    of_vertex: &[u32],
+) -> Vec<u32> {
+    let regular = complex.regular();
+    let index = |f: Facet| 4 * f.cell.index() + f.opposite;
+    let mut at = vec![NONE; 4 * regular.cell_count()];
+    for (vertex, &corner) in boundary.vertices().iter().zip(of_vertex) {
+        at[index(regular.mirror(vertex.facet))] = corner;
+    }
+    // Spheres that touch in a point of a singular triangle's plane have it on both sides.
+    for (facet, _) in complex.triangles().filter(|f| f.1 == Class::Singular) {
+        let [one, other] = [facet, regular.mirror(facet)].map(index);
+        if at[one] == NONE {
+            at[one] = at[other];
+        } else if at[other] == NONE {
+            at[other] = at[one];
+        }
+    }
+    at
 }
 
 /// The box of all centres, which the dual complex is in.

@@ -92,15 +92,9 @@ fn stations_of(corners: &Corners, delaunay: &Delaunay, cell: CellId) -> ([u32; 4
     let mut free = true;
     let stations = [0, 1, 2, 3].map(|opposite| {
         let facet = delaunay.facet_vertices(Facet { cell, opposite });
-        let [mut first, second, third] = facet.map(|v| corners.balls(v));
-        // The shortest list first.
-        let (mut second, mut third) = (second, third);
-        if second.len() < first.len() {
-            std::mem::swap(&mut first, &mut second);
-        }
-        if third.len() < first.len() {
-            std::mem::swap(&mut first, &mut third);
-        }
+        let mut lists = facet.map(|v| corners.balls(v));
+        lists.sort_unstable_by_key(|list| list.len());
+        let [first, second, third] = lists;
         let apex = corners.balls(delaunay.vertices(cell)[opposite]);
         let mut found = NONE;
         for &ball in first.iter().filter(|&b| has(second, *b) && has(third, *b)) {
