@@ -6,6 +6,7 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use medial::Vec3;
+use medial::complex::UnionAxis;
 use medial::geometry::delaunay::Delaunay;
 use medial::geometry::predicates::{circumsphere, in_sphere, orient3d};
 use medial::geometry::regular::Regular;
@@ -90,7 +91,7 @@ fn triangulations(c: &mut Criterion) {
 }
 
 /// The union of balls: its dual complex, the vertices of its boundary, and the poles of samples,
-/// each without the triangulation that it starts from.
+/// each without the triangulation that it starts from; and its medial axis as a whole.
 fn unions(c: &mut Criterion) {
     let samples = surface(20_000);
     let delaunay = Delaunay::new(&samples).expect("spans space");
@@ -122,12 +123,14 @@ fn unions(c: &mut Criterion) {
         let weights: Vec<f64> = balls.iter().map(|b| b.radius * b.radius).collect();
         let regular = Regular::new(&points, &weights).expect("spans space");
         let complex = DualComplex::new(&regular);
-        for part in ["dual complex", "union boundary"] {
+        for part in ["dual complex", "union boundary", "union axis"] {
             let mut group = c.benchmark_group(part);
             group.sample_size(20);
             group.throughput(Throughput::Elements(balls.len() as u64));
             group.bench_function(*name, |b| match part {
                 "dual complex" => b.iter(|| DualComplex::new(&regular).contains(CellId(0))),
+                // With both triangulations.
+                "union axis" => b.iter(|| UnionAxis::of_balls(balls).map(|a| a.edges().len())),
                 _ => b.iter(|| UnionBoundary::new(&complex).vertices().len()),
             });
             group.finish();

@@ -13,6 +13,8 @@ pub mod pmat;
 pub mod qmat;
 mod ranked;
 mod ranked_facets;
+pub mod sat;
+pub mod sat_pairwise;
 
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
@@ -23,6 +25,8 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(qmat::Qmat::new()),
         Box::new(pmat::Pmat::new()),
         Box::new(hem::Hem::new()),
+        Box::new(sat::Sat::new()),
+        Box::new(sat_pairwise::SatPairwise::new()),
     ]
 }
 

@@ -13,17 +13,19 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 
 use crate::Vec3;
-use crate::complex::{
-    CellSpheres, ComplexError, DualTriangulation, MedialMesh, voronoi_medial_mesh,
-};
-use crate::geometry::{BvhError, Delaunay, TriangleBvh, TriangulationError};
+use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, voronoi_medial_mesh};
+use crate::geometry::{Delaunay, TriangleBvh};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::simplifier::Diagnostics;
 use crate::surface::{InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, sample};
 
 mod contacts;
+mod error;
+mod inner_balls;
 
 pub use contacts::ContactSets;
+pub use error::ShapeError;
+pub use inner_balls::InnerBalls;
 
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
 pub struct Shape {
@@ -59,6 +61,8 @@ pub enum Substrate {
     Inside,
     /// Voronoi medial mesh.
     MedialMesh,
+    /// Poles of the samples, and the polar balls inside.
+    Poles,
     /// Bounding-volume tree of the surface.
     SurfaceTree,
     /// Contact points of a medial mesh that came without them.
@@ -73,6 +77,7 @@ impl Substrate {
             Self::Delaunay => "delaunay",
             Self::Inside => "inside",
             Self::MedialMesh => "medial_mesh",
+            Self::Poles => "poles",
             Self::SurfaceTree => "surface_tree",
             Self::Contacts => "contacts",
         }
@@ -99,6 +104,7 @@ struct Store {
     delaunay: Cache<Sampling, Arc<Delaunay>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
     medial: Cache<Sampling, Arc<MedialMesh>>,
+    balls: Cache<Sampling, Arc<InnerBalls>>,
     tree: Cache<(), Arc<TriangleBvh>>,
 }
 
@@ -131,6 +137,7 @@ impl Shape {
             delaunay: Cache::default(),
             cells: Cache::default(),
             medial: Cache::default(),
+            balls: Cache::default(),
             tree: Cache::default(),
         };
         Ok(Self { store: Arc::new(store), used: Mutex::default() })
@@ -253,14 +260,33 @@ impl Shape {
         let built = self.store.medial.get(options.sampling, || {
             let mesh = voronoi_medial_mesh(&delaunay, &cells, &self.samples(), options.dual);
             if mesh.spheres.is_empty() {
-                return Err(match cells.in_guard_band {
-                    0 => ShapeError::EmptyMedialMesh,
-                    centres => ShapeError::BelowResolution { centres },
-                });
+                return Err(ShapeError::of_nothing_inside(&cells));
             }
             Ok(Arc::new(mesh))
         });
         self.take(Substrate::MedialMesh, built)
+    }
+
+    /// The balls whose union stands for the shape, in normalised units: the spheres of the given
+    /// medial mesh, or the inner polar balls of the samples.
+    ///
+    /// # Errors
+    /// When the samples do not span space, or no pole lies inside the surface; when the given mesh has
+    /// no sphere or is not valid.
+    pub fn inner_balls(&self) -> Result<Arc<InnerBalls>, ShapeError> {
+        if let Some(given) = &self.store.given {
+            return given.as_ref().map(|m| Arc::new(InnerBalls::of_mesh(m))).map_err(Clone::clone);
+        }
+        let delaunay = self.delaunay()?;
+        let cells = self.cells()?;
+        let built = self.store.balls.get(self.store.options.sampling, || {
+            let balls = InnerBalls::of_poles(&delaunay, &cells, &self.samples());
+            if balls.spheres.is_empty() {
+                return Err(ShapeError::of_nothing_inside(&cells));
+            }
+            Ok(Arc::new(balls))
+        });
+        self.take(Substrate::Poles, built)
     }
 
     /// The medial mesh that every simplifier of this shape starts from, in normalised units: the
@@ -389,40 +415,4 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Cost) {
     let cost =
         Cost { seconds: wall.elapsed().as_secs_f64(), cpu_seconds: cpu.elapsed().as_secs_f64() };
     (value, cost)
-}
-
-/// Why a substrate could not be built.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ShapeError {
-    /// The bounding box is empty, flat to a point, or not finite.
-    #[error("the surface has no extent: its bounding-box diagonal is zero or not finite")]
-    Extent,
-    /// The samples cannot be triangulated.
-    #[error("triangulating the boundary samples: {0}")]
-    Triangulation(#[from] TriangulationError),
-    /// The surface has no bounding-volume tree.
-    #[error("the surface: {0}")]
-    Tree(#[from] BvhError),
-    /// The medial mesh to start from has no sphere.
-    #[error("the initial medial mesh has no sphere")]
-    EmptyInitial,
-    /// The medial mesh to start from is not valid in units of the surface's diagonal.
-    #[error("the initial medial mesh, divided by the diagonal of the surface: {0}")]
-    Initial(ComplexError),
-    /// The inside of the shape holds no Voronoi vertex.
-    #[error(
-        "the initial medial mesh is empty: no circumcentre of the samples lies inside the surface; \
-         sample more densely, for example --sampling blue:20000"
-    )]
-    EmptyMedialMesh,
-    /// The inside of the shape holds Voronoi vertices, but all too close to the surface.
-    #[error(
-        "the initial medial mesh is empty: the circumcentres inside the surface ({centres}) are \
-         all within a billionth of its diagonal of it; what is so thin or small beside the whole \
-         cannot be resolved: put parts that are far apart into files of their own"
-    )]
-    BelowResolution {
-        /// Number of these circumcentres.
-        centres: usize,
-    },
 }

@@ -8,6 +8,7 @@ mod reduction;
 mod stability;
 mod topology;
 mod union;
+pub mod union_axis;
 mod voronoi;
 mod voronoi_facets;
 
@@ -17,6 +18,7 @@ pub use mesh::{ComplexError, Contacts, MedialMesh};
 pub use stability::{ZERO_LENGTH, stability_ratio};
 pub use topology::{betti, euler};
 pub use union::{MedialUnion, NearestPrimitive, Primitive, UnionError};
+pub use union_axis::{AxisFacet, AxisTally, UnionAxis};
 pub use voronoi::{CellSpheres, DualTriangulation, voronoi_medial_mesh};
 pub use voronoi_facets::VoronoiFacets;
 

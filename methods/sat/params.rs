@@ -1,0 +1,72 @@
+//! The parameters of the scale axis transform.
+
+use medial::simplifier::{ParamInfo, SimplifyError};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the scale axis transform; the default is that of the authors' tool, without its
+/// angle filter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SatParams {
+    /// What all radii are multiplied by before anything else; a pure number.
+    pub radius_factor: f64,
+    /// How far a centre is moved at most along each axis, as a fraction of the radius.
+    pub jitter: f64,
+    /// Facets with a smaller object angle are removed from the outside in; degrees, 0 for none.
+    pub sat_angle: f64,
+}
+
+impl Default for SatParams {
+    fn default() -> Self {
+        Self { radius_factor: 1.002, jitter: 1e-4, sat_angle: 0.0 }
+    }
+}
+
+impl SatParams {
+    pub(super) fn validate(self) -> Result<Self, SimplifyError> {
+        let ranges = [
+            ("radius_factor", self.radius_factor, 0.5..=2.0),
+            ("jitter", self.jitter, 0.0..=0.1),
+            ("sat_angle", self.sat_angle, 0.0..=90.0),
+        ];
+        for (name, value, range) in ranges {
+            if !range.contains(&value) {
+                return Err(SimplifyError::Parameter(format!(
+                    "{name} = {value} is outside {} to {}",
+                    range.start(),
+                    range.end()
+                )));
+            }
+        }
+        Ok(self)
+    }
+
+    pub(super) fn describe() -> Vec<ParamInfo> {
+        let defaults = Self::default();
+        let info = |name, default: f64, unit, help| {
+            let default = format!("{default:?}");
+            ParamInfo { name, default, unit, help }
+        };
+        vec![
+            info(
+                "radius_factor",
+                defaults.radius_factor,
+                "pure number",
+                "all radii are multiplied by this before the scale, so that balls that touch in a \
+                 sample overlap",
+            ),
+            info(
+                "jitter",
+                defaults.jitter,
+                "fraction of the radius",
+                "centres are moved by at most this along each axis, seeded",
+            ),
+            info(
+                "sat_angle",
+                defaults.sat_angle,
+                "degrees of object angle, 0 for no filter",
+                "facets below it are removed from the outside in; the authors' tool has 30",
+            ),
+        ]
+    }
+}

@@ -1,0 +1,157 @@
+//! Pairwise scale filter: removes every ball that another one contains once both are scaled.
+//!
+//! How P. Li, B. Wang, F. Sun, X. Guo, C. Zhang, W. Wang 2015 (Q-MAT, ACM Transactions on Graphics
+//! 35(1), <https://doi.org/10.1145/2753755>) describe the scale axis transform in their section on
+//! related work. It is not that transform, which removes balls that the *union* of all scaled balls
+//! covers and takes the medial axis of that union anew: for this see [`crate::sat`].
+//!
+//! 1. The initial medial mesh.
+//! 2. The scaled ball `(c_j, s r_j)` contains `(c_i, s r_i)` if and only if
+//!    `|c_i - c_j| <= s (r_j - r_i)`. The critical scale of a ball is the smallest such `s` over all
+//!    larger balls; the largest balls have none.
+//! 3. Keep the balls whose critical scale is above `s`, or the given number of balls with the largest
+//!    ones.
+//! 4. The induced subcomplex of the initial mesh: edges and faces all of whose spheres are kept.
+//!
+//! # Choices
+//! - Containment is transitive, so removing all at once or one by one is the same.
+//! - The spheres are those of the initial medial mesh, not the polar balls, so that there is a complex
+//!   to restrict.
+//! - A ball without a critical scale counts as having the largest number of double precision.
+
+mod containment;
+
+use medial::shape::Shape;
+use medial::simplifier::{
+    Diagnostics, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext, Simplification,
+    SimplifyError,
+};
+use serde::Deserialize;
+
+use crate::ranked::{Ranked, Scale};
+
+/// The pairwise scale filter as a method.
+pub struct SatPairwise {
+    info: MethodInfo,
+}
+
+/// The pairwise scale filter has no parameter beside its level.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SatPairwiseParams {}
+
+impl SatPairwise {
+    /// The method with its description.
+    pub fn new() -> Self {
+        Self {
+            info: MethodInfo {
+                id: "sat-pairwise",
+                title: "Pairwise scale filter (not SAT)",
+                citation: "After the description in Li et al. 2015, Q-MAT, ACM Transactions on \
+                           Graphics 35(1), https://doi.org/10.1145/2753755, of Miklos, Giesen, Pauly \
+                           2010, https://doi.org/10.1145/1778765.1778838",
+                summary: "Removes the spheres that another sphere contains once both are scaled.",
+                native: Some(NativeLevel {
+                    name: "s",
+                    unit: "scale factor",
+                    larger_is_coarser: true,
+                }),
+                published: "unsupported: it is described, not published, as a method",
+                params: vec![],
+            },
+        }
+    }
+}
+
+impl Default for SatPairwise {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl MedialSimplifier for SatPairwise {
+    fn info(&self) -> &MethodInfo {
+        &self.info
+    }
+
+    fn prepare<'s>(
+        &self,
+        shape: &'s Shape,
+        params: &Params,
+        _run: &RunContext,
+    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+        let SatPairwiseParams {} = params.typed()?;
+        let mesh = shape.initial()?;
+        let value = containment::critical_scales(&mesh.spheres);
+        let scale = Scale {
+            name: "s",
+            range: 0.0..=f64::MAX,
+            inclusive: false,
+            no_published: "this filter is described, not published, as a method; ask for a number of \
+                           spheres or for a scale (1.1 to 2 is usual for the transform)",
+        };
+        Ok(Box::new(Ranked::new(mesh, value, scale, Diagnostics::default())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use medial::Vec3;
+    use medial::complex::{Sphere, UnionAxis};
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::containment::critical_scales;
+
+    #[test]
+    fn critical_scales_are_those_of_all_pairs() {
+        let mut rng = Pcg64::seed_from_u64(51);
+        for n in [1, 2, 9, 100, 700] {
+            let mut x = || rng.random_range(0.0..1.0);
+            let mut balls: Vec<Sphere> =
+                (0..n).map(|_| Sphere::new(Vec3::new(x(), x(), x()), x() * x())).collect();
+            balls.push(balls[0]);
+            balls.push(Sphere::new(balls[0].centre, 2.0));
+            let of_all_pairs = |a: &Sphere| {
+                let larger = balls.iter().filter(|b| b.radius > a.radius);
+                let scales = larger.map(|b| a.centre.distance(b.centre) / (b.radius - a.radius));
+                scales.fold(f64::MAX, f64::min)
+            };
+            let expected: Vec<f64> = balls.iter().map(of_all_pairs).collect();
+            assert_eq!(critical_scales(&balls), expected);
+            assert_eq!((expected[0], expected[n + 1]), (0.0, f64::MAX));
+        }
+    }
+
+    #[test]
+    fn what_it_removes_the_transform_removes_too_and_more() {
+        let mut rng = Pcg64::seed_from_u64(52);
+        let (mut here, mut there) = (0, 0);
+        for _ in 0..100 {
+            let mut x = || rng.random_range(0.0..1.0);
+            let balls: Vec<Sphere> =
+                (0..40).map(|_| Sphere::new(Vec3::new(x(), x(), x()), 0.3 * x())).collect();
+            let critical = critical_scales(&balls);
+            for scale in [1.0, 1.3, 2.0] {
+                let grown: Vec<Sphere> =
+                    balls.iter().map(|b| Sphere::new(b.centre, scale * b.radius)).collect();
+                let axis = UnionAxis::of_balls(&grown).expect("balls");
+                let is_centre = |i: usize| axis.balls().binary_search(&(i as u32)).is_ok();
+                for (i, &at) in critical.iter().enumerate() {
+                    // Off the scale itself, which rounding decides.
+                    assert!(at >= scale * (1.0 - 1e-9) || !is_centre(i));
+                    here += u32::from(at < scale);
+                    there += u32::from(!is_centre(i));
+                }
+            }
+        }
+        assert!(here > 1_000 && there > here + 500, "{here} {there}");
+    }
+
+    #[test]
+    fn equal_balls_never_contain_each_other() {
+        let balls = [0.0, 1.0, 2.0].map(|x| Sphere::new(Vec3::new(x, 0.0, 0.0), 1.0));
+        assert_eq!(critical_scales(&balls), [f64::MAX; 3]);
+        assert!(critical_scales(&[]).is_empty());
+    }
+}

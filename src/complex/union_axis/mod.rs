@@ -1,0 +1,259 @@
+//! The medial axis of a union of balls: exact, and piecewise linear.
+//!
+//! D. Attali, A. Montanvert: *Computing and simplifying 2D and 3D continuous skeletons*, Computer
+//! Vision and Image Understanding 67 (1997), <https://doi.org/10.1006/cviu.1997.0536>; N. Amenta,
+//! R. K. Kolluri: *The medial axis of a union of balls*, Computational Geometry 20 (2001),
+//! <https://doi.org/10.1016/S0925-7721(01)00033-5>.
+//!
+//! Theorem (both papers): with the dual complex `K` of the balls and the vertices `V` of the
+//! boundary of their union, the medial axis is the union of the singular simplices of `K` and of the
+//! part of the Voronoi diagram of `V` inside the tetrahedra of `K`.
+//!
+//! 1. Regular triangulation, `K`, and `V` with the balls that meet in each of its *corners*
+//!    ([`corners`]).
+//! 2. *Sectors*: the triangles at an edge `ij` of `K` leave gaps and enclose solid sectors. The
+//!    corners at the two sides of a sector are on the circle of `i` and `j`, and the edge is part of
+//!    their Voronoi facet: on one side of it, in the sector, that facet is inside `K` or outside
+//!    ([`sectors`]).
+//! 3. Delaunay triangulation of `V`. The Voronoi vertex of a cell whose corners share a ball is that
+//!    ball's centre. A Voronoi edge whose corners share a ball passes through that ball's centre, and
+//!    only there does it cross the boundary of `K`; where they share two it runs along an edge of `K`.
+//!    So all other Voronoi edges join vertices on one side, and the sectors say on which
+//!    ([`sides`]).
+//! 4. The part of each Voronoi facet inside `K` is bounded by Voronoi edges inside, as far as the
+//!    first ball centre on them, and by the solid sectors, among which a singular triangle is one of
+//!    no width. These sides, directed, close up to polygons ([`facets`]).
+//! 5. The polygons with the singular edges and vertices of `K` are the axis. Radii: of a ball at its
+//!    centre, the distance to the corners at a Voronoi vertex.
+//!
+//! Nothing in steps 2 to 4 is decided by coordinates but the Delaunay triangulation of the rounded
+//! corners, so that the axis has the topology of `K` wherever that triangulation has every facet of
+//! step 2 and no corner that rounding moved into a ball. [`AxisTally`] counts violations. On balls in
+//! random position there was none among 1,500 unions. Where balls touch in single points, or many
+//! spheres meet in one corner, parts of the axis can coincide and are then taken for one: 12 of 400
+//! unions of balls on small lattices have other Betti numbers than their axis, none once perturbed.
+//! [`UnionAxis::union_betti`] tells.
+//!
+//! Polar balls as they are, which meet in samples by construction but only up to rounding, are beyond
+//! this: their dual complex is decided by rounding, and their other corners are where spheres nearly
+//! touch. The polar balls of a smooth solid of 2,500 samples gave Betti numbers (146, 42, 16), and
+//! (12, 129, 91) with the samples in place of the corners there, instead of (1, 0, 0). With radii times
+//! 1.002 and centres moved by `1e-4 r` no facet was open on any solid tried.
+//!
+//! Deviations from the papers
+//!
+//! * Amenta and Kolluri clip by classifying Voronoi vertices and keep facets all of whose vertices
+//!   are inside. A facet that an edge of `K` cuts has vertices on both sides (four balls that meet
+//!   have a single Voronoi vertex and six such facets); here it is cut along that edge.
+//! * Where the spheres of several balls meet in one corner, polygons need not be convex.
+
+mod corners;
+mod facets;
+mod sectors;
+mod sides;
+
+use rayon::prelude::*;
+
+use super::MedialMesh;
+use crate::Vec3;
+use crate::geometry::dual_complex::Class;
+use crate::geometry::{CellId, DualComplex, Sphere, TriangulationError};
+
+use corners::Corners;
+use facets::Polygon;
+
+/// No ball, corner, or vertex.
+const NONE: u32 = u32::MAX;
+
+/// The medial axis of a union of balls.
+///
+/// ```
+/// use medial::{Vec3, complex::{Sphere, UnionAxis}};
+///
+/// // Two balls that meet, one inside the first, one apart.
+/// let balls = [(0.0, 2.0), (3.0, 1.5), (0.5, 1.0), (9.0, 1.0)];
+/// let balls = balls.map(|(x, r)| Sphere::new(Vec3::new(x, 0.0, 0.0), r));
+/// let axis = UnionAxis::of_balls(&balls)?.mesh();
+/// assert_eq!(axis.spheres, [balls[0], balls[1], balls[3]]);
+/// assert_eq!(axis.edges, [[0, 1]]);
+/// # Ok::<(), medial::geometry::TriangulationError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct UnionAxis {
+    spheres: Vec<Sphere>,
+    /// For the first of the spheres the ball that each is.
+    balls: Vec<u32>,
+    edges: Vec<[u32; 2]>,
+    polygons: Vec<Polygon>,
+    union_betti: [u64; 3],
+    tally: AxisTally,
+}
+
+/// What the axis was made from, and what rounding spoilt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AxisTally {
+    /// Balls that are in the dual complex: those that contribute to the boundary of the union, or
+    /// whose centre is inside its solid part.
+    pub balls: usize,
+    /// Different vertices of the boundary.
+    pub corners: usize,
+    /// Voronoi vertices inside the dual complex, ball centres not counted.
+    pub inside: usize,
+    /// Groups of Voronoi vertices that no sector or contradictory sectors put on a side. Zero but
+    /// for rounding.
+    pub doubtful: usize,
+    /// Facets whose sides do not close up and are missing from the axis. Zero but for rounding.
+    pub open: usize,
+    /// Voronoi vertices that rounding had outside the box of all centres, moved into it.
+    pub clamped: usize,
+}
+
+/// A convex polygon of the axis, unless several balls meet in its corners: a part of a Voronoi facet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisFacet<'a> {
+    /// The two points of the boundary of the union that are nearest to each point of it.
+    pub corners: [Vec3; 2],
+    /// The vertices in order, as indices of spheres.
+    pub polygon: &'a [u32],
+}
+
+impl UnionAxis {
+    /// The medial axis of the union of any number of balls.
+    ///
+    /// Costs a regular triangulation of the balls and a Delaunay triangulation of the vertices of the
+    /// boundary, of which there are up to twice as many. The same for any number of threads.
+    ///
+    /// # Errors
+    /// A centre or radius that is not finite or too large; a negative radius.
+    pub fn of_balls(balls: &[Sphere]) -> Result<Self, TriangulationError> {
+        let complex = DualComplex::of_balls(balls)?;
+        let corners = Corners::of(&complex, balls)?;
+        let sectors = sectors::of(&complex, &corners);
+        let mut tally = AxisTally {
+            balls: complex.vertices().count(),
+            corners: corners.count(),
+            ..AxisTally::default()
+        };
+        let voronoi = sides::classify(&corners, &sectors, &mut tally);
+        let mut sides = facets::solid_sides(&sectors);
+        facets::voronoi_sides(&corners, &voronoi, balls.len() as u32, &mut sides);
+        let polygons = facets::close_up(&mut sides, &mut tally);
+        let mut edges: Vec<[u32; 2]> = lone_edges(&complex);
+        edges.extend(voronoi.edges(&corners, balls.len() as u32));
+        Ok(Self::assemble(balls, &complex, &corners, edges, polygons, tally))
+    }
+
+    /// Numbers the vertices: ball centres by ball, then Voronoi vertices by cell.
+    fn assemble(
+        balls: &[Sphere],
+        complex: &DualComplex<'_>,
+        corners: &Corners,
+        mut edges: Vec<[u32; 2]>,
+        mut polygons: Vec<Polygon>,
+        mut tally: AxisTally,
+    ) -> Self {
+        let mut used = vec![false; balls.len() + corners.cell_count()];
+        let singular = complex.vertices().filter(|v| v.1 == Class::Singular).map(|v| v.0.0);
+        let on_sides = polygons.iter().flat_map(|p| p.vertices.iter().copied());
+        for v in singular.chain(on_sides).chain(edges.iter().flatten().copied()) {
+            used[v as usize] = true;
+        }
+        let mut number = vec![NONE; used.len()];
+        let (mut spheres, mut of_ball) = (Vec::new(), Vec::new());
+        let bounds = corners::bounds(balls);
+        for old in (0..used.len()).filter(|&v| used[v]) {
+            number[old] = spheres.len() as u32;
+            spheres.push(if old < balls.len() {
+                of_ball.push(old as u32);
+                balls[old]
+            } else {
+                let (sphere, clamped) = corners.sphere(CellId((old - balls.len()) as u32), bounds);
+                tally.clamped += usize::from(clamped);
+                sphere
+            });
+        }
+        for v in polygons.iter_mut().flat_map(|p| &mut p.vertices).chain(edges.iter_mut().flatten())
+        {
+            *v = number[*v as usize];
+        }
+        for polygon in &mut polygons {
+            polygon.corners = polygon.between.map(|c| corners.point(c));
+        }
+        // The other sides are Voronoi edges.
+        let is_ball = |v: u32| (v as usize) < of_ball.len();
+        let along_balls = polygons.iter().flat_map(Polygon::edges);
+        edges.extend(along_balls.filter(|&[a, b]| is_ball(a) && is_ball(b)));
+        for edge in &mut edges {
+            edge.sort_unstable();
+        }
+        edges.par_sort_unstable_by_key(|&[a, b]| u64::from(a) << 32 | u64::from(b));
+        edges.dedup();
+        let union_betti = complex.betti();
+        Self { spheres, balls: of_ball, edges, polygons, union_betti, tally }
+    }
+
+    /// The vertices: centres of balls with their radii, ascending, then Voronoi vertices with their
+    /// distances from the boundary.
+    pub fn spheres(&self) -> &[Sphere] {
+        &self.spheres
+    }
+
+    /// For the first of the spheres the ball that each is, ascending.
+    pub fn balls(&self) -> &[u32] {
+        &self.balls
+    }
+
+    /// All edges, as ascending pairs in lexicographic order: sides of facets, and singular edges.
+    pub fn edges(&self) -> &[[u32; 2]] {
+        &self.edges
+    }
+
+    /// The facets, by corners.
+    pub fn facets(&self) -> impl ExactSizeIterator<Item = AxisFacet<'_>> {
+        self.polygons.iter().map(|p| AxisFacet { corners: p.corners, polygon: &p.vertices })
+    }
+
+    /// The Betti numbers of the union, exact: those of the axis, but for what is said in
+    /// [the module](self).
+    pub fn union_betti(&self) -> [u64; 3] {
+        self.union_betti
+    }
+
+    /// What it was made from.
+    pub fn tally(&self) -> &AxisTally {
+        &self.tally
+    }
+
+    /// The axis as a medial mesh, facets cut into fans from their smallest vertex.
+    pub fn mesh(&self) -> MedialMesh {
+        self.part(|_| true, |_| true, |_| true)
+    }
+
+    /// The mesh of some facets, edges and spheres, by their indices, and of all that these have.
+    pub fn part(
+        &self,
+        facet: impl Fn(usize) -> bool,
+        edge: impl Fn(usize) -> bool,
+        sphere: impl Fn(usize) -> bool,
+    ) -> MedialMesh {
+        let kept = self.polygons.iter().enumerate().filter(|(i, _)| facet(*i));
+        let polygons: Vec<&Polygon> = kept.map(|(_, p)| p).collect();
+        let kept = self.edges.iter().enumerate().filter(|(i, _)| edge(*i));
+        let edges: Vec<[u32; 2]> = kept.map(|(_, e)| *e).collect();
+        let mut keep: Vec<bool> = (0..self.spheres.len()).map(sphere).collect();
+        let of_polygons = polygons.iter().flat_map(|p| &p.vertices);
+        for &v in edges.iter().flatten().chain(of_polygons) {
+            keep[v as usize] = true;
+        }
+        let faces = polygons.iter().flat_map(|p| p.fan()).collect();
+        let mesh = MedialMesh::from_simplices(self.spheres.clone(), edges, faces)
+            .expect("finite spheres and ids in range");
+        if keep.contains(&false) { mesh.induced(&keep) } else { mesh }
+    }
+}
+
+/// Edges of the dual complex without a triangle.
+fn lone_edges(complex: &DualComplex<'_>) -> Vec<[u32; 2]> {
+    let singular = complex.edges().filter(|e| e.1 == Class::Singular);
+    singular.map(|(edge, _)| complex.edge_vertices(edge).map(|v| v.0)).collect()
+}
