@@ -247,7 +247,8 @@ impl MedialUnion {
         })
     }
 
-    /// Whether some primitive holds `p` more than `depth` below its surface.
+    /// Whether some primitive holds `p` more than `depth` below its surface; with a negative depth,
+    /// whether one is nearer than that. Ends at the first that is found.
     pub fn buries(&self, p: Vec3, depth: f64) -> bool {
         let mut search = Buried { union: self, p, limit: -depth };
         self.tree.search(&mut search);

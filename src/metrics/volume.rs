@@ -120,14 +120,18 @@ impl<F: Fn(Vec3) -> bool> Division<'_, F> {
         if cell.level >= self.depth {
             let jitter = Vec3::new(rng.random(), rng.random(), rng.random());
             let point = cell.lo + jitter * cell.size;
-            let differs = (self.inside)(point) != (self.union.signed(point) < 0.0);
+            let differs = (self.inside)(point) != self.union.buries(point, 0.0);
             return if differs { cell.volume() } else { 0.0 };
         }
         let (centre, reach) = (cell.lo + cell.size * 0.5, cell.size.length() * 0.5);
-        let sigma = self.union.signed(centre);
-        if sigma.abs() > reach && !self.bvh.any_within(centre, reach) {
-            let differs = (self.inside)(centre) != (sigma < 0.0);
-            return if differs { cell.volume() } else { 0.0 };
+        // Most cells are near the surface, which is the quickest to find out; and none of these
+        // questions needs the distance itself.
+        if !self.bvh.any_within(centre, reach) {
+            let covered = self.union.buries(centre, reach);
+            if covered || !self.union.buries(centre, -reach) {
+                let differs = (self.inside)(centre) != covered;
+                return if differs { cell.volume() } else { 0.0 };
+            }
         }
         cell.children().iter().map(|child| self.difference(child, rng)).sum()
     }
