@@ -1,7 +1,7 @@
 //! Signed distances to sphere, cone and slab against brute force, over all degenerate classes.
 
 use medial::Vec3;
-use medial::geometry::{Cone, Slab, Sphere};
+use medial::geometry::{Cone, Slab, SlabFace, Sphere};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -273,6 +273,36 @@ fn foot(spheres: &[Sphere], p: Vec3) -> (f64, Sphere, Vec3, Vec<f64>) {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// The direction from the nearest centre supports the hull: no ball reaches beyond the nearest
+    /// point in it.
+    #[test]
+    fn nearest_centres_attain_the_distance((spheres, p, _) in any_class()) {
+        let (distance, centre) = match *spheres {
+            [a, b] => {
+                let cone = Cone::new(a, b);
+                prop_assert_eq!(cone.nearest_centre(p).0, cone.signed_distance(p));
+                cone.nearest_centre(p)
+            }
+            [a, b, c] => {
+                let cones = [[a, b], [b, c], [c, a]].map(|[m, n]| Cone::new(m, n).nearest_centre(p));
+                let least = |x: (f64, Vec3), y: (f64, Vec3)| if y.0 < x.0 { y } else { x };
+                let sides = cones.into_iter().reduce(least).expect("three");
+                let face = SlabFace::new([a, b, c]);
+                let inner = face.and_then(|face| face.nearest_centre(p));
+                prop_assert_eq!(inner.map(|i| i.0), face.and_then(|f| f.signed_distance(p)));
+                inner.unwrap_or(sides)
+            }
+            _ => unreachable!("two or three spheres"),
+        };
+        prop_assert!((distance - signed(&spheres, p)).abs() <= 1e-12);
+        if let Some(u) = (p - centre).try_normalize() {
+            let reach = |m: &Sphere| (m.centre - p).dot(u) + m.radius;
+            let reach = spheres.iter().map(reach).fold(f64::NEG_INFINITY, f64::max);
+            // At internal tangency the centre carries half the digits.
+            prop_assert!(reach <= 1e-6 - distance, "{} {}", reach, distance);
+        }
+    }
 
     #[test]
     fn distances_are_lipschitz((spheres, p, seed) in any_class()) {

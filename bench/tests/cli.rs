@@ -53,6 +53,7 @@ fn methods_and_their_parameters() {
     insta::assert_snapshot!("methods", run(&["methods"]).1);
     insta::assert_snapshot!("methods_qmat", run(&["methods", "qmat"]).1);
     insta::assert_snapshot!("methods_pmat", run(&["methods", "pmat"]).1);
+    insta::assert_snapshot!("methods_hem", run(&["methods", "hem"]).1);
     insta::assert_snapshot!("methods_angle", run(&["methods", "angle"]).1);
     let (code, _, stderr) = run(&["methods", "nothing"]);
     assert_eq!(code, 2);
@@ -136,7 +137,7 @@ fn axis_simplify_evaluate_convert() {
     }
     assert_eq!(object["betti"], object["expected_betti"]);
 
-    for method in ["qmat", "pmat", "angle", "lambda"] {
+    for method in ["qmat", "pmat", "hem", "dey-zhao", "angle", "lambda"] {
         let (code, object) =
             json(&["simplify", mesh, "--method", method, "--spheres", "60", "-o", simple]);
         assert_eq!(code, 0, "{object}");
@@ -184,7 +185,7 @@ fn axis_simplify_evaluate_convert() {
 #[test]
 fn threads_change_no_byte() {
     let dir = tempfile::tempdir().expect("a folder");
-    for method in ["qmat", "pmat", "angle", "lambda"] {
+    for method in ["qmat", "pmat", "hem", "dey-zhao", "angle", "lambda"] {
         let written = ["1", "2"].map(|threads| {
             let path = dir.path().join(format!("{method}-{threads}.ma"));
             let (code, ..) = run(&[

@@ -30,8 +30,9 @@ pub(super) fn sample_error(
     Ok(largest(distances))
 }
 
-/// The number of collapses, up to `all`, that bisection finds to be within a bound when one more is
-/// not; `all` when that is. None at all is known to be within.
+/// A number of collapses, up to `all`, that is within a bound, while one more is not: `all` itself
+/// where it is. Looked for backwards in growing steps, because the error can grow and shrink again,
+/// and the latest level is the coarsest; none at all is known to be within.
 ///
 /// # Errors
 /// Those of the test.
@@ -39,10 +40,12 @@ pub(super) fn last_within(
     all: usize,
     mut is_within: impl FnMut(usize) -> Result<bool, SimplifyError>,
 ) -> Result<usize, SimplifyError> {
-    if all == 0 || is_within(all)? {
-        return Ok(all);
+    let (mut within, mut beyond, mut step) = (all, all + 1, 1);
+    while within > 0 && !is_within(within)? {
+        beyond = within;
+        within = within.saturating_sub(step);
+        step *= 2;
     }
-    let (mut within, mut beyond) = (0, all);
     while beyond - within > 1 {
         let middle = within + (beyond - within) / 2;
         if is_within(middle)? {

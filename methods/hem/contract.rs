@@ -39,6 +39,14 @@ pub(super) enum Stop {
     Error(f64),
 }
 
+/// The collapse that is next.
+struct Taken {
+    error: f64,
+    ends: [u32; 2],
+    /// Which of the ends survives.
+    survivor: usize,
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     evaluations: usize,
@@ -85,16 +93,17 @@ impl Contraction {
                 let evaluated = chunk.iter().map(|&ends| {
                     let mut edge = Edge::unknown(NONE);
                     edge.evaluate(&ground, ends, f64::INFINITY, &mut star);
-                    edge.queued = edge.key(ground.complex, ends);
+                    edge.queued = edge.cost();
                     edge
                 });
                 (evaluated.collect(), star.distances)
             })
             .collect();
         let edges = jobs.iter().flat_map(|(edges, _)| edges);
-        let candidates = all.iter().zip(edges.clone()).map(|(&ends, edge)| {
-            Candidate::new(ground.complex, ends, edge.queued.0, edge.queued.1)
-        });
+        let candidates = all
+            .iter()
+            .zip(edges.clone())
+            .map(|(&ends, edge)| candidate(ground.complex, ends, edge.queued));
         let queue = CollapseQueue::from_candidates(candidates.collect());
         let edges = all.iter().copied().zip(edges.copied()).collect();
         self.star.distances += jobs.iter().map(|(_, distances)| distances).sum::<u64>();
@@ -145,9 +154,10 @@ impl Contraction {
         let total = self.sphere_count().saturating_sub(target);
         let first = self.record().len();
         while self.sphere_count() > target {
-            let Some((cheapest, survivor)) = self.cheapest(bound) else { break };
-            self.collapse(cheapest.ends(), survivor);
-            self.largest = self.largest.max(cheapest.cost());
+            let Some(next) = self.cheapest(bound) else { break };
+            let Taken { error, ends, survivor } = next;
+            self.collapse(ends, survivor);
+            self.largest = self.largest.max(error);
             let done = self.record().len() - first;
             if done.is_multiple_of(REPORT_EVERY) {
                 run.step(done, total)?;
@@ -156,22 +166,22 @@ impl Contraction {
         run.step(total, total)
     }
 
-    /// Step 2: the edge of smallest error, if that is within the bound, and which end survives.
-    fn cheapest(&mut self, bound: f64) -> Option<(Candidate, usize)> {
+    /// Step 2: the edge of smallest error, in its better direction, if it is within the bound.
+    fn cheapest(&mut self, bound: f64) -> Option<Taken> {
         loop {
             let candidate = self.queue.pop(&self.complex)?;
-            let ends = candidate.ends();
+            let (error, ends) = (candidate.cost(), candidate.ends());
             let edge = self.edges[&ends];
-            if edge.queued.0.total_cmp(&candidate.cost()).is_ne() {
+            if edge.queued.total_cmp(&error).is_ne() {
+                // It was queued again since, earlier or later.
                 continue;
             }
-            if candidate.cost() > bound {
+            if error > bound {
                 self.queue.push(candidate);
                 return None;
             }
-            let now = edge.key(&self.complex, ends);
-            if let Some(survivor) = edge.decided().filter(|_| now == edge.queued) {
-                return Some((candidate, survivor));
+            if let Some(survivor) = edge.decided() {
+                return Some(Taken { error, ends, survivor });
             }
             self.refine(ends, edge);
         }
@@ -184,17 +194,16 @@ impl Contraction {
         }
         if edge.is_open() {
             let cutoff = self.queue.peek(&self.complex).map_or(f64::INFINITY, |next| next.cost());
-            let ground =
-                Ground { complex: &self.complex, samples: &self.samples, inside: self.inside };
-            edge.evaluate(&ground, ends, cutoff, &mut self.star);
+            let Self { complex, samples, inside, star, .. } = self;
+            edge.evaluate(&Ground { complex, samples, inside: *inside }, ends, cutoff, star);
             self.tally.evaluations += 1;
         }
-        edge.queued = (f64::INFINITY, f64::INFINITY);
+        edge.queued = f64::INFINITY;
         enqueue(&mut self.queue, &self.complex, ends, &mut edge);
         self.edges.insert(ends, edge);
     }
 
-    /// The link condition for the edge, the inversion test for each direction.
+    /// The condition on the links for the edge, the inversion test for each direction.
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
         edge.tested = true;
@@ -268,7 +277,7 @@ impl Contraction {
         let added = added.chain(change.sides.iter().copied());
         let added = added.filter(|simplex| !simplex.contains(&other));
         star.distances += edge.renew(&ground, ends, change.removed, added);
-        edge.queued = (f64::INFINITY, f64::INFINITY);
+        edge.queued = f64::INFINITY;
         enqueue(queue, complex, ends, edge);
     }
 
@@ -318,11 +327,18 @@ impl Contraction {
     }
 }
 
+/// An edge at a cost. Of equal costs, in the main zeros, the shorter edge comes first: it is as good
+/// as the other, and clusters of coincident spheres grow in no order rather than around one hub.
+fn candidate(complex: &CollapseComplex, ends: [u32; 2], cost: f64) -> Candidate {
+    let [a, b] = ends.map(|v| complex.sphere(v).centre);
+    Candidate::new(complex, ends, cost, a.distance(b))
+}
+
 /// Queues an edge where it comes earlier than it is queued.
 fn enqueue(queue: &mut CollapseQueue, complex: &CollapseComplex, ends: [u32; 2], edge: &mut Edge) {
-    let key = edge.key(complex, ends);
-    if !edge.is_barred() && key < edge.queued {
-        edge.queued = key;
-        queue.push(Candidate::new(complex, ends, key.0, key.1));
+    let cost = edge.cost();
+    if !edge.is_barred() && cost < edge.queued {
+        edge.queued = cost;
+        queue.push(candidate(complex, ends, cost));
     }
 }

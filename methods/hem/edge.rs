@@ -19,6 +19,7 @@
 //! to the witness cannot be nearer ([`super::star`]), so most are not even built.
 
 use medial::Vec3;
+use medial::complex::ZERO_LENGTH;
 use medial::complex::collapse::CollapseComplex;
 use medial::geometry::{Cone, SlabFace};
 
@@ -29,9 +30,9 @@ use super::star::{Nearest, ROUNDING, Star, excess_of};
 /// Absent index.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Errors below this are rounding, in units of the diagonal, and count as zero: equal costs are
-/// ordered by the size of the stars.
-pub(super) const NOISE: f64 = 1e-14;
+/// Errors below this are rounding, in units of the diagonal, and count as zero, so that ids and not
+/// rounding decide between them.
+pub(super) const NOISE: f64 = ZERO_LENGTH;
 
 /// One direction of an edge.
 #[derive(Clone, Copy, Debug)]
@@ -62,8 +63,8 @@ enum State {
 pub(super) struct Edge {
     /// Into the smaller id, into the larger.
     pub into: [Directed; 2],
-    /// Cost and second key of the candidate in the queue; infinite when there is none.
-    pub queued: (f64, f64),
+    /// Cost of the candidate in the queue; infinite when there is none.
+    pub queued: f64,
     /// Whether both directions passed the tests, or are barred.
     pub tested: bool,
 }
@@ -114,28 +115,13 @@ pub(super) struct Ground<'a> {
 impl Edge {
     /// An edge of which nothing is known.
     pub(super) fn unknown(witness: u32) -> Self {
-        Self {
-            into: [Directed::unknown(witness); 2],
-            queued: (f64::INFINITY, f64::INFINITY),
-            tested: false,
-        }
+        Self { into: [Directed::unknown(witness); 2], queued: f64::INFINITY, tested: false }
     }
 
-    /// The smaller of both errors, or a lower bound of it.
-    pub(super) fn error(&self) -> f64 {
-        self.into[0].error().min(self.into[1].error())
-    }
-
-    /// Cost and second key: errors of mere rounding are zero, and then small stars go first.
-    /// Clusters that grow evenly rarely violate the link condition, one hub that swallows its
-    /// neighbours soon does.
-    pub(super) fn key(&self, complex: &CollapseComplex, ends: [u32; 2]) -> (f64, f64) {
-        let error = self.error();
-        if error >= NOISE {
-            return (error, 0.0);
-        }
-        let [m, n] = ends.map(|v| complex.neighbours(v).len());
-        (0.0, -1.0 / (m + n) as f64)
+    /// The smaller of both errors, or a lower bound of it; mere rounding counts as zero.
+    pub(super) fn cost(&self) -> f64 {
+        let error = self.into[0].error().min(self.into[1].error());
+        if error < NOISE { 0.0 } else { error }
     }
 
     /// Which end survives (0 or 1) at the smaller error, when that is known exactly and the direction
@@ -237,7 +223,7 @@ impl Directed {
         let [removed, kept] = [removed, kept].map(|v| ground.samples.of(v).iter().copied());
         for id in first.into_iter().chain(removed).chain(kept) {
             let p = ground.samples.point(id);
-            let floor = self.error();
+            let floor = self.error().max(NOISE);
             let nearest = star.nearest(p, floor, ground.inside);
             if nearest.signed.abs() > floor {
                 self.set(star, id, p, &nearest, State::Exact);

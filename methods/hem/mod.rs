@@ -36,7 +36,7 @@
 //!
 //! - edges are collapsed until the cheapest one costs more than the bound;
 //! - the error of every sample is measured against the whole union, in the reading of the parameter;
-//! - while it exceeds the bound, collapses are taken back, their number found by bisection. The
+//! - while it exceeds the bound, collapses are taken back, in growing steps and then by bisection. The
 //!   count `taken_back_for_the_bound` says how many. The initial mesh has to be within the bound.
 //!
 //! In the reading `depth` it often is not: the cones and slabs of a Voronoi medial mesh stick out of the

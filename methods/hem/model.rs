@@ -23,8 +23,8 @@ pub(super) struct Model {
     pub inside: Inside,
 }
 
-/// An edge as the queue orders it: cost, second key, ends; and which end survives.
-pub(super) type Choice = (f64, f64, [u32; 2], usize);
+/// An edge: cost, ends, which of them survives.
+pub(super) type Choice = (f64, [u32; 2], usize);
 
 impl Model {
     pub(super) fn new(
@@ -81,13 +81,15 @@ impl Model {
             }
         }
         let hub = at(kept);
+        let cones = around.iter().map(|&v| Cone::new(hub, at(v)));
+        let rims = sides.iter().map(|&[v, w]| Cone::new(at(v), at(w)));
+        let cones: Vec<Cone> = cones.chain(rims).collect();
+        let slabs = sides.iter().map(|&[v, w]| Slab::new([hub, at(v), at(w)]));
+        let slabs: Vec<Slab> = slabs.collect();
         let distances = |p: Vec3| {
             let mut all = vec![hub.signed_distance(p)];
-            all.extend(around.iter().map(|&v| Cone::new(hub, at(v)).signed_distance(p)));
-            for &[v, w] in &sides {
-                all.push(Slab::new([hub, at(v), at(w)]).signed_distance(p));
-                all.push(Cone::new(at(v), at(w)).signed_distance(p));
-            }
+            all.extend(cones.iter().map(|cone| cone.signed_distance(p)));
+            all.extend(slabs.iter().map(|slab| slab.signed_distance(p)));
             all
         };
         let error = |&id: &u32| {
@@ -105,7 +107,14 @@ impl Model {
     pub(super) fn cheapest(&self) -> Option<Choice> {
         let mut complex = CollapseComplex::from_mesh(&self.mesh());
         let choices = self.edges.iter().filter_map(|&ends| self.choice(&mut complex, ends));
-        choices.min_by(|x, y| x.0.total_cmp(&y.0).then(x.1.total_cmp(&y.1)).then(x.2.cmp(&y.2)))
+        let length = |choice: &Choice| {
+            let [a, b] = choice.1.map(|v| self.spheres[v as usize].centre);
+            a.distance(b)
+        };
+        choices.min_by(|x, y| {
+            let costs = x.0.total_cmp(&y.0);
+            costs.then(length(x).total_cmp(&length(y))).then(x.1.cmp(&y.1))
+        })
     }
 
     /// An edge with the better of its directions that pass both tests.
@@ -121,10 +130,7 @@ impl Model {
         if error == f64::INFINITY {
             return None;
         }
-        let degrees = ends.map(|v| complex.neighbours(v).len());
-        let small = -1.0 / (degrees[0] + degrees[1]) as f64;
-        let (cost, tie) = if error < NOISE { (0.0, small) } else { (error, 0.0) };
-        Some((cost, tie, ends, survivor))
+        Some((if error < NOISE { 0.0 } else { error }, ends, survivor))
     }
 
     pub(super) fn collapse(&mut self, removed: u32, kept: u32) {

@@ -41,6 +41,8 @@ pub(super) struct Star {
     /// Pairs of places in `link`.
     sides: Vec<[u32; 2]>,
     hub: Sphere,
+    /// Radius of a ball around the centre of the hub that holds all balls of the star.
+    reach: f64,
     /// Excess of each link vertex.
     excess: Vec<f64>,
     /// Number of the query that last evaluated the cone to each link vertex.
@@ -74,6 +76,7 @@ impl Star {
             spheres: Vec::new(),
             sides: Vec::new(),
             hub: Sphere::new(Vec3::ZERO, 0.0),
+            reach: 0.0,
             excess: Vec::new(),
             tested: Vec::new(),
             query: 0,
@@ -111,6 +114,8 @@ impl Star {
 
     /// Which end survives.
     pub(super) fn set_hub(&mut self, hub: Sphere) {
+        let reach = |m: &Sphere| m.centre.distance(hub.centre) + m.radius;
+        self.reach = self.spheres.iter().map(reach).fold(hub.radius, f64::max);
         self.hub = hub;
         self.cones.renew(self.link.len());
         self.faces.renew(self.sides.len());
@@ -133,6 +138,9 @@ impl Star {
     /// The primitive of least signed distance.
     fn deepest(&mut self, p: Vec3, floor: f64) -> Nearest {
         let mut best = self.at_hub(p);
+        if self.is_within_hub(best.signed, limit(best.signed, floor)) {
+            return best;
+        }
         self.query += 1;
         let mut hub = self.measure_excess(p, best.towards(p));
         for _ in 0..ROUNDS {
@@ -168,7 +176,11 @@ impl Star {
     fn nearest_surface(&mut self, p: Vec3, floor: f64) -> Nearest {
         let mut best = self.at_hub(p);
         let towards = best.towards(p);
-        best.signed = best.signed.abs();
+        let signed = best.signed;
+        best.signed = signed.abs();
+        if best.signed <= floor || self.is_within_hub(signed, ROUNDING - best.signed) {
+            return best;
+        }
         let hub = self.measure_excess(p, towards);
         for k in 0..self.link.len() {
             if best.signed <= floor {
@@ -194,6 +206,13 @@ impl Star {
             }
         }
         best
+    }
+
+    /// Whether no ball has an excess beyond `limit` in the direction from the hub to a point at a
+    /// signed distance from it, by the reach alone: so in a cluster of coincident spheres, where
+    /// all samples and all link vertices meet.
+    fn is_within_hub(&self, signed: f64, limit: f64) -> bool {
+        self.reach - (self.hub.radius + signed) <= limit
     }
 
     fn at_hub(&mut self, p: Vec3) -> Nearest {

@@ -16,8 +16,8 @@ use super::*;
 
 const READINGS: [Inside; 2] = [Inside::Depth, Inside::Surface];
 
-/// More than the distances can be rounded.
-const CLOSE: f64 = 1e-12;
+/// More than the distances can be rounded, and than what counts as no error.
+const CLOSE: f64 = 3e-12;
 
 /// What a random model is made of; simplices and lists with repetitions.
 type Parts =
@@ -84,12 +84,8 @@ fn assert_bounds_hold(model: &Model, contraction: &Contraction) {
         for (directed, truth) in edge.into.iter().zip(truth) {
             assert!(directed.bound() <= truth + CLOSE, "{ends:?}: {directed:?} above {truth}");
         }
-        if let Some((cost, _, _, _)) = model.choice(&mut complex, ends) {
-            assert!(
-                edge.queued.0 <= cost + CLOSE,
-                "{ends:?} queued at {:?} of {cost}",
-                edge.queued
-            );
+        if let Some((cost, _, _)) = model.choice(&mut complex, ends) {
+            assert!(edge.queued <= cost + CLOSE, "{ends:?} queued at {:?} of {cost}", edge.queued);
         }
     }
 }
@@ -118,7 +114,7 @@ fn follow(mut model: Model, checks_each: bool) -> usize {
             assert!(expected.is_none() || target == 0, "{expected:?} was left");
             return contraction.sphere_count();
         };
-        let (cost, _, ends, survivor) = expected.expect("nothing may be collapsed");
+        let (cost, ends, survivor) = expected.expect("nothing may be collapsed");
         if [taken.kept, taken.removed] != [ends[survivor], ends[1 - survivor]] {
             let error = model.error(taken.removed, taken.kept);
             assert!(error <= cost + CLOSE, "{taken:?} at {error}, not {ends:?} at {cost}");
@@ -217,7 +213,7 @@ fn run(model: &Model, stop: Stop) -> Contraction {
 fn a_straight_chain_is_free_but_for_its_ends() {
     let model = chain(9);
     let two = run(&model, Stop::Spheres(2));
-    assert!(two.largest() < 1e-15);
+    assert_eq!(two.largest(), 0.0);
     assert_eq!(two.to_mesh().spheres, [model.spheres[0], model.spheres[8]]);
     // The last collapse leaves the far end at the length of the chain.
     let one = run(&model, Stop::Spheres(1));
@@ -255,7 +251,7 @@ fn spheres_without_samples_vanish_first_and_contained_ones_cost_nothing() {
     let model = Model::new(&mesh, points, &[vec![0, 1], vec![], vec![], vec![2, 3]], Inside::Depth);
     let contraction = run(&model, Stop::Error(1e-9));
     assert_eq!(contraction.to_mesh().spheres, [model.spheres[0], model.spheres[3]]);
-    assert!(contraction.largest() < 1e-15);
+    assert_eq!(contraction.largest(), 0.0);
 }
 
 #[test]
@@ -308,6 +304,7 @@ fn a_level_within_the_bound_is_found() {
     assert_eq!(last_within(9, within(&[9])).unwrap(), 9);
     assert_eq!(last_within(9, within(&[1, 2, 3, 4, 5])).unwrap(), 5);
     assert_eq!(last_within(9, within(&[])).unwrap(), 0);
+    assert_eq!(last_within(9, within(&[1, 2, 8])).unwrap(), 8, "the latest");
 }
 
 #[test]

@@ -114,7 +114,8 @@ mod tests {
         assert_eq!(sets.ids(1), [55, 155]);
         assert!(sets.ids(2).is_empty());
         assert_eq!(sets.ids(3), [54, 55, 154, 155]);
-        assert_eq!(sets.empty_sets(), 1);
+        assert_eq!((sets.spheres(), sets.empty_sets()), (4, 1));
+        assert_eq!(sets.samples(), &samples);
         assert_eq!(sets.with(0, <[Vec3]>::to_vec), [samples[55], samples[155]]);
     }
 }

@@ -1,0 +1,222 @@
+//! HEM on the medial meshes of sampled solids.
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, MedialUnion, betti};
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError, Work,
+};
+use medial::surface;
+use medial_methods::hem::Hem;
+
+fn shape(id: &str, resolution: u32) -> Shape {
+    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
+    let mesh = built_in.mesh(resolution);
+    let report = surface::validate(&mesh).expect("built-in shapes are solids");
+    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+fn prepare<'s>(shape: &'s Shape, inside: &str) -> Box<dyn Simplification + 's> {
+    let mut params = Params::none();
+    params.set("inside", inside);
+    Hem::new().prepare(shape, &params, &RunContext::default()).expect("prepared")
+}
+
+fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified {
+    simplification.at(Level::Spheres(count)).expect("a count")
+}
+
+fn count(result: &Simplified, name: &str) -> u64 {
+    let counts = &result.diagnostics.counts;
+    counts.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("no count {name}")).1
+}
+
+/// The samples of the initial mesh, of which the bound speaks.
+fn touched(initial: &MedialMesh) -> Vec<Vec3> {
+    let contacts = initial.contacts.as_ref().expect("the Voronoi medial mesh has contacts");
+    let mut ids = contacts.of_sphere.as_flattened().to_vec();
+    ids.sort_unstable();
+    ids.dedup();
+    ids.into_iter().map(|id| contacts.samples[id as usize]).collect()
+}
+
+/// Largest `|sigma|`, and largest distance to the surface of a primitive, buried spheres included.
+fn errors(mesh: &MedialMesh, samples: &[Vec3]) -> [f64; 2] {
+    let union = MedialUnion::new(mesh).expect("a union");
+    let to_sphere = |p: Vec3| {
+        let distances = mesh.spheres.iter().map(|m| m.signed_distance(p).abs());
+        distances.fold(f64::INFINITY, f64::min)
+    };
+    let depth = samples.iter().map(|&p| union.signed(p).abs());
+    let surface = samples.iter().map(|&p| union.unsigned_nearest(p).min(to_sphere(p)));
+    [depth.fold(0.0, f64::max), surface.fold(0.0, f64::max)]
+}
+
+#[test]
+fn a_sampled_sphere_becomes_one_sphere() {
+    let shape = shape("sphere", 40);
+    let result = spheres(prepare(&shape, "depth").as_mut(), 1);
+    let &[sphere] = result.mesh.spheres.as_slice() else { panic!("{:?}", result.diagnostics) };
+    // The survivor is one of the Voronoi vertices.
+    let scale = shape.normalisation().diagonal;
+    assert!((sphere.radius * scale - 1.0).abs() < 1e-9, "{sphere:?}");
+    assert!(shape.normalisation().backward(sphere.centre).length() < 1e-9, "{sphere:?}");
+    assert!(result.native_level.is_some_and(|error| error < 1e-9));
+}
+
+#[test]
+fn survivors_are_spheres_of_the_initial_mesh() {
+    let shape = shape("bracket", 9);
+    let initial = shape.initial().expect("an initial medial mesh");
+    for inside in ["depth", "surface"] {
+        let result = spheres(prepare(&shape, inside).as_mut(), 60);
+        assert_eq!(result.mesh.spheres.len(), 60);
+        assert!(result.mesh.spheres.iter().all(|m| initial.spheres.contains(m)));
+    }
+}
+
+#[test]
+fn topology_is_kept_at_every_level() {
+    for (id, resolution, smallest) in [("torus", 26, 3), ("hollow-sphere", 20, 4)] {
+        let shape = shape(id, resolution);
+        let initial = shape.initial().expect("an initial medial mesh");
+        let expected = medial_datasets::find(id).expect("in the catalogue").expected_betti;
+        assert_eq!(betti(&initial), expected, "{id}: too coarse a sample for this test");
+        let mut simplification = prepare(&shape, "depth");
+        let mut count = initial.spheres.len();
+        while count > 1 {
+            count = if count > 60 { count * 9 / 10 } else { count - 1 };
+            let result = spheres(simplification.as_mut(), count);
+            assert_eq!(betti(&result.mesh), expected, "{id} at {count}");
+            let reached = result.mesh.spheres.len();
+            assert!(reached >= smallest, "{id}: {reached} spheres cannot hold this topology");
+            assert_eq!(reached > count, !result.diagnostics.warnings.is_empty(), "{id} at {count}");
+        }
+    }
+}
+
+#[test]
+fn a_bound_holds_for_every_sample() {
+    for (id, resolution) in [("box", 8), ("capsule", 20), ("bracket", 8), ("torus", 20)] {
+        let shape = shape(id, resolution);
+        let initial = shape.initial().expect("an initial medial mesh");
+        let samples = touched(&initial);
+        for (reading, inside) in ["depth", "surface"].into_iter().enumerate() {
+            let least = errors(&initial, &samples)[reading];
+            let mut simplification = prepare(&shape, inside);
+            let mut before = initial.spheres.len();
+            for epsilon in [1e-3, 1e-2, 5e-2] {
+                let result = simplification.at(Level::Native(epsilon));
+                if least > epsilon {
+                    let refused = result.expect_err("no level holds this bound").to_string();
+                    assert!(refused.contains("cannot be held"), "{refused}");
+                    continue;
+                }
+                let result = result.expect("a bound that can be held");
+                let error = errors(&result.mesh, &samples)[reading];
+                assert!(error <= epsilon, "{id} {inside}: {error} beyond {epsilon}");
+                let left = result.mesh.spheres.len();
+                assert!(left <= before, "{id} {inside}: {left} after {before}");
+                before = left;
+            }
+            // Where primitives far from a sample hold it deeper than its own star, as in the coarse
+            // box, nearly all collapses are taken back.
+            let most = if inside == "surface" {
+                initial.spheres.len() / 8
+            } else {
+                initial.spheres.len() - 1
+            };
+            assert!(before <= most, "{id} {inside}: {before} left");
+        }
+    }
+}
+
+/// Collapses are taken back where the order's local errors overlooked something.
+#[test]
+fn levels_of_either_kind_do_not_depend_on_what_was_asked_before() {
+    let shape = shape("bracket", 9);
+    let asked = [
+        Level::Native(0.01),
+        Level::Spheres(40),
+        Level::Native(0.02),
+        Level::Published,
+        Level::Native(0.01),
+        Level::Spheres(400),
+    ];
+    let mut continued = prepare(&shape, "surface");
+    for level in asked {
+        let here = continued.at(level).expect("a level");
+        let alone = prepare(&shape, "surface").at(level).expect("a level");
+        assert_eq!(here.mesh, alone.mesh, "{level}");
+        if let Level::Native(_) = level {
+            let taken_back = count(&here, "taken_back_for_the_bound");
+            let initial = shape.initial().expect("an initial medial mesh").spheres.len() as u64;
+            assert_eq!(
+                count(&alone, "collapses") - taken_back,
+                initial - here.mesh.spheres.len() as u64
+            );
+        }
+    }
+}
+
+#[test]
+fn levels_continue_start_anew_and_say_what_they_cannot_do() {
+    let shape = shape("capsule", 24);
+    let initial = shape.initial().expect("an initial medial mesh");
+    let mut simplification = prepare(&shape, "depth");
+    let works = [200, 80, 80, 120].map(|count| {
+        let result = spheres(simplification.as_mut(), count);
+        assert_eq!(result.mesh.spheres.len(), count);
+        result.work
+    });
+    assert_eq!(works, [Work::Anew, Work::Continued, Work::Continued, Work::Anew]);
+    let more = spheres(simplification.as_mut(), initial.spheres.len() + 1);
+    assert_eq!(more.mesh.spheres, initial.spheres);
+    assert_eq!(more.diagnostics.warnings.len(), 1);
+    let published = simplification.at(Level::Published).expect("the rule of the code");
+    assert!(published.mesh.spheres.len() < initial.spheres.len());
+    for level in [Level::Spheres(0), Level::Native(-1.0), Level::Native(f64::NAN)] {
+        assert!(matches!(simplification.at(level), Err(SimplifyError::Level(_))), "{level}");
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    for inside in ["depth", "surface"] {
+        let results = [1, 2].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.expect("a pool").install(|| {
+                let shape = shape("blob", 14);
+                let mut simplification = prepare(&shape, inside);
+                [1000, 100, 10].map(|count| {
+                    let result = spheres(simplification.as_mut(), count);
+                    (result.mesh, result.native_level, result.diagnostics)
+                })
+            })
+        });
+        assert_eq!(results[0], results[1], "{inside}");
+    }
+}
+
+#[test]
+fn a_mesh_without_contacts_gets_the_nearest_samples() {
+    let plain = shape("capsule", 24);
+    let initial = plain.initial().expect("an initial medial mesh");
+    let bare =
+        initial.transformed(plain.normalisation().diagonal, |p| plain.normalisation().backward(p));
+    let given = shape("capsule", 24).with_initial(&MedialMesh { contacts: None, ..bare });
+    let result = spheres(prepare(&given, "depth").as_mut(), 30);
+    assert_eq!((result.mesh.spheres.len(), result.diagnostics.warnings.len()), (30, 1));
+    let [depth, _] = errors(&result.mesh, &touched(&initial));
+    assert!(depth < 0.02, "{depth}");
+}
+
+#[test]
+fn a_cancelled_run_ends_as_cancelled() {
+    let shape = shape("capsule", 24);
+    let run = RunContext::default();
+    let mut simplification = Hem::new().prepare(&shape, &Params::none(), &run).expect("prepared");
+    run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+    let cancelled = simplification.at(Level::Spheres(10));
+    assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));
+}
