@@ -142,12 +142,15 @@ impl MedialMesh {
         }
         check_order("edge", &self.edges)?;
         check_order("face", &self.faces)?;
-        for (face, corners) in self.faces.iter().enumerate() {
-            for side in sides(corners) {
-                if self.edges.binary_search(&side).is_err() {
-                    return Err(ComplexError::MissingEdge { face, side });
-                }
-            }
+        let key = |&[a, b]: &[u32; 2]| u64::from(a) << 32 | u64::from(b);
+        let is_missing =
+            |side: &[u32; 2]| self.edges.binary_search_by_key(&key(side), key).is_err();
+        let missing = self.faces.par_iter().enumerate().find_map_first(|(face, corners)| {
+            let side = sides(corners).into_iter().find(is_missing)?;
+            Some(ComplexError::MissingEdge { face, side })
+        });
+        if let Some(missing) = missing {
+            return Err(missing);
         }
         self.check_contacts()
     }
