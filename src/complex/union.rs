@@ -168,7 +168,7 @@ impl MedialUnion {
         let boxes: Vec<_> = parts.iter().map(|&(_, _, bounds)| bounds).collect();
         let sides = boxes.iter().map(|(b, _)| (b.hi - b.lo).max_element());
         let padding = sides.sum::<f64>() / boxes.len() as f64;
-        let tree = Tree::build(&boxes, Plan { max_leaf: 2, padding });
+        let tree = Tree::build(&boxes, Plan { max_leaf: 2, group: 1, padding });
         let in_order = || tree.order().iter().map(|&part| &parts[part as usize]);
         let shapes = in_order().map(|(_, shape, _)| shape.clone()).collect();
         let primitives = in_order().map(|&(primitive, _, _)| primitive).collect();

@@ -11,12 +11,14 @@
 //! than rounding can explain, and equal distances are decided by the smaller index. Batches may
 //! therefore start each query from its neighbour's answer, in any chunks, on any number of threads.
 
+mod block;
 mod build;
 mod expansion;
 mod morton;
 mod search;
 mod solid_angle;
 mod triangles;
+mod wide;
 mod winding;
 
 pub(crate) use build::Plan;

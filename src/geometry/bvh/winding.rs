@@ -21,6 +21,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::expansion::{Estimate, Expansion};
 use super::solid_angle::Facet;
+use super::wide::power_of_two_below;
 use super::{Bounds, BvhError, Plan, Tree, build, check_corners, in_morton_order};
 use crate::Vec3;
 use crate::surface::TriMesh;
@@ -98,7 +99,7 @@ impl WindingTree {
         let scale = power_of_two_below(1.0 / lo.abs().max(hi.abs()).max_element());
         let scaled: Vec<_> = triangles.iter().map(|t| t.map(|v| v * scale)).collect();
         let boxes: Vec<_> = scaled.iter().map(|&t| (Bounds::of_points(t), 0.0)).collect();
-        let tree = Tree::build(&boxes, Plan { max_leaf: 4, padding: 0.0 });
+        let tree = Tree::build(&boxes, Plan { max_leaf: 4, group: 1, padding: 0.0 });
         let facets: Vec<_> = tree.order().iter().map(|&f| Facet::new(scaled[f as usize])).collect();
         let expansions = tree.ranges().into_iter().map(|r| Expansion::new(&facets[r])).collect();
         Ok(Self { tree, facets, expansions, scale, tolerance: Self::TOLERANCE })
@@ -182,9 +183,4 @@ impl WindingTree {
     pub fn winding_number_batch(&self, points: &[Vec3]) -> Vec<f64> {
         in_morton_order(points, |(): &mut (), p| self.winding_number(p))
     }
-}
-
-/// The largest power of two that is not above a positive number; 1 for zero or infinity.
-fn power_of_two_below(value: f64) -> f64 {
-    if value.is_normal() { f64::from_bits(value.to_bits() & (0x7ff << 52)) } else { 1.0 }
 }
