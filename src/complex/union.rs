@@ -285,11 +285,19 @@ fn signed_bound(node: &Node, p: Vec3) -> f64 {
     node.bounds.distance_squared(p).sqrt() - node.reach
 }
 
+/// Lower bound of the depths in the primitives below a node, negative where some may not hold `p`.
+///
+/// Each primitive holds its largest ball, whose centre is in the box of the centres.
+#[inline]
+fn depth_bound(node: &Node, p: Vec3) -> f64 {
+    node.least_reach - node.bounds.farthest_squared(p).sqrt()
+}
+
 /// Which of the two distances is minimised.
 trait Measure {
     fn value(signed: f64) -> f64;
-    /// A lower bound of the value from a lower bound of the signed distance.
-    fn bound(signed: f64) -> f64;
+    /// A lower bound of the values below a node.
+    fn bound(node: &Node, p: Vec3) -> f64;
 }
 
 enum Signed {}
@@ -299,8 +307,9 @@ impl Measure for Signed {
         signed
     }
 
-    fn bound(signed: f64) -> f64 {
-        signed
+    #[inline]
+    fn bound(node: &Node, p: Vec3) -> f64 {
+        signed_bound(node, p)
     }
 }
 
@@ -311,8 +320,11 @@ impl Measure for Unsigned {
         signed.abs()
     }
 
-    fn bound(signed: f64) -> f64 {
-        signed.max(0.0)
+    /// Outside all primitives of a node the least signed distance counts, inside all of them the
+    /// largest.
+    #[inline]
+    fn bound(node: &Node, p: Vec3) -> f64 {
+        signed_bound(node, p).max(depth_bound(node, p)).max(0.0)
     }
 }
 
@@ -337,7 +349,7 @@ impl<M: Measure> Nearest<'_, M> {
 impl<M: Measure> Search for Nearest<'_, M> {
     #[inline]
     fn bound(&self, node: &Node) -> f64 {
-        M::bound(signed_bound(node, self.p))
+        M::bound(node, self.p)
     }
 
     #[inline]

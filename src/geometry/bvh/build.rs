@@ -52,7 +52,8 @@ impl Plan {
 }
 
 impl Tree {
-    /// A tree over the boxes of items, each with a value whose maximum is kept in the nodes.
+    /// A tree over the boxes of items, each with a value that is not negative, whose maximum and
+    /// minimum are kept in the nodes.
     ///
     /// Cost `O(n log n)`.
     pub fn build(items: &[(Bounds, f64)], plan: Plan) -> Self {
@@ -73,7 +74,8 @@ impl Tree {
 fn node(items: &[Item], first: usize) -> Node {
     let bounds = items.iter().fold(Bounds::EMPTY, |b, item| b.union(&item.bounds));
     let reach = items.iter().fold(0.0, |reach, item| f64::max(reach, item.reach));
-    Node { bounds, reach, first: first as u32, count: items.len() as u32 }
+    let least_reach = items.iter().fold(reach, |least, item| f64::min(least, item.reach));
+    Node { bounds, reach, least_reach, first: first as u32, count: items.len() as u32 }
 }
 
 /// Where a range of items is: its first item, and the depth of its node.

@@ -63,6 +63,12 @@ impl Bounds {
     pub fn distance_squared(&self, p: Vec3) -> f64 {
         (self.lo - p).max(p - self.hi).max(Vec3::ZERO).length_squared()
     }
+
+    /// Squared distance from `p` to the farthest corner.
+    #[inline]
+    pub fn farthest_squared(&self, p: Vec3) -> f64 {
+        (p - self.lo).max(self.hi - p).length_squared()
+    }
 }
 
 /// A node of the flat tree. The children of an inner node are adjacent.
@@ -71,6 +77,8 @@ pub(crate) struct Node {
     pub bounds: Bounds,
     /// Largest value that the items below carry: the largest radius of medial primitives.
     pub reach: f64,
+    /// Smallest of these values.
+    pub least_reach: f64,
     /// First child of an inner node, first item of a leaf.
     first: u32,
     /// Number of items of a leaf, 0 for an inner node.
@@ -118,13 +126,14 @@ impl Tree {
         while let Some(index) = stack.pop() {
             let node = &self.nodes[index];
             let covers = |b: &Bounds, reach: f64| {
-                b.union(&node.bounds) == node.bounds && reach <= node.reach
+                let range = node.least_reach..=node.reach;
+                b.union(&node.bounds) == node.bounds && range.contains(&reach)
             };
             let first = node.first as usize;
             if node.count == 0 {
                 for child in [first, first + 1] {
                     let c = &self.nodes[child];
-                    if child <= index || !covers(&c.bounds, c.reach) {
+                    if child <= index || !(covers(&c.bounds, c.reach) && covers(&c.bounds, c.least_reach)) {
                         return Err(format!("node {child} is not inside its parent {index}"));
                     }
                     stack.push(child);
