@@ -133,7 +133,9 @@ impl Tree {
             if node.count == 0 {
                 for child in [first, first + 1] {
                     let c = &self.nodes[child];
-                    if child <= index || !(covers(&c.bounds, c.reach) && covers(&c.bounds, c.least_reach)) {
+                    if child <= index
+                        || !(covers(&c.bounds, c.reach) && covers(&c.bounds, c.least_reach))
+                    {
                         return Err(format!("node {child} is not inside its parent {index}"));
                     }
                     stack.push(child);

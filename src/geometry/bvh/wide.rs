@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use wide::f32x4;
 
+use super::super::planar_frame::power_of_two_below;
 use super::build::MAX_DEPTH;
 use super::{Bounds, Tree};
 use crate::Vec3;
@@ -61,11 +62,6 @@ impl Frame {
     pub fn forward(&self, p: Vec3) -> Vec3 {
         (p - self.centre) * self.scale
     }
-}
-
-/// The largest power of two that is not above a positive number; 1 for zero or infinity.
-pub(super) fn power_of_two_below(value: f64) -> f64 {
-    if value.is_normal() { f64::from_bits(value.to_bits() & (0x7ff << 52)) } else { 1.0 }
 }
 
 /// A query in single precision.

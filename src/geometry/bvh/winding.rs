@@ -19,9 +19,9 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::super::planar_frame::power_of_two_below;
 use super::expansion::{Estimate, Expansion};
 use super::solid_angle::Facet;
-use super::wide::power_of_two_below;
 use super::{Bounds, BvhError, Plan, Tree, build, check_corners, in_morton_order};
 use crate::Vec3;
 use crate::surface::TriMesh;
