@@ -14,7 +14,7 @@ mod sphere;
 mod tangent_planes;
 pub mod triangulation;
 
-pub(crate) use bvh::{Bounds, Node, Plan, Search, Tree, in_morton_order};
+pub(crate) use bvh::{Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order};
 pub use bvh::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree};
 pub use cone::Cone;
 pub use delaunay::Delaunay;

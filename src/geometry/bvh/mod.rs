@@ -25,6 +25,7 @@ pub(crate) use build::Plan;
 pub(crate) use morton::in_morton_order;
 pub(crate) use search::Search;
 pub use triangles::{BvhError, Closest, Feature, TriangleBvh};
+pub(crate) use wide::WideTree;
 pub use winding::{Winding, WindingTree};
 
 use triangles::check_corners;

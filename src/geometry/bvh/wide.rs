@@ -9,7 +9,7 @@
 //!    from the centre and one more. Limits are larger by that: nothing is given up that double
 //!    precision would look at, so that answers do not depend on any of this.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use wide::f32x4;
 
@@ -66,7 +66,7 @@ impl Frame {
 
 /// A query in single precision.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Query {
+pub(crate) struct Query {
     pub p: [Lanes; 3],
     scale: f64,
     /// Largest error of distances.
@@ -184,7 +184,47 @@ impl WideTree {
     }
 }
 
+impl WideTree {
+    /// Shows the leaves whose boxes, rounded outward, reach above `p` or to it along `z`, and have
+    /// `x` and `y` of `p`. `p` is in the box of everything.
+    #[inline]
+    pub fn above(&self, p: Vec3, mut visit: impl FnMut(Range<u32>) -> ControlFlow<()>) {
+        // Moving, scaling and rounding keep the order of coordinates, ties included.
+        let p = self.frame.forward(p).to_array().map(|x| Lanes::splat(x as f32));
+        let mut stack = [self.root; 3 * MAX_DEPTH + 4];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let current = stack[height];
+            if current & LEAF != 0 {
+                if visit(self.leaves[(current & !LEAF) as usize].clone()).is_break() {
+                    return;
+                }
+                continue;
+            }
+            let node = &self.nodes[current as usize];
+            let mut hits = node.above(&p).to_bitmask();
+            // The left ones on top: a search that ends at the point itself ends sooner from below.
+            while hits != 0 {
+                let lane = hits.ilog2();
+                stack[height] = node.children[lane as usize];
+                height += 1;
+                hits ^= 1 << lane;
+            }
+        }
+    }
+}
+
 impl Node {
+    #[inline]
+    fn above(&self, p: &[Lanes; 3]) -> Lanes {
+        self.lo[0].simd_le(p[0])
+            & p[0].simd_le(self.hi[0])
+            & self.lo[1].simd_le(p[1])
+            & p[1].simd_le(self.hi[1])
+            & p[2].simd_le(self.hi[2])
+    }
+
     #[inline]
     fn distance_squared(&self, query: &Query) -> Lanes {
         let beyond = |k: usize| {
