@@ -218,3 +218,63 @@ fn spheres_alone_and_degenerate_unions() {
     assert!(matches!(bad, Err(UnionError::Invalid(_))));
     assert!(union.signed(Vec3::NAN).is_nan());
 }
+
+/// Pruning in single precision loses nothing: bit for bit the least of the distances to each
+/// triangle alone, of equal ones the first, wherever and however large the mesh is.
+#[test]
+fn closest_points_are_those_of_single_triangles() {
+    let mut rng = Pcg64::seed_from_u64(14);
+    let mesh = soup(150, &mut rng);
+    let queries: Vec<Vec3> = (0..200)
+        .map(|k| vector(&mut rng) * [1.0, 1.3, 70.0, 1e5][k % 4])
+        .chain(mesh.vertices.iter().copied().take(60))
+        .collect();
+    let shifts = [(1.0, 0.0), (1.0, 1e6), (1e-12, 1.0), (1e140, 0.0), (1e-140, 0.0), (1e-3, 3.0)];
+    for (scale, shift) in shifts {
+        let place = |p: Vec3| p * scale + Vec3::new(shift, -shift, 0.5 * shift);
+        let triangles: Vec<[Vec3; 3]> = (0..150).map(|f| mesh.triangle(f).map(place)).collect();
+        let bvh = TriangleBvh::from_triangles(&triangles).unwrap();
+        let alone: Vec<TriangleBvh> =
+            triangles.iter().map(|&t| TriangleBvh::from_triangles(&[t]).unwrap()).collect();
+        let queries: Vec<Vec3> = queries.iter().map(|&p| place(p)).collect();
+        for (&p, found) in queries.iter().zip(bvh.closest_batch(&queries)) {
+            let each = alone.iter().map(|t| t.closest(p).distance);
+            let least =
+                (0..).zip(each).fold(
+                    (0, f64::INFINITY),
+                    |best: (u32, f64), (f, d)| {
+                        if d < best.1 { (f, d) } else { best }
+                    },
+                );
+            assert_eq!(found.distance, least.1);
+            // Distances may agree where their squares do not.
+            let tied = alone[found.face as usize].closest(p).distance == least.1;
+            assert!(found.face == least.0 || tied, "{found:?} for {least:?}");
+        }
+    }
+}
+
+/// Balls that nearly coincide, as in the initial medial mesh of a sphere: bit for bit the least of
+/// all, although nearly all are nearly as near.
+#[test]
+fn nearly_coincident_balls_are_told_apart() {
+    let mut rng = Pcg64::seed_from_u64(15);
+    let middle = Vec3::new(0.2, -0.1, 0.3);
+    for spread in [1e-2, 1e-6, 1e-10, 1e-14, 0.0] {
+        let spheres: Vec<Sphere> = (0..800)
+            .map(|_| {
+                let radius = 0.3 + spread * rng.random::<f64>();
+                Sphere::new(middle + spread * vector(&mut rng), radius)
+            })
+            .collect();
+        let union = MedialUnion::of_spheres(&spheres).unwrap();
+        for k in 0..200 {
+            let reach = 0.3 + [0.0, 1e-3, -1e-3, spread, 1.0][k % 5] * rng.random::<f64>();
+            let p = middle + reach * vector(&mut rng).normalize();
+            let signed = || spheres.iter().map(|m| m.signed_distance(p));
+            let (sigma, mu) = (signed().fold(f64::INFINITY, f64::min), signed().map(f64::abs));
+            assert_eq!(union.signed(p), sigma);
+            assert_eq!(union.unsigned_nearest(p), mu.fold(f64::INFINITY, f64::min));
+        }
+    }
+}

@@ -57,11 +57,13 @@ impl PlanarFrame {
         let (base, slant) = (b - a, c - a);
         let length = base.length();
         let x = if length > 0.0 { base / length } else { Vec3::X };
-        let across = accurate_cross(base, slant);
-        let doubled_area = across.length();
-        let flat = doubled_area <= FLAT * length * length;
+        // Scaled, which loses nothing: the square of an area is a fourth power of lengths.
+        let scale = power_of_two_below(1.0 / length);
+        let across = accurate_cross(base * scale, slant * scale);
+        let (doubled_area, scaled_length) = (across.length(), length * scale);
+        let flat = doubled_area <= FLAT * scaled_length * scaled_length;
         let normal = if flat { x.any_orthonormal_vector() } else { across / doubled_area };
-        let height = if flat { 0.0 } else { doubled_area / length };
+        let height = if flat { 0.0 } else { doubled_area / scaled_length / scale };
         let apex = [slant.dot(x).clamp(0.0, length), height];
         let reciprocal = [apex[0], length - apex[0]].map(|run| {
             let squared = run * run + height * height;
@@ -171,11 +173,16 @@ impl PlanarFrame {
     }
 }
 
+/// The largest power of two that is not above a positive number; 1 for zero or infinity.
+pub(super) fn power_of_two_below(value: f64) -> f64 {
+    if value.is_normal() { f64::from_bits(value.to_bits() & (0x7ff << 52)) } else { 1.0 }
+}
+
 /// Cross product with every component within two units in the last place of its exact value.
 ///
 /// The normal of a needle is a small difference of large products; a plain cross product would
 /// turn it by as much as the triangle is thin.
-fn accurate_cross(u: Vec3, v: Vec3) -> Vec3 {
+pub(super) fn accurate_cross(u: Vec3, v: Vec3) -> Vec3 {
     Vec3::new(
         difference_of_products(u.y, v.z, u.z, v.y),
         difference_of_products(u.z, v.x, u.x, v.z),

@@ -1,4 +1,4 @@
-//! A tree of axis-parallel boxes over triangles: for pairs that overlap, and for vertical rays.
+//! A tree of axis-parallel boxes over triangles, for pairs that overlap.
 //!
 //! Built top-down by splitting at the median centre along the longest side; a node's first child
 //! follows it. The tree of [`crate::geometry`] answers other questions (closest points); this one

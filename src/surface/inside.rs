@@ -13,18 +13,22 @@
 //!    Neighbouring faces see opposite signs for their common edge, so exactly one of them is hit.
 //! 2. A face is above `p` by the sign of `orient3d`. Is that zero and `p` within the face, then
 //!    `p` lies on the surface, where there is no winding number.
-//! 3. A tree of boxes finds the faces: those whose box reaches above `p` and contains `(x, y)`.
+//! 3. A tree of boxes, tested four at a time and rounded outward, finds the faces: those whose box
+//!    reaches above `p` and contains `(x, y)`.
 //!
 //! All signs are exact for coordinates above 2^-150 of the largest; smaller ones are taken as
 //! zero, in the surface and in the queries.
 
 use std::ops::ControlFlow;
 
-use super::boxes::{BoxTree, bounds};
+use super::boxes::bounds;
 use super::mesh::TriMesh;
 use super::predicates::{Point2, Sign, Unit, orient2d, orient3d, project, projection_axis};
 use crate::Vec3;
-use crate::geometry::in_morton_order;
+use crate::geometry::{Bounds, Plan, Tree, WideTree, in_morton_order};
+
+/// Triangles of a leaf.
+const LEAF: usize = 4;
 
 /// Where a point lies with respect to a closed surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -56,9 +60,13 @@ pub enum Side {
 #[derive(Debug)]
 pub struct InsideTest {
     unit: Unit,
-    tree: BoxTree,
-    lo: Vec3,
-    hi: Vec3,
+    tree: WideTree,
+    /// In leaf order, scaled.
+    triangles: Vec<[Vec3; 3]>,
+    /// For each place in leaf order the face.
+    ids: Vec<u32>,
+    /// Box of everything, scaled.
+    bounds: Bounds,
 }
 
 impl InsideTest {
@@ -76,14 +84,11 @@ impl InsideTest {
     /// The same for points that are scaled already.
     pub(super) fn of_scaled(unit: Unit, points: &[Vec3], faces: &[[u32; 3]]) -> Self {
         let corners = |face: &[u32; 3]| face.map(|v| points[v as usize]);
-        let tree = BoxTree::new((0..).zip(faces.iter().map(corners)));
-        let (lo, hi) = tree
-            .triangles
-            .iter()
-            .map(|&t| bounds(t))
-            .reduce(|(lo, hi), (l, h)| (lo.min(l), hi.max(h)))
-            .unwrap_or((Vec3::INFINITY, Vec3::NEG_INFINITY));
-        Self { unit, tree, lo, hi }
+        let boxes: Vec<_> = faces.iter().map(|f| (Bounds::of_points(corners(f)), 0.0)).collect();
+        let tree = Tree::build(&boxes, Plan { max_leaf: LEAF, group: LEAF, padding: 0.0 });
+        let ids = tree.order().to_vec();
+        let triangles = ids.iter().map(|&face| corners(&faces[face as usize])).collect();
+        Self { unit, tree: WideTree::new(&tree), triangles, ids, bounds: tree.bounds() }
     }
 
     /// How often the surface winds around a point, or `None` for a point on the surface.
@@ -131,34 +136,41 @@ impl InsideTest {
         p: Vec3,
         mut report: impl FnMut(u32, Crossing) -> ControlFlow<()>,
     ) {
-        if !(p.cmpge(self.lo).all() && p.cmple(self.hi).all()) {
+        if !(p.cmpge(self.bounds.lo).all() && p.cmple(self.bounds.hi).all()) {
             return;
         }
         let in_column = |lo: Vec3, hi: Vec3| {
             (lo.x <= p.x) & (p.x <= hi.x) & (lo.y <= p.y) & (p.y <= hi.y) & (p.z <= hi.z)
         };
-        self.tree.visit(in_column, |item| {
-            let triangle = self.tree.triangles[item];
-            let (lo, hi) = bounds(triangle);
-            if !in_column(lo, hi) {
-                return ControlFlow::Continue(());
-            }
-            let looks_up = crossed_by_column(triangle, p);
-            if p.z >= lo.z {
-                let [a, b, c] = triangle;
-                let height = orient3d(a, b, c, p);
-                if height.is_zero() && contains(triangle, p) {
-                    return report(self.tree.ids[item], Crossing::On);
-                }
-                if looks_up * height.value() <= 0 {
+        self.tree.above(p, |places| {
+            places.into_iter().try_for_each(|place| {
+                let triangle = self.triangles[place as usize];
+                let (lo, hi) = bounds(triangle);
+                if !in_column(lo, hi) {
                     return ControlFlow::Continue(());
                 }
-            } else if looks_up == 0 {
-                return ControlFlow::Continue(());
-            }
-            report(self.tree.ids[item], Crossing::Above(looks_up))
+                match crossing(triangle, lo.z, p) {
+                    Some(crossing) => report(self.ids[place as usize], crossing),
+                    None => ControlFlow::Continue(()),
+                }
+            })
         });
     }
+}
+
+/// How a triangle whose box, from `low` on, is in the column of `p` meets the ray from there.
+#[inline]
+fn crossing(triangle: [Vec3; 3], low: f64, p: Vec3) -> Option<Crossing> {
+    let looks_up = crossed_by_column(triangle, p);
+    if p.z >= low {
+        let [a, b, c] = triangle;
+        let height = orient3d(a, b, c, p);
+        if height.is_zero() && contains(triangle, p) {
+            return Some(Crossing::On);
+        }
+        return (looks_up * height.value() > 0).then_some(Crossing::Above(looks_up));
+    }
+    (looks_up != 0).then_some(Crossing::Above(looks_up))
 }
 
 /// How a face meets the vertical ray from a point.

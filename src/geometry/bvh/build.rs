@@ -37,13 +37,23 @@ struct Bin {
 pub(crate) struct Plan {
     /// Leaves never hold more items.
     pub max_leaf: usize,
+    /// Items that are looked at together, at the cost of one: a share of a group costs a group.
+    pub group: usize,
     /// Added to the sides of boxes when costs are compared: how much farther than a box itself
     /// its items are felt. Also what tells flat boxes apart, which have no area.
     pub padding: f64,
 }
 
+impl Plan {
+    /// Cost of looking at some items.
+    fn cost(self, count: usize) -> f64 {
+        count.div_ceil(self.group) as f64
+    }
+}
+
 impl Tree {
-    /// A tree over the boxes of items, each with a value whose maximum is kept in the nodes.
+    /// A tree over the boxes of items, each with a value that is not negative, whose maximum and
+    /// minimum are kept in the nodes.
     ///
     /// Cost `O(n log n)`.
     pub fn build(items: &[(Bounds, f64)], plan: Plan) -> Self {
@@ -64,7 +74,8 @@ impl Tree {
 fn node(items: &[Item], first: usize) -> Node {
     let bounds = items.iter().fold(Bounds::EMPTY, |b, item| b.union(&item.bounds));
     let reach = items.iter().fold(0.0, |reach, item| f64::max(reach, item.reach));
-    Node { bounds, reach, first: first as u32, count: items.len() as u32 }
+    let least_reach = items.iter().fold(reach, |least, item| f64::min(least, item.reach));
+    Node { bounds, reach, least_reach, first: first as u32, count: items.len() as u32 }
 }
 
 /// Where a range of items is: its first item, and the depth of its node.
@@ -78,13 +89,13 @@ struct Place {
 fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], place: Place, plan: Plan) {
     let Place { first, depth } = place;
     let count = items.len();
-    let plane = if depth < HALVING_DEPTH { cheapest_plane(items, plan.padding) } else { None };
+    let plane = if depth < HALVING_DEPTH { cheapest_plane(items, plan) } else { None };
     let middle = match plane {
         _ if count < 2 => return,
         Some(plane) => {
             let cost = DESCENT + plane.cost / nodes[index].bounds.half_area(plan.padding);
             // Also false when the area vanishes and the cost is not a number.
-            let pays = cost < count as f64;
+            let pays = cost < plan.cost(count);
             if count <= plan.max_leaf && !pays {
                 return;
             }
@@ -128,7 +139,7 @@ impl Binning {
 }
 
 /// The cheapest plane with items on both sides, `None` when all centres share one bin.
-fn cheapest_plane(items: &[Item], padding: f64) -> Option<Plane> {
+fn cheapest_plane(items: &[Item], plan: Plan) -> Option<Plane> {
     let centres = Bounds::of_points(items.iter().map(|item| item.centre));
     let mut best: Option<Plane> = None;
     for axis in 0..3 {
@@ -144,7 +155,7 @@ fn cheapest_plane(items: &[Item], padding: f64) -> Option<Plane> {
             bin.bounds = bin.bounds.union(&item.bounds);
             bin.count += 1;
         }
-        let (bin, cost) = sweep(&bins, padding);
+        let (bin, cost) = sweep(&bins, plan);
         if best.as_ref().is_none_or(|b| cost < b.cost) {
             best = Some(Plane { axis, binning, bin, cost });
         }
@@ -153,14 +164,14 @@ fn cheapest_plane(items: &[Item], padding: f64) -> Option<Plane> {
 }
 
 /// The best first bin of the right side, and its cost; infinite when one side would be empty.
-fn sweep(bins: &[Bin; BINS], padding: f64) -> (usize, f64) {
+fn sweep(bins: &[Bin; BINS], plan: Plan) -> (usize, f64) {
     let mut right_cost = [f64::INFINITY; BINS];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
     for k in (1..BINS).rev() {
         bounds = bounds.union(&bins[k].bounds);
         count += bins[k].count;
         if count > 0 {
-            right_cost[k] = count as f64 * bounds.half_area(padding);
+            right_cost[k] = plan.cost(count) * bounds.half_area(plan.padding);
         }
     }
     let mut best = (0, f64::INFINITY);
@@ -169,7 +180,7 @@ fn sweep(bins: &[Bin; BINS], padding: f64) -> (usize, f64) {
         bounds = bounds.union(&bins[k - 1].bounds);
         count += bins[k - 1].count;
         if count > 0 {
-            let cost = count as f64 * bounds.half_area(padding) + right_cost[k];
+            let cost = plan.cost(count) * bounds.half_area(plan.padding) + right_cost[k];
             if cost < best.1 {
                 best = (k, cost);
             }
@@ -194,7 +205,7 @@ fn partition(items: &mut [Item], plane: &Plane) -> usize {
 mod tests {
     use super::*;
 
-    const PLAN: Plan = Plan { max_leaf: 4, padding: 0.0 };
+    const PLAN: Plan = Plan { max_leaf: 4, group: 1, padding: 0.0 };
 
     fn boxes(centres: impl IntoIterator<Item = Vec3>, half: f64) -> Vec<(Bounds, f64)> {
         let half = Vec3::splat(half);

@@ -11,15 +11,26 @@
 //! than rounding can explain, and equal distances are decided by the smaller index. Batches may
 //! therefore start each query from its neighbour's answer, in any chunks, on any number of threads.
 
+mod block;
 mod build;
+mod expansion;
 mod morton;
 mod search;
+mod solid_angle;
 mod triangles;
+mod wide;
+mod winding;
 
 pub(crate) use build::Plan;
 pub(crate) use morton::in_morton_order;
 pub(crate) use search::Search;
 pub use triangles::{BvhError, Closest, Feature, TriangleBvh};
+pub(crate) use wide::WideTree;
+pub use winding::{Winding, WindingTree};
+
+use triangles::check_corners;
+
+use std::ops::Range;
 
 use crate::Vec3;
 
@@ -53,6 +64,12 @@ impl Bounds {
     pub fn distance_squared(&self, p: Vec3) -> f64 {
         (self.lo - p).max(p - self.hi).max(Vec3::ZERO).length_squared()
     }
+
+    /// Squared distance from `p` to the farthest corner.
+    #[inline]
+    pub fn farthest_squared(&self, p: Vec3) -> f64 {
+        (p - self.lo).max(self.hi - p).length_squared()
+    }
 }
 
 /// A node of the flat tree. The children of an inner node are adjacent.
@@ -61,6 +78,8 @@ pub(crate) struct Node {
     pub bounds: Bounds,
     /// Largest value that the items below carry: the largest radius of medial primitives.
     pub reach: f64,
+    /// Smallest of these values.
+    pub least_reach: f64,
     /// First child of an inner node, first item of a leaf.
     first: u32,
     /// Number of items of a leaf, 0 for an inner node.
@@ -81,6 +100,20 @@ impl Tree {
         &self.order
     }
 
+    /// For each node the places of the items below it.
+    pub fn ranges(&self) -> Vec<Range<usize>> {
+        let mut ranges = vec![0..0; self.nodes.len()];
+        // Children follow their parents, and the left one has the smaller places.
+        for (index, node) in self.nodes.iter().enumerate().rev() {
+            let first = node.first as usize;
+            ranges[index] = match node.count {
+                0 => ranges[first].start..ranges[first + 1].end,
+                count => first..first + count as usize,
+            };
+        }
+        ranges
+    }
+
     /// Box of everything.
     pub fn bounds(&self) -> Bounds {
         self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
@@ -94,13 +127,16 @@ impl Tree {
         while let Some(index) = stack.pop() {
             let node = &self.nodes[index];
             let covers = |b: &Bounds, reach: f64| {
-                b.union(&node.bounds) == node.bounds && reach <= node.reach
+                let range = node.least_reach..=node.reach;
+                b.union(&node.bounds) == node.bounds && range.contains(&reach)
             };
             let first = node.first as usize;
             if node.count == 0 {
                 for child in [first, first + 1] {
                     let c = &self.nodes[child];
-                    if child <= index || !covers(&c.bounds, c.reach) {
+                    if child <= index
+                        || !(covers(&c.bounds, c.reach) && covers(&c.bounds, c.least_reach))
+                    {
                         return Err(format!("node {child} is not inside its parent {index}"));
                     }
                     stack.push(child);

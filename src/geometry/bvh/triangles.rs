@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use super::super::planar_frame::{Part, PlanarFrame};
+use super::block::Block;
+use super::wide::WideTree;
 use super::{Bounds, Node, Plan, Search, Tree, in_morton_order};
 use crate::Vec3;
 use crate::surface::TriMesh;
@@ -30,6 +32,10 @@ const LARGEST: f64 = 1e150;
 #[derive(Clone, Debug)]
 pub struct TriangleBvh {
     tree: Tree,
+    /// The same tree, for the closest triangle.
+    wide: WideTree,
+    /// For each leaf of the wide tree.
+    blocks: Vec<Block>,
     /// In leaf order.
     frames: Vec<PlanarFrame>,
     /// In leaf order.
@@ -83,6 +89,20 @@ pub enum BvhError {
     },
 }
 
+/// That there are triangles, whose corners can be squared.
+pub(super) fn check_corners(triangles: &[[Vec3; 3]]) -> Result<(), BvhError> {
+    if triangles.is_empty() {
+        return Err(BvhError::Empty);
+    }
+    for (face, corners) in triangles.iter().enumerate() {
+        let fits = |corner: &&Vec3| corner.abs().max_element() <= LARGEST && !corner.is_nan();
+        if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
+            return Err(BvhError::Corner { face, corner });
+        }
+    }
+    Ok(())
+}
+
 impl TriangleBvh {
     /// A tree over the faces of a mesh. Cost `O(n log n)`.
     ///
@@ -101,17 +121,9 @@ impl TriangleBvh {
     /// # Errors
     /// When there are none, or a corner is not finite.
     pub fn from_triangles(triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
-        if triangles.is_empty() {
-            return Err(BvhError::Empty);
-        }
-        for (face, corners) in triangles.iter().enumerate() {
-            let fits = |corner: &&Vec3| corner.abs().max_element() <= LARGEST && !corner.is_nan();
-            if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
-                return Err(BvhError::Corner { face, corner });
-            }
-        }
+        check_corners(triangles)?;
         let boxes: Vec<_> = triangles.iter().map(|&t| (Bounds::of_points(t), 0.0)).collect();
-        let tree = Tree::build(&boxes, Plan { max_leaf: 4, padding: 0.0 });
+        let tree = Tree::build(&boxes, Plan { max_leaf: 4, group: 4, padding: 0.0 });
         let corners: Vec<_> = tree.order().iter().map(|&f| triangles[f as usize]).collect();
         let mut places = vec![0; triangles.len()];
         for (place, &face) in (0..).zip(tree.order()) {
@@ -119,14 +131,13 @@ impl TriangleBvh {
         }
         let Bounds { lo, hi } = tree.bounds();
         let slack = 64.0 * f64::EPSILON * lo.abs().max(hi.abs()).max_element();
-        let (frames, firsts) = corners
-            .iter()
-            .map(|&t| {
-                let (frame, first) = PlanarFrame::new(t);
-                (frame, first as u8)
-            })
-            .unzip();
-        Ok(Self { tree, frames, corners, firsts, places, slack })
+        let framed = corners.iter().map(|&t| PlanarFrame::new(t));
+        let (frames, firsts): (Vec<_>, Vec<_>) = framed.map(|(t, k)| (t, k as u8)).unzip();
+        let wide = WideTree::new(&tree);
+        let block =
+            |l: &Range<u32>| Block::new(&frames[l.start as usize..l.end as usize], wide.frame());
+        let blocks = wide.leaves().iter().map(block).collect();
+        Ok(Self { tree, wide, blocks, frames, corners, firsts, places, slack })
     }
 
     /// Number of triangles.
@@ -161,15 +172,27 @@ impl TriangleBvh {
 
     /// The distances of many queries, in their order, in parallel.
     pub fn distance_batch(&self, points: &[Vec3]) -> Vec<f64> {
+        self.distance_batch_with(points, |_, distance| distance)
+    }
+
+    /// What `finish` makes of many queries and their distances.
+    pub(crate) fn distance_batch_with(
+        &self,
+        points: &[Vec3],
+        finish: impl Fn(Vec3, f64) -> f64 + Sync,
+    ) -> Vec<f64> {
         in_morton_order(points, |last: &mut u32, p| {
             let search = self.nearest(Nearest::starting(self, p, *last as usize));
             *last = search.place as u32;
-            search.squared.sqrt()
+            finish(p, search.squared.sqrt())
         })
     }
 
     /// The closest point to `p` that is not farther away than `bound`, if there is one.
     pub fn closest_within(&self, p: Vec3, bound: f64) -> Option<Closest> {
+        if bound.is_nan() || bound < 0.0 {
+            return None;
+        }
         let found = self.nearest(Nearest::within(self, p, bound));
         (found.place != NONE).then(|| self.describe(p, found.place, found.squared))
     }
@@ -179,7 +202,7 @@ impl TriangleBvh {
         if distance.is_nan() || distance < 0.0 {
             return false;
         }
-        let limit = padded(distance, self.slack);
+        let limit = padded(distance, self.slack).powi(2);
         let mut search = Any { bvh: self, p, squared: inclusive_square(distance), limit };
         self.tree.search(&mut search);
         search.limit < 0.0
@@ -191,7 +214,21 @@ impl TriangleBvh {
     }
 
     fn nearest<'a>(&'a self, mut search: Nearest<'a>) -> Nearest<'a> {
-        self.tree.search(&mut search);
+        let Some(query) = self.wide.query(search.p) else {
+            self.tree.search(&mut search);
+            return search;
+        };
+        let limit = query.limit(search.reach());
+        self.wide.nearest(&query, limit, |leaf, limit| {
+            let places = self.wide.leaves()[leaf].clone();
+            let mut near = self.blocks[leaf].within(&query, limit) & ((1 << places.len()) - 1);
+            let before = search.squared;
+            while near != 0 {
+                search.measure(places.start as usize + near.trailing_zeros() as usize);
+                near &= near - 1;
+            }
+            if search.squared < before { query.limit(search.reach()) } else { limit }
+        });
         search
     }
 
@@ -219,11 +256,10 @@ impl TriangleBvh {
 /// No place.
 const NONE: usize = usize::MAX;
 
-/// The square of a distance increased by more than rounding can have taken from it.
+/// A distance increased by more than rounding can have taken from it.
 #[inline]
 fn padded(distance: f64, slack: f64) -> f64 {
-    let limit = distance * (1.0 + 1e-14) + slack;
-    limit * limit
+    distance * (1.0 + 1e-14) + slack
 }
 
 /// The square of a bound, such that a distance found earlier is within itself.
@@ -249,16 +285,34 @@ impl<'a> Nearest<'a> {
     }
 
     fn within(bvh: &'a TriangleBvh, p: Vec3, bound: f64) -> Self {
-        let squared = if bound >= 0.0 { inclusive_square(bound) } else { -1.0 };
-        let mut search = Self { bvh, p, squared, place: NONE, limit: -1.0 };
-        if bound >= 0.0 {
-            search.tighten();
-        }
+        let mut search = Self { bvh, p, squared: inclusive_square(bound), place: NONE, limit: 0.0 };
+        search.tighten();
         search
     }
 
     fn tighten(&mut self) {
-        self.limit = padded(self.squared.sqrt(), self.bvh.slack);
+        let reach = self.reach();
+        self.limit = reach * reach;
+    }
+
+    /// Nothing farther away can be as near as the best.
+    #[inline]
+    fn reach(&self) -> f64 {
+        padded(self.squared.sqrt(), self.bvh.slack)
+    }
+
+    #[inline]
+    fn measure(&mut self, place: usize) {
+        let squared = self.bvh.frames[place].distance_squared(self.p);
+        if squared > self.squared {
+            return;
+        }
+        let order = self.bvh.tree.order();
+        let first = self.place == NONE || order[place] < order[self.place];
+        if squared < self.squared || first {
+            self.place = place;
+            self.squared = squared;
+        }
     }
 }
 
@@ -275,18 +329,10 @@ impl Search for Nearest<'_> {
 
     #[inline]
     fn visit(&mut self, places: Range<usize>) {
-        let order = self.bvh.tree.order();
-        for place in places {
-            let squared = self.bvh.frames[place].distance_squared(self.p);
-            if squared > self.squared {
-                continue;
-            }
-            let first = self.place == NONE || order[place] < order[self.place];
-            if squared < self.squared || first {
-                self.place = place;
-                self.squared = squared;
-                self.tighten();
-            }
+        let before = self.squared;
+        places.for_each(|place| self.measure(place));
+        if self.squared < before {
+            self.tighten();
         }
     }
 }

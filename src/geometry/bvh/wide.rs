@@ -1,0 +1,258 @@
+//! The tree with four children a node, whose boxes are tested together in single precision.
+//!
+//! 1. The binary tree is collapsed: of a node's children the largest inner one is replaced by its
+//!    own two until there are four (I. Wald, C. Benthin, S. Boulos, *Getting rid of packets*, 2008,
+//!    doi:10.1109/RT.2008.4634620).
+//! 2. Boxes are moved to the centre of the mesh, scaled by a power of two to half a side of at most
+//!    1, and rounded outward to single precision. Queries are moved, scaled and rounded alike.
+//! 3. A distance so computed is off by no more than [`BLUR`] for each unit of the query's distance
+//!    from the centre and one more. Limits are larger by that: nothing is given up that double
+//!    precision would look at, so that answers do not depend on any of this.
+
+use std::ops::{ControlFlow, Range};
+
+use wide::f32x4;
+
+use super::super::planar_frame::power_of_two_below;
+use super::build::MAX_DEPTH;
+use super::{Bounds, Tree};
+use crate::Vec3;
+
+/// Bound of the error of distances in single precision, to boxes and to triangles. The longest
+/// computation, a triangle's, makes less than 25 roundings of 2^-24 each.
+const BLUR: f64 = 6e-6;
+/// Queries farther away than this, in half sides, would prune too little.
+const FARTHEST: f64 = 64.0;
+const LEAF: u32 = 1 << 31;
+
+/// Four values, one for each child.
+pub(super) type Lanes = f32x4;
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    lo: [Lanes; 3],
+    hi: [Lanes; 3],
+    /// A node, or with [`LEAF`] a leaf. Lanes without a child have an empty box.
+    children: [u32; 4],
+}
+
+/// A tree with four children a node.
+#[derive(Clone, Debug)]
+pub(crate) struct WideTree {
+    nodes: Vec<Node>,
+    /// Places of each leaf's items.
+    leaves: Vec<Range<u32>>,
+    root: u32,
+    frame: Frame,
+}
+
+/// The similarity to single precision.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    centre: Vec3,
+    pub scale: f64,
+}
+
+impl Frame {
+    fn new(Bounds { lo, hi }: Bounds) -> Self {
+        let half = (hi - lo).max_element() * 0.5;
+        Self { centre: lo + (hi - lo) * 0.5, scale: power_of_two_below(1.0 / half) }
+    }
+
+    pub fn forward(&self, p: Vec3) -> Vec3 {
+        (p - self.centre) * self.scale
+    }
+}
+
+/// A query in single precision.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Query {
+    pub p: [Lanes; 3],
+    scale: f64,
+    /// Largest error of distances.
+    blur: f64,
+}
+
+impl Query {
+    /// The square up to which computed distances may mean `distance` or less.
+    #[inline]
+    pub fn limit(&self, distance: f64) -> f32 {
+        let limit = (distance * self.scale + self.blur) * (1.0 + 1e-6);
+        (limit * limit) as f32
+    }
+}
+
+impl WideTree {
+    /// Collapses a tree whose leaves hold four items at most.
+    pub fn new(tree: &Tree) -> Self {
+        let frame = Frame::new(tree.bounds());
+        let mut wide = Self { nodes: Vec::new(), leaves: Vec::new(), root: 0, frame };
+        if !tree.nodes.is_empty() {
+            wide.root = wide.collapse(tree, 0);
+        }
+        wide
+    }
+
+    /// The places of each leaf's items, in leaf order.
+    pub fn leaves(&self) -> &[Range<u32>] {
+        &self.leaves
+    }
+
+    pub(super) fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    fn collapse(&mut self, tree: &Tree, index: usize) -> u32 {
+        let node = &tree.nodes[index];
+        if node.count > 0 {
+            self.leaves.push(node.first..node.first + node.count);
+            return LEAF | (self.leaves.len() - 1) as u32;
+        }
+        let children = descendants(tree, index);
+        let place = self.nodes.len();
+        let empty = Lanes::splat(f32::INFINITY);
+        self.nodes.push(Node { lo: [empty; 3], hi: [-empty; 3], children: [0; 4] });
+        let (mut lo, mut hi) = ([[f32::INFINITY; 4]; 3], [[f32::NEG_INFINITY; 4]; 3]);
+        for (lane, &child) in children.iter().enumerate() {
+            let Bounds { lo: l, hi: h } = tree.nodes[child].bounds;
+            let (l, h) = (self.frame.forward(l), self.frame.forward(h));
+            for axis in 0..3 {
+                lo[axis][lane] = (l[axis] as f32).next_down();
+                hi[axis][lane] = (h[axis] as f32).next_up();
+            }
+            self.nodes[place].children[lane] = self.collapse(tree, child);
+        }
+        self.nodes[place].lo = lo.map(Lanes::from);
+        self.nodes[place].hi = hi.map(Lanes::from);
+        place as u32
+    }
+
+    /// The query for a point, `None` when it is too far away, or not a number.
+    #[inline]
+    pub fn query(&self, p: Vec3) -> Option<Query> {
+        let q = self.frame.forward(p);
+        let far = q.length();
+        (far <= FARTHEST).then(|| Query {
+            p: q.to_array().map(|x| Lanes::splat(x as f32)),
+            scale: self.frame.scale,
+            blur: BLUR * (1.0 + far),
+        })
+    }
+
+    /// Shows the leaves within a limit, roughly from near to far. `visit` gets the leaf and the
+    /// limit, and returns the new one.
+    #[inline]
+    pub fn nearest(&self, query: &Query, mut limit: f32, mut visit: impl FnMut(usize, f32) -> f32) {
+        let mut stack = [(0.0_f32, 0_u32); 3 * MAX_DEPTH + 4];
+        let mut height = 0;
+        let mut current = self.root;
+        loop {
+            if current & LEAF == 0 {
+                let node = &self.nodes[current as usize];
+                let squared = node.distance_squared(query);
+                let mut hits = squared.simd_le(Lanes::splat(limit)).to_bitmask();
+                let squared = squared.to_array();
+                let bottom = height;
+                while hits != 0 {
+                    let lane = hits.trailing_zeros() as usize;
+                    hits &= hits - 1;
+                    // Sorted in: the nearest on top.
+                    let entry = (squared[lane], node.children[lane]);
+                    let mut at = height;
+                    while at > bottom && stack[at - 1].0 < entry.0 {
+                        stack[at] = stack[at - 1];
+                        at -= 1;
+                    }
+                    stack[at] = entry;
+                    height += 1;
+                }
+            } else {
+                limit = visit((current & !LEAF) as usize, limit);
+            }
+            loop {
+                if height == 0 {
+                    return;
+                }
+                height -= 1;
+                let (bound, next) = stack[height];
+                if bound <= limit {
+                    current = next;
+                    break;
+                }
+            }
+        }
+    }
+}
+
+impl WideTree {
+    /// Shows the leaves whose boxes, rounded outward, reach above `p` or to it along `z`, and have
+    /// `x` and `y` of `p`. `p` is in the box of everything.
+    #[inline]
+    pub fn above(&self, p: Vec3, mut visit: impl FnMut(Range<u32>) -> ControlFlow<()>) {
+        // Moving, scaling and rounding keep the order of coordinates, ties included.
+        let p = self.frame.forward(p).to_array().map(|x| Lanes::splat(x as f32));
+        let mut stack = [self.root; 3 * MAX_DEPTH + 4];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let current = stack[height];
+            if current & LEAF != 0 {
+                if visit(self.leaves[(current & !LEAF) as usize].clone()).is_break() {
+                    return;
+                }
+                continue;
+            }
+            let node = &self.nodes[current as usize];
+            let mut hits = node.above(&p).to_bitmask();
+            // The left ones on top: a search that ends at the point itself ends sooner from below.
+            while hits != 0 {
+                let lane = hits.ilog2();
+                stack[height] = node.children[lane as usize];
+                height += 1;
+                hits ^= 1 << lane;
+            }
+        }
+    }
+}
+
+impl Node {
+    #[inline]
+    fn above(&self, p: &[Lanes; 3]) -> Lanes {
+        self.lo[0].simd_le(p[0])
+            & p[0].simd_le(self.hi[0])
+            & self.lo[1].simd_le(p[1])
+            & p[1].simd_le(self.hi[1])
+            & p[2].simd_le(self.hi[2])
+    }
+
+    #[inline]
+    fn distance_squared(&self, query: &Query) -> Lanes {
+        let beyond = |k: usize| {
+            let outside = (self.lo[k] - query.p[k]).fast_max(query.p[k] - self.hi[k]);
+            outside.fast_max(Lanes::ZERO)
+        };
+        let [x, y, z] = [beyond(0), beyond(1), beyond(2)];
+        x * x + y * y + z * z
+    }
+}
+
+/// Up to four descendants of an inner node, from left to right.
+fn descendants(tree: &Tree, index: usize) -> Vec<usize> {
+    let pair = |index: usize| {
+        let first = tree.nodes[index].first as usize;
+        [first, first + 1]
+    };
+    let mut children = pair(index).to_vec();
+    while children.len() < 4 {
+        let area = |&child: &usize| tree.nodes[child].bounds.half_area(0.0);
+        let inner = |child: &usize| tree.nodes[*child].count == 0;
+        let largest = (0..children.len())
+            .filter(|&k| inner(&children[k]))
+            .max_by(|&a, &b| area(&children[a]).total_cmp(&area(&children[b])));
+        let Some(largest) = largest else {
+            break;
+        };
+        children.splice(largest..=largest, pair(children[largest]));
+    }
+    children
+}
