@@ -6,6 +6,7 @@
 use medial::simplifier::MedialSimplifier;
 
 pub mod angle;
+pub mod aof;
 pub mod lambda;
 pub mod qmat;
 mod ranked;
@@ -16,6 +17,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(angle::AngleFilter::new()),
         Box::new(lambda::LambdaMedialAxis::new()),
         Box::new(qmat::Qmat::new()),
+        Box::new(aof::AverageOutwardFlux::new()),
     ]
 }
 

@@ -1,6 +1,7 @@
 //! The medial mesh: a simplicial complex of dimension at most two on medial spheres.
 
 pub mod collapse;
+mod cubical;
 mod formats;
 mod incidence;
 mod mesh;
@@ -10,6 +11,7 @@ mod topology;
 mod union;
 mod voronoi;
 
+pub use cubical::cubical_betti;
 pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
 pub use incidence::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};

@@ -318,6 +318,12 @@ impl NearBatch {
         self.len == 0
     }
 
+    /// Whether a triangle was found for query `k` that is nearer than its bound.
+    #[inline]
+    pub fn is_nearer(&self, k: usize) -> bool {
+        self.answers[k / 2].triangle.to_array()[k % 2] != NONE
+    }
+
     /// Query `k`, relative to the centre.
     pub fn point(&self, k: usize) -> Vec3 {
         let [x, y, z] = self.points[k / 2].map(|axis| axis.to_array()[k % 2]);
