@@ -131,11 +131,7 @@ impl Levels {
 
     fn tally(&self) -> Tally {
         let levels = self.sizes.len();
-        Tally {
-            dismissed: vec![0; levels - 1],
-            evaluated: vec![0; levels],
-            ..Tally::default()
-        }
+        Tally { dismissed: vec![0; levels - 1], evaluated: vec![0; levels], ..Tally::default() }
     }
 }
 
@@ -143,10 +139,8 @@ impl Tally {
     fn add(&mut self, other: &Self) {
         self.start += other.start;
         self.deepest = self.deepest.max(other.deepest);
-        let pairs = [
-            (&mut self.dismissed, &other.dismissed),
-            (&mut self.evaluated, &other.evaluated),
-        ];
+        let pairs =
+            [(&mut self.dismissed, &other.dismissed), (&mut self.evaluated, &other.evaluated)];
         for (mine, theirs) in pairs {
             mine.iter_mut().zip(theirs).for_each(|(a, b)| *a += b);
         }
@@ -165,7 +159,9 @@ fn blocks(surface: &Surface, grid: &Grid, levels: &Levels) -> Vec<Block> {
     let whole = Block {
         lo: [0; 3],
         hi: grid.coarse_size(),
-        set: surface.triangles.all(grid.origin + Vec3::from(grid.size.map(f64::from)) * 0.5 * grid.side),
+        set: surface
+            .triangles
+            .all(grid.origin + Vec3::from(grid.size.map(f64::from)) * 0.5 * grid.side),
     };
     let (mut open, mut done) = (vec![whole], Vec::new());
     while let Some(block) = open.pop() {
@@ -181,7 +177,8 @@ fn blocks(surface: &Surface, grid: &Grid, levels: &Levels) -> Vec<Block> {
         high[longest] = middle;
         for (lo, hi) in [(block.lo, low), (high, block.hi)] {
             let split = f64::from(grid.split);
-            let corner = |c: [u32; 3]| grid.origin + Vec3::from(c.map(f64::from)) * split * grid.side;
+            let corner =
+                |c: [u32; 3]| grid.origin + Vec3::from(c.map(f64::from)) * split * grid.side;
             let centre = (corner(lo) + corner(hi)) * 0.5;
             let half = (corner(hi) - corner(lo)).length() * 0.5;
             let mut set = NearSet::default();

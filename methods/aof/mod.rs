@@ -74,7 +74,7 @@ pub use flux::{Probe, Sphere};
 pub use grid::Grid;
 pub use params::{AofParams, Start, Variant};
 pub use refine::{Refined, refine};
-pub use simple::SimpleTable;
+pub use simple::{SimpleTable, is_simple};
 pub use solid::{Axis, Solid};
 pub use spiral::Spiral;
 pub use thinning::{Order, is_end_point, thin};

@@ -28,7 +28,12 @@ fn key([x, y, z]: Place) -> [u16; 3] {
 }
 
 /// The balls of voxels: around their centres, or around points of the axis near them.
-pub fn balls(voxels: &[Voxel], grid: &Grid, tree: &TriangleBvh, onto_axis: Option<&Sphere>) -> Vec<Ball> {
+pub fn balls(
+    voxels: &[Voxel],
+    grid: &Grid,
+    tree: &TriangleBvh,
+    onto_axis: Option<&Sphere>,
+) -> Vec<Ball> {
     let ball = |voxel: &Voxel| {
         let centre = grid.centre(voxel.place);
         match onto_axis {

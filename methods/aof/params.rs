@@ -25,7 +25,8 @@ pub struct AofParams {
     pub samples: String,
     /// `alpha`: object angle in degrees of the thinnest sheets that are kept.
     pub angle: f64,
-    /// `mu` of the final threshold `-mu sin alpha`.
+    /// `mu` of the final threshold `-mu sin alpha`; 0 for 1/8 where voxels are kept by the
+    /// threshold, and 3/8 where only end points are.
     pub mu: f64,
     /// What is made of the flux.
     pub variant: Variant,
@@ -70,7 +71,7 @@ impl Default for AofParams {
             levels: 3,
             samples: "70/60/50".to_owned(),
             angle: 30.0,
-            mu: 0.125,
+            mu: 0.0,
             variant: Variant::Thinning,
             spiral: Spiral::EqualArea,
             start: Start::Fine,
@@ -104,8 +105,11 @@ impl AofParams {
             ));
         }
         check_angle(self.angle).map_err(SimplifyError::Parameter)?;
-        if !(self.mu > 0.0 && self.mu <= 0.75) {
-            return refuse(format!("mu = {:?}: give a number in (0, 0.75], such as 0.125", self.mu));
+        if !(self.mu >= 0.0 && self.mu <= 0.75) {
+            return refuse(format!(
+                "mu = {:?}: give a number in [0, 0.75], such as 0.125",
+                self.mu
+            ));
         }
         if !(self.max_memory > 0.0 && self.max_memory.is_finite()) {
             return refuse(format!("max_memory = {:?}: give megabytes, above 0", self.max_memory));
@@ -139,7 +143,12 @@ impl AofParams {
 
     /// Flux at or below which a voxel is kept for an object angle in degrees.
     pub(super) fn threshold(&self, angle: f64) -> f32 {
-        (-self.mu * angle.to_radians().sin()) as f32
+        let mu = match self.variant {
+            _ if self.mu > 0.0 => self.mu,
+            Variant::Plain | Variant::Homotopy => 0.125,
+            Variant::Thinning => 0.375,
+        };
+        (-mu * angle.to_radians().sin()) as f32
     }
 
     pub(super) fn describe() -> Vec<ParamInfo> {
@@ -175,8 +184,8 @@ impl AofParams {
                 "mu",
                 defaults.mu.to_string(),
                 "pure number",
-                "factor of the threshold -mu sin(angle): 0.125 keeps a sheet wherever it meets a \
-                 voxel, 0.5 where it runs through the centre",
+                "factor of the threshold -mu sin(angle); 0 is 0.125 for plain and homotopy, where a \
+                 sheet anywhere in a voxel keeps it, and 0.375 for the end points of thinning",
             ),
             info(
                 "variant",

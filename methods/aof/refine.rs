@@ -62,7 +62,8 @@ pub fn refine(tree: &TriangleBvh, sphere: &Sphere, centre: Vec3) -> Refined {
         })
         .take(FOLLOWED);
     let subtended = |r: &Refined| r.contacts[0].distance(r.contacts[1]) / r.ball.radius;
-    let best = found.reduce(|best, next| if subtended(&next) > subtended(&best) { next } else { best });
+    let best =
+        found.reduce(|best, next| if subtended(&next) > subtended(&best) { next } else { best });
     best.unwrap_or_else(|| {
         let near = tree.closest(centre);
         Refined { ball: Ball::new(centre, near.distance), contacts: [near.point; 2] }

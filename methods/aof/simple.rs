@@ -53,6 +53,58 @@ impl SimpleTable {
     }
 }
 
+/// Layers of a neighbourhood without its lowest and its highest column, row and layer.
+const NOT_LOW: [u32; 3] = [0o666_666_666, 0o770_770_770, 0o777_777_000];
+const NOT_HIGH: [u32; 3] = [0o333_333_333, 0o077_077_077, 0o000_777_777];
+/// How far a step along each axis moves a bit.
+const STEP: [u32; 3] = [1, 3, 9];
+/// The 18 nearest neighbours, and of them the six nearest.
+const NEAREST_18: u32 = 0o272_757_272;
+const NEAREST_6_BITS: u32 = 1 << 4 | 1 << 10 | 1 << 12 | 1 << 14 | 1 << 16 | 1 << 22;
+
+/// Whether a voxel with this neighbourhood is simple, without the table: some 100 operations.
+#[inline]
+pub fn is_simple(neighbourhood: u32) -> bool {
+    let object = neighbourhood & 0x7ff_ffff & !(1 << CENTRE);
+    let rest = !neighbourhood & NEAREST_18;
+    let seeds = rest & NEAREST_6_BITS;
+    if object == 0 || seeds == 0 {
+        return false;
+    }
+    if flood(seeds & seeds.wrapping_neg(), rest, grow_6) & seeds != seeds {
+        return false;
+    }
+    flood(object & object.wrapping_neg(), object, grow_26) == object
+}
+
+/// What can be reached from a seed within a mask.
+#[inline]
+fn flood(seed: u32, mask: u32, grow: impl Fn(u32) -> u32) -> u32 {
+    let mut reached = seed;
+    loop {
+        let grown = grow(reached) & mask;
+        if grown == reached {
+            return reached;
+        }
+        reached = grown;
+    }
+}
+
+#[inline]
+fn neighbours(bits: u32, axis: usize) -> u32 {
+    (bits & NOT_HIGH[axis]) << STEP[axis] | (bits & NOT_LOW[axis]) >> STEP[axis]
+}
+
+#[inline]
+fn grow_26(bits: u32) -> u32 {
+    (0..3).fold(bits, |bits, axis| bits | neighbours(bits, axis))
+}
+
+#[inline]
+fn grow_6(bits: u32) -> u32 {
+    (0..3).fold(bits, |grown, axis| grown | neighbours(bits, axis))
+}
+
 /// The 26 neighbours as consecutive bits.
 #[inline]
 pub fn without_centre(neighbourhood: u32) -> u32 {
@@ -86,8 +138,6 @@ const fn adjacency() -> Adjacency {
             let near = d[0] <= 1 && d[1] <= 1 && d[2] <= 1;
             if a != b && a != CENTRE && b != CENTRE && near {
                 table.by_26[a as usize] |= 1 << b;
-                let corner = |o: [i32; 3]| o[0] != 0 && o[1] != 0 && o[2] != 0;
-                let _ = corner;
                 let far_p = p[0] != 0 && p[1] != 0 && p[2] != 0;
                 let far_q = q[0] != 0 && q[1] != 0 && q[2] != 0;
                 if d[0] + d[1] + d[2] == 1 && !far_p && !far_q {
@@ -165,24 +215,25 @@ mod tests {
 
     /// By the definition, one neighbourhood at a time.
     fn is_simple_by_definition(neighbourhood: u32) -> bool {
-        let components = |bits: &[u32], near: &dyn Fn([i32; 3]) -> bool, counts: &dyn Fn(u32) -> bool| {
-            let mut label: Vec<usize> = (0..bits.len()).collect();
-            for _ in 0..bits.len() {
-                for i in 0..bits.len() {
-                    for j in 0..bits.len() {
-                        let (p, q) = (offset(bits[i]), offset(bits[j]));
-                        if near([0, 1, 2].map(|k| (p[k] - q[k]).abs())) {
-                            label[i] = label[i].min(label[j]);
+        let components =
+            |bits: &[u32], near: &dyn Fn([i32; 3]) -> bool, counts: &dyn Fn(u32) -> bool| {
+                let mut label: Vec<usize> = (0..bits.len()).collect();
+                for _ in 0..bits.len() {
+                    for i in 0..bits.len() {
+                        for j in 0..bits.len() {
+                            let (p, q) = (offset(bits[i]), offset(bits[j]));
+                            if near([0, 1, 2].map(|k| (p[k] - q[k]).abs())) {
+                                label[i] = label[i].min(label[j]);
+                            }
                         }
                     }
                 }
-            }
-            let mut labels: Vec<usize> =
-                (0..bits.len()).filter(|&i| counts(bits[i])).map(|i| label[i]).collect();
-            labels.sort_unstable();
-            labels.dedup();
-            labels.len()
-        };
+                let mut labels: Vec<usize> =
+                    (0..bits.len()).filter(|&i| counts(bits[i])).map(|i| label[i]).collect();
+                labels.sort_unstable();
+                labels.dedup();
+                labels.len()
+            };
         let norm = |bit: u32| offset(bit).iter().map(|x| x.abs()).sum::<i32>();
         let around = || (0..27).filter(|&bit| bit != CENTRE);
         let object: Vec<u32> = around().filter(|&bit| neighbourhood >> bit & 1 == 1).collect();
@@ -203,6 +254,24 @@ mod tests {
             let word = (state >> 3) & if k % 3 == 0 { state.rotate_left(9) } else { u32::MAX };
             let word = (if k % 3 == 1 { word | state.rotate_left(17) } else { word }) & 0x7ff_ffff;
             assert_eq!(table.is_simple(word), is_simple_by_definition(word), "{word:027b}");
+        }
+        // Both ways to tell, everywhere.
+        let with_centre = |k: u32| (k & 0x1fff) | (k >> 13 << 14);
+        let differs = |&k: &u32| is_simple(with_centre(k)) != table.is_simple(with_centre(k));
+        assert_eq!((0..NEIGHBOURHOODS as u32).into_par_iter().find_any(differs), None);
+    }
+
+    #[test]
+    fn bits_and_offsets_agree() {
+        for bit in 0..27 {
+            let o = offset(bit);
+            for axis in 0..3 {
+                assert_eq!(NOT_LOW[axis] >> bit & 1 == 1, o[axis] > -1);
+                assert_eq!(NOT_HIGH[axis] >> bit & 1 == 1, o[axis] < 1);
+            }
+            let steps = o.iter().map(|x| x.abs()).sum::<i32>();
+            assert_eq!(NEAREST_18 >> bit & 1 == 1, steps == 1 || steps == 2);
+            assert_eq!(NEAREST_6_BITS >> bit & 1 == 1, steps == 1);
         }
     }
 }

@@ -121,7 +121,11 @@ impl<'s> Solid<'s> {
 
     fn nothing_fits(&self, resolution: u32, deepest: f64) -> SimplifyError {
         let longest = self.grid(resolution).side * f64::from(resolution);
-        let enough = if deepest > 0.0 { (1.5 * longest / deepest).ceil() } else { 8.0 * f64::from(resolution) };
+        let enough = if deepest > 0.0 {
+            (1.5 * longest / deepest).ceil()
+        } else {
+            8.0 * f64::from(resolution)
+        };
         SimplifyError::Parameter(format!(
             "resolution = {resolution}: the solid is thinner than a voxel everywhere, no sphere of \
              a voxel's side lies inside; resolution = {enough} should do"
@@ -183,7 +187,8 @@ impl<'s> Solid<'s> {
         };
         let vertices = &self.shape.mesh().vertices;
         let farthest = vertices.iter().map(|&v| rings(v)).enumerate();
-        let (vertex, ring) = farthest.max_by_key(|&(index, ring)| (ring, std::cmp::Reverse(index)))?;
+        let (vertex, ring) =
+            farthest.max_by_key(|&(index, ring)| (ring, std::cmp::Reverse(index)))?;
         (ring > RESOLVED).then(|| self.shape.normalisation().backward(vertices[vertex]))
     }
 

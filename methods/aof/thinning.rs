@@ -19,7 +19,7 @@ use std::collections::BinaryHeap;
 use medial::simplifier::{RunContext, SimplifyError};
 
 use super::bricks::{Bricks, Marks, Place, Voxel};
-use super::simple::{CENTRE, SimpleTable, offset};
+use super::simple::{CENTRE, SimpleTable, is_simple, offset};
 
 /// Which voxels go, and in which order.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,13 +71,16 @@ impl Order {
     }
 }
 
+/// Voxels from which on the table of simple neighbourhoods is worth building.
+const WITH_TABLE: usize = 4_000_000;
+
 /// Deletes voxels that are simple when their turn comes.
 ///
 /// # Errors
 /// When the run was cancelled.
 pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), SimplifyError> {
-    let table = SimpleTable::get();
     let total = voxels.len();
+    let table = (total >= WITH_TABLE).then(SimpleTable::get);
     let mut queue = Queue::new(voxels);
     for voxel in voxels.iter() {
         let surrounded = voxels.neighbourhood(voxel.place) & FACES == FACES;
@@ -96,7 +99,11 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), S
         }
         let neighbourhood = voxels.neighbourhood(place);
         let voxel = voxels.get(place).expect("queued voxels are there");
-        if !table.is_simple(neighbourhood) {
+        let simple = match table {
+            Some(table) => table.is_simple(neighbourhood),
+            None => is_simple(neighbourhood),
+        };
+        if !simple {
             continue;
         }
         if order.stays(&voxel, neighbourhood) {

@@ -24,8 +24,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (key, value) in settings.split(',').filter_map(|word| word.split_once('=')) {
         given.set(key, value);
     }
-    println!("{:<14} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>7} {:>7}", "shape", "start", "level 1",
-        "level 2", "kept", "s", "cpu s", "thin s", "betti");
+    println!(
+        "{:<14} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>7} {:>7}",
+        "shape", "start", "level 1", "level 2", "kept", "s", "cpu s", "thin s", "betti"
+    );
     for name in names {
         let params: AofParams = given.typed()?;
         let shape = shape(name)?;
@@ -35,7 +37,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         let solid = Solid::new(&shape, surface, params.clone(), RunContext::default());
         let (clock, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
-        let wanted = if params.variant == medial_methods::aof::Variant::Plain { Wanted::Kept } else { Wanted::All };
+        let wanted = if params.variant == medial_methods::aof::Variant::Plain {
+            Wanted::Kept
+        } else {
+            Wanted::All
+        };
         let descent = solid.descend(resolution, wanted)?;
         let (seconds, cpu) = (clock.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
         let clock = Instant::now();
@@ -46,7 +52,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         let level = |k: usize| tally.dismissed.get(k).map_or(f64::NAN, |&n| share(n));
         println!(
             "{name:<14} {:>9} {:>8.1}% {:>8.1}% {:>9} {seconds:>7.2} {cpu:>7.2} {thinning:>7.2} {:?} evaluated {:?} {} MB",
-            tally.start, level(0), level(1), axis.voxels.len(), axis.betti(), tally.evaluated,
+            tally.start,
+            level(0),
+            level(1),
+            axis.voxels.len(),
+            axis.betti(),
+            tally.evaluated,
             descent.voxels.bytes() / 1_000_000
         );
     }

@@ -63,15 +63,12 @@ impl Rows {
                 hi[axis] = hi[axis].max(voxel[axis]);
             }
         }
-        let mut sorted: Vec<[u32; 3]> = voxels
-            .iter()
-            .map(|v| [v[2] - lo[2] + 1, v[1] - lo[1] + 1, v[0] - lo[0] + 1])
-            .collect();
+        let mut sorted: Vec<[u32; 3]> =
+            voxels.iter().map(|v| [v[2] - lo[2] + 1, v[1] - lo[1] + 1, v[0] - lo[0] + 1]).collect();
         sorted.sort_unstable();
         sorted.dedup();
         let size = [1, 2].map(|axis| (hi[axis] - lo[axis]) as usize + 3);
-        let mut rows =
-            Self { width: hi[0] - lo[0] + 3, size, runs: Vec::new(), first: Vec::new() };
+        let mut rows = Self { width: hi[0] - lo[0] + 3, size, runs: Vec::new(), first: Vec::new() };
         for [z, y, x] in sorted {
             let row = y as usize + z as usize * size[0];
             let new_row = rows.open(row);
@@ -211,7 +208,9 @@ mod tests {
             for _ in 0..20 {
                 let kept: Vec<[u32; 3]> = cube(6)
                     .filter(|_| {
-                        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                        state = state
+                            .wrapping_mul(6364136223846793005)
+                            .wrapping_add(1442695040888963407);
                         (state >> 33) % 100 < density
                     })
                     .collect();

@@ -7,7 +7,11 @@
 //! 2. A triangle is convex: with `u` the unit vector from `c` to its closest point and `d` the
 //!    distance, it lies beyond the plane `(y - c) . u = d`. A query `p` is therefore at least
 //!    `d - (p - c) . u` away from it. Most triangles of a set need no more than this.
-//! 3. Queries are measured two at a time in double precision.
+//! 3. With `u0` and `D` those of the nearest triangle, and `w = p - c`, the closest point to `c` is at
+//!    most `D - u0 . w + e` away from `p`, `e = D - sqrt(D^2 - reach^2)`. By step 2 a triangle
+//!    matters only if `d <= D + |u - u0| reach + e`. That is far less than `D + 2 reach` on the side
+//!    where the nearest triangle is.
+//! 4. Queries are measured two at a time in double precision.
 //!
 //! Only the closest point inside the surface is of interest here, so features are told apart by
 //! what they do to the distance: a *fan* feature is an edge or vertex that is the closest point of
@@ -140,26 +144,31 @@ impl NearbyTriangles {
             return;
         };
         let moved = centre - within.centre;
-        let mut best = self.measure(first.triangle, centre).distance;
+        let bound = |entry: &Entry| entry.distance - entry.toward.dot(moved);
+        let mut best = self.measure(first.triangle, centre);
         for entry in &within.entries {
-            let bound = entry.distance - entry.toward.dot(moved);
-            if bound > limit(best, reach) {
-                continue;
+            if bound(entry) < best.distance {
+                let measured = self.measure(entry.triangle, centre);
+                if measured.distance < best.distance {
+                    best = measured;
+                }
             }
-            let entry = self.measure(entry.triangle, centre);
-            best = best.min(entry.distance);
-            set.entries.push(entry);
         }
-        let limit = limit(best, reach);
-        set.entries.retain(|entry| entry.distance <= limit);
+        // The same as for the entries of the new set, with what the old one knows of a triangle.
+        let relevant = Relevant::new(&best, reach);
+        for entry in &within.entries {
+            if relevant.may_be_nearest(bound(entry), entry.toward) {
+                set.entries.push(self.measure(entry.triangle, centre));
+            }
+        }
+        set.entries.retain(|entry| relevant.may_be_nearest(entry.distance, entry.toward));
         set.find_nearest();
     }
 
+    #[inline]
     fn measure(&self, triangle: u32, p: Vec3) -> Entry {
-        let foot = self.foot(triangle, p).0;
-        let distance = foot.distance(p);
-        let toward = if distance > 0.0 { (foot - p) / distance } else { Vec3::ZERO };
-        Entry { triangle, distance, toward }
+        let (distance, away) = self.frames[triangle as usize].distance_and_direction(p);
+        Entry { triangle, distance, toward: -away }
     }
 
     /// Closest point of a triangle, and whether it lies on a fan feature.
@@ -240,9 +249,32 @@ impl NearbyTriangles {
     }
 }
 
-/// Up to where triangles belong to the set of a ball, with more than rounding can take.
-fn limit(distance: f64, reach: f64) -> f64 {
-    (distance + 2.0 * reach) * (1.0 + 1e-12)
+/// Step 3.
+struct Relevant {
+    /// `u0`.
+    toward: Vec3,
+    /// `D + e`, and `D + 2 reach`, with more than rounding can take.
+    limits: [f64; 2],
+    reach: f64,
+}
+
+impl Relevant {
+    fn new(nearest: &Entry, reach: f64) -> Self {
+        let d = nearest.distance;
+        let bent = if d > reach { d - (d * d - reach * reach).sqrt() } else { 2.0 * reach };
+        let slack = 1e-12 * (d + reach);
+        let limits = [d + bent + slack, d + 2.0 * reach + slack];
+        Self { toward: nearest.toward, limits, reach }
+    }
+
+    /// Whether a triangle beyond a plane with the normal `toward`, at `distance` from the centre,
+    /// may be nearest to a point of the ball.
+    #[inline]
+    fn may_be_nearest(&self, distance: f64, toward: Vec3) -> bool {
+        let beyond = distance - self.limits[0];
+        let turned = self.reach * self.reach * toward.distance_squared(self.toward);
+        beyond <= 0.0 || (distance <= self.limits[1] && beyond * beyond <= turned)
+    }
 }
 
 impl NearSet {
@@ -373,8 +405,7 @@ impl Spread {
     /// unless the foot is inside.
     #[inline]
     fn measure(&self, point: &[f64x2; 3], triangle: f64, answer: &mut Answer) {
-        let [x, y, height] =
-            [0, 1, 2].map(|axis| dot(&self.axes[axis], point) - self.origin[axis]);
+        let [x, y, height] = [0, 1, 2].map(|axis| dot(&self.axes[axis], point) - self.origin[axis]);
         let [cx, cy] = self.apex;
         let zero = f64x2::ZERO;
         let over = height * height;
