@@ -6,6 +6,7 @@
 use medial::simplifier::MedialSimplifier;
 
 pub mod angle;
+pub mod aof;
 pub mod dey_zhao;
 pub mod hem;
 pub mod lambda;
@@ -27,6 +28,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(hem::Hem::new()),
         Box::new(sat::Sat::new()),
         Box::new(sat_pairwise::SatPairwise::new()),
+        Box::new(aof::AverageOutwardFlux::new()),
     ]
 }
 

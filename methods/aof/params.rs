@@ -1,0 +1,231 @@
+//! The parameters of the average outward flux.
+
+use medial::simplifier::{ParamInfo, SimplifyError};
+use serde::{Deserialize, Serialize};
+
+use super::spiral::Spiral;
+
+/// Most voxels along a side of the bounding box: places have 16 bits.
+const MAX_RESOLUTION: u32 = 60_000;
+/// Most voxels along the longest side of a coarse voxel.
+const MAX_SPLIT: u32 = 1024;
+
+/// Parameters; the default is the paper's where the paper has one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AofParams {
+    /// Voxels along the longest side of the bounding box, at the finest level.
+    pub resolution: u32,
+    /// `d`: each voxel is split into `d^3`.
+    pub d: u32,
+    /// Number of levels, the finest included.
+    pub levels: u32,
+    /// `N`: samples on each sphere, from the coarsest level to the finest, separated by `/`; the
+    /// last one holds for all levels that follow.
+    pub samples: String,
+    /// `alpha`: object angle in degrees of the thinnest sheets that are kept.
+    pub angle: f64,
+    /// `mu` of the final threshold `-mu sin alpha`; 0 for 1/8 where voxels are kept by the
+    /// threshold, and 3/8 where only end points are.
+    pub mu: f64,
+    /// What is made of the flux.
+    pub variant: Variant,
+    /// How the samples lie on the sphere.
+    pub spiral: Spiral,
+    /// Which voxels there are to begin with.
+    pub start: Start,
+    /// Whether centres are moved from the voxel's onto the axis.
+    pub refine: bool,
+    /// Limit of the memory for voxels, in megabytes.
+    pub max_memory: f64,
+}
+
+/// What is made of the flux.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Variant {
+    /// All voxels with a flux at or below the threshold.
+    Plain,
+    /// Voxels above the threshold are deleted where they are simple, outermost first.
+    Homotopy,
+    /// Simple voxels are deleted by flux, the least medial first, except for end points below the
+    /// threshold (Siddiqi, Bouix, Tannenbaum, Zucker 2002).
+    Thinning,
+}
+
+/// Which voxels there are to begin with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Start {
+    /// Voxels of the finest level whose spheres lie inside. Coarser ones that do not are split.
+    Fine,
+    /// Voxels of the coarsest level whose spheres lie inside, as in the paper.
+    Coarse,
+}
+
+impl Default for AofParams {
+    fn default() -> Self {
+        Self {
+            resolution: 81,
+            d: 3,
+            levels: 3,
+            samples: "70/60/50".to_owned(),
+            angle: 30.0,
+            mu: 0.0,
+            variant: Variant::Thinning,
+            spiral: Spiral::EqualArea,
+            start: Start::Fine,
+            refine: true,
+            max_memory: 1000.0,
+        }
+    }
+}
+
+impl AofParams {
+    /// The parameters if they are in their ranges.
+    pub(super) fn validate(self) -> Result<Self, SimplifyError> {
+        let refuse = |message: String| Err(SimplifyError::Parameter(message));
+        if !(1..=MAX_RESOLUTION).contains(&self.resolution) {
+            return refuse(format!(
+                "resolution = {}: give 1 to {MAX_RESOLUTION} voxels along the longest side",
+                self.resolution
+            ));
+        }
+        if self.levels == 0 || (self.levels > 1 && self.d < 2) {
+            return refuse(format!(
+                "levels = {}, d = {}: give at least one level, and 2 or more for d",
+                self.levels, self.d
+            ));
+        }
+        let split = self.d.checked_pow(self.levels - 1).filter(|&split| split <= MAX_SPLIT);
+        if split.is_none() {
+            return refuse(format!(
+                "levels = {}, d = {}: d^(levels - 1) is above {MAX_SPLIT}; give fewer levels",
+                self.levels, self.d
+            ));
+        }
+        check_angle(self.angle).map_err(SimplifyError::Parameter)?;
+        if !(self.mu >= 0.0 && self.mu <= 0.75) {
+            return refuse(format!(
+                "mu = {:?}: give a number in [0, 0.75], such as 0.125",
+                self.mu
+            ));
+        }
+        if !(self.max_memory > 0.0 && self.max_memory.is_finite()) {
+            return refuse(format!("max_memory = {:?}: give megabytes, above 0", self.max_memory));
+        }
+        self.sample_counts()?;
+        Ok(self)
+    }
+
+    /// Samples of each level, from coarse to fine.
+    pub(super) fn sample_counts(&self) -> Result<Vec<usize>, SimplifyError> {
+        let refuse = || {
+            SimplifyError::Parameter(format!(
+                "samples = {}: give 8 to 10000 for each level, such as 70/60/50",
+                self.samples
+            ))
+        };
+        let counts: Option<Vec<usize>> =
+            self.samples.split('/').map(|word| word.trim().parse().ok()).collect();
+        let mut counts = counts.ok_or_else(refuse)?;
+        if counts.len() > self.levels as usize {
+            // Fewer levels: those that are left out are the coarse ones.
+            counts.drain(..counts.len() - self.levels as usize);
+        }
+        let last = *counts.last().ok_or_else(refuse)?;
+        counts.resize(self.levels as usize, last);
+        if counts.iter().any(|count| !(8..=10_000).contains(count)) {
+            return Err(refuse());
+        }
+        Ok(counts)
+    }
+
+    /// Flux at or below which a voxel is kept for an object angle in degrees.
+    pub(super) fn threshold(&self, angle: f64) -> f32 {
+        let mu = match self.variant {
+            _ if self.mu > 0.0 => self.mu,
+            Variant::Plain | Variant::Homotopy => 0.125,
+            Variant::Thinning => 0.375,
+        };
+        (-mu * angle.to_radians().sin()) as f32
+    }
+
+    pub(super) fn describe() -> Vec<ParamInfo> {
+        let defaults = Self::default();
+        let info = |name, default: String, unit, help| ParamInfo { name, default, unit, help };
+        vec![
+            info(
+                "resolution",
+                defaults.resolution.to_string(),
+                "voxels",
+                "voxels along the longest side of the bounding box, at the finest level",
+            ),
+            info("d", defaults.d.to_string(), "number", "each voxel is split into d x d x d"),
+            info(
+                "levels",
+                defaults.levels.to_string(),
+                "number",
+                "levels of resolution, from coarse to fine",
+            ),
+            info(
+                "samples",
+                defaults.samples,
+                "numbers",
+                "samples on each sphere, from the coarsest level to the finest",
+            ),
+            info(
+                "angle",
+                defaults.angle.to_string(),
+                "degrees",
+                "object angle of the sheets that are kept, when no level names one",
+            ),
+            info(
+                "mu",
+                defaults.mu.to_string(),
+                "pure number",
+                "factor of the threshold -mu sin(angle); 0 is 0.125 for plain and homotopy, where a \
+                 sheet anywhere in a voxel keeps it, and 0.375 for the end points of thinning",
+            ),
+            info(
+                "variant",
+                "thinning".into(),
+                "plain, homotopy or thinning",
+                "keep by threshold; delete simple voxels alone, outermost first; or thin by flux",
+            ),
+            info(
+                "spiral",
+                "equal-area".into(),
+                "equal-area or classic",
+                "how the samples lie on the sphere",
+            ),
+            info(
+                "start",
+                "fine".into(),
+                "fine or coarse",
+                "begin with the voxels whose spheres fit inside at the finest level, or at the \
+                 coarsest as in the paper",
+            ),
+            info(
+                "refine",
+                defaults.refine.to_string(),
+                "true or false",
+                "move centres onto the axis, between opposite closest points",
+            ),
+            info(
+                "max_memory",
+                defaults.max_memory.to_string(),
+                "megabytes",
+                "limit of the memory for voxels",
+            ),
+        ]
+    }
+}
+
+/// An object angle is above 0 and at most a right angle.
+pub(super) fn check_angle(angle: f64) -> Result<(), String> {
+    if angle > 0.0 && angle <= 90.0 {
+        return Ok(());
+    }
+    Err(format!("angle = {angle:?}: an object angle is above 0 and at most 90 degrees"))
+}

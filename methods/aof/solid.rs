@@ -1,0 +1,361 @@
+//! One solid at any resolution: its start set, its flux, its axis at an angle or at a count.
+
+use std::sync::Arc;
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, cubical_betti};
+use medial::geometry::TriangleBvh;
+use medial::shape::Shape;
+use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+
+use super::bricks::{Bricks, Place, Voxel};
+use super::coarse_to_fine::{Descent, Surface, Wanted, coarse_to_fine};
+use super::flux::Sphere;
+use super::grid::Grid;
+use super::output::{balls, medial_mesh, sorted};
+use super::params::{AofParams, Variant};
+use super::thinning::{Order, thin};
+
+/// Bytes for each voxel of the start set: values in bricks that are not full, twice while one is
+/// thinned, lists of blocks, the heap.
+const BYTES_PER_VOXEL: f64 = 64.0;
+/// How often the lattice is made finer, half as fine again each time, for the topology of a start set.
+const REFINEMENTS: u32 = 3;
+
+/// A solid, ready for any lattice.
+pub struct Solid<'s> {
+    shape: &'s Shape,
+    surface: Surface,
+    params: AofParams,
+    run: RunContext,
+    volume: f64,
+}
+
+/// The voxels of an axis.
+pub struct Axis {
+    /// The lattice.
+    pub grid: Grid,
+    /// Voxels by `z`, then `y`, then `x`.
+    pub voxels: Vec<Voxel>,
+    /// The sphere of the finest level.
+    sphere: Sphere,
+}
+
+impl<'s> Solid<'s> {
+    /// A solid from a shape and its surface.
+    pub fn new(shape: &'s Shape, surface: Surface, params: AofParams, run: RunContext) -> Self {
+        let mesh = shape.mesh();
+        let signed = |f: usize| {
+            let [a, b, c] = mesh.triangle(f);
+            a.dot(b.cross(c)) / 6.0
+        };
+        let volume = (0..mesh.faces.len()).map(signed).sum();
+        Self { shape, surface, params, run, volume }
+    }
+
+    /// The parameters.
+    pub fn params(&self) -> &AofParams {
+        &self.params
+    }
+
+    /// The lattice of a resolution.
+    pub fn grid(&self, resolution: u32) -> Grid {
+        Grid::new(self.shape.mesh(), resolution, self.params.d.pow(self.params.levels - 1))
+    }
+
+    /// Flux and distances at a resolution.
+    ///
+    /// # Errors
+    /// When the voxels would not fit into memory; when the run was cancelled.
+    pub fn descend(&self, resolution: u32, wanted: Wanted) -> Result<Descent, SimplifyError> {
+        let grid = self.grid(resolution);
+        self.check_memory(resolution, &grid)?;
+        coarse_to_fine(&self.surface, &grid, &self.params, wanted, &self.run)
+    }
+
+    fn wanted(&self) -> Wanted {
+        if self.params.variant == Variant::Plain { Wanted::Kept } else { Wanted::All }
+    }
+
+    fn check_memory(&self, resolution: u32, grid: &Grid) -> Result<(), SimplifyError> {
+        let voxels = self.volume / grid.side.powi(3);
+        let bricks: f64 = grid.size.iter().map(|&n| f64::from(n) / 8.0).product();
+        let megabytes = (voxels * BYTES_PER_VOXEL + bricks * 4.0) / 1e6;
+        let limit = self.params.max_memory;
+        if megabytes <= limit {
+            return Ok(());
+        }
+        let fits = (f64::from(resolution) * (limit / megabytes).cbrt()).floor().max(1.0);
+        Err(SimplifyError::Parameter(format!(
+            "resolution = {resolution}: about {megabytes:.0} MB for {voxels:.3e} voxels, above \
+             max_memory = {limit}; resolution = {fits} fits, or raise max_memory"
+        )))
+    }
+
+    /// The resolution to work at, its flux, and what is to be said of it.
+    ///
+    /// Variants that keep the topology of their start set make the lattice finer until that is
+    /// the solid's.
+    ///
+    /// # Errors
+    /// When no voxel fits into the solid; as [`Solid::descend`].
+    pub fn base(&self) -> Result<(u32, Descent, Diagnostics), SimplifyError> {
+        let mut diagnostics = Diagnostics::default();
+        let asked = self.params.resolution;
+        let mut resolution = asked;
+        if self.params.variant != Variant::Plain {
+            resolution = self.faithful_resolution(&mut diagnostics)?;
+        }
+        let base = self.descend(resolution, self.wanted())?;
+        if base.tally.start == 0 {
+            return Err(self.nothing_fits(resolution, base.tally.deepest));
+        }
+        diagnostics.count("resolution", resolution as usize);
+        diagnostics.count("start_voxels", base.tally.start as usize);
+        for (level, &dismissed) in base.tally.dismissed.iter().enumerate() {
+            diagnostics.count(&format!("dismissed_at_level_{}", level + 1), dismissed as usize);
+        }
+        diagnostics.count("spheres_evaluated", base.tally.evaluated.iter().sum::<u64>() as usize);
+        Ok((resolution, base, diagnostics))
+    }
+
+    fn nothing_fits(&self, resolution: u32, deepest: f64) -> SimplifyError {
+        let longest = self.grid(resolution).side * f64::from(resolution);
+        let enough = if deepest > 0.0 {
+            (1.5 * longest / deepest).ceil()
+        } else {
+            8.0 * f64::from(resolution)
+        };
+        SimplifyError::Parameter(format!(
+            "resolution = {resolution}: the solid is thinner than a voxel everywhere, no sphere of \
+             a voxel's side lies inside; resolution = {enough} should do"
+        ))
+    }
+
+    /// The least resolution from the given one on whose start set has the topology of the solid.
+    fn faithful_resolution(&self, diagnostics: &mut Diagnostics) -> Result<u32, SimplifyError> {
+        let asked = self.params.resolution;
+        let Some(expected) = self.shape.expected_betti() else {
+            return Ok(asked);
+        };
+        let mut first_with_voxels = None;
+        for refinement in 0..=REFINEMENTS {
+            let resolution = (f64::from(asked) * 1.5_f64.powi(refinement as i32)).round() as u32;
+            let start = match self.descend(resolution, Wanted::Places) {
+                Err(SimplifyError::Parameter(_)) if refinement > 0 => break,
+                other => other?,
+            };
+            let betti = betti_of(&start.voxels);
+            if betti == expected {
+                if refinement > 0 {
+                    diagnostics.warn(format!(
+                        "resolution {resolution} instead of {asked}: below, the voxels whose \
+                         spheres fit inside do not have the topology of the solid"
+                    ));
+                }
+                return Ok(resolution);
+            }
+            if start.tally.start > 0 && first_with_voxels.is_none() {
+                first_with_voxels = Some((resolution, start, betti));
+            }
+        }
+        let Some((resolution, start, betti)) = first_with_voxels else {
+            return Ok(asked);
+        };
+        let side = self.grid(resolution).side * self.shape.normalisation().diagonal;
+        let place = self.lost_vertex(resolution, &start.voxels).map_or(String::new(), |p| {
+            format!(", such as at ({:.6}, {:.6}, {:.6})", p.x, p.y, p.z)
+        });
+        diagnostics.warn(format!(
+            "the voxels whose spheres fit inside have the Betti numbers {betti:?} instead of the \
+             solid's {expected:?}: parts thinner than {:.4} or gaps narrower than {side:.4} in \
+             units of the surface are not resolved{place}; give a higher resolution",
+            2.0 * side
+        ));
+        Ok(resolution)
+    }
+
+    /// The vertex of the surface, in input units, that is farthest from all voxels, if it is
+    /// farther than those of a part that is resolved.
+    fn lost_vertex(&self, resolution: u32, voxels: &Bricks) -> Option<Vec3> {
+        const RESOLVED: i32 = 3;
+        const FARTHEST: i32 = 12;
+        let grid = self.grid(resolution);
+        let rings = |vertex: Vec3| {
+            let at = ((vertex - grid.origin) / grid.side).to_array().map(|x| x.floor() as i32);
+            (0..FARTHEST).find(|&ring| has_voxel(voxels, &grid, at, ring)).unwrap_or(FARTHEST)
+        };
+        let vertices = &self.shape.mesh().vertices;
+        let farthest = vertices.iter().map(|&v| rings(v)).enumerate();
+        let (vertex, ring) =
+            farthest.max_by_key(|&(index, ring)| (ring, std::cmp::Reverse(index)))?;
+        (ring > RESOLVED).then(|| self.shape.normalisation().backward(vertices[vertex]))
+    }
+
+    /// The axis of a lattice for an object angle in degrees.
+    ///
+    /// # Errors
+    /// When the run was cancelled.
+    pub fn axis(&self, resolution: u32, base: &Descent, angle: f64) -> Result<Axis, SimplifyError> {
+        let threshold = self.params.threshold(angle);
+        let grid = self.grid(resolution);
+        let kept = match self.params.variant {
+            Variant::Plain => {
+                let mut kept = sorted(&base.voxels);
+                kept.retain(|voxel| voxel.flux <= threshold);
+                kept
+            }
+            Variant::Homotopy | Variant::Thinning => {
+                let mut voxels = base.voxels.clone();
+                let order = match self.params.variant {
+                    Variant::Homotopy => Order::OutermostFirst { threshold },
+                    _ => Order::ByFlux { threshold },
+                };
+                thin(&mut voxels, order, &self.run)?;
+                sorted(&voxels)
+            }
+        };
+        Ok(self.axis_of(grid, kept))
+    }
+
+    fn axis_of(&self, grid: Grid, voxels: Vec<Voxel>) -> Axis {
+        let counts = self.params.sample_counts().expect("validated");
+        let count = counts[counts.len() - 1];
+        Axis { sphere: Sphere::new(self.params.spiral, count, grid.side), grid, voxels }
+    }
+
+    /// The axis of the coarsest lattice that still has `count` voxels and the topology of the base,
+    /// taken down to the count.
+    ///
+    /// # Errors
+    /// When the run was cancelled.
+    pub fn with_count(
+        &self,
+        resolution: u32,
+        base: &Descent,
+        count: usize,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<Axis, SimplifyError> {
+        let angle = self.params.angle;
+        let mut best = self.axis(resolution, base, angle)?;
+        if best.voxels.len() <= count {
+            if best.voxels.len() < count {
+                diagnostics.warn(format!(
+                    "{} spheres instead of {count}: the axis has no more voxels at resolution \
+                     {resolution}",
+                    best.voxels.len()
+                ));
+            }
+            return Ok(best);
+        }
+        let topology = betti_of(&base.voxels);
+        let (mut low, mut high) = (1, resolution);
+        // The number of voxels of a surface grows with the square of the resolution.
+        let share = (count as f64 / best.voxels.len() as f64).sqrt();
+        let mut next = (f64::from(resolution) * share).ceil() as u32;
+        while high - low > 1 + high / 16 {
+            let tried = next.clamp(low + 1, high - 1);
+            match self.axis_with_topology(tried, topology, angle)? {
+                Some(axis) if axis.voxels.len() >= count => (best, high) = (axis, tried),
+                _ => low = tried,
+            }
+            next = low.midpoint(high);
+        }
+        if best.voxels.len() > count {
+            self.take_down(&mut best, count, diagnostics)?;
+        }
+        diagnostics.count("lattice", high as usize);
+        Ok(best)
+    }
+
+    fn axis_with_topology(
+        &self,
+        resolution: u32,
+        topology: [u64; 3],
+        angle: f64,
+    ) -> Result<Option<Axis>, SimplifyError> {
+        if self.params.variant != Variant::Plain {
+            let start = self.descend(resolution, Wanted::Places)?;
+            if betti_of(&start.voxels) != topology {
+                return Ok(None);
+            }
+        }
+        let base = self.descend(resolution, self.wanted())?;
+        self.axis(resolution, &base, angle).map(Some)
+    }
+
+    fn take_down(
+        &self,
+        axis: &mut Axis,
+        count: usize,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<(), SimplifyError> {
+        let before = axis.voxels.len();
+        if self.params.variant == Variant::Plain {
+            axis.voxels.sort_by(|a, b| a.flux.total_cmp(&b.flux));
+            axis.voxels.truncate(count);
+            axis.voxels.sort_unstable_by_key(|v| [v.place[2], v.place[1], v.place[0]]);
+        } else {
+            let mut voxels = Bricks::new(axis.grid.size);
+            axis.voxels.iter().for_each(|&voxel| voxels.insert(voxel));
+            thin(&mut voxels, Order::Down { to: count }, &self.run)?;
+            axis.voxels = sorted(&voxels);
+            if axis.voxels.len() > count {
+                diagnostics.warn(format!(
+                    "{} spheres instead of {count}: to delete another voxel would change the \
+                     topology",
+                    axis.voxels.len()
+                ));
+            }
+        }
+        diagnostics.count("deleted_to_the_count", before - axis.voxels.len());
+        Ok(())
+    }
+}
+
+fn has_voxel(voxels: &Bricks, grid: &Grid, at: [i32; 3], ring: i32) -> bool {
+    let side = 2 * ring + 1;
+    (0..side.pow(3)).any(|k| {
+        let step = [k % side - ring, k / side % side - ring, k / side / side - ring];
+        let on_ring = step.iter().any(|x| x.abs() == ring);
+        let place = [0, 1, 2].map(|axis| at[axis] + step[axis]);
+        let within = (0..3).all(|axis| (0..grid.size[axis] as i32).contains(&place[axis]));
+        on_ring && within && voxels.get(place.map(|x| x as u16)).is_some()
+    })
+}
+
+/// Betti numbers of the union of closed voxels.
+pub fn betti_of(voxels: &Bricks) -> [u64; 3] {
+    cubical_betti(&voxels.iter().map(|voxel| voxel.place.map(u32::from)).collect::<Vec<_>>())
+}
+
+impl Axis {
+    /// Centres of the voxels, normalised.
+    pub fn points(&self) -> Vec<Vec3> {
+        self.voxels.iter().map(|voxel| self.grid.centre(voxel.place)).collect()
+    }
+
+    /// Betti numbers of the union of the closed voxels.
+    pub fn betti(&self) -> [u64; 3] {
+        cubical_betti(&self.places().map(|place| place.map(u32::from)).collect::<Vec<_>>())
+    }
+
+    fn places(&self) -> impl Iterator<Item = Place> + '_ {
+        self.voxels.iter().map(|voxel| voxel.place)
+    }
+
+    /// The medial mesh, with centres on the axis or in the voxels.
+    pub fn medial_mesh(&self, tree: &Arc<TriangleBvh>, params: &AofParams) -> MedialMesh {
+        let onto_axis = params.refine.then_some(&self.sphere);
+        medial_mesh(&self.voxels, balls(&self.voxels, &self.grid, tree, onto_axis))
+    }
+
+    pub(super) fn diagnose(&self, angle: f64, diagnostics: &mut Diagnostics) {
+        if self.voxels.is_empty() {
+            diagnostics.warn(format!("no voxel passes an object angle of {angle} degrees"));
+        }
+        for (name, number) in ["voxel_b0", "voxel_b1", "voxel_b2"].into_iter().zip(self.betti()) {
+            diagnostics.count(name, number as usize);
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Homotopic deletion of voxels in a given order.
+//!
+//! - *Outermost first* (section 6.3): voxels above the flux threshold, by distance to the surface.
+//! - *By flux*: K. Siddiqi, S. Bouix, A. Tannenbaum, S. W. Zucker, *Hamilton-Jacobi skeletons*,
+//!   International Journal of Computer Vision 48(3), 2002, doi:10.1023/A:1016376116653, section
+//!   3.3: simple voxels in a heap, the least medial first; one that is an end point with a flux
+//!   below a threshold stays for good.
+//!
+//! 1. All border voxels that may go are put into a heap, by key, then by place.
+//! 2. The first is taken. If it is simple and not to be kept, it is deleted, and its neighbours
+//!    that may go and are not in the heap are put in.
+//!
+//! An *end point* ends an open curve in one of nine digital planes through it: of the eight
+//! neighbours in the plane one is there, or two that touch.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use medial::simplifier::{RunContext, SimplifyError};
+
+use super::bricks::{Bricks, Marks, Place, Voxel};
+use super::simple::{CENTRE, SimpleTable, is_simple, offset};
+
+/// Which voxels go, and in which order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Order {
+    /// Those with a flux above the threshold, the smallest distance first.
+    OutermostFirst {
+        /// Flux at or below which a voxel stays.
+        threshold: f32,
+    },
+    /// All but end points with a flux at or below the threshold, the largest flux first.
+    ByFlux {
+        /// Flux at or below which an end point stays.
+        threshold: f32,
+    },
+    /// All, the largest flux first, until so many are left.
+    Down {
+        /// Number of voxels to leave.
+        to: usize,
+    },
+}
+
+impl Order {
+    fn key(self, voxel: &Voxel) -> f32 {
+        match self {
+            Self::OutermostFirst { .. } => voxel.distance,
+            Self::ByFlux { .. } | Self::Down { .. } => -voxel.flux,
+        }
+    }
+
+    fn may_go(self, voxel: &Voxel) -> bool {
+        match self {
+            Self::OutermostFirst { threshold } => voxel.flux > threshold,
+            Self::ByFlux { .. } | Self::Down { .. } => true,
+        }
+    }
+
+    fn stays(self, voxel: &Voxel, neighbourhood: u32) -> bool {
+        match self {
+            Self::ByFlux { threshold } => voxel.flux <= threshold && is_end_point(neighbourhood),
+            Self::OutermostFirst { .. } | Self::Down { .. } => false,
+        }
+    }
+
+    fn leaves(self) -> usize {
+        match self {
+            Self::Down { to } => to,
+            Self::OutermostFirst { .. } | Self::ByFlux { .. } => 0,
+        }
+    }
+}
+
+/// Voxels from which on the table of simple neighbourhoods is worth building.
+const WITH_TABLE: usize = 4_000_000;
+
+/// Deletes voxels that are simple when their turn comes.
+///
+/// # Errors
+/// When the run was cancelled.
+pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), SimplifyError> {
+    let total = voxels.len();
+    let table = (total >= WITH_TABLE).then(SimpleTable::get);
+    let mut queue = Queue::new(voxels);
+    for voxel in voxels.iter() {
+        let surrounded = voxels.neighbourhood(voxel.place) & FACES == FACES;
+        if order.may_go(&voxel) && !surrounded {
+            queue.push(order.key(&voxel), voxel.place);
+        }
+    }
+    let mut steps = 0_usize;
+    while let Some(place) = queue.pop() {
+        if voxels.len() <= order.leaves() {
+            break;
+        }
+        steps += 1;
+        if steps % 65_536 == 0 {
+            run.step((total - voxels.len()).min(total), total)?;
+        }
+        let neighbourhood = voxels.neighbourhood(place);
+        let voxel = voxels.get(place).expect("queued voxels are there");
+        let simple = match table {
+            Some(table) => table.is_simple(neighbourhood),
+            None => is_simple(neighbourhood),
+        };
+        if !simple {
+            continue;
+        }
+        if order.stays(&voxel, neighbourhood) {
+            queue.retire(place);
+            continue;
+        }
+        voxels.remove(place);
+        for bit in ones(neighbourhood & !(1 << CENTRE)) {
+            let step = offset(bit);
+            let near = [0, 1, 2].map(|axis| (i32::from(place[axis]) + step[axis]) as u16);
+            let voxel = voxels.get(near).expect("a neighbour that is there");
+            if order.may_go(&voxel) {
+                queue.push(order.key(&voxel), near);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The six neighbours that share a face.
+const FACES: u32 = 1 << 4 | 1 << 10 | 1 << 12 | 1 << 14 | 1 << 16 | 1 << 22;
+
+fn ones(mut bits: u32) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        let bit = (bits != 0).then(|| bits.trailing_zeros())?;
+        bits &= bits - 1;
+        Some(bit)
+    })
+}
+
+/// A heap that holds each place at most once.
+struct Queue {
+    heap: BinaryHeap<Reverse<(u32, [u16; 3])>>,
+    /// Places in the heap, and those that must not come in again.
+    barred: Marks,
+}
+
+impl Queue {
+    fn new(voxels: &Bricks) -> Self {
+        Self { heap: BinaryHeap::new(), barred: Marks::of(voxels) }
+    }
+
+    fn push(&mut self, key: f32, [x, y, z]: Place) {
+        if self.barred.set([x, y, z]) {
+            self.heap.push(Reverse((ascending(key), [z, y, x])));
+        }
+    }
+
+    fn pop(&mut self) -> Option<Place> {
+        let Reverse((_, [z, y, x])) = self.heap.pop()?;
+        self.barred.clear([x, y, z]);
+        Some([x, y, z])
+    }
+
+    fn retire(&mut self, place: Place) {
+        self.barred.set(place);
+    }
+}
+
+/// Bits that compare like the number, negative ones included.
+fn ascending(key: f32) -> u32 {
+    let bits = (key + 0.0).to_bits();
+    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
+}
+
+/// Whether a voxel ends an open curve in one of the nine digital planes through it.
+pub fn is_end_point(neighbourhood: u32) -> bool {
+    PLANES.iter().any(|plane| {
+        let there = neighbourhood & plane;
+        match there.count_ones() {
+            1 => true,
+            2 => touch(there.trailing_zeros(), 31 - there.leading_zeros()),
+            _ => false,
+        }
+    })
+}
+
+fn touch(a: u32, b: u32) -> bool {
+    let (p, q) = (offset(a), offset(b));
+    (0..3).all(|axis| (p[axis] - q[axis]).abs() <= 1)
+}
+
+/// The neighbours in the planes `x = 0`, `y = 0`, `z = 0`, `x = +-y`, `y = +-z`, `z = +-x`.
+const PLANES: [u32; 9] = planes();
+
+const fn planes() -> [u32; 9] {
+    let normals = [
+        [1, 0, 0],
+        [0, 1, 0],
+        [0, 0, 1],
+        [1, -1, 0],
+        [1, 1, 0],
+        [0, 1, -1],
+        [0, 1, 1],
+        [1, 0, -1],
+        [1, 0, 1],
+    ];
+    let mut masks = [0; 9];
+    let mut plane = 0;
+    while plane < 9 {
+        let mut bit = 0;
+        while bit < 27 {
+            let (o, n) = (offset(bit), normals[plane]);
+            if bit != CENTRE && o[0] * n[0] + o[1] * n[1] + o[2] * n[2] == 0 {
+                masks[plane] |= 1 << bit;
+            }
+            bit += 1;
+        }
+        plane += 1;
+    }
+    masks
+}

@@ -1,0 +1,313 @@
+//! Average outward flux: closed forms, known axes, topology, bad input.
+
+use medial::Vec3;
+use medial::complex::cubical_betti;
+use medial::geometry::{NearSet, NearbyTriangles, TriangleBvh};
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
+use medial::surface::{self, InsideTest, TriMesh};
+use medial_methods::aof::{
+    AofParams, AverageOutwardFlux, Axis, Descent, Grid, Probe, Solid, Sphere, Spiral, Surface,
+    Variant, Voxel, Wanted, refine,
+};
+
+fn shape_of(mesh: &TriMesh) -> Shape {
+    let report = surface::validate(mesh).expect("a solid");
+    Shape::new("shape", mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+fn built_in(id: &str) -> Shape {
+    let shape = medial_datasets::find(id).expect("in the catalogue");
+    shape_of(&shape.mesh(shape.default_resolution))
+}
+
+fn solid<'s>(shape: &'s Shape, params: &AofParams) -> Solid<'s> {
+    let surface = Surface {
+        triangles: NearbyTriangles::new(shape.mesh()),
+        inside: InsideTest::new(shape.mesh()),
+    };
+    Solid::new(shape, surface, params.clone(), RunContext::default())
+}
+
+fn params(variant: Variant) -> AofParams {
+    AofParams { variant, ..AofParams::default() }
+}
+
+/// A box with half sides `half`, as twelve triangles.
+fn cuboid(half: Vec3) -> TriMesh {
+    let corner = |i: u32| {
+        let side = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        half * Vec3::new(side(0), side(1), side(2))
+    };
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    TriMesh {
+        vertices: (0..8).map(corner).collect(),
+        faces: quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+    }
+}
+
+const HALF: Vec3 = Vec3::new(1.5, 1.0, 0.5);
+
+/// Flux through a sphere of radius `sigma` in the box.
+fn flux_in_box(spiral: Spiral, samples: usize, sigma: f64, centre: Vec3) -> f64 {
+    let triangles = NearbyTriangles::new(&cuboid(HALF));
+    let sphere = Sphere::new(spiral, samples, sigma);
+    let mut set = NearSet::default();
+    triangles.narrow(&triangles.all(centre), centre, sigma, &mut set);
+    Probe::new(&sphere).flux(&triangles, &set)
+}
+
+#[test]
+fn a_plane_and_a_corner_of_45_degrees_have_their_closed_forms() {
+    for spiral in [Spiral::EqualArea, Spiral::Classic] {
+        let sigma = 0.01;
+        // A sheet at distance t sigma from the centre: -1/2 (1 - t^2) sin alpha. Off the centre the
+        // field jumps where it is not tangent, which samples resolve less well.
+        for t in [0.0, 0.3, 0.6, 0.9] {
+            let tolerance = if t == 0.0 { 0.002 } else { 0.007 };
+            let expected = -0.5 * (1.0 - t * t);
+            let middle = flux_in_box(spiral, 500, sigma, Vec3::new(0.1, 0.2, t * sigma));
+            assert!((middle - expected).abs() < tolerance, "{spiral:?} {t}: {middle}");
+            let depth = 0.2;
+            let across = Vec3::new(1.0, 0.0, -1.0).normalize() * (t * sigma);
+            let on_sheet = Vec3::new(HALF.x - depth, 0.1, HALF.z - depth);
+            let corner = flux_in_box(spiral, 500, sigma, on_sheet + across);
+            let expected = expected * 0.5_f64.sqrt();
+            assert!((corner - expected).abs() < tolerance, "{spiral:?} {t}: {corner}");
+        }
+    }
+}
+
+/// The box `3 x 2 x 1` with `resolution` voxels along its longest side.
+fn box_flux(resolution: u32) -> (Grid, f64, Vec<Voxel>) {
+    let shape = shape_of(&cuboid(HALF));
+    let solid = solid(&shape, &params(Variant::Plain));
+    let descent = solid.descend(resolution, Wanted::Kept).expect("fits");
+    let diagonal = shape.normalisation().diagonal;
+    (solid.grid(resolution), diagonal, descent.voxels.iter().collect())
+}
+
+/// Depths of a centre below the faces of the box, in its own units: along x, y, z.
+fn depths(grid: &Grid, diagonal: f64, voxel: &Voxel) -> Vec3 {
+    HALF - (grid.centre(voxel.place) * diagonal).abs()
+}
+
+#[test]
+fn sheets_of_the_box_have_the_flux_of_the_paper() {
+    // 99 voxels: 33 across the thickness, so that the middle sheet runs through centres.
+    let (grid, diagonal, voxels) = box_flux(99);
+    let sigma = grid.side * diagonal;
+    let (mut middle, mut inclined) = (0, 0);
+    for voxel in &voxels {
+        let Vec3 { x, y, z } = depths(&grid, diagonal, voxel);
+        // Away from seams, where x or y is as deep as z, by 2 sigma.
+        let far = |a: f64, b: f64| a - b > 2.0 * 2.0_f64.sqrt() * sigma;
+        if (z - HALF.z).abs() < 1e-9 && far(x, z) && far(y, z) {
+            middle += 1;
+            assert!((voxel.flux + 0.5).abs() < 0.012, "middle {voxel:?}");
+        }
+        let sheet = |a: f64, b: f64, c: f64, limit: f64| {
+            (a - b).abs() < 1e-9
+                && far(c, a)
+                && limit - a > 2.0 * 2.0_f64.sqrt() * sigma
+                && a > 2.0 * sigma
+        };
+        if sheet(x, z, y, HALF.z) || sheet(y, z, x, HALF.z) || sheet(x, y, z, HALF.z) {
+            inclined += 1;
+            assert!((voxel.flux + 0.125_f32.sqrt()).abs() < 0.012, "inclined {voxel:?}");
+        }
+    }
+    assert!(middle > 1000 && inclined > 3000, "{middle} {inclined}");
+}
+
+/// The paper prints -0.3315 for a sheet between two voxels. Midway the closed form gives -0.375; its
+/// classic spiral with 50 to 70 samples gives between -0.34 and -0.40, depending on the
+/// orientation, and the printed value is that of an offset of 0.58 sigma.
+#[test]
+fn a_sheet_midway_between_voxels_has_three_quarters_of_the_flux() {
+    let (grid, diagonal, voxels) = box_flux(90);
+    let sigma = grid.side * diagonal;
+    let mut midway = 0;
+    for voxel in &voxels {
+        let Vec3 { x, y, z } = depths(&grid, diagonal, voxel);
+        let far = |a: f64, b: f64| a - b > 2.0 * 2.0_f64.sqrt() * sigma;
+        if (HALF.z - z - 0.5 * sigma).abs() < 1e-9 && far(x, z) && far(y, z) {
+            midway += 1;
+            assert!((voxel.flux + 0.375).abs() < 0.03, "{voxel:?}");
+        }
+    }
+    assert!(midway > 2000);
+    let offset = flux_in_box(Spiral::EqualArea, 2000, 0.01, Vec3::new(0.0, 0.0, 0.0058));
+    assert!((offset + 0.3315).abs() < 0.002, "{offset}");
+}
+
+fn axis_at(shape: &Shape, params: &AofParams, resolution: u32, angle: f64) -> (Axis, Descent) {
+    let wanted = if params.variant == Variant::Plain { Wanted::Kept } else { Wanted::All };
+    let solid = solid(shape, params);
+    let descent = solid.descend(resolution, wanted).expect("fits");
+    (solid.axis(resolution, &descent, angle).expect("not cancelled"), descent)
+}
+
+#[test]
+fn kept_voxels_are_within_sigma_of_a_known_axis() {
+    // The axis of the continuous shape is that of its mesh for flat shapes alone. The threshold
+    // is below what the samples make of a constant field.
+    for id in ["box", "plate"] {
+        let built_in = medial_datasets::find(id).expect("in the catalogue");
+        let shape = shape_of(&built_in.mesh(built_in.default_resolution));
+        let normal = shape.normalisation();
+        let axis = built_in.axis().expect("known").mesh;
+        let centre = |v: u32| normal.forward(axis.spheres[v as usize].centre);
+        let sheets: Vec<[Vec3; 3]> = axis.faces.iter().map(|f| f.map(centre)).collect();
+        let sheets = TriangleBvh::from_triangles(&sheets).expect("sheets");
+        for resolution in [60, 77, 99] {
+            let (kept, _) = axis_at(&shape, &params(Variant::Plain), resolution, 30.0);
+            assert!(kept.voxels.len() > 500, "{id} at {resolution}");
+            for point in kept.points() {
+                let distance = sheets.closest(point).distance;
+                assert!(distance < kept.grid.side, "{id} at {resolution}: {point}");
+            }
+        }
+    }
+}
+
+#[test]
+fn at_most_two_voxels_across_a_sheet_along_the_lattice() {
+    let shape = shape_of(&cuboid(HALF));
+    for resolution in [60, 61, 75, 90, 99, 100] {
+        let (kept, _) = axis_at(&shape, &params(Variant::Plain), resolution, 60.0);
+        let mut columns = std::collections::BTreeMap::<[u16; 2], u32>::new();
+        let diagonal = shape.normalisation().diagonal;
+        for voxel in &kept.voxels {
+            let Vec3 { x, y, z } = depths(&kept.grid, diagonal, voxel);
+            if x > z + 0.2 && y > z + 0.2 {
+                *columns.entry([voxel.place[0], voxel.place[1]]).or_default() += 1;
+            }
+        }
+        assert!(columns.len() > 100 && columns.values().all(|&count| count <= 2), "{resolution}");
+    }
+}
+
+#[test]
+fn homotopic_variants_keep_the_topology_of_the_start_set() {
+    for shape in medial_datasets::catalogue() {
+        let (id, expected) = (shape.id, shape.expected_betti);
+        let shape = shape_of(&shape.mesh(shape.default_resolution));
+        for variant in [Variant::Homotopy, Variant::Thinning] {
+            // Coarse lattices too, where the start set falls apart.
+            for resolution in [15, 24, 60] {
+                let (axis, start) = axis_at(&shape, &params(variant), resolution, 30.0);
+                let places: Vec<_> = start.voxels.iter().map(|v| v.place.map(u32::from)).collect();
+                assert_eq!(axis.betti(), cubical_betti(&places), "{id} {variant:?} {resolution}");
+                assert!(axis.voxels.len() <= places.len());
+            }
+            let params = AofParams { resolution: 48, ..params(variant) };
+            let (resolution, start, diagnostics) = solid(&shape, &params).base().expect("fits");
+            let places: Vec<_> = start.voxels.iter().map(|v| v.place.map(u32::from)).collect();
+            let betti = cubical_betti(&places);
+            assert!(betti == expected || diagnostics.warnings[0].contains("Betti"), "{id}");
+            assert!(betti == expected, "{id} at {resolution}: {betti:?}");
+        }
+    }
+}
+
+fn simplified(
+    shape: &Shape,
+    set: &[(&str, &str)],
+    level: Level,
+) -> Result<Simplified, SimplifyError> {
+    let mut params = Params::none();
+    set.iter().for_each(|(key, value)| params.set(key, value));
+    AverageOutwardFlux::new().prepare(shape, &params, &RunContext::default())?.at(level)
+}
+
+#[test]
+fn refined_spheres_are_internal_and_touch_twice() {
+    let shape = built_in("bracket");
+    let tree = shape.surface_tree().expect("faces");
+    let inside = InsideTest::new(shape.mesh());
+    let (axis, _) = axis_at(&shape, &params(Variant::Thinning), 48, 30.0);
+    let sphere = Sphere::new(Spiral::EqualArea, 50, axis.grid.side);
+    let mut two = 0;
+    for centre in axis.points() {
+        let refined = refine(&tree, &sphere, centre);
+        let (c, r) = (refined.ball.centre, refined.ball.radius);
+        assert_eq!(inside.side(c), surface::Side::Inside);
+        assert!((tree.closest(c).distance - r).abs() < 1e-15);
+        assert!(c.distance(centre) <= axis.grid.side * 1.000_001);
+        let [p, q] = refined.contacts;
+        assert!(p.distance(c) - r < 1e-9 && q.distance(c) - r < 1e-9, "{refined:?}");
+        two += usize::from(p.distance(q) > 0.5 * r);
+    }
+    assert!(two * 100 > axis.voxels.len() * 98, "{two} of {}", axis.voxels.len());
+}
+
+#[test]
+fn counts_are_met_with_one_component_and_a_coarse_lattice() {
+    let shape = built_in("box");
+    for count in [500, 100] {
+        let result = simplified(&shape, &[], Level::Spheres(count)).expect("a count");
+        assert_eq!(result.mesh.spheres.len(), count);
+        let of =
+            |name: &str| result.diagnostics.counts.iter().find(|(n, _)| n == name).map(|c| c.1);
+        assert_eq!([of("voxel_b0"), of("voxel_b1"), of("voxel_b2")], [Some(1), Some(0), Some(0)]);
+        assert!(of("lattice") < Some(60));
+    }
+}
+
+#[test]
+fn larger_angles_leave_fewer_voxels() {
+    let shape = built_in("torus");
+    for variant in ["plain", "homotopy", "thinning"] {
+        let set = [("variant", variant), ("resolution", "40")];
+        let mut prepared = {
+            let mut params = Params::none();
+            set.iter().for_each(|(key, value)| params.set(key, value));
+            let run = RunContext::default();
+            AverageOutwardFlux::new().prepare(&shape, &params, &run).expect("prepared")
+        };
+        let counts = [5.0, 30.0, 60.0, 90.0]
+            .map(|angle| prepared.at(Level::Native(angle)).expect("an angle").mesh.spheres.len());
+        assert!(counts.windows(2).all(|pair| pair[0] >= pair[1]), "{variant}: {counts:?}");
+        assert!(counts[0] > counts[3], "{variant}: {counts:?}");
+    }
+}
+
+#[test]
+fn bad_input_is_refused_and_says_what_would_work() {
+    let shape = built_in("box");
+    let message = |set: &[(&str, &str)], level| match simplified(&shape, set, level) {
+        Err(SimplifyError::Parameter(message) | SimplifyError::Level(message)) => message,
+        other => panic!("{set:?}: {other:?}"),
+    };
+    let any = Level::Spheres(10);
+    assert!(message(&[("resolution", "5000")], any).contains("fits, or raise max_memory"));
+    assert!(message(&[("resolution", "0")], any).contains("resolution"));
+    assert!(message(&[("angle", "0")], any).contains("above 0"));
+    assert!(message(&[("angle", "-10")], any).contains("above 0"));
+    assert!(message(&[], Level::Native(0.0)).contains("above 0"));
+    assert!(message(&[("samples", "70/x")], any).contains("70/60/50"));
+    assert!(message(&[("d", "1")], any).contains("2 or more"));
+    assert!(message(&[("levels", "40")], any).contains("fewer levels"));
+    let thin = [("resolution", "1"), ("variant", "plain")];
+    let advice = message(&thin, any);
+    assert!(advice.contains("thinner than a voxel everywhere"), "{advice}");
+    let words = advice.rsplit("resolution = ").next().expect("a resolution");
+    let enough: String = words.chars().take_while(char::is_ascii_digit).collect();
+    let works = [("resolution", enough.as_str()), ("variant", "plain")];
+    assert!(simplified(&shape, &works, any).is_ok(), "{advice}");
+}
+
+#[test]
+fn cancelling_ends_the_run() {
+    let shape = built_in("torus");
+    let run = RunContext::default();
+    let flag = run.cancel_flag();
+    let run = run.on_progress(move |progress| {
+        assert!(progress.done <= progress.total);
+        flag.store(progress.done * 2 > progress.total, std::sync::atomic::Ordering::Relaxed);
+    });
+    let prepared = AverageOutwardFlux::new().prepare(&shape, &Params::none(), &run);
+    assert!(matches!(prepared.err(), Some(SimplifyError::Cancelled)));
+}

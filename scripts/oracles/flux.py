@@ -1,0 +1,126 @@
+"""AOF' of the voxels of a task with Open3D's closest points, and how long its queries take.
+
+    flux.py FILE ANSWERS THREADS ROUNDS [GUARD]
+
+FILE, FILE.voxels and ANSWERS as in methods/examples/flux_oracle.rs. All samples are asked in one
+batched call of RaycastingScene (single precision), the opposites of fan samples in a second one. Fans
+are told from the primitive's barycentric coordinates. A voxel with a sample that single precision
+cannot decide (GUARD, a fraction of the diagonal; a closest point elsewhere at an equal distance, or one
+next to the border of a fan) is a tie: it is counted and left out. Prints seconds a batch of the first
+call, its number of queries, ties, and the largest difference; fails where it exceeds 1e-4.
+"""
+
+import sys
+import time
+
+import numpy as np
+import open3d as o3d
+
+file, answers, threads, rounds = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
+guard = float(sys.argv[5]) if len(sys.argv) > 5 else 2e-6
+
+raw = open(file, "rb").read()
+nv, nf, nq = np.frombuffer(raw, "<u8", 3)
+nv, nf, nq = int(nv), int(nf), int(nq)
+vertices = np.frombuffer(raw, "<f8", 3 * nv, 24).reshape(-1, 3)
+faces = np.frombuffer(raw, "<u4", 3 * nf, 24 + 24 * nv).reshape(-1, 3)
+samples = np.frombuffer(raw, "<f8", 3 * nq, 24 + 24 * nv + 12 * nf).reshape(-1, 3)
+head = np.fromfile(file + ".voxels", "<f8")
+count, n, sigma = int(head[0]), int(head[1]), head[2]
+centres = head[3:].reshape(-1, 3)
+ours = np.fromfile(answers, "<f8").reshape(-1, 4)
+flux = np.fromfile(answers + ".flux", "<f8")
+
+scene = o3d.t.geometry.RaycastingScene(nthreads=threads)
+scene.add_triangles(
+    o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(faces.astype(np.uint32))
+)
+
+
+def ask(points):
+    found = scene.compute_closest_points(
+        o3d.core.Tensor(points.astype(np.float32)), nthreads=threads
+    )
+    return (
+        found["points"].numpy().astype(float),
+        found["primitive_ids"].numpy(),
+        found["primitive_uvs"].numpy().astype(float),
+    )
+
+
+ask(samples[:1000])
+seconds = []
+for _ in range(rounds):
+    start = time.perf_counter()
+    near, face, uv = ask(samples)
+    seconds.append(time.perf_counter() - start)
+
+# Concave sides: side k of a face from corner k on; vertices that end one.
+corner = vertices[faces.astype(int)]
+normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+side_of = {}
+for f, (a, b, c) in enumerate(faces.tolist()):
+    for k, edge in enumerate(((a, b), (b, c), (c, a))):
+        side_of[edge] = (f, k)
+concave = np.zeros((nf, 3), bool)
+for (a, b), (f, k) in side_of.items():
+    g, _ = side_of[(b, a)]
+    along = vertices[b] - vertices[a]
+    sine = np.dot(np.cross(normal[f], normal[g]), along / np.linalg.norm(along))
+    concave[f, k] = sine < -1e-7
+concave_vertex = np.zeros(nv, bool)
+for k in range(3):
+    ends = faces[concave[:, k]]
+    concave_vertex[ends[:, k].astype(int)] = True
+    concave_vertex[ends[:, (k + 1) % 3].astype(int)] = True
+
+
+def distances_to_sides(points, face):
+    """For each point on a face the distance to the line of each side, and to each corner."""
+    t = vertices[faces[face].astype(int)]
+    to_side, to_corner = np.empty((len(points), 3)), np.empty((len(points), 3))
+    for k in range(3):
+        a, b = t[:, k], t[:, (k + 1) % 3]
+        u = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
+        to_side[:, k] = np.linalg.norm(np.cross(points - a, u), axis=1)
+        to_corner[:, k] = np.linalg.norm(points - a, axis=1)
+    return to_side, to_corner
+
+
+to_side, to_corner = distances_to_sides(near, face)
+is_concave_vertex = concave_vertex[faces[face].astype(int)]
+on_fan = ((to_side < guard) & concave[face]).any(1) | ((to_corner < guard) & is_concave_vertex).any(1)
+close = ((to_side < 10 * guard) & concave[face]).any(1) | (
+    (to_corner < 10 * guard) & is_concave_vertex
+).any(1)
+
+away = samples - near
+distance = np.linalg.norm(away, axis=1)
+gradient = away / distance[:, None]
+direction = (samples - np.repeat(centres, n, axis=0)) / sigma
+along = (gradient * direction).sum(1)
+doubtful = np.linalg.norm(near - ours[:, :3], axis=1) > guard
+# A fan ends where its face begins: the closest point then turns from the edge into the face.
+doubtful |= close & ~on_fan
+plane = np.abs((away * normal[face]).sum(1))
+doubtful |= on_fan & (distance - plane < 1e-6 * distance)
+
+counted = np.where(on_fan, 0.0, along)
+inward = np.flatnonzero(on_fan & (along < 0))
+if len(inward):
+    opposite = samples[inward] - 2 * sigma * along[inward, None] * gradient[inward]
+    other, _, _ = ask(opposite)
+    own = np.linalg.norm(opposite - near[inward], axis=1)
+    shorter = own - np.linalg.norm(opposite - other, axis=1)
+    one_sided = shorter > guard
+    counted[inward[one_sided]] = along[inward[one_sided]]
+    doubtful[inward[np.abs(shorter - guard) < 0.9 * guard]] = True
+    doubtful[inward[(shorter > 0.1 * guard) & (shorter < 10 * guard)]] = True
+
+theirs = counted.reshape(-1, n).sum(1) / n
+ties = doubtful.reshape(-1, n).any(1)
+difference = np.abs(theirs - flux)
+worst = difference[~ties].max() if (~ties).any() else float("nan")
+print(f"{min(seconds):.4f} {nq} {int(ties.sum())} {count} {worst:.2e} {int(on_fan.sum())}")
+sys.exit(0 if worst <= 1e-4 and (~ties).mean() > 0.5 else 1)
