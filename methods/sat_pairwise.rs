@@ -3,7 +3,7 @@
 //! How P. Li, B. Wang, F. Sun, X. Guo, C. Zhang, W. Wang 2015 (Q-MAT, ACM Transactions on Graphics
 //! 35(1), <https://doi.org/10.1145/2753755>) describe the scale axis transform in their section on
 //! related work. It is not that transform, which removes balls that the *union* of all scaled balls
-//! covers and takes the medial axis of that union anew: for this see [`crate::sat`].
+//! covers and takes the medial axis of that union anew: for this see the method `sat`.
 //!
 //! 1. The initial medial mesh.
 //! 2. The scaled ball `(c_j, s r_j)` contains `(c_i, s r_i)` if and only if

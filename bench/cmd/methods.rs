@@ -31,8 +31,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         infos.into_iter().for_each(describe);
     } else {
         for info in infos {
-            print_line(&format!("{:<10} {}", info.id, info.title));
-            print_line(&format!("{:<10} {}", "", info.summary));
+            print_line(&format!("{:<12} {}", info.id, info.title));
+            print_line(&format!("{:<12} {}", "", info.summary));
         }
     }
     Ok(Exit::Done)
