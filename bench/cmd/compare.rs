@@ -21,7 +21,7 @@ pub const RESULTS: &str = "results.jsonl";
 
 /// How a comparison measures unless told otherwise: coarser than `evaluate`, since it measures
 /// hundreds of results. Sample counts are in every record.
-const QUICK: JudgeOptions = JudgeOptions { samples: 10_000, volume_depth: 6, seed: 0 };
+const QUICK: JudgeOptions = JudgeOptions { samples: 10_000, volume_depth: 5, seed: 0 };
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
