@@ -30,8 +30,8 @@ use super::star::{Nearest, ROUNDING, Star, excess_of};
 /// Absent index.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Errors below this are rounding, in units of the diagonal, and count as zero, so that ids and not
-/// rounding decide between them.
+/// Errors below this are rounding, in units of the diagonal, and count as zero, so that the length
+/// of the edges and not rounding decides between them.
 pub(super) const NOISE: f64 = ZERO_LENGTH;
 
 /// One direction of an edge.
@@ -39,7 +39,7 @@ pub(super) const NOISE: f64 = ZERO_LENGTH;
 pub(super) struct Directed {
     /// The sample that the bound is from.
     pub witness: u32,
-    /// Its signed distance; of unknown sign, hence 0, when nothing is known.
+    /// Its signed distance, or what is left of it as a bound; 0 when nothing is known.
     signed: f64,
     /// Unit vector from its nearest primitive.
     towards: Vec3,
@@ -54,7 +54,7 @@ enum State {
     AtLeast,
     /// The distance of the witness is the error.
     Exact,
-    /// The direction fails the link condition or the inversion test.
+    /// The direction would change the homotopy type or fold a face over.
     Barred,
 }
 

@@ -160,10 +160,10 @@ impl Star {
             let limit = limit(best.signed, floor);
             let [k, l] = self.sides[f];
             let out = self.excess[k as usize].max(self.excess[l as usize]) > limit;
-            if out || hub > limit {
-                if let Some(found) = self.face(f).and_then(|face| face.nearest_centre(p)) {
-                    best.improve(found, [k, l]);
-                }
+            if (out || hub > limit)
+                && let Some(found) = self.face(f).and_then(|face| face.nearest_centre(p))
+            {
+                best.improve(found, [k, l]);
             }
             if out {
                 best.improve(self.rim(f).nearest_centre(p), [k, l]);
@@ -196,10 +196,10 @@ impl Star {
             }
             let [k, l] = self.sides[f];
             let rim = self.excess[k as usize].max(self.excess[l as usize]);
-            if rim.max(hub) > ROUNDING - best.signed {
-                if let Some(found) = self.face(f).and_then(|face| face.nearest_centre(p)) {
-                    best.approach(found, [k, l]);
-                }
+            if rim.max(hub) > ROUNDING - best.signed
+                && let Some(found) = self.face(f).and_then(|face| face.nearest_centre(p))
+            {
+                best.approach(found, [k, l]);
             }
             if rim > ROUNDING - best.signed {
                 best.approach(self.rim(f).nearest_centre(p), [k, l]);

@@ -131,7 +131,7 @@ fn a_bound_holds_for_every_sample() {
     }
 }
 
-/// Collapses are taken back where the order's local errors overlooked something.
+/// Going on after collapses were taken back for a bound is going on from the state before that.
 #[test]
 fn levels_of_either_kind_do_not_depend_on_what_was_asked_before() {
     let shape = shape("bracket", 9);
