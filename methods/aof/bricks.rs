@@ -48,6 +48,11 @@ impl Bricks {
         Self { size, table, bricks: Vec::new(), len: 0 }
     }
 
+    /// Whether there is no voxel.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// Number of voxels.
     pub fn len(&self) -> usize {
         self.len

@@ -94,7 +94,7 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), S
             break;
         }
         steps += 1;
-        if steps % 65_536 == 0 {
+        if steps.is_multiple_of(65_536) {
             run.step((total - voxels.len()).min(total), total)?;
         }
         let neighbourhood = voxels.neighbourhood(place);

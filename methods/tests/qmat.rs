@@ -1,5 +1,7 @@
 //! Q-MAT on the medial meshes of sampled solids.
 
+#![allow(clippy::print_stderr)] // A skipped test says so.
+
 use std::path::{Path, PathBuf};
 
 use medial::complex::betti;

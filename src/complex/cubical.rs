@@ -237,7 +237,7 @@ mod tests {
         for k in (0..cells.len()).filter(|&k| cells[k]) {
             let n = 2 * N + 1;
             let dimension = (k % n) % 2 + (k / n % n) % 2 + (k / n / n) % 2;
-            chi += if dimension % 2 == 0 { 1 } else { -1 };
+            chi += if dimension.is_multiple_of(2) { 1 } else { -1 };
         }
         let flood = |kind: bool, corners: bool| {
             let mut seen = vec![false; object.len()];

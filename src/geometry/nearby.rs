@@ -225,7 +225,7 @@ impl NearbyTriangles {
     pub fn answer(&self, set: &NearSet, batch: &NearBatch, k: usize) -> Option<NearPoint> {
         let (answer, lane) = (&batch.answers[k / 2], k % 2);
         let triangle = answer.triangle.to_array()[lane];
-        if triangle == NONE {
+        if triangle < 0.0 {
             return None;
         }
         let triangle = triangle as u32;
@@ -353,7 +353,7 @@ impl NearBatch {
     /// Whether a triangle was found for query `k` that is nearer than its bound.
     #[inline]
     pub fn is_nearer(&self, k: usize) -> bool {
-        self.answers[k / 2].triangle.to_array()[k % 2] != NONE
+        self.answers[k / 2].triangle.to_array()[k % 2] >= 0.0
     }
 
     /// Query `k`, relative to the centre.
