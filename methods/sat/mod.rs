@@ -7,11 +7,11 @@
 //!
 //! 1. The shape as a union of balls: the inner polar balls of its samples.
 //! 2. Radii times 1.002, centres moved by up to `1e-4 r`, so that balls that touch in a sample
-//!    overlap in general position (the authors' tool; [`perturb`]).
+//!    overlap in general position (the authors' tool; file `perturb.rs`).
 //! 3. Every radius is multiplied by the scale `s`.
 //! 4. The medial axis of the union of the grown balls, exact ([`UnionAxis`]). A ball that the union of
 //!    others covers contributes nothing.
-//! 5. Optional: sheets of small object angle are removed from the outside in ([`sheets`]).
+//! 5. Optional: sheets of small object angle are removed from the outside in (file `sheets.rs`).
 //! 6. Radii are divided by `s`.
 //!
 //! Where grown parts touch, a tunnel closes or a loop appears. That is what the transform does: the

@@ -10,19 +10,19 @@
 //! part of the Voronoi diagram of `V` inside the tetrahedra of `K`.
 //!
 //! 1. Regular triangulation, `K`, and `V` with the balls that meet in each of its *corners*
-//!    ([`corners`]).
+//!    (file `corners.rs`).
 //! 2. *Sectors*: the triangles at an edge `ij` of `K` leave gaps and enclose solid sectors. The
 //!    corners at the two sides of a sector are on the circle of `i` and `j`, and the edge is part of
 //!    their Voronoi facet: on one side of it, in the sector, that facet is inside `K` or outside
-//!    ([`sectors`]).
+//!    (file `sectors.rs`).
 //! 3. Delaunay triangulation of `V`. The Voronoi vertex of a cell whose corners share a ball is that
 //!    ball's centre. A Voronoi edge whose corners share a ball passes through that ball's centre, and
 //!    only there does it cross the boundary of `K`; where they share two it runs along an edge of `K`.
 //!    So all other Voronoi edges join vertices on one side, and the sectors say on which
-//!    ([`sides`]).
+//!    (file `sides.rs`).
 //! 4. The part of each Voronoi facet inside `K` is bounded by Voronoi edges inside, as far as the
 //!    first ball centre on them, and by the solid sectors, among which a singular triangle is one of
-//!    no width. These sides, directed, close up to polygons ([`facets`]).
+//!    no width. These sides, directed, close up to polygons (file `facets.rs`).
 //! 5. The polygons with the singular edges and vertices of `K` are the axis. Radii: of a ball at its
 //!    centre, the distance to the corners at a Voronoi vertex.
 //!
