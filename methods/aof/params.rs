@@ -66,7 +66,7 @@ pub enum Start {
 impl Default for AofParams {
     fn default() -> Self {
         Self {
-            resolution: 81,
+            resolution: 54,
             d: 3,
             levels: 3,
             samples: "70/60/50".to_owned(),
