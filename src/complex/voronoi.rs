@@ -20,7 +20,7 @@ use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
 use crate::Vec3;
 use crate::complex::{Contacts, MedialMesh, Sphere, VoronoiFacets};
-use crate::geometry::{CellId, Delaunay, TriangleBvh};
+use crate::geometry::{CellId, Delaunay, TriangleBvh, morton_order};
 use crate::surface::{InsideTest, Side};
 
 /// Circumcentres closer to the surface than this count as outside, in units of the diagonal.
@@ -30,7 +30,7 @@ const GUARD_BAND: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DualTriangulation {
-    /// A fan from the vertex of the smallest id, as published.
+    /// A fan from the vertex of the smallest Delaunay cell, as published.
     #[default]
     Fan,
     /// The planar Delaunay triangulation: larger smallest angles.
@@ -41,6 +41,9 @@ pub enum DualTriangulation {
 pub struct CellSpheres {
     /// Circumsphere of each finite cell; `None` for those centred outside.
     inside: Vec<Option<Sphere>>,
+    /// The cells centred inside, along a Morton curve of their centres: what is close in space is
+    /// close in memory, which contractions, that walk from neighbour to neighbour, need.
+    kept: Vec<CellId>,
     /// Circumcentres inside the surface but within the guard band of it, counted as outside.
     pub in_guard_band: usize,
 }
@@ -62,7 +65,13 @@ impl CellSpheres {
             let (&side, &near) = verdicts.next()?;
             (side == Side::Inside && !near).then_some(sphere)
         });
-        Self { inside: inside.collect(), in_guard_band: near.iter().filter(|&&near| near).count() }
+        let inside: Vec<Option<Sphere>> = inside.collect();
+        let cells = delaunay.triangulation().finite_cells();
+        let cells: Vec<CellId> = cells.filter(|cell| inside[cell.index()].is_some()).collect();
+        let centres: Vec<Vec3> = inside.iter().flatten().map(|s| s.centre).collect();
+        let kept = morton_order(&centres).into_iter().map(|(_, i)| cells[i as usize]).collect();
+        let in_guard_band = near.iter().filter(|&&near| near).count();
+        Self { inside, kept, in_guard_band }
     }
 
     /// Whether the circumcentre of a cell is inside; never for infinite cells.
@@ -75,16 +84,15 @@ impl CellSpheres {
     /// id.
     pub(super) fn sphere_ids(&self, cells: usize) -> Vec<u32> {
         let mut ids = vec![u32::MAX; cells];
-        let inside = self.inside.iter().enumerate().filter(|(_, sphere)| sphere.is_some());
-        for (sphere, (cell, _)) in (0..).zip(inside) {
-            ids[cell] = sphere;
+        for (sphere, cell) in (0..).zip(&self.kept) {
+            ids[cell.index()] = sphere;
         }
         ids
     }
 }
 
 /// The Voronoi medial mesh of a triangulation of boundary samples, with contact points. Spheres
-/// are in the order of the cells. Parallel; the same mesh for any number of threads.
+/// lie along a Morton curve. Parallel; the same mesh for any number of threads.
 pub fn voronoi_medial_mesh(
     delaunay: &Delaunay,
     cells: &CellSpheres,
@@ -92,9 +100,10 @@ pub fn voronoi_medial_mesh(
     dual: DualTriangulation,
 ) -> MedialMesh {
     let triangulation = delaunay.triangulation();
-    let kept: Vec<CellId> = triangulation.finite_cells().filter(|&c| cells.is_inside(c)).collect();
+    let kept = &cells.kept;
     let sphere_of_cell = cells.sphere_ids(triangulation.cell_count());
-    let spheres: Vec<Sphere> = cells.inside.iter().flatten().copied().collect();
+    let spheres: Vec<Sphere> =
+        kept.iter().map(|c| cells.inside[c.index()].expect("kept cells are inside")).collect();
     let sphere = |cell: CellId| sphere_of_cell[cell.index()];
 
     let edges = kept.par_iter().flat_map_iter(|&cell| {
@@ -128,7 +137,7 @@ pub(super) fn triangulated(
     }
 }
 
-/// A fan from the first vertex, which is the one of the smallest id.
+/// A fan from the first vertex, which is the one of the smallest cell.
 fn fan(polygon: &[u32]) -> Vec<[u32; 3]> {
     polygon[1..].windows(2).map(|pair| [polygon[0], pair[0], pair[1]]).collect()
 }

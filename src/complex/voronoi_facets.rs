@@ -18,8 +18,8 @@ const EDGES_OF_CELL: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 
 #[derive(Clone, Debug, Default)]
 pub struct VoronoiFacets {
     ends: Vec<[VertexId; 2]>,
-    /// `polygons[start[i]..start[i + 1]]` are the spheres of facet `i` in rotational order, the
-    /// smallest id first.
+    /// `polygons[start[i]..start[i + 1]]` are the spheres of facet `i` in rotational order, that of
+    /// the smallest cell first.
     start: Vec<u32>,
     polygons: Vec<u32>,
 }

@@ -19,7 +19,7 @@ mod tangent_planes;
 pub mod triangulation;
 pub mod union_boundary;
 
-pub(crate) use bvh::{Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order};
+pub(crate) use bvh::{Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order, morton_order};
 pub use bvh::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree};
 pub use cone::Cone;
 pub use delaunay::Delaunay;

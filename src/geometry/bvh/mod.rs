@@ -24,7 +24,7 @@ mod wide;
 mod winding;
 
 pub(crate) use build::Plan;
-pub(crate) use morton::in_morton_order;
+pub(crate) use morton::{in_morton_order, morton_order};
 pub(crate) use search::Search;
 pub use triangles::{BvhError, Closest, Feature, TriangleBvh};
 pub(crate) use wide::WideTree;

@@ -1,4 +1,5 @@
-//! Batches of queries along a Morton curve, each starting from the answer of the one before.
+//! Points along a Morton curve, and batches of queries along it, each starting from the answer of
+//! the one before.
 
 use rayon::prelude::*;
 
@@ -35,8 +36,8 @@ where
     places.par_iter().map(|&place| sorted[place as usize]).collect()
 }
 
-/// Morton codes and indices of points, sorted.
-fn morton_order(points: &[Vec3]) -> Vec<(u64, u32)> {
+/// Morton codes and indices of points, sorted. Points that are not numbers have a code too.
+pub(crate) fn morton_order(points: &[Vec3]) -> Vec<(u64, u32)> {
     let Bounds { lo, hi } = Bounds::of_points(points.iter().copied());
     let scale = (hi - lo).map(|extent| if extent > 0.0 { (1 << 21) as f64 / extent } else { 0.0 });
     let code = |p: Vec3| {
