@@ -165,8 +165,15 @@ fn union_distances_match_brute_force() {
             (union.signed_batch(&queries), union.unsigned_nearest_batch(&queries));
         let (deepest, surface) =
             (union.deepest_batch(&queries), union.nearest_surface_batch(&queries));
+        let readings = union.readings_batch(&queries);
+        let mut unburied = queries.clone();
+        union.retain_unburied(&mut unburied, 1e-3);
+        let one_by_one: Vec<Vec3> =
+            queries.iter().copied().filter(|&p| !union.buries(p, 1e-3)).collect();
+        assert_eq!(unburied, one_by_one);
         for (k, &p) in queries.iter().enumerate() {
             let all = all_signed(&mesh, p);
+            assert_eq!((readings[k].sigma, readings[k].mu), (signed[k], nearest[k]));
             let sigma = all.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
             let mu = all.iter().map(|s| s.1.abs()).fold(f64::INFINITY, f64::min);
             assert!((signed[k] - sigma).abs() < 1e-14, "{} for {sigma}", signed[k]);

@@ -19,7 +19,7 @@ pub use incidence::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};
 pub use stability::{ZERO_LENGTH, stability_ratio};
 pub use topology::{betti, euler};
-pub use union::{MedialUnion, NearestPrimitive, Primitive, UnionError};
+pub use union::{MedialUnion, NearestPrimitive, Primitive, Readings, UnionError};
 pub use union_axis::{AxisFacet, AxisTally, UnionAxis};
 pub use voronoi::{CellSpheres, DualTriangulation, voronoi_medial_mesh};
 pub use voronoi_facets::VoronoiFacets;

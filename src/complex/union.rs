@@ -66,6 +66,15 @@ pub struct NearestPrimitive {
     pub primitive: Primitive,
 }
 
+/// The two distances of a point to a union.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Readings {
+    /// The least signed distance to a primitive.
+    pub sigma: f64,
+    /// The least distance to the surface of a primitive, buried or not.
+    pub mu: f64,
+}
+
 /// More than the rounding errors of a bound and of a signed distance together, relative to the
 /// distances and lengths that they are computed from: the distance itself, the radius, and how far
 /// the primitive extends. These are differences of coordinates, so where the union lies does not
@@ -229,6 +238,23 @@ impl MedialUnion {
         })
     }
 
+    /// Both readings for many points, in their order, in parallel: [`signed`](Self::signed) and
+    /// [`unsigned_nearest`](Self::unsigned_nearest), in hardly more time than the dearer of the two.
+    pub fn readings_batch(&self, points: &[Vec3]) -> Vec<Readings> {
+        in_morton_order(points, |last: &mut [usize; 2], p| {
+            let (nearest, place) = self.query::<Signed>(p, last[0]);
+            last[0] = place;
+            let sigma = nearest.signed;
+            if sigma >= 0.0 {
+                // Outside of all primitives the least distance is the least unsigned one.
+                return Readings { sigma, mu: sigma };
+            }
+            let (nearest, place) = self.query::<Unsigned>(p, last[1]);
+            last[1] = place;
+            Readings { sigma, mu: nearest.signed.abs() }
+        })
+    }
+
     /// [`deepest`](Self::deepest) for many points, in their order, in parallel.
     pub fn deepest_batch(&self, points: &[Vec3]) -> Vec<NearestPrimitive> {
         in_morton_order(points, |last: &mut usize, p| {
@@ -250,9 +276,29 @@ impl MedialUnion {
     /// Whether some primitive holds `p` more than `depth` below its surface; with a negative depth,
     /// whether one is nearer than that. Ends at the first that is found.
     pub fn buries(&self, p: Vec3, depth: f64) -> bool {
-        let mut search = Buried { union: self, p, limit: -depth };
+        self.burier(p, depth, None).is_some()
+    }
+
+    /// Keeps of some points those that no primitive [`buries`](Self::buries) deeper than `depth`.
+    /// Quicker where each point is close to the one before.
+    pub fn retain_unburied(&self, points: &mut Vec<Vec3>, depth: f64) {
+        let mut last = None;
+        points.retain(|&p| {
+            let burier = self.burier(p, depth, last);
+            last = burier.or(last);
+            burier.is_none()
+        });
+    }
+
+    /// A primitive that holds `p` more than `depth` below its surface, by its place, where one
+    /// does; the one at `first` is tried before all others.
+    fn burier(&self, p: Vec3, depth: f64, first: Option<usize>) -> Option<usize> {
+        if first.is_some_and(|place| self.shapes[place].signed(p) < -depth) {
+            return first;
+        }
+        let mut search = Buried { union: self, p, limit: -depth, place: None };
         self.tree.search(&mut search);
-        search.limit == f64::NEG_INFINITY
+        search.place
     }
 
     fn query<M: Measure>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
@@ -388,6 +434,7 @@ struct Buried<'a> {
     p: Vec3,
     /// Minus the depth, and minus infinity once a primitive is found.
     limit: f64,
+    place: Option<usize>,
 }
 
 impl Search for Buried<'_> {
@@ -403,7 +450,9 @@ impl Search for Buried<'_> {
 
     #[inline]
     fn visit(&mut self, mut places: Range<usize>) {
-        if places.any(|place| self.union.shapes[place].signed(self.p) < self.limit) {
+        let holds = |&place: &usize| self.union.shapes[place].signed(self.p) < self.limit;
+        if let Some(place) = places.find(holds) {
+            self.place = Some(place);
             self.limit = f64::NEG_INFINITY;
         }
     }

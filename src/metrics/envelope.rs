@@ -126,7 +126,7 @@ fn sample_patches(
             let mut points = Vec::new();
             if count > 0 {
                 patch.sample(count, &mut Pcg64::seed_from_u64(options.seed ^ stream), &mut points);
-                points.retain(|&p| !union.buries(p, options.burial));
+                union.retain_unburied(&mut points, options.burial);
             }
             points
         })

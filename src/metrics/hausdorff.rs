@@ -99,8 +99,9 @@ pub fn distances(
 ) -> Result<Distances, MetricError> {
     let union = MedialUnion::new(mesh)?;
     let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
-    let sigma = absolute(union.signed_batch(&samples.points));
-    let mu = union.unsigned_nearest_batch(&samples.points);
+    let readings = union.readings_batch(&samples.points);
+    let sigma: Vec<f64> = readings.iter().map(|r| r.sigma.abs()).collect();
+    let mu: Vec<f64> = readings.iter().map(|r| r.mu).collect();
     let spheres = absolute(MedialUnion::of_spheres(&mesh.spheres)?.signed_batch(&samples.points));
     let envelope = sample_envelope(
         mesh,

@@ -124,7 +124,7 @@ impl Judge {
         mesh: &MedialMesh,
         truth: &MedialMesh,
     ) -> Result<AxisDistances, MetricError> {
-        let options = AxisOptions { seed: self.options.seed, ..AxisOptions::default() };
+        let options = AxisOptions { samples: self.options.samples, seed: self.options.seed };
         axis_distance(mesh, truth, &options)
     }
 
