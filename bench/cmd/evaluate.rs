@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use medial::metrics::{Evaluation, JudgeOptions};
+use medial::metrics::{Evaluation, JudgeOptions, MetricError};
 use medial::shape::ShapeOptions;
 
 use super::{
@@ -22,6 +22,9 @@ pub struct Arguments {
     /// Seed of the samples.
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Enclose the Hausdorff distance in an interval at most so wide, as a fraction of the diagonal.
+    #[arg(long, value_name = "TOL")]
+    certify: Option<f64>,
     #[command(flatten)]
     measure: MeasureArguments,
 }
@@ -41,9 +44,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
     let to_normal = shape.normalisation();
     let mesh = mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
-    let evaluation = judge
-        .evaluate(&mesh)
-        .map_err(|error| Failure::input(format!("{}: {error}", arguments.axis.display())))?;
+    let refused = |error: MetricError| match error {
+        MetricError::Tolerance(_) | MetricError::TooFine { .. } => {
+            Failure::usage(format!("--certify: {error}"))
+        }
+        _ => Failure::input(format!("{}: {error}", arguments.axis.display())),
+    };
+    let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
+    let certified = certified.transpose().map_err(refused)?;
+    let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(refused)? };
     warnings.extend(input.report.warnings);
     if global.json {
         print_json(&evaluation, &warnings);
@@ -91,5 +100,9 @@ pub fn print_evaluation(evaluation: &Evaluation) {
     ];
     for (label, value) in lines {
         print_line(&format!("  {label:<24} {value}"));
+    }
+    if let Some(certified) = evaluation.certified {
+        let (lower, upper) = (percent(certified.lower), percent(certified.upper));
+        print_line(&format!("  {:<24} {lower} to {upper}", "Hausdorff, certified"));
     }
 }

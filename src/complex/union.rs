@@ -123,6 +123,19 @@ impl Shape {
     }
 }
 
+impl Shape {
+    /// As [`Shape::signed`], with the centre of the interpolated sphere that attains it; `None`
+    /// where a slab leaves the answer to the cones of its sides.
+    #[inline]
+    fn nearest_centre(&self, p: Vec3) -> Option<(f64, Vec3)> {
+        match self {
+            Self::Sphere(sphere) => Some((sphere.signed_distance(p), sphere.centre)),
+            Self::Cone(cone) => Some(cone.nearest_centre(p)),
+            Self::Slab(face) => face.nearest_centre(p),
+        }
+    }
+}
+
 impl MedialUnion {
     /// The union of all primitives of a mesh. Cost `O(n log n)`.
     ///
@@ -301,6 +314,13 @@ impl MedialUnion {
         search.place
     }
 
+    /// Calls `each` for all primitives nearer to `p` than `limit` by signed distance, with that
+    /// distance and the centre of the interpolated sphere that attains it. A slab counts where its
+    /// nearest sphere is inside the triangle, and is else represented by the cones of its sides.
+    pub(crate) fn each_nearer(&self, p: Vec3, limit: f64, each: impl FnMut(f64, Vec3)) {
+        self.tree.search(&mut Nearer { union: self, p, limit, each });
+    }
+
     fn query<M: Measure>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
         let signed = self.shapes[start].signed(p);
         let mut search = Nearest::<M> {
@@ -454,6 +474,37 @@ impl Search for Buried<'_> {
         if let Some(place) = places.find(holds) {
             self.place = Some(place);
             self.limit = f64::NEG_INFINITY;
+        }
+    }
+}
+
+/// Search for all primitives nearer than a limit.
+struct Nearer<'a, F> {
+    union: &'a MedialUnion,
+    p: Vec3,
+    limit: f64,
+    each: F,
+}
+
+impl<F: FnMut(f64, Vec3)> Search for Nearer<'_, F> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        signed_bound(node, self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit + self.union.slack
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        for place in places {
+            if let Some((signed, centre)) = self.union.shapes[place].nearest_centre(self.p)
+                && signed < self.limit
+            {
+                (self.each)(signed, centre);
+            }
         }
     }
 }

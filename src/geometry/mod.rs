@@ -7,7 +7,7 @@ pub mod delaunay;
 pub mod dual_complex;
 mod enclosing;
 mod nearby;
-mod planar_frame;
+pub(crate) mod planar_frame;
 pub mod poles;
 pub mod predicates;
 pub mod regular;

@@ -17,7 +17,7 @@ const FLAT: f64 = 1e-15;
 
 /// A triangle in its own orthonormal frame. Segments and points are triangles of no height.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PlanarFrame {
+pub(crate) struct PlanarFrame {
     pub origin: Vec3,
     pub x: Vec3,
     pub y: Vec3,
@@ -32,7 +32,7 @@ pub(super) struct PlanarFrame {
 
 /// The part of a triangle that holds its nearest point, in the corners' rotated order `a, b, c`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
+pub(crate) enum Part {
     Face,
     /// The side from this corner to the next.
     Side(usize),
@@ -218,7 +218,7 @@ impl PlanarFrame {
 }
 
 /// The largest power of two that is not above a positive number; 1 for zero or infinity.
-pub(super) fn power_of_two_below(value: f64) -> f64 {
+pub(crate) fn power_of_two_below(value: f64) -> f64 {
     if value.is_normal() { f64::from_bits(value.to_bits() & (0x7ff << 52)) } else { 1.0 }
 }
 
@@ -226,7 +226,7 @@ pub(super) fn power_of_two_below(value: f64) -> f64 {
 ///
 /// The normal of a needle is a small difference of large products; a plain cross product would
 /// turn it by as much as the triangle is thin.
-pub(super) fn accurate_cross(u: Vec3, v: Vec3) -> Vec3 {
+pub(crate) fn accurate_cross(u: Vec3, v: Vec3) -> Vec3 {
     Vec3::new(
         difference_of_products(u.y, v.z, u.z, v.y),
         difference_of_products(u.z, v.x, u.x, v.z),

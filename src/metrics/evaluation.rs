@@ -5,12 +5,17 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Certificate;
+
 /// Everything measured on one medial mesh against one surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     /// Distances between the surface and the union of spheres, cones and slabs.
     #[serde(flatten)]
     pub distances: Distances,
+    /// An interval that holds the Hausdorff distance, where it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certified: Option<Certificate>,
     /// Volume of the symmetric difference of solid and union, over the solid's volume.
     pub volume_error: Option<f64>,
     /// Angles of the medial triangles.

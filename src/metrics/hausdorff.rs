@@ -76,6 +76,21 @@ pub enum MetricError {
         /// The limit.
         most: usize,
     },
+    /// An interval that cannot be certified.
+    #[error(
+        "a tolerance of {0} cannot be certified: ask for a fraction of the diagonal between 1e-6 and 1"
+    )]
+    Tolerance(f64),
+    /// The certificate would not fit into memory.
+    #[error(
+        "a tolerance of {tolerance:.1e} would need {pieces} pieces and more: ask for a larger one"
+    )]
+    TooFine {
+        /// Width of the interval.
+        tolerance: f64,
+        /// Pieces at the moment of giving up.
+        pieces: usize,
+    },
     /// The balls on the primitives cannot be triangulated.
     #[error(transparent)]
     Triangulation(#[from] TriangulationError),

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::{
-    AxisDistances, AxisOptions, DistanceOptions, Distances, Evaluation, MetricError, VolumeOptions,
-    axis_distance, counts, distances, spikes, triangle_quality, volume_error,
+    AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
+    VolumeOptions, axis_distance, certify, counts, distances, spikes, triangle_quality,
+    volume_error,
 };
 use crate::complex::{MedialMesh, MedialUnion, betti, euler};
 use crate::geometry::TriangleBvh;
@@ -84,6 +85,7 @@ impl Judge {
         Ok(Evaluation {
             warnings: self.misfits(mesh, &union, &distances),
             distances,
+            certified: None,
             volume_error: self.volume_error(&union)?,
             quality: triangle_quality(mesh),
             spikes: spikes(mesh),
@@ -108,6 +110,15 @@ impl Judge {
             seed: self.options.seed,
         };
         distances(&self.surface, &self.tree, mesh, &options)
+    }
+
+    /// An interval no wider than `tolerance` that holds the Hausdorff distance of
+    /// [`certify`](super::certify), as fractions of the diagonal.
+    ///
+    /// # Errors
+    /// As [`Judge::evaluate`], and when the tolerance is out of range or too fine.
+    pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
+        certify(&self.surface, &self.tree, mesh, tolerance)
     }
 
     fn volume_error(&self, union: &MedialUnion) -> Result<Option<f64>, MetricError> {

@@ -3,6 +3,7 @@
 //! [`Judge`] runs them all; each can be had alone.
 
 mod axis_distance;
+mod certificate;
 mod counts;
 mod envelope;
 mod evaluation;
@@ -14,6 +15,7 @@ mod union_topology;
 mod volume;
 
 pub use axis_distance::{AxisOptions, axis_distance};
+pub use certificate::{Certificate, FINEST, ROUNDING, certify};
 pub use counts::counts;
 pub use envelope::{EnvelopeOptions, sample_envelope};
 pub use evaluation::{

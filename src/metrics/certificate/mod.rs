@@ -1,0 +1,210 @@
+//! A certified interval for the Hausdorff distance between a surface and the boundary of a union.
+//!
+//! With the surface S, the union U of all medial primitives and `sigma` their least signed
+//! distance, the certified quantity is the larger of
+//!
+//! - (a) the largest `|sigma(p)|` over the points `p` of S, and
+//! - (b) the largest distance to S over the points of the boundary of U.
+//!
+//! These are what [`Distances`](super::Distances) samples as `epsilon_union` and `reverse`. Outside
+//! U, `sigma` is the distance to U; inside, `-sigma` is the depth in the deepest single
+//! primitive, which is less than the depth in U where primitives cover each other.
+//!
+//! Branch and bound. Triangles of S, and the triangles, cone laterals and spherical triangles that
+//! make up the surfaces of all primitives, are divided until each is known to lie below
+//! `lower + tolerance`, where `lower` is the largest distance found so far at a point that is
+//! certainly on S or on the boundary of U:
+//!
+//! 1. Distances are 1-Lipschitz: none in a piece is farther from that at its centre than the piece
+//!    extends.
+//! 2. The signed distance to a primitive, a convex body, is a convex function, and so is the
+//!    distance to one triangle. Over a piece neither exceeds its largest value at the corners of a
+//!    convex polytope around the piece. One primitive bounds `sigma`, one triangle the distance to S,
+//!    from above: an error of second order in the size of the piece (file `union_side.rs`).
+//! 3. From below, a convex function is no less than its tangent plane. Of each primitive that could
+//!    be deep enough the tangent plane at the centre of the piece is taken (file
+//!    `surface_side.rs`).
+//! 4. A piece of the boundary of one primitive that another holds, by 1 or by 2, is not on the
+//!    boundary of U and is dropped.
+//!
+//! Pieces are evaluated in rounds, all those of one size together, so that the result is the same
+//! for any number of threads.
+//!
+//! Rounding: all of this is double precision, whose errors, at coordinates of the order of the
+//! surface's diagonal, are below [`ROUNDING`] diagonals. The interval is wider by that on both sides.
+
+mod surface_side;
+#[cfg(test)]
+mod tests;
+mod union_side;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::MetricError;
+use crate::Vec3;
+use crate::complex::{MedialMesh, MedialUnion, Primitive};
+use crate::geometry::{Cone, Slab, Sphere, TriangleBvh};
+use crate::surface::TriMesh;
+
+use surface_side::SurfaceSide;
+use union_side::UnionSide;
+
+/// What rounding can contribute to a distance, in units of the surface's diagonal.
+pub const ROUNDING: f64 = 1e-9;
+
+/// Finer intervals than this, in diagonals, are refused: rounding would be a part of them.
+pub const FINEST: f64 = 1e-6;
+
+/// So many pieces are held at a time at most: about 2 GB.
+const MOST_PIECES: usize = 1 << 24;
+
+/// An interval that holds the Hausdorff distance between a surface and the boundary of a union.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// No more than the distance.
+    pub lower: f64,
+    /// No less than the distance.
+    pub upper: f64,
+    /// `upper - lower` was to be no more than this.
+    pub tolerance: f64,
+    /// Pieces that were looked at.
+    pub pieces: u64,
+}
+
+/// Encloses the Hausdorff distance in an interval no wider than `tolerance`, in the unit of both,
+/// for a surface of diagonal about 1. The same for any number of threads.
+///
+/// Costs more the smaller the tolerance is beside the distance: most of the work is done where the
+/// distance is within a tolerance of its maximum.
+///
+/// # Errors
+/// A tolerance below [`FINEST`] or not a number; an interval that would need too many pieces; a
+/// medial mesh without a union; a surface without faces.
+pub fn certify(
+    surface: &TriMesh,
+    bvh: &TriangleBvh,
+    mesh: &MedialMesh,
+    tolerance: f64,
+) -> Result<Certificate, MetricError> {
+    if !(FINEST..=1.0).contains(&tolerance) {
+        return Err(MetricError::Tolerance(tolerance));
+    }
+    if surface.faces.is_empty() {
+        return Err(MetricError::NoArea);
+    }
+    let union = MedialUnion::new(mesh)?;
+    let hulls = Hulls::new(mesh);
+    // A little less than both sides add, for the rounding of these sums.
+    let goal = tolerance - 2.5 * ROUNDING;
+    let mut search = Search { lower: 0.0, upper: 0.0, goal, pieces: 0 };
+    let side = SurfaceSide { union: &union, hulls: &hulls };
+    search.lower = side.largest_at(&surface.vertices);
+    search.run(&side, side.pieces(surface))?;
+    let side = UnionSide::new(surface, bvh, mesh, &union, &hulls);
+    search.run(&side, side.pieces())?;
+    Ok(Certificate {
+        lower: (search.lower - ROUNDING).max(0.0),
+        upper: search.upper.max(search.lower) + ROUNDING,
+        tolerance,
+        pieces: search.pieces,
+    })
+}
+
+/// Distances on one of the two surfaces to the other.
+trait Side: Sync {
+    /// A part of this surface.
+    type Piece: Copy + Send + Sync;
+
+    /// What can be said about the distances in a piece. `known` is reached somewhere; an upper bound
+    /// needs to be no better than `enough`.
+    fn bound(&self, piece: &Self::Piece, known: f64, enough: f64) -> Bound;
+
+    /// Appends pieces that together cover a piece.
+    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>);
+}
+
+/// Bounds of the largest distance in a piece.
+#[derive(Clone, Copy, Debug)]
+struct Bound {
+    /// Reached at some point of the piece; 0 where none is known.
+    reached: f64,
+    /// Not exceeded in the piece.
+    upper: f64,
+}
+
+/// The state of the branch and bound.
+struct Search {
+    lower: f64,
+    upper: f64,
+    goal: f64,
+    pieces: u64,
+}
+
+impl Search {
+    fn run<S: Side>(&mut self, side: &S, mut pieces: Vec<S::Piece>) -> Result<(), MetricError> {
+        while !pieces.is_empty() {
+            self.pieces += pieces.len() as u64;
+            let (known, enough) = (self.lower, self.lower + self.goal);
+            let bounds: Vec<Bound> = pieces
+                .par_iter()
+                .with_min_len(64)
+                .map(|piece| side.bound(piece, known, enough))
+                .collect();
+            self.lower = bounds.iter().fold(self.lower, |lower, b| lower.max(b.reached));
+            let enough = self.lower + self.goal;
+            let mut parts = Vec::new();
+            for (piece, bound) in pieces.iter().zip(&bounds) {
+                if bound.upper <= enough {
+                    self.upper = self.upper.max(bound.upper);
+                } else {
+                    side.divide(piece, &mut parts);
+                }
+            }
+            if parts.len() > MOST_PIECES {
+                return Err(MetricError::TooFine { tolerance: self.goal, pieces: parts.len() });
+            }
+            pieces = parts;
+        }
+        Ok(())
+    }
+}
+
+/// The primitives as whole convex bodies, unlike the parts in [`MedialUnion`].
+struct Hulls {
+    spheres: Vec<Sphere>,
+    cones: Vec<Cone>,
+    slabs: Vec<Slab>,
+}
+
+impl Hulls {
+    fn new(mesh: &MedialMesh) -> Self {
+        let sphere = |v: u32| mesh.spheres[v as usize];
+        Self {
+            spheres: mesh.spheres.clone(),
+            cones: mesh.edges.iter().map(|e| Cone::new(sphere(e[0]), sphere(e[1]))).collect(),
+            slabs: mesh.faces.iter().map(|f| Slab::new(f.map(sphere))).collect(),
+        }
+    }
+
+    /// The largest signed distance to a primitive over the convex hull of some points.
+    fn largest_over(&self, primitive: Primitive, corners: &[Vec3]) -> f64 {
+        let signed = |p: Vec3| match primitive {
+            Primitive::Sphere(v) => self.spheres[v as usize].signed_distance(p),
+            Primitive::Edge(e) => self.cones[e as usize].signed_distance(p),
+            Primitive::Face(f) => self.slabs[f as usize].signed_distance(p),
+        };
+        corners.iter().fold(f64::NEG_INFINITY, |largest, &p| largest.max(signed(p)))
+    }
+}
+
+/// The distance from a point to the farthest of some others.
+fn farthest(from: Vec3, points: &[Vec3]) -> f64 {
+    points.iter().fold(0.0, |far, &p| f64::max(far, from.distance_squared(p))).sqrt()
+}
+
+/// A triangle in four, by the midpoints of its sides.
+fn quartered([a, b, c]: [Vec3; 3], middle: impl Fn(Vec3, Vec3) -> Vec3) -> [[Vec3; 3]; 4] {
+    let [d, e, f] = [middle(b, c), middle(c, a), middle(a, b)];
+    [[a, f, e], [f, b, d], [e, d, c], [d, e, f]]
+}

@@ -1,0 +1,84 @@
+//! The first side: `|sigma|` over the triangles of the surface.
+
+use super::{Bound, Hulls, Side, farthest, quartered};
+use crate::Vec3;
+use crate::complex::MedialUnion;
+use crate::surface::TriMesh;
+
+/// Nearer than this to the centre that attains a distance, its gradient is rounding.
+const BLIND: f64 = 1e-9;
+
+/// The triangles of a surface against a union.
+pub(super) struct SurfaceSide<'a> {
+    pub union: &'a MedialUnion,
+    pub hulls: &'a Hulls,
+}
+
+impl SurfaceSide<'_> {
+    pub fn pieces(&self, surface: &TriMesh) -> Vec<[Vec3; 3]> {
+        (0..surface.faces.len()).map(|face| surface.triangle(face)).collect()
+    }
+
+    /// The largest distance at some points of the surface.
+    pub fn largest_at(&self, points: &[Vec3]) -> f64 {
+        self.union.signed_batch(points).into_iter().fold(0.0, |far, s| f64::max(far, s.abs()))
+    }
+
+    /// A bound of `sigma` over a triangle: of the primitives that are deepest at the centre or
+    /// at a corner one that rises least.
+    fn above(&self, triangle: &[Vec3; 3], enough: f64, first: f64) -> f64 {
+        let mut least = first;
+        for &corner in triangle {
+            if least <= enough {
+                break;
+            }
+            let deepest = self.union.deepest(corner).primitive;
+            least = least.min(self.hulls.largest_over(deepest, triangle));
+        }
+        least
+    }
+
+    /// A bound of `-sigma` over a triangle, where that can exceed `enough`.
+    fn below(&self, triangle: &[Vec3; 3], centre: Vec3, reach: f64, enough: f64) -> f64 {
+        let mut depth = 0.0_f64;
+        self.union.each_nearer(centre, reach - enough, |signed, attained_at| {
+            let arm = centre - attained_at;
+            let length = arm.length();
+            let mut lowest = signed - reach;
+            if length > BLIND {
+                let rise = |&corner: &Vec3| signed + arm.dot(corner - centre) / length;
+                lowest = triangle.iter().map(rise).fold(f64::INFINITY, f64::min).max(lowest);
+            }
+            depth = depth.max(-lowest);
+        });
+        depth
+    }
+}
+
+impl Side for SurfaceSide<'_> {
+    type Piece = [Vec3; 3];
+
+    fn bound(&self, triangle: &[Vec3; 3], _: f64, enough: f64) -> Bound {
+        let centre = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
+        let reach = farthest(centre, triangle);
+        let deepest = self.union.deepest(centre);
+        let reached = deepest.signed.abs();
+        let lipschitz = reached + reach;
+        if lipschitz <= enough {
+            return Bound { reached, upper: lipschitz };
+        }
+        let first = self.hulls.largest_over(deepest.primitive, triangle);
+        let above = self.above(triangle, enough, first.min(deepest.signed + reach));
+        if above > enough {
+            return Bound { reached, upper: above };
+        }
+        // Primitives that are not looked at are no deeper than `enough`.
+        let unseen = enough.min(reach - deepest.signed);
+        let below = self.below(triangle, centre, reach, enough).max(unseen);
+        Bound { reached, upper: above.max(below) }
+    }
+
+    fn divide(&self, triangle: &[Vec3; 3], parts: &mut Vec<[Vec3; 3]>) {
+        parts.extend(quartered(*triangle, Vec3::midpoint));
+    }
+}

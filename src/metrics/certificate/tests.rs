@@ -1,0 +1,124 @@
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::*;
+use crate::metrics::{DistanceOptions, distances};
+
+/// The box of the given half sides around the origin.
+fn cuboid(half: Vec3) -> TriMesh {
+    let corner = |k: u32| {
+        let sign = |bit: u32| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
+        half * Vec3::new(sign(0), sign(1), sign(2))
+    };
+    let quads =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriMesh { vertices: (0..8).map(corner).collect(), faces }
+}
+
+fn medial(spheres: &[(Vec3, f64)], edges: &[[u32; 2]], faces: &[[u32; 3]]) -> MedialMesh {
+    let spheres = spheres.iter().map(|&(c, r)| Sphere::new(c, r)).collect();
+    MedialMesh::from_simplices(spheres, edges.to_vec(), faces.to_vec()).unwrap()
+}
+
+fn certified(surface: &TriMesh, mesh: &MedialMesh, tolerance: f64) -> Certificate {
+    let bvh = TriangleBvh::new(surface).unwrap();
+    let certificate = certify(surface, &bvh, mesh, tolerance).unwrap();
+    assert!(certificate.upper - certificate.lower <= tolerance, "{certificate:?}");
+    certificate
+}
+
+#[track_caller]
+fn holds(surface: &TriMesh, mesh: &MedialMesh, exact: f64) {
+    for tolerance in [1e-2, 1e-3, 1e-4] {
+        let Certificate { lower, upper, .. } = certified(surface, mesh, tolerance);
+        assert!((lower..=upper).contains(&exact), "{exact} is not within {lower} to {upper}");
+    }
+}
+
+#[test]
+fn the_interval_holds_known_distances() {
+    let half = Vec3::new(0.4, 0.3, 0.2);
+    let surface = cuboid(half);
+    // A ball inside: the corners are farthest, or the middle of the ball's surface.
+    let ball = |c, r| medial(&[(c, r)], &[], &[]);
+    holds(&surface, &ball(Vec3::ZERO, 0.15), half.length() - 0.15);
+    // A ball around the box: its poles over the largest faces.
+    holds(&surface, &ball(Vec3::ZERO, 0.9), 0.9 - 0.2);
+    // A point.
+    holds(&surface, &ball(Vec3::ZERO, 0.0), half.length());
+    // A capsule along the longest axis: the corners again.
+    let ends = [(-0.3 * Vec3::X, 0.1), (0.3 * Vec3::X, 0.1)];
+    let capsule = medial(&ends, &[[0, 1]], &[]);
+    holds(&surface, &capsule, Vec3::new(0.1, 0.3, 0.2).length() - 0.1);
+    // A tapered cone that sticks out: its far end.
+    let spike = medial(&[(Vec3::ZERO, 0.15), (Vec3::X, 0.05)], &[[0, 1]], &[]);
+    let corner = Cone::new(Sphere::new(Vec3::ZERO, 0.15), Sphere::new(Vec3::X, 0.05));
+    holds(
+        &surface,
+        &spike,
+        (1.05_f64 - 0.4).max(corner.signed_distance(Vec3::new(-0.4, 0.3, 0.2))),
+    );
+    // A slab far above: its plane is parallel to the box's top.
+    let corners = [Vec3::new(-0.1, -0.1, 0.7), Vec3::new(0.2, -0.1, 0.7), Vec3::new(0.0, 0.2, 0.7)];
+    let slab = medial(&corners.map(|c| (c, 0.05)), &[], &[[0, 1, 2]]);
+    let depth = Slab::new(corners.map(|c| Sphere::new(c, 0.05)));
+    let below = surface.vertices.iter().map(|&v| depth.signed_distance(v)).fold(0.0, f64::max);
+    holds(&surface, &slab, below.max(0.75 - 0.2));
+}
+
+/// The boundary of a ball that another one mostly covers counts only where it is not covered.
+#[test]
+fn buried_parts_do_not_count() {
+    let surface = cuboid(Vec3::splat(0.3));
+    let balls = [(Vec3::ZERO, 0.5), (0.1 * Vec3::X, 0.3)];
+    let alone = certified(&surface, &medial(&balls[..1], &[], &[]), 1e-4);
+    let both = certified(&surface, &medial(&balls, &[], &[]), 1e-4);
+    assert!((alone.lower - both.lower).abs() <= 1e-4 && (alone.upper - both.upper).abs() <= 1e-4);
+}
+
+#[test]
+fn the_interval_agrees_with_samples_on_random_meshes() {
+    let mut rng = Pcg64::seed_from_u64(7);
+    let mut random =
+        |scale: f64| scale * Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
+    let surface = cuboid(Vec3::new(0.35, 0.3, 0.2));
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    for round in 0..12 {
+        let spheres: Vec<_> =
+            (0..8).map(|_| (random(0.3), random(0.2).length() * f64::from(round % 3))).collect();
+        let edges = [[0, 5], [5, 6], [1, 7]];
+        let mesh = medial(&spheres, &edges, &[[0, 1, 2], [1, 2, 3], [2, 3, 4]]);
+        let interval = certified(&surface, &mesh, 1e-3);
+        let options =
+            DistanceOptions { surface_samples: 40_000, envelope_samples: 40_000, seed: 1 };
+        let sampled = distances(&surface, &bvh, &mesh, &options).unwrap().hausdorff;
+        assert!(sampled <= interval.upper, "{sampled} is above {interval:?}");
+        assert!(sampled >= interval.lower - 0.02, "{sampled} is far below {interval:?}");
+    }
+}
+
+#[test]
+fn the_same_for_any_number_of_threads() {
+    let surface = cuboid(Vec3::splat(0.3));
+    let spheres = [(Vec3::ZERO, 0.2), (0.2 * Vec3::Y, 0.1), (0.2 * Vec3::X, 0.1)];
+    let mesh = medial(&spheres, &[], &[[0, 1, 2]]);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| certified(&surface, &mesh, 1e-4))
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn what_cannot_be_certified_is_refused() {
+    let surface = cuboid(Vec3::splat(0.3));
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    let mesh = medial(&[(Vec3::ZERO, 0.2)], &[], &[]);
+    for tolerance in [0.0, -1.0, 1e-9, 2.0, f64::NAN, f64::INFINITY] {
+        let refused = certify(&surface, &bvh, &mesh, tolerance);
+        assert!(matches!(refused, Err(MetricError::Tolerance(_))), "{refused:?}");
+    }
+    let empty = certify(&surface, &bvh, &MedialMesh::default(), 1e-3);
+    assert!(matches!(empty, Err(MetricError::Union(_))));
+}
