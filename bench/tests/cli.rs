@@ -174,6 +174,13 @@ fn axis_simplify_evaluate_convert() {
         assert_eq!(number("hausdorff"), number("epsilon_union").max(number("reverse")));
     }
 
+    let certify = ["evaluate", mesh, simple, "--samples", "2000", "--certify", "1e-3"];
+    let (code, object) = json(&certify);
+    assert_eq!(code, 0);
+    let bound = |key: &str| object["certified"][key].as_f64().expect("a number");
+    assert!(bound("lower") > 0.0 && bound("upper") - bound("lower") <= 1e-3, "{object}");
+    assert!(object["hausdorff"].as_f64().expect("a number") <= bound("upper"), "{object}");
+
     let from_file = ["simplify", mesh, "--method", "qmat", "--spheres", "60", "--initial", axis];
     assert_eq!(json(&from_file).1["spheres"], 60);
     assert_eq!(run(&["convert", simple, ply]).0, 0);
@@ -505,9 +512,10 @@ fn absurd_requests_are_refused_at_once() {
     fs::write(&ball, "1 0 0\nv 0 0 0 1\n").expect("written");
     fs::write(&huge, "1 0 0\nv 0 0 0 1e200\n").expect("written");
     let mesh = "builtin:sphere:8";
-    let cases: [(&[&str], i32, &str); 8] = [
+    let cases: [(&[&str], i32, &str); 9] = [
         (&["info", mesh, "--threads", "100000"], 2, "1024"),
         (&["evaluate", mesh, &ball, "--samples", "99999999999"], 2, "10000000"),
+        (&["evaluate", mesh, &ball, "--certify", "1e-9"], 2, "1e-6"),
         (&["evaluate", mesh, &huge], 1, "huge.ma: sphere 0"),
         (&["simplify", mesh, "-m", "qmat", "-o", &nowhere], 1, "there is no folder"),
         (&["simplify", mesh, "-m", "qmat", "-o", "x.xyz"], 1, "\"xyz\" is not one of"),
