@@ -225,7 +225,7 @@ fn axis() -> Vec<Column> {
     macro_rules! axis {
         ($($key:ident),*) => {
             vec![$(column(concat!("axis_", stringify!($key)), |r| {
-                Some(number(r.evaluate.as_ref()?.axis?.$key))
+                Some(number(r.evaluate.as_ref()?.axis.as_ref()?.in_space.$key))
             })),*]
         };
     }

@@ -1,18 +1,30 @@
-//! Distances between two medial axes as point sets in space, radii left aside.
+//! Distances between two medial axes: as sets of points in space, and as sets of spheres.
 //!
 //! Each axis is sampled and measured against the triangles, lone edges and isolated points of the
 //! other.
 //!
-//! - Maxima are over samples of all triangles and lone edges, and all sphere centres.
+//! - In space, radii are left aside. With radii an axis is a set of points `(x, y, z, r)`, linear
+//!   over each simplex, and distances are those of four-dimensional space: two axes in one place
+//!   whose radii differ by `d` everywhere are `d` apart.
+//! - Maxima are over samples of all triangles and lone edges, and all spheres.
 //! - Means are over the parts of the highest dimension that the sampled axis has: by area where it
 //!   has triangles, else by length, else over its points. A curve has no area to weigh it against
 //!   a sheet.
+//! - The *sheets* of the true axis are its sets of triangles that are connected across edges of
+//!   just two triangles. A sheet is covered where the computed axis is within [`COVERED`] in space.
 
-use super::hausdorff::sample_triangles;
-use super::{AxisDistances, MetricError};
+use glam::DVec4;
+
+use super::hausdorff::{Placed, place_on_triangles};
+use super::lifted_axis::{LiftedAxis, lifted};
+use super::{AxisDistances, AxisSpan, MetricError, SheetCoverage};
 use crate::Vec3;
 use crate::complex::{MedialMesh, UnionError};
-use crate::geometry::{BvhError, TriangleBvh};
+use crate::disjoint::DisjointSets;
+use crate::geometry::TriangleBvh;
+
+/// Distance, in the unit of the axes, within which a point of a sheet is covered.
+pub const COVERED: f64 = 0.01;
 
 /// How densely to sample an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,23 +53,76 @@ pub fn axis_distance(
     if options.samples == 0 {
         return Err(MetricError::NoSamples("samples"));
     }
+    let sheet_of_face = sheets(truth);
     let [computed, truth] = [AxisParts::new(computed)?, AxisParts::new(truth)?];
     let there = directed(&computed, &truth, options)?;
     let back = directed(&truth, &computed, options)?;
-    Ok(AxisDistances {
+    let span = |there: Extent, back: Extent| AxisSpan {
         computed_to_true_max: there.max,
         computed_to_true_mean: there.mean,
         true_to_computed_max: back.max,
         true_to_computed_mean: back.mean,
+    };
+    Ok(AxisDistances {
+        coverage: coverage(&truth, &sheet_of_face, &back),
+        in_space: span(there.in_space, back.in_space),
+        with_radius: span(there.with_radius, back.with_radius),
     })
 }
 
-/// A medial mesh as a point set.
+/// For each triangle the smallest triangle of its sheet.
+fn sheets(mesh: &MedialMesh) -> Vec<u32> {
+    let mut faces_of_edge = vec![(0_u32, [0_u32; 2]); mesh.edges.len()];
+    for (face, &[a, b, c]) in (0..).zip(&mesh.faces) {
+        for side in [[a, b], [a, c], [b, c]] {
+            if let Ok(edge) = mesh.edges.binary_search(&side) {
+                let (count, faces) = &mut faces_of_edge[edge];
+                if let Some(slot) = faces.get_mut(*count as usize) {
+                    *slot = face;
+                }
+                *count += 1;
+            }
+        }
+    }
+    let mut sheets = DisjointSets::singletons(mesh.faces.len());
+    for (count, [first, second]) in faces_of_edge {
+        if count == 2 {
+            sheets.join(first, second);
+        }
+    }
+    (0..mesh.faces.len() as u32).map(|face| sheets.find(face)).collect()
+}
+
+/// The covered share of each sheet, the largest sheet first.
+fn coverage(truth: &AxisParts, sheet_of_face: &[u32], back: &Directed) -> Vec<SheetCoverage> {
+    let mut sheets: Vec<(u32, SheetCoverage, [usize; 2])> = Vec::new();
+    let mut index = vec![usize::MAX; sheet_of_face.len()];
+    for (face, &sheet) in sheet_of_face.iter().enumerate() {
+        if index[sheet as usize] == usize::MAX {
+            index[sheet as usize] = sheets.len();
+            sheets.push((sheet, SheetCoverage { area: 0.0, covered: None }, [0; 2]));
+        }
+        let [a, b, c] = truth.triangles[face].map(DVec4::truncate);
+        sheets[index[sheet as usize]].1.area += (b - a).cross(c - a).length() * 0.5;
+    }
+    for (placed, &distance) in back.on_triangles.iter().zip(&back.of_triangles) {
+        let [near, all] = &mut sheets[index[sheet_of_face[placed.triangle] as usize]].2;
+        *all += 1;
+        *near += usize::from(distance <= COVERED);
+    }
+    for (_, sheet, [near, all]) in &mut sheets {
+        sheet.covered = (*all > 0).then(|| *near as f64 / *all as f64);
+    }
+    sheets.sort_by(|a, b| b.1.area.total_cmp(&a.1.area).then(a.0.cmp(&b.0)));
+    sheets.into_iter().map(|(_, sheet, _)| sheet).collect()
+}
+
+/// A medial mesh as a set of points with radii.
 struct AxisParts {
-    triangles: Vec<[Vec3; 3]>,
+    triangles: Vec<[DVec4; 3]>,
     /// Edges without a face.
-    segments: Vec<[Vec3; 2]>,
-    centres: Vec<Vec3>,
+    segments: Vec<[DVec4; 2]>,
+    spheres: Vec<DVec4>,
 }
 
 impl AxisParts {
@@ -66,7 +131,7 @@ impl AxisParts {
         if mesh.spheres.is_empty() {
             return Err(UnionError::Empty.into());
         }
-        let centre = |v: u32| mesh.spheres[v as usize].centre;
+        let point = |v: u32| lifted(&mesh.spheres[v as usize]);
         let mut with_face = vec![false; mesh.edges.len()];
         for &[a, b, c] in &mesh.faces {
             for side in [[a, b], [a, c], [b, c]] {
@@ -77,24 +142,43 @@ impl AxisParts {
         }
         let lone = mesh.edges.iter().zip(with_face).filter(|&(_, with)| !with);
         Ok(Self {
-            triangles: mesh.faces.iter().map(|f| f.map(centre)).collect(),
-            segments: lone.map(|(e, _)| e.map(centre)).collect(),
-            centres: mesh.spheres.iter().map(|m| m.centre).collect(),
+            triangles: mesh.faces.iter().map(|f| f.map(point)).collect(),
+            segments: lone.map(|(e, _)| e.map(point)).collect(),
+            spheres: mesh.spheres.iter().map(lifted).collect(),
         })
     }
 
-    /// A tree over all parts: segments and points as triangles of no area.
-    fn tree(&self) -> Result<TriangleBvh, BvhError> {
+    /// All parts: segments and points as triangles of no area.
+    fn simplices(&self) -> Vec<[DVec4; 3]> {
         let mut parts = self.triangles.clone();
         parts.extend(self.segments.iter().map(|&[a, b]| [a, b, b]));
-        parts.extend(self.centres.iter().map(|&c| [c; 3]));
-        TriangleBvh::from_triangles(&parts)
+        parts.extend(self.spheres.iter().map(|&c| [c; 3]));
+        parts
     }
 }
 
+/// Distances from one axis to another.
 struct Directed {
+    in_space: Extent,
+    with_radius: Extent,
+    /// Where the samples of the triangles are, and their distances in space.
+    on_triangles: Vec<Placed>,
+    of_triangles: Vec<f64>,
+}
+
+struct Extent {
     max: f64,
     mean: f64,
+}
+
+impl Extent {
+    /// Of the distances of samples of triangles, of lone edges, and of spheres.
+    fn of(sets: &[Vec<f64>; 3]) -> Self {
+        let max = sets.iter().flatten().copied().fold(0.0, f64::max);
+        let highest = sets.iter().find(|set| !set.is_empty());
+        let mean = highest.map_or(0.0, |set| set.iter().sum::<f64>() / set.len() as f64);
+        Self { max, mean }
+    }
 }
 
 fn directed(
@@ -102,28 +186,37 @@ fn directed(
     to: &AxisParts,
     options: &AxisOptions,
 ) -> Result<Directed, MetricError> {
-    let sheets = sample_triangles(&from.triangles, options.samples, options.seed);
+    let in_space: Vec<_> = from.triangles.iter().map(|t| t.map(DVec4::truncate)).collect();
+    let placed = place_on_triangles(&in_space, options.samples, options.seed).unwrap_or_default();
+    let sheets = placed.iter().map(|placed| placed.on(&from.triangles)).collect();
     let curves = sample_segments(&from.segments, options.samples);
-    let tree = to.tree().map_err(MetricError::Tree)?;
-    let sets = [sheets.unwrap_or_default(), curves, from.centres.clone()];
-    let distances = sets.map(|points| tree.distance_batch(&points));
-    let max = distances.iter().flatten().copied().fold(0.0, f64::max);
-    let highest = distances.iter().find(|set| !set.is_empty());
-    let mean = highest.map_or(0.0, |set| set.iter().sum::<f64>() / set.len() as f64);
-    Ok(Directed { max, mean })
+    let sets: [Vec<DVec4>; 3] = [sheets, curves, from.spheres.clone()];
+    let simplices = to.simplices();
+    let flat: Vec<_> = simplices.iter().map(|s| s.map(DVec4::truncate)).collect();
+    let tree = TriangleBvh::from_triangles(&flat).map_err(MetricError::Tree)?;
+    let axis = LiftedAxis::new(&simplices);
+    let with_radius = [0, 1, 2].map(|k| axis.distances(&sets[k]));
+    let in_space = sets.map(|set| {
+        let points: Vec<Vec3> = set.into_iter().map(DVec4::truncate).collect();
+        tree.distance_batch(&points)
+    });
+    let (with_radius, extent) = (Extent::of(&with_radius), Extent::of(&in_space));
+    let [of_triangles, ..] = in_space;
+    Ok(Directed { in_space: extent, with_radius, on_triangles: placed, of_triangles })
 }
 
 /// `count` points, equally spaced along the list of segments; none when they have no length.
-fn sample_segments(segments: &[[Vec3; 2]], count: usize) -> Vec<Vec3> {
-    let total: f64 = segments.iter().map(|[a, b]| a.distance(*b)).sum();
+fn sample_segments(segments: &[[DVec4; 2]], count: usize) -> Vec<DVec4> {
+    let extent = |[a, b]: &[DVec4; 2]| a.truncate().distance(b.truncate());
+    let total: f64 = segments.iter().map(extent).sum();
     let mut points = Vec::new();
     if !(total > 0.0 && total.is_finite()) {
         return points;
     }
     let spacing = total / count as f64;
     let mut below = 0.0;
-    for &[a, b] in segments {
-        let length = a.distance(b);
+    for segment in segments {
+        let ([a, b], length) = (*segment, extent(segment));
         while let at = (points.len() as f64 + 0.5) * spacing
             && at < below + length
         {

@@ -136,9 +136,21 @@ pub struct Counts {
     pub nonmanifold_edges: u64,
 }
 
-/// Distances between a computed medial axis and the true one, in space.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Distances between a computed medial axis and the true one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisDistances {
+    /// As sets of points in space.
+    #[serde(flatten)]
+    pub in_space: AxisSpan,
+    /// As sets of points with radii, in four-dimensional space.
+    pub with_radius: AxisSpan,
+    /// How much of each sheet of the true axis the computed one covers, the largest sheet first.
+    pub coverage: Vec<SheetCoverage>,
+}
+
+/// Distances between two axes, both ways.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisSpan {
     /// Largest distance from the computed axis to the true one.
     pub computed_to_true_max: f64,
     /// Mean of the same.
@@ -147,4 +159,13 @@ pub struct AxisDistances {
     pub true_to_computed_max: f64,
     /// Mean of the same.
     pub true_to_computed_mean: f64,
+}
+
+/// How much of one sheet of the true axis is covered.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SheetCoverage {
+    /// Area of the sheet.
+    pub area: f64,
+    /// Share of it that is covered; `None` where no sample fell on it.
+    pub covered: Option<f64>,
 }

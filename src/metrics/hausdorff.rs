@@ -19,6 +19,8 @@
 //!   strips along the tangent curves of neighbouring primitives count more than once in
 //!   `reverse_mean`.
 
+use std::ops::{Add, Mul, Sub};
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -204,37 +206,66 @@ pub(super) fn sample_triangles(
     count: usize,
     seed: u64,
 ) -> Option<Vec<Vec3>> {
+    let placed = place_on_triangles(triangles, count, seed)?;
+    Some(placed.iter().map(|placed| placed.on(triangles)).collect())
+}
+
+/// A point of a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    pub triangle: usize,
+    /// Weights of the second and third corner.
+    weights: [f64; 2],
+}
+
+impl Placed {
+    /// The point, on the triangle in whatever space.
+    pub fn on<V>(&self, triangles: &[[V; 3]]) -> V
+    where
+        V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f64, Output = V>,
+    {
+        let [a, b, c] = triangles[self.triangle];
+        a + (b - a) * self.weights[0] + (c - a) * self.weights[1]
+    }
+}
+
+/// As [`sample_triangles`], as places on the triangles.
+pub(super) fn place_on_triangles(
+    triangles: &[[Vec3; 3]],
+    count: usize,
+    seed: u64,
+) -> Option<Vec<Placed>> {
     let area = |&[a, b, c]: &[Vec3; 3]| (b - a).cross(c - a).length() * 0.5;
     let total: f64 = triangles.iter().map(area).sum();
     if !(total > 0.0 && total.is_finite()) {
         return None;
     }
     let mut rng = Pcg64::seed_from_u64(seed ^ STREAM);
-    let mut points = Vec::with_capacity(count);
+    let mut placed = Vec::with_capacity(count);
     let (mut below, mut last) = (0.0, None);
     let mut target = rng.random::<f64>() / count as f64 * total;
-    for triangle in triangles {
+    for (index, triangle) in triangles.iter().enumerate() {
         let size = area(triangle);
         below += size;
-        while points.len() < count && target < below {
-            points.push(uniform_in(triangle, &mut rng));
-            target = (points.len() as f64 + rng.random::<f64>()) / count as f64 * total;
+        while placed.len() < count && target < below {
+            placed.push(uniform_in(index, &mut rng));
+            target = (placed.len() as f64 + rng.random::<f64>()) / count as f64 * total;
         }
         if size > 0.0 {
-            last = Some(triangle);
+            last = Some(index);
         }
     }
     // The running sum may end a rounding below the total.
-    while let (true, Some(triangle)) = (points.len() < count, last) {
-        points.push(uniform_in(triangle, &mut rng));
+    while let (true, Some(index)) = (placed.len() < count, last) {
+        placed.push(uniform_in(index, &mut rng));
     }
-    Some(points)
+    Some(placed)
 }
 
-fn uniform_in(&[a, b, c]: &[Vec3; 3], rng: &mut Pcg64) -> Vec3 {
+fn uniform_in(triangle: usize, rng: &mut Pcg64) -> Placed {
     let root = rng.random::<f64>().sqrt();
     let v = rng.random::<f64>();
-    a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)
+    Placed { triangle, weights: [root * (1.0 - v), root * v] }
 }
 
 /// Mean, root mean square and percentiles of some values.

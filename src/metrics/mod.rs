@@ -9,17 +9,19 @@ mod envelope;
 mod evaluation;
 mod hausdorff;
 mod judge;
+mod lifted_axis;
 mod quality;
 mod spikes;
 mod union_topology;
 mod volume;
 
-pub use axis_distance::{AxisOptions, axis_distance};
+pub use axis_distance::{AxisOptions, COVERED, axis_distance};
 pub use certificate::{Certificate, FINEST, ROUNDING, certify};
 pub use counts::counts;
 pub use envelope::{EnvelopeOptions, sample_envelope};
 pub use evaluation::{
-    AxisDistances, Counts, Distances, Evaluation, RatioSpikes, Spikes, TriangleQuality,
+    AxisDistances, AxisSpan, Counts, Distances, Evaluation, RatioSpikes, SheetCoverage, Spikes,
+    TriangleQuality,
 };
 pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{Judge, JudgeOptions, Truth};
