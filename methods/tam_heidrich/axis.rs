@@ -21,10 +21,12 @@ pub(super) struct Axis {
     /// Relative volumes of the tetrahedra whose pole is nearest to this face, for a mesh whose
     /// spheres are no poles.
     pub(super) at_face: Vec<f64>,
+    /// The number of voids.
+    pub(super) b2: u64,
 }
 
 impl Axis {
-    /// An axis without volumes.
+    /// An axis whose volumes and voids are not known.
     pub(super) fn of_mesh(mesh: MedialMesh) -> Self {
         let incidence = Incidence::of(&mesh);
         // Spheres without edges stay as well as the ends of edges without faces.
@@ -38,7 +40,7 @@ impl Axis {
         }
         let at_sphere = vec![0.0; mesh.spheres.len()];
         let at_face = vec![0.0; mesh.faces.len()];
-        Self { mesh, incidence, on_curve, at_sphere, at_face }
+        Self { mesh, incidence, on_curve, at_sphere, at_face, b2: 0 }
     }
 
     /// The axis of a shape that the parameters ask for.
@@ -59,6 +61,7 @@ impl Axis {
             false => {
                 let mesh = shape.initial()?;
                 let mut axis = Self::of_mesh(mesh.as_ref().clone());
+                axis.b2 = betti(&axis.mesh)[2];
                 if let Some(contacts) = mesh.contacts.as_ref().filter(|_| !given) {
                     axis.at_sphere = volumes(contacts, 0..contacts.of_sphere.len());
                 }
@@ -128,6 +131,7 @@ fn of_union(
     diagnostics.count("facets_left_open", union.tally().open);
     diagnostics.count("doubtful_groups", union.tally().doubtful);
     let found = betti(&axis.mesh);
+    axis.b2 = found[2];
     if found != union.union_betti() {
         diagnostics.warn(format!(
             "the axis has Betti numbers {found:?}, the union of balls {:?}: rounding left {} facets \

@@ -63,7 +63,7 @@ use medial::simplifier::{
 };
 
 use axis::Axis;
-pub use params::{AxisChoice, List, TamHeidrichParams};
+pub use params::{AxisChoice, Checked, List, TamHeidrichParams};
 use parts::{Parts, Remaining};
 use schedule::Pruning;
 
@@ -133,9 +133,9 @@ struct Prepared {
 impl Simplification for Prepared {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let (t_v, enough) = self.schedule(level)?;
-        let all = Remaining::all(&self.axis);
-        let mut pruning = Pruning::new(all, self.diagnostics.clone(), &self.run, enough);
-        pruning.published(&self.params, &t_v)?;
+        let diagnostics = self.diagnostics.clone();
+        let mut pruning = Pruning::new(&self.axis, &self.params, diagnostics, &self.run, enough);
+        pruning.published(&t_v)?;
         if let Level::Spheres(count) = level {
             pruning.go_on(t_v.last().copied().unwrap_or(0.0))?;
             say_what_was_reached(&mut pruning, count);

@@ -15,6 +15,8 @@ pub struct TamHeidrichParams {
     pub drop: f64,
     /// `t_v`: for each of the later rounds, parts of at most this relative volume go; per cent.
     pub t_v: List<f64>,
+    /// Which rounds keep loops and components.
+    pub topology: Checked,
     /// The axis to work on.
     pub axis: AxisChoice,
     /// Ids of parts to remove in the end.
@@ -23,6 +25,18 @@ pub struct TamHeidrichParams {
     pub radius_factor: f64,
     /// How far a polar ball is moved at most along each axis, as a fraction of its radius.
     pub jitter: f64,
+}
+
+/// Which rounds keep loops and components.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Checked {
+    /// Those by volume, as published.
+    Volume,
+    /// All.
+    All,
+    /// None.
+    None,
 }
 
 /// The axis to work on.
@@ -85,6 +99,7 @@ impl Default for TamHeidrichParams {
             t_t_rounds: 3,
             drop: 0.25,
             t_v: List(vec![1.0, 1.0]),
+            topology: Checked::Volume,
             axis: AxisChoice::Auto,
             remove: List::default(),
             radius_factor: 1.002,
@@ -142,6 +157,12 @@ impl TamHeidrichParams {
                 t_v.join(","),
                 "per cent of the solid's volume, one for each round",
                 "then parts of at most this volume go, as far as topology allows",
+            ),
+            param(
+                "topology",
+                "volume".into(),
+                "volume | all | none",
+                "rounds that keep loops and components: those by volume, as published, all, or none",
             ),
             param(
                 "axis",

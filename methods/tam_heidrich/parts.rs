@@ -66,6 +66,19 @@ impl<'a> Remaining<'a> {
         (0..self.face_kept.len() as u32).filter(|&face| self.face_kept[face as usize])
     }
 
+    /// Betti numbers over `Z_2`, nearly linear. Parts of level 1 leave `b2` of the whole, whatever
+    /// else goes with them (step 3); `b0` is counted, and `b1` follows from the Euler number.
+    pub(super) fn betti(&self) -> [u64; 3] {
+        let (whole, b2) = (&self.axis.mesh, self.axis.b2);
+        let mut components = DisjointSets::singletons(whole.spheres.len());
+        let kept = whole.edges.iter().zip(&self.edge_kept).filter(|e| *e.1);
+        let edges = kept.inspect(|&(&[a, b], _)| drop(components.join(a, b))).count();
+        let b0 = components.len() - (whole.spheres.len() - self.spheres);
+        let euler = (self.spheres + self.faces().count()) as i64 - edges as i64;
+        let b1 = (b0 as u64 + b2).checked_add_signed(-euler).expect("a complex");
+        [b0 as u64, b1, b2]
+    }
+
     /// As a mesh of its own, in the order of the whole.
     pub(super) fn mesh(&self) -> MedialMesh {
         let whole = &self.axis.mesh;

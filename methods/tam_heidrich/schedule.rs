@@ -1,23 +1,23 @@
 //! Steps 4 and 5: rounds.
 //!
 //! A round decomposes what is there, sorts the parts of level 1 whose significance does not exceed the
-//! threshold, and removes them from the least significant on: in rounds by triangle count all, in
-//! rounds by volume those that keep loops and components, tested when their turn comes. No round
-//! removes a part that touches nothing, so that no component vanishes.
+//! threshold, and removes them from the least significant on: in rounds that do not check topology all,
+//! in the others those that keep loops and components, tested when their turn comes. No round removes a
+//! part that touches nothing, so that no component vanishes.
 
-use medial::complex::betti;
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
+use super::axis::Axis;
 use super::graph::Graph;
-use super::params::TamHeidrichParams;
+use super::params::{Checked, TamHeidrichParams};
 use super::parts::{Parts, Remaining};
 
-/// What a round removes.
+/// What a round removes at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Measure {
-    /// Parts of at most so many triangles, whatever their removal does to the topology.
+    /// Parts of at most so many triangles.
     Triangles(usize),
-    /// Parts of at most this relative volume in per cent, as far as the topology stays.
+    /// Parts of at most this relative volume in per cent.
     Volume(f64),
 }
 
@@ -28,6 +28,7 @@ pub(super) struct Pruning<'a> {
     pub(super) parts: Parts,
     pub(super) diagnostics: Diagnostics,
     run: &'a RunContext,
+    params: &'a TamHeidrichParams,
     /// Rounds end as soon as so many spheres are left.
     enough: usize,
     rounds: usize,
@@ -37,14 +38,16 @@ pub(super) struct Pruning<'a> {
 
 impl<'a> Pruning<'a> {
     pub(super) fn new(
-        remaining: Remaining<'a>,
+        axis: &'a Axis,
+        params: &'a TamHeidrichParams,
         diagnostics: Diagnostics,
         run: &'a RunContext,
         enough: usize,
     ) -> Self {
+        let remaining = Remaining::all(axis);
         let parts = Parts::of(&remaining);
         let (rounds, t_v) = (0, None);
-        let mut pruning = Self { remaining, parts, diagnostics, run, enough, rounds, t_v };
+        let mut pruning = Self { remaining, parts, diagnostics, run, params, enough, rounds, t_v };
         pruning.report("start", &[]);
         pruning
     }
@@ -61,11 +64,9 @@ impl<'a> Pruning<'a> {
 
     /// The published schedule: rounds by triangle count until they bring little, then one round for
     /// each `t_v`.
-    pub(super) fn published(
-        &mut self,
-        params: &TamHeidrichParams,
-        t_v: &[f64],
-    ) -> Result<(), SimplifyError> {
+    pub(super) fn published(&mut self, t_v: &[f64]) -> Result<(), SimplifyError> {
+        let params = self.params;
+        let whole = self.remaining.betti();
         let mut before = 0;
         for k in 0..params.t_t_rounds {
             let removed = self.round(Measure::Triangles(params.t_t))?;
@@ -77,6 +78,13 @@ impl<'a> Pruning<'a> {
         }
         for &t in t_v {
             self.round(Measure::Volume(t))?;
+        }
+        let left = self.remaining.betti();
+        if left != whole {
+            self.diagnostics.warn(format!(
+                "rounds that do not check topology, as published, changed the Betti numbers from \
+                 {whole:?} to {left:?}; topology=all keeps them"
+            ));
         }
         Ok(())
     }
@@ -100,7 +108,11 @@ impl<'a> Pruning<'a> {
         }
         self.run.step(self.rounds, self.rounds + 1)?;
         let candidates = self.candidates(measure);
-        let checked = matches!(measure, Measure::Volume(_));
+        let checked = match self.params.topology {
+            Checked::Volume => matches!(measure, Measure::Volume(_)),
+            Checked::All => true,
+            Checked::None => false,
+        };
         let graph = checked.then(|| Graph::of(&self.parts, &self.remaining));
         let (mut removed, mut refused, mut leaves) = (0, 0, 0);
         for (done, &part) in candidates.iter().enumerate() {
@@ -162,7 +174,7 @@ impl<'a> Pruning<'a> {
 
     /// Counts of a round, and what it left.
     fn report(&mut self, name: &str, counts: &[(&str, usize)]) {
-        let [b0, b1, b2] = betti(&self.remaining.mesh()).map(|b| b as usize);
+        let [b0, b1, b2] = self.remaining.betti().map(|b| b as usize);
         let level_1 = self.parts.free.iter().filter(|&&free| free).count();
         let left = [
             ("parts", self.parts.len()),
