@@ -7,6 +7,7 @@ use medial::metrics::enclosed_volume;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
+use super::merge;
 use super::params::{AxisChoice, TamHeidrichParams};
 use crate::perturb::perturbed;
 
@@ -120,14 +121,20 @@ fn of_union(
     run.step(0, 1)?;
     let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
     let union = UnionAxis::of_balls(&spheres).map_err(ShapeError::from)?;
-    let mut axis = Axis::of_mesh(union.mesh());
+    let whole = union.mesh();
+    let (mesh, into) = merge::merged(&whole, params.merge, run)?;
+    let mut axis = Axis::of_mesh(mesh);
     if let Some(contacts) = balls.contacts.as_ref().filter(|_| !shape.has_given_initial()) {
         // The first vertices of the axis are centres of balls.
         let poles = union.balls().iter().map(|&ball| ball as usize);
-        axis.at_sphere[..union.balls().len()].copy_from_slice(&volumes(contacts, poles));
+        for (volume, &v) in volumes(contacts, poles).into_iter().zip(&into) {
+            axis.at_sphere[v as usize] += volume;
+        }
     }
     diagnostics.count("balls", spheres.len());
     diagnostics.count("balls_on_the_axis", union.balls().len());
+    diagnostics.count("vertices", whole.spheres.len());
+    diagnostics.count("vertices_merged", whole.spheres.len() - axis.mesh.spheres.len());
     diagnostics.count("facets_left_open", union.tally().open);
     diagnostics.count("doubtful_groups", union.tally().doubtful);
     let found = betti(&axis.mesh);

@@ -25,6 +25,8 @@ pub struct TamHeidrichParams {
     pub radius_factor: f64,
     /// How far a polar ball is moved at most along each axis, as a fraction of its radius.
     pub jitter: f64,
+    /// Vertices of the axis nearer than this are one, as a fraction of the radius.
+    pub merge: f64,
 }
 
 /// Which rounds keep loops and components.
@@ -104,6 +106,7 @@ impl Default for TamHeidrichParams {
             remove: List::default(),
             radius_factor: 1.002,
             jitter: 1e-4,
+            merge: 1e-3,
         }
     }
 }
@@ -114,6 +117,7 @@ impl TamHeidrichParams {
             ("drop", self.drop, 0.0..=1.0),
             ("radius_factor", self.radius_factor, 0.5..=2.0),
             ("jitter", self.jitter, 0.0..=0.1),
+            ("merge", self.merge, 0.0..=0.1),
         ];
         let t_v = self.t_v.0.iter().map(|&t| ("t_v", t, 0.0..=100.0));
         for (name, value, range) in ranges.into_iter().chain(t_v) {
@@ -190,6 +194,12 @@ impl TamHeidrichParams {
                 format!("{:?}", default.jitter),
                 "fraction of the radius",
                 "polar balls are moved by at most this along each axis, seeded",
+            ),
+            param(
+                "merge",
+                default.merge.to_string(),
+                "fraction of the radius",
+                "vertices of their axis that are nearer than this are one, as far as topology allows",
             ),
         ]
     }

@@ -72,7 +72,11 @@ impl<'a> Remaining<'a> {
         let (whole, b2) = (&self.axis.mesh, self.axis.b2);
         let mut components = DisjointSets::singletons(whole.spheres.len());
         let kept = whole.edges.iter().zip(&self.edge_kept).filter(|e| *e.1);
-        let edges = kept.inspect(|&(&[a, b], _)| drop(components.join(a, b))).count();
+        let edges = kept
+            .inspect(|&(&[a, b], _)| {
+                components.join(a, b);
+            })
+            .count();
         let b0 = components.len() - (whole.spheres.len() - self.spheres);
         let euler = (self.spheres + self.faces().count()) as i64 - edges as i64;
         let b1 = (b0 as u64 + b2).checked_add_signed(-euler).expect("a complex");

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere, UnionAxis, betti};
-use medial::simplifier::{Params, SimplifyError};
+use medial::simplifier::{Params, RunContext, SimplifyError};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::TamHeidrichParams;
 use super::axis::Axis;
 use super::graph::{Graph, levels};
+use super::merge;
 use super::parts::{Parts, Remaining};
 
 fn complex(n: usize, edges: Vec<[u32; 2]>, faces: Vec<[u32; 3]>) -> MedialMesh {
@@ -180,6 +181,36 @@ fn the_exact_test_is_that_of_homology_by_brute_force() {
 }
 
 #[test]
+fn merging_duplicate_vertices_keeps_the_topology() {
+    let mut rng = Pcg64::seed_from_u64(74);
+    let mut gone = 0;
+    for _ in 0..150 {
+        let n = rng.random_range(4..60);
+        let largest = [0.2, 0.4, 0.7][rng.random_range(0..3usize)];
+        let mut x = || rng.random_range(-1.0..1.0);
+        let balls: Vec<Sphere> = (0..n)
+            .map(|_| Sphere::new(Vec3::new(x(), x(), x()), 0.02 + largest * x().abs()))
+            .collect();
+        let whole = UnionAxis::of_balls(&balls).expect("balls").mesh();
+        for merge in [0.0, 0.03, 0.1, 0.5] {
+            let (mesh, into) = merge::merged(&whole, merge, &RunContext::default()).expect("run");
+            mesh.check().expect("a valid complex");
+            assert_eq!(betti(&mesh), betti(&whole), "{balls:?}");
+            // Each sphere that is left is the first of those that went into it.
+            let mut first = vec![usize::MAX; mesh.spheres.len()];
+            for (old, &new) in into.iter().enumerate() {
+                first[new as usize] = first[new as usize].min(old);
+            }
+            let of_whole: Vec<Sphere> = first.iter().map(|&v| whole.spheres[v]).collect();
+            assert_eq!(of_whole, mesh.spheres);
+            assert!(merge > 0.0 || mesh == whole);
+            gone += whole.spheres.len() - mesh.spheres.len();
+        }
+    }
+    assert!(gone > 1_000, "{gone}");
+}
+
+#[test]
 fn betti_numbers_agree_with_brute_force() {
     let mut rng = Pcg64::seed_from_u64(72);
     for _ in 0..300 {
@@ -298,6 +329,7 @@ fn parameters_are_checked() {
         ("remove", "-3"),
         ("radius_factor", "0"),
         ("jitter", "1"),
+        ("merge", "1"),
         ("t_t", "1.5"),
     ] {
         let error = typed(key, value);
