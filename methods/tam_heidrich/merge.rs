@@ -28,9 +28,12 @@ pub(super) fn merged(
     let mut complex = CollapseComplex::from_mesh(mesh);
     let mut into: Vec<u32> = (0..mesh.spheres.len() as u32).collect();
     let mut done = 0;
-    loop {
-        let before = done;
-        for [kept, removed] in short_edges(&complex, merge) {
+    // Spheres at which something changed in the pass before: elsewhere the answers are the same.
+    let mut changed: Vec<u32> = complex.vertices().collect();
+    while !changed.is_empty() {
+        let edges = short_edges(&complex, &changed, merge);
+        changed.clear();
+        for [kept, removed] in edges {
             let is_edge = complex.is_alive(kept)
                 && complex.is_alive(removed)
                 && complex.neighbours(removed).contains(&kept);
@@ -38,15 +41,17 @@ pub(super) fn merged(
                 let sphere = complex.sphere(kept);
                 complex.collapse(kept, removed, sphere);
                 into[removed as usize] = kept;
+                changed.push(kept);
+                changed.extend(complex.neighbours(kept));
                 done += 1;
                 if done % 4096 == 0 {
                     run.step(done, mesh.spheres.len())?;
                 }
             }
         }
-        if done == before {
-            break;
-        }
+        changed.retain(|&v| complex.is_alive(v));
+        changed.sort_unstable();
+        changed.dedup();
     }
     let mut number = vec![u32::MAX; mesh.spheres.len()];
     complex.vertices().zip(0..).for_each(|(old, new)| number[old as usize] = new);
@@ -57,16 +62,20 @@ pub(super) fn merged(
     Ok((complex.to_mesh(), into))
 }
 
-/// Ascending pairs, the shortest first.
-fn short_edges(complex: &CollapseComplex, merge: f64) -> Vec<[u32; 2]> {
-    let length = |[a, b]: [u32; 2]| {
-        let (a, b) = (complex.sphere(a), complex.sphere(b));
-        let length = a.centre.distance(b.centre);
-        (length <= merge * a.radius.min(b.radius)).then_some(length)
-    };
-    let ascending = complex.edges().map(|[a, b]| [a.min(b), a.max(b)]);
-    let mut short: Vec<(f64, [u32; 2])> =
-        ascending.filter_map(|edge| Some((length(edge)?, edge))).collect();
-    short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+/// The short edges at some spheres as ascending pairs, the shortest first.
+fn short_edges(complex: &CollapseComplex, at: &[u32], merge: f64) -> Vec<[u32; 2]> {
+    let mut short: Vec<(f64, [u32; 2])> = Vec::new();
+    for &v in at {
+        let a = complex.sphere(v);
+        for &w in complex.neighbours(v) {
+            let b = complex.sphere(w);
+            let length = a.centre.distance(b.centre);
+            if length <= merge * a.radius.min(b.radius) {
+                short.push((length, [v.min(w), v.max(w)]));
+            }
+        }
+    }
+    short.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    short.dedup();
     short.into_iter().map(|s| s.1).collect()
 }
