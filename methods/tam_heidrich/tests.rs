@@ -155,9 +155,9 @@ fn the_exact_test_is_that_of_homology_by_brute_force() {
                 assert_eq!(parts.is_removable(p), vanishes, "{:?}", axis.mesh);
                 assert_eq!(vanishes, same && parts.has_contact(p), "{:?}", axis.mesh);
                 if vanishes {
-                    kept += 1
+                    kept += 1;
                 } else {
-                    lost += 1
+                    lost += 1;
                 }
                 if is_first {
                     assert!(!vanishes || graph.is_leaf[p], "{:?}", axis.mesh);
