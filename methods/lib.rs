@@ -10,12 +10,14 @@ pub mod aof;
 pub mod dey_zhao;
 pub mod hem;
 pub mod lambda;
+mod perturb;
 pub mod pmat;
 pub mod qmat;
 mod ranked;
 mod ranked_facets;
 pub mod sat;
 pub mod sat_pairwise;
+pub mod tam_heidrich;
 
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
@@ -28,6 +30,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(hem::Hem::new()),
         Box::new(sat::Sat::new()),
         Box::new(sat_pairwise::SatPairwise::new()),
+        Box::new(tam_heidrich::TamHeidrich::new()),
         Box::new(aof::AverageOutwardFlux::new()),
     ]
 }

@@ -252,6 +252,27 @@ pub struct Extras {
     /// All levels of the method at once. [`MedialSimplifier::resume`] of the same method goes on
     /// from it without the shape.
     pub hierarchy: Option<Arc<Hierarchy>>,
+    /// The parts that the medial mesh was decomposed into, by id.
+    pub parts: Option<Vec<PartInfo>>,
+}
+
+/// A part of a medial mesh, for methods that decompose it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartInfo {
+    /// Consecutive from 0, the largest part first.
+    pub id: u32,
+    /// 1 at a free edge, 2 beside a part of level 1, and so on; 0 where no free edge can be reached.
+    pub level: u32,
+    /// Number of faces.
+    pub triangles: usize,
+    /// Volume of the feature that the part stands for, as a fraction of the solid's.
+    pub volume: f64,
+    /// Centroid, in normalised units.
+    pub centre: [f64; 3],
+    /// Whether removing it leaves components and loops of the whole as they are.
+    pub removable: bool,
+    /// Whether it was removed on demand, and is not in the medial mesh any more.
+    pub removed: bool,
 }
 
 /// How the work of one level relates to earlier levels; decides what counts into its seconds.

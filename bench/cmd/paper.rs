@@ -91,8 +91,8 @@ fn list(exhibits: &[Exhibit], global: &Global) {
         return;
     }
     for exhibit in exhibits {
-        print_line(&format!("{:<16} {}", exhibit.id, exhibit.source));
-        print_line(&format!("{:<16} {}", "", exhibit.shows));
+        print_line(&format!("{:<22} {}", exhibit.id, exhibit.source));
+        print_line(&format!("{:<22} {}", "", exhibit.shows));
     }
 }
 

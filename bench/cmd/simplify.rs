@@ -7,7 +7,8 @@ use medial::complex;
 use medial::metrics::JudgeOptions;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError, Work,
+    Level, MedialSimplifier, Params, PartInfo, RunContext, Simplification, Simplified,
+    SimplifyError, Work,
 };
 use medial_reports::{Simplify, Stages, Status};
 use serde::Serialize;
@@ -119,14 +120,30 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         if let Some(search) = &search {
             object["max_error"] = serde_json::to_value(search).map_err(Failure::input)?;
         }
+        if let Some(parts) = &simplified.extras.parts {
+            object["parts"] = in_input_units(parts, &shape).map_err(Failure::input)?;
+        }
         print_json(&object, &warnings);
     } else {
         print_result(&simplify, search.as_ref(), arguments);
+        if let Some(parts) = &simplified.extras.parts {
+            print_line(&format!("  {}, listed by --json", counted(parts.len() as u64, "part")));
+        }
         for warning in simplify.warnings.iter().chain(&warnings) {
             print_line(&format!("  warning: {warning}"));
         }
     }
     Ok(Exit::Done)
+}
+
+/// The list of parts with their centres as in the input.
+fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde_json::Value> {
+    let back = shape.normalisation();
+    let carried = |part: &PartInfo| PartInfo {
+        centre: back.backward(part.centre.into()).to_array(),
+        ..part.clone()
+    };
+    serde_json::to_value(parts.iter().map(carried).collect::<Vec<_>>())
 }
 
 /// A method that does not answer, or anything else that went wrong.

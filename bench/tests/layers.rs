@@ -40,7 +40,18 @@ fn crates_depend_in_one_direction() {
 #[test]
 fn methods_do_not_see_each_other() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../methods");
-    let ids = ["angle", "aof", "dey_zhao", "hem", "lambda", "pmat", "qmat", "sat", "sat_pairwise"];
+    let ids = [
+        "angle",
+        "aof",
+        "dey_zhao",
+        "hem",
+        "lambda",
+        "pmat",
+        "qmat",
+        "sat",
+        "sat_pairwise",
+        "tam_heidrich",
+    ];
     let mut folders = vec![std::path::PathBuf::from(root)];
     let mut read = 0;
     while let Some(folder) = folders.pop() {

@@ -245,7 +245,7 @@ impl Simplification for Levels {
             native_level: scale.is_finite().then_some(scale),
             work: Work::Anew,
             diagnostics: self.diagnose(level, stage),
-            extras: Extras { hierarchy: Some(Arc::clone(&self.hierarchy)) },
+            extras: Extras { hierarchy: Some(Arc::clone(&self.hierarchy)), ..Extras::default() },
         })
     }
 }

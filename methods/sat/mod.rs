@@ -7,7 +7,7 @@
 //!
 //! 1. The shape as a union of balls: the inner polar balls of its samples.
 //! 2. Radii times 1.002, centres moved by up to `1e-4 r`, so that balls that touch in a sample
-//!    overlap in general position (the authors' tool; file `perturb.rs`).
+//!    overlap in general position (the authors' tool; `methods/perturb.rs`).
 //! 3. Every radius is multiplied by the scale `s`.
 //! 4. The medial axis of the union of the grown balls, exact ([`UnionAxis`]). A ball that the union of
 //!    others covers contributes nothing.
@@ -32,7 +32,6 @@
 //!   request is answered anew, so that its seconds are those of this request alone.
 
 mod params;
-mod perturb;
 mod search;
 mod sheets;
 #[cfg(test)]
@@ -45,6 +44,7 @@ use medial::simplifier::{
     Simplification, Simplified, SimplifyError, Work,
 };
 
+use crate::perturb::perturbed;
 pub use params::SatParams;
 
 /// Scale of [`Level::Published`]: the default of the authors' tool.
@@ -102,7 +102,7 @@ impl MedialSimplifier for Sat {
         let params = params.typed::<SatParams>()?.validate()?;
         let balls = shape.inner_balls()?;
         run.step(0, balls.spheres.len())?;
-        let spheres = perturb::perturbed(&balls.spheres, &params, run.seed);
+        let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
         Ok(Box::new(Prepared { spheres, params, run: run.clone() }))
     }
 }

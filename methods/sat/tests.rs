@@ -6,7 +6,7 @@ use medial::simplifier::{Params, SimplifyError};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::{SatParams, perturb, sheets};
+use super::{SatParams, perturbed, sheets};
 
 #[test]
 fn the_angle_filter_changes_no_topology() {
@@ -63,17 +63,16 @@ fn edges_without_facets_stay() {
 fn perturbation_is_as_large_as_said_and_seeded() {
     let balls: Vec<Sphere> =
         (1..100).map(|k| Sphere::new(Vec3::splat(f64::from(k)), f64::from(k))).collect();
-    let params = SatParams::default();
-    let moved = perturb::perturbed(&balls, &params, 7);
-    assert_eq!(moved, perturb::perturbed(&balls, &params, 7));
-    assert_ne!(moved, perturb::perturbed(&balls, &params, 8));
+    let SatParams { radius_factor, jitter, .. } = SatParams::default();
+    let moved = perturbed(&balls, radius_factor, jitter, 7);
+    assert_eq!(moved, perturbed(&balls, radius_factor, jitter, 7));
+    assert_ne!(moved, perturbed(&balls, radius_factor, jitter, 8));
     for (a, b) in balls.iter().zip(&moved) {
         assert!((b.radius / a.radius - 1.002).abs() < 1e-15);
         let offset = (b.centre - a.centre).abs().max_element() / a.radius;
         assert!(offset > 0.0 && offset <= 1e-4 * (1.0 + 1e-9));
     }
-    let pure = SatParams { radius_factor: 1.0, jitter: 0.0, ..params };
-    assert_eq!(perturb::perturbed(&balls, &pure, 7), balls);
+    assert_eq!(perturbed(&balls, 1.0, 0.0, 7), balls);
 }
 
 #[test]

@@ -1,0 +1,162 @@
+//! Steps 1 and 2: the axis that is pruned, and the volume that each of its simplices stands for.
+
+use medial::Vec3;
+use medial::complex::{Contacts, Incidence, MedialMesh, UnionAxis, betti};
+use medial::geometry::TriangleBvh;
+use medial::metrics::enclosed_volume;
+use medial::shape::{Shape, ShapeError};
+use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+
+use super::merge;
+use super::params::{AxisChoice, TamHeidrichParams};
+use crate::perturb::perturbed;
+
+/// A medial mesh with all that pruning asks of it.
+pub(super) struct Axis {
+    pub(super) mesh: MedialMesh,
+    pub(super) incidence: Incidence,
+    /// Whether a sphere is the end of an edge that has no face, or has no edge: it stays.
+    pub(super) on_curve: Vec<bool>,
+    /// Relative volumes of the tetrahedra whose pole is this sphere.
+    pub(super) at_sphere: Vec<f64>,
+    /// Relative volumes of the tetrahedra whose pole is nearest to this face, for a mesh whose
+    /// spheres are no poles.
+    pub(super) at_face: Vec<f64>,
+    /// The number of voids.
+    pub(super) b2: u64,
+}
+
+impl Axis {
+    /// An axis whose volumes and voids are not known.
+    pub(super) fn of_mesh(mesh: MedialMesh) -> Self {
+        let incidence = Incidence::of(&mesh);
+        // Spheres without edges stay as well as the ends of edges without faces.
+        let mut on_curve = vec![true; mesh.spheres.len()];
+        let edges = || mesh.edges.iter().zip(incidence.faces_at());
+        for v in edges().filter(|e| *e.1 > 0).flat_map(|e| e.0) {
+            on_curve[*v as usize] = false;
+        }
+        for v in edges().filter(|e| *e.1 == 0).flat_map(|e| e.0) {
+            on_curve[*v as usize] = true;
+        }
+        let at_sphere = vec![0.0; mesh.spheres.len()];
+        let at_face = vec![0.0; mesh.faces.len()];
+        Self { mesh, incidence, on_curve, at_sphere, at_face, b2: 0 }
+    }
+
+    /// The axis of a shape that the parameters ask for.
+    pub(super) fn of_shape(
+        shape: &Shape,
+        params: &TamHeidrichParams,
+        run: &RunContext,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<Self, SimplifyError> {
+        let given = shape.has_given_initial();
+        let from_union = match params.axis {
+            AxisChoice::Auto => !given,
+            AxisChoice::Union => true,
+            AxisChoice::Initial => false,
+        };
+        let mut axis = match from_union {
+            true => of_union(shape, params, run, diagnostics)?,
+            false => {
+                let mesh = shape.initial()?;
+                let mut axis = Self::of_mesh(mesh.as_ref().clone());
+                axis.b2 = betti(&axis.mesh)[2];
+                if let Some(contacts) = mesh.contacts.as_ref().filter(|_| !given) {
+                    axis.at_sphere = volumes(contacts, 0..contacts.of_sphere.len());
+                }
+                axis
+            }
+        };
+        run.step(0, 1)?;
+        if given {
+            axis.share_out(shape)?;
+            diagnostics.warn(
+                "the given medial mesh has no poles: each interior Delaunay tetrahedron of the \
+                 samples counts for the part nearest to its circumcentre",
+            );
+        }
+        let whole = enclosed_volume(shape.mesh());
+        if whole > 0.0 {
+            axis.at_sphere.iter_mut().chain(&mut axis.at_face).for_each(|v| *v /= whole);
+        }
+        Ok(axis)
+    }
+
+    /// Gives each face the volume of the interior tetrahedra whose circumcentre it is nearest to.
+    fn share_out(&mut self, shape: &Shape) -> Result<(), SimplifyError> {
+        if self.mesh.faces.is_empty() {
+            return Ok(());
+        }
+        let delaunay = shape.delaunay()?;
+        let cells = shape.cells()?;
+        let centre = |v: u32| self.mesh.spheres[v as usize].centre;
+        let mut targets: Vec<[Vec3; 3]> =
+            self.mesh.faces.iter().map(|face| face.map(centre)).collect();
+        // What is nearest to a curve belongs to no part.
+        let curves = self.mesh.edges.iter().zip(self.incidence.faces_at()).filter(|e| *e.1 == 0);
+        targets.extend(curves.map(|(&[a, b], _)| [centre(a), centre(b), centre(b)]));
+        let tree = TriangleBvh::from_triangles(&targets).map_err(ShapeError::from)?;
+        let inside: Vec<_> = delaunay.finite_cells().filter(|&c| cells.is_inside(c)).collect();
+        let circumcentre = |&c| delaunay.circumsphere(c).map_or(Vec3::ZERO, |s| s.0);
+        let centres: Vec<Vec3> = inside.iter().map(circumcentre).collect();
+        for (cell, nearest) in inside.iter().zip(tree.closest_batch(&centres)) {
+            if let Some(volume) = self.at_face.get_mut(nearest.face as usize) {
+                *volume += tetrahedron(delaunay.vertices(*cell).map(|v| delaunay.point(v)));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The exact axis of the union of the perturbed balls.
+fn of_union(
+    shape: &Shape,
+    params: &TamHeidrichParams,
+    run: &RunContext,
+    diagnostics: &mut Diagnostics,
+) -> Result<Axis, SimplifyError> {
+    let balls = shape.inner_balls()?;
+    run.step(0, 1)?;
+    let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
+    let union = UnionAxis::of_balls(&spheres).map_err(ShapeError::from)?;
+    let whole = union.mesh();
+    let (mesh, into) = merge::merged(&whole, params.merge, run)?;
+    let mut axis = Axis::of_mesh(mesh);
+    if let Some(contacts) = balls.contacts.as_ref().filter(|_| !shape.has_given_initial()) {
+        // The first vertices of the axis are centres of balls.
+        let poles = union.balls().iter().map(|&ball| ball as usize);
+        for (volume, &v) in volumes(contacts, poles).into_iter().zip(&into) {
+            axis.at_sphere[v as usize] += volume;
+        }
+    }
+    diagnostics.count("balls", spheres.len());
+    diagnostics.count("balls_on_the_axis", union.balls().len());
+    diagnostics.count("vertices", whole.spheres.len());
+    diagnostics.count("vertices_merged", whole.spheres.len() - axis.mesh.spheres.len());
+    diagnostics.count("facets_left_open", union.tally().open);
+    diagnostics.count("doubtful_groups", union.tally().doubtful);
+    let found = betti(&axis.mesh);
+    axis.b2 = found[2];
+    if found != union.union_betti() {
+        diagnostics.warn(format!(
+            "the axis has Betti numbers {found:?}, the union of balls {:?}: rounding left {} facets \
+             open and {} groups of vertices in doubt",
+            union.union_betti(),
+            union.tally().open,
+            union.tally().doubtful
+        ));
+    }
+    Ok(axis)
+}
+
+/// The volumes of the Delaunay tetrahedra of some poles.
+fn volumes(contacts: &Contacts, poles: impl Iterator<Item = usize>) -> Vec<f64> {
+    let corners = |pole: usize| contacts.of_sphere[pole].map(|s| contacts.samples[s as usize]);
+    poles.map(|pole| tetrahedron(corners(pole))).collect()
+}
+
+fn tetrahedron([a, b, c, d]: [Vec3; 4]) -> f64 {
+    (b - a).dot((c - a).cross(d - a)).abs() / 6.0
+}

@@ -1,0 +1,191 @@
+//! Steps 4 and 5: rounds.
+//!
+//! A round decomposes what is there, sorts the parts of level 1 whose significance does not exceed the
+//! threshold, and removes them from the least significant on: in rounds that do not check topology all,
+//! in the others those that keep loops and components, tested when their turn comes. No round removes a
+//! part that touches nothing, so that no component vanishes.
+
+use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+
+use super::axis::Axis;
+use super::graph::Graph;
+use super::params::{Checked, TamHeidrichParams};
+use super::parts::{Parts, Remaining};
+
+/// What a round removes at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Measure {
+    /// Parts of at most so many triangles.
+    Triangles(usize),
+    /// Parts of at most this relative volume in per cent.
+    Volume(f64),
+}
+
+/// Pruning in progress.
+pub(super) struct Pruning<'a> {
+    pub(super) remaining: Remaining<'a>,
+    /// The decomposition of what remains.
+    pub(super) parts: Parts,
+    pub(super) diagnostics: Diagnostics,
+    run: &'a RunContext,
+    params: &'a TamHeidrichParams,
+    /// Rounds end as soon as so many spheres are left.
+    enough: usize,
+    rounds: usize,
+    /// The `t_v` of the last round, if it was one by volume.
+    pub(super) t_v: Option<f64>,
+}
+
+impl<'a> Pruning<'a> {
+    pub(super) fn new(
+        axis: &'a Axis,
+        params: &'a TamHeidrichParams,
+        diagnostics: Diagnostics,
+        run: &'a RunContext,
+        enough: usize,
+    ) -> Self {
+        let remaining = Remaining::all(axis);
+        let parts = Parts::of(&remaining);
+        let (rounds, t_v) = (0, None);
+        let mut pruning = Self { remaining, parts, diagnostics, run, params, enough, rounds, t_v };
+        pruning.report("start", &[]);
+        pruning
+    }
+
+    /// Whether so many spheres are left as were asked for, or fewer.
+    pub(super) fn is_enough(&self) -> bool {
+        self.remaining.spheres <= self.enough
+    }
+
+    /// Whether no round took place.
+    pub(super) fn is_untouched(&self) -> bool {
+        self.rounds == 0
+    }
+
+    /// The published schedule: rounds by triangle count until they bring little, then one round for
+    /// each `t_v`.
+    pub(super) fn published(&mut self, t_v: &[f64]) -> Result<(), SimplifyError> {
+        let params = self.params;
+        let whole = self.remaining.betti();
+        let mut before = 0;
+        for k in 0..params.t_t_rounds {
+            let removed = self.round(Measure::Triangles(params.t_t))?;
+            // Nothing removed: the next round would find the same parts.
+            if removed == 0 || k > 0 && (removed as f64) < params.drop * before as f64 {
+                break;
+            }
+            before = removed;
+        }
+        for &t in t_v {
+            self.round(Measure::Volume(t))?;
+        }
+        let left = self.remaining.betti();
+        if left != whole {
+            self.diagnostics.warn(format!(
+                "rounds that do not check topology, as published, changed the Betti numbers from \
+                 {whole:?} to {left:?}; topology=all keeps them"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Further rounds by volume, with twice the threshold each, until nothing can go.
+    pub(super) fn go_on(&mut self, mut t_v: f64) -> Result<(), SimplifyError> {
+        // Every round at 100 per cent but the last removes something.
+        loop {
+            let last = t_v >= 100.0;
+            t_v = (2.0 * t_v).clamp(1.0, 100.0);
+            if self.is_enough() || self.round(Measure::Volume(t_v))? == 0 && last {
+                return Ok(());
+            }
+        }
+    }
+
+    /// One round; the number of parts removed.
+    fn round(&mut self, measure: Measure) -> Result<usize, SimplifyError> {
+        if self.is_enough() {
+            return Ok(0);
+        }
+        self.run.step(self.rounds, self.rounds + 1)?;
+        let candidates = self.candidates(measure);
+        let checked = match self.params.topology {
+            Checked::Volume => matches!(measure, Measure::Volume(_)),
+            Checked::All => true,
+            Checked::None => false,
+        };
+        let graph = checked.then(|| Graph::of(&self.parts, &self.remaining));
+        let (mut removed, mut refused, mut leaves) = (0, 0, 0);
+        for (done, &part) in candidates.iter().enumerate() {
+            if self.is_enough() {
+                break;
+            }
+            if done % 4096 == 4095 {
+                self.run.step(done, candidates.len())?;
+            }
+            let may_go = match checked {
+                true => self.parts.is_removable(part),
+                false => self.parts.has_contact(part),
+            };
+            if may_go {
+                self.parts.remove(part, &mut self.remaining);
+                removed += 1;
+            } else {
+                refused += 1;
+                leaves += usize::from(graph.as_ref().is_some_and(|g| g.is_leaf[part]));
+            }
+        }
+        self.rounds += 1;
+        self.t_v = match measure {
+            Measure::Volume(t) => Some(t),
+            Measure::Triangles(_) => None,
+        };
+        let name = format!("round_{}", self.rounds);
+        let mut counts = vec![("removed", removed), ("refused", refused)];
+        if let Some(graph) = graph {
+            let of_graph = [("nodes", graph.nodes), ("graph_loops", graph.loops)];
+            counts.extend(of_graph.into_iter().chain([("refused_leaves", leaves)]));
+        }
+        if removed > 0 {
+            self.parts = Parts::of(&self.remaining);
+        }
+        self.report(&name, &counts);
+        Ok(removed)
+    }
+
+    /// The parts of level 1 within the threshold, the least significant first.
+    fn candidates(&self, measure: Measure) -> Vec<usize> {
+        let parts = &self.parts;
+        let free = (0..parts.len()).filter(|&p| parts.free[p]);
+        match measure {
+            Measure::Triangles(most) => {
+                let mut small: Vec<usize> =
+                    free.filter(|&p| parts.faces(p).len() <= most).collect();
+                small.sort_by_key(|&p| (parts.faces(p).len(), p));
+                small
+            }
+            Measure::Volume(t) => {
+                let mut small: Vec<usize> =
+                    free.filter(|&p| 100.0 * parts.volume[p] <= t).collect();
+                small.sort_by(|&p, &q| parts.volume[p].total_cmp(&parts.volume[q]).then(p.cmp(&q)));
+                small
+            }
+        }
+    }
+
+    /// Counts of a round, and what it left.
+    fn report(&mut self, name: &str, counts: &[(&str, usize)]) {
+        let [b0, b1, b2] = self.remaining.betti().map(|b| b as usize);
+        let level_1 = self.parts.free.iter().filter(|&&free| free).count();
+        let left = [
+            ("parts", self.parts.len()),
+            ("parts_of_level_1", level_1),
+            ("spheres", self.remaining.spheres),
+            ("b0", b0),
+            ("b1", b1),
+            ("b2", b2),
+        ];
+        for (key, value) in counts.iter().copied().chain(left) {
+            self.diagnostics.count(&format!("{name}_{key}"), value);
+        }
+    }
+}

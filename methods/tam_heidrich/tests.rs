@@ -1,0 +1,342 @@
+//! The exact test against homology by brute force, parts by hand, parameters.
+
+use std::collections::BTreeSet;
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, Sphere, UnionAxis, betti};
+use medial::simplifier::{Params, RunContext, SimplifyError};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::TamHeidrichParams;
+use super::axis::Axis;
+use super::graph::{Graph, levels};
+use super::merge;
+use super::parts::{Parts, Remaining};
+
+fn complex(n: usize, edges: Vec<[u32; 2]>, faces: Vec<[u32; 3]>) -> MedialMesh {
+    let spheres = (0..n).map(|i| Sphere::new(Vec3::splat(i as f64), 1.0)).collect();
+    MedialMesh::from_simplices(spheres, edges, faces).expect("a complex")
+}
+
+/// Rank over two elements by elimination on rows of bits.
+fn rank(mut rows: Vec<u128>) -> usize {
+    let mut rank = 0;
+    while let Some(row) = rows.pop() {
+        if row != 0 {
+            rank += 1;
+            let lowest = row & row.wrapping_neg();
+            rows.iter_mut().filter(|r| **r & lowest != 0).for_each(|r| *r ^= row);
+        }
+    }
+    rank
+}
+
+/// A set of simplices, each the set of its vertices.
+type Simplices = BTreeSet<Vec<u32>>;
+
+fn simplices(mesh: &MedialMesh) -> Simplices {
+    let vertices = (0..mesh.spheres.len() as u32).map(|v| vec![v]);
+    let edges = mesh.edges.iter().map(|e| e.to_vec());
+    vertices.chain(edges).chain(mesh.faces.iter().map(|f| f.to_vec())).collect()
+}
+
+/// The homology of a set of simplices relative to those that are not in it, by definition.
+fn homology(all: &Simplices) -> [usize; 3] {
+    let of_size = |n: usize| all.iter().filter(move |s| s.len() == n).collect::<Vec<_>>();
+    let [vertices, edges, faces] = [1, 2, 3].map(of_size);
+    let boundary = |cells: &[&Vec<u32>], sides: &[&Vec<u32>]| {
+        let row = |cell: &&Vec<u32>| {
+            let is_side = |side: &Vec<u32>| side.iter().all(|v| cell.contains(v));
+            let bits = sides.iter().enumerate().filter(|(_, side)| is_side(side));
+            bits.fold(0, |row, (i, _)| row | 1 << i)
+        };
+        assert!(sides.len() <= 128, "bits");
+        rank(cells.iter().map(row).collect())
+    };
+    let (d1, d2) = (boundary(&edges, &vertices), boundary(&faces, &edges));
+    [vertices.len() - d1, edges.len() - d1 - d2, faces.len() - d2]
+}
+
+/// What is left, read off the flags.
+fn left(remaining: &Remaining<'_>) -> Simplices {
+    let whole = &remaining.axis.mesh;
+    let kept = |flags: &[bool], i: usize| flags[i];
+    let mut all = Simplices::new();
+    let v = (0..whole.spheres.len()).filter(|&i| kept(&remaining.sphere_kept, i));
+    all.extend(v.map(|i| vec![i as u32]));
+    let e = (0..whole.edges.len()).filter(|&i| kept(&remaining.edge_kept, i));
+    all.extend(e.map(|i| whole.edges[i].to_vec()));
+    let f = (0..whole.faces.len()).filter(|&i| kept(&remaining.face_kept, i));
+    all.extend(f.map(|i| whole.faces[i].to_vec()));
+    all
+}
+
+/// The subcomplex without a set of faces, by definition: the closure of the other faces, and the edges
+/// and vertices that are sides of nothing that goes.
+fn without(before: &Simplices, gone: &BTreeSet<Vec<u32>>) -> Simplices {
+    let within = |small: &[u32], large: &[u32]| small.iter().all(|v| large.contains(v));
+    let faces: Vec<_> = before.iter().filter(|s| s.len() == 3).collect();
+    let stays = |s: &&Vec<u32>| match s.len() {
+        3 => !gone.contains(*s),
+        _ => {
+            let above: Vec<_> = faces.iter().filter(|f| within(s, f)).collect();
+            let curve = before
+                .iter()
+                .any(|e| e.len() == 2 && within(s, e) && !faces.iter().any(|f| within(e, f)));
+            above.is_empty() || curve || above.iter().any(|f| !gone.contains(**f))
+        }
+    };
+    before.iter().filter(stays).cloned().collect()
+}
+
+fn random_complex(rng: &mut Pcg64) -> MedialMesh {
+    let n = rng.random_range(4..11u32);
+    let (faces, edges) = (rng.random_range(1..26), rng.random_range(0..4));
+    let mut distinct = |k: usize| {
+        let mut chosen: Vec<u32> = Vec::new();
+        while chosen.len() < k {
+            let v = rng.random_range(0..n);
+            if !chosen.contains(&v) {
+                chosen.push(v);
+            }
+        }
+        chosen
+    };
+    let faces = (0..faces).map(|_| <[u32; 3]>::try_from(distinct(3)).expect("three")).collect();
+    let edges = (0..edges).map(|_| <[u32; 2]>::try_from(distinct(2)).expect("two")).collect();
+    complex(n as usize, edges, faces)
+}
+
+/// A strip or disc, folded so that pieces of a surface are common in the corpus.
+fn random_sheets(rng: &mut Pcg64) -> MedialMesh {
+    let (w, h) = (rng.random_range(2..6u32), rng.random_range(2..4u32));
+    let mut faces = Vec::new();
+    for i in 0..w - 1 {
+        for j in 0..h - 1 {
+            let v = |di: u32, dj: u32| (j + dj) * w + i + di;
+            faces.extend([[v(0, 0), v(1, 0), v(1, 1)], [v(0, 0), v(1, 1), v(0, 1)]]);
+        }
+    }
+    // Glue some vertices to others.
+    let mut to: Vec<u32> = (0..w * h).collect();
+    for _ in 0..rng.random_range(0..5) {
+        let (a, b) = (rng.random_range(0..w * h), rng.random_range(0..w * h));
+        to[a.max(b) as usize] = to[a.min(b) as usize];
+    }
+    faces.iter_mut().for_each(|f| *f = f.map(|v| to[v as usize]));
+    faces.retain(|[a, b, c]| a != b && b != c && a != c);
+    faces.retain(|_| rng.random_range(0..12) > 0);
+    complex((w * h) as usize, vec![], faces)
+}
+
+#[test]
+fn the_exact_test_is_that_of_homology_by_brute_force() {
+    let mut rng = Pcg64::seed_from_u64(71);
+    let (mut kept, mut lost, mut missed_by_graph) = (0, 0, 0);
+    for round in 0..4_000 {
+        let mesh = if round % 2 == 0 { random_complex(&mut rng) } else { random_sheets(&mut rng) };
+        let axis = Axis::of_mesh(mesh);
+        let mut remaining = Remaining::all(&axis);
+        let mut parts = Parts::of(&remaining);
+        let graph = Graph::of(&parts, &remaining);
+        let mut there: Vec<usize> = (0..parts.len()).filter(|&p| parts.free[p]).collect();
+        let mut is_first = true;
+        while !there.is_empty() {
+            let before = left(&remaining);
+            assert_eq!(remaining.spheres, before.iter().filter(|s| s.len() == 1).count());
+            for &p in &there {
+                let face = |&f: &u32| axis.mesh.faces[f as usize].to_vec();
+                let gone: Simplices = parts.faces(p).iter().map(face).collect();
+                let after = without(&before, &gone);
+                let relative: Simplices = before.difference(&after).cloned().collect();
+                let vanishes = homology(&relative) == [0, 0, 0];
+                let same = homology(&before) == homology(&after);
+                assert_eq!(parts.is_removable(p), vanishes, "{:?}", axis.mesh);
+                assert_eq!(vanishes, same && parts.has_contact(p), "{:?}", axis.mesh);
+                if vanishes {
+                    kept += 1;
+                } else {
+                    lost += 1;
+                }
+                if is_first {
+                    assert!(!vanishes || graph.is_leaf[p], "{:?}", axis.mesh);
+                    missed_by_graph += u32::from(!vanishes && graph.is_leaf[p]);
+                }
+            }
+            // Any of them goes, so that the counters meet all states.
+            let p = there.swap_remove(rng.random_range(0..there.len()));
+            let face = |&f: &u32| axis.mesh.faces[f as usize].to_vec();
+            let gone: Simplices = parts.faces(p).iter().map(face).collect();
+            parts.remove(p, &mut remaining);
+            assert_eq!(left(&remaining), without(&before, &gone), "{:?}", axis.mesh);
+            is_first = false;
+        }
+        remaining.mesh().check().expect("a complex");
+    }
+    assert!(
+        kept > 3_000 && lost > 3_000 && missed_by_graph > 50,
+        "{kept} {lost} {missed_by_graph}"
+    );
+}
+
+#[test]
+fn merging_duplicate_vertices_keeps_the_topology() {
+    let mut rng = Pcg64::seed_from_u64(74);
+    let mut gone = 0;
+    for _ in 0..150 {
+        let n = rng.random_range(4..60);
+        let largest = [0.2, 0.4, 0.7][rng.random_range(0..3usize)];
+        let mut x = || rng.random_range(-1.0..1.0);
+        let balls: Vec<Sphere> = (0..n)
+            .map(|_| Sphere::new(Vec3::new(x(), x(), x()), 0.02 + largest * x().abs()))
+            .collect();
+        let whole = UnionAxis::of_balls(&balls).expect("balls").mesh();
+        for merge in [0.0, 0.03, 0.1, 0.5] {
+            let (mesh, into) = merge::merged(&whole, merge, &RunContext::default()).expect("run");
+            mesh.check().expect("a valid complex");
+            assert_eq!(betti(&mesh), betti(&whole), "{balls:?}");
+            // Each sphere that is left is the first of those that went into it.
+            let mut first = vec![usize::MAX; mesh.spheres.len()];
+            for (old, &new) in into.iter().enumerate() {
+                first[new as usize] = first[new as usize].min(old);
+            }
+            let of_whole: Vec<Sphere> = first.iter().map(|&v| whole.spheres[v]).collect();
+            assert_eq!(of_whole, mesh.spheres);
+            assert!(merge > 0.0 || mesh == whole);
+            gone += whole.spheres.len() - mesh.spheres.len();
+        }
+    }
+    assert!(gone > 1_000, "{gone}");
+}
+
+#[test]
+fn betti_numbers_agree_with_brute_force() {
+    let mut rng = Pcg64::seed_from_u64(72);
+    for _ in 0..300 {
+        let mesh = random_complex(&mut rng);
+        assert_eq!(betti(&mesh).map(|b| b as usize), homology(&simplices(&mesh)));
+    }
+}
+
+#[test]
+fn checked_removal_in_any_order_keeps_the_topology_of_unions() {
+    let mut rng = Pcg64::seed_from_u64(73);
+    let mut removed = 0;
+    for _ in 0..150 {
+        let n = rng.random_range(4..60);
+        let largest = [0.2, 0.4, 0.7][rng.random_range(0..3usize)];
+        let mut x = || rng.random_range(-1.0..1.0);
+        let balls: Vec<Sphere> = (0..n)
+            .map(|_| Sphere::new(Vec3::new(x(), x(), x()), 0.02 + largest * x().abs()))
+            .collect();
+        let axis = Axis::of_mesh(UnionAxis::of_balls(&balls).expect("balls").mesh());
+        let whole = betti(&axis.mesh);
+        let mut remaining = Remaining::all(&axis);
+        loop {
+            let mut parts = Parts::of(&remaining);
+            let before = removed;
+            for p in (0..parts.len()).filter(|&p| parts.free[p]).collect::<Vec<_>>() {
+                if parts.is_removable(p) {
+                    parts.remove(p, &mut remaining);
+                    removed += 1;
+                }
+            }
+            assert_eq!(betti(&remaining.mesh()), whole, "{balls:?}");
+            if removed == before {
+                break;
+            }
+        }
+    }
+    assert!(removed > 1_000, "{removed}");
+}
+
+/// A regular grid of `w` times `h` vertices from `first`, two triangles to a cell.
+fn grid(first: u32, w: u32, h: u32) -> Vec<[u32; 3]> {
+    let mut faces = Vec::new();
+    for i in 0..w - 1 {
+        for j in 0..h - 1 {
+            let v = |di: u32, dj: u32| first + (j + dj) * w + i + di;
+            faces.extend([[v(0, 0), v(1, 0), v(1, 1)], [v(0, 0), v(1, 1), v(0, 1)]]);
+        }
+    }
+    faces
+}
+
+#[test]
+fn three_sheets_around_a_seam_are_no_loop() {
+    // Figure 7, left: three half discs on the seam 0 - 1.
+    let axis = Axis::of_mesh(complex(5, vec![], vec![[0, 1, 2], [0, 1, 3], [0, 1, 4]]));
+    let remaining = Remaining::all(&axis);
+    let parts = Parts::of(&remaining);
+    let graph = Graph::of(&parts, &remaining);
+    assert_eq!((graph.nodes, graph.loops), (1, 0));
+    assert!((0..3).all(|p| parts.free[p] && parts.is_removable(p) && graph.is_leaf[p]));
+}
+
+#[test]
+fn a_handle_on_one_connected_seam_is_a_loop_that_the_graph_misses() {
+    // A ribbon of three vertices by two (one part), whose short sides lie on the seams 0 - 1 and 1 - 2
+    // of a book of two sheets along the path 0 - 1 - 2 each.
+    let mut faces = vec![[0, 1, 3], [1, 2, 3], [0, 1, 4], [1, 2, 4]];
+    faces.extend([[0, 1, 5], [1, 5, 6], [5, 6, 7], [6, 7, 8], [7, 8, 1], [8, 1, 2]]);
+    let axis = Axis::of_mesh(complex(9, vec![], faces));
+    let remaining = Remaining::all(&axis);
+    let parts = Parts::of(&remaining);
+    let graph = Graph::of(&parts, &remaining);
+    let ribbon = (0..parts.len()).max_by_key(|&p| parts.faces(p).len()).expect("parts");
+    assert_eq!((parts.faces(ribbon).len(), parts.free[ribbon]), (6, true));
+    assert!(graph.is_leaf[ribbon] && !parts.is_removable(ribbon));
+}
+
+#[test]
+fn curves_are_pieces_of_the_graph() {
+    // Two discs joined by two curves: a loop of the graph and of the complex.
+    let mut faces = grid(0, 3, 3);
+    faces.extend(grid(9, 3, 3));
+    let axis = Axis::of_mesh(complex(19, vec![[0, 9], [2, 18], [11, 18]], faces));
+    let remaining = Remaining::all(&axis);
+    let parts = Parts::of(&remaining);
+    let graph = Graph::of(&parts, &remaining);
+    assert_eq!((parts.len(), graph.nodes, graph.loops), (2, 4, 1));
+    assert_eq!(betti(&axis.mesh), [1, 1, 0]);
+    assert!((0..2).all(|p| parts.free[p] && !parts.is_removable(p) && !graph.is_leaf[p]));
+}
+
+#[test]
+fn closed_pieces_have_no_level() {
+    let hollow = vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
+    let axis = Axis::of_mesh(complex(6, vec![[3, 4], [4, 5]], hollow));
+    let remaining = Remaining::all(&axis);
+    let parts = Parts::of(&remaining);
+    assert_eq!((parts.len(), levels(&parts, &remaining)), (1, vec![0]));
+    assert!(!parts.free[0]);
+}
+
+#[test]
+fn parameters_are_checked() {
+    let typed = |key: &str, value: &str| {
+        let mut params = Params::none();
+        params.set(key, value);
+        params.typed::<TamHeidrichParams>().and_then(TamHeidrichParams::validate)
+    };
+    for (key, value) in [
+        ("t_v", "-1"),
+        ("t_v", "1,many"),
+        ("t_v", "[1,101]"),
+        ("drop", "2"),
+        ("axis", "none"),
+        ("remove", "-3"),
+        ("radius_factor", "0"),
+        ("jitter", "1"),
+        ("merge", "1"),
+        ("t_t", "1.5"),
+    ] {
+        let error = typed(key, value);
+        assert!(matches!(error, Err(SimplifyError::Parameter(m)) if m.contains(key)), "{key}");
+    }
+    assert_eq!(typed("t_v", "1,10").expect("a list").t_v.0, [1.0, 10.0]);
+    assert_eq!(typed("t_v", "5").expect("a number").t_v.0, [5.0]);
+    assert_eq!(typed("remove", "[3,1]").expect("an array").remove.0, [3, 1]);
+    assert_eq!(typed("remove", "").expect("nothing").remove.0, [0; 0]);
+}

@@ -1,0 +1,294 @@
+//! Part pruning: the sheets of a box, loops of solids with tunnels, parts by hand, real meshes.
+
+#![allow(clippy::print_stderr)] // A skipped test says so.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, betti};
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, PartInfo, RunContext, Simplified, SimplifyError,
+};
+use medial::surface::{self, TriMesh};
+use medial_methods::tam_heidrich::{TamHeidrich, parts_of_faces};
+
+fn shape_of(name: &str, mesh: &TriMesh) -> Shape {
+    let report = surface::validate(mesh).expect("a solid");
+    Shape::new(name, mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+fn built_in(id: &str) -> Shape {
+    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
+    shape_of(id, &built_in.mesh(built_in.default_resolution))
+}
+
+fn try_at(
+    shape: &Shape,
+    params: &[(&str, &str)],
+    level: Level,
+) -> Result<Simplified, SimplifyError> {
+    let mut all = Params::none();
+    for (key, value) in params {
+        all.set(key, value);
+    }
+    TamHeidrich::new().prepare(shape, &all, &RunContext::default())?.at(level)
+}
+
+fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
+    let result = try_at(shape, params, level).expect("an answer");
+    result.mesh.check().expect("a valid complex");
+    result
+}
+
+fn count(result: &Simplified, name: &str) -> u64 {
+    let found = result.diagnostics.counts.iter().find(|c| c.0 == name);
+    found.unwrap_or_else(|| panic!("no count {name} in {:?}", result.diagnostics)).1
+}
+
+/// The Betti numbers after each round, from the start on, and whether each checked the topology.
+fn betti_by_round(result: &Simplified) -> Vec<(bool, [u64; 3])> {
+    let has = |name: &str| result.diagnostics.counts.iter().any(|c| c.0 == name);
+    let mut rounds = vec!["start".to_owned()];
+    rounds.extend((1..).map(|k| format!("round_{k}")).take_while(|r| has(&format!("{r}_b0"))));
+    let of_round = |round: &String| {
+        let betti = ["b0", "b1", "b2"].map(|b| count(result, &format!("{round}_{b}")));
+        (has(&format!("{round}_nodes")), betti)
+    };
+    rounds.iter().map(of_round).collect()
+}
+
+fn parts(result: &Simplified) -> &[PartInfo] {
+    result.extras.parts.as_deref().expect("a list of parts")
+}
+
+const NO_ROUNDS: [(&str, &str); 2] = [("t_t_rounds", "0"), ("t_v", "")];
+
+#[test]
+fn the_exact_axis_of_a_box_has_twelve_parts_of_level_one_and_one_of_level_two() {
+    let exact = medial_datasets::find("box").and_then(|b| b.axis()).expect("known").mesh;
+    let shape = built_in("box").with_initial(&exact);
+    let result = at(&shape, &NO_ROUNDS, Level::Published);
+    assert_eq!(result.mesh.faces.len(), exact.faces.len());
+    let of_level = |level| parts(&result).iter().filter(|p| p.level == level).collect::<Vec<_>>();
+    assert_eq!((parts(&result).len(), of_level(1).len(), of_level(2).len()), (13, 12, 1));
+    assert!(of_level(2)[0].centre.iter().all(|x| x.abs() < 1e-12));
+    assert!(parts(&result).iter().all(|p| p.removable == (p.level == 1)));
+    // The tetrahedra are shared out among all parts.
+    let volume: f64 = parts(&result).iter().map(|p| p.volume).sum();
+    assert!((volume - 1.0).abs() < 0.1, "{volume}");
+    // One round by volume takes all twelve, and leaves the central rectangle.
+    let params = [("t_t_rounds", "0"), ("t_v", "100")];
+    let result = at(&shape, &params, Level::Published);
+    assert_eq!(count(&result, "round_1_removed"), 12);
+    assert_eq!((result.mesh.spheres.len(), result.mesh.faces.len()), (4, 2));
+}
+
+/// Which exact sheet of the 3 by 2 by 1 box a point with its radius is on: 0 for the rectangle, else
+/// the number of the edge; distance to it in units of the box.
+fn sheet(half: Vec3, centre: Vec3) -> (usize, f64) {
+    let depth = half - centre.abs();
+    // The two nearest sides of the box, by axis.
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|&a, &b| depth[a].total_cmp(&depth[b]));
+    let on_rectangle = centre.z.abs();
+    let off_edge = (depth[axes[0]] - depth[axes[1]]).abs() / 2.0_f64.sqrt();
+    let along = axes[2];
+    let (u, v) = ((along + 1) % 3, (along + 2) % 3);
+    let side = |x: f64| usize::from(x > 0.0);
+    let edge = 1 + 4 * along + 2 * side(centre[u]) + side(centre[v]);
+    match on_rectangle < off_edge && axes[0] == 2 {
+        true => (0, on_rectangle),
+        false => (edge, off_edge),
+    }
+}
+
+#[test]
+fn parts_of_a_sampled_box_cover_its_sheets() {
+    // Not one part to one sheet: as soon as one edge of a seam has lost its third triangle, the two
+    // sheets that are left there are one part.
+    let (half, shape) = (Vec3::new(1.5, 1.0, 0.5), built_in("box"));
+    let back = shape.normalisation();
+    // Rectangle; triangle and trapezoids down to the edges along x, y and z.
+    let slope = half.z * 2.0_f64.sqrt();
+    let along = |x: f64| slope * (2.0 * x - half.z).max(half.z);
+    let exact = [[2.0 * 1.0; 4], [along(1.5); 4], [along(1.0); 4], [along(0.5); 4]].concat();
+    for rounds in ["1", "2", "3"] {
+        let result = at(&shape, &[("t_v", ""), ("t_t_rounds", rounds)], Level::Published);
+        let listed = parts(&result);
+        assert!(listed.windows(2).all(|w| w[0].triangles >= w[1].triangles));
+        assert!(listed.len() < 30, "{}", listed.len());
+        let of_face = parts_of_faces(&result.mesh);
+        let (mut area_on, mut off) = ([[0.0; 13]; 13], 0.0_f64);
+        for (face, part) in result.mesh.faces.iter().zip(of_face) {
+            let [a, b, c] = face.map(|v| back.backward(result.mesh.spheres[v as usize].centre));
+            let (id, distance) = sheet(half, (a + b + c) / 3.0);
+            area_on[(part as usize).min(12)][id] += (b - a).cross(c - a).length() / 2.0;
+            off = off.max(distance);
+        }
+        // Samples are 0.125 apart.
+        assert!(off < 0.05, "{off}");
+        for id in 0..13 {
+            let whole: f64 = area_on.iter().map(|part| part[id]).sum();
+            let share = whole / exact[3 + id];
+            assert!((0.5..1.05).contains(&share), "sheet {id} with {share} of its area, {rounds}");
+        }
+        let holder = |id: usize| (0..13).max_by(|&p, &q| area_on[p][id].total_cmp(&area_on[q][id]));
+        let holders: BTreeSet<Option<usize>> = (0..13).map(holder).collect();
+        assert!(holders.len() >= 7, "13 sheets in {} parts", holders.len());
+    }
+}
+
+#[test]
+fn loops_survive_every_checked_round() {
+    for id in ["torus", "double-torus", "frame", "hollow-sphere", "coil", "pair"] {
+        let shape = built_in(id);
+        let schedules: [&[(&str, &str)]; 3] = [
+            &[],
+            &[("t_t_rounds", "0"), ("t_v", "1,5,20,100,100")],
+            &[("t_v", "1,5,20,100,100,100")],
+        ];
+        for schedule in schedules {
+            let result = at(&shape, schedule, Level::Published);
+            let rounds = betti_by_round(&result);
+            assert_eq!(Some(rounds[0].1), shape.expected_betti(), "{id}");
+            for w in rounds.windows(2) {
+                assert!(!w[1].0 || w[1].1 == w[0].1, "{id} {schedule:?}: {rounds:?}");
+            }
+            assert_eq!(rounds[rounds.len() - 1].1, betti(&result.mesh));
+            let warned = result.diagnostics.warnings.iter().any(|w| w.contains("topology=all"));
+            assert_eq!(warned, rounds[rounds.len() - 1].1 != rounds[0].1, "{id} {rounds:?}");
+        }
+        let checked = at(&shape, &[("topology", "all")], Level::Published);
+        assert_eq!(Some(betti(&checked.mesh)), shape.expected_betti(), "{id}");
+        assert!(betti_by_round(&checked).iter().skip(1).all(|r| r.0));
+    }
+}
+
+#[test]
+fn counts_are_met_from_above_and_results_are_nested() {
+    let shape = built_in("blob");
+    let whole = at(&shape, &NO_ROUNDS, Level::Published).mesh;
+    let mut finer = whole.clone();
+    let mut t_v = 0.0;
+    for spheres in [whole.spheres.len() + 5, 9_500, 8_000, 6_000, 5_000, 1_000, 1] {
+        let result = at(&shape, &[], Level::Spheres(spheres));
+        let reached = result.mesh.spheres.len();
+        eprintln!(
+            "{spheres}: {reached} {:?} {:?}",
+            result.native_level, result.diagnostics.warnings
+        );
+        assert!(reached == spheres || !result.diagnostics.warnings.is_empty());
+        let in_finer = |s| finer.spheres.contains(s);
+        assert!(result.mesh.spheres.iter().all(in_finer));
+        let level = result.native_level.unwrap_or(t_v);
+        assert!(level >= t_v);
+        (finer, t_v) = (result.mesh, level);
+    }
+    // One sheet for each body is what no rule allows to go.
+    let result = at(&shape, &[("topology", "all")], Level::Spheres(1));
+    assert!(parts(&result).iter().all(|p| !p.removable));
+    assert_eq!(betti(&result.mesh), betti(&whole));
+}
+
+#[test]
+fn a_part_goes_by_hand_and_nothing_else() {
+    let shape = built_in("blob");
+    let plain = at(&shape, &[], Level::Published);
+    let limb = parts(&plain).iter().find(|p| p.removable && p.triangles > 5).expect("a limb");
+    let id = limb.id.to_string();
+    let result = at(&shape, &[("remove", &id)], Level::Published);
+    assert_eq!(result.mesh.faces.len() + limb.triangles, plain.mesh.faces.len());
+    assert_eq!(betti(&result.mesh), betti(&plain.mesh));
+    let removed: Vec<u32> = parts(&result).iter().filter(|p| p.removed).map(|p| p.id).collect();
+    assert_eq!(removed, [limb.id]);
+    assert_eq!(parts(&result).len(), parts(&plain).len());
+    // The rest is that of the faces by id.
+    let left = |mesh: &MedialMesh, keep: &dyn Fn(u32) -> bool| {
+        let of_face = parts_of_faces(mesh);
+        let corner = |f: &[u32; 3]| f.map(|v| mesh.spheres[v as usize]);
+        let kept = mesh.faces.iter().zip(of_face).filter(|f| keep(f.1));
+        kept.map(|(f, _)| corner(f)).collect::<Vec<_>>()
+    };
+    assert_eq!(left(&plain.mesh, &|p| p != limb.id), left(&result.mesh, &|_| true));
+    let unknown = try_at(&shape, &[("remove", "100000")], Level::Published);
+    assert!(matches!(unknown, Err(SimplifyError::Parameter(m)) if m.contains("100000")));
+}
+
+#[test]
+fn any_axis_can_be_pruned() {
+    let shape = built_in("bracket");
+    let voronoi = at(&shape, &[("axis", "initial")], Level::Published);
+    assert!(voronoi.mesh.contacts.is_some());
+    let union = at(&shape, &[("axis", "union")], Level::Published);
+    assert_eq!(union.mesh, at(&shape, &[], Level::Published).mesh);
+    assert_ne!(union.mesh, voronoi.mesh);
+    let back = shape.normalisation();
+    let given = voronoi.mesh.transformed(back.diagonal, |p| back.backward(p));
+    let given = built_in("bracket").with_initial(&given);
+    for axis in ["auto", "union", "initial"] {
+        let result = at(&given, &[("axis", axis)], Level::Published);
+        assert!(!result.diagnostics.warnings.is_empty(), "it says whose volumes these are");
+        let volume: f64 = parts(&result).iter().map(|p| p.volume).sum();
+        assert!(volume > 0.1, "{axis}: {volume}");
+    }
+}
+
+#[test]
+fn senseless_levels_are_refused() {
+    let shape = built_in("box");
+    for level in [Level::Spheres(0), Level::Native(-1.0), Level::Native(101.0)] {
+        assert!(matches!(try_at(&shape, &[], level), Err(SimplifyError::Level(_))), "{level}");
+    }
+}
+
+fn for_threads(name: &str, mesh: &TriMesh, level: Level) -> Simplified {
+    let results = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.expect("a pool").install(|| at(&shape_of(name, mesh), &[], level))
+    });
+    let [one, two] = results;
+    assert_eq!(one.mesh, two.mesh, "{name}");
+    assert_eq!(one.extras.parts, two.extras.parts, "{name}");
+    assert_eq!(one.diagnostics, two.diagnostics, "{name}");
+    one
+}
+
+#[test]
+fn built_in_shapes_give_the_same_for_any_number_of_threads() {
+    for built_in in medial_datasets::catalogue() {
+        let mesh = built_in.mesh(built_in.default_resolution);
+        for level in [Level::Published, Level::Native(10.0)] {
+            let result = for_threads(built_in.id, &mesh, level);
+            assert!(!result.mesh.spheres.is_empty());
+            let rounds = betti_by_round(&result);
+            assert!(rounds.windows(2).all(|w| !w[1].0 || w[1].1 == w[0].1), "{rounds:?}");
+        }
+    }
+}
+
+#[test]
+fn shared_meshes_give_valid_axes_for_any_number_of_threads() {
+    for path in shared_meshes() {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        let mesh = surface::read(&path).expect("a solid").mesh;
+        let result = for_threads(&name, &mesh, Level::Published);
+        let rounds = betti_by_round(&result);
+        assert!(rounds.windows(2).all(|w| !w[1].0 || w[1].1 == w[0].1), "{name}: {rounds:?}");
+        assert_eq!(rounds[rounds.len() - 1].1, betti(&result.mesh), "{name}");
+    }
+}
+
+/// Shared meshes, or none where they are missing.
+fn shared_meshes() -> Vec<PathBuf> {
+    let folder = std::env::var("MEDIAL_MESHES").unwrap_or_else(|_| "../shared/meshes".into());
+    let Ok(files) = std::fs::read_dir(&folder) else {
+        eprintln!("skipped: no meshes in {folder}");
+        return Vec::new();
+    };
+    let mut files: Vec<PathBuf> = files.flatten().map(|f| f.path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "off" || e == "obj"));
+    files.sort_unstable();
+    files
+}
