@@ -114,6 +114,18 @@ impl Shape {
     }
 }
 
+impl Shape {
+    /// Radius of the interpolated sphere that attains the signed distance.
+    fn radius_towards(&self, p: Vec3) -> f64 {
+        let of = |(signed, centre): (f64, Vec3)| (p.distance(centre) - signed).max(0.0);
+        match self {
+            Self::Sphere(sphere) => sphere.radius,
+            Self::Cone(cone) => of(cone.nearest_centre(p)),
+            Self::Slab(face) => face.nearest_centre(p).map_or(f64::INFINITY, of),
+        }
+    }
+}
+
 impl MedialUnion {
     /// The union of all primitives of a mesh. Cost `O(n log n)`.
     ///
@@ -235,6 +247,16 @@ impl MedialUnion {
             let (nearest, place) = self.query::<Signed>(p, *last);
             *last = place;
             nearest
+        })
+    }
+
+    /// For many points, in their order, in parallel: [`signed`](Self::signed), and the radius of the
+    /// ball on the primitive that attains it.
+    pub fn deepest_ball_batch(&self, points: &[Vec3]) -> Vec<(f64, f64)> {
+        in_morton_order(points, |last: &mut usize, p| {
+            let (nearest, place) = self.query::<Signed>(p, *last);
+            *last = place;
+            (nearest.signed, self.shapes[place].radius_towards(p))
         })
     }
 

@@ -22,7 +22,7 @@
 //!
 //! In truth many balls meet in one point: all polar balls of a sample do. There the crust has corners at
 //! one position up to rounding, with edges of no length between them.
-//! [`crate::surface::Contraction`] merges them along these edges.
+//! [`PowerCrust::surface`] merges them along these edges, which keeps the crust a manifold.
 //!
 //! Deviations from the paper
 //!
@@ -34,7 +34,7 @@ use rayon::prelude::*;
 use super::triangulation::{CellId, VertexId};
 use super::{Regular, Sphere, TriangulationError};
 use crate::Vec3;
-use crate::surface::TriMesh;
+use crate::surface::{Contraction, Folds, TriMesh, contract_short_edges};
 
 /// The facets of the power diagram that separate inner from outer balls.
 ///
@@ -158,6 +158,15 @@ impl PowerCrust {
             faces.extend(ring[1..].windows(2).map(|pair| [ring[0], pair[0], pair[1]]));
         }
         TriMesh { vertices: self.corners.clone(), faces }
+    }
+
+    /// The crust as triangles, with corners at one position merged along the edges between them.
+    /// Corners nearer than `coincident`, in the unit of the balls, are at one position; above the level of
+    /// rounding, which flat groups of balls amplify to some 1e-8 of the diagonal, any value well below
+    /// the distance of samples will do.
+    pub fn surface(&self, coincident: f64) -> Contraction {
+        let limits = vec![coincident; self.corners.len()];
+        contract_short_edges(&self.triangles(), &limits, Folds::Ignored)
     }
 }
 
