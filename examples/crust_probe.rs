@@ -20,6 +20,7 @@ fn main(){
  let cnt=|x:f64|ls.iter().filter(|&&l|l<x).count();
  println!("{} in {} out {} V {} F {} maxd {:.2e} t {:.2} {:.2} genus_exp {:?} n {}",a[1],b.inner.len(),b.outer.len(),n,m.faces.len(),mx,t1,t.elapsed().as_secs_f64(),l.report.genus,ls.len());
  for e in [1e-17,1e-15,1e-14,1e-13,1e-12,1e-11,1e-10,1e-9,1e-8,1e-7,1e-6,1e-5,1e-4,1e-3,1e-2]{print!(" {e:e}:{}",cnt(e));} println!();
+ println!("rejected {}",b.rejected);
  for eps in a[3..].iter().map(|e|e.parse::<f64>().unwrap()){
  let t=std::time::Instant::now();
  let c=surface::contract_short_edges(&m,&vec![eps;m.vertices.len()],surface::Folds::Ignored);

@@ -34,7 +34,7 @@ pub struct Arguments {
     mesh: Option<MeshArgument>,
     /// How far the surface may be from the boundary of the union, as a fraction of the diagonal of
     /// the mesh, or of the box around the spheres without one.
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.005)]
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.01)]
     tolerance: f64,
     #[command(flatten)]
     substrate: SubstrateArguments,
@@ -231,7 +231,8 @@ fn of_union(
     let made = made.map_err(|error| {
         of_file(match error {
             ContourError::TooFine { most, feasible, .. } => format!(
-                "--tolerance {} needs more than {most} tetrahedra; --tolerance {:.1e} is feasible",
+                "--tolerance {} needs more than {most} tetrahedra, or finer ones than there are; \
+                 --tolerance {:.1e} is feasible",
                 arguments.tolerance,
                 feasible / diagonal
             ),
@@ -301,6 +302,7 @@ fn of_poles(
     let more = Map::from_iter([
         ("inner".to_owned(), Value::from(counts[0])),
         ("outer".to_owned(), Value::from(counts[1])),
+        ("rejected".to_owned(), Value::from(balls.rejected)),
         ("facets".to_owned(), Value::from(facets)),
         ("merged".to_owned(), Value::from(crust.contracted)),
         ("samples".to_owned(), Value::from(shape.samples().len())),

@@ -60,11 +60,19 @@ pub(super) struct Bisection {
     vertex_at: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
 }
 
-/// The subdivision has more tetrahedra than are allowed.
+/// The subdivision has more tetrahedra than are allowed, or would have many times as many.
 pub(super) struct TooMany {
-    /// Bisections of the finest one before the round that failed.
+    /// Bisections of the finest one when that was found.
     pub generation: u8,
+    /// Tetrahedra then.
+    pub leaves: usize,
 }
+
+/// How many times too many tetrahedra have to be foreseen for giving up at once.
+const HOPELESS: f64 = 8.0;
+
+/// From this generation on it is foreseen: before, the boundary is not told from its surroundings.
+const FORESIGHT: u8 = 15;
 
 impl Bisection {
     /// Kuhn's six tetrahedra of the cube with this lowest corner and side; no values yet.
@@ -105,12 +113,14 @@ impl Bisection {
     }
 
     /// Bisects until no tetrahedron is wanted and all are conforming. `values` gives the values at
-    /// new vertices.
+    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary.
     ///
     /// # Errors
-    /// When there are more than `most` tetrahedra.
+    /// When there are more than `most` tetrahedra, or will be by far: near a surface, three bisections
+    /// make four of one.
     pub(super) fn refine(
         &mut self,
+        goal: u8,
         most: usize,
         values: impl Fn(&[Vec3]) -> Vec<Value>,
         wanted: impl Fn(&Leaf, [Value; 4]) -> bool + Sync,
@@ -131,8 +141,11 @@ impl Bisection {
             if more == 0 {
                 return Ok(());
             }
-            if self.leaves.len() + more > most {
-                return Err(TooMany { generation: finest });
+            let to_come = f64::from(goal.saturating_sub(finest)) * 2.0 / 3.0;
+            let foreseen = if finest < FORESIGHT { 0.0 } else { more as f64 * to_come.exp2() };
+            let leaves = self.leaves.len() + more;
+            if leaves > most || foreseen > HOPELESS * most as f64 {
+                return Err(TooMany { generation: finest, leaves });
             }
             self.round += 1;
             let old = std::mem::take(&mut self.leaves);
@@ -248,7 +261,7 @@ mod tests {
             let size = sizes[usize::from(leaf.generation)];
             size > smallest && values.iter().all(|v| v.signed <= size)
         };
-        assert!(all.refine(1 << 20, values, wanted).is_ok());
+        assert!(all.refine(0, 1 << 20, values, wanted).is_ok());
         all
     }
 

@@ -26,6 +26,9 @@ const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 const PAIRS: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]];
 
+/// How near to the boundary a vertex is, in lengths of its edge.
+const ENOUGH: f64 = 1e-9;
+
 /// Evaluations on one edge: halving alone would reach the resolution of doubles.
 const MOST_STEPS: usize = 60;
 
@@ -45,13 +48,14 @@ pub(super) fn march(grid: &Bisection, union: &MedialUnion) -> (TriMesh, Vec<f64>
     let mut edges: Vec<u64> = mixed.par_iter().flat_map_iter(crossings).collect();
     edges.par_sort_unstable();
     edges.dedup();
-    let meet = |&key: &u64| {
+    let meet = |near: &mut usize, &key: &u64| {
         let ends = [(key >> 32) as u32, key as u32];
         let [a, b] = ends.map(|v| grid.position(v));
         let values = ends.map(|v| grid.values[v as usize].signed);
-        (crossing(union, a, b, values), a.distance(b))
+        (crossing(union, near, [a, b], values), a.distance(b))
     };
-    let found: Vec<(Vec3, f64)> = edges.par_iter().with_min_len(1 << 8).map(meet).collect();
+    let chunks = edges.par_iter().with_min_len(1 << 8);
+    let found: Vec<(Vec3, f64)> = chunks.map_init(|| 0, meet).collect();
     let vertices: Vec<Vec3> = found.iter().map(|f| f.0).collect();
     let vertex = |a: u32, b: u32| {
         edges.binary_search(&edge_key(a, b)).expect("listed, its ends are on different sides") as u32
@@ -107,10 +111,15 @@ fn cut(ring: &[u32], vertices: &[Vec3]) -> Vec<[u32; 3]> {
 
 /// Step 1: a point of the edge from `a` to `b` at which the signed distance is zero, up to rounding,
 /// for values of different sides at its ends.
-fn crossing(union: &MedialUnion, a: Vec3, b: Vec3, [at_a, at_b]: [f64; 2]) -> Vec3 {
+fn crossing(
+    union: &MedialUnion,
+    near: &mut usize,
+    [a, b]: [Vec3; 2],
+    [at_a, at_b]: [f64; 2],
+) -> Vec3 {
     let (mut s, mut t) = (0.0, 1.0);
     let (mut low, mut high) = (at_a, at_b);
-    let enough = 1e-13 * a.distance(b);
+    let enough = ENOUGH * a.distance(b);
     let mut best = if at_a.abs() < at_b.abs() { (at_a.abs(), 0.0) } else { (at_b.abs(), 1.0) };
     for _ in 0..MOST_STEPS {
         if best.0 <= enough || t - s <= f64::EPSILON {
@@ -118,7 +127,7 @@ fn crossing(union: &MedialUnion, a: Vec3, b: Vec3, [at_a, at_b]: [f64; 2]) -> Ve
         }
         // Illinois: the end that stays twice counts half.
         let u = (s + (t - s) * (low / (low - high))).clamp(s, t);
-        let value = union.signed(a.lerp(b, u));
+        let value = union.signed_from(a.lerp(b, u), near);
         if value.abs() < best.0 {
             best = (value.abs(), u);
         }

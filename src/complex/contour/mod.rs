@@ -57,7 +57,8 @@ pub enum ContourError {
     Tolerance(f64),
     /// The tolerance is too fine for the memory that this may take.
     #[error(
-        "a tolerance of {tolerance:e} needs more than {most} tetrahedra; {feasible:e} is feasible"
+        "a tolerance of {tolerance:e} needs more than {most} tetrahedra, or finer ones than there are; \
+         {feasible:e} is feasible"
     )]
     TooFine {
         /// What was asked, in the unit of the mesh.
@@ -140,14 +141,7 @@ pub fn union_surface_within(
     let smallest = THINNEST * longest;
     let mut grid = cube_around(&union, longest);
     let sizes: Vec<f64> = (0..=MOST_BISECTIONS).map(|g| grid.longest_edge(g)).collect();
-    let feasible = |generation: u8| {
-        // One bisection less than was possible, and no thin parts that are refined further.
-        let before = sizes[usize::from(generation.saturating_sub(1))];
-        ContourError::TooFine { tolerance, most, feasible: before / EDGE_SHARE / THINNEST }
-    };
-    if sizes[usize::from(MOST_BISECTIONS)] > smallest {
-        return Err(feasible(MOST_BISECTIONS));
-    }
+    let goal = sizes.iter().position(|&s| s <= longest).unwrap_or(sizes.len() - 1) as u8;
     let wanted = |leaf: &Leaf, values: [Value; 4]| {
         let size = sizes[usize::from(leaf.generation)];
         let radius = values.iter().map(|v| v.radius).fold(f64::INFINITY, f64::min);
@@ -157,7 +151,16 @@ pub fn union_surface_within(
         let found = union.deepest_ball_batch(points).into_iter();
         found.map(|(signed, radius)| Value { signed, radius }).collect()
     };
-    grid.refine(most, values, wanted).map_err(|many| feasible(many.generation))?;
+    grid.refine(goal, most, values, wanted).map_err(|many| {
+        // Enough even if everything is thin and has to be refined as far as that goes.
+        let size = sizes[usize::from(many.generation)] / THINNEST;
+        let feasible = size / EDGE_SHARE * f64::max(1.0, (many.leaves as f64 / most as f64).sqrt());
+        ContourError::TooFine { tolerance, most, feasible }
+    })?;
+    if sizes[usize::from(goal)] > longest {
+        let feasible = sizes[usize::from(goal)] / EDGE_SHARE;
+        return Err(ContourError::TooFine { tolerance, most, feasible });
+    }
     let (raw, edges) = march::march(&grid, &union);
     if raw.faces.is_empty() {
         // Half a radius is enough for a vertex of the tetrahedra to be in the ball.
