@@ -271,7 +271,9 @@ fn of_poles(
     axis: Option<&MedialMesh>,
     stages: &mut Stages,
 ) -> Result<Made, Failure> {
-    let (Some(shape), Some(mesh)) = (shape, &arguments.mesh) else { unreachable!("checked before") };
+    let (Some(shape), Some(mesh)) = (shape, &arguments.mesh) else {
+        unreachable!("checked before")
+    };
     let of_mesh = |message: String| Failure::input(format!("{}: {message}", mesh.display()));
     let (balls, lap) = Stopwatch::time(|| shape.polar_balls());
     stages.add("poles", lap);
@@ -281,7 +283,8 @@ fn of_poles(
         Some(axis) => axis.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)).spheres,
         None => balls.inner,
     };
-    let (counts, named) = ([inner.len(), balls.outer.len()], arguments.axis.as_ref().unwrap_or(mesh));
+    let (counts, named) =
+        ([inner.len(), balls.outer.len()], arguments.axis.as_ref().unwrap_or(mesh));
     let of_named = |message: String| Failure::input(format!("{}: {message}", named.display()));
     let (crust, lap) = Stopwatch::time(|| {
         let crust = PowerCrust::new(&inner, &balls.outer)?;

@@ -121,7 +121,8 @@ impl PowerCrust {
         let corner = |&cell: &CellId| {
             // The box around the balls has inner balls on no hull edge: no infinite cell is met. An
             // orthocentre beyond the largest double is that of a cell of nearly coplanar balls.
-            let mean = || regular.vertices(cell).map(|v| regular.point(v)).iter().sum::<Vec3>() / 4.0;
+            let mean =
+                || regular.vertices(cell).map(|v| regular.point(v)).iter().sum::<Vec3>() / 4.0;
             regular.orthosphere(cell).map_or_else(mean, |(centre, _)| centre)
         };
         let corners = cells.par_iter().with_min_len(1 << 10).map(corner).collect();

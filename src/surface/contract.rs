@@ -233,9 +233,8 @@ impl<'a> Shrinking<'a> {
             }
             let corners = [v, others[0], others[1], others[2]];
             let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-            let is_short = |&(i, j): &(usize, usize)| {
-                self.short_edge(corners[i], corners[j]).is_some()
-            };
+            let is_short =
+                |&(i, j): &(usize, usize)| self.short_edge(corners[i], corners[j]).is_some();
             if pairs.iter().all(is_short) {
                 corners.into_iter().for_each(|c| self.stars[c as usize].clear());
                 dropped += 1;

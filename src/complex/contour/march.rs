@@ -58,12 +58,14 @@ pub(super) fn march(grid: &Bisection, union: &MedialUnion) -> (TriMesh, Vec<f64>
     let found: Vec<(Vec3, f64)> = chunks.map_init(|| 0, meet).collect();
     let vertices: Vec<Vec3> = found.iter().map(|f| f.0).collect();
     let vertex = |a: u32, b: u32| {
-        edges.binary_search(&edge_key(a, b)).expect("listed, its ends are on different sides") as u32
+        edges.binary_search(&edge_key(a, b)).expect("listed, its ends are on different sides")
+            as u32
     };
     let triangles = |leaf: &&Leaf| {
         let x = leaf.vertices;
         let (polygon, corners) = polygon(x.map(inside));
-        let mut ring = polygon.map(|(i, j)| if corners == 3 && i == j { 0 } else { vertex(x[i], x[j]) });
+        let mut ring =
+            polygon.map(|(i, j)| if corners == 3 && i == j { 0 } else { vertex(x[i], x[j]) });
         let ring = &mut ring[..corners];
         let [a, b, c, d] = x.map(|v| grid.position(v));
         if (b - a).cross(c - a).dot(d - a) < 0.0 {

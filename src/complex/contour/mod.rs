@@ -69,7 +69,9 @@ pub enum ContourError {
         feasible: f64,
     },
     /// No part of the union is thick enough.
-    #[error("no part of the union is as thick as {smallest:e}: a tolerance below {feasible:e} shows some")]
+    #[error(
+        "no part of the union is as thick as {smallest:e}: a tolerance below {feasible:e} shows some"
+    )]
     TooThin {
         /// The smallest tetrahedron.
         smallest: f64,
