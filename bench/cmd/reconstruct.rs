@@ -53,6 +53,9 @@ enum Method {
 /// diagonal.
 const COINCIDENT: f64 = 1e-6;
 
+/// A result farther from the mesh than this, in its diagonals, is taken to be of another surface.
+const ASTRAY: f64 = 0.5;
+
 /// A surface that was made, in input units, and what is to be said of it.
 struct Made {
     mesh: TriMesh,
@@ -105,6 +108,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     // Untimed: the verdict.
     let report = examine(arguments, &made.mesh, &mut warnings)?;
     let deviation = shape.as_ref().map(|shape| deviation(shape, &made.mesh)).transpose()?;
+    if let (Some([max, _]), Some(axis)) = (deviation, &arguments.axis)
+        && max > ASTRAY
+    {
+        warnings.push(format!(
+            "the result is up to {max:.1} diagonals of the mesh away from it: is {} of this surface, and in \
+             its units?",
+            axis.display()
+        ));
+    }
     let tolerance = match arguments.method {
         Method::Union => arguments.tolerance,
         Method::PowerCrust => COINCIDENT,

@@ -139,6 +139,18 @@ fn what_makes_no_surface_is_said() {
         assert!(code == expected && stderr.contains(part), "{words:?}: {code}, {stderr}");
         assert!(!Path::new(&out).exists(), "{words:?} wrote a file");
     }
+    let grown = write("grown.ma", "1 0 0\nv 0 0 0 100\n");
+    let (code, object) = json(&["reconstruct", &grown, "--mesh", mesh, "-o", &out]);
+    let warning = object["warnings"].to_string();
+    // In diagonals of the mesh so fine a surface of it would be too large.
+    assert!(
+        code == 1 && object["error"].as_str().is_some_and(|e| e.contains("grown.ma")),
+        "{warning}"
+    );
+    let words = ["--mesh", mesh, "-o", &out, "--tolerance", "1"];
+    let (code, object) = json(&[&["reconstruct", &grown][..], &words].concat());
+    assert!(code == 0 && object["warnings"].to_string().contains("in its units"), "{object}");
+
     // Lone spheres, one of them a point, are no error.
     let lone = write("lone.ma", "3 0 0\nv 0 0 0 1\nv 5 0 0 1\nv 9 0 0 0\n");
     let (code, object) = json(&["reconstruct", &lone, "-o", &out]);

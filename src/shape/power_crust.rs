@@ -23,9 +23,10 @@ const BOX: f64 = 2.5;
 /// Poles nearer to the surface than this share of their radius are rejected.
 ///
 /// Their balls pass between the samples of a part that is thinner than the samples are apart, and
-/// reach far to the other side; the side of the centre says nothing of them. A few in ten thousand on surfaces with such
-/// parts: a handle on one mesh comes from 51 of 200,000. From 3/4 on, thin parts lose poles that they need.
-/// The published program has no surface to ask, and estimates the same from the shape of Voronoi cells.
+/// reach far to the other side; the side of the centre says nothing of them. They are a few in ten
+/// thousand, but one mesh has a false handle with them. From 3/4 on, thin parts lose poles that
+/// they need. The published program has no surface to ask, and estimates the same from the shape of
+/// Voronoi cells.
 const LEAST_DEPTH: f64 = 0.25;
 
 impl Shape {
