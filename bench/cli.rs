@@ -46,6 +46,8 @@ pub enum Verb {
     Simplify(cmd::simplify::Arguments),
     /// Measure a medial mesh from anywhere against a surface.
     Evaluate(cmd::evaluate::Arguments),
+    /// Make a surface from a medial mesh: the boundary of its union, or the power crust.
+    Reconstruct(cmd::reconstruct::Arguments),
     /// Triangulate an array of points: Delaunay, or regular with weights.
     Triangulate(cmd::triangulate::Arguments),
     /// Convert between surface formats, or between medial mesh formats.
@@ -84,6 +86,7 @@ fn run(verb: Verb, global: &Global) -> Result<cmd::Exit, cmd::Failure> {
         Verb::Axis(arguments) => cmd::axis::run(&arguments, global),
         Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global),
         Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
+        Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Triangulate(arguments) => cmd::triangulate::run(&arguments, global),
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
         Verb::Methods(arguments) => cmd::methods::run(&arguments, global),

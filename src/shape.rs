@@ -22,10 +22,12 @@ use crate::surface::{InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh
 mod contacts;
 mod error;
 mod inner_balls;
+mod power_crust;
 
 pub use contacts::ContactSets;
 pub use error::ShapeError;
 pub use inner_balls::InnerBalls;
+pub use power_crust::PolarBalls;
 
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
 pub struct Shape {

@@ -26,6 +26,7 @@ pub mod hierarchy;
 pub mod info;
 pub mod methods;
 pub mod paper;
+pub mod reconstruct;
 pub mod report;
 pub mod simplify;
 pub mod triangulate;

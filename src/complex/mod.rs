@@ -1,6 +1,7 @@
 //! The medial mesh: a simplicial complex of dimension at most two on medial spheres.
 
 pub mod collapse;
+mod contour;
 mod cubical;
 mod formats;
 mod incidence;
@@ -13,6 +14,7 @@ pub mod union_axis;
 mod voronoi;
 mod voronoi_facets;
 
+pub use contour::{ContourError, UnionSurface, union_surface, union_surface_within};
 pub use cubical::cubical_betti;
 pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
 pub use incidence::Incidence;

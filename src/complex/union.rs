@@ -121,9 +121,7 @@ impl Shape {
             Self::Slab(face) => face.signed_distance(p).unwrap_or(f64::INFINITY),
         }
     }
-}
 
-impl Shape {
     /// As [`Shape::signed`], with the centre of the interpolated sphere that attains it; `None`
     /// where a slab leaves the answer to the cones of its sides.
     #[inline]
@@ -133,6 +131,12 @@ impl Shape {
             Self::Cone(cone) => Some(cone.nearest_centre(p)),
             Self::Slab(face) => face.nearest_centre(p),
         }
+    }
+
+    /// Radius of the interpolated sphere that attains the signed distance.
+    fn radius_towards(&self, p: Vec3) -> f64 {
+        let radius = |(signed, centre): (f64, Vec3)| (p.distance(centre) - signed).max(0.0);
+        self.nearest_centre(p).map_or(f64::INFINITY, radius)
     }
 }
 
@@ -218,6 +222,14 @@ impl MedialUnion {
         self.deepest(p).signed
     }
 
+    /// `sigma(p)`, beginning with the primitive that the last call with the same `near` found:
+    /// faster for points that follow each other, with the same answer.
+    pub(super) fn signed_from(&self, p: Vec3, near: &mut usize) -> f64 {
+        let (nearest, place) = self.query::<Signed>(p, *near);
+        *near = place;
+        nearest.signed
+    }
+
     /// `mu(p)`: the least distance to the surface of a primitive, buried or not.
     pub fn unsigned_nearest(&self, p: Vec3) -> f64 {
         self.nearest_surface(p).signed.abs()
@@ -274,6 +286,16 @@ impl MedialUnion {
             let (nearest, place) = self.query::<Signed>(p, *last);
             *last = place;
             nearest
+        })
+    }
+
+    /// For many points, in their order, in parallel: [`signed`](Self::signed), and the radius of the
+    /// ball on the primitive that attains it.
+    pub fn deepest_ball_batch(&self, points: &[Vec3]) -> Vec<(f64, f64)> {
+        in_morton_order(points, |last: &mut usize, p| {
+            let (nearest, place) = self.query::<Signed>(p, *last);
+            *last = place;
+            (nearest.signed, self.shapes[place].radius_towards(p))
         })
     }
 

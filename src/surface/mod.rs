@@ -11,6 +11,7 @@
 
 mod boxes;
 mod check;
+mod contract;
 mod eliminate;
 mod error;
 mod inside;
@@ -33,6 +34,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+pub use contract::{Contraction, Folds, contract_short_edges};
 pub use error::{Fault, Place, SurfaceError, VertexName};
 pub use inside::{InsideTest, Side};
 pub use mesh::{Normalisation, TriMesh};

@@ -1,0 +1,358 @@
+//! `medial reconstruct X.ma -o x.ply`: a surface from a medial mesh.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use medial::complex::{self, ContourError, MedialMesh, MedialUnion, union_surface};
+use medial::geometry::PowerCrust;
+use medial::shape::Shape;
+use medial::surface::{self, Normalisation, SurfaceReport, TriMesh};
+use serde_json::{Map, Value, json};
+
+use super::{
+    Exit, Failure, check_folder, counted, extension, medial_mesh_for, percent, print_json,
+    print_line, shape_options,
+};
+use crate::cli::{Global, MeshArgument, SubstrateArguments};
+use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes};
+
+/// Arguments of `reconstruct`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Medial mesh (.ma, or .ply with radii). The power crust can do without one: it then takes all
+    /// inner poles of the mesh.
+    axis: Option<PathBuf>,
+    /// The surface (.ply, .off, .obj), in the units of the medial mesh.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// What is made of the spheres.
+    #[arg(long, value_enum, default_value_t = Method::Union)]
+    method: Method,
+    /// Surface that the medial mesh is of: a file, or `builtin:ID[:RESOLUTION]`. The power crust
+    /// takes its outer poles; either result is measured against it.
+    #[arg(long, value_name = "MESH")]
+    mesh: Option<MeshArgument>,
+    /// How far the surface may be from the boundary of the union, as a fraction of the diagonal of
+    /// the mesh, or of the box around the spheres without one.
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.01)]
+    tolerance: f64,
+    #[command(flatten)]
+    substrate: SubstrateArguments,
+}
+
+/// What is made of the spheres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// The boundary of the union of spheres, cones and slabs.
+    Union,
+    /// The surface between the power cells of the spheres and of the outer poles of the mesh.
+    PowerCrust,
+}
+
+/// Corners of the power crust that are nearer than this along it are one, as a fraction of the
+/// diagonal.
+const COINCIDENT: f64 = 1e-6;
+
+/// A result farther from the mesh than this, in its diagonals, is taken to be of another surface.
+const ASTRAY: f64 = 0.5;
+
+/// A surface that was made, in input units, and what is to be said of it.
+struct Made {
+    mesh: TriMesh,
+    diagonal: f64,
+    /// Keys of this method alone.
+    more: Map<String, Value>,
+    warnings: Vec<String>,
+}
+
+/// Seconds by stage.
+#[derive(Default)]
+struct Stages {
+    seconds: Map<String, Value>,
+    cpu_seconds: Map<String, Value>,
+    total: Lap,
+}
+
+impl Stages {
+    fn add(&mut self, stage: &str, lap: Lap) {
+        self.seconds.insert(stage.into(), lap.seconds.into());
+        self.cpu_seconds.insert(stage.into(), lap.cpu_seconds.into());
+        self.total += lap;
+    }
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When an input is refused, the power crust has no mesh, the tolerance is too fine, or the output
+/// cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    check_arguments(arguments)?;
+    let mut stages = Stages::default();
+    let (read, lap) = Stopwatch::time(|| read(arguments));
+    let (shape, axis, mut warnings) = read?;
+    stages.add("read", lap);
+    let made = match arguments.method {
+        Method::Union => of_union(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
+        Method::PowerCrust => of_poles(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
+    }?;
+    warnings.extend(made.warnings);
+    let (written, lap) = Stopwatch::time(|| surface::write(&arguments.output, &made.mesh));
+    written.map_err(Failure::input)?;
+    stages.add("write", lap);
+    let (seconds, cpu_seconds) = (stages.total.seconds, stages.total.cpu_seconds);
+    stages.seconds.insert("total".into(), seconds.into());
+    stages.cpu_seconds.insert("total".into(), cpu_seconds.into());
+    let peak = peak_bytes();
+
+    // Untimed: the verdict.
+    let report = examine(arguments, &made.mesh, &mut warnings)?;
+    let deviation = shape.as_ref().map(|shape| deviation(shape, &made.mesh)).transpose()?;
+    if let (Some([max, _]), Some(axis)) = (deviation, &arguments.axis)
+        && max > ASTRAY
+    {
+        warnings.push(format!(
+            "the result is up to {max:.1} diagonals of the mesh away from it: is {} of this surface, and in \
+             its units?",
+            axis.display()
+        ));
+    }
+    let tolerance = match arguments.method {
+        Method::Union => arguments.tolerance,
+        Method::PowerCrust => COINCIDENT,
+    };
+    let method = match arguments.method {
+        Method::Union => "union",
+        Method::PowerCrust => "power-crust",
+    };
+    if global.json {
+        let object = json!({
+            "method": method, "vertices": report.vertices, "faces": report.faces,
+            "closed": report.closed, "manifold": report.manifold, "genus": report.genus,
+            "components": report.components, "intersecting_pairs": report.intersecting_pairs,
+            "tolerance": tolerance, "diagonal": made.diagonal,
+            "deviation": deviation.map(|[max, mean]| json!({ "max": max, "mean": mean })),
+            "seconds": stages.seconds, "cpu_seconds": stages.cpu_seconds, "peak_bytes": peak,
+            "output": arguments.output,
+        });
+        let Value::Object(mut object) = object else { unreachable!("made above") };
+        object.extend(made.more);
+        print_json(&object, &warnings);
+        return Ok(Exit::Done);
+    }
+    let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
+    let yes = |flag: bool| if flag { "" } else { "not " };
+    print_line(&format!(
+        "{}: {}, {} in {seconds:.2} s",
+        arguments.output.display(),
+        counted(report.vertices as u64, "vertex").replace("vertexs", "vertices"),
+        counted(report.faces as u64, "face")
+    ));
+    print_line(&format!(
+        "  {}closed, {}manifold, {}, genus {genus}",
+        yes(report.closed),
+        yes(report.manifold),
+        counted(report.components as u64, "component")
+    ));
+    if let Some([max, mean]) = deviation {
+        print_line(&format!("  from the mesh: at most {}, mean {}", percent(max), percent(mean)));
+    }
+    for warning in warnings {
+        print_line(&format!("  warning: {warning}"));
+    }
+    Ok(Exit::Done)
+}
+
+/// What can be refused before anything is read.
+fn check_arguments(arguments: &Arguments) -> Result<(), Failure> {
+    let output = &arguments.output;
+    let extension = extension(output);
+    if !["ply", "off", "obj"].contains(&extension.as_str()) {
+        return Err(Failure::input(format!(
+            "{}: the extension {extension:?} is not one of .ply, .off, .obj",
+            output.display()
+        )));
+    }
+    check_folder(output)?;
+    let tolerance = arguments.tolerance;
+    if !(tolerance > 0.0 && tolerance <= 1.0) {
+        let message = format!("--tolerance {tolerance}: ask for more than 0 and at most 1");
+        return Err(Failure::usage(message));
+    }
+    match (arguments.method, &arguments.axis, &arguments.mesh) {
+        (Method::Union, None, _) => Err(Failure::usage(
+            "the union is that of a medial mesh: name one, or ask for --method power-crust",
+        )),
+        (Method::PowerCrust, _, None) => Err(Failure::usage(
+            "the power crust takes its outer poles from a surface: name it by --mesh MESH, or ask \
+             for --method union",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The shape and the medial mesh, in its own units, where they are named, and what was repaired.
+type Read = (Option<Shape>, Option<MedialMesh>, Vec<String>);
+
+fn read(arguments: &Arguments) -> Result<Read, Failure> {
+    let options = shape_options(&arguments.substrate)?;
+    let mut warnings = Vec::new();
+    let shape = match &arguments.mesh {
+        None => None,
+        Some(mesh) => {
+            let source = Source::parse(mesh).map_err(Failure::usage)?;
+            let input = Input::load(&source)?;
+            warnings.extend(input.report.warnings.iter().cloned());
+            Some(input.shape(options).map_err(|error| Failure::of(&source, error))?)
+        }
+    };
+    let axis = match (&arguments.axis, &shape) {
+        (None, _) => None,
+        (Some(path), Some(shape)) => Some(medial_mesh_for(path, shape)?),
+        (Some(path), None) => {
+            let loaded = complex::read(path).map_err(Failure::input)?;
+            Some((loaded.mesh, loaded.notes))
+        }
+    };
+    let axis = axis.map(|(mesh, notes)| {
+        warnings.extend(notes);
+        mesh
+    });
+    Ok((shape, axis, warnings))
+}
+
+/// The boundary of the union of spheres, cones and slabs.
+fn of_union(
+    arguments: &Arguments,
+    shape: Option<&Shape>,
+    axis: Option<&MedialMesh>,
+    stages: &mut Stages,
+) -> Result<Made, Failure> {
+    let (Some(axis), Some(path)) = (axis, &arguments.axis) else { unreachable!("checked before") };
+    let of_file = |message: String| Failure::input(format!("{}: {message}", path.display()));
+    let union = MedialUnion::new(axis).map_err(|error| of_file(error.to_string()))?;
+    let (lo, hi) = union.bounding_box();
+    let corners = TriMesh { vertices: vec![lo, hi], faces: vec![] };
+    let diagonal = shape.map(|s| s.normalisation().diagonal);
+    let of_balls = || Normalisation::of(&corners).map(|n| n.diagonal);
+    let diagonal = diagonal
+        .or_else(of_balls)
+        .ok_or_else(|| of_file("its spheres have no extent, or one that is not finite".into()))?;
+    let (made, lap) = Stopwatch::time(|| union_surface(axis, arguments.tolerance * diagonal));
+    stages.add("reconstruct", lap);
+    let made = made.map_err(|error| {
+        of_file(match error {
+            ContourError::TooFine { most, feasible, .. } => format!(
+                "--tolerance {} needs more than {most} tetrahedra, or finer ones than there are; \
+                 --tolerance {:.1e} is feasible",
+                arguments.tolerance,
+                feasible / diagonal
+            ),
+            ContourError::TooThin { feasible, .. } => format!(
+                "no sphere is thick enough to show; --tolerance {:.1e} would show the largest",
+                feasible / diagonal
+            ),
+            other => other.to_string(),
+        })
+    })?;
+    let mut warnings = Vec::new();
+    if made.lost > 0 {
+        warnings.push(format!(
+            "{} with a radius below {:.1e} of the diagonal: where the union is as thin, parts of it may be \
+             missing; a finer --tolerance shows more",
+            counted(made.lost as u64, "sphere"),
+            made.smallest / diagonal
+        ));
+    }
+    let centroids: Vec<_> = (0..made.mesh.faces.len())
+        .map(|f| made.mesh.triangle(f).into_iter().sum::<medial::Vec3>() / 3.0)
+        .collect();
+    let off = union.signed_batch(&centroids).into_iter().map(f64::abs).fold(0.0, f64::max);
+    let more = Map::from_iter([
+        ("tetrahedra".to_owned(), Value::from(made.tetrahedra)),
+        ("lost".to_owned(), Value::from(made.lost)),
+        ("faces_to_union".to_owned(), Value::from(off / diagonal)),
+    ]);
+    Ok(Made { mesh: made.mesh, diagonal, more, warnings })
+}
+
+/// The power crust of the spheres of the medial mesh, or of all inner poles, and of the outer poles.
+fn of_poles(
+    arguments: &Arguments,
+    shape: Option<&Shape>,
+    axis: Option<&MedialMesh>,
+    stages: &mut Stages,
+) -> Result<Made, Failure> {
+    let (Some(shape), Some(mesh)) = (shape, &arguments.mesh) else {
+        unreachable!("checked before")
+    };
+    let of_mesh = |message: String| Failure::input(format!("{}: {message}", mesh.display()));
+    let (balls, lap) = Stopwatch::time(|| shape.polar_balls());
+    stages.add("poles", lap);
+    let balls = balls.map_err(|error| of_mesh(error.to_string()))?;
+    let to_normal = shape.normalisation();
+    let inner = match axis {
+        Some(axis) => axis.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)).spheres,
+        None => balls.inner,
+    };
+    let (counts, named) =
+        ([inner.len(), balls.outer.len()], arguments.axis.as_ref().unwrap_or(mesh));
+    let of_named = |message: String| Failure::input(format!("{}: {message}", named.display()));
+    let (crust, lap) = Stopwatch::time(|| {
+        let crust = PowerCrust::new(&inner, &balls.outer)?;
+        Ok((crust.facet_count(), crust.surface(COINCIDENT)))
+    });
+    stages.add("reconstruct", lap);
+    let (facets, mut crust) =
+        crust.map_err(|error: medial::geometry::TriangulationError| of_named(error.to_string()))?;
+    if crust.mesh.faces.is_empty() {
+        return Err(of_named(
+            "no inner ball has a power cell: is the medial mesh of this surface, and in its units?"
+                .into(),
+        ));
+    }
+    for vertex in &mut crust.mesh.vertices {
+        *vertex = to_normal.backward(*vertex);
+    }
+    let more = Map::from_iter([
+        ("inner".to_owned(), Value::from(counts[0])),
+        ("outer".to_owned(), Value::from(counts[1])),
+        ("rejected".to_owned(), Value::from(balls.rejected)),
+        ("facets".to_owned(), Value::from(facets)),
+        ("merged".to_owned(), Value::from(crust.contracted)),
+        ("samples".to_owned(), Value::from(shape.samples().len())),
+        ("sampling".to_owned(), Value::from(shape.options().sampling.to_string())),
+        ("seed".to_owned(), Value::from(arguments.substrate.seed)),
+    ]);
+    Ok(Made { mesh: crust.mesh, diagonal: to_normal.diagonal, more, warnings: vec![] })
+}
+
+/// What `medial info` says of the file that was written; of what is no file, the mesh itself.
+fn examine(
+    arguments: &Arguments,
+    mesh: &TriMesh,
+    warnings: &mut Vec<String>,
+) -> Result<SurfaceReport, Failure> {
+    let path: &Path = &arguments.output;
+    if !path.is_file() {
+        return surface::validate(mesh).map_err(Failure::input);
+    }
+    let inspection = surface::inspect(path).map_err(Failure::input)?;
+    warnings.extend(inspection.refused.map(|fault| fault.to_string()));
+    warnings.extend(inspection.report.repairs.iter().map(ToString::to_string));
+    warnings.extend(inspection.report.warnings.iter().cloned());
+    Ok(inspection.report)
+}
+
+/// The largest and the mean distance of a surface's vertices and face centres from the mesh of a
+/// shape, as fractions of its diagonal.
+fn deviation(shape: &Shape, mesh: &TriMesh) -> Result<[f64; 2], Failure> {
+    let centroids =
+        (0..mesh.faces.len()).map(|f| mesh.triangle(f).into_iter().sum::<medial::Vec3>() / 3.0);
+    let to_normal = shape.normalisation();
+    let points = mesh.vertices.iter().copied().chain(centroids);
+    let points: Vec<_> = points.map(|p| to_normal.forward(p)).collect();
+    let distances = shape.surface_tree().map_err(Failure::input)?.distance_batch(&points);
+    let max = distances.iter().copied().fold(0.0, f64::max);
+    Ok([max, distances.iter().sum::<f64>() / distances.len() as f64])
+}

@@ -1,0 +1,159 @@
+//! `medial reconstruct` as its users meet it.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn run(arguments: &[&str]) -> (i32, String, String) {
+    let mut command = Command::cargo_bin("medial").expect("the binary is built");
+    let output = command.args(arguments).output().expect("the command starts");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
+}
+
+fn json(arguments: &[&str]) -> (i32, Value) {
+    let (code, stdout, stderr) = run(&[arguments, &["--json"]].concat());
+    assert_eq!(stdout.lines().count(), 1, "one line of JSON: {stdout}\n{stderr}");
+    (code, serde_json::from_str(&stdout).expect("JSON"))
+}
+
+fn text_path(path: &Path) -> &str {
+    path.to_str().expect("a UTF-8 path")
+}
+
+/// Checks what both methods promise, and that `medial info` agrees.
+fn check(object: &Value, output: &str, genus: u64) {
+    for key in [
+        "method",
+        "vertices",
+        "faces",
+        "closed",
+        "manifold",
+        "genus",
+        "components",
+        "tolerance",
+        "seconds",
+        "cpu_seconds",
+        "peak_bytes",
+        "warnings",
+        "version",
+    ] {
+        assert!(!object[key].is_null(), "{key} is missing in {object}");
+    }
+    assert!(object["seconds"]["total"].is_f64(), "{object}");
+    assert_eq!((&object["closed"], &object["manifold"]), (&true.into(), &true.into()), "{object}");
+    assert_eq!((&object["genus"], &object["components"]), (&genus.into(), &1.into()), "{object}");
+    let (code, info) = json(&["info", output]);
+    assert_eq!(code, 0, "{info}");
+    assert_eq!(info["genus"], object["genus"]);
+}
+
+#[test]
+fn a_torus_comes_back_by_either_method() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (axis, mesh) = (at("x.ma"), "builtin:torus");
+    let simplify = ["simplify", mesh, "-m", "qmat", "--spheres", "100", "-o", &axis];
+    assert_eq!(run(&simplify).0, 0);
+
+    let union = at("union.ply");
+    let (code, object) =
+        json(&["reconstruct", &axis, "-o", &union, "--mesh", mesh, "--tolerance", "0.03"]);
+    assert_eq!((code, &object["method"]), (0, &"union".into()), "{object}");
+    check(&object, &union, 1);
+    assert!(object["faces_to_union"].as_f64().expect("a number") < 0.03, "{object}");
+    assert!(object["deviation"]["max"].as_f64().expect("a number") < 0.1, "{object}");
+
+    let crust = at("crust.off");
+    let words = ["reconstruct", "-o", &crust, "--mesh", mesh, "--method", "power-crust"];
+    let (code, object) = json(&[&words[..], &["--sampling", "blue:3000"]].concat());
+    assert_eq!((code, &object["method"]), (0, &"power-crust".into()), "{object}");
+    check(&object, &crust, 1);
+    assert!(object["deviation"]["max"].as_f64().expect("a number") < 0.005, "{object}");
+
+    // The spheres of a file in place of the inner poles.
+    let all = at("all.ma");
+    assert_eq!(run(&["axis", mesh, "-o", &all]).0, 0);
+    let (code, object) = json(&[&words[..], &[&all]].concat());
+    assert_eq!(code, 0, "{object}");
+    check(&object, &crust, 1);
+    let (code, stdout, _) = run(&[&words[..], &[&all]].concat());
+    assert!(code == 0 && stdout.contains("genus 1"), "{stdout}");
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (axis, mesh) = (at("x.ma"), "builtin:blob");
+    assert_eq!(run(&["simplify", mesh, "-m", "qmat", "--spheres", "50", "-o", &axis]).0, 0);
+    for method in ["union", "power-crust"] {
+        let written = ["1", "2"].map(|threads| {
+            let path = at(&format!("{method}-{threads}.obj"));
+            let words = ["reconstruct", &axis, "--mesh", mesh, "--method", method, "-o", &path];
+            let more = ["--tolerance", "0.05", "--threads", threads];
+            let (code, _, stderr) = run(&[&words[..], &more].concat());
+            assert_eq!(code, 0, "{stderr}");
+            fs::read(path).expect("written")
+        });
+        assert!(written[0] == written[1], "{method}");
+    }
+}
+
+#[test]
+fn what_makes_no_surface_is_said() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let write = |name: &str, text: &str| {
+        fs::write(at(name), text).expect("written");
+        at(name)
+    };
+    let ball = write("ball.ma", "1 0 0\nv 0 0 0 1\n");
+    let empty = write("empty.ma", "0 0 0\n");
+    let points = write("points.ma", "2 1 0\nv 0 0 0 0\nv 1 0 0 0\ne 0 1\n");
+    let specks = write("specks.ma", "2 0 0\nv 0 0 0 1e-6\nv 1 0 0 1e-6\n");
+    let huge = write("huge.ma", "1 0 0\nv 0 0 0 1e200\n");
+    let far = write("far.ma", "1 0 0\nv 1e15 0 0 1\n");
+    let (out, nowhere) = (at("x.ply"), at("no/such/folder/x.ply"));
+    let mesh = "builtin:sphere:8";
+    let crust = ["--method", "power-crust"];
+    let crust_of = ["--method", "power-crust", "--mesh", mesh];
+    let cases: [(&[&str], &[&str], i32, &str); 12] = [
+        (&[&ball, "-o", "x.stl"], &[], 1, "\"stl\" is not one of .ply"),
+        (&[&ball, "-o", &nowhere], &[], 1, "there is no folder"),
+        (&["no-such.ma", "-o", &out], &[], 1, "no-such.ma"),
+        (&[&ball, "-o", &out], &crust, 2, "--mesh MESH"),
+        (&["-o", &out], &[], 2, "--method power-crust"),
+        (&[&ball, "-o", &out], &["--tolerance", "0"], 2, "--tolerance 0"),
+        (&[&ball, "-o", &out], &["--tolerance", "1e-7"], 1, "is feasible"),
+        (&[&empty, "-o", &out], &[], 1, "empty.ma"),
+        (&[&points, "-o", &out], &[], 1, "points.ma: all spheres have radius zero"),
+        (&[&specks, "-o", &out], &[], 1, "specks.ma: no sphere is thick enough"),
+        (&[&huge, "-o", &out], &[], 1, "huge.ma"),
+        (&[&far, "-o", &out], &crust_of, 1, "far.ma"),
+    ];
+    for (words, more, expected, part) in cases {
+        let (code, _, stderr) = run(&[&["reconstruct"], words, more].concat());
+        assert!(code == expected && stderr.contains(part), "{words:?}: {code}, {stderr}");
+        assert!(!Path::new(&out).exists(), "{words:?} wrote a file");
+    }
+    let grown = write("grown.ma", "1 0 0\nv 0 0 0 100\n");
+    let (code, object) = json(&["reconstruct", &grown, "--mesh", mesh, "-o", &out]);
+    let warning = object["warnings"].to_string();
+    // In diagonals of the mesh so fine a surface of it would be too large.
+    assert!(
+        code == 1 && object["error"].as_str().is_some_and(|e| e.contains("grown.ma")),
+        "{warning}"
+    );
+    let words = ["--mesh", mesh, "-o", &out, "--tolerance", "1"];
+    let (code, object) = json(&[&["reconstruct", &grown][..], &words].concat());
+    assert!(code == 0 && object["warnings"].to_string().contains("in its units"), "{object}");
+
+    // Lone spheres, one of them a point, are no error.
+    let lone = write("lone.ma", "3 0 0\nv 0 0 0 1\nv 5 0 0 1\nv 9 0 0 0\n");
+    let (code, object) = json(&["reconstruct", &lone, "-o", &out]);
+    assert_eq!((code, &object["components"], &object["lost"]), (0, &2.into(), &1.into()));
+    assert!(object["warnings"][0].as_str().is_some_and(|w| w.contains("1 sphere")), "{object}");
+}

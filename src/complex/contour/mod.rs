@@ -1,0 +1,185 @@
+//! The boundary surface of the union of spheres, cones and slabs of a medial mesh.
+//!
+//! With `sigma` the least signed distance to a primitive, negative inside and 1-Lipschitz
+//! ([`MedialUnion`]):
+//!
+//! 1. A cube around the union is filled with tetrahedra, which are bisected where the boundary may be, as
+//!    the values of `sigma` at their vertices allow, until none has an edge longer than 4/5 of the
+//!    tolerance, or than the radius of the union's balls there where that is less (file `bisection.rs`).
+//! 2. Marching tetrahedra: a closed manifold with its vertices on the boundary (file `march.rs`).
+//! 3. Edges shorter than a quarter of the tetrahedron's edge are contracted: a closed manifold stays one,
+//!    and vertices stay on the boundary ([`contract_short_edges`]).
+//!
+//! # What the tolerance means
+//!
+//! Every point with `sigma > tolerance` is outside the surface, and every point with
+//! `sigma < -tolerance` is inside. Proof: let `d` be the longest edge of the tetrahedron that holds the
+//! point. If `|sigma| > d` there, all four vertices are on the same side as the point, so that the surface
+//! does not enter. If `d` is larger than 4/5 of the tolerance, `|sigma| > d` at a vertex, and the tetrahedron
+//! is on one side as a whole, rightly. Contraction moves the surface by at most `d / 4`.
+//!
+//! So no point of the surface is farther than the tolerance from the union, or deeper in it. On smooth
+//! parts the distance is much less, about `d^2 / 8 r` for curvature radius `r`. What is thinner than a
+//! tetrahedron can be missed: parts of the union with a radius below 1/20 of the tolerance
+//! ([`UnionSurface::lost`]), and crevices and holes narrower than the tolerance.
+
+mod bisection;
+mod march;
+
+use bisection::{Bisection, Leaf, MOST_BISECTIONS, Value};
+
+use super::{MedialMesh, MedialUnion, UnionError};
+use crate::Vec3;
+use crate::surface::{Folds, TriMesh, contract_short_edges};
+
+/// The boundary surface of a union, see [`union_surface`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnionSurface {
+    /// Closed and manifold, counter-clockwise as seen from outside.
+    pub mesh: TriMesh,
+    /// Tetrahedra that were needed.
+    pub tetrahedra: usize,
+    /// Spheres with a radius below the smallest tetrahedron: these, and what tapers to them, may be
+    /// missing.
+    pub lost: usize,
+    /// Radius below which a sphere counts as lost, in the unit of the mesh.
+    pub smallest: f64,
+}
+
+/// Why there is no surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ContourError {
+    /// The medial mesh has no union.
+    #[error(transparent)]
+    Union(#[from] UnionError),
+    /// The tolerance is not a positive number.
+    #[error("a tolerance of {0} is not positive")]
+    Tolerance(f64),
+    /// The tolerance is too fine for the memory that this may take.
+    #[error(
+        "a tolerance of {tolerance:e} needs more than {most} tetrahedra, or finer ones than there are; \
+         {feasible:e} is feasible"
+    )]
+    TooFine {
+        /// What was asked, in the unit of the mesh.
+        tolerance: f64,
+        /// The most tetrahedra that are taken.
+        most: usize,
+        /// A tolerance that is feasible, in the unit of the mesh.
+        feasible: f64,
+    },
+    /// No part of the union is thick enough.
+    #[error(
+        "no part of the union is as thick as {smallest:e}: a tolerance below {feasible:e} shows some"
+    )]
+    TooThin {
+        /// The smallest tetrahedron.
+        smallest: f64,
+        /// A tolerance that would show the largest sphere.
+        feasible: f64,
+    },
+    /// All radii are zero.
+    #[error("all spheres have radius zero: their union has no inside")]
+    NoInside,
+}
+
+/// Tetrahedra's edges as a share of the tolerance; contraction takes the rest.
+const EDGE_SHARE: f64 = 0.8;
+
+/// Edges are contracted below this share of the tetrahedron's edge that the vertex is on.
+const CONTRACTED: f64 = 0.25;
+
+/// Tetrahedra are refined to the radius of the union's balls, but to no less than this share of
+/// what the tolerance demands anyway.
+const THINNEST: f64 = 1.0 / 16.0;
+
+/// About 4 GB.
+const MOST_TETRAHEDRA: usize = 50_000_000;
+
+/// The boundary of the union of all primitives of a medial mesh as triangles. `tolerance` is in the unit of
+/// the mesh; the head of this file says what it means.
+///
+/// The time and memory grow with the area of the boundary over the square of the tolerance. Parallel;
+/// the same surface for any number of threads.
+///
+/// ```
+/// use medial::{Vec3, surface};
+/// use medial::complex::{MedialMesh, Sphere, union_surface};
+///
+/// let spheres = vec![Sphere::new(Vec3::ZERO, 1.0), Sphere::new(4.0 * Vec3::X, 1.0)];
+/// let capsule = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![])?;
+/// let boundary = union_surface(&capsule, 0.2)?;
+/// let report = surface::validate(&boundary.mesh)?;
+/// let exact = std::f64::consts::PI * (4.0 / 3.0 + 4.0);
+/// assert!((report.volume.unwrap() / exact - 1.0).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the mesh has no union, the tolerance is not positive, or so fine that more than 50 million
+/// tetrahedra would be needed, and when nothing is thick enough to show.
+pub fn union_surface(mesh: &MedialMesh, tolerance: f64) -> Result<UnionSurface, ContourError> {
+    union_surface_within(mesh, tolerance, MOST_TETRAHEDRA)
+}
+
+/// [`union_surface`] with at most so many tetrahedra, of some 80 bytes each.
+///
+/// # Errors
+/// As [`union_surface`].
+pub fn union_surface_within(
+    mesh: &MedialMesh,
+    tolerance: f64,
+    most: usize,
+) -> Result<UnionSurface, ContourError> {
+    let union = MedialUnion::new(mesh)?;
+    if !(tolerance > 0.0 && tolerance.is_finite()) {
+        return Err(ContourError::Tolerance(tolerance));
+    }
+    let largest = mesh.spheres.iter().map(|m| m.radius).fold(0.0, f64::max);
+    if largest == 0.0 {
+        return Err(ContourError::NoInside);
+    }
+    let longest = EDGE_SHARE * tolerance;
+    let smallest = THINNEST * longest;
+    let mut grid = cube_around(&union, longest);
+    let sizes: Vec<f64> = (0..=MOST_BISECTIONS).map(|g| grid.longest_edge(g)).collect();
+    let goal = sizes.iter().position(|&s| s <= longest).unwrap_or(sizes.len() - 1) as u8;
+    let wanted = |leaf: &Leaf, values: [Value; 4]| {
+        let size = sizes[usize::from(leaf.generation)];
+        let radius = values.iter().map(|v| v.radius).fold(f64::INFINITY, f64::min);
+        size > longest.min(radius.max(smallest)) && values.iter().all(|v| v.signed.abs() <= size)
+    };
+    let values = |points: &[Vec3]| {
+        let found = union.deepest_ball_batch(points).into_iter();
+        found.map(|(signed, radius)| Value { signed, radius }).collect()
+    };
+    grid.refine(goal, most, values, wanted).map_err(|many| {
+        // Enough even if everything is thin and has to be refined as far as that goes.
+        let size = sizes[usize::from(many.generation)] / THINNEST;
+        let feasible = size / EDGE_SHARE * f64::max(1.0, (many.leaves as f64 / most as f64).sqrt());
+        ContourError::TooFine { tolerance, most, feasible }
+    })?;
+    if sizes[usize::from(goal)] > longest {
+        let feasible = sizes[usize::from(goal)] / EDGE_SHARE;
+        return Err(ContourError::TooFine { tolerance, most, feasible });
+    }
+    let (raw, edges) = march::march(&grid, &union);
+    if raw.faces.is_empty() {
+        // Half a radius is enough for a vertex of the tetrahedra to be in the ball.
+        let feasible = 0.5 * largest / EDGE_SHARE;
+        return Err(ContourError::TooThin { smallest, feasible });
+    }
+    let limits: Vec<f64> = edges.iter().map(|length| CONTRACTED * length).collect();
+    let mesh_of = contract_short_edges(&raw, &limits, Folds::Refused).mesh;
+    let lost = mesh.spheres.iter().filter(|m| m.radius < smallest).count();
+    Ok(UnionSurface { mesh: mesh_of, tetrahedra: grid.leaves.len(), lost, smallest })
+}
+
+/// A cube with the union in its inside. It is off centre by odd fractions, so that symmetric unions do not
+/// have their boundary run through vertices.
+fn cube_around(union: &MedialUnion, longest: f64) -> Bisection {
+    let (lo, hi) = union.bounding_box();
+    let extent = (hi - lo).max_element().max(longest);
+    let margin = 0.1 * extent * Vec3::new(0.731, 0.617, 0.849);
+    Bisection::of_cube(lo - margin, 1.2 * extent)
+}

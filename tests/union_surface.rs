@@ -1,0 +1,195 @@
+//! Boundary surfaces of unions of spheres, cones and slabs against closed forms.
+
+use std::f64::consts::PI;
+
+use medial::Vec3;
+use medial::complex::{
+    ContourError, MedialMesh, MedialUnion, Sphere, union_surface, union_surface_within,
+};
+use medial::geometry::TriangleBvh;
+use medial::metrics::{EnvelopeOptions, sample_envelope, union_betti};
+use medial::surface::{self, SurfaceReport};
+use proptest::prelude::*;
+
+fn mesh(spheres: &[([f64; 3], f64)], edges: &[[u32; 2]], faces: &[[u32; 3]]) -> MedialMesh {
+    let spheres = spheres.iter().map(|&(c, r)| Sphere::new(Vec3::from(c), r)).collect();
+    MedialMesh::from_simplices(spheres, edges.to_vec(), faces.to_vec()).unwrap()
+}
+
+/// Checks the surface of a union against the union, both ways, and reports on it.
+fn checked(axis: &MedialMesh, tolerance: f64) -> SurfaceReport {
+    let made = union_surface(axis, tolerance).unwrap();
+    let report = surface::validate(&made.mesh).unwrap();
+    assert!(!report.self_intersecting, "{} pairs", report.intersecting_pairs);
+    let union = MedialUnion::new(axis).unwrap();
+    for &v in &made.mesh.vertices {
+        assert!(union.signed(v).abs() < 1e-9 * tolerance, "{v}: {}", union.signed(v));
+    }
+    for f in 0..made.mesh.faces.len() {
+        let centre = made.mesh.triangle(f).iter().sum::<Vec3>() / 3.0;
+        assert!(union.signed(centre).abs() <= tolerance);
+    }
+    let options = EnvelopeOptions { samples: 2000, burial: 1e-7, seed: 0 };
+    let envelope = sample_envelope(axis, &union, &options).unwrap();
+    let back = TriangleBvh::new(&made.mesh).unwrap().distance_batch(&envelope);
+    assert!(back.iter().all(|&d| d <= tolerance), "{:?}", back.iter().cloned().reduce(f64::max));
+    report
+}
+
+fn near(value: Option<f64>, exact: f64, share: f64) {
+    let value = value.unwrap();
+    assert!((value / exact - 1.0).abs() < share, "{value}, exactly {exact}");
+}
+
+#[test]
+fn a_sphere_has_its_area_and_volume() {
+    let ball = mesh(&[([0.3, -0.2, 7.0], 2.0)], &[], &[]);
+    let mut last = f64::INFINITY;
+    for tolerance in [0.8, 0.4, 0.2] {
+        let report = checked(&ball, tolerance);
+        assert_eq!((report.components, report.genus), (1, Some(0)));
+        let short = 1.0 - report.volume.unwrap() / (32.0 / 3.0 * PI);
+        // Inscribed, and quadratic in the tolerance.
+        assert!(short > 0.0 && short < 0.4 * last, "{tolerance}: {short} after {last}");
+        last = short;
+    }
+    near(checked(&ball, 0.1).area, 16.0 * PI, 0.002);
+}
+
+#[test]
+fn two_spheres_apart_are_two_components() {
+    let pair = mesh(&[([0.0; 3], 1.0), ([3.0, 0.0, 0.0], 0.5)], &[], &[]);
+    let report = checked(&pair, 0.1);
+    assert_eq!((report.components, report.genus), (2, Some(0)));
+    near(report.volume, 4.0 / 3.0 * PI * (1.0 + 0.125), 0.01);
+}
+
+#[test]
+fn a_tapered_cone_and_a_sphere() {
+    // Spheres of radii 1 and 0.5, 3 apart: caps and the frustum between their circles of contact.
+    let axis =
+        mesh(&[([0.0; 3], 1.0), ([3.0, 0.0, 0.0], 0.5), ([0.0, 9.0, 0.0], 0.8)], &[[0, 1]], &[]);
+    let report = checked(&axis, 0.1);
+    assert_eq!((report.components, report.genus), (2, Some(0)));
+    let sine: f64 = 0.5 / 3.0;
+    let cosine = (1.0 - sine * sine).sqrt();
+    let (a, b) = (cosine, 0.5 * cosine);
+    let height = 3.0 + 0.5 * sine - sine;
+    let frustum = PI * height * (a * a + a * b + b * b) / 3.0;
+    let cap = |r: f64, h: f64| PI * h * h * (3.0 * r - h) / 3.0;
+    let cone = frustum + cap(1.0, 1.0 + sine) + cap(0.5, 0.5 - 0.5 * sine);
+    near(report.volume, cone + 4.0 / 3.0 * PI * 0.512, 0.005);
+}
+
+#[test]
+fn a_slab_is_its_triangle_grown() {
+    // Steiner: V = 2 r A + pi r^2 P / 2 + 4/3 pi r^3.
+    let axis =
+        mesh(&[([0.0; 3], 0.2), ([3.0, 0.0, 0.0], 0.2), ([0.0, 4.0, 0.0], 0.2)], &[], &[[0, 1, 2]]);
+    let report = checked(&axis, 0.05);
+    assert_eq!(report.genus, Some(0));
+    let r: f64 = 0.2;
+    near(report.volume, 2.0 * r * 6.0 + PI * r * r * 6.0 + 4.0 / 3.0 * PI * r.powi(3), 0.005);
+    near(report.area, 12.0 + PI * r * 12.0 + 4.0 * PI * r * r, 0.005);
+}
+
+#[test]
+fn thin_parts_are_refined_and_thinner_ones_counted() {
+    // A plate of half the tolerance has no hole.
+    let plate = |r: f64| {
+        let corners = [[0.0; 3], [3.0, 0.0, 0.0], [0.0, 3.0, 0.0]];
+        mesh(&corners.map(|c| (c, r)), &[], &[[0, 1, 2]])
+    };
+    let made = union_surface(&plate(0.05), 0.1).unwrap();
+    assert_eq!(made.lost, 0);
+    assert_eq!(surface::validate(&made.mesh).unwrap().genus, Some(0));
+    let mut with_points = plate(0.3);
+    with_points.spheres.push(Sphere::new(Vec3::splat(9.0), 0.0));
+    let made = union_surface(&with_points, 0.2).unwrap();
+    assert_eq!(made.lost, 1);
+    assert_eq!(surface::validate(&made.mesh).unwrap().components, 1);
+}
+
+#[test]
+fn loops_and_voids_of_the_union_are_those_of_the_surface() {
+    let ring = |n: u32, r: f64| {
+        let angle = |k: u32| f64::from(k) * std::f64::consts::TAU / f64::from(n);
+        let spheres: Vec<_> =
+            (0..n).map(|k| ([angle(k).cos(), angle(k).sin(), 0.1 * angle(k).cos()], r)).collect();
+        let edges: Vec<_> = (0..n).map(|k| [k, (k + 1) % n]).collect();
+        mesh(&spheres, &edges, &[])
+    };
+    let corners = [[0.0; 3], [3.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 3.0]];
+    let hollow =
+        mesh(&corners.map(|c| (c, 0.15)), &[], &[[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]);
+    for (axis, tolerance) in [(ring(9, 0.2), 0.1), (ring(5, 0.95), 0.1), (hollow, 0.1)] {
+        let [b0, b1, b2] = union_betti(&axis, 0.05).unwrap().map(|b| b as usize);
+        let report = checked(&axis, tolerance);
+        assert_eq!(report.expected_betti, Some([b0, b1, b2]));
+    }
+}
+
+#[test]
+fn what_cannot_be_shown_is_said() {
+    let ball = mesh(&[([0.0; 3], 1.0)], &[], &[]);
+    assert!(matches!(union_surface(&ball, 0.0), Err(ContourError::Tolerance(_))));
+    assert!(matches!(union_surface(&ball, f64::NAN), Err(ContourError::Tolerance(_))));
+    let Err(ContourError::TooFine { feasible, .. }) = union_surface_within(&ball, 1e-3, 50_000)
+    else {
+        panic!("a million tetrahedra are needed")
+    };
+    assert!(union_surface_within(&ball, feasible, 50_000).is_ok(), "{feasible}");
+    assert!(matches!(union_surface(&ball, 1e-9), Err(ContourError::TooFine { .. })));
+    let points = mesh(&[([0.0; 3], 0.0), ([1.0, 0.0, 0.0], 0.0)], &[[0, 1]], &[]);
+    assert!(matches!(union_surface(&points, 0.1), Err(ContourError::NoInside)));
+    let speck = mesh(&[([0.0; 3], 1e-3), ([1.0, 0.0, 0.0], 1e-3)], &[], &[]);
+    let Err(ContourError::TooThin { feasible, .. }) = union_surface(&speck, 1.0) else {
+        panic!("specks")
+    };
+    assert!(union_surface(&speck, feasible).is_ok(), "{feasible}");
+    assert!(matches!(union_surface(&MedialMesh::default(), 1.0), Err(ContourError::Union(_))));
+}
+
+/// A sphere on a coarse lattice.
+fn lattice_sphere() -> impl Strategy<Value = ([f64; 3], f64)> {
+    (prop::array::uniform3(0..4_i32), 1..4_i32)
+        .prop_map(|(c, r)| (c.map(f64::from), 0.25 * f64::from(r)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn small_unions_are_closed_manifolds_on_any_number_of_threads(
+        spheres in prop::collection::vec(lattice_sphere(), 1..6),
+        faces in prop::collection::vec(prop::array::uniform3(0..6_usize), 0..3),
+        edges in prop::collection::vec(prop::array::uniform2(0..6_usize), 0..3),
+        tolerance in 0.2..0.6,
+    ) {
+        let n = spheres.len();
+        let name = |i: usize| (i % n) as u32;
+        let faces: Vec<_> = faces.into_iter().map(|f| f.map(name)).collect();
+        let edges: Vec<_> = edges.into_iter().map(|e| e.map(name)).collect();
+        let different = |s: &[u32]| (1..s.len()).all(|i| !s[..i].contains(&s[i]));
+        let faces: Vec<_> = faces.into_iter().filter(|f| different(f)).collect();
+        let edges: Vec<_> = edges.into_iter().filter(|e| different(e)).collect();
+        let axis = mesh(&spheres, &edges, &faces);
+        let made = union_surface(&axis, tolerance).unwrap();
+        prop_assert!(surface::validate(&made.mesh).is_ok());
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        prop_assert_eq!(one.install(|| union_surface(&axis, tolerance).unwrap()), made);
+        // The sandwich, at the corners of a lattice.
+        let union = MedialUnion::new(&axis).unwrap();
+        let inside = medial::surface::InsideTest::new(
+            &union_surface(&axis, tolerance).unwrap().mesh,
+        );
+        for k in 0..1000_i32 {
+            let p = Vec3::new((k % 10).into(), (k / 10 % 10).into(), (k / 100).into());
+            let p = 0.5 * p - Vec3::splat(0.75);
+            let sigma = union.signed(p);
+            let is_inside = inside.side(p) == medial::surface::Side::Inside;
+            prop_assert!(is_inside || sigma >= -tolerance, "{} {}", p, sigma);
+            prop_assert!(!is_inside || sigma <= tolerance, "{} {}", p, sigma);
+        }
+    }
+}
