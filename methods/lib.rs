@@ -14,6 +14,7 @@ pub mod pmat;
 pub mod qmat;
 mod ranked;
 mod ranked_facets;
+mod reuse;
 pub mod sat;
 pub mod sat_pairwise;
 

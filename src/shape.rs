@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, voronoi_medial_mesh};
@@ -84,13 +85,30 @@ impl Substrate {
     }
 }
 
-/// What a substrate cost when it was built.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What a piece of work, such as building a substrate, cost when it was done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Seconds of the whole process on all processors.
     pub cpu_seconds: f64,
+}
+
+impl Cost {
+    /// Does `work` and says what it cost.
+    pub fn of<T>(work: impl FnOnce() -> T) -> (T, Self) {
+        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let value = work();
+        let (seconds, cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        (value, Self { seconds, cpu_seconds })
+    }
+}
+
+impl std::ops::AddAssign for Cost {
+    fn add_assign(&mut self, other: Self) {
+        self.seconds += other.seconds;
+        self.cpu_seconds += other.cpu_seconds;
+    }
 }
 
 struct Store {
@@ -321,7 +339,7 @@ impl Shape {
             return Ok(ContactSets::known(known));
         }
         let samples = self.samples();
-        let (sets, cost) = timed(|| ContactSets::search(mesh, &samples));
+        let (sets, cost) = Cost::of(|| ContactSets::search(mesh, &samples));
         self.note(Substrate::Contacts, Use { cost, built_here: true });
         let empty = sets.empty_sets();
         diagnostics.warn(format!(
@@ -402,17 +420,9 @@ impl<K: Eq + Hash, T: Clone> Cache<K, T> {
         let (value, cost) = slot
             .get_or_init(|| {
                 built_here = true;
-                timed(build)
+                Cost::of(build)
             })
             .clone();
         (value, Use { cost, built_here })
     }
-}
-
-fn timed<T>(work: impl FnOnce() -> T) -> (T, Cost) {
-    let (wall, cpu) = (Instant::now(), ProcessTime::now());
-    let value = work();
-    let cost =
-        Cost { seconds: wall.elapsed().as_secs_f64(), cpu_seconds: cpu.elapsed().as_secs_f64() };
-    (value, cost)
 }
