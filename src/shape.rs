@@ -14,7 +14,7 @@ use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
-use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, voronoi_medial_mesh};
+use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, VoronoiFacets, voronoi_medial_mesh};
 use crate::geometry::{Delaunay, TriangleBvh};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::simplifier::Diagnostics;
@@ -60,6 +60,8 @@ pub enum Substrate {
     Delaunay,
     /// Circumspheres of the cells, each classified as inside or outside.
     Inside,
+    /// Voronoi facets inside.
+    Facets,
     /// Voronoi medial mesh.
     MedialMesh,
     /// Poles of the samples, and the polar balls inside.
@@ -77,6 +79,7 @@ impl Substrate {
             Self::Samples => "samples",
             Self::Delaunay => "delaunay",
             Self::Inside => "inside",
+            Self::Facets => "facets",
             Self::MedialMesh => "medial_mesh",
             Self::Poles => "poles",
             Self::SurfaceTree => "surface_tree",
@@ -121,6 +124,7 @@ struct Store {
     samples: Cache<Sampling, Arc<[Vec3]>>,
     delaunay: Cache<Sampling, Arc<Delaunay>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
+    facets: Cache<Sampling, Arc<VoronoiFacets>>,
     medial: Cache<Sampling, Arc<MedialMesh>>,
     balls: Cache<Sampling, Arc<InnerBalls>>,
     tree: Cache<(), Arc<TriangleBvh>>,
@@ -154,6 +158,7 @@ impl Shape {
             samples: Cache::default(),
             delaunay: Cache::default(),
             cells: Cache::default(),
+            facets: Cache::default(),
             medial: Cache::default(),
             balls: Cache::default(),
             tree: Cache::default(),
@@ -267,6 +272,19 @@ impl Shape {
         self.take(Substrate::Inside, built)
     }
 
+    /// The Voronoi facets all of whose vertices are inside.
+    ///
+    /// # Errors
+    /// When the samples do not span space.
+    pub fn facets(&self) -> Result<Arc<VoronoiFacets>, ShapeError> {
+        let delaunay = self.delaunay()?;
+        let cells = self.cells()?;
+        let built = self.store.facets.get(self.store.options.sampling, || {
+            Ok(Arc::new(VoronoiFacets::new(&delaunay, &cells)))
+        });
+        self.take(Substrate::Facets, built)
+    }
+
     /// The Voronoi medial mesh, in normalised units, with contact points.
     ///
     /// # Errors
@@ -274,9 +292,11 @@ impl Shape {
     pub fn voronoi(&self) -> Result<Arc<MedialMesh>, ShapeError> {
         let delaunay = self.delaunay()?;
         let cells = self.cells()?;
+        let facets = self.facets()?;
         let options = &self.store.options;
         let built = self.store.medial.get(options.sampling, || {
-            let mesh = voronoi_medial_mesh(&delaunay, &cells, &self.samples(), options.dual);
+            let samples = self.samples();
+            let mesh = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, options.dual);
             if mesh.spheres.is_empty() {
                 return Err(ShapeError::of_nothing_inside(&cells));
             }

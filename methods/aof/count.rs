@@ -15,7 +15,6 @@ use std::sync::Arc;
 use medial::simplifier::{Diagnostics, SimplifyError};
 
 use super::bricks::Bricks;
-use super::coarse_to_fine::Wanted;
 use super::output::sorted;
 use super::params::Variant;
 use super::solid::{Axis, Base, Solid, betti_of};
@@ -26,7 +25,7 @@ use crate::reuse::Reuse;
 pub type Lattices = Reuse<u32, Option<Axis>>;
 
 /// A lattice with at most this share of voxels above the count is not made coarser.
-const ENOUGH: f64 = 1.125;
+const ENOUGH: f64 = 1.15;
 /// What the estimate aims at, in counts.
 const AIM: f64 = 1.06;
 /// Lattices that are tried for a count.
@@ -63,15 +62,17 @@ impl Solid<'_> {
         }
         let mut growth = Growth::of(&taken(&best), base.resolution);
         let (mut low, mut high) = (1, base.resolution);
-        let mut tried = 0;
-        while tried < MOST_TRIES && high - low > 1 + high / 16 {
-            if size(&best) as f64 <= ENOUGH * count as f64 {
+        let (mut tried, mut is_lost) = (0, false);
+        while tried < MOST_TRIES && size(&best) as f64 > ENOUGH * count as f64 {
+            // Below a lattice that lost the topology not much is gained by going close to it.
+            if high - low <= 1 + high / if is_lost { 8 } else { 16 } {
                 break;
             }
             tried += 1;
             let ideal = growth.resolution_of(AIM * count as f64);
             let next = if low < ideal && ideal < high { ideal } else { low.midpoint(high) };
             let lattice = lattices.get(next, || self.axis_with_topology(next, base.topology))?;
+            is_lost |= lattice.is_none();
             match size(&lattice) {
                 0 => low = next,
                 found => {
@@ -98,13 +99,10 @@ impl Solid<'_> {
         resolution: u32,
         topology: Option<[u64; 3]>,
     ) -> Result<Option<Axis>, SimplifyError> {
-        if let Some(topology) = topology {
-            let start = self.descend(resolution, Wanted::Places)?;
-            if betti_of(&start.voxels) != topology {
-                return Ok(None);
-            }
-        }
         let base = self.descend(resolution, self.wanted())?;
+        if topology.is_some_and(|topology| betti_of(&base.voxels) != topology) {
+            return Ok(None);
+        }
         self.axis(resolution, &base, self.params().angle).map(Some)
     }
 

@@ -119,12 +119,20 @@ impl<'s> Solid<'s> {
     /// When no voxel fits into the solid; as [`Solid::descend`].
     pub fn base(&self) -> Result<Base, SimplifyError> {
         let mut diagnostics = Diagnostics::default();
-        let keeps_topology = self.params.variant != Variant::Plain;
-        let (resolution, known) = match keeps_topology {
-            true => self.faithful_resolution(&mut diagnostics)?,
-            false => (self.params.resolution, None),
-        };
-        let descent = self.descend(resolution, self.wanted())?;
+        let mut resolution = self.params.resolution;
+        let mut descent = self.descend(resolution, self.wanted())?;
+        let mut topology = None;
+        if self.params.variant != Variant::Plain {
+            let mut betti = betti_of(&descent.voxels);
+            if let Some(expected) = self.shape.expected_betti().filter(|&e| e != betti) {
+                (resolution, betti) =
+                    self.faithful_resolution(expected, &descent, betti, &mut diagnostics)?;
+                if resolution != self.params.resolution {
+                    descent = self.descend(resolution, self.wanted())?;
+                }
+            }
+            topology = Some(betti);
+        }
         let tally = &descent.tally;
         if tally.start == 0 {
             return Err(self.nothing_fits(resolution, tally.deepest));
@@ -135,8 +143,6 @@ impl<'s> Solid<'s> {
             diagnostics.count(&format!("dismissed_at_level_{}", level + 1), dismissed as usize);
         }
         diagnostics.count("spheres_evaluated", tally.evaluated.iter().sum::<u64>() as usize);
-        let topology =
-            keeps_topology.then(|| known.unwrap_or_else(|| betti_of(&descent.voxels)));
         Ok(Base { resolution, descent, topology, diagnostics })
     }
 
@@ -153,42 +159,44 @@ impl<'s> Solid<'s> {
         ))
     }
 
-    /// The least resolution from the given one on whose start set has the topology of the solid,
-    /// with the Betti numbers of that set where they were needed.
+    /// The least resolution above the given one on whose start set has the topology of the solid,
+    /// else the least that has voxels, with the Betti numbers of its start set.
     fn faithful_resolution(
         &self,
+        expected: [u64; 3],
+        asked: &Descent,
+        betti: [u64; 3],
         diagnostics: &mut Diagnostics,
-    ) -> Result<(u32, Option<[u64; 3]>), SimplifyError> {
-        let asked = self.params.resolution;
-        let Some(expected) = self.shape.expected_betti() else {
-            return Ok((asked, None));
-        };
-        let mut first_with_voxels = None;
-        for refinement in 0..=REFINEMENTS {
-            let resolution = (f64::from(asked) * 1.5_f64.powi(refinement as i32)).round() as u32;
+    ) -> Result<(u32, [u64; 3]), SimplifyError> {
+        let coarsest = self.params.resolution;
+        let mut first_with_voxels = (asked.tally.start > 0).then_some((coarsest, betti));
+        for refinement in 1..=REFINEMENTS {
+            let resolution = (f64::from(coarsest) * 1.5_f64.powi(refinement as i32)).round() as u32;
             let start = match self.descend(resolution, Wanted::Places) {
-                Err(SimplifyError::Parameter(_)) if refinement > 0 => break,
+                Err(SimplifyError::Parameter(_)) => break,
                 other => other?,
             };
             let betti = betti_of(&start.voxels);
             if betti == expected {
-                if refinement > 0 {
-                    diagnostics.warn(format!(
-                        "resolution {resolution} instead of {asked}: below, the voxels whose \
-                         spheres fit inside do not have the topology of the solid"
-                    ));
-                }
-                return Ok((resolution, Some(betti)));
+                diagnostics.warn(format!(
+                    "resolution {resolution} instead of {coarsest}: below, the voxels whose \
+                     spheres fit inside do not have the topology of the solid"
+                ));
+                return Ok((resolution, betti));
             }
-            if start.tally.start > 0 && first_with_voxels.is_none() {
-                first_with_voxels = Some((resolution, start, betti));
+            if start.tally.start > 0 {
+                first_with_voxels.get_or_insert((resolution, betti));
             }
         }
-        let Some((resolution, start, betti)) = first_with_voxels else {
-            return Ok((asked, None));
+        let Some((resolution, betti)) = first_with_voxels else {
+            return Ok((coarsest, betti));
+        };
+        let start = match resolution == coarsest {
+            true => &asked.voxels,
+            false => &self.descend(resolution, Wanted::Places)?.voxels,
         };
         let side = self.grid(resolution).side * self.shape.normalisation().diagonal;
-        let place = self.lost_vertex(resolution, &start.voxels).map_or(String::new(), |p| {
+        let place = self.lost_vertex(resolution, start).map_or(String::new(), |p| {
             format!(", such as at ({:.6}, {:.6}, {:.6})", p.x, p.y, p.z)
         });
         diagnostics.warn(format!(
@@ -197,7 +205,7 @@ impl<'s> Solid<'s> {
              units of the surface are not resolved{place}; give a higher resolution",
             2.0 * side
         ));
-        Ok((resolution, Some(betti)))
+        Ok((resolution, betti))
     }
 
     /// The vertex of the surface, in input units, that is farthest from all voxels, if it is

@@ -34,10 +34,9 @@ enum End {
 }
 
 impl Umbrellas {
-    /// Cost `O(n)` in the number of cells; parallel, the same for any number of threads.
-    pub fn new(delaunay: &Delaunay) -> Self {
-        let spheres = delaunay.circumspheres();
-        let pole_vectors = pole_vectors(delaunay, &spheres);
+    /// From the circumspheres of all finite cells. Cost `O(n)` in the number of cells; parallel, the same for any number of threads.
+    pub fn new(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Self {
+        let pole_vectors = pole_vectors(delaunay, spheres);
         let parts: Vec<(Vec<(u32, Triangle)>, usize)> = (0..delaunay.finite_cell_count() as u32)
             .into_par_iter()
             .chunks(4096)
@@ -46,7 +45,7 @@ impl Umbrellas {
                 for cell in cells {
                     crossing(
                         delaunay,
-                        &spheres,
+                        spheres,
                         &pole_vectors,
                         CellId(cell),
                         &mut found,
