@@ -17,6 +17,7 @@ mod ranked_facets;
 mod reuse;
 pub mod sat;
 pub mod sat_pairwise;
+mod sheets;
 
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {

@@ -14,7 +14,9 @@ use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
-use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, VoronoiFacets, voronoi_medial_mesh};
+use crate::complex::{
+    CellSpheres, DualTriangulation, MedialMesh, VoronoiFacets, voronoi_medial_mesh,
+};
 use crate::geometry::{Delaunay, TriangleBvh};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::simplifier::Diagnostics;

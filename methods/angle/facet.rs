@@ -32,9 +32,7 @@ pub(super) fn prepare(shape: &Shape, at: FacetAngle) -> Result<RankedFacets, Sim
                 let mean = vertices.clone().sum::<Vec3>() / vertices.len() as f64;
                 angle_from(mean, ends)
             }
-            FacetAngle::Minimum => {
-                vertices.map(|x| angle_from(x, ends)).fold(180.0, f64::min)
-            }
+            FacetAngle::Minimum => vertices.map(|x| angle_from(x, ends)).fold(180.0, f64::min),
         }
     };
     let values = (0..set.facets.len()).into_par_iter().map(value).collect();

@@ -139,7 +139,7 @@ fn directions(
             Side::Inside => found.next().map_or([0.0; 3], |(&c, near)| {
                 (near.point - c).normalize_or_zero().as_vec3().to_array()
             }),
-            Side::Outside => [0.0; 3],
+            Side::On | Side::Outside => [0.0; 3],
         };
         toward.extend(sides.iter().map(direction));
     }
@@ -217,8 +217,7 @@ impl Faces {
         ids.sort_unstable();
         ids.dedup();
         let number = |id: u32| ids.binary_search(&id).expect("a corner of a kept face") as u32;
-        let sphere =
-            |&id: &u32| Sphere::new(self.grid.corner(id), self.radius[id as usize]);
+        let sphere = |&id: &u32| Sphere::new(self.grid.corner(id), self.radius[id as usize]);
         let triangles = kept.iter().flat_map(|face| {
             let [a, b, c, d] = face.corners.map(number);
             [[a, b, c], [a, c, d]]

@@ -47,8 +47,8 @@ impl Solid<'_> {
         diagnostics: &mut Diagnostics,
     ) -> Result<Axis, SimplifyError> {
         let angle = self.params().angle;
-        let mut best =
-            lattices.get(base.resolution, || self.axis(base.resolution, &base.descent, angle).map(Some))?;
+        let mut best = lattices
+            .get(base.resolution, || self.axis(base.resolution, &base.descent, angle).map(Some))?;
         let size = |lattice: &Arc<Option<Axis>>| lattice.as_ref().as_ref().map_or(0, Axis::len);
         if size(&best) <= count {
             if size(&best) < count {
@@ -157,10 +157,7 @@ impl Growth {
         let places = axis.voxels.iter().map(|voxel| voxel.place);
         let sheets = places.filter(|&place| neighbours(place) >= ON_A_SHEET).count();
         let r = f64::from(resolution);
-        Self {
-            sheets: sheets as f64 / (r * r),
-            curves: (axis.voxels.len() - sheets) as f64 / r,
-        }
+        Self { sheets: sheets as f64 / (r * r), curves: (axis.voxels.len() - sheets) as f64 / r }
     }
 
     /// The resolution, rounded up, that should have so many voxels.

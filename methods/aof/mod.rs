@@ -64,8 +64,8 @@ use std::sync::Arc;
 use medial::geometry::{NearbyTriangles, TriangleBvh};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
 use medial::surface::InsideTest;
 
@@ -163,9 +163,7 @@ impl Simplification for Prepared<'_> {
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }
-            Level::Spheres(count) => {
-                solid.with_count(base, count, lattices, &mut diagnostics)?
-            }
+            Level::Spheres(count) => solid.with_count(base, count, lattices, &mut diagnostics)?,
             Level::Native(_) | Level::Published => {
                 params::check_angle(angle).map_err(SimplifyError::Level)?;
                 solid.axis(base.resolution, &base.descent, angle)?

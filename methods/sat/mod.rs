@@ -184,7 +184,9 @@ impl Simplification for Prepared {
         self.scales.begin();
         let scaled = match level {
             Level::Published => self.at_scale(PUBLISHED)?,
-            Level::Native(scale) if (1.0..=LARGEST_SCALE).contains(&scale) => self.at_scale(scale)?,
+            Level::Native(scale) if (1.0..=LARGEST_SCALE).contains(&scale) => {
+                self.at_scale(scale)?
+            }
             Level::Native(scale) => {
                 return Err(SimplifyError::Level(format!(
                     "s = {scale:?} is outside 1 to {LARGEST_SCALE:e}"

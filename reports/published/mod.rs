@@ -279,6 +279,7 @@ pub fn published() -> Vec<Exhibit> {
         include_str!("qmat-figure-16.json"),
         include_str!("qmat-figure-20.json"),
         include_str!("pmat-table-1.json"),
+        include_str!("dey-zhao-table-1.json"),
     ];
     let read = |text: &&str| serde_json::from_str(text).expect("a published table is well formed");
     files.iter().map(read).collect()
