@@ -1,16 +1,15 @@
-//! The sheets of a complex of Voronoi facets, and the complex without some of them.
+//! The complex of the Voronoi facets inside a surface, and what is left without some of them.
+//!
+//! A facet is where two samples are the closest: a sheet of the medial axis as it is governed by
+//! two sites of the boundary.
 
 use medial::complex::{MedialMesh, VoronoiFacets};
 
-/// The facets inside a surface, grouped into sheets, with the edges and spheres that have no facet.
+/// The facets inside a surface as sheets, with the edges and spheres that have no facet.
 pub(crate) struct Sheets {
-    /// For each facet.
-    of_facet: Vec<u32>,
-    /// The edges of each sheet, each with the number of its facets there.
-    edges: Vec<Vec<(u32, u32)>>,
+    /// The edges and the vertices of each sheet, ascending; each once.
+    edges: Vec<Vec<u32>>,
     vertices: Vec<Vec<u32>>,
-    /// Euler characteristic of each sheet in itself.
-    euler: Vec<i64>,
     /// For each edge and each sphere the sheets that it belongs to, ascending.
     sheets_at_edge: Vec<Vec<u32>>,
     sheets_at_sphere: Vec<Vec<u32>>,
@@ -21,7 +20,7 @@ pub(crate) struct Sheets {
 }
 
 impl Sheets {
-    /// Groups the facets of a Voronoi medial mesh. `O(n log n)`.
+    /// The facets of a Voronoi medial mesh. `O(n log n)`.
     ///
     /// # Panics
     /// If a side of a facet is no edge of the mesh.
@@ -30,41 +29,23 @@ impl Sheets {
             let found = mesh.edges.binary_search(&[a.min(b), a.max(b)]);
             found.expect("a side of a facet is an edge") as u32
         };
-        let sides: Vec<Vec<u32>> = (0..facets.len())
-            .map(|facet| {
-                let v = facets.polygon(facet);
-                (0..v.len()).map(|k| edge_id(v[k], v[(k + 1) % v.len()])).collect()
-            })
-            .collect();
-        let mut facets_at = vec![Vec::new(); mesh.edges.len()];
-        for (facet, sides) in sides.iter().enumerate() {
-            for &edge in sides {
-                facets_at[edge as usize].push(facet as u32);
-            }
+        let sorted = |ids: &mut dyn Iterator<Item = u32>| {
+            let mut ids: Vec<u32> = ids.collect();
+            ids.sort_unstable();
+            ids
+        };
+        let (mut edges, mut vertices) = (Vec::new(), Vec::new());
+        for facet in 0..facets.len() {
+            let v = facets.polygon(facet);
+            let mut sides = (0..v.len()).map(|k| edge_id(v[k], v[(k + 1) % v.len()]));
+            edges.push(sorted(&mut sides));
+            vertices.push(sorted(&mut v.iter().copied()));
         }
-        let of_facet = grouped(&sides, &facets_at);
-        let count = of_facet.iter().max().map_or(0, |&most| most as usize + 1);
-        let (mut all_sides, mut vertices) = (vec![Vec::new(); count], vec![Vec::new(); count]);
-        let mut euler = vec![0_i64; count];
-        for (facet, &sheet) in of_facet.iter().enumerate() {
-            all_sides[sheet as usize].extend(&sides[facet]);
-            vertices[sheet as usize].extend(facets.polygon(facet));
-            euler[sheet as usize] += 1;
-        }
-        let mut edges = Vec::with_capacity(count);
-        for (sheet, mut sides) in all_sides.into_iter().enumerate() {
-            sides.sort_unstable();
-            vertices[sheet].sort_unstable();
-            vertices[sheet].dedup();
-            let runs = sides.chunk_by(|a, b| a == b);
-            let counted: Vec<(u32, u32)> = runs.map(|run| (run[0], run.len() as u32)).collect();
-            euler[sheet] += vertices[sheet].len() as i64 - counted.len() as i64;
-            edges.push(counted);
-        }
+        let count = edges.len();
         let mut sheets_at_edge = vec![Vec::new(); mesh.edges.len()];
         let mut sheets_at_sphere = vec![Vec::new(); mesh.spheres.len()];
         for sheet in 0..count {
-            edges[sheet].iter().for_each(|&(e, _)| sheets_at_edge[e as usize].push(sheet as u32));
+            edges[sheet].iter().for_each(|&e| sheets_at_edge[e as usize].push(sheet as u32));
             vertices[sheet].iter().for_each(|&v| sheets_at_sphere[v as usize].push(sheet as u32));
         }
         // Diagonals that cut a facet into triangles lie in a facet though they are no side of one.
@@ -84,10 +65,8 @@ impl Sheets {
             .filter(|&v| sheets_at_sphere[v as usize].is_empty() && !has_bare_edge[v as usize])
             .collect();
         Self {
-            of_facet,
             edges,
             vertices,
-            euler,
             sheets_at_edge,
             sheets_at_sphere,
             has_bare_edge,
@@ -101,11 +80,6 @@ impl Sheets {
         self.edges.len()
     }
 
-    /// The sheet of a facet.
-    pub(crate) fn of_facet(&self, facet: usize) -> usize {
-        self.of_facet[facet] as usize
-    }
-
     /// Edges that lie in no facet: parts that are like curves.
     pub(crate) fn bare_edges(&self) -> &[[u32; 2]] {
         &self.bare_edges
@@ -115,34 +89,6 @@ impl Sheets {
     pub(crate) fn bare_spheres(&self) -> &[u32] {
         &self.bare_spheres
     }
-}
-
-/// Numbers the sheets by their first facet: a facet goes on over edges with two.
-fn grouped(sides: &[Vec<u32>], facets_at: &[Vec<u32>]) -> Vec<u32> {
-    const NONE: u32 = u32::MAX;
-    let mut sheet = vec![NONE; sides.len()];
-    let mut count = 0;
-    for first in 0..sides.len() {
-        if sheet[first] != NONE {
-            continue;
-        }
-        sheet[first] = count;
-        let mut open = vec![first];
-        while let Some(facet) = open.pop() {
-            for &edge in &sides[facet] {
-                if let [a, b] = facets_at[edge as usize][..] {
-                    for next in [a as usize, b as usize] {
-                        if sheet[next] == NONE {
-                            sheet[next] = count;
-                            open.push(next);
-                        }
-                    }
-                }
-            }
-        }
-        count += 1;
-    }
-    sheet
 }
 
 /// A complex while sheets are removed.
@@ -185,28 +131,24 @@ impl<'a> Without<'a> {
         self.spheres
     }
 
-    /// Whether removing a sheet leaves the Betti numbers as they are: it has a rim, and a seam with its
-    /// own Euler characteristic.
+    /// Whether removing a sheet leaves the Betti numbers as they are: a part of its border is free, and
+    /// its seam, what it shares with others, has its own Euler characteristic, 1.
     pub(crate) fn may_go(&self, sheet: usize) -> bool {
-        let Sheets { edges, vertices, euler, .. } = self.sheets;
-        // The facets of the sheet together end at an edge where an odd number of them meets.
-        let is_rim = |&(edge, facets): &(u32, u32)| {
-            self.at_edge[edge as usize] == 1 && !facets.is_multiple_of(2)
-        };
-        if self.gone[sheet] || !edges[sheet].iter().any(is_rim) {
+        if self.gone[sheet] {
             return false;
         }
-        let seam_edges = edges[sheet].iter().filter(|e| self.at_edge[e.0 as usize] > 1).count();
-        let seam_vertices =
+        let Sheets { edges, vertices, .. } = self.sheets;
+        let shared_edges = edges[sheet].iter().filter(|&&e| self.at_edge[e as usize] > 1).count();
+        let shared_vertices =
             vertices[sheet].iter().filter(|&&v| self.at_sphere[v as usize] > 1).count();
-        seam_vertices > 0 && seam_vertices as i64 - seam_edges as i64 == euler[sheet]
+        shared_edges < edges[sheet].len() && shared_vertices == shared_edges + 1
     }
 
     /// Removes a sheet without its seam; the sheets at its seam that are left, ascending.
     pub(crate) fn remove(&mut self, sheet: usize) -> Vec<usize> {
         let Sheets { edges, vertices, sheets_at_sphere, .. } = self.sheets;
         self.gone[sheet] = true;
-        for &(edge, _) in &edges[sheet] {
+        for &edge in &edges[sheet] {
             self.at_edge[edge as usize] -= 1;
         }
         let mut neighbours = Vec::new();

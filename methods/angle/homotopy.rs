@@ -3,33 +3,27 @@
 //! Sud, Foskey, Manocha: *Homotopy-preserving medial axis simplification*, SPM 2005,
 //! doi:10.1145/1060244.1060250.
 //!
-//! 1. Sheets: Voronoi facets that go on over Voronoi edges with just two facets inside. The *rim* of
-//!    a sheet is where nothing else is: edges with a single facet. Its *seam* is what it shares with
+//! 1. A sheet is where the same two sites of the boundary are closest: here two samples, so that a
+//!    sheet is a Voronoi facet. Its *rim* is where nothing else is. Its *seam* is what it shares with
 //!    other sheets and with edges that have no facet.
-//! 2. The value of a sheet is its largest separation angle. A facet has its own at its point nearest
-//!    to the middle of its two samples.
-//! 3. A sheet may go if it has a rim and a seam, and the seam has the sheet's Euler characteristic. Of
-//!    the sheets that may go the one of the smallest value goes first, then its neighbours are looked
-//!    at again.
+//! 2. The value of a sheet is its largest separation angle, at its point nearest to the middle of its
+//!    two samples.
+//! 3. A *frontier sheet* may go: its rim and its seam are not empty and connected. Of these the one of
+//!    the smallest value goes first, then its neighbours are looked at again.
 //! 4. The *effective* value of a sheet is the largest value up to its removal. At `theta` all sheets
 //!    are gone whose effective value is at most `theta`: those that would have gone had no sheet
 //!    above `theta` been touched. A number of spheres is met the same way, as far as sheets can go.
 //!
 //! # Why the topology stays
-//! Let `F` be the sheet and `S` its seam. `F` is connected and `S` is not empty, so `H0(F, S) = 0`. A
-//! cycle of `H2(F, S)` over Z/2 that has one facet has all of them, as each goes on over edges with two
-//! facets, and then its boundary has the rim, which is not in `S`: `H2(F, S) = 0`. (An edge that other
-//! sheets have left is on the rim where an odd number of facets of `F` meets.) Equal Euler
-//! characteristics leave `H1(F, S) = 0`. By excision the Betti numbers of the whole stay.
+//! A facet is a disc. A seam that is a connected part of its border and not all of it is an arc or a
+//! point, onto which the disc retracts. A part of a circle that is not the whole has as many pieces as
+//! its vertices outnumber its edges, so that step 3 is a count: one vertex more than edges, and an
+//! edge that is free. Betti numbers stay exactly.
 //!
 //! # Deviations from the paper
-//! - The paper asks for a rim and a seam that are each not empty and connected. That is the same for a
-//!   sheet that is a disc and not enough for one with a handle or a hole, which Voronoi facets of
-//!   samples can form; step 3 is exact for all.
-//! - The paper's axis is that of polyhedra, where two faces of the surface govern a sheet. Here two
-//!   samples do, so that most sheets are single facets before any has gone.
-//! - The paper does not say in the part that we know whether sheets that are left alone at a seam grow
-//!   into one. Here they stay what they were, and their seam stays one.
+//! - The paper's axis is that of polyhedra, where two faces of the surface govern a sheet, and a sheet
+//!   can be large. Facets of samples are small, and are removed one by one.
+//! - The paper does not say in the part that we know which angle is a sheet's; here its largest.
 
 use std::collections::BTreeSet;
 
@@ -69,13 +63,8 @@ pub(super) fn prepare(shape: &Shape, run: &RunContext) -> Result<Peeled, Simplif
         let vertices: Vec<Vec3> = polygon.map(|&s| set.mesh.spheres[s as usize].centre).collect();
         angle_from(nearest_of_polygon(&vertices, ends[0].midpoint(ends[1])), ends)
     };
-    let angles: Vec<f64> = (0..set.facets.len()).into_par_iter().map(widest).collect();
+    let value: Vec<f64> = (0..set.facets.len()).into_par_iter().map(widest).collect();
     let sheets = Sheets::of(&set.mesh, &set.facets);
-    let mut value = vec![0.0_f64; sheets.len()];
-    for (facet, &angle) in angles.iter().enumerate() {
-        let sheet = sheets.of_facet(facet);
-        value[sheet] = value[sheet].max(angle);
-    }
     let mut without = Without::none(&sheets);
     let (mut removed, mut left) = (Vec::new(), vec![without.spheres()]);
     // Values are not negative, so that their bits are in order.
@@ -141,7 +130,7 @@ impl Peeled {
             without.remove(sheet as usize);
         }
         let facets: Vec<u32> = (0..self.set.facets.len())
-            .filter(|&facet| !without.is_gone(self.sheets.of_facet(facet)))
+            .filter(|&facet| !without.is_gone(facet))
             .map(|facet| facet as u32)
             .collect();
         let FacetSet { mesh, facets: all, dual } = &self.set;
