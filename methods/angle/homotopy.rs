@@ -23,6 +23,8 @@
 //! # Deviations from the paper
 //! - The paper's axis is that of polyhedra, where two faces of the surface govern a sheet, and a sheet
 //!   can be large. Facets of samples are small, and are removed one by one.
+//! - Edges of the Voronoi diagram whose facets are all cut by the surface are kept as they are, and hold
+//!   the facets between them: the number of spheres has a lower limit, which is said.
 //! - The paper does not say in the part that we know which angle is a sheet's; here its largest.
 
 use std::collections::BTreeSet;
