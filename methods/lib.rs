@@ -15,8 +15,10 @@ pub mod pmat;
 pub mod qmat;
 mod ranked;
 mod ranked_facets;
+mod reuse;
 pub mod sat;
 pub mod sat_pairwise;
+mod sheets;
 pub mod tam_heidrich;
 
 /// All methods, in the order of the tables.

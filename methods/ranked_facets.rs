@@ -1,6 +1,7 @@
 //! What the per-facet filters share: rank the Voronoi facets once, then keep those above a
 //! threshold, or as many of the best as a number of spheres allows, with their edges and vertices.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use medial::complex::{DualTriangulation, MedialMesh, VoronoiFacets};
@@ -9,12 +10,14 @@ use medial::simplifier::{
     Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work,
 };
 
+use rayon::prelude::*;
+
 use crate::ranked::Scale;
 
 /// The Voronoi facets of a shape and the medial mesh that their vertices belong to.
 pub(crate) struct FacetSet {
     pub mesh: Arc<MedialMesh>,
-    pub facets: VoronoiFacets,
+    pub facets: Arc<VoronoiFacets>,
     pub dual: DualTriangulation,
 }
 
@@ -29,8 +32,7 @@ impl FacetSet {
                        mesh has none: leave out --initial";
             return Err(SimplifyError::Unsupported { why: why.into() });
         }
-        let (delaunay, cells, mesh) = (shape.delaunay()?, shape.cells()?, shape.voronoi()?);
-        let facets = VoronoiFacets::new(&delaunay, &cells);
+        let (facets, mesh) = (shape.facets()?, shape.voronoi()?);
         Ok(Self { mesh, facets, dual: shape.options().dual })
     }
 }
@@ -39,8 +41,8 @@ impl FacetSet {
 pub(crate) struct RankedFacets {
     set: FacetSet,
     value: Vec<f64>,
-    /// Facets by descending value, then ascending id.
-    order: Vec<u32>,
+    /// Facets by descending value, then ascending id; only levels that ask for spheres need it.
+    order: OnceCell<Vec<u32>>,
     scale: Scale,
     /// The level of [`Level::Published`], where there is one.
     published: Option<f64>,
@@ -57,18 +59,22 @@ impl RankedFacets {
         published: Option<f64>,
         prepared: Diagnostics,
     ) -> Self {
-        let mut order: Vec<u32> = (0..value.len() as u32).collect();
-        order.sort_unstable_by(|&a, &b| {
-            value[b as usize].total_cmp(&value[a as usize]).then(a.cmp(&b))
-        });
-        Self { set, value, order, scale, published, prepared }
+        Self { set, value, order: OnceCell::new(), scale, published, prepared }
+    }
+
+    fn order(&self) -> &[u32] {
+        self.order.get_or_init(|| {
+            let mut ranked: Vec<(f64, u32)> = self.value.iter().copied().zip(0..).collect();
+            ranked.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            ranked.into_iter().map(|(_, facet)| facet).collect()
+        })
     }
 
     /// How many of the best facets have at most so many vertices together, at least one.
     fn facets_for(&self, spheres: usize) -> usize {
         let mut seen = vec![false; self.set.mesh.spheres.len()];
         let mut count = 0;
-        for (rank, &facet) in self.order.iter().enumerate() {
+        for (rank, &facet) in self.order().iter().enumerate() {
             for &sphere in self.set.facets.polygon(facet as usize) {
                 count += usize::from(!std::mem::replace(&mut seen[sphere as usize], true));
             }
@@ -76,31 +82,37 @@ impl RankedFacets {
                 return rank.max(1);
             }
         }
-        self.order.len()
+        self.value.len()
     }
 
-    fn by_level(&self, level: f64) -> Result<usize, SimplifyError> {
-        let kept = |&facet: &u32| {
-            let value = self.value[facet as usize];
-            value > level || (self.scale.inclusive && value == level)
-        };
+    /// The facets that a native level keeps, ascending.
+    fn by_level(&self, level: f64) -> Result<Vec<u32>, SimplifyError> {
         self.scale.check(level)?;
-        Ok(self.order.partition_point(kept))
+        let kept = |value: f64| value > level || (self.scale.inclusive && value == level);
+        let facets = (0..).zip(&self.value).filter(|&(_, &value)| kept(value));
+        Ok(facets.map(|(facet, _)| facet).collect())
+    }
+
+    /// The facets that a number of spheres allows, ascending, and the value of the best of the
+    /// others.
+    fn by_count(&self, spheres: usize) -> (Vec<u32>, f64) {
+        let order = self.order();
+        let count = self.facets_for(spheres);
+        let dropped = order.get(count).map(|&facet| self.value[facet as usize]);
+        let mut kept = order[..count].to_vec();
+        kept.sort_unstable();
+        (kept, dropped.unwrap_or(*self.scale.range.start()))
     }
 }
 
 impl Simplification for RankedFacets {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let mut diagnostics = self.prepared.clone();
-        let (count, native) = match level {
+        let (kept, native) = match level {
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }
-            Level::Spheres(spheres) => {
-                let count = self.facets_for(spheres);
-                let dropped = self.order.get(count).map(|&facet| self.value[facet as usize]);
-                (count, dropped.unwrap_or(*self.scale.range.start()))
-            }
+            Level::Spheres(spheres) => self.by_count(spheres),
             Level::Native(level) => (self.by_level(level)?, level),
             Level::Published => match self.published {
                 Some(level) => (self.by_level(level)?, level),
@@ -110,19 +122,17 @@ impl Simplification for RankedFacets {
             },
         };
         let FacetSet { mesh, facets, dual } = &self.set;
-        let mut kept = self.order[..count].to_vec();
-        kept.sort_unstable();
         let mesh = facets.subcomplex(mesh, *dual, &kept, &[], &[]);
         let reached = mesh.spheres.len();
         match level {
             Level::Spheres(asked) if reached != asked => diagnostics.warn(format!(
                 "{reached} spheres instead of {asked}: whole facets are kept, {} in all",
-                if count == self.order.len() { "and these are" } else { "the best" }
+                if kept.len() == self.value.len() { "and these are" } else { "the best" }
             )),
             _ if reached == 0 => diagnostics.warn(format!(
                 "no facet passes {} = {native}: the largest is {}",
                 self.scale.name,
-                self.order.first().map_or(0.0, |&facet| self.value[facet as usize])
+                self.value.iter().copied().fold(0.0, f64::max)
             )),
             _ => {}
         }

@@ -11,9 +11,12 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
-use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, voronoi_medial_mesh};
+use crate::complex::{
+    CellSpheres, DualTriangulation, MedialMesh, VoronoiFacets, voronoi_medial_mesh,
+};
 use crate::geometry::{Delaunay, TriangleBvh};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::simplifier::Diagnostics;
@@ -61,6 +64,8 @@ pub enum Substrate {
     Delaunay,
     /// Circumspheres of the cells, each classified as inside or outside.
     Inside,
+    /// Voronoi facets inside.
+    Facets,
     /// Voronoi medial mesh.
     MedialMesh,
     /// Poles of the samples, and the polar balls inside.
@@ -78,6 +83,7 @@ impl Substrate {
             Self::Samples => "samples",
             Self::Delaunay => "delaunay",
             Self::Inside => "inside",
+            Self::Facets => "facets",
             Self::MedialMesh => "medial_mesh",
             Self::Poles => "poles",
             Self::SurfaceTree => "surface_tree",
@@ -86,13 +92,30 @@ impl Substrate {
     }
 }
 
-/// What a substrate cost when it was built.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What a piece of work, such as building a substrate, cost when it was done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Seconds of the whole process on all processors.
     pub cpu_seconds: f64,
+}
+
+impl Cost {
+    /// Does `work` and says what it cost.
+    pub fn of<T>(work: impl FnOnce() -> T) -> (T, Self) {
+        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let value = work();
+        let (seconds, cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        (value, Self { seconds, cpu_seconds })
+    }
+}
+
+impl std::ops::AddAssign for Cost {
+    fn add_assign(&mut self, other: Self) {
+        self.seconds += other.seconds;
+        self.cpu_seconds += other.cpu_seconds;
+    }
 }
 
 struct Store {
@@ -105,6 +128,7 @@ struct Store {
     samples: Cache<Sampling, Arc<[Vec3]>>,
     delaunay: Cache<Sampling, Arc<Delaunay>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
+    facets: Cache<Sampling, Arc<VoronoiFacets>>,
     medial: Cache<Sampling, Arc<MedialMesh>>,
     balls: Cache<Sampling, Arc<InnerBalls>>,
     tree: Cache<(), Arc<TriangleBvh>>,
@@ -138,6 +162,7 @@ impl Shape {
             samples: Cache::default(),
             delaunay: Cache::default(),
             cells: Cache::default(),
+            facets: Cache::default(),
             medial: Cache::default(),
             balls: Cache::default(),
             tree: Cache::default(),
@@ -251,6 +276,19 @@ impl Shape {
         self.take(Substrate::Inside, built)
     }
 
+    /// The Voronoi facets all of whose vertices are inside.
+    ///
+    /// # Errors
+    /// When the samples do not span space.
+    pub fn facets(&self) -> Result<Arc<VoronoiFacets>, ShapeError> {
+        let delaunay = self.delaunay()?;
+        let cells = self.cells()?;
+        let built = self.store.facets.get(self.store.options.sampling, || {
+            Ok(Arc::new(VoronoiFacets::new(&delaunay, &cells)))
+        });
+        self.take(Substrate::Facets, built)
+    }
+
     /// The Voronoi medial mesh, in normalised units, with contact points.
     ///
     /// # Errors
@@ -258,9 +296,11 @@ impl Shape {
     pub fn voronoi(&self) -> Result<Arc<MedialMesh>, ShapeError> {
         let delaunay = self.delaunay()?;
         let cells = self.cells()?;
+        let facets = self.facets()?;
         let options = &self.store.options;
         let built = self.store.medial.get(options.sampling, || {
-            let mesh = voronoi_medial_mesh(&delaunay, &cells, &self.samples(), options.dual);
+            let samples = self.samples();
+            let mesh = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, options.dual);
             if mesh.spheres.is_empty() {
                 return Err(ShapeError::of_nothing_inside(&cells));
             }
@@ -323,7 +363,7 @@ impl Shape {
             return Ok(ContactSets::known(known));
         }
         let samples = self.samples();
-        let (sets, cost) = timed(|| ContactSets::search(mesh, &samples));
+        let (sets, cost) = Cost::of(|| ContactSets::search(mesh, &samples));
         self.note(Substrate::Contacts, Use { cost, built_here: true });
         let empty = sets.empty_sets();
         diagnostics.warn(format!(
@@ -404,17 +444,9 @@ impl<K: Eq + Hash, T: Clone> Cache<K, T> {
         let (value, cost) = slot
             .get_or_init(|| {
                 built_here = true;
-                timed(build)
+                Cost::of(build)
             })
             .clone();
         (value, Use { cost, built_here })
     }
-}
-
-fn timed<T>(work: impl FnOnce() -> T) -> (T, Cost) {
-    let (wall, cpu) = (Instant::now(), ProcessTime::now());
-    let value = work();
-    let cost =
-        Cost { seconds: wall.elapsed().as_secs_f64(), cpu_seconds: cpu.elapsed().as_secs_f64() };
-    (value, cost)
 }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::complex::collapse::Hierarchy;
 use crate::complex::{ComplexError, MedialMesh};
-use crate::shape::{Shape, ShapeError};
+use crate::shape::{Cost, Shape, ShapeError};
 
 /// A method that simplifies the medial axis of a shape.
 pub trait MedialSimplifier: Send + Sync {
@@ -276,13 +276,16 @@ pub struct PartInfo {
 }
 
 /// How the work of one level relates to earlier levels; decides what counts into its seconds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Work {
     /// All of it was done for this level: its seconds are those of this call.
     Anew,
     /// It went on from the previous call: its seconds add to those.
     Continued,
+    /// Parts of it had been done for earlier calls: what these cost then adds to the seconds of
+    /// this call.
+    Reused(Cost),
 }
 
 /// Counts and remarks beside a result.

@@ -1,10 +1,12 @@
 //! `medial axis MESH -o x.ma`: the initial Voronoi medial mesh.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
 use medial::complex;
 use medial::metrics;
+use medial::shape::Cost;
 use serde_json::json;
 
 use super::{Exit, Failure, check_output, counted, print_json, print_line, shape_options};
@@ -42,20 +44,22 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         complex::write(output, &mesh).map_err(Failure::input)?;
     }
     let counts = metrics::counts(&mesh);
-    let mut seconds = serde_json::Map::new();
-    let mut cpu_seconds = serde_json::Map::new();
-    let (mut total, mut cpu_total) = (read.seconds, read.cpu_seconds);
-    seconds.insert("read".into(), read.seconds.into());
-    cpu_seconds.insert("read".into(), read.cpu_seconds.into());
+    let read = Cost { seconds: read.seconds, cpu_seconds: read.cpu_seconds };
+    let mut stages = BTreeMap::from([("read", read)]);
+    let mut total = read;
     for (substrate, cost) in shape.used() {
-        let stage = if substrate.name() == "medial_mesh" { "extract" } else { substrate.name() };
-        seconds.insert(stage.into(), cost.seconds.into());
-        cpu_seconds.insert(stage.into(), cost.cpu_seconds.into());
-        total += cost.seconds;
-        cpu_total += cost.cpu_seconds;
+        let stage = match substrate.name() {
+            "facets" | "medial_mesh" => "extract",
+            name => name,
+        };
+        *stages.entry(stage).or_default() += cost;
+        total += cost;
     }
-    seconds.insert("total".into(), total.into());
-    cpu_seconds.insert("total".into(), cpu_total.into());
+    stages.insert("total", total);
+    let by_stage = |part: fn(&Cost) -> f64| -> serde_json::Map<String, serde_json::Value> {
+        stages.iter().map(|(&stage, cost)| (stage.to_owned(), part(cost).into())).collect()
+    };
+    let [seconds, cpu_seconds] = [by_stage(|c| c.seconds), by_stage(|c| c.cpu_seconds)];
     let expected = shape.expected_betti();
     let mut warnings = shape.report().warnings.clone();
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
@@ -79,12 +83,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     print_line(&format!(
-        "{}: {}, {}, {} from {} samples in {total:.2} s",
+        "{}: {}, {}, {} from {} samples in {:.2} s",
         input.name,
         counted(counts.spheres, "sphere"),
         counted(counts.edges, "edge"),
         counted(counts.faces, "face"),
-        shape.samples().len()
+        shape.samples().len(),
+        total.seconds
     ));
     let demanded =
         expected.map_or_else(String::new, |expected| format!(", the solid's {expected:?}"));

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use medial::complex::{self, MedialMesh};
 use medial::metrics::Judge;
-use medial::shape::Shape;
+use medial::shape::{Cost, Shape};
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError, Work,
 };
@@ -177,9 +177,13 @@ fn answer_levels(
             return Answer { outcome: Err(failure.clone()), prepare, simplify: Lap::default() };
         }
         let (outcome, lap) = Stopwatch::time(|| guarded(|| simplification.at(level)));
-        match &outcome {
-            Ok(simplified) if simplified.work == Work::Continued => so_far += lap,
-            _ => so_far = lap,
+        match outcome.as_ref().map_or(Work::Anew, |simplified| simplified.work) {
+            Work::Continued => so_far += lap,
+            Work::Anew => so_far = lap,
+            Work::Reused(Cost { seconds, cpu_seconds }) => {
+                so_far = lap;
+                so_far += Lap { seconds, cpu_seconds };
+            }
         }
         if let Err(failure) = &outcome
             && failure.status == Status::Panicked

@@ -44,10 +44,11 @@
 //! - [`Level::Spheres`] is not in the paper. Ranking the voxels of a fine lattice by `AOF'` leaves
 //!   scattered pieces of the flattest sheet. Instead the lattice is made as coarse as the count
 //!   allows while its start set keeps the topology, and its thinned axis is taken down to the count
-//!   by deleting simple voxels, largest `AOF'` first.
+//!   by deleting simple voxels, largest `AOF'` first (file `count.rs`).
 
 mod bricks;
 mod coarse_to_fine;
+mod count;
 mod flux;
 mod grid;
 mod output;
@@ -63,10 +64,12 @@ use std::sync::Arc;
 use medial::geometry::{NearbyTriangles, TriangleBvh};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError, Work,
+    Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
 use medial::surface::InsideTest;
+
+use count::Lattices;
 
 pub use bricks::{Bricks, Place, Voxel};
 pub use coarse_to_fine::{Descent, Surface, Tally, Wanted, coarse_to_fine};
@@ -75,7 +78,7 @@ pub use grid::Grid;
 pub use params::{AofParams, Start, Variant};
 pub use refine::{Refined, refine};
 pub use simple::{SimpleTable, is_simple};
-pub use solid::{Axis, Solid};
+pub use solid::{Axis, Base, Solid};
 pub use spiral::Spiral;
 pub use thinning::{Order, is_end_point, thin};
 
@@ -134,8 +137,8 @@ impl MedialSimplifier for AverageOutwardFlux {
             inside: InsideTest::new(shape.mesh()),
         };
         let solid = Solid::new(shape, surface, params, run.clone());
-        let (resolution, base, diagnostics) = solid.base()?;
-        Ok(Box::new(Prepared { solid, tree, resolution, base, diagnostics }))
+        let base = solid.base()?;
+        Ok(Box::new(Prepared { solid, tree, base, lattices: Lattices::new() }))
     }
 }
 
@@ -143,31 +146,30 @@ impl MedialSimplifier for AverageOutwardFlux {
 struct Prepared<'s> {
     solid: Solid<'s>,
     tree: Arc<TriangleBvh>,
-    resolution: u32,
-    base: Descent,
-    diagnostics: Diagnostics,
+    base: Base,
+    lattices: Lattices,
 }
 
 impl Simplification for Prepared<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
-        let mut diagnostics = self.diagnostics.clone();
+        let Self { solid, tree, base, lattices } = self;
+        let mut diagnostics = base.diagnostics.clone();
+        lattices.begin();
         let angle = match level {
             Level::Native(angle) => angle,
-            Level::Spheres(_) | Level::Published => self.solid.params().angle,
+            Level::Spheres(_) | Level::Published => solid.params().angle,
         };
         let axis = match level {
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }
-            Level::Spheres(count) => {
-                self.solid.with_count(self.resolution, &self.base, count, &mut diagnostics)?
-            }
+            Level::Spheres(count) => solid.with_count(base, count, lattices, &mut diagnostics)?,
             Level::Native(_) | Level::Published => {
                 params::check_angle(angle).map_err(SimplifyError::Level)?;
-                self.solid.axis(self.resolution, &self.base, angle)?
+                solid.axis(base.resolution, &base.descent, angle)?
             }
         };
-        let mesh = axis.medial_mesh(&self.tree, self.solid.params());
+        let mesh = axis.medial_mesh(tree, solid.params());
         mesh.check()?;
         axis.diagnose(angle, &mut diagnostics);
         let native = (!matches!(level, Level::Spheres(_))).then_some(angle);
@@ -175,7 +177,7 @@ impl Simplification for Prepared<'_> {
             mesh,
             asked: level,
             native_level: native,
-            work: Work::Anew,
+            work: lattices.work(),
             diagnostics,
             extras: Extras::default(),
         })

@@ -31,7 +31,20 @@ pub struct Solid<'s> {
     volume: f64,
 }
 
+/// The lattice that the parameters ask for.
+pub struct Base {
+    /// Voxels along the longest side.
+    pub resolution: u32,
+    /// Its flux.
+    pub descent: Descent,
+    /// Betti numbers of its voxels, where the variant keeps them.
+    pub topology: Option<[u64; 3]>,
+    /// What is to be said of it.
+    pub diagnostics: Diagnostics,
+}
+
 /// The voxels of an axis.
+#[derive(Clone)]
 pub struct Axis {
     /// The lattice.
     pub grid: Grid,
@@ -73,7 +86,12 @@ impl<'s> Solid<'s> {
         coarse_to_fine(&self.surface, &grid, &self.params, wanted, &self.run)
     }
 
-    fn wanted(&self) -> Wanted {
+    /// What the run is surrounded by.
+    pub(super) fn run(&self) -> &RunContext {
+        &self.run
+    }
+
+    pub(super) fn wanted(&self) -> Wanted {
         if self.params.variant == Variant::Plain { Wanted::Kept } else { Wanted::All }
     }
 
@@ -92,31 +110,40 @@ impl<'s> Solid<'s> {
         )))
     }
 
-    /// The resolution to work at, its flux, and what is to be said of it.
+    /// The lattice to work at.
     ///
     /// Variants that keep the topology of their start set make the lattice finer until that is
     /// the solid's.
     ///
     /// # Errors
     /// When no voxel fits into the solid; as [`Solid::descend`].
-    pub fn base(&self) -> Result<(u32, Descent, Diagnostics), SimplifyError> {
+    pub fn base(&self) -> Result<Base, SimplifyError> {
         let mut diagnostics = Diagnostics::default();
-        let asked = self.params.resolution;
-        let mut resolution = asked;
+        let mut resolution = self.params.resolution;
+        let mut descent = self.descend(resolution, self.wanted())?;
+        let mut topology = None;
         if self.params.variant != Variant::Plain {
-            resolution = self.faithful_resolution(&mut diagnostics)?;
+            let mut betti = betti_of(&descent.voxels);
+            if let Some(expected) = self.shape.expected_betti().filter(|&e| e != betti) {
+                (resolution, betti) =
+                    self.faithful_resolution(expected, &descent, betti, &mut diagnostics)?;
+                if resolution != self.params.resolution {
+                    descent = self.descend(resolution, self.wanted())?;
+                }
+            }
+            topology = Some(betti);
         }
-        let base = self.descend(resolution, self.wanted())?;
-        if base.tally.start == 0 {
-            return Err(self.nothing_fits(resolution, base.tally.deepest));
+        let tally = &descent.tally;
+        if tally.start == 0 {
+            return Err(self.nothing_fits(resolution, tally.deepest));
         }
         diagnostics.count("resolution", resolution as usize);
-        diagnostics.count("start_voxels", base.tally.start as usize);
-        for (level, &dismissed) in base.tally.dismissed.iter().enumerate() {
+        diagnostics.count("start_voxels", tally.start as usize);
+        for (level, &dismissed) in tally.dismissed.iter().enumerate() {
             diagnostics.count(&format!("dismissed_at_level_{}", level + 1), dismissed as usize);
         }
-        diagnostics.count("spheres_evaluated", base.tally.evaluated.iter().sum::<u64>() as usize);
-        Ok((resolution, base, diagnostics))
+        diagnostics.count("spheres_evaluated", tally.evaluated.iter().sum::<u64>() as usize);
+        Ok(Base { resolution, descent, topology, diagnostics })
     }
 
     fn nothing_fits(&self, resolution: u32, deepest: f64) -> SimplifyError {
@@ -132,38 +159,44 @@ impl<'s> Solid<'s> {
         ))
     }
 
-    /// The least resolution from the given one on whose start set has the topology of the solid.
-    fn faithful_resolution(&self, diagnostics: &mut Diagnostics) -> Result<u32, SimplifyError> {
-        let asked = self.params.resolution;
-        let Some(expected) = self.shape.expected_betti() else {
-            return Ok(asked);
-        };
-        let mut first_with_voxels = None;
-        for refinement in 0..=REFINEMENTS {
-            let resolution = (f64::from(asked) * 1.5_f64.powi(refinement as i32)).round() as u32;
+    /// The least resolution above the given one on whose start set has the topology of the solid,
+    /// else the least that has voxels, with the Betti numbers of its start set.
+    fn faithful_resolution(
+        &self,
+        expected: [u64; 3],
+        asked: &Descent,
+        betti: [u64; 3],
+        diagnostics: &mut Diagnostics,
+    ) -> Result<(u32, [u64; 3]), SimplifyError> {
+        let coarsest = self.params.resolution;
+        let mut first_with_voxels = (asked.tally.start > 0).then_some((coarsest, betti));
+        for refinement in 1..=REFINEMENTS {
+            let resolution = (f64::from(coarsest) * 1.5_f64.powi(refinement as i32)).round() as u32;
             let start = match self.descend(resolution, Wanted::Places) {
-                Err(SimplifyError::Parameter(_)) if refinement > 0 => break,
+                Err(SimplifyError::Parameter(_)) => break,
                 other => other?,
             };
             let betti = betti_of(&start.voxels);
             if betti == expected {
-                if refinement > 0 {
-                    diagnostics.warn(format!(
-                        "resolution {resolution} instead of {asked}: below, the voxels whose \
-                         spheres fit inside do not have the topology of the solid"
-                    ));
-                }
-                return Ok(resolution);
+                diagnostics.warn(format!(
+                    "resolution {resolution} instead of {coarsest}: below, the voxels whose \
+                     spheres fit inside do not have the topology of the solid"
+                ));
+                return Ok((resolution, betti));
             }
-            if start.tally.start > 0 && first_with_voxels.is_none() {
-                first_with_voxels = Some((resolution, start, betti));
+            if start.tally.start > 0 {
+                first_with_voxels.get_or_insert((resolution, betti));
             }
         }
-        let Some((resolution, start, betti)) = first_with_voxels else {
-            return Ok(asked);
+        let Some((resolution, betti)) = first_with_voxels else {
+            return Ok((coarsest, betti));
+        };
+        let start = match resolution == coarsest {
+            true => &asked.voxels,
+            false => &self.descend(resolution, Wanted::Places)?.voxels,
         };
         let side = self.grid(resolution).side * self.shape.normalisation().diagonal;
-        let place = self.lost_vertex(resolution, &start.voxels).map_or(String::new(), |p| {
+        let place = self.lost_vertex(resolution, start).map_or(String::new(), |p| {
             format!(", such as at ({:.6}, {:.6}, {:.6})", p.x, p.y, p.z)
         });
         diagnostics.warn(format!(
@@ -172,7 +205,7 @@ impl<'s> Solid<'s> {
              units of the surface are not resolved{place}; give a higher resolution",
             2.0 * side
         ));
-        Ok(resolution)
+        Ok((resolution, betti))
     }
 
     /// The vertex of the surface, in input units, that is farthest from all voxels, if it is
@@ -223,94 +256,6 @@ impl<'s> Solid<'s> {
         let count = counts[counts.len() - 1];
         Axis { sphere: Sphere::new(self.params.spiral, count, grid.side), grid, voxels }
     }
-
-    /// The axis of the coarsest lattice that still has `count` voxels and the topology of the base,
-    /// taken down to the count.
-    ///
-    /// # Errors
-    /// When the run was cancelled.
-    pub fn with_count(
-        &self,
-        resolution: u32,
-        base: &Descent,
-        count: usize,
-        diagnostics: &mut Diagnostics,
-    ) -> Result<Axis, SimplifyError> {
-        let angle = self.params.angle;
-        let mut best = self.axis(resolution, base, angle)?;
-        if best.voxels.len() <= count {
-            if best.voxels.len() < count {
-                diagnostics.warn(format!(
-                    "{} spheres instead of {count}: the axis has no more voxels at resolution \
-                     {resolution}",
-                    best.voxels.len()
-                ));
-            }
-            return Ok(best);
-        }
-        let topology = betti_of(&base.voxels);
-        let (mut low, mut high) = (1, resolution);
-        // The number of voxels of a surface grows with the square of the resolution.
-        let share = (count as f64 / best.voxels.len() as f64).sqrt();
-        let mut next = (f64::from(resolution) * share).ceil() as u32;
-        while high - low > 1 + high / 16 {
-            let tried = next.clamp(low + 1, high - 1);
-            match self.axis_with_topology(tried, topology, angle)? {
-                Some(axis) if axis.voxels.len() >= count => (best, high) = (axis, tried),
-                _ => low = tried,
-            }
-            next = low.midpoint(high);
-        }
-        if best.voxels.len() > count {
-            self.take_down(&mut best, count, diagnostics)?;
-        }
-        diagnostics.count("lattice", high as usize);
-        Ok(best)
-    }
-
-    fn axis_with_topology(
-        &self,
-        resolution: u32,
-        topology: [u64; 3],
-        angle: f64,
-    ) -> Result<Option<Axis>, SimplifyError> {
-        if self.params.variant != Variant::Plain {
-            let start = self.descend(resolution, Wanted::Places)?;
-            if betti_of(&start.voxels) != topology {
-                return Ok(None);
-            }
-        }
-        let base = self.descend(resolution, self.wanted())?;
-        self.axis(resolution, &base, angle).map(Some)
-    }
-
-    fn take_down(
-        &self,
-        axis: &mut Axis,
-        count: usize,
-        diagnostics: &mut Diagnostics,
-    ) -> Result<(), SimplifyError> {
-        let before = axis.voxels.len();
-        if self.params.variant == Variant::Plain {
-            axis.voxels.sort_by(|a, b| a.flux.total_cmp(&b.flux));
-            axis.voxels.truncate(count);
-            axis.voxels.sort_unstable_by_key(|v| [v.place[2], v.place[1], v.place[0]]);
-        } else {
-            let mut voxels = Bricks::new(axis.grid.size);
-            axis.voxels.iter().for_each(|&voxel| voxels.insert(voxel));
-            thin(&mut voxels, Order::Down { to: count }, &self.run)?;
-            axis.voxels = sorted(&voxels);
-            if axis.voxels.len() > count {
-                diagnostics.warn(format!(
-                    "{} spheres instead of {count}: to delete another voxel would change the \
-                     topology",
-                    axis.voxels.len()
-                ));
-            }
-        }
-        diagnostics.count("deleted_to_the_count", before - axis.voxels.len());
-        Ok(())
-    }
 }
 
 fn has_voxel(voxels: &Bricks, grid: &Grid, at: [i32; 3], ring: i32) -> bool {
@@ -330,6 +275,11 @@ pub fn betti_of(voxels: &Bricks) -> [u64; 3] {
 }
 
 impl Axis {
+    /// Number of voxels.
+    pub(super) fn len(&self) -> usize {
+        self.voxels.len()
+    }
+
     /// Centres of the voxels, normalised.
     pub fn points(&self) -> Vec<Vec3> {
         self.voxels.iter().map(|voxel| self.grid.centre(voxel.place)).collect()

@@ -157,7 +157,7 @@ impl MedialSimplifier for DeyZhao {
         let params = params.typed::<DeyZhaoParams>()?.validate()?;
         let set = FacetSet::of(shape)?;
         let delaunay = shape.delaunay()?;
-        let umbrellas = Umbrellas::new(&delaunay);
+        let umbrellas = Umbrellas::new(&delaunay, shape.cells()?.circumspheres());
         let value = (0..set.facets.len())
             .into_par_iter()
             .map(|facet| strength(&delaunay, &umbrellas, &params, set.facets.ends(facet)))

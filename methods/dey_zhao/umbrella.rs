@@ -25,33 +25,19 @@ pub(super) struct Umbrellas {
     flat: usize,
 }
 
-/// An end of a Voronoi edge.
-#[derive(Clone, Copy)]
-enum End {
-    Point(Vec3),
-    /// At infinity in this direction.
-    Infinite(Vec3),
-}
-
 impl Umbrellas {
-    /// Cost `O(n)` in the number of cells; parallel, the same for any number of threads.
-    pub fn new(delaunay: &Delaunay) -> Self {
-        let spheres = delaunay.circumspheres();
-        let pole_vectors = pole_vectors(delaunay, &spheres);
+    /// From the circumspheres of all finite cells. Cost `O(n)` in the number of cells; parallel, the same for any number of threads.
+    pub fn new(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Self {
+        let pole_vectors = pole_vectors(delaunay, spheres);
+        let ahead = corners_ahead(delaunay, spheres, &pole_vectors);
         let parts: Vec<(Vec<(u32, Triangle)>, usize)> = (0..delaunay.finite_cell_count() as u32)
             .into_par_iter()
             .chunks(4096)
             .map(|cells| {
                 let (mut found, mut flat) = (Vec::new(), 0);
                 for cell in cells {
-                    crossing(
-                        delaunay,
-                        &spheres,
-                        &pole_vectors,
-                        CellId(cell),
-                        &mut found,
-                        &mut flat,
-                    );
+                    let cell = CellId(cell);
+                    crossing(delaunay, &ahead, &pole_vectors, cell, &mut found, &mut flat);
                 }
                 (found, flat)
             })
@@ -111,44 +97,66 @@ fn pole_vectors(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Vec<Vec3> {
     first_poles(delaunay, spheres).into_iter().enumerate().map(vector).collect()
 }
 
+/// For each finite cell the corners, as bits, to which its Voronoi vertex is on the pole's side; `None`
+/// for a vertex that is not representable.
+fn corners_ahead(
+    delaunay: &Delaunay,
+    spheres: &[Option<Sphere>],
+    pole_vectors: &[Vec3],
+) -> Vec<Option<u8>> {
+    let of_cell = |(cell, sphere): (usize, &Option<Sphere>)| {
+        let centre = (*sphere)?.centre;
+        let corners = delaunay.vertices(CellId(cell as u32)).into_iter().enumerate();
+        Some(corners.fold(0, |bits, (k, v)| {
+            let ahead = (centre - delaunay.point(v)).dot(pole_vectors[v.index()]) >= 0.0;
+            bits | u8::from(ahead) << k
+        }))
+    };
+    spheres.par_iter().enumerate().with_min_len(1024).map(of_cell).collect()
+}
+
 /// Adds the facets of a cell, each from its smaller cell, to the umbrellas that they belong to.
 fn crossing(
     delaunay: &Delaunay,
-    spheres: &[Option<Sphere>],
+    ahead: &[Option<u8>],
     pole_vectors: &[Vec3],
     cell: CellId,
     found: &mut Vec<(u32, Triangle)>,
     flat: &mut usize,
 ) {
-    let Some(here) = spheres[cell.index()].map(|s| End::Point(s.centre)) else { return };
+    let Some(here) = ahead[cell.index()] else { return };
     let (vertices, neighbours) = (delaunay.vertices(cell), delaunay.neighbours(cell));
     for opposite in 0..4 {
         let other = neighbours[opposite];
         if other < cell {
             continue;
         }
-        let facet = [1, 2, 3].map(|k| vertices[(opposite + k) % 4]);
-        let corners = facet.map(|v| delaunay.point(v));
-        let there = match spheres.get(other.index()) {
-            Some(Some(sphere)) => End::Point(sphere.centre),
+        let places = [1, 2, 3].map(|k| (opposite + k) % 4);
+        let facet = places.map(|k| vertices[k]);
+        let there = match ahead.get(other.index()) {
+            Some(&Some(bits)) => {
+                let corners = delaunay.vertices(other);
+                facet.map(|v| {
+                    let k = corners.iter().position(|&w| w == v).expect("a shared corner");
+                    bits >> k & 1 == 1
+                })
+            }
             Some(None) => continue,
             None => {
+                let corners = facet.map(|v| delaunay.point(v));
                 let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
                 let inwards = delaunay.point(vertices[opposite]) - corners[0];
-                End::Infinite(if normal.dot(inwards) > 0.0 { -normal } else { normal })
+                let outwards = if normal.dot(inwards) > 0.0 { -normal } else { normal };
+                facet.map(|v| outwards.dot(pole_vectors[v.index()]) >= 0.0)
             }
         };
         let mut shape = None;
         for k in 0..3 {
-            let (p, v) = (corners[k], pole_vectors[facet[k].index()]);
-            let ahead = |end: End| match end {
-                End::Point(x) => (x - p).dot(v) >= 0.0,
-                End::Infinite(direction) => direction.dot(v) >= 0.0,
-            };
-            if ahead(here) == ahead(there) {
+            if (here >> places[k] & 1 == 1) == there[k] {
                 continue;
             }
-            let Some((normal, circumradius)) = *shape.get_or_insert_with(|| measure(corners))
+            let corners = || facet.map(|v| delaunay.point(v));
+            let Some((normal, circumradius)) = *shape.get_or_insert_with(|| measure(corners()))
             else {
                 *flat += 1;
                 continue;

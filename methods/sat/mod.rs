@@ -24,12 +24,13 @@
 //!   these samples do.
 //! - Step 5 is off by default. The authors' tool removes sheets below 30 degrees at scales above 1;
 //!   `sat_angle=30` asks for it. It removes facets one by one, so that a sheet can go in part.
-//! - Step 6 does not undo the factor of step 2, neither does the tool: a result at scale 1 is 0.2 %
-//!   larger than the union of polar balls. Without step 2 (`radius_factor=1`, `jitter=0`) rounding
-//!   decides which polar balls meet at scale 1, and the result is torn; a warning says so.
+//! - Step 6 does not undo the factor of step 2: a result at scale 1 is 0.2 % larger than the union of
+//!   polar balls. As far as we know the authors' tool does not undo it either. Without step 2
+//!   (`radius_factor=1`, `jitter=0`) rounding decides which polar balls meet at scale 1, and the result
+//!   is torn; a warning says so.
 //! - A number of spheres is met by a search on `s`. A scale has the count it has: the result is the
-//!   largest count at most as large as asked that the search meets, to 1 %, and is reported. Every
-//!   request is answered anew, so that its seconds are those of this request alone.
+//!   largest count at most as large as asked that the search meets, to 1 %, and is reported. Scales
+//!   are kept from request to request; the seconds of each are those of all scales that it needed.
 
 mod params;
 mod search;
@@ -37,14 +38,18 @@ mod sheets;
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
+
 use medial::complex::{AxisTally, MedialMesh, Sphere, UnionAxis, betti};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
     Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError, Work,
+    Simplification, Simplified, SimplifyError,
 };
 
 use crate::perturb::perturbed;
+use crate::reuse::Reuse;
+
 pub use params::SatParams;
 
 /// Scale of [`Level::Published`]: the default of the authors' tool.
@@ -55,7 +60,8 @@ const LARGEST_SCALE: f64 = 1e6;
 
 /// The scale axis transform as a method.
 ///
-/// Answers all levels. Each scale costs one regular and one Delaunay triangulation.
+/// Answers all levels. Each scale costs one regular and one Delaunay triangulation, and the memory
+/// of its axis for as long as levels can be asked.
 #[derive(Clone, Debug)]
 pub struct Sat {
     info: MethodInfo,
@@ -103,7 +109,7 @@ impl MedialSimplifier for Sat {
         let balls = shape.inner_balls()?;
         run.step(0, balls.spheres.len())?;
         let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
-        Ok(Box::new(Prepared { spheres, params, run: run.clone() }))
+        Ok(Box::new(Prepared { spheres, params, run: run.clone(), scales: Reuse::new() }))
     }
 }
 
@@ -112,6 +118,8 @@ struct Prepared {
     spheres: Vec<Sphere>,
     params: SatParams,
     run: RunContext,
+    /// The scales computed so far, by the bits of the scale.
+    scales: Reuse<u64, Scaled>,
 }
 
 /// The scale axis at one scale.
@@ -125,51 +133,32 @@ struct Scaled {
 }
 
 impl Prepared {
-    /// Steps 3 to 6.
-    fn scaled(&self, scale: f64) -> Result<Scaled, SimplifyError> {
-        let resized = |balls: &[Sphere], factor: f64| -> Vec<Sphere> {
-            balls.iter().map(|b| Sphere::new(b.centre, b.radius * factor)).collect()
-        };
-        let grown = resized(&self.spheres, scale);
-        let axis = UnionAxis::of_balls(&grown).map_err(ShapeError::from)?;
-        let (mut mesh, removed_facets) = sheets::filtered(&axis, self.params.sat_angle);
-        mesh.spheres = resized(&mesh.spheres, 1.0 / scale);
-        let (tally, union_betti) = (*axis.tally(), axis.union_betti());
-        Ok(Scaled { scale, mesh, tally, union_betti, removed_facets })
-    }
-}
-
-impl Simplification for Prepared {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
-        let mut diagnostics = Diagnostics::default();
-        let scaled = match level {
-            Level::Published => self.scaled(PUBLISHED)?,
-            Level::Native(scale) if (1.0..=LARGEST_SCALE).contains(&scale) => self.scaled(scale)?,
-            Level::Native(scale) => {
-                return Err(SimplifyError::Level(format!(
-                    "s = {scale:?} is outside 1 to {LARGEST_SCALE:e}"
-                )));
-            }
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
-            Level::Spheres(count) => search::to_count(self, count, &mut diagnostics)?,
-        };
-        scaled.diagnose(self.spheres.len(), &mut diagnostics);
-        let Scaled { scale, mesh, .. } = scaled;
-        let native_level = Some(scale);
-        Ok(Simplified {
-            mesh,
-            asked: level,
-            native_level,
-            work: Work::Anew,
-            diagnostics,
-            extras: Extras::default(),
-        })
+    /// The axis at a scale, computed once.
+    fn at_scale(&mut self, scale: f64) -> Result<Arc<Scaled>, SimplifyError> {
+        let Self { spheres, params, scales, .. } = self;
+        scales.get(scale.to_bits(), || Scaled::new(spheres, params, scale))
     }
 }
 
 impl Scaled {
+    /// Steps 3 to 6.
+    fn new(spheres: &[Sphere], params: &SatParams, scale: f64) -> Result<Self, SimplifyError> {
+        let resized = |balls: &[Sphere], factor: f64| -> Vec<Sphere> {
+            balls.iter().map(|b| Sphere::new(b.centre, b.radius * factor)).collect()
+        };
+        let grown = resized(spheres, scale);
+        let axis = UnionAxis::of_balls(&grown).map_err(ShapeError::from)?;
+        let (mut mesh, removed_facets) = sheets::filtered(&axis, params.sat_angle);
+        mesh.spheres = resized(&mesh.spheres, 1.0 / scale);
+        let (tally, union_betti) = (*axis.tally(), axis.union_betti());
+        Ok(Self { scale, mesh, tally, union_betti, removed_facets })
+    }
+
+    /// Number of spheres.
+    fn size(&self) -> usize {
+        self.mesh.spheres.len()
+    }
+
     fn diagnose(&self, balls: usize, diagnostics: &mut Diagnostics) {
         let AxisTally { open, doubtful, .. } = self.tally;
         diagnostics.count("balls", balls);
@@ -186,5 +175,36 @@ impl Scaled {
                 self.union_betti
             ));
         }
+    }
+}
+
+impl Simplification for Prepared {
+    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        let mut diagnostics = Diagnostics::default();
+        self.scales.begin();
+        let scaled = match level {
+            Level::Published => self.at_scale(PUBLISHED)?,
+            Level::Native(scale) if (1.0..=LARGEST_SCALE).contains(&scale) => {
+                self.at_scale(scale)?
+            }
+            Level::Native(scale) => {
+                return Err(SimplifyError::Level(format!(
+                    "s = {scale:?} is outside 1 to {LARGEST_SCALE:e}"
+                )));
+            }
+            Level::Spheres(0) => {
+                return Err(SimplifyError::Level("ask for at least one sphere".into()));
+            }
+            Level::Spheres(count) => search::to_count(self, count, &mut diagnostics)?,
+        };
+        scaled.diagnose(self.spheres.len(), &mut diagnostics);
+        Ok(Simplified {
+            mesh: scaled.mesh.clone(),
+            asked: level,
+            native_level: Some(scaled.scale),
+            work: self.scales.work(),
+            diagnostics,
+            extras: Extras::default(),
+        })
     }
 }

@@ -1,4 +1,15 @@
 //! A scale for a number of spheres.
+//!
+//! 1. From scale 1 up, in steps that double, until the count is at most the one asked. The count
+//!    does not fall everywhere: facets that get more corners get more vertices. The ladder ends where
+//!    it has stalled.
+//! 2. Between the last two scales the Illinois variant of regula falsi, on logarithms of scale and
+//!    count.
+//!
+//! Which scales are tried depends on the count alone, so that the same count has the same answer
+//! whatever was asked before. Scales that are there already are not computed again.
+
+use std::sync::Arc;
 
 use medial::simplifier::{Diagnostics, SimplifyError};
 
@@ -8,7 +19,13 @@ use super::{Prepared, Scaled};
 const FIRST_STEP: f64 = 0.1;
 
 /// Steps until the search gives up: scale 3,277.
-const MOST_STEPS: i32 = 16;
+const MOST_STEPS: usize = 16;
+
+/// Before scale 7.4 the count can rise for long and fall later.
+const STEPS_BEFORE_STALL: usize = 7;
+
+/// The count has stalled if as many steps brought it down by less than this fraction.
+const STALL: (usize, f64) = (3, 0.03);
 
 /// Scales that are tried between two of these steps.
 const MOST_TRIES: usize = 8;
@@ -17,39 +34,28 @@ const MOST_TRIES: usize = 8;
 const TOLERANCE: f64 = 0.01;
 
 /// The scale axis with the largest count that the search meets of those not above `count`; with a
-/// larger one, the smallest met, where there is none. Each scale is computed once.
+/// larger one, the smallest met, where there is none.
 pub(super) fn to_count(
-    sat: &Prepared,
+    sat: &mut Prepared,
     count: usize,
     diagnostics: &mut Diagnostics,
-) -> Result<Scaled, SimplifyError> {
+) -> Result<Arc<Scaled>, SimplifyError> {
     let mut tried = 0;
     let mut at = |scale: f64| {
         sat.run.step(tried, MOST_TRIES + 3)?;
         tried += 1;
-        sat.scaled(scale)
+        sat.at_scale(scale)
     };
-    let mut fine = at(1.0)?;
-    let mut coarse = None;
-    for step in 0..MOST_STEPS {
-        if size(&fine) <= count {
-            break;
-        }
-        let scaled = at(1.0 + FIRST_STEP * f64::powi(2.0, step))?;
-        if size(&scaled) <= count {
-            coarse = Some(scaled);
-            break;
-        }
-        fine = scaled;
-    }
-    let found = match coarse {
-        Some(coarse) => between(fine, coarse, count, &mut at)?,
-        None => fine,
+    let (found, stalled) = match ladder(count, &mut at)? {
+        Ladder::Passed { fine, coarse } => (between(&fine, coarse, count, &mut at)?, false),
+        Ladder::First(only) => (only, false),
+        Ladder::Above { smallest, stalled } => (smallest, stalled),
     };
     diagnostics.count("scales_tried", tried);
-    if size(&found) != count {
-        let (reached, scale) = (size(&found), found.scale);
+    if found.size() != count {
+        let (reached, scale) = (found.size(), found.scale);
         let why = match reached > count {
+            true if stalled => "at larger scales the count does not fall any more",
             true => "no scale tried has so few",
             false if scale == 1.0 => "the medial axis of the union of balls has no more",
             false => "the nearest count from below that the search on s met",
@@ -59,34 +65,101 @@ pub(super) fn to_count(
     Ok(found)
 }
 
-fn size(scaled: &Scaled) -> usize {
-    scaled.mesh.spheres.len()
+/// Where the ladder of scales ended.
+enum Ladder {
+    /// Scale 1 has no more spheres than asked.
+    First(Arc<Scaled>),
+    /// Between two scales.
+    Passed { fine: Arc<Scaled>, coarse: Arc<Scaled> },
+    /// Nowhere: the scale with the fewest spheres, the first of several.
+    Above { smallest: Arc<Scaled>, stalled: bool },
 }
 
-/// Regula falsi on the logarithms of scale and count, kept off the ends of the bracket.
-fn between(
-    mut fine: Scaled,
-    mut coarse: Scaled,
+/// Step 1.
+fn ladder(
     count: usize,
-    at: &mut impl FnMut(f64) -> Result<Scaled, SimplifyError>,
-) -> Result<Scaled, SimplifyError> {
-    let target = (count as f64).ln();
-    for _ in 0..MOST_TRIES {
-        if size(&coarse) as f64 >= (1.0 - TOLERANCE) * count as f64 {
-            break;
+    at: &mut impl FnMut(f64) -> Result<Arc<Scaled>, SimplifyError>,
+) -> Result<Ladder, SimplifyError> {
+    let mut fine = at(1.0)?;
+    if fine.size() <= count {
+        return Ok(Ladder::First(fine));
+    }
+    let mut smallest = Arc::clone(&fine);
+    let mut least = vec![fine.size()];
+    for step in 0..MOST_STEPS {
+        let scaled = at(1.0 + FIRST_STEP * f64::powi(2.0, step as i32))?;
+        if scaled.size() <= count {
+            return Ok(Ladder::Passed { fine, coarse: scaled });
         }
-        let [low, high] = [&fine, &coarse].map(|s| (s.scale.ln(), (size(s) as f64).max(0.5).ln()));
-        let share = ((low.1 - target) / (low.1 - high.1)).clamp(0.15, 0.85);
-        let scale = (low.0 + share * (high.0 - low.0)).exp();
-        if scale <= fine.scale || scale >= coarse.scale {
-            break;
+        if scaled.size() < smallest.size() {
+            smallest = Arc::clone(&scaled);
         }
-        let scaled = at(scale)?;
-        if size(&scaled) > count {
-            fine = scaled;
-        } else {
-            coarse = scaled;
+        least.push(smallest.size());
+        fine = scaled;
+        if has_stalled(&least) {
+            return Ok(Ladder::Above { smallest, stalled: true });
         }
     }
+    Ok(Ladder::Above { smallest, stalled: false })
+}
+
+/// Whether the ladder goes nowhere, from the least counts up to each of its scales.
+fn has_stalled(least: &[usize]) -> bool {
+    let (steps, fall) = STALL;
+    let last = least.len() - 1;
+    last >= STEPS_BEFORE_STALL && least[last] as f64 > (1.0 - fall) * least[last - steps] as f64
+}
+
+/// Step 2. Aims a little below the count, since a count above is of no use.
+fn between(
+    fine: &Scaled,
+    mut coarse: Arc<Scaled>,
+    count: usize,
+    at: &mut impl FnMut(f64) -> Result<Arc<Scaled>, SimplifyError>,
+) -> Result<Arc<Scaled>, SimplifyError> {
+    let target = ((1.0 - TOLERANCE / 2.0) * count as f64).ln();
+    let point = |s: &Scaled| (s.scale.ln(), (s.size() as f64).max(0.5).ln() - target);
+    let (mut low, mut high) = (point(fine), point(&coarse));
+    let mut last_was_above = None;
+    for _ in 0..MOST_TRIES {
+        if coarse.size() as f64 >= (1.0 - TOLERANCE) * count as f64 {
+            break;
+        }
+        let share = (low.1 / (low.1 - high.1)).clamp(0.05, 0.95);
+        let logarithm = low.0 + share * (high.0 - low.0);
+        if logarithm <= low.0 || logarithm >= high.0 {
+            break;
+        }
+        let scaled = at(logarithm.exp())?;
+        let is_above = scaled.size() > count;
+        // An end that stays twice pulls half as hard.
+        let again = last_was_above == Some(is_above);
+        if is_above {
+            low = point(&scaled);
+            high.1 *= if again { 0.5 } else { 1.0 };
+        } else {
+            high = point(&scaled);
+            low.1 *= if again { 0.5 } else { 1.0 };
+            if scaled.size() >= coarse.size() {
+                coarse = scaled;
+            }
+        }
+        last_was_above = Some(is_above);
+    }
     Ok(coarse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ladder_stalls_only_late_and_when_flat() {
+        // A plate: rises and stays above.
+        let plate = [3205; 8];
+        assert!(!has_stalled(&plate[..7]) && has_stalled(&plate));
+        // Falls by a third of a tenth each step.
+        let slow: Vec<usize> = (0..12).map(|k| (5000.0 * 0.97_f64.powi(k)) as usize).collect();
+        assert!((7..12).all(|k| !has_stalled(&slow[..=k])));
+    }
 }

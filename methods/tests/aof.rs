@@ -203,11 +203,14 @@ fn homotopic_variants_keep_the_topology_of_the_start_set() {
                 assert!(axis.voxels.len() <= places.len());
             }
             let params = AofParams { resolution: 48, ..params(variant) };
-            let (resolution, start, diagnostics) = solid(&shape, &params).base().expect("fits");
-            let places: Vec<_> = start.voxels.iter().map(|v| v.place.map(u32::from)).collect();
+            let base = solid(&shape, &params).base().expect("fits");
+            let voxels = base.descent.voxels.iter();
+            let places: Vec<_> = voxels.map(|v| v.place.map(u32::from)).collect();
             let betti = cubical_betti(&places);
-            assert!(betti == expected || diagnostics.warnings[0].contains("Betti"), "{id}");
-            assert!(betti == expected, "{id} at {resolution}: {betti:?}");
+            let warnings = &base.diagnostics.warnings;
+            assert!(betti == expected || warnings[0].contains("Betti"), "{id}");
+            assert!(betti == expected, "{id} at {}: {betti:?}", base.resolution);
+            assert_eq!(base.topology, Some(betti));
         }
     }
 }

@@ -281,6 +281,7 @@ pub fn published() -> Vec<Exhibit> {
         include_str!("pmat-table-1.json"),
         include_str!("tam-heidrich-table-1.json"),
         include_str!("tam-heidrich-figure-10.json"),
+        include_str!("dey-zhao-table-1.json"),
     ];
     let read = |text: &&str| serde_json::from_str(text).expect("a published table is well formed");
     files.iter().map(read).collect()

@@ -107,11 +107,10 @@ impl MedialMesh {
         for face in &mut faces {
             face.sort_unstable();
         }
-        // Single integers in the lexicographic order, which compare faster.
-        faces.par_sort_unstable_by_key(|&[a, b, c]| (a, u64::from(b) << 32 | u64::from(c)));
+        sort_simplices(&mut faces, spheres.len());
         faces.dedup();
         edges.extend(faces.iter().flat_map(sides));
-        edges.par_sort_unstable_by_key(|&[a, b]| u64::from(a) << 32 | u64::from(b));
+        sort_simplices(&mut edges, spheres.len());
         edges.dedup();
         let mesh = Self { spheres, edges, faces, contacts: None };
         mesh.check()?;
@@ -142,9 +141,12 @@ impl MedialMesh {
         }
         check_order("edge", &self.edges)?;
         check_order("face", &self.faces)?;
-        let key = |&[a, b]: &[u32; 2]| u64::from(a) << 32 | u64::from(b);
-        let is_missing =
-            |side: &[u32; 2]| self.edges.binary_search_by_key(&key(side), key).is_err();
+        // In order, so that the edges of a sphere are a short run.
+        let first = run_starts(&self.edges, spheres);
+        let is_missing = |&[a, b]: &[u32; 2]| {
+            let run = &self.edges[first[a as usize] as usize..first[a as usize + 1] as usize];
+            run.binary_search_by_key(&b, |edge| edge[1]).is_err()
+        };
         let missing = self.faces.par_iter().enumerate().find_map_first(|(face, corners)| {
             let side = sides(corners).into_iter().find(is_missing)?;
             Some(ComplexError::MissingEdge { face, side })
@@ -238,6 +240,40 @@ impl MedialMesh {
 fn sides(face: &[u32; 3]) -> [[u32; 2]; 3] {
     let [a, b, c] = *face;
     [[a, b], [a, c], [b, c]]
+}
+
+/// Sorts simplices lexicographically: into runs by their first sphere, then each run. `O(n)` where
+/// few simplices begin at the same sphere.
+fn sort_simplices<const N: usize>(simplices: &mut Vec<[u32; N]>, spheres: usize) {
+    // Ids that are out of range are found later; few simplices are not worth a list of all spheres.
+    if simplices.len() < spheres / 8 || simplices.iter().any(|s| s[0] as usize >= spheres) {
+        simplices.sort_unstable();
+        return;
+    }
+    let start = run_starts(simplices, spheres);
+    let mut next = start.clone();
+    let mut sorted = vec![[0; N]; simplices.len()];
+    for &simplex in simplices.iter() {
+        let place = &mut next[simplex[0] as usize];
+        sorted[*place as usize] = simplex;
+        *place += 1;
+    }
+    for run in start.windows(2) {
+        sorted[run[0] as usize..run[1] as usize].sort_unstable();
+    }
+    *simplices = sorted;
+}
+
+/// For each sphere the number of simplices that begin at a smaller one, then the number of all.
+fn run_starts<const N: usize>(simplices: &[[u32; N]], spheres: usize) -> Vec<u32> {
+    let mut start = vec![0; spheres + 1];
+    for simplex in simplices {
+        start[simplex[0] as usize + 1] += 1;
+    }
+    for sphere in 0..spheres {
+        start[sphere + 1] += start[sphere];
+    }
+    start
 }
 
 fn check_order<T: Ord>(what: &'static str, simplices: &[T]) -> Result<(), ComplexError> {

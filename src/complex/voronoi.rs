@@ -37,10 +37,12 @@ pub enum DualTriangulation {
     Delaunay,
 }
 
-/// The circumspheres of the finite Delaunay cells that are centred inside the surface.
+/// The circumspheres of the finite Delaunay cells, and which are centred inside the surface.
 pub struct CellSpheres {
-    /// Circumsphere of each finite cell; `None` for those centred outside.
-    inside: Vec<Option<Sphere>>,
+    /// Circumsphere of each finite cell; `None` where it is not representable.
+    circumspheres: Vec<Option<Sphere>>,
+    /// For each finite cell.
+    is_inside: Vec<bool>,
     /// The cells centred inside, along a Morton curve of their centres: what is close in space is
     /// close in memory, which contractions, that walk from neighbour to neighbour, need.
     kept: Vec<CellId>,
@@ -51,8 +53,8 @@ pub struct CellSpheres {
 impl CellSpheres {
     /// Computes and classifies the circumcentre of every finite cell, in parallel.
     pub fn classify(delaunay: &Delaunay, inside: &InsideTest, surface: &TriangleBvh) -> Self {
-        let spheres = delaunay.circumspheres();
-        let centres: Vec<Vec3> = spheres.iter().flatten().map(|s| s.centre).collect();
+        let circumspheres = delaunay.circumspheres();
+        let centres: Vec<Vec3> = circumspheres.iter().flatten().map(|s| s.centre).collect();
         let sides = inside.sides(&centres);
         let near: Vec<bool> = centres
             .par_iter()
@@ -60,24 +62,36 @@ impl CellSpheres {
             .map(|(&c, &side)| side == Side::Inside && surface.any_within(c, GUARD_BAND))
             .collect();
         let mut verdicts = sides.iter().zip(&near);
-        let inside = spheres.into_iter().map(|sphere| {
-            let sphere = sphere?;
-            let (&side, &near) = verdicts.next()?;
-            (side == Side::Inside && !near).then_some(sphere)
-        });
-        let inside: Vec<Option<Sphere>> = inside.collect();
-        let cells = delaunay.triangulation().finite_cells();
-        let cells: Vec<CellId> = cells.filter(|cell| inside[cell.index()].is_some()).collect();
-        let centres: Vec<Vec3> = inside.iter().flatten().map(|s| s.centre).collect();
-        let kept = morton_order(&centres).into_iter().map(|(_, i)| cells[i as usize]).collect();
+        let inside = |(&side, &near): (&Side, &bool)| side == Side::Inside && !near;
+        let is_inside: Vec<bool> = circumspheres
+            .iter()
+            .map(|sphere| sphere.is_some() && verdicts.next().is_some_and(inside))
+            .collect();
         let in_guard_band = near.iter().filter(|&&near| near).count();
-        Self { inside, kept, in_guard_band }
+        let cells = delaunay.triangulation().finite_cells().zip(&circumspheres);
+        let (cells, centres): (Vec<CellId>, Vec<Vec3>) = cells
+            .filter(|(cell, _)| is_inside[cell.index()])
+            .filter_map(|(cell, sphere)| Some((cell, sphere.as_ref()?.centre)))
+            .unzip();
+        let kept = morton_order(&centres).into_iter().map(|(_, i)| cells[i as usize]).collect();
+        Self { circumspheres, is_inside, kept, in_guard_band }
+    }
+
+    /// The circumspheres of all finite cells, those centred outside included, see
+    /// [`Delaunay::circumspheres`].
+    pub fn circumspheres(&self) -> &[Option<Sphere>] {
+        &self.circumspheres
+    }
+
+    /// The spheres that are centred inside, in the order of the Voronoi medial mesh.
+    fn inner_spheres(&self) -> impl Iterator<Item = Sphere> + '_ {
+        self.kept.iter().filter_map(|cell| self.circumspheres[cell.index()])
     }
 
     /// Whether the circumcentre of a cell is inside; never for infinite cells.
     pub fn is_inside(&self, cell: CellId) -> bool {
         // Finite cells come first; infinite ones are beyond the list.
-        self.inside.get(cell.index()).is_some_and(Option::is_some)
+        self.is_inside.get(cell.index()).is_some_and(|&inside| inside)
     }
 
     /// For each of so many cells the sphere of the Voronoi medial mesh that it is, or the largest
@@ -92,18 +106,19 @@ impl CellSpheres {
 }
 
 /// The Voronoi medial mesh of a triangulation of boundary samples, with contact points. Spheres
-/// lie along a Morton curve. Parallel; the same mesh for any number of threads.
+/// lie along a Morton curve. Parallel; the same mesh for any number of threads. `facets` are those of
+/// the same cells.
 pub fn voronoi_medial_mesh(
     delaunay: &Delaunay,
     cells: &CellSpheres,
+    facets: &VoronoiFacets,
     samples: &Arc<[Vec3]>,
     dual: DualTriangulation,
 ) -> MedialMesh {
     let triangulation = delaunay.triangulation();
     let kept = &cells.kept;
     let sphere_of_cell = cells.sphere_ids(triangulation.cell_count());
-    let spheres: Vec<Sphere> =
-        kept.iter().map(|c| cells.inside[c.index()].expect("kept cells are inside")).collect();
+    let spheres: Vec<Sphere> = cells.inner_spheres().collect();
     let sphere = |cell: CellId| sphere_of_cell[cell.index()];
 
     let edges = kept.par_iter().flat_map_iter(|&cell| {
@@ -112,7 +127,7 @@ pub fn voronoi_medial_mesh(
             .filter(move |&other| other > cell && cells.is_inside(other))
             .map(move |other| [sphere(cell), sphere(other)])
     });
-    let faces = VoronoiFacets::new(delaunay, cells).triangles(&spheres, dual);
+    let faces = facets.triangles(&spheres, dual);
     let mut mesh = MedialMesh::from_simplices(spheres, edges.collect(), faces)
         .expect("circumspheres are finite and ids in range");
     mesh.contacts = Some(Contacts {

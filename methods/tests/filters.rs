@@ -1,0 +1,343 @@
+//! The variants of the angle filter and of the lambda-medial axis: thresholds on boxes and plates,
+//! incidence, topology, scale.
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, betti};
+use medial::geometry::enclosing_ball;
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, Params, RunContext, Simplified, SimplifyError};
+use medial::surface::{self, TriMesh};
+
+const ANGLE: [&[(&str, &str)]; 4] = [
+    &[("variant", "facet")],
+    &[("variant", "facet"), ("at", "minimum")],
+    &[("variant", "grid")],
+    &[("variant", "homotopy")],
+];
+const LAMBDA: [&[(&str, &str)]; 2] =
+    [&[("variant", "cell")], &[("variant", "cell"), ("leftovers", "false")]];
+
+fn shape_of(mesh: &TriMesh) -> Shape {
+    let report = surface::validate(mesh).expect("a solid");
+    Shape::new("shape", mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+fn built_in(id: &str) -> TriMesh {
+    let shape = medial_datasets::find(id).expect("in the catalogue");
+    shape.mesh(shape.default_resolution)
+}
+
+fn params(set: &[(&str, &str)]) -> Params {
+    let mut params = Params::none();
+    set.iter().for_each(|(key, value)| params.set(key, value));
+    params
+}
+
+fn levels(
+    shape: &Shape,
+    method: &str,
+    set: &[(&str, &str)],
+    levels: &[Level],
+) -> Vec<Result<Simplified, SimplifyError>> {
+    let method = medial_methods::find(method).expect("registered");
+    let run = RunContext::default();
+    let mut prepared = method.prepare(shape, &params(set), &run).expect("prepared");
+    levels.iter().map(|&level| prepared.at(level)).collect()
+}
+
+fn at(shape: &Shape, method: &str, set: &[(&str, &str)], level: Level) -> MedialMesh {
+    let mesh = levels(shape, method, set, &[level]).remove(0).expect("a level").mesh;
+    mesh.check().expect("a valid complex");
+    mesh
+}
+
+/// A solid box around the origin, in the shape's units: its half sides, descending, and how far a point
+/// is from the central rectangle.
+struct Cuboid {
+    middle: Vec3,
+    half: Vec3,
+    thinnest: usize,
+}
+
+impl Cuboid {
+    fn of(shape: &Shape) -> Self {
+        let (lo, hi) = shape.mesh().bounding_box().expect("vertices");
+        let half = (hi - lo) / 2.0;
+        let thinnest = (0..3).min_by(|&a, &b| half[a].total_cmp(&half[b])).expect("three");
+        Self { middle: lo.midpoint(hi), half, thinnest }
+    }
+
+    fn thickness(&self) -> f64 {
+        2.0 * self.half[self.thinnest]
+    }
+
+    fn rectangle(&self) -> Vec3 {
+        let mut reach = self.half - Vec3::splat(self.half[self.thinnest]);
+        reach[self.thinnest] = 0.0;
+        reach
+    }
+
+    fn from_rectangle(&self, x: Vec3) -> f64 {
+        let (reach, x) = (self.rectangle(), x - self.middle);
+        x.distance(x.clamp(-reach, reach))
+    }
+
+    /// The farthest of some points of the rectangle from all spheres.
+    fn uncovered(&self, mesh: &MedialMesh) -> f64 {
+        let reach = self.rectangle();
+        let steps = 12;
+        let points = (0..=steps).flat_map(|i| (0..=steps).map(move |j| (i, j)));
+        let far = points.map(|(i, j)| {
+            let mut p = reach;
+            let axes = [1, 2].map(|k| (self.thinnest + k) % 3);
+            for (axis, n) in axes.into_iter().zip([i, j]) {
+                p[axis] *= 2.0 * f64::from(n) / f64::from(steps) - 1.0;
+            }
+            let p = self.middle + p;
+            mesh.spheres.iter().map(|s| s.centre.distance(p)).fold(f64::INFINITY, f64::min)
+        });
+        far.fold(0.0, f64::max)
+    }
+}
+
+/// The longest edge of the surface: the spacing of its samples.
+fn spacing(shape: &Shape) -> f64 {
+    let mesh = shape.mesh();
+    let edges = (0..mesh.faces.len()).flat_map(|f| {
+        let [a, b, c] = mesh.triangle(f);
+        [a.distance(b), b.distance(c), c.distance(a)]
+    });
+    edges.fold(0.0, f64::max)
+}
+
+#[test]
+fn facets_above_a_right_angle_are_the_central_rectangle_of_a_box() {
+    let shape = shape_of(&medial_datasets::find("box").expect("in the catalogue").mesh(90));
+    let (cuboid, h) = (Cuboid::of(&shape), spacing(&shape));
+    for set in &ANGLE[..2] {
+        let mesh = at(&shape, "angle", set, Level::Native(110.0));
+        assert!(!mesh.faces.is_empty());
+        assert!(mesh.faces.iter().flatten().count() >= mesh.spheres.len(), "facets and closure");
+        for sphere in &mesh.spheres {
+            let off = cuboid.from_rectangle(sphere.centre);
+            // Contacts are samples: an angle scatters by about h / r.
+            let resolved = 2.0 * h / 20.0_f64.to_radians();
+            assert!(off < 2.0 * h || sphere.radius < resolved, "{set:?}: {sphere:?} {off}");
+        }
+        assert!(cuboid.uncovered(&mesh) < 3.0 * h, "{set:?}");
+        // Below a right angle the sheets of the edges are there: some sphere is far off.
+        let mesh = at(&shape, "angle", set, Level::Native(60.0));
+        let off = mesh.spheres.iter().filter(|s| s.radius > 3.0 * h);
+        let off = off.map(|s| cuboid.from_rectangle(s.centre)).fold(0.0, f64::max);
+        assert!(off > 2.0 * h, "{set:?}: {off}");
+    }
+}
+
+#[test]
+fn the_smallest_angle_of_a_facet_keeps_no_more_than_its_barycentre() {
+    let shape = shape_of(&built_in("ellipsoid"));
+    for theta in [20.0, 60.0, 120.0] {
+        let [mean, least] = [0, 1].map(|k| at(&shape, "angle", ANGLE[k], Level::Native(theta)));
+        assert!(least.spheres.len() < mean.spheres.len(), "{theta}");
+        assert!(least.spheres.iter().all(|s| mean.spheres.contains(s)), "{theta}");
+    }
+}
+
+#[test]
+fn a_grid_separates_right_angles_and_straight_ones_exactly() {
+    let mesh = built_in("box");
+    let shape = shape_of(&mesh);
+    let cuboid = Cuboid::of(&shape);
+    for resolution in ["24", "31", "64"] {
+        let side = 2.0 * cuboid.half.max_element() / resolution.parse::<f64>().expect("a number");
+        let set = [("variant", "grid"), ("resolution", resolution)];
+        for theta in [90.001, 179.9] {
+            let mesh = at(&shape, "angle", &set, Level::Native(theta));
+            let off = mesh.spheres.iter().map(|s| cuboid.from_rectangle(s.centre));
+            assert!(off.fold(0.0, f64::max) < 1.5 * side, "{resolution} {theta}");
+            assert!(cuboid.uncovered(&mesh) < 2.0 * side, "{resolution} {theta}");
+        }
+        let mesh = at(&shape, "angle", &set, Level::Native(89.999));
+        // Radii are distances, and the sheets reach the edges of the box.
+        for sphere in &mesh.spheres {
+            let room = (cuboid.half - (sphere.centre - cuboid.middle).abs()).min_element();
+            assert!((sphere.radius - room).abs() < 1e-12, "{sphere:?} has room for {room}");
+        }
+        let off = mesh.spheres.iter().map(|s| cuboid.from_rectangle(s.centre));
+        assert!(off.fold(0.0, f64::max) > cuboid.half[cuboid.thinnest], "{resolution}");
+    }
+}
+
+#[test]
+fn lambda_keeps_what_its_table_says_on_a_box_and_a_plate() {
+    for id in ["box", "plate"] {
+        let shape = shape_of(&built_in(id));
+        let (cuboid, h) = (Cuboid::of(&shape), spacing(&shape));
+        let half = cuboid.thickness() / 2.0;
+        for set in LAMBDA {
+            // A facet has exactly half of the thickness where its two samples are opposite.
+            let mesh = at(&shape, "lambda", set, Level::Native(half * (1.0 - 1e-9)));
+            assert!(cuboid.uncovered(&mesh) < 3.0 * h, "{id} {set:?}");
+            let beyond = (half * half + h * h).sqrt() * (1.0 + 1e-9);
+            assert!(at(&shape, "lambda", set, Level::Native(beyond)).spheres.is_empty(), "{id}");
+        }
+        // Sheets from the edges go up to the radius sqrt 2 lambda.
+        let lambda = 0.6 * half;
+        if lambda > 3.0 * h {
+            let mesh = at(&shape, "lambda", LAMBDA[0], Level::Native(lambda));
+            for sphere in &mesh.spheres {
+                assert!(sphere.radius > 2.0_f64.sqrt() * (lambda - h), "{id}: {sphere:?}");
+            }
+            let least = mesh.spheres.iter().map(|s| s.radius).fold(f64::INFINITY, f64::min);
+            assert!(least < 2.0_f64.sqrt() * (lambda + 2.0 * h), "{id}: {least}");
+        }
+    }
+}
+
+#[test]
+fn lambda_grows_from_facets_to_edges_to_vertices() {
+    let shape = shape_of(&built_in("bracket"));
+    let (mesh, facets) = (shape.voronoi().expect("a mesh"), shape.facets().expect("facets"));
+    let delaunay = shape.delaunay().expect("samples in space");
+    let contacts = mesh.contacts.as_ref().expect("contacts");
+    let ball = |ids: &[u32]| {
+        let points: Vec<Vec3> = ids.iter().map(|&id| contacts.samples[id as usize]).collect();
+        enclosing_ball(&points).1
+    };
+    let grown = 1.0 + 1e-9;
+    for facet in 0..facets.len() {
+        let [p, q] = facets.ends(facet).map(|v| delaunay.point(v));
+        let polygon = facets.polygon(facet);
+        for k in 0..polygon.len() {
+            let [a, b] = [polygon[k], polygon[(k + 1) % polygon.len()]];
+            let [mine, theirs] = [a, b].map(|v| contacts.of_sphere[v as usize]);
+            let shared: Vec<u32> = mine.into_iter().filter(|s| theirs.contains(s)).collect();
+            assert!(shared.len() >= 3, "a side is dual to a triangle");
+            let (edge, vertex) = (ball(&shared), ball(&mine));
+            assert!(p.distance(q) / 2.0 <= edge * grown && edge <= vertex * grown);
+            assert!(vertex <= mesh.spheres[a as usize].radius * grown);
+        }
+    }
+}
+
+#[test]
+fn lambda_cells_are_nested_and_leftovers_come_on_top() {
+    let shape = shape_of(&built_in("capsule"));
+    let asked = [0.01, 0.03, 0.06, 0.1, 0.14].map(Level::Native);
+    let [with, without] = LAMBDA.map(|set| levels(&shape, "lambda", set, &asked));
+    let meshes = |all: Vec<Result<Simplified, SimplifyError>>| -> Vec<MedialMesh> {
+        all.into_iter().map(|level| level.expect("in range").mesh).collect()
+    };
+    let (with, without) = (meshes(with), meshes(without));
+    for (full, sheets) in with.iter().zip(&without) {
+        assert!(sheets.spheres.iter().all(|s| full.spheres.contains(s)));
+        assert_eq!(full.faces.len(), sheets.faces.len());
+    }
+    for pair in with.windows(2) {
+        assert!(pair[1].spheres.iter().all(|s| pair[0].spheres.contains(s)));
+    }
+    let shape = shape_of(&built_in("blob"));
+    for count in [700, 100, 7] {
+        // Neighbours whose enclosing balls rest on the same samples have the same value.
+        let reached = at(&shape, "lambda", LAMBDA[0], Level::Spheres(count)).spheres.len();
+        assert!(reached <= count && reached * 10 >= count * 8, "{reached} for {count}");
+    }
+}
+
+#[test]
+fn sheets_go_without_a_change_of_topology() {
+    for id in ["sphere", "box", "plate", "capsule", "torus", "hollow-sphere", "bracket", "pair"] {
+        let shape = shape_of(&built_in(id));
+        let initial = shape.voronoi().expect("a mesh");
+        let expected = betti(&initial);
+        let asked = [0.0, 30.0, 60.0, 91.0, 120.0, 150.0, 180.0].map(Level::Native);
+        let mut last = initial.spheres.len();
+        for (level, theta) in levels(&shape, "angle", ANGLE[3], &asked).into_iter().zip(asked) {
+            let mesh = level.expect("in range").mesh;
+            mesh.check().expect("valid");
+            assert_eq!(betti(&mesh), expected, "{id} {theta}");
+            assert!(mesh.spheres.len() <= last, "{id} {theta}");
+            last = mesh.spheres.len();
+        }
+        for count in [last * 3, last + 1] {
+            let mesh = at(&shape, "angle", ANGLE[3], Level::Spheres(count));
+            assert!(
+                mesh.spheres.len() <= count && mesh.spheres.len() * 2 > count.min(last),
+                "{id}"
+            );
+            assert_eq!(betti(&mesh), expected, "{id} {count}");
+        }
+    }
+}
+
+#[test]
+fn counts_are_met_from_below_or_it_is_said() {
+    let shape = shape_of(&built_in("bracket"));
+    let all = ANGLE.iter().map(|set| ("angle", *set)).chain(LAMBDA.map(|set| ("lambda", set)));
+    for (method, set) in all {
+        let asked = [600, 100, 20].map(Level::Spheres);
+        for (found, count) in levels(&shape, method, set, &asked).into_iter().zip([600, 100, 20]) {
+            let found = found.expect("a count");
+            let reached = found.mesh.spheres.len();
+            assert!(reached > 0 && (reached == count || !found.diagnostics.warnings.is_empty()));
+            // Sheets end where edges without a facet hold them: these never go.
+            let is_held = set == ANGLE[3] && reached > count;
+            assert!(reached <= count || is_held, "{method} {set:?}: {reached} for {count}");
+        }
+        let refused = levels(&shape, method, set, &[Level::Published, Level::Spheres(0)]);
+        assert!(refused.iter().all(Result::is_err), "{method} {set:?}");
+    }
+}
+
+#[test]
+fn scale_by_a_power_of_two_and_threads_change_nothing() {
+    let mesh = built_in("bracket");
+    let all = ANGLE.iter().map(|set| ("angle", *set, 70.0));
+    for (method, set, level) in all.chain(LAMBDA.map(|set| ("lambda", set, 0.04))) {
+        let level = Level::Native(level);
+        let plain = at(&shape_of(&mesh), method, set, level);
+        assert!(!plain.spheres.is_empty());
+        let vertices = mesh.vertices.iter().map(|&v| v * 512.0).collect();
+        let scaled = TriMesh { vertices, faces: mesh.faces.clone() };
+        assert_eq!(plain, at(&shape_of(&scaled), method, set, level), "{method} {set:?}");
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let again = pool.expect("a pool").install(|| at(&shape_of(&mesh), method, set, level));
+            assert_eq!(plain, again, "{method} {set:?}");
+        }
+    }
+}
+
+#[test]
+fn variants_of_voronoi_facets_refuse_a_given_mesh() {
+    let mesh = built_in("box");
+    let given = shape_of(&mesh).voronoi().expect("a mesh");
+    let shape = shape_of(&mesh);
+    let shape = {
+        let back = *shape.normalisation();
+        shape_of(&mesh).with_initial(&given.transformed(back.diagonal, |p| back.backward(p)))
+    };
+    for (method, set) in [("angle", ANGLE[0]), ("angle", ANGLE[3]), ("lambda", LAMBDA[0])] {
+        let method = medial_methods::find(method).expect("registered");
+        let refused = method.prepare(&shape, &params(set), &RunContext::default()).err();
+        assert!(matches!(refused, Some(SimplifyError::Unsupported { .. })), "{set:?}");
+    }
+}
+
+#[test]
+fn wrong_parameters_are_refused_by_name() {
+    let shape = shape_of(&built_in("box"));
+    for (method, key, value) in [
+        ("angle", "variant", "cell"),
+        ("angle", "resolution", "1"),
+        ("angle", "resolution", "100000"),
+        ("angle", "at", "middle"),
+        ("lambda", "variant", "facet"),
+        ("lambda", "leftovers", "maybe"),
+    ] {
+        let found = medial_methods::find(method).expect("registered");
+        let refused = found.prepare(&shape, &params(&[(key, value)]), &RunContext::default()).err();
+        let named = matches!(&refused, Some(SimplifyError::Parameter(why)) if why.contains(key));
+        assert!(named, "{method} {key} = {value}");
+    }
+}
