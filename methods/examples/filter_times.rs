@@ -4,11 +4,13 @@
 
 #![allow(clippy::print_stdout)] // It is what the example is for.
 
+use std::error::Error;
+
 use medial::shape::{Cost, Shape, ShapeOptions, Substrate};
 use medial::simplifier::{Level, Params, RunContext};
 use medial::surface;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let path = arguments.first().ok_or("name a mesh")?;
     let sampling = arguments.get(1).map_or("vertices", String::as_str).parse()?;
@@ -25,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{} samples; best of {repeat}, processor seconds", samples.len());
     // Samples as vertices of nothing: the same points for every repetition, sampled once.
     let mut best = [f64::INFINITY; 5];
-    pool.install(|| -> Result<(), Box<dyn std::error::Error>> {
+    pool.install(|| -> Result<(), Box<dyn Error + Send + Sync>> {
         let shape = Shape::new(
             "shape",
             &mesh,

@@ -77,7 +77,7 @@ impl Cuboid {
         reach
     }
 
-    fn from_rectangle(&self, x: Vec3) -> f64 {
+    fn off_rectangle(&self, x: Vec3) -> f64 {
         let (reach, x) = (self.rectangle(), x - self.middle);
         x.distance(x.clamp(-reach, reach))
     }
@@ -119,7 +119,7 @@ fn facets_above_a_right_angle_are_the_central_rectangle_of_a_box() {
         assert!(!mesh.faces.is_empty());
         assert!(mesh.faces.iter().flatten().count() >= mesh.spheres.len(), "facets and closure");
         for sphere in &mesh.spheres {
-            let off = cuboid.from_rectangle(sphere.centre);
+            let off = cuboid.off_rectangle(sphere.centre);
             // Contacts are samples: an angle scatters by about h / r.
             let resolved = 2.0 * h / 20.0_f64.to_radians();
             assert!(off < 2.0 * h || sphere.radius < resolved, "{set:?}: {sphere:?} {off}");
@@ -128,7 +128,7 @@ fn facets_above_a_right_angle_are_the_central_rectangle_of_a_box() {
         // Below a right angle the sheets of the edges are there: some sphere is far off.
         let mesh = at(&shape, "angle", set, Level::Native(60.0));
         let off = mesh.spheres.iter().filter(|s| s.radius > 3.0 * h);
-        let off = off.map(|s| cuboid.from_rectangle(s.centre)).fold(0.0, f64::max);
+        let off = off.map(|s| cuboid.off_rectangle(s.centre)).fold(0.0, f64::max);
         assert!(off > 2.0 * h, "{set:?}: {off}");
     }
 }
@@ -153,7 +153,7 @@ fn a_grid_separates_right_angles_and_straight_ones_exactly() {
         let set = [("variant", "grid"), ("resolution", resolution)];
         for theta in [90.001, 179.9] {
             let mesh = at(&shape, "angle", &set, Level::Native(theta));
-            let off = mesh.spheres.iter().map(|s| cuboid.from_rectangle(s.centre));
+            let off = mesh.spheres.iter().map(|s| cuboid.off_rectangle(s.centre));
             assert!(off.fold(0.0, f64::max) < 1.5 * side, "{resolution} {theta}");
             assert!(cuboid.uncovered(&mesh) < 2.0 * side, "{resolution} {theta}");
         }
@@ -163,7 +163,7 @@ fn a_grid_separates_right_angles_and_straight_ones_exactly() {
             let room = (cuboid.half - (sphere.centre - cuboid.middle).abs()).min_element();
             assert!((sphere.radius - room).abs() < 1e-12, "{sphere:?} has room for {room}");
         }
-        let off = mesh.spheres.iter().map(|s| cuboid.from_rectangle(s.centre));
+        let off = mesh.spheres.iter().map(|s| cuboid.off_rectangle(s.centre));
         assert!(off.fold(0.0, f64::max) > cuboid.half[cuboid.thinnest], "{resolution}");
     }
 }
