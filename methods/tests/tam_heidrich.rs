@@ -106,8 +106,8 @@ fn sheet(half: Vec3, centre: Vec3) -> (usize, f64) {
 
 #[test]
 fn parts_of_a_sampled_box_cover_its_sheets() {
-    // Not one part to one sheet: as soon as one edge of a seam has lost its third triangle, the two
-    // sheets that are left there are one part.
+    // Not one part to one sheet: where an edge of a seam has two triangles, the sheets there are one
+    // part.
     let (half, shape) = (Vec3::new(1.5, 1.0, 0.5), built_in("box"));
     let back = shape.normalisation();
     // Rectangle; triangle and trapezoids down to the edges along x, y and z.
