@@ -77,13 +77,51 @@ impl Quadric {
 
     /// The minimiser `-A⁻¹ b / 2`, or `None` when the smallest eigenvalue of `A` is at most
     /// `singular_ratio` times the largest. The radius may be negative.
+    #[inline]
+    pub(super) fn minimiser(&self, singular_ratio: f64) -> Option<Sphere> {
+        self.plainly_regular(singular_ratio).or_else(|| self.pivoted(singular_ratio))
+    }
+
+    /// The minimiser by `L D Lᵀ` without exchanges, which is stable for a definite matrix, or `None`
+    /// when it could be singular.
+    ///
+    /// With the trace `t` no eigenvalue exceeds `t`, and three of them multiply to `(t/3)³` at most.
+    /// So the smallest is no less than the determinant over that.
+    #[inline]
+    fn plainly_regular(&self, singular_ratio: f64) -> Option<Sphere> {
+        let [a00, a01, a02, a03, a11, a12, a13, a22, a23, a33] = self.a;
+        let third = (a00 + a11 + a22 + a33) / 3.0;
+        let (l10, l20, l30) = (a01 / a00, a02 / a00, a03 / a00);
+        let (b11, b21, b31) = (a11 - l10 * a01, a12 - l10 * a02, a13 - l10 * a03);
+        let (b22, b32, b33) = (a22 - l20 * a02, a23 - l20 * a03, a33 - l30 * a03);
+        let (l21, l31) = (b21 / b11, b31 / b11);
+        let (c22, c32, c33) = (b22 - l21 * b21, b32 - l21 * b31, b33 - l31 * b31);
+        let l32 = c32 / c22;
+        let d33 = c33 - l32 * c32;
+        let definite = a00 > 0.0 && b11 > 0.0 && c22 > 0.0 && d33 > 0.0;
+        let determinant = a00 * b11 * c22 * d33;
+        // Twice as much as needed, for the rounding of the pivots.
+        if !(definite && determinant > 6.0 * singular_ratio * third * third * third * third) {
+            return None;
+        }
+        let x0 = -0.5 * self.b[0];
+        let x1 = -0.5 * self.b[1] - l10 * x0;
+        let x2 = -0.5 * self.b[2] - l20 * x0 - l21 * x1;
+        let x3 = -0.5 * self.b[3] - l30 * x0 - l31 * x1 - l32 * x2;
+        let radius = x3 / d33;
+        let z = x2 / c22 - l32 * radius;
+        let y = x1 / b11 - l21 * z - l31 * radius;
+        let x = x0 / a00 - l10 * y - l20 * z - l30 * radius;
+        Some(Sphere::new(Vec3::new(x, y, z), radius))
+    }
+
+    /// The minimiser where the matrix is close to singular.
     ///
     /// `L D Lᵀ` with diagonal pivoting settles the question without eigenvalues in all but a
     /// narrow band: with the pivots `d₁ ≥ .. ≥ d₄` and `|L| ≤ 1`, `λ_min` lies in `[d₄/31, d₄]`
     /// (the entries of `L⁻¹` are at most 1, 1, 2, 4 by distance from the diagonal) and `λ_max` in
     /// `[d₁, 4 d₁]`.
-    #[inline]
-    pub(super) fn minimiser(&self, singular_ratio: f64) -> Option<Sphere> {
+    fn pivoted(&self, singular_ratio: f64) -> Option<Sphere> {
         let mut m = self.matrix();
         let mut x = self.b.map(|b| -0.5 * b);
         let mut order = [0, 1, 2, 3];

@@ -123,6 +123,8 @@ struct AxisParts {
     /// Edges without a face.
     segments: Vec<[DVec4; 2]>,
     spheres: Vec<DVec4>,
+    /// Spheres without an edge.
+    isolated: Vec<DVec4>,
 }
 
 impl AxisParts {
@@ -140,11 +142,20 @@ impl AxisParts {
                 }
             }
         }
+        let mut with_edge = vec![false; mesh.spheres.len()];
+        for &v in mesh.edges.as_flattened() {
+            with_edge[v as usize] = true;
+        }
         let lone = mesh.edges.iter().zip(with_face).filter(|&(_, with)| !with);
         Ok(Self {
             triangles: mesh.faces.iter().map(|f| f.map(point)).collect(),
             segments: lone.map(|(e, _)| e.map(point)).collect(),
             spheres: mesh.spheres.iter().map(lifted).collect(),
+            isolated: (0..)
+                .zip(&with_edge)
+                .filter(|&(_, &with)| !with)
+                .map(|(v, _)| point(v))
+                .collect(),
         })
     }
 
@@ -152,7 +163,7 @@ impl AxisParts {
     fn simplices(&self) -> Vec<[DVec4; 3]> {
         let mut parts = self.triangles.clone();
         parts.extend(self.segments.iter().map(|&[a, b]| [a, b, b]));
-        parts.extend(self.spheres.iter().map(|&c| [c; 3]));
+        parts.extend(self.isolated.iter().map(|&c| [c; 3]));
         parts
     }
 }

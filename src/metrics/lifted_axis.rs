@@ -68,13 +68,14 @@ impl Search for Nearest<'_> {
 
     fn visit(&mut self, places: Range<usize>) {
         for simplex in &self.axis.simplices[places] {
-            self.distance = self.distance.min(distance(self.p, simplex));
+            self.distance = self.distance.min(squared_distance(self.p, simplex).sqrt());
         }
     }
 }
 
-/// Distance of a point to a triangle, in any position.
-fn distance(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> f64 {
+/// Squared distance of a point to a triangle, in any position.
+#[inline]
+fn squared_distance(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> f64 {
     let (u, v, w) = (b - a, c - a, p - a);
     let [uu, uv, vv] = [u.dot(u), u.dot(v), v.dot(v)];
     let [wu, wv] = [w.dot(u), w.dot(v)];
@@ -82,20 +83,20 @@ fn distance(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> f64 {
     if determinant > THIN * uu * vv {
         let (s, t) = ((wu * vv - wv * uv) / determinant, (wv * uu - wu * uv) / determinant);
         if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
-            return (w - s * u - t * v).length();
+            return (w - s * u - t * v).length_squared();
         }
     }
-    [(a, b), (b, c), (c, a)]
-        .map(|(from, to)| to_segment(p, from, to))
-        .into_iter()
-        .fold(f64::INFINITY, f64::min)
+    let sides = to_segment(p, a, b).min(to_segment(p, c, a));
+    sides.min(to_segment(p, b, c))
 }
 
+/// Squared distance of a point to a segment.
+#[inline]
 fn to_segment(p: DVec4, from: DVec4, to: DVec4) -> f64 {
     let (along, w) = (to - from, p - from);
     let squared = along.length_squared();
     let share = if squared > 0.0 { (w.dot(along) / squared).clamp(0.0, 1.0) } else { 0.0 };
-    (w - share * along).length()
+    (w - share * along).length_squared()
 }
 
 #[cfg(test)]
