@@ -77,19 +77,22 @@ impl Judge {
     /// When the mesh has no sphere or is not valid.
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
         let union = MedialUnion::new(mesh)?;
-        let distances = self.distances(mesh)?;
-        let axis = match &self.truth.axis {
-            Some(truth) => Some(self.axis_distances(mesh, truth)?),
-            None => None,
-        };
+        let axis = || self.truth.axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
+        let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
+        // Side by side, because parts of each run on one thread.
+        let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
+            || rayon::join(|| self.distances(mesh), || self.volume_error(&union)),
+            || rayon::join(axis, complex),
+        );
+        let (distances, axis) = (distances?, axis.transpose()?);
         Ok(Evaluation {
             warnings: self.misfits(mesh, &union, &distances),
             distances,
             certified: None,
-            volume_error: self.volume_error(&union)?,
-            quality: triangle_quality(mesh),
-            spikes: spikes(mesh),
-            betti: betti(mesh),
+            volume_error: volume_error?,
+            quality,
+            spikes,
+            betti,
             euler: euler(mesh),
             expected_betti: self.truth.betti,
             counts: counts(mesh),
