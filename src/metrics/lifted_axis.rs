@@ -111,8 +111,7 @@ mod tests {
     fn distances_match_dense_points() {
         let mut rng = Pcg64::seed_from_u64(4);
         let mut random = || DVec4::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
-        let mut simplices: Vec<[DVec4; 3]> =
-            (0..40).map(|_| [(); 3].map(|()| random())).map(|[a, b, c]| [a, b, c]).collect();
+        let mut simplices: Vec<[DVec4; 3]> = (0..40).map(|_| [(); 3].map(|()| random())).collect();
         for k in 0..10 {
             simplices[k][2] = simplices[k][1];
             simplices[k / 2] = [simplices[k / 2][0]; 3];

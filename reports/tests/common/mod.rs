@@ -92,6 +92,7 @@ pub fn ok(mesh: &str, method: &str, count: usize, shape: usize, rank: usize) -> 
             samples: 50_000,
             reverse_samples: 48_000,
         },
+        certified: None,
         volume_error: Some(error),
         quality: TriangleQuality {
             min_angle_mean: Some(38.0 - 2.0 * rank as f64 * wobble - 10.0 * steep),
