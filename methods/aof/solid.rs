@@ -1,19 +1,20 @@
 //! One solid at any resolution: its start set, its flux, its axis at an angle or at a count.
 
-use std::sync::Arc;
-
 use medial::Vec3;
-use medial::complex::{MedialMesh, cubical_betti};
+use medial::complex::{MedialMesh, Sphere as Ball, cubical_betti};
 use medial::geometry::TriangleBvh;
 use medial::shape::Shape;
-use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, LatticeVoxel, LatticeVoxels, RunContext, SimplifyError};
+
+use rayon::prelude::*;
 
 use super::bricks::{Bricks, Place, Voxel};
 use super::coarse_to_fine::{Descent, Surface, Wanted, coarse_to_fine};
 use super::flux::Sphere;
 use super::grid::Grid;
-use super::output::{balls, medial_mesh, sorted};
+use super::output::{medial_mesh, sorted};
 use super::params::{AofParams, Variant};
+use super::refine::refine;
 use super::thinning::{Order, thin};
 
 /// Bytes for each voxel of the start set: values in bricks that are not full, twice while one is
@@ -251,6 +252,28 @@ impl<'s> Solid<'s> {
         Ok(self.axis_of(grid, kept))
     }
 
+    /// The medial mesh of an axis, with centres on the axis or in the voxels.
+    ///
+    /// # Errors
+    /// When the run was cancelled.
+    pub fn medial_mesh(
+        &self,
+        axis: &Axis,
+        tree: &TriangleBvh,
+    ) -> Result<MedialMesh, SimplifyError> {
+        let centres = axis.points();
+        let balls = if self.params.refine {
+            refine(&self.surface.triangles, tree, &axis.sphere, &centres, &self.run)?
+                .into_iter()
+                .map(|refined| refined.ball)
+                .collect()
+        } else {
+            let ball = |&centre: &Vec3| Ball::new(centre, tree.closest(centre).distance);
+            centres.par_iter().map(ball).collect()
+        };
+        medial_mesh(&axis.voxels, balls, &self.run)
+    }
+
     fn axis_of(&self, grid: Grid, voxels: Vec<Voxel>) -> Axis {
         let counts = self.params.sample_counts().expect("validated");
         let count = counts[counts.len() - 1];
@@ -294,10 +317,19 @@ impl Axis {
         self.voxels.iter().map(|voxel| voxel.place)
     }
 
-    /// The medial mesh, with centres on the axis or in the voxels.
-    pub fn medial_mesh(&self, tree: &Arc<TriangleBvh>, params: &AofParams) -> MedialMesh {
-        let onto_axis = params.refine.then_some(&self.sphere);
-        medial_mesh(&self.voxels, balls(&self.voxels, &self.grid, tree, onto_axis))
+    /// The voxels as data, normalised.
+    pub fn lattice_voxels(&self) -> LatticeVoxels {
+        let voxel = |voxel: &Voxel| LatticeVoxel {
+            place: voxel.place.map(u32::from),
+            distance: f64::from(voxel.distance),
+            flux: f64::from(voxel.flux),
+        };
+        LatticeVoxels {
+            origin: self.grid.origin,
+            side: self.grid.side,
+            size: self.grid.size,
+            voxels: self.voxels.iter().map(voxel).collect(),
+        }
     }
 
     pub(super) fn diagnose(&self, angle: f64, diagnostics: &mut Diagnostics) {

@@ -233,8 +233,9 @@ fn refined_spheres_are_internal_and_touch_twice() {
     let (axis, _) = axis_at(&shape, &params(Variant::Thinning), 48, 30.0);
     let sphere = Sphere::new(Spiral::EqualArea, 50, axis.grid.side);
     let mut two = 0;
-    for centre in axis.points() {
-        let refined = refine(&tree, &sphere, centre);
+    let (triangles, centres) = (NearbyTriangles::new(shape.mesh()), axis.points());
+    let all = refine(&triangles, &tree, &sphere, &centres, &RunContext::default()).expect("runs");
+    for (refined, centre) in all.iter().zip(centres) {
         let (c, r) = (refined.ball.centre, refined.ball.radius);
         assert_eq!(inside.side(c), surface::Side::Inside);
         assert!((tree.closest(c).distance - r).abs() < 1e-15);
