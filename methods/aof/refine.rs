@@ -61,7 +61,7 @@ pub fn refine(
     run: &RunContext,
 ) -> Result<Vec<Refined>, SimplifyError> {
     let refiner = Refiner { triangles, tree, sphere };
-    let mut voxels: Vec<(u32, Vec3)> = (0..).zip(centres.iter().copied()).collect();
+    let mut voxels: Vec<Centre> = (0..).zip(centres.iter().copied()).collect();
     let mut groups = Vec::new();
     let whole = triangles.all(centres.first().copied().unwrap_or_default());
     refiner.divide(&mut voxels, &whole, &mut groups);
@@ -81,6 +81,9 @@ pub fn refine(
     Ok(refined.into_iter().map(|(_, refined)| refined).collect())
 }
 
+/// A voxel's place in the list, and its centre.
+type Centre = (u32, Vec3);
+
 struct Refiner<'a> {
     triangles: &'a NearbyTriangles,
     tree: &'a TriangleBvh,
@@ -91,24 +94,24 @@ impl Refiner<'_> {
     /// Groups of voxels for the tasks, with the triangles near each.
     fn divide<'v>(
         &self,
-        voxels: &'v mut [(u32, Vec3)],
+        voxels: &'v mut [Centre],
         around: &NearSet,
-        groups: &mut Vec<(&'v mut [(u32, Vec3)], NearSet)>,
+        groups: &mut Vec<(&'v mut [Centre], NearSet)>,
     ) {
         let set = self.near(voxels, around);
         if voxels.len() <= TASK {
             groups.push((voxels, set));
             return;
         }
-        let (low, high) = halves(voxels);
+        let [low, high] = halves(voxels);
         self.divide(low, &set, groups);
         self.divide(high, &set, groups);
     }
 
     /// Halves a group until few voxels share a set.
-    fn group(&self, voxels: &mut [(u32, Vec3)], set: &NearSet, refined: &mut Vec<(u32, Refined)>) {
+    fn group(&self, voxels: &mut [Centre], set: &NearSet, refined: &mut Vec<(u32, Refined)>) {
         if voxels.len() > TOGETHER {
-            let (low, high) = halves(voxels);
+            let [low, high] = halves(voxels);
             for half in [low, high] {
                 let set = self.near(half, set);
                 self.group(half, &set, refined);
@@ -123,7 +126,7 @@ impl Refiner<'_> {
     }
 
     /// The triangles near the spheres of voxels.
-    fn near(&self, voxels: &[(u32, Vec3)], around: &NearSet) -> NearSet {
+    fn near(&self, voxels: &[Centre], around: &NearSet) -> NearSet {
         let [lo, hi] = corners(voxels);
         let mut set = NearSet::default();
         let reach = 0.5 * (hi - lo).length() * (1.0 + 1e-12) + self.sphere.radius;
@@ -171,20 +174,20 @@ impl Refiner<'_> {
     }
 }
 
-fn corners(voxels: &[(u32, Vec3)]) -> [Vec3; 2] {
+fn corners(voxels: &[Centre]) -> [Vec3; 2] {
     voxels.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[lo, hi], (_, centre)| {
         [lo.min(*centre), hi.max(*centre)]
     })
 }
 
 /// Two halves along the longest side.
-fn halves(voxels: &mut [(u32, Vec3)]) -> (&mut [(u32, Vec3)], &mut [(u32, Vec3)]) {
+fn halves(voxels: &mut [Centre]) -> [&mut [Centre]; 2] {
     let [lo, hi] = corners(voxels);
     let axis = (hi - lo).max_position();
     let middle = voxels.len() / 2;
     voxels
         .select_nth_unstable_by(middle, |a, b| a.1[axis].total_cmp(&b.1[axis]).then(a.0.cmp(&b.0)));
-    voxels.split_at_mut(middle)
+    voxels.split_at_mut(middle).into()
 }
 
 /// The ray from a closest point through its sample; points are relative to the centre of the set.

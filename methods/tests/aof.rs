@@ -215,6 +215,7 @@ fn homotopic_variants_keep_the_topology_of_the_start_set() {
     }
 }
 
+#[allow(clippy::print_stderr)]
 /// Shared meshes: three holes, and four. The start set has them too, or a warning says where not.
 #[test]
 fn homotopy_on_shared_meshes_keeps_their_loops() {
