@@ -11,8 +11,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::Vec3;
 use crate::complex::collapse::Hierarchy;
-use crate::complex::{ComplexError, MedialMesh};
+use crate::complex::{ComplexError, MedialMesh, cubical_betti};
 use crate::shape::{Cost, Shape, ShapeError};
 
 /// A method that simplifies the medial axis of a shape.
@@ -36,6 +37,11 @@ pub trait MedialSimplifier: Send + Sync {
     /// Whether the answers carry a hierarchy in [`Extras`] that [`MedialSimplifier::resume`] can go
     /// on from.
     fn has_hierarchy(&self) -> bool {
+        false
+    }
+
+    /// Whether the answers carry voxels in [`Extras`].
+    fn has_voxels(&self) -> bool {
         false
     }
 
@@ -254,6 +260,45 @@ pub struct Extras {
     pub hierarchy: Option<Arc<Hierarchy>>,
     /// The parts that the medial mesh was decomposed into, by id.
     pub parts: Option<Vec<PartInfo>>,
+    /// The voxels of a cubic lattice that the spheres stand for, one for each sphere in the same
+    /// order.
+    pub voxels: Option<Arc<LatticeVoxels>>,
+}
+
+/// Voxels of a cubic lattice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LatticeVoxels {
+    /// Lower corner of the lattice, in normalised units.
+    pub origin: Vec3,
+    /// Side of a voxel, in normalised units.
+    pub side: f64,
+    /// Voxels of the lattice along each axis.
+    pub size: [u32; 3],
+    /// The voxels, by `z`, then `y`, then `x`.
+    pub voxels: Vec<LatticeVoxel>,
+}
+
+/// A voxel with what was measured there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LatticeVoxel {
+    /// Indices along the axes, from the lower corner.
+    pub place: [u32; 3],
+    /// Distance of its centre to the surface, in normalised units, to single precision.
+    pub distance: f64,
+    /// Average outward flux of the gradient of the distance, `AOF'`; 0 where it was not measured.
+    pub flux: f64,
+}
+
+impl LatticeVoxels {
+    /// Centre of a voxel, in normalised units.
+    pub fn centre(&self, voxel: &LatticeVoxel) -> Vec3 {
+        self.origin + (Vec3::from(voxel.place.map(f64::from)) + 0.5) * self.side
+    }
+
+    /// Betti numbers of the union of the closed voxels.
+    pub fn betti(&self) -> [u64; 3] {
+        cubical_betti(&self.voxels.iter().map(|voxel| voxel.place).collect::<Vec<_>>())
+    }
 }
 
 /// A part of a medial mesh, for methods that decompose it.

@@ -30,6 +30,7 @@ pub mod reconstruct;
 pub mod report;
 pub mod simplify;
 pub mod triangulate;
+pub mod voxels;
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

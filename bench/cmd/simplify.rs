@@ -17,7 +17,7 @@ use super::hierarchy::{self, Loaded, Origin};
 use super::methods::unknown_method;
 use super::{
     Exit, Failure, check_folder, check_output, counted, judge_options, medial_mesh_for, params,
-    percent, print_json, print_line, shape_options,
+    percent, print_json, print_line, shape_options, voxels,
 };
 use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes, search_error};
@@ -66,6 +66,9 @@ pub struct Arguments {
     /// computing it.
     #[arg(long, value_name = "FILE")]
     hierarchy: Option<PathBuf>,
+    /// Write the voxels with their distance and flux (.ply, .npy, .csv), for methods on a lattice.
+    #[arg(long, value_name = "FILE")]
+    voxels: Option<PathBuf>,
     #[command(flatten)]
     substrate: SubstrateArguments,
     #[command(flatten)]
@@ -84,6 +87,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_output(arguments.output.as_deref())?;
     check_bound(arguments)?;
     check_hierarchy(arguments, method.as_ref())?;
+    check_voxels(arguments, method.as_ref())?;
     let input = Input::load(&source)?;
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
@@ -115,6 +119,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     if let (Some(path), Some(all)) = (&arguments.save_hierarchy, &simplified.extras.hierarchy) {
         hierarchy::save(path, all, &origin)?;
     }
+    let voxels = simplified.extras.voxels.as_deref();
+    if let (Some(path), Some(voxels)) = (&arguments.voxels, voxels) {
+        voxels::write(path, voxels, &shape)?;
+    }
     if global.json {
         let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
         if let Some(search) = &search {
@@ -122,6 +130,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         }
         if let Some(parts) = &simplified.extras.parts {
             object["parts"] = in_input_units(parts, &shape).map_err(Failure::input)?;
+        }
+        if let Some(voxels) = voxels {
+            object["voxels"] = voxels::describe(voxels, &shape);
         }
         print_json(&object, &warnings);
     } else {
@@ -217,6 +228,15 @@ fn check_hierarchy(arguments: &Arguments, method: &dyn MedialSimplifier) -> Resu
         return Err(Failure::usage(format!("{option}: {id} has no hierarchy of levels")));
     }
     arguments.save_hierarchy.as_deref().map_or(Ok(()), check_folder)
+}
+
+fn check_voxels(arguments: &Arguments, method: &dyn MedialSimplifier) -> Result<(), Failure> {
+    let Some(path) = &arguments.voxels else { return Ok(()) };
+    if !method.has_voxels() {
+        let id = method.info().id;
+        return Err(Failure::usage(format!("--voxels: {id} has no voxels")));
+    }
+    voxels::check(path)
 }
 
 fn simplify(
@@ -333,5 +353,8 @@ fn print_result(simplify: &Simplify, search: Option<&Search>, arguments: &Argume
     }
     if let Some(path) = &arguments.save_hierarchy {
         print_line(&format!("  written: {} with all levels", path.display()));
+    }
+    if let Some(path) = &arguments.voxels {
+        print_line(&format!("  written: {}, a point for each voxel", path.display()));
     }
 }

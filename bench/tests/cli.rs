@@ -363,6 +363,50 @@ fn hierarchies_are_saved_and_taken_from_a_file() {
 }
 
 #[test]
+fn voxels_are_written_in_three_formats() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let aof = |more: &[&str]| {
+        json(&[&["simplify", "builtin:plate", "-m", "aof", "--spheres", "200"], more].concat())
+    };
+    let (ply, npy, csv) = (at("v.ply"), at("v.npy"), at("v.csv"));
+    for file in [&ply, &npy, &csv] {
+        let (code, object) = aof(&["--voxels", file]);
+        assert_eq!(code, 0, "{object}");
+        let voxels = &object["voxels"];
+        assert_eq!(voxels["count"], 200);
+        assert_eq!(voxels["betti"], serde_json::json!([1, 0, 0]));
+    }
+    let read = |path: &str| fs::read(path).expect("written");
+    let text = String::from_utf8(read(&csv)).expect("UTF-8");
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("x,y,z,distance,flux,i,j,k"));
+    let rows: Vec<Vec<f64>> = lines
+        .map(|line| line.split(',').map(|word| word.parse().expect("a number")).collect())
+        .collect();
+    assert_eq!(rows.len(), 200);
+    let numbers = |bytes: &[u8]| -> Vec<f64> {
+        let number = |b: &[u8]| f64::from_le_bytes(b.try_into().expect("eight bytes"));
+        bytes.chunks_exact(8).map(number).collect()
+    };
+    // The same numbers in all of them.
+    let (npy, flat) = (read(&npy), rows.concat());
+    assert_eq!(numbers(&npy[npy.len() - 8 * flat.len()..]), flat);
+    assert_eq!((npy.len() - 8 * flat.len()) % 64, 0);
+    let ply = read(&ply);
+    let body = &ply[ply.len() - 200 * 52..];
+    assert!(ply[..ply.len() - body.len()].ends_with(b"end_header\n"));
+    for (row, expected) in body.chunks_exact(52).zip(&rows) {
+        assert_eq!(numbers(&row[..40]), expected[..5]);
+    }
+    let (code, object) = aof(&["--voxels", &at("v.txt")]);
+    assert!(code == 1 && object["error"].as_str().is_some_and(|e| e.contains(".csv")), "{object}");
+    let (code, _, stderr) =
+        run(&["simplify", "builtin:box", "-m", "qmat", "--voxels", &at("v.ply")]);
+    assert!(code == 2 && stderr.contains("no voxels"), "{stderr}");
+}
+
+#[test]
 fn max_error_is_met() {
     let dir = tempfile::tempdir().expect("a folder");
     let path = dir.path().join("x.ma");

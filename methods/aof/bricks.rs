@@ -24,28 +24,18 @@ pub struct Voxel {
 /// A set of voxels with values.
 #[derive(Clone, Debug)]
 pub struct Bricks {
-    /// Bricks along each axis.
-    size: [u32; 3],
-    table: Vec<u32>,
-    bricks: Vec<Brick>,
+    there: Bits,
+    values: Vec<Box<Values>>,
     len: usize,
 }
 
-#[derive(Clone, Debug)]
-struct Brick {
-    at: [u32; 3],
-    /// One bit for each voxel: a byte for each row along x, a word for each layer.
-    there: [u64; 8],
-    distance: Vec<f32>,
-    flux: Vec<f32>,
-}
+/// Distance and flux of each voxel of a brick.
+type Values = [[f32; 2]; (SIDE * SIDE * SIDE) as usize];
 
 impl Bricks {
     /// No voxel of a grid of so many along each axis.
     pub fn new(grid: [u32; 3]) -> Self {
-        let size = grid.map(|n| n.div_ceil(SIDE));
-        let table = vec![ABSENT; size.iter().map(|&n| n as usize).product()];
-        Self { size, table, bricks: Vec::new(), len: 0 }
+        Self { there: Bits::new(grid), values: Vec::new(), len: 0 }
     }
 
     /// Whether there is no voxel.
@@ -60,78 +50,52 @@ impl Bricks {
 
     /// Puts in a voxel that is not there yet.
     pub fn insert(&mut self, voxel: Voxel) {
-        let at = voxel.place.map(|x| u32::from(x) / SIDE);
-        let slot = self.slot(at);
-        if self.table[slot] == ABSENT {
-            self.table[slot] = self.bricks.len() as u32;
-            let values = vec![0.0; (SIDE * SIDE * SIDE) as usize];
-            self.bricks.push(Brick { at, there: [0; 8], distance: values.clone(), flux: values });
+        let brick = self.there.brick_or_new(voxel.place);
+        if brick == self.values.len() {
+            self.values.push(Box::new([[0.0; 2]; (SIDE * SIDE * SIDE) as usize]));
         }
-        let brick = &mut self.bricks[self.table[slot] as usize];
         let (layer, bit) = inside(voxel.place);
-        debug_assert!(brick.there[layer] >> bit & 1 == 0, "inserted twice");
-        brick.there[layer] |= 1 << bit;
-        brick.distance[64 * layer + bit] = voxel.distance;
-        brick.flux[64 * layer + bit] = voxel.flux;
+        let word = &mut self.there.words[brick][layer];
+        debug_assert!(*word >> bit & 1 == 0, "inserted twice");
+        *word |= 1 << bit;
+        self.values[brick][64 * layer + bit] = [voxel.distance, voxel.flux];
         self.len += 1;
     }
 
     /// Takes out a voxel that is there.
     pub fn remove(&mut self, place: Place) {
-        let slot = self.slot(place.map(|x| u32::from(x) / SIDE));
-        let (layer, bit) = inside(place);
-        self.bricks[self.table[slot] as usize].there[layer] &= !(1 << bit);
+        *self.there.word(place) &= !(1 << inside(place).1);
         self.len -= 1;
     }
 
     /// The voxel at a place, if there is one.
     pub fn get(&self, place: Place) -> Option<Voxel> {
-        let brick = self.brick(place.map(|x| u32::from(x) / SIDE))?;
+        let brick = self.there.brick(place)?;
         let (layer, bit) = inside(place);
-        (brick.there[layer] >> bit & 1 == 1).then(|| brick.voxel(layer, bit))
+        let [distance, flux] = self.values[brick][64 * layer + bit];
+        let is_there = self.there.words[brick][layer] >> bit & 1 == 1;
+        is_there.then_some(Voxel { place, distance, flux })
     }
 
     /// Which of a voxel's 27 neighbours are there, itself included: bit
     /// `dx + 1 + 3 (dy + 1) + 9 (dz + 1)`.
+    #[inline]
     pub fn neighbourhood(&self, place: Place) -> u32 {
-        let [x, y, z] = place.map(i32::from);
-        let within = |v: i32| (1..SIDE as i32 - 1).contains(&(v % SIDE as i32));
-        if within(x) && within(y) && within(z) {
-            let Some(brick) = self.brick(place.map(|x| u32::from(x) / SIDE)) else {
-                return 0;
-            };
-            let (layer, bit) = inside(place);
-            return (0..3).fold(0, |bits, k| {
-                let rows = brick.there[layer + k - 1] >> (bit - 9);
-                let nine = (rows & 7) | (rows >> 8 & 7) << 3 | (rows >> 16 & 7) << 6;
-                bits | (nine as u32) << (9 * k)
-            });
-        }
-        (0..27).fold(0, |bits, k| {
-            bits | u32::from(self.has([x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1])) << k
-        })
-    }
-
-    fn has(&self, place: [i32; 3]) -> bool {
-        let limit = |axis: usize| (self.size[axis] * SIDE) as i32;
-        if (0..3).any(|axis| place[axis] < 0 || place[axis] >= limit(axis)) {
-            return false;
-        }
-        let place = place.map(|x| x as u16);
-        let (layer, bit) = inside(place);
-        let brick = self.brick(place.map(|x| u32::from(x) / SIDE));
-        brick.is_some_and(|brick| brick.there[layer] >> bit & 1 == 1)
+        self.there.neighbourhood(place)
     }
 
     /// All voxels, brick by brick.
     pub fn iter(&self) -> impl Iterator<Item = Voxel> + '_ {
-        self.bricks.iter().flat_map(|brick| {
+        (0..self.values.len()).flat_map(move |brick| {
             (0..8).flat_map(move |layer| {
-                let mut bits = brick.there[layer];
+                let mut bits = self.there.words[brick][layer];
                 std::iter::from_fn(move || {
                     let bit = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
                     bits &= bits - 1;
-                    Some(brick.voxel(layer, bit))
+                    let at = [bit as u16 % 8, bit as u16 / 8, layer as u16];
+                    let place = [0, 1, 2].map(|k| self.there.at[brick][k] * SIDE as u16 + at[k]);
+                    let [distance, flux] = self.values[brick][64 * layer + bit];
+                    Some(Voxel { place, distance, flux })
                 })
             })
         })
@@ -139,69 +103,142 @@ impl Bricks {
 
     /// Resident bytes, about.
     pub fn bytes(&self) -> usize {
-        let brick = size_of::<Brick>() + 8 * (SIDE * SIDE * SIDE) as usize;
-        4 * self.table.len() + brick * self.bricks.len()
-    }
-
-    fn slot(&self, at: [u32; 3]) -> usize {
-        let [x, y, z] = at.map(|n| n as usize);
-        x + self.size[0] as usize * (y + self.size[1] as usize * z)
-    }
-
-    fn brick(&self, at: [u32; 3]) -> Option<&Brick> {
-        self.bricks.get(self.table[self.slot(at)] as usize)
+        self.there.bytes() + (size_of::<Values>() + size_of::<usize>()) * self.values.len()
     }
 }
 
 /// A mark for each place of a set of bricks.
-pub struct Marks {
-    size: [u32; 3],
-    table: Vec<u32>,
-    marks: Vec<[u64; 8]>,
-}
+pub struct Marks(Bits);
 
 impl Marks {
     /// No mark on any place of these bricks.
     pub fn of(bricks: &Bricks) -> Self {
-        let marks = vec![[0; 8]; bricks.bricks.len()];
-        Self { size: bricks.size, table: bricks.table.clone(), marks }
+        let mut marks = bricks.there.clone();
+        marks.words.fill([0; 8]);
+        Self(marks)
     }
 
     /// Marks a place; whether it had no mark.
     pub fn set(&mut self, place: Place) -> bool {
-        let (word, bit) = self.word(place);
-        let new = *word >> bit & 1 == 0;
-        *word |= 1 << bit;
+        let bit = 1 << inside(place).1;
+        let word = self.0.word(place);
+        let new = *word & bit == 0;
+        *word |= bit;
         new
     }
 
     /// Takes the mark from a place.
     pub fn clear(&mut self, place: Place) {
-        let (word, bit) = self.word(place);
-        *word &= !(1 << bit);
+        *self.0.word(place) &= !(1 << inside(place).1);
     }
 
-    fn word(&mut self, place: Place) -> (&mut u64, usize) {
-        let [x, y, z] = place.map(|v| usize::from(v) / SIDE as usize);
-        let slot = x + self.size[0] as usize * (y + self.size[1] as usize * z);
-        let (layer, bit) = inside(place);
-        (&mut self.marks[self.table[slot] as usize][layer], bit)
+    /// Which of the 27 neighbours have a mark, as for [`Bricks::neighbourhood`].
+    #[inline]
+    pub fn neighbourhood(&self, place: Place) -> u32 {
+        self.0.neighbourhood(place)
     }
 }
 
-impl Brick {
-    fn voxel(&self, layer: usize, bit: usize) -> Voxel {
-        let inner = [bit as u32 % SIDE, bit as u32 / SIDE, layer as u32];
-        let place = [0, 1, 2].map(|axis| (self.at[axis] * SIDE + inner[axis]) as u16);
-        let index = 64 * layer + bit;
-        Voxel { place, distance: self.distance[index], flux: self.flux[index] }
+/// A bit for each place, in bricks that are there where bits are.
+#[derive(Clone, Debug)]
+struct Bits {
+    /// Bricks along each axis.
+    size: [u32; 3],
+    table: Vec<u32>,
+    /// For each brick its place among the bricks.
+    at: Vec<Place>,
+    /// For each brick a byte for each row along x, a word for each layer.
+    words: Vec<[u64; 8]>,
+}
+
+impl Bits {
+    fn new(grid: [u32; 3]) -> Self {
+        let size = grid.map(|n| n.div_ceil(SIDE));
+        let table = vec![ABSENT; size.iter().map(|&n| n as usize).product()];
+        Self { size, table, at: Vec::new(), words: Vec::new() }
+    }
+
+    fn bytes(&self) -> usize {
+        4 * self.table.len() + (size_of::<Place>() + 64) * self.words.len()
+    }
+
+    #[inline]
+    fn slot(&self, [x, y, z]: Place) -> usize {
+        let [width, depth, _] = self.size.map(|n| n as usize);
+        usize::from(x / 8) + width * (usize::from(y / 8) + depth * usize::from(z / 8))
+    }
+
+    #[inline]
+    fn brick(&self, place: Place) -> Option<usize> {
+        let brick = self.table[self.slot(place)];
+        (brick != ABSENT).then_some(brick as usize)
+    }
+
+    fn brick_or_new(&mut self, place: Place) -> usize {
+        let slot = self.slot(place);
+        if self.table[slot] == ABSENT {
+            self.table[slot] = self.words.len() as u32;
+            self.words.push([0; 8]);
+            self.at.push(place.map(|x| x / 8));
+        }
+        self.table[slot] as usize
+    }
+
+    /// The word of a place in a brick that is there.
+    #[inline]
+    fn word(&mut self, place: Place) -> &mut u64 {
+        let brick = self.table[self.slot(place)] as usize;
+        &mut self.words[brick][inside(place).0]
+    }
+
+    #[inline]
+    fn neighbourhood(&self, place: Place) -> u32 {
+        let within = |v: u16| (1..7).contains(&(v % 8));
+        if place.into_iter().all(within) {
+            let Some(brick) = self.brick(place) else {
+                return 0;
+            };
+            let (layer, bit) = inside(place);
+            return (0..3).fold(0, |bits, k| {
+                let rows = self.words[brick][layer + k - 1] >> (bit - 9);
+                let nine = (rows & 7) | (rows >> 8 & 7) << 3 | (rows >> 16 & 7) << 6;
+                bits | (nine as u32) << (9 * k)
+            });
+        }
+        self.across_bricks(place.map(i32::from))
+    }
+
+    fn across_bricks(&self, [x, y, z]: [i32; 3]) -> u32 {
+        (0..9).fold(0, |bits, k| {
+            let (y, z) = (y + k % 3 - 1, z + k / 3 - 1);
+            let row = |x: i32| u32::from(self.row([x, y, z]));
+            // From the bit before the row to the one after it.
+            let mut ten = row(x) << 1;
+            match x % 8 {
+                0 => ten |= row(x - 1) >> 7,
+                7 => ten |= (row(x + 1) & 1) << 9,
+                _ => {}
+            }
+            bits | (ten >> (x % 8) & 7) << (3 * k)
+        })
+    }
+
+    /// The row of a brick that holds a place; empty outside.
+    #[inline]
+    fn row(&self, place: [i32; 3]) -> u8 {
+        if (0..3).any(|axis| place[axis] < 0 || place[axis] >= (self.size[axis] * SIDE) as i32) {
+            return 0;
+        }
+        let place = place.map(|x| x as u16);
+        let brick = self.brick(place);
+        brick.map_or(0, |brick| (self.words[brick][inside(place).0] >> (8 * (place[1] % 8))) as u8)
     }
 }
 
 /// Layer of a place in its brick, and bit in the layer.
-fn inside(place: Place) -> (usize, usize) {
-    let [x, y, z] = place.map(|v| usize::from(v) % SIDE as usize);
-    (z, x + SIDE as usize * y)
+#[inline]
+fn inside([x, y, z]: Place) -> (usize, usize) {
+    (usize::from(z % 8), usize::from(x % 8 + 8 * (y % 8)))
 }
 
 #[cfg(test)]

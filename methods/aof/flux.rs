@@ -12,7 +12,8 @@
 //!
 //!   A two-sided sample adds nothing; a one-sided one adds `a`.
 //!
-//! The sum is divided by the number of all samples.
+//! The sum is divided by the number of all samples. Where the surface that is near is one plane,
+//! the gradient is the same everywhere, and need not be sampled.
 
 use medial::Vec3;
 use medial::geometry::{NearBatch, NearSet, NearbyTriangles};
@@ -29,7 +30,9 @@ pub struct Sphere {
     pub directions: Vec<Vec3>,
     /// `sigma`.
     pub radius: f64,
-    /// Length of the mean of the unit vectors: what a constant field's flux is off by at most.
+    /// Mean of the unit vectors: its product with a constant field is that field's flux.
+    pub mean: Vec3,
+    /// Length of the mean: what a constant field's flux is off by at most.
     pub bias: f64,
 }
 
@@ -47,8 +50,8 @@ impl Sphere {
     /// `count` samples on a sphere of radius `sigma`.
     pub fn new(spiral: Spiral, count: usize, radius: f64) -> Self {
         let directions = spiral.directions(count);
-        let bias = directions.iter().sum::<Vec3>().length() / count as f64;
-        Self { directions, radius, bias }
+        let mean = directions.iter().sum::<Vec3>() / count as f64;
+        Self { directions, radius, mean, bias: mean.length() }
     }
 }
 
@@ -64,25 +67,28 @@ impl<'a> Probe<'a> {
 
     /// `AOF'` through the sphere around the centre of a set, whose reach is at least the radius.
     pub fn flux(&mut self, triangles: &NearbyTriangles, set: &NearSet) -> f64 {
+        if let Some(gradient) = triangles.constant_gradient(set) {
+            return gradient.dot(self.sphere.mean);
+        }
         self.samples.reset();
         self.opposite.clear();
         self.inward.clear();
         triangles.closest(set, &mut self.samples);
-        let mut sum = 0.0;
-        for (k, &normal) in self.sphere.directions.iter().enumerate() {
-            let Some(near) = triangles.answer(set, &self.samples, k) else {
-                continue;
-            };
+        let Self { sphere, samples, opposite, inward } = self;
+        let mut beside_faces = 0.0;
+        let inside_faces = triangles.sum_along(set, samples, |k, near| {
+            let normal = sphere.directions[k];
             let along = near.gradient.dot(normal);
             if !near.on_fan {
-                sum += along;
+                beside_faces += along;
             } else if along < 0.0 {
-                let step = -2.0 * self.sphere.radius * along;
-                let opposite = normal * self.sphere.radius + near.gradient * step;
-                self.opposite.push(opposite, (near.distance + step) * (1.0 - SAME));
-                self.inward.push(along);
+                let step = -2.0 * sphere.radius * along;
+                let point = normal * sphere.radius + near.gradient * step;
+                opposite.push(point, (near.distance + step) * (1.0 - SAME));
+                inward.push(along);
             }
-        }
+        });
+        let mut sum = inside_faces / sphere.radius + beside_faces;
         if !self.opposite.is_empty() {
             triangles.closest(set, &mut self.opposite);
             for (k, along) in self.inward.iter().enumerate() {

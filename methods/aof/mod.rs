@@ -12,7 +12,8 @@
 //! 4. Coarse to fine: voxels with `AOF' >= 0` are dismissed, the others split (Algorithm 1).
 //! 5. At the finest level voxels with `AOF' <= -1/8 sin alpha` are kept (proposition 5.1), or the
 //!    others deleted where they are simple (section 6.3), or the voxels thinned by flux.
-//! 6. A sphere for each voxel, moved onto the axis; edges and triangles between neighbours.
+//! 6. A sphere for each voxel, moved onto the axis; edges and triangles between neighbours, with
+//!    the Betti numbers of the voxels. The voxels themselves are in [`Extras`].
 //!
 //! # Notation
 //!
@@ -53,11 +54,13 @@ mod flux;
 mod grid;
 mod output;
 mod params;
+mod queue;
 mod refine;
 mod simple;
 mod solid;
 mod spiral;
 mod thinning;
+mod voids;
 
 use std::sync::Arc;
 
@@ -124,6 +127,10 @@ impl MedialSimplifier for AverageOutwardFlux {
         &self.info
     }
 
+    fn has_voxels(&self) -> bool {
+        true
+    }
+
     fn prepare<'s>(
         &self,
         shape: &'s Shape,
@@ -169,7 +176,7 @@ impl Simplification for Prepared<'_> {
                 solid.axis(base.resolution, &base.descent, angle)?
             }
         };
-        let mesh = axis.medial_mesh(tree, solid.params());
+        let mesh = solid.medial_mesh(&axis, tree)?;
         mesh.check()?;
         axis.diagnose(angle, &mut diagnostics);
         let native = (!matches!(level, Level::Spheres(_))).then_some(angle);
@@ -179,7 +186,7 @@ impl Simplification for Prepared<'_> {
             native_level: native,
             work: lattices.work(),
             diagnostics,
-            extras: Extras::default(),
+            extras: Extras { voxels: Some(axis.lattice_voxels().into()), ..Extras::default() },
         })
     }
 }

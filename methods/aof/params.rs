@@ -22,6 +22,7 @@ pub struct AofParams {
     pub levels: u32,
     /// `N`: samples on each sphere, from the coarsest level to the finest, separated by `/`; the
     /// last one holds for all levels that follow.
+    #[serde(deserialize_with = "number_or_text")]
     pub samples: String,
     /// `alpha`: object angle in degrees of the thinnest sheets that are kept.
     pub angle: f64,
@@ -220,6 +221,20 @@ impl AofParams {
             ),
         ]
     }
+}
+
+/// One number of samples for all levels may be given as a number.
+fn number_or_text<'de, D: serde::Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "expected 8 to 10000 for each level, such as 70/60/50")]
+    enum Given {
+        Number(u64),
+        Text(String),
+    }
+    Ok(match Given::deserialize(from)? {
+        Given::Number(number) => number.to_string(),
+        Given::Text(text) => text,
+    })
 }
 
 /// An object angle is above 0 and at most a right angle.

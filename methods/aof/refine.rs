@@ -6,15 +6,22 @@
 //!
 //! 1. A sample `p` with `a = grad D . N < 0` and closest point `B` looks into the sphere along the
 //!    ray from `B` through `p`. Up to the axis, `B` stays the closest point of the points of the ray.
-//! 2. If `B` is not the closest point of the opposite `p'` of `p` any more, the axis lies between:
-//!    bisection for the last point `x` with `D(x) = |x - B|`.
+//! 2. If `B` is not the closest point of the opposite `p'` of `p` any more, the axis lies between.
+//!    Bisection for the last point `x` with `D(x) = |x - B|`: of a point nearer to some `B'`, all
+//!    of the ray beyond the plane midway between `B` and `B'` is too, so that the interval is cut
+//!    there, and in the middle only where that is slow.
 //! 3. There the ball of radius `D(x)` is inside the solid, and touches the surface at `B` and
 //!    within the tolerance at a second point `B'`. Of the samples that look nearest past the centre
 //!    the one whose `B`, `B'` subtend the largest angle is taken.
+//!
+//! All of this happens in the sphere of the voxel, and needs the triangles near it alone. These
+//! are collected for all voxels, then for halves of them, and so on.
 
 use medial::Vec3;
 use medial::complex::Sphere as Ball;
-use medial::geometry::TriangleBvh;
+use medial::geometry::{NearBatch, NearSet, NearbyTriangles, TriangleBvh};
+use medial::simplifier::{RunContext, SimplifyError};
+use rayon::prelude::*;
 
 use super::flux::Sphere;
 
@@ -24,6 +31,12 @@ const FOLLOWED: usize = 4;
 const TOLERANCE: f64 = 1e-9;
 /// Relative to the distance, how much nearer the surface must be for it to be another point.
 const SAME: f64 = 1e-12;
+/// One in so many cuts is in the middle.
+const HALVING: u32 = 4;
+/// Voxels that share a set of triangles, at least.
+const TOGETHER: usize = 8;
+/// Voxels that are worth a task of their own.
+const TASK: usize = 512;
 
 /// A ball on the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,73 +48,194 @@ pub struct Refined {
     pub contacts: [Vec3; 2],
 }
 
-/// The ball on the axis near `centre`, or the ball around `centre` itself where no sample and its
+/// The balls on the axis near `centres`, or around a centre itself where no sample and its
 /// opposite have different closest points.
-pub fn refine(tree: &TriangleBvh, sphere: &Sphere, centre: Vec3) -> Refined {
-    let mut rays = Vec::with_capacity(sphere.directions.len());
-    let mut last = None;
-    for &normal in &sphere.directions {
-        let p = centre + normal * sphere.radius;
-        let near = tree.closest_from(p, last);
-        last = Some(near.face);
-        let Some(gradient) = (p - near.point).try_normalize() else {
-            continue;
-        };
-        let along = gradient.dot(normal);
-        if along < 0.0 {
-            rays.push((along, p, gradient, near.point));
+///
+/// # Errors
+/// When the run was cancelled.
+pub fn refine(
+    triangles: &NearbyTriangles,
+    tree: &TriangleBvh,
+    sphere: &Sphere,
+    centres: &[Vec3],
+    run: &RunContext,
+) -> Result<Vec<Refined>, SimplifyError> {
+    let refiner = Refiner { triangles, tree, sphere };
+    let mut voxels: Vec<Centre> = (0..).zip(centres.iter().copied()).collect();
+    let mut groups = Vec::new();
+    let whole = triangles.all(centres.first().copied().unwrap_or_default());
+    refiner.divide(&mut voxels, &whole, &mut groups);
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let parts: Result<Vec<_>, SimplifyError> = groups
+        .into_par_iter()
+        .map(|(voxels, set)| {
+            let mut refined = Vec::with_capacity(voxels.len());
+            refiner.group(voxels, &set, &mut refined);
+            let before = done.fetch_add(refined.len(), std::sync::atomic::Ordering::Relaxed);
+            run.step(before + refined.len(), centres.len())?;
+            Ok(refined)
+        })
+        .collect();
+    let mut refined = parts?.concat();
+    refined.sort_unstable_by_key(|&(index, _)| index);
+    Ok(refined.into_iter().map(|(_, refined)| refined).collect())
+}
+
+/// A voxel's place in the list, and its centre.
+type Centre = (u32, Vec3);
+
+struct Refiner<'a> {
+    triangles: &'a NearbyTriangles,
+    tree: &'a TriangleBvh,
+    sphere: &'a Sphere,
+}
+
+impl Refiner<'_> {
+    /// Groups of voxels for the tasks, with the triangles near each.
+    fn divide<'v>(
+        &self,
+        voxels: &'v mut [Centre],
+        around: &NearSet,
+        groups: &mut Vec<(&'v mut [Centre], NearSet)>,
+    ) {
+        let set = self.near(voxels, around);
+        if voxels.len() <= TASK {
+            groups.push((voxels, set));
+            return;
+        }
+        let [low, high] = halves(voxels);
+        self.divide(low, &set, groups);
+        self.divide(high, &set, groups);
+    }
+
+    /// Halves a group until few voxels share a set.
+    fn group(&self, voxels: &mut [Centre], set: &NearSet, refined: &mut Vec<(u32, Refined)>) {
+        if voxels.len() > TOGETHER {
+            let [low, high] = halves(voxels);
+            for half in [low, high] {
+                let set = self.near(half, set);
+                self.group(half, &set, refined);
+            }
+            return;
+        }
+        let mut own = NearSet::default();
+        for &mut (index, centre) in voxels {
+            self.triangles.narrow(set, centre, self.sphere.radius, &mut own);
+            refined.push((index, self.one(&own)));
         }
     }
-    rays.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let length = |along: f64| -2.0 * sphere.radius * along;
-    let found = rays
-        .iter()
-        .filter_map(|&(along, p, gradient, foot)| {
-            let ray = Ray { tree, start: p, gradient, foot };
-            ray.localise(length(along), TOLERANCE * sphere.radius)
+
+    /// The triangles near the spheres of voxels.
+    fn near(&self, voxels: &[Centre], around: &NearSet) -> NearSet {
+        let [lo, hi] = corners(voxels);
+        let mut set = NearSet::default();
+        let reach = 0.5 * (hi - lo).length() * (1.0 + 1e-12) + self.sphere.radius;
+        self.triangles.narrow(around, 0.5 * (lo + hi), reach, &mut set);
+        set
+    }
+
+    /// Steps 1 to 3.
+    fn one(&self, set: &NearSet) -> Refined {
+        let (triangles, radius) = (self.triangles, self.sphere.radius);
+        let mut samples = NearBatch::default();
+        for &normal in &self.sphere.directions {
+            samples.push(normal * radius, f64::INFINITY);
+        }
+        triangles.closest(set, &mut samples);
+        let mut rays = Vec::with_capacity(samples.len());
+        for (k, &normal) in self.sphere.directions.iter().enumerate() {
+            let Some(near) = triangles.answer(set, &samples, k) else {
+                continue;
+            };
+            let along = near.gradient.dot(normal);
+            if along < 0.0 {
+                let start = normal * radius;
+                let foot = start - near.gradient * near.distance;
+                let (gradient, distance) = (near.gradient, near.distance);
+                rays.push((along, Ray { triangles, set, start, gradient, foot, distance }));
+            }
+        }
+        rays.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let found = rays
+            .iter()
+            .filter_map(|(along, ray)| {
+                let (centre, contacts) = ray.localise(-2.0 * radius * along, TOLERANCE * radius)?;
+                let [centre, p, q] = [centre, contacts[0], contacts[1]].map(|v| v + set.centre());
+                let ball = Ball::new(centre, self.tree.closest(centre).distance);
+                Some(Refined { ball, contacts: [p, q] })
+            })
+            .take(FOLLOWED);
+        let subtended = |r: &Refined| r.contacts[0].distance(r.contacts[1]) / r.ball.radius;
+        let better = |best, next| if subtended(&next) > subtended(&best) { next } else { best };
+        found.reduce(better).unwrap_or_else(|| {
+            let near = self.tree.closest(set.centre());
+            Refined { ball: Ball::new(set.centre(), near.distance), contacts: [near.point; 2] }
         })
-        .take(FOLLOWED);
-    let subtended = |r: &Refined| r.contacts[0].distance(r.contacts[1]) / r.ball.radius;
-    let best =
-        found.reduce(|best, next| if subtended(&next) > subtended(&best) { next } else { best });
-    best.unwrap_or_else(|| {
-        let near = tree.closest(centre);
-        Refined { ball: Ball::new(centre, near.distance), contacts: [near.point; 2] }
+    }
+}
+
+fn corners(voxels: &[Centre]) -> [Vec3; 2] {
+    voxels.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[lo, hi], (_, centre)| {
+        [lo.min(*centre), hi.max(*centre)]
     })
 }
 
-/// The ray from a closest point through its sample.
+/// Two halves along the longest side.
+fn halves(voxels: &mut [Centre]) -> [&mut [Centre]; 2] {
+    let [lo, hi] = corners(voxels);
+    let axis = (hi - lo).max_position();
+    let middle = voxels.len() / 2;
+    voxels
+        .select_nth_unstable_by(middle, |a, b| a.1[axis].total_cmp(&b.1[axis]).then(a.0.cmp(&b.0)));
+    voxels.split_at_mut(middle).into()
+}
+
+/// The ray from a closest point through its sample; points are relative to the centre of the set.
 struct Ray<'a> {
-    tree: &'a TriangleBvh,
+    triangles: &'a NearbyTriangles,
+    set: &'a NearSet,
     start: Vec3,
     gradient: Vec3,
     foot: Vec3,
+    /// From the foot to the start.
+    distance: f64,
 }
 
 impl Ray<'_> {
-    /// A point nearer than the foot to the point of the ray `t` behind the sample, if there is one.
+    /// The closest point of the surface to the point of the ray `t` behind the sample, if it is
+    /// nearer than the foot.
     fn other(&self, t: f64) -> Option<Vec3> {
         let q = self.start + self.gradient * t;
-        let bound = q.distance(self.foot) * (1.0 - SAME);
-        self.tree.closest_within(q, bound).map(|near| near.point)
+        let bound = (self.distance + t) * (1.0 - SAME);
+        let (point, _) = self.triangles.closest_within(self.set, q, bound)?;
+        Some(point - self.set.centre())
     }
 
-    /// Step 2.
-    fn localise(&self, length: f64, tolerance: f64) -> Option<Refined> {
+    /// Where the ray is as far from the foot as from another point.
+    fn even(&self, other: Vec3) -> f64 {
+        let apart = other - self.foot;
+        0.5 * apart.length_squared() / self.gradient.dot(apart) - self.distance
+    }
+
+    /// Step 2: the point, relative to the centre of the set, and its two closest points.
+    fn localise(&self, length: f64, tolerance: f64) -> Option<(Vec3, [Vec3; 2])> {
         let mut second = self.other(length)?;
         let (mut low, mut high) = (0.0, length);
-        while high - low > tolerance {
-            let middle = 0.5 * (low + high);
-            match self.other(middle) {
-                Some(point) => (high, second) = (middle, point),
-                None => low = middle,
-            }
-            if !(low < 0.5 * (low + high) && 0.5 * (low + high) < high) {
+        for cut in 1_u32.. {
+            high = self.even(second).clamp(low, high);
+            if high - low <= tolerance {
                 break;
             }
+            let in_the_middle = cut.is_multiple_of(HALVING);
+            let at = if in_the_middle { low.midpoint(high) } else { high - tolerance };
+            if !(low < at && at < high) {
+                break;
+            }
+            match self.other(at) {
+                Some(point) => (high, second) = (at, point),
+                None => low = at,
+            }
         }
-        let centre = self.start + self.gradient * low;
-        let radius = self.tree.closest(centre).distance;
-        Some(Refined { ball: Ball::new(centre, radius), contacts: [self.foot, second] })
+        Some((self.start + self.gradient * low, [self.foot, second]))
     }
 }

@@ -1,19 +1,20 @@
 //! One solid at any resolution: its start set, its flux, its axis at an angle or at a count.
 
-use std::sync::Arc;
-
 use medial::Vec3;
-use medial::complex::{MedialMesh, cubical_betti};
+use medial::complex::{MedialMesh, Sphere as Ball, cubical_betti};
 use medial::geometry::TriangleBvh;
 use medial::shape::Shape;
-use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, LatticeVoxel, LatticeVoxels, RunContext, SimplifyError};
+
+use rayon::prelude::*;
 
 use super::bricks::{Bricks, Place, Voxel};
 use super::coarse_to_fine::{Descent, Surface, Wanted, coarse_to_fine};
 use super::flux::Sphere;
 use super::grid::Grid;
-use super::output::{balls, medial_mesh, sorted};
+use super::output::{medial_mesh, sorted};
 use super::params::{AofParams, Variant};
+use super::refine::refine;
 use super::thinning::{Order, thin};
 
 /// Bytes for each voxel of the start set: values in bricks that are not full, twice while one is
@@ -82,7 +83,7 @@ impl<'s> Solid<'s> {
     /// When the voxels would not fit into memory; when the run was cancelled.
     pub fn descend(&self, resolution: u32, wanted: Wanted) -> Result<Descent, SimplifyError> {
         let grid = self.grid(resolution);
-        self.check_memory(resolution, &grid)?;
+        self.check_memory(resolution)?;
         coarse_to_fine(&self.surface, &grid, &self.params, wanted, &self.run)
     }
 
@@ -95,18 +96,32 @@ impl<'s> Solid<'s> {
         if self.params.variant == Variant::Plain { Wanted::Kept } else { Wanted::All }
     }
 
-    fn check_memory(&self, resolution: u32, grid: &Grid) -> Result<(), SimplifyError> {
+    /// Memory for the voxels of a resolution, in megabytes, and their number.
+    fn megabytes(&self, resolution: u32) -> (f64, f64) {
+        let grid = self.grid(resolution);
         let voxels = self.volume / grid.side.powi(3);
         let bricks: f64 = grid.size.iter().map(|&n| f64::from(n) / 8.0).product();
-        let megabytes = (voxels * BYTES_PER_VOXEL + bricks * 4.0) / 1e6;
+        ((voxels * BYTES_PER_VOXEL + bricks * 4.0) / 1e6, voxels)
+    }
+
+    fn check_memory(&self, resolution: u32) -> Result<(), SimplifyError> {
+        let (megabytes, voxels) = self.megabytes(resolution);
         let limit = self.params.max_memory;
         if megabytes <= limit {
             return Ok(());
         }
-        let fits = (f64::from(resolution) * (limit / megabytes).cbrt()).floor().max(1.0);
+        // Not quite a cube root: the lattice is a whole number of coarse voxels.
+        let mut fits = (f64::from(resolution) * (limit / megabytes).cbrt()).ceil() as u32;
+        while fits > 0 && self.megabytes(fits).0 > limit {
+            fits -= 1;
+        }
+        let advice = match fits {
+            0 => format!("give max_memory = {}", megabytes.ceil()),
+            _ => format!("resolution = {fits} fits, or raise max_memory"),
+        };
         Err(SimplifyError::Parameter(format!(
-            "resolution = {resolution}: about {megabytes:.0} MB for {voxels:.3e} voxels, above \
-             max_memory = {limit}; resolution = {fits} fits, or raise max_memory"
+            "resolution = {resolution}: about {megabytes:.3} MB for {voxels:.3e} voxels, above \
+             max_memory = {limit}; {advice}"
         )))
     }
 
@@ -146,16 +161,29 @@ impl<'s> Solid<'s> {
         Ok(Base { resolution, descent, topology, diagnostics })
     }
 
+    /// The error for a lattice without voxels. It names a resolution that was tried and has some.
     fn nothing_fits(&self, resolution: u32, deepest: f64) -> SimplifyError {
         let longest = self.grid(resolution).side * f64::from(resolution);
-        let enough = if deepest > 0.0 {
-            (1.5 * longest / deepest).ceil()
-        } else {
-            8.0 * f64::from(resolution)
+        // No voxel can be there while its side is above the largest distance.
+        let (mut tried, mut deepest) = (resolution, deepest);
+        let advice = loop {
+            let least = if deepest > 0.0 { (1.1 * longest / deepest).ceil() } else { 0.0 };
+            tried = least.clamp(1.5 * f64::from(tried), 3.0 * f64::from(tried)).ceil() as u32;
+            match self.descend(tried, Wanted::Places) {
+                Ok(start) if start.tally.start > 0 => break format!("resolution = {tried} does"),
+                Ok(start) => deepest = deepest.max(start.tally.deepest),
+                Err(SimplifyError::Parameter(_)) => {
+                    break format!(
+                        "none up to resolution = {tried} does, where max_memory = {} ends; raise it",
+                        self.params.max_memory
+                    );
+                }
+                Err(error) => return error,
+            }
         };
         SimplifyError::Parameter(format!(
             "resolution = {resolution}: the solid is thinner than a voxel everywhere, no sphere of \
-             a voxel's side lies inside; resolution = {enough} should do"
+             a voxel's side lies inside; {advice}"
         ))
     }
 
@@ -213,15 +241,18 @@ impl<'s> Solid<'s> {
     fn lost_vertex(&self, resolution: u32, voxels: &Bricks) -> Option<Vec3> {
         const RESOLVED: i32 = 3;
         const FARTHEST: i32 = 12;
+        const ASKED: usize = 2000;
         let grid = self.grid(resolution);
         let rings = |vertex: Vec3| {
             let at = ((vertex - grid.origin) / grid.side).to_array().map(|x| x.floor() as i32);
             (0..FARTHEST).find(|&ring| has_voxel(voxels, &grid, at, ring)).unwrap_or(FARTHEST)
         };
         let vertices = &self.shape.mesh().vertices;
-        let farthest = vertices.iter().map(|&v| rings(v)).enumerate();
-        let (vertex, ring) =
-            farthest.max_by_key(|&(index, ring)| (ring, std::cmp::Reverse(index)))?;
+        // It stands for many: some of them are enough.
+        let (vertex, ring) = (0..vertices.len())
+            .step_by(vertices.len().div_ceil(ASKED))
+            .map(|index| (index, rings(vertices[index])))
+            .max_by_key(|&(index, ring)| (ring, std::cmp::Reverse(index)))?;
         (ring > RESOLVED).then(|| self.shape.normalisation().backward(vertices[vertex]))
     }
 
@@ -249,6 +280,28 @@ impl<'s> Solid<'s> {
             }
         };
         Ok(self.axis_of(grid, kept))
+    }
+
+    /// The medial mesh of an axis, with centres on the axis or in the voxels.
+    ///
+    /// # Errors
+    /// When the run was cancelled.
+    pub fn medial_mesh(
+        &self,
+        axis: &Axis,
+        tree: &TriangleBvh,
+    ) -> Result<MedialMesh, SimplifyError> {
+        let centres = axis.points();
+        let balls = if self.params.refine {
+            refine(&self.surface.triangles, tree, &axis.sphere, &centres, &self.run)?
+                .into_iter()
+                .map(|refined| refined.ball)
+                .collect()
+        } else {
+            let ball = |&centre: &Vec3| Ball::new(centre, tree.closest(centre).distance);
+            centres.par_iter().map(ball).collect()
+        };
+        medial_mesh(&axis.voxels, balls, &self.run)
     }
 
     fn axis_of(&self, grid: Grid, voxels: Vec<Voxel>) -> Axis {
@@ -294,10 +347,19 @@ impl Axis {
         self.voxels.iter().map(|voxel| voxel.place)
     }
 
-    /// The medial mesh, with centres on the axis or in the voxels.
-    pub fn medial_mesh(&self, tree: &Arc<TriangleBvh>, params: &AofParams) -> MedialMesh {
-        let onto_axis = params.refine.then_some(&self.sphere);
-        medial_mesh(&self.voxels, balls(&self.voxels, &self.grid, tree, onto_axis))
+    /// The voxels as data, normalised.
+    pub fn lattice_voxels(&self) -> LatticeVoxels {
+        let voxel = |voxel: &Voxel| LatticeVoxel {
+            place: voxel.place.map(u32::from),
+            distance: f64::from(voxel.distance),
+            flux: f64::from(voxel.flux),
+        };
+        LatticeVoxels {
+            origin: self.grid.origin,
+            side: self.grid.side,
+            size: self.grid.size,
+            voxels: self.voxels.iter().map(voxel).collect(),
+        }
     }
 
     pub(super) fn diagnose(&self, angle: f64, diagnostics: &mut Diagnostics) {

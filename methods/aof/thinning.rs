@@ -6,19 +6,17 @@
 //!   3.3: simple voxels in a heap, the least medial first; one that is an end point with a flux
 //!   below a threshold stays for good.
 //!
-//! 1. All border voxels that may go are put into a heap, by key, then by place.
+//! 1. All border voxels that may go are put into a queue by key (file `queue.rs`).
 //! 2. The first is taken. If it is simple and not to be kept, it is deleted, and its neighbours
-//!    that may go and are not in the heap are put in.
+//!    that may go and are not in the queue are put in.
 //!
 //! An *end point* ends an open curve in one of nine digital planes through it: of the eight
 //! neighbours in the plane one is there, or two that touch.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use medial::simplifier::{RunContext, SimplifyError};
 
-use super::bricks::{Bricks, Marks, Place, Voxel};
+use super::bricks::{Bricks, Marks, Voxel};
+use super::queue::BucketQueue;
 use super::simple::{CENTRE, SimpleTable, is_simple, offset};
 
 /// Which voxels go, and in which order.
@@ -49,6 +47,16 @@ impl Order {
         }
     }
 
+    /// The range of the keys.
+    fn keys(self, voxels: &Bricks) -> [f32; 2] {
+        match self {
+            Self::OutermostFirst { .. } => {
+                [0.0, voxels.iter().map(|voxel| voxel.distance).fold(0.0, f32::max)]
+            }
+            Self::ByFlux { .. } | Self::Down { .. } => [-1.0, 1.0],
+        }
+    }
+
     fn may_go(self, voxel: &Voxel) -> bool {
         match self {
             Self::OutermostFirst { threshold } => voxel.flux > threshold,
@@ -72,7 +80,7 @@ impl Order {
 }
 
 /// Voxels from which on the table of simple neighbourhoods is worth building.
-const WITH_TABLE: usize = 4_000_000;
+const WITH_TABLE: usize = 40_000_000;
 
 /// Deletes voxels that are simple when their turn comes.
 ///
@@ -81,10 +89,13 @@ const WITH_TABLE: usize = 4_000_000;
 pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), SimplifyError> {
     let total = voxels.len();
     let table = (total >= WITH_TABLE).then(SimpleTable::get);
-    let mut queue = Queue::new(voxels);
+    let mut queue = BucketQueue::new(order.keys(voxels));
+    // Places in the queue, and those that must not come in again.
+    let mut barred = Marks::of(voxels);
     for voxel in voxels.iter() {
         let surrounded = voxels.neighbourhood(voxel.place) & FACES == FACES;
         if order.may_go(&voxel) && !surrounded {
+            barred.set(voxel.place);
             queue.push(order.key(&voxel), voxel.place);
         }
     }
@@ -97,8 +108,8 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), S
         if steps.is_multiple_of(65_536) {
             run.step((total - voxels.len()).min(total), total)?;
         }
+        barred.clear(place);
         let neighbourhood = voxels.neighbourhood(place);
-        let voxel = voxels.get(place).expect("queued voxels are there");
         let simple = match table {
             Some(table) => table.is_simple(neighbourhood),
             None => is_simple(neighbourhood),
@@ -106,16 +117,18 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), S
         if !simple {
             continue;
         }
+        let voxel = voxels.get(place).expect("queued voxels are there");
         if order.stays(&voxel, neighbourhood) {
-            queue.retire(place);
+            barred.set(place);
             continue;
         }
         voxels.remove(place);
-        for bit in ones(neighbourhood & !(1 << CENTRE)) {
+        for bit in ones(neighbourhood & !(1 << CENTRE) & !barred.neighbourhood(place)) {
             let step = offset(bit);
             let near = [0, 1, 2].map(|axis| (i32::from(place[axis]) + step[axis]) as u16);
             let voxel = voxels.get(near).expect("a neighbour that is there");
             if order.may_go(&voxel) {
+                barred.set(near);
                 queue.push(order.key(&voxel), near);
             }
         }
@@ -132,41 +145,6 @@ fn ones(mut bits: u32) -> impl Iterator<Item = u32> {
         bits &= bits - 1;
         Some(bit)
     })
-}
-
-/// A heap that holds each place at most once.
-struct Queue {
-    heap: BinaryHeap<Reverse<(u32, [u16; 3])>>,
-    /// Places in the heap, and those that must not come in again.
-    barred: Marks,
-}
-
-impl Queue {
-    fn new(voxels: &Bricks) -> Self {
-        Self { heap: BinaryHeap::new(), barred: Marks::of(voxels) }
-    }
-
-    fn push(&mut self, key: f32, [x, y, z]: Place) {
-        if self.barred.set([x, y, z]) {
-            self.heap.push(Reverse((ascending(key), [z, y, x])));
-        }
-    }
-
-    fn pop(&mut self) -> Option<Place> {
-        let Reverse((_, [z, y, x])) = self.heap.pop()?;
-        self.barred.clear([x, y, z]);
-        Some([x, y, z])
-    }
-
-    fn retire(&mut self, place: Place) {
-        self.barred.set(place);
-    }
-}
-
-/// Bits that compare like the number, negative ones included.
-fn ascending(key: f32) -> u32 {
-    let bits = (key + 0.0).to_bits();
-    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
 /// Whether a voxel ends an open curve in one of the nine digital planes through it.

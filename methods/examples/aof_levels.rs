@@ -25,8 +25,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         given.set(key, value);
     }
     println!(
-        "{:<14} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>7} {:>7}",
-        "shape", "start", "level 1", "level 2", "kept", "s", "cpu s", "thin s", "betti"
+        "{:<14} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>7} {:>7} {:>7}",
+        "shape", "start", "level 1", "level 2", "kept", "s", "cpu s", "thin s", "mesh s", "betti"
     );
     for name in names {
         let params: AofParams = given.typed()?;
@@ -47,11 +47,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         let clock = Instant::now();
         let axis = solid.axis(resolution, &descent, params.angle)?;
         let thinning = clock.elapsed().as_secs_f64();
+        let tree = shape.surface_tree()?;
+        let clock = Instant::now();
+        solid.medial_mesh(&axis, &tree)?;
+        let meshing = clock.elapsed().as_secs_f64();
         let tally = &descent.tally;
         let share = |n: u64| 100.0 * n as f64 / tally.start as f64;
         let level = |k: usize| tally.dismissed.get(k).map_or(f64::NAN, |&n| share(n));
         println!(
-            "{name:<14} {:>9} {:>8.1}% {:>8.1}% {:>9} {seconds:>7.2} {cpu:>7.2} {thinning:>7.2} {:?} evaluated {:?} {} MB",
+            "{name:<14} {:>9} {:>8.1}% {:>8.1}% {:>9} {seconds:>7.2} {cpu:>7.2} {thinning:>7.2} {meshing:>7.2} {:?} evaluated {:?} {} MB",
             tally.start,
             level(0),
             level(1),

@@ -1,7 +1,7 @@
 //! Average outward flux: closed forms, known axes, topology, bad input.
 
 use medial::Vec3;
-use medial::complex::cubical_betti;
+use medial::complex::{betti, cubical_betti};
 use medial::geometry::{NearSet, NearbyTriangles, TriangleBvh};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
@@ -215,6 +215,36 @@ fn homotopic_variants_keep_the_topology_of_the_start_set() {
     }
 }
 
+#[allow(clippy::print_stderr)]
+/// Shared meshes: three holes, and four. The start set has them too, or a warning says where not.
+#[test]
+fn homotopy_on_shared_meshes_keeps_their_loops() {
+    let folder = std::env::var("MEDIAL_MESHES").unwrap_or_else(|_| "../shared/meshes".into());
+    for (name, expected) in [("threeholes.off", [1, 3, 0]), ("fertility.off", [1, 4, 0])] {
+        let path = std::path::Path::new(&folder).join(name);
+        if !path.exists() {
+            eprintln!("skipped: {} is not there", path.display());
+            continue;
+        }
+        let shape = shape_of(&surface::read(&path).expect("a surface").mesh);
+        for variant in [Variant::Homotopy, Variant::Thinning] {
+            for resolution in [20, 48] {
+                let solid = solid(&shape, &AofParams { resolution, ..params(variant) });
+                let base = solid.base().expect("fits");
+                let warnings = &base.diagnostics.warnings;
+                let betti = base.topology.expect("kept");
+                assert!(
+                    betti == expected || warnings.iter().any(|w| w.contains("thinner than")),
+                    "{name} at {resolution}: {betti:?} {warnings:?}"
+                );
+                assert!(resolution < 48 || betti == expected, "{name}: {betti:?}");
+                let axis = solid.axis(base.resolution, &base.descent, 30.0).expect("runs");
+                assert_eq!(axis.betti(), betti, "{name} {variant:?}");
+            }
+        }
+    }
+}
+
 fn simplified(
     shape: &Shape,
     set: &[(&str, &str)],
@@ -233,8 +263,9 @@ fn refined_spheres_are_internal_and_touch_twice() {
     let (axis, _) = axis_at(&shape, &params(Variant::Thinning), 48, 30.0);
     let sphere = Sphere::new(Spiral::EqualArea, 50, axis.grid.side);
     let mut two = 0;
-    for centre in axis.points() {
-        let refined = refine(&tree, &sphere, centre);
+    let (triangles, centres) = (NearbyTriangles::new(shape.mesh()), axis.points());
+    let all = refine(&triangles, &tree, &sphere, &centres, &RunContext::default()).expect("runs");
+    for (refined, centre) in all.iter().zip(centres) {
         let (c, r) = (refined.ball.centre, refined.ball.radius);
         assert_eq!(inside.side(c), surface::Side::Inside);
         assert!((tree.closest(c).distance - r).abs() < 1e-15);
@@ -244,6 +275,116 @@ fn refined_spheres_are_internal_and_touch_twice() {
         two += usize::from(p.distance(q) > 0.5 * r);
     }
     assert!(two * 100 > axis.voxels.len() * 98, "{two} of {}", axis.voxels.len());
+}
+
+/// Betti numbers of the medial mesh and of the voxels; `what` names the case.
+fn assert_same_topology(result: &Simplified, what: &str) {
+    let voxels = result.extras.voxels.as_ref().expect("voxels");
+    assert_eq!(voxels.voxels.len(), result.mesh.spheres.len(), "{what}");
+    assert_eq!(betti(&result.mesh), voxels.betti(), "{what}");
+    assert_eq!(result.mesh.check(), Ok(()), "{what}");
+}
+
+#[test]
+fn medial_meshes_have_the_betti_numbers_of_their_voxels() {
+    for built_in in medial_datasets::catalogue() {
+        let shape = shape_of(&built_in.mesh(built_in.default_resolution));
+        for variant in ["plain", "homotopy", "thinning"] {
+            // Coarse ones fall apart; a small angle leaves thick ones.
+            for (resolution, angle) in [("14", 30.0), ("30", 3.0), ("40", 45.0)] {
+                let set = [("variant", variant), ("resolution", resolution), ("refine", "false")];
+                let what = format!("{} {set:?} {angle}", built_in.id);
+                match simplified(&shape, &set, Level::Native(angle)) {
+                    Ok(result) => assert_same_topology(&result, &what),
+                    Err(SimplifyError::Parameter(why)) => {
+                        assert!(why.contains("thinner than a voxel"), "{what}: {why}");
+                    }
+                    Err(error) => panic!("{what}: {error}"),
+                }
+            }
+        }
+        for count in [400, 60] {
+            let result = simplified(&shape, &[], Level::Spheres(count)).expect("a count");
+            assert_same_topology(&result, &format!("{} at {count}", built_in.id));
+        }
+    }
+}
+
+#[test]
+fn voxels_carry_the_distances_of_their_centres_and_their_flux() {
+    let shape = built_in("bracket");
+    let tree = shape.surface_tree().expect("faces");
+    let set = [("variant", "plain"), ("refine", "false")];
+    let result = simplified(&shape, &set, Level::Native(30.0)).expect("an angle");
+    let voxels = result.extras.voxels.expect("voxels");
+    for (voxel, ball) in voxels.voxels.iter().zip(&result.mesh.spheres) {
+        let centre = voxels.centre(voxel);
+        assert!(centre.distance(ball.centre) < 1e-15);
+        assert!((tree.closest(centre).distance - voxel.distance).abs() < 1e-7);
+        assert!((-1.0..=-0.125 * 0.5).contains(&(voxel.flux - 1e-7)), "{voxel:?}");
+    }
+    let angle = built_in("box");
+    let run = RunContext::default();
+    let other = medial_methods::find("angle").expect("a method");
+    let mut other = other.prepare(&angle, &Params::none(), &run).expect("prepared");
+    assert!(other.at(Level::Spheres(10)).expect("a count").extras.voxels.is_none());
+}
+
+/// Closed forms over one plane, and beside its border.
+#[test]
+fn a_gradient_that_is_the_same_everywhere_needs_no_samples() {
+    let triangles = NearbyTriangles::new(&cuboid(HALF));
+    let sphere = Sphere::new(Spiral::Classic, 50, 0.01);
+    let mut set = NearSet::default();
+    for (centre, gradient) in [
+        (Vec3::new(0.2, 0.1, 0.4), Some(-Vec3::Z)),
+        (Vec3::new(1.4, 0.1, 0.0), Some(-Vec3::X)),
+        (Vec3::new(0.2, 0.1, 0.005), None),
+        (Vec3::new(1.4, 0.1, 0.395), None),
+    ] {
+        triangles.narrow(&triangles.all(centre), centre, sphere.radius, &mut set);
+        assert_eq!(triangles.constant_gradient(&set), gradient, "{centre}");
+        let flux = Probe::new(&sphere).flux(&triangles, &set);
+        let along = |n: &Vec3| {
+            let depth = HALF - (centre + *n * sphere.radius).abs();
+            let least = depth.min_element();
+            let axis = (0..3).find(|&axis| depth[axis] == least).expect("an axis");
+            -n[axis] * (centre + *n * sphere.radius)[axis].signum()
+        };
+        let expected = sphere.directions.iter().map(along).sum::<f64>() / 50.0;
+        assert!((flux - expected).abs() < 1e-12, "{centre}: {flux} {expected}");
+    }
+}
+
+/// Bytes of a result: everything that is written.
+fn bytes_of(result: &Simplified) -> Vec<u64> {
+    let ball = |s: &medial::complex::Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
+    let simplices = result.mesh.edges.iter().flatten().chain(result.mesh.faces.iter().flatten());
+    let voxels = result.extras.voxels.iter().flat_map(|voxels| &voxels.voxels);
+    let balls = result.mesh.spheres.iter().flat_map(ball).map(f64::to_bits);
+    balls
+        .chain(simplices.map(|&v| u64::from(v)))
+        .chain(voxels.flat_map(|v| [v.distance.to_bits(), v.flux.to_bits()]))
+        .collect()
+}
+
+#[test]
+fn one_and_two_threads_give_the_same_bytes() {
+    let shape = built_in("bracket");
+    for variant in ["plain", "homotopy", "thinning"] {
+        for level in [Level::Native(25.0), Level::Spheres(150)] {
+            let with = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+                pool.expect("a pool").install(|| {
+                    let set = [("variant", variant), ("resolution", "50")];
+                    bytes_of(&simplified(&shape, &set, level).expect("a result"))
+                })
+            };
+            let one = with(1);
+            assert!(one.len() > 500);
+            assert!([2, 3].iter().all(|&threads| with(threads) == one), "{variant} {level:?}");
+        }
+    }
 }
 
 #[test]
@@ -291,26 +432,65 @@ fn bad_input_is_refused_and_says_what_would_work() {
     assert!(message(&[("angle", "-10")], any).contains("above 0"));
     assert!(message(&[], Level::Native(0.0)).contains("above 0"));
     assert!(message(&[("samples", "70/x")], any).contains("70/60/50"));
+    assert!(message(&[("samples", "5")], any).contains("70/60/50"));
+    assert!(message(&[("samples", "-50")], any).contains("70/60/50"));
+    assert!(simplified(&shape, &[("samples", "50")], any).is_ok());
     assert!(message(&[("d", "1")], any).contains("2 or more"));
     assert!(message(&[("levels", "40")], any).contains("fewer levels"));
-    let thin = [("resolution", "1"), ("variant", "plain")];
-    let advice = message(&thin, any);
-    assert!(advice.contains("thinner than a voxel everywhere"), "{advice}");
-    let words = advice.rsplit("resolution = ").next().expect("a resolution");
-    let enough: String = words.chars().take_while(char::is_ascii_digit).collect();
-    let works = [("resolution", enough.as_str()), ("variant", "plain")];
-    assert!(simplified(&shape, &works, any).is_ok(), "{advice}");
+    // What the messages name works.
+    let named = |advice: &str| -> String {
+        let words = advice.rsplit("resolution = ").next().expect("a resolution");
+        words.chars().take_while(char::is_ascii_digit).collect()
+    };
+    for id in ["box", "plate", "torus"] {
+        let shape = built_in(id);
+        let plain = |resolution: &str| {
+            let set = [("resolution", resolution), ("variant", "plain")];
+            simplified(&shape, &set, Level::Native(20.0)).map(|_| ())
+        };
+        let advice = plain("1").expect_err("too coarse").to_string();
+        assert!(advice.contains("thinner than a voxel everywhere"), "{advice}");
+        assert!(plain(&named(&advice)).is_ok(), "{advice}");
+        let small = |resolution: &str| {
+            let set = [("resolution", resolution), ("max_memory", "0.5")];
+            simplified(&shape, &set, Level::Native(20.0)).map(|_| ())
+        };
+        let advice = small("300").expect_err("too fine").to_string();
+        let fits = named(&advice);
+        assert!(small(&fits).is_ok(), "{advice}");
+        let next = (fits.parse::<u32>().expect("a number") + 3).to_string();
+        assert!(small(&next).is_err(), "{advice}");
+    }
+    assert!(message(&[("max_memory", "1e-9")], any).contains("give max_memory = "));
 }
 
+/// Every stage asks: a run that is cancelled at any of its questions ends there.
 #[test]
-fn cancelling_ends_the_run() {
+fn cancelling_ends_the_run_at_every_stage() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
     let shape = built_in("torus");
-    let run = RunContext::default();
-    let flag = run.cancel_flag();
-    let run = run.on_progress(move |progress| {
-        assert!(progress.done <= progress.total);
-        flag.store(progress.done * 2 > progress.total, std::sync::atomic::Ordering::Relaxed);
-    });
-    let prepared = AverageOutwardFlux::new().prepare(&shape, &Params::none(), &run);
-    assert!(matches!(prepared.err(), Some(SimplifyError::Cancelled)));
+    // Asks so many times, then cancels.
+    let cancelled_after = |questions: usize| {
+        let run = RunContext::default();
+        let (flag, asked) = (run.cancel_flag(), Arc::new(AtomicUsize::new(0)));
+        let counted = Arc::clone(&asked);
+        let run = run.on_progress(move |progress| {
+            assert!(progress.done <= progress.total, "{progress:?}");
+            flag.store(counted.fetch_add(1, Relaxed) >= questions, Relaxed);
+        });
+        let method = AverageOutwardFlux::new();
+        let answer = method
+            .prepare(&shape, &Params::none(), &run)
+            .and_then(|mut prepared| prepared.at(Level::Published));
+        (answer, asked.load(Relaxed))
+    };
+    let (answer, questions) = cancelled_after(usize::MAX);
+    assert!(answer.is_ok() && questions > 5, "{questions}");
+    for k in (0..questions).step_by(1 + questions / 12).chain([questions - 1]) {
+        let (answer, asked) = cancelled_after(k);
+        assert!(matches!(answer.err(), Some(SimplifyError::Cancelled)), "{k} of {questions}");
+        // Those that other threads were about to ask.
+        assert!(asked <= k + 1 + rayon::current_num_threads(), "{asked} after {k}");
+    }
 }

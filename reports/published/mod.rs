@@ -72,6 +72,9 @@ pub struct Column {
     /// Places in the [`Record`](crate::Record), as JSON pointers; their values are added. Beside the
     /// record's own there is `/union/betti`, the Betti numbers of the union of the primitives.
     pub of: Vec<String>,
+    /// What their sum is divided by, where the column is a share.
+    #[serde(default)]
+    pub per: Option<String>,
     /// Factor from the record's unit to this column's.
     #[serde(default = "one")]
     pub scale: f64,
@@ -258,8 +261,10 @@ impl Exhibit {
 impl Column {
     /// The number in a record as JSON, if all its parts are there.
     pub fn read(&self, record: &Value) -> Option<f64> {
-        let parts = self.of.iter().map(|place| record.pointer(place)?.as_f64());
-        parts.sum::<Option<f64>>().map(|sum| sum * self.scale)
+        let number = |place: &String| record.pointer(place)?.as_f64();
+        let sum = self.of.iter().map(number).sum::<Option<f64>>()?;
+        let whole = self.per.as_ref().map_or(Some(1.0), number)?;
+        (whole != 0.0).then(|| sum / whole * self.scale)
     }
 }
 
@@ -282,6 +287,7 @@ pub fn published() -> Vec<Exhibit> {
         include_str!("tam-heidrich-table-1.json"),
         include_str!("tam-heidrich-figure-10.json"),
         include_str!("dey-zhao-table-1.json"),
+        include_str!("stolpner-table-2.json"),
     ];
     let read = |text: &&str| serde_json::from_str(text).expect("a published table is well formed");
     files.iter().map(read).collect()

@@ -27,6 +27,9 @@ use crate::surface::TriMesh;
 /// Sine of the dihedral deviation below which two faces are coplanar.
 const COPLANAR: f64 = 1e-7;
 
+/// How far the normals of triangles in one plane may be apart.
+const SAME_NORMAL: f64 = 1e-12;
+
 /// Triangles in their own frames, with the kinds of their sides and corners.
 #[derive(Clone, Debug)]
 pub struct NearbyTriangles {
@@ -82,8 +85,8 @@ struct Answer {
     squared: f64x2,
     /// Triangle, as a number.
     triangle: f64x2,
-    /// Height over its plane.
-    height: f64x2,
+    /// Its gradient times the query, where the foot is inside the triangle.
+    along: f64x2,
     /// All bits set where the foot is inside the triangle.
     interior: f64x2,
 }
@@ -140,6 +143,7 @@ impl NearbyTriangles {
     pub fn narrow(&self, within: &NearSet, centre: Vec3, reach: f64, set: &mut NearSet) {
         set.centre = centre;
         set.entries.clear();
+        set.nearest = 0;
         let Some(first) = within.entries.get(within.nearest) else {
             return;
         };
@@ -156,13 +160,19 @@ impl NearbyTriangles {
         }
         // The same as for the entries of the new set, with what the old one knows of a triangle.
         let relevant = Relevant::new(&best, reach);
+        let mut nearest = f64::INFINITY;
         for entry in &within.entries {
-            if relevant.may_be_nearest(bound(entry), entry.toward) {
-                set.entries.push(self.measure(entry.triangle, centre));
+            if !relevant.may_be_nearest(bound(entry), entry.toward) {
+                continue;
+            }
+            let entry = self.measure(entry.triangle, centre);
+            if relevant.may_be_nearest(entry.distance, entry.toward) {
+                if entry.distance < nearest {
+                    (nearest, set.nearest) = (entry.distance, set.entries.len());
+                }
+                set.entries.push(entry);
             }
         }
-        set.entries.retain(|entry| relevant.may_be_nearest(entry.distance, entry.toward));
-        set.find_nearest();
     }
 
     #[inline]
@@ -189,6 +199,23 @@ impl NearbyTriangles {
             Part::Side(k) => (corner(k).lerp(corner(k + 1), t), fans >> k & 1 == 1),
             Part::Corner(k) => (corner(k), fans >> (3 + k) & 1 == 1),
         }
+    }
+
+    /// The gradient of the distance in the whole ball, where all triangles of the set lie in one
+    /// plane. A closest point at their border would be one of a triangle beyond it too, which the
+    /// set would hold.
+    pub fn constant_gradient(&self, set: &NearSet) -> Option<Vec3> {
+        let frame = |entry: &Entry| &self.frames[entry.triangle as usize];
+        let own = frame(set.entries.get(set.nearest)?);
+        let height = own.local(set.centre)[2];
+        let in_plane = |other: &PlanarFrame| {
+            let apart = (other.origin - own.origin).dot(own.normal);
+            !other.is_flat()
+                && other.normal.distance_squared(own.normal) < SAME_NORMAL * SAME_NORMAL
+                && apart.abs() < SAME_NORMAL * height.abs()
+        };
+        let all = set.entries.iter().all(|entry| in_plane(frame(entry)));
+        all.then(|| own.normal * height.signum())
     }
 
     /// Answers a batch. Queries that have a bound keep it where no triangle of the set is nearer.
@@ -230,16 +257,62 @@ impl NearbyTriangles {
         }
         let triangle = triangle as u32;
         let distance = answer.squared.to_array()[lane].sqrt();
-        if answer.interior.to_bitmask() >> lane & 1 == 1 {
-            let height = answer.height.to_array()[lane];
-            let normal = self.frames[triangle as usize].normal;
-            let gradient = if height == 0.0 { Vec3::ZERO } else { normal * height.signum() };
+        let p = set.centre + batch.point(k);
+        if answer.is_interior(lane) {
+            let frame = &self.frames[triangle as usize];
+            let height = frame.local(p)[2];
+            let gradient =
+                if distance == 0.0 { Vec3::ZERO } else { frame.normal * height.signum() };
             return Some(NearPoint { distance, gradient, on_fan: false, triangle });
         }
-        let p = set.centre + batch.point(k);
         let (foot, on_fan) = self.foot(triangle, p);
         let gradient = (p - foot).try_normalize().unwrap_or(Vec3::ZERO);
         Some(NearPoint { distance, gradient, on_fan, triangle })
+    }
+
+    /// The sum of `gradient . query` over the queries, relative to the centre, whose closest points
+    /// are inside triangles. The other queries that have an answer go to `beside`.
+    #[inline]
+    pub fn sum_along(
+        &self,
+        set: &NearSet,
+        batch: &NearBatch,
+        mut beside: impl FnMut(usize, NearPoint),
+    ) -> f64 {
+        let (mut sum, mut single) = (f64x2::ZERO, 0.0);
+        for (pair, answer) in batch.answers.iter().enumerate() {
+            if answer.interior.all() && 2 * pair + 1 < batch.len {
+                sum += answer.along;
+                continue;
+            }
+            for k in 2 * pair..(2 * pair + 2).min(batch.len) {
+                if answer.is_interior(k % 2) {
+                    single += answer.along.to_array()[k % 2];
+                } else if let Some(near) = self.answer(set, batch, k) {
+                    beside(k, near);
+                }
+            }
+        }
+        let [even, odd] = sum.to_array();
+        even + odd + single
+    }
+
+    /// The closest point of the surface to a point of the ball, relative to its centre, if it is
+    /// nearer than `bound`, and its distance.
+    pub fn closest_within(&self, set: &NearSet, point: Vec3, bound: f64) -> Option<(Vec3, f64)> {
+        let p = set.centre + point;
+        let (mut best, mut found) = (bound, None);
+        for entry in &set.entries {
+            if entry.distance * (1.0 - 1e-12) - entry.toward.dot(point) < best {
+                let (distance, away) =
+                    self.frames[entry.triangle as usize].distance_and_direction(p);
+                if distance < best {
+                    best = distance;
+                    found = Some((p - away * distance, distance));
+                }
+            }
+        }
+        found
     }
 
     /// The closest point of query `k` of a batch.
@@ -366,7 +439,12 @@ impl NearBatch {
 impl Answer {
     fn bounded(squared: f64x2) -> Self {
         let none = f64x2::splat(NONE);
-        Self { squared, triangle: none, height: f64x2::ZERO, interior: f64x2::ZERO }
+        Self { squared, triangle: none, along: f64x2::ZERO, interior: f64x2::ZERO }
+    }
+
+    #[inline]
+    fn is_interior(&self, lane: usize) -> bool {
+        self.interior.to_bitmask() >> lane & 1 == 1
     }
 }
 
@@ -438,7 +516,9 @@ impl Spread {
         if nearer.any() {
             answer.squared = nearer.bitselect(squared, answer.squared);
             answer.triangle = nearer.bitselect(f64x2::splat(triangle), answer.triangle);
-            answer.height = nearer.bitselect(height, answer.height);
+            // On the surface there is no gradient.
+            let along = (height + self.origin[2]).flip_signs(height) & height.simd_ne(zero);
+            answer.along = nearer.bitselect(along, answer.along);
             answer.interior = nearer.bitselect(inside, answer.interior);
         }
     }

@@ -91,6 +91,22 @@ proptest! {
                 prop_assert!((p - found.gradient * found.distance).distance(point) < 1e-9);
             }
         }
+        // One query at a time, and the sums over all of them.
+        let near_one = |k: usize| near.closest_within(&inner, batch.point(k), f64::INFINITY);
+        let (mut beside, mut total) = (0.0, 0.0);
+        let within = near.sum_along(&inner, &batch, |k, point| {
+            beside += point.gradient.dot(batch.point(k));
+        });
+        for k in 0..batch.len() {
+            let found = near.answer(&inner, &batch, k).expect("no bound");
+            let (point, distance) = near_one(k).expect("no bound");
+            prop_assert!((distance - found.distance).abs() < 1e-12);
+            let p = inner.centre() + batch.point(k);
+            prop_assert!((point.distance(p) - distance).abs() < 1e-12);
+            prop_assert!(near.closest_within(&inner, batch.point(k), 0.999 * distance).is_none());
+            total += found.gradient.dot(batch.point(k));
+        }
+        prop_assert!((within + beside - total).abs() < 1e-12);
         // A bound that is met stays; one that is not is replaced.
         let truth: Vec<f64> =
             directions.iter().map(|&u| bvh.closest(inner.centre() + u * reach).distance).collect();
