@@ -12,6 +12,7 @@ mod judge;
 mod lifted_axis;
 mod quality;
 mod spikes;
+mod surface_distance;
 mod union_topology;
 mod volume;
 
@@ -27,5 +28,6 @@ pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{Judge, JudgeOptions, Truth};
 pub use quality::triangle_quality;
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
+pub use surface_distance::{SurfaceDistances, surface_distances};
 pub use union_topology::union_betti;
 pub use volume::{VolumeOptions, enclosed_volume, volume_error};
