@@ -50,7 +50,7 @@ pub fn write_report(
     for plot in &overview_plots {
         files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
     }
-    let extras = extras(dir, &comparison, &summaries, &how)?;
+    let extras = extras(dir, &comparison, &summaries)?;
     for extra in &extras {
         files.write_tables(extra.stem, extra.title, &extra.tables)?;
         for plot in extra.plots.iter().chain(extra.mesh_plots.iter().map(|(_, plot)| plot)) {

@@ -49,7 +49,7 @@ fn radii_that_do_not_fit_are_named() {
     for (factor, told) in [
         (1e-3, " 1.0e-3 times"),
         (0.0, " 0.0e0 times"),
-        (0.01, " 0.010 times"),
+        (0.02, " 0.020 times"),
         (0.5, " 0.500 times"),
         (0.8, " 0.800 times"),
         (1.3, " 1.300 times"),

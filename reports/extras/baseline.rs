@@ -72,7 +72,6 @@ pub(super) fn section(
     dir: &Path,
     comparison: &Comparison<'_>,
     summaries: &[CountSummary],
-    how: &str,
 ) -> Result<Option<Extra>, ReportError> {
     let all: Vec<Baseline> = read_lines(&dir.join(BASELINES))?;
     let hash_of =
@@ -86,12 +85,10 @@ pub(super) fn section(
             known.insert(baseline.numbers_asked, baseline);
         }
     }
-    if of_mesh.iter().all(BTreeMap::is_empty) {
-        return Ok(None);
-    }
-    let tool = of_mesh.iter().flat_map(BTreeMap::values).map(|b| b.tool.as_str()).next();
-    let tool = tool.unwrap_or_default().to_owned();
-    let label = "decimated surface".to_owned();
+    let Some(first) = of_mesh.iter().flat_map(BTreeMap::values).next() else { return Ok(None) };
+    let tool = first.tool.clone();
+    let how = &super::made_by(&first.version, &first.command);
+    let label = "baseline: decimated mesh".to_owned();
     let mut plots = Vec::new();
     for metric in [&HAUSDORFF, &MEAN_ERROR] {
         let points = mean_points(&of_mesh, metric);
@@ -220,7 +217,7 @@ fn per_mesh(
                 |of: &dyn Fn(&Entry<'_>) -> Option<String>| Cell::optional(best.and_then(of));
             let indices = |entry: &Entry<'_>| {
                 let counts = entry.record.evaluate.as_ref()?.counts;
-                Some(grouped(2 * counts.lone_edges + 3 * counts.faces))
+                Some(grouped((counts.bytes() - 8 * counts.numbers()) / 4))
             };
             let error = |metric: &'static Metric| {
                 move |entry: &Entry<'_>| metric.of(entry.record).map(|e| significant(e, 3))

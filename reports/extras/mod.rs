@@ -50,13 +50,17 @@ pub(crate) fn extras(
     dir: &Path,
     comparison: &Comparison<'_>,
     summaries: &[CountSummary],
-    how: &str,
 ) -> Result<Vec<Extra>, ReportError> {
     let mut extras = Vec::new();
-    extras.extend(baseline::section(dir, comparison, summaries, how)?);
-    extras.extend(stability::section(dir, how)?);
+    extras.extend(baseline::section(dir, comparison, summaries)?);
+    extras.extend(stability::section(dir)?);
     extras.extend(oracles::section(dir)?);
     Ok(extras)
+}
+
+/// How a file was made: under each of its tables.
+fn made_by(version: &str, command: &str) -> String {
+    format!("Made by medial {version}, with: {command}")
 }
 
 /// Reads the lines of a file; none where there is no file.

@@ -55,11 +55,10 @@ impl NoiseRecord {
 }
 
 /// The section; `None` without a record.
-pub(super) fn section(dir: &Path, how: &str) -> Result<Option<Extra>, ReportError> {
+pub(super) fn section(dir: &Path) -> Result<Option<Extra>, ReportError> {
     let all: Vec<NoiseRecord> = read_lines(&dir.join(STABILITY))?;
-    if all.is_empty() {
-        return Ok(None);
-    }
+    let Some(first) = all.first() else { return Ok(None) };
+    let how = &super::made_by(&first.record.version, &first.record.command);
     let records: Vec<Record> = all.iter().map(|noisy| noisy.record.clone()).collect();
     // For the labels and colours of the methods: the clean runs, or what else there is.
     let comparison = Comparison::new(&records);

@@ -3,13 +3,17 @@
 use std::sync::Arc;
 
 use super::{
-    AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
-    SurfaceDistances, VolumeOptions, axis_distance, certify, counts, distances, spikes,
-    surface_distances, triangle_quality, volume_error,
+    AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, EnvelopeOptions,
+    Evaluation, MetricError, SurfaceDistances, VolumeOptions, axis_distance, centres_outside,
+    certify, counts, distances, protrusion, spikes, surface_distances, triangle_quality,
+    volume_error,
 };
 use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
 use crate::geometry::TriangleBvh;
 use crate::surface::{InsideTest, Side, TriMesh};
+
+/// Depth, as a fraction of the diagonal, from which a point is buried: as in [`distances`].
+const BURIAL: f64 = 1e-7;
 
 /// Mean error from which radii that do not fit the surface are named. Below, the result is right
 /// whatever its radii.
@@ -91,16 +95,19 @@ impl Judge {
         let axis = || self.truth.axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
         let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
         // Side by side, because parts of each run on one thread.
-        let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
+        let ((distances, volume_error), (axis, (complex, protrusion))) = rayon::join(
             || rayon::join(|| self.distances(mesh), || self.volume_error(&union)),
-            || rayon::join(axis, complex),
+            || rayon::join(axis, || (complex(), self.protrusion(mesh, &union))),
         );
         let (distances, axis) = (distances?, axis.transpose()?);
+        let (quality, spikes, betti) = complex;
         Ok(Evaluation {
             warnings: self.misfits(mesh, &union, &distances),
             distances,
             certified: None,
             volume_error: volume_error?,
+            protrusion: Some(protrusion?),
+            centres_outside: Some(centres_outside(mesh, &self.inside)),
             quality,
             spikes,
             betti,
@@ -148,6 +155,16 @@ impl Judge {
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
         mesh.check().map_err(UnionError::from)?;
         certify(&self.surface, &self.tree, &mesh.in_order(), tolerance)
+    }
+
+    /// By the same points as the reverse distance.
+    fn protrusion(&self, mesh: &MedialMesh, union: &MedialUnion) -> Result<f64, MetricError> {
+        let options = EnvelopeOptions {
+            samples: self.options.samples,
+            burial: BURIAL,
+            seed: self.options.seed,
+        };
+        protrusion(mesh, union, &self.tree, &self.inside, &options)
     }
 
     fn volume_error(&self, union: &MedialUnion) -> Result<Option<f64>, MetricError> {
@@ -208,7 +225,7 @@ impl Judge {
             let scaled = (median - 1.0).abs() > 0.1 && high < 1.1 * low;
             if off || scaled {
                 let times = match median {
-                    0.001..1000.0 => format!("{median:.3}"),
+                    0.01..1000.0 => format!("{median:.3}"),
                     _ => format!("{median:.1e}"),
                 };
                 misfits.push(format!(
