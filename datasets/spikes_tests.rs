@@ -5,6 +5,8 @@ use medial::metrics::{Spikes, spikes};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{self, Normalisation, TriMesh};
 
+use crate::{add_noise, catalogue, find};
+
 /// Measures 1 to 5 at a threshold of 0.1: share of weak edges, spikes, dangling edges, fins, idle
 /// spheres.
 fn measures(found: &Spikes) -> [f64; 5] {
@@ -19,7 +21,7 @@ fn measures(found: &Spikes) -> [f64; 5] {
 }
 
 fn exact(id: &str) -> Option<[f64; 5]> {
-    let shape = medial_datasets::find(id).unwrap();
+    let shape = find(id).unwrap();
     let normal = Normalisation::of(&shape.mesh(shape.default_resolution)).unwrap();
     let axis = shape.axis()?.mesh;
     Some(measures(&spikes(&axis.transformed(1.0 / normal.diagonal, |p| normal.forward(p)))))
@@ -28,7 +30,7 @@ fn exact(id: &str) -> Option<[f64; 5]> {
 /// METHODOLOGY.md has these values.
 #[test]
 fn floors_on_exact_axes() {
-    for shape in medial_datasets::catalogue() {
+    for shape in catalogue() {
         if let Some([weak, spikes, dangling, fins, idle]) = exact(shape.id) {
             println!("{:14} {weak:.4} {spikes} {dangling} {fins} {idle}", shape.id);
         }
@@ -45,11 +47,11 @@ fn initial(mesh: &TriMesh) -> MedialMesh {
 
 /// Means over three random versions of each level.
 fn at_noise(id: &str, noise: f64) -> [f64; 6] {
-    let shape = medial_datasets::find(id).unwrap();
+    let shape = find(id).unwrap();
     let clean = shape.mesh(shape.default_resolution);
     let mut sum = [0.0; 6];
     for seed in 1..=3 {
-        let mesh = initial(&medial_datasets::add_noise(&clean, noise, seed));
+        let mesh = initial(&add_noise(&clean, noise, seed));
         let found = spikes(&mesh);
         let [weak, count, dangling, fins, idle] = measures(&found);
         let angle = found.angle_spikes.unwrap() as f64;
