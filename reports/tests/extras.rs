@@ -1,5 +1,6 @@
 //! What a report shows from files of their own: the baseline, stability under noise, oracles.
 
+#[allow(dead_code)]
 mod common;
 
 use std::fs;
