@@ -152,7 +152,7 @@ fn study(arguments: &Arguments) -> Result<Study, Failure> {
         return Err(Failure::usage("--noise-seeds 0: ask for at least one"));
     }
     let levels: Vec<Level> = counts.into_iter().map(Level::Spheres).collect();
-    let item = |method: &Box<dyn MedialSimplifier>| Item {
+    let item = |method: &dyn MedialSimplifier| Item {
         method: method.info().id.to_owned(),
         params: Params::none(),
         levels: levels.clone(),
@@ -160,7 +160,7 @@ fn study(arguments: &Arguments) -> Result<Study, Failure> {
     let seed = arguments.substrate.seed;
     let quick = JudgeOptions { samples: 10_000, volume_depth: 5, seed: 0 };
     Ok(Study {
-        items: methods.iter().map(item).collect(),
+        items: methods.iter().map(|method| item(method.as_ref())).collect(),
         methods,
         judge: judge_options(&arguments.measure, quick, seed)?,
         options: RunOptions { seed, repeat: 1, out: Some(arguments.out.join(FOLDER)) },
