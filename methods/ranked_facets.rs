@@ -37,12 +37,30 @@ impl FacetSet {
     }
 }
 
-/// Facets with a value for each; larger values are kept longer.
-pub(crate) struct RankedFacets {
+/// What the facets are ranked by.
+pub(crate) trait FacetValue: Send + Sync {
+    /// The value of a facet, in native units; larger values are kept longer.
+    fn value(&self, facet: usize) -> f64;
+
+    /// Whether the value is above a level. To be overridden where that is known sooner.
+    fn is_above(&self, facet: usize, level: f64) -> bool {
+        self.value(facet) > level
+    }
+}
+
+impl FacetValue for Vec<f64> {
+    fn value(&self, facet: usize) -> f64 {
+        self[facet]
+    }
+}
+
+/// Facets with a value for each.
+pub(crate) struct RankedFacets<'s> {
     set: FacetSet,
-    value: Vec<f64>,
-    /// Facets by descending value, then ascending id; only levels that ask for spheres need it.
-    order: OnceCell<Vec<u32>>,
+    value: Box<dyn FacetValue + 's>,
+    /// Values and facets by descending value, then ascending id; only levels that ask for spheres
+    /// need it.
+    order: OnceCell<Vec<(f64, u32)>>,
     scale: Scale,
     /// The level of [`Level::Published`], where there is one.
     published: Option<f64>,
@@ -50,23 +68,26 @@ pub(crate) struct RankedFacets {
     prepared: Diagnostics,
 }
 
-impl RankedFacets {
-    /// Ranks facets by `value`, in native units.
+impl<'s> RankedFacets<'s> {
+    /// Ranks facets by `value`.
     pub(crate) fn new(
         set: FacetSet,
-        value: Vec<f64>,
+        value: impl FacetValue + 's,
         scale: Scale,
         published: Option<f64>,
         prepared: Diagnostics,
     ) -> Self {
+        let value = Box::new(value);
         Self { set, value, order: OnceCell::new(), scale, published, prepared }
     }
 
-    fn order(&self) -> &[u32] {
+    fn order(&self) -> &[(f64, u32)] {
         self.order.get_or_init(|| {
-            let mut ranked: Vec<(f64, u32)> = self.value.iter().copied().zip(0..).collect();
+            let facets = (0..self.set.facets.len()).into_par_iter().with_min_len(256);
+            let mut ranked: Vec<(f64, u32)> =
+                facets.map(|facet| (self.value.value(facet), facet as u32)).collect();
             ranked.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            ranked.into_iter().map(|(_, facet)| facet).collect()
+            ranked
         })
     }
 
@@ -74,7 +95,7 @@ impl RankedFacets {
     fn facets_for(&self, spheres: usize) -> usize {
         let mut seen = vec![false; self.set.mesh.spheres.len()];
         let mut count = 0;
-        for (rank, &facet) in self.order().iter().enumerate() {
+        for (rank, &(_, facet)) in self.order().iter().enumerate() {
             for &sphere in self.set.facets.polygon(facet as usize) {
                 count += usize::from(!std::mem::replace(&mut seen[sphere as usize], true));
             }
@@ -82,15 +103,19 @@ impl RankedFacets {
                 return rank.max(1);
             }
         }
-        self.value.len()
+        self.set.facets.len()
     }
 
     /// The facets that a native level keeps, ascending.
     fn by_level(&self, level: f64) -> Result<Vec<u32>, SimplifyError> {
         self.scale.check(level)?;
-        let kept = |value: f64| value > level || (self.scale.inclusive && value == level);
-        let facets = (0..).zip(&self.value).filter(|&(_, &value)| kept(value));
-        Ok(facets.map(|(facet, _)| facet).collect())
+        let (value, inclusive) = (&self.value, self.scale.inclusive);
+        let kept = |&facet: &u32| {
+            let facet = facet as usize;
+            value.is_above(facet, level) || (inclusive && value.value(facet) == level)
+        };
+        let facets = (0..self.set.facets.len() as u32).into_par_iter().with_min_len(256);
+        Ok(facets.filter(kept).collect())
     }
 
     /// The facets that a number of spheres allows, ascending, and the value of the best of the
@@ -98,14 +123,14 @@ impl RankedFacets {
     fn by_count(&self, spheres: usize) -> (Vec<u32>, f64) {
         let order = self.order();
         let count = self.facets_for(spheres);
-        let dropped = order.get(count).map(|&facet| self.value[facet as usize]);
-        let mut kept = order[..count].to_vec();
+        let dropped = order.get(count).map(|&(value, _)| value);
+        let mut kept: Vec<u32> = order[..count].iter().map(|&(_, facet)| facet).collect();
         kept.sort_unstable();
         (kept, dropped.unwrap_or(*self.scale.range.start()))
     }
 }
 
-impl Simplification for RankedFacets {
+impl Simplification for RankedFacets<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let mut diagnostics = self.prepared.clone();
         let (kept, native) = match level {
@@ -127,12 +152,12 @@ impl Simplification for RankedFacets {
         match level {
             Level::Spheres(asked) if reached != asked => diagnostics.warn(format!(
                 "{reached} spheres instead of {asked}: whole facets are kept, {} in all",
-                if kept.len() == self.value.len() { "and these are" } else { "the best" }
+                if kept.len() == self.set.facets.len() { "and these are" } else { "the best" }
             )),
             _ if reached == 0 => diagnostics.warn(format!(
                 "no facet passes {} = {native}: the largest is {}",
                 self.scale.name,
-                self.value.iter().copied().fold(0.0, f64::max)
+                self.order().first().map_or(0.0, |&(value, _)| value.max(0.0))
             )),
             _ => {}
         }

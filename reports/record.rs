@@ -105,7 +105,8 @@ pub struct Record {
     /// What was measured on the answer. Absent where there is none, or where it was not measured.
     #[serde(default)]
     pub evaluate: Option<Evaluation>,
-    /// Wall-clock seconds of the evaluation; part of no method's time.
+    /// Wall-clock seconds of the evaluation; part of no method's time. The levels of a method are
+    /// measured side by side, and levels with the same result once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evaluate_seconds: Option<f64>,
     /// The medial mesh that every simplifier of this shape starts from.

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use medial::Vec3;
 use medial::complex::{
-    ContourError, MedialMesh, MedialUnion, Sphere, union_surface, union_surface_within,
+    ContourError, MedialMesh, MedialUnion, Sphere, union_surface, union_surface_while,
+    union_surface_within,
 };
 use medial::geometry::TriangleBvh;
 use medial::metrics::{EnvelopeOptions, sample_envelope, union_betti};
@@ -126,6 +127,26 @@ fn loops_and_voids_of_the_union_are_those_of_the_surface() {
         let [b0, b1, b2] = union_betti(&axis, 0.05).unwrap().map(|b| b as usize);
         let report = checked(&axis, tolerance);
         assert_eq!(report.expected_betti, Some([b0, b1, b2]));
+    }
+}
+
+#[test]
+fn it_stops_when_it_is_told_to() {
+    let ball = mesh(&[([0.0; 3], 1.0)], &[], &[]);
+    let within = |most: usize| {
+        let mut asked = 0;
+        let made = union_surface_while(&ball, 0.1, 1 << 24, || {
+            asked += 1;
+            asked <= most
+        });
+        (made, asked)
+    };
+    let (whole, questions) = within(usize::MAX);
+    assert_eq!(whole, union_surface(&ball, 0.1));
+    // It is asked in every round of the refinement, and last while edges are contracted.
+    assert!(questions > 12, "{questions}");
+    for most in [0, 1, 10, questions - 1] {
+        assert!(matches!(within(most).0, Err(ContourError::Cancelled)), "{most}");
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use medial::complex::{self, ContourError, MedialMesh, MedialUnion, union_surface};
 use medial::geometry::PowerCrust;
+use medial::metrics::union_betti;
 use medial::shape::Shape;
 use medial::surface::{self, Normalisation, SurfaceReport, TriMesh};
 use serde_json::{Map, Value, json};
@@ -52,6 +53,9 @@ enum Method {
 /// Corners of the power crust that are nearer than this along it are one, as a fraction of the
 /// diagonal.
 const COINCIDENT: f64 = 1e-6;
+
+/// Balls that stand for the union where its topology is asked are so far apart, in tolerances.
+const BALL_SPACING: f64 = 0.5;
 
 /// A result farther from the mesh than this, in its diagonals, is taken to be of another surface.
 const ASTRAY: f64 = 0.5;
@@ -107,6 +111,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 
     // Untimed: the verdict.
     let report = examine(arguments, &made.mesh, &mut warnings)?;
+    let union = match (arguments.method, &axis) {
+        (Method::Union, Some(axis)) => {
+            topology_of_union(axis, arguments.tolerance * made.diagonal, &report, &mut warnings)
+        }
+        _ => None,
+    };
     let deviation = shape.as_ref().map(|shape| deviation(shape, &made.mesh)).transpose()?;
     if let (Some([max, _]), Some(axis)) = (deviation, &arguments.axis)
         && max > ASTRAY
@@ -131,6 +141,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             "closed": report.closed, "manifold": report.manifold, "genus": report.genus,
             "components": report.components, "intersecting_pairs": report.intersecting_pairs,
             "tolerance": tolerance, "diagonal": made.diagonal,
+            "betti": report.expected_betti, "union_betti": union,
             "deviation": deviation.map(|[max, mean]| json!({ "max": max, "mean": mean })),
             "seconds": stages.seconds, "cpu_seconds": stages.cpu_seconds, "peak_bytes": peak,
             "output": arguments.output,
@@ -342,6 +353,25 @@ fn examine(
     warnings.extend(inspection.report.repairs.iter().map(ToString::to_string));
     warnings.extend(inspection.report.warnings.iter().cloned());
     Ok(inspection.report)
+}
+
+/// The Betti numbers of the union of balls along the primitives, and a warning where those of the
+/// surface differ; none where there are too many balls.
+fn topology_of_union(
+    axis: &MedialMesh,
+    tolerance: f64,
+    report: &SurfaceReport,
+    warnings: &mut Vec<String>,
+) -> Option<[u64; 3]> {
+    let union = union_betti(axis, BALL_SPACING * tolerance).ok()?;
+    let found = report.expected_betti?.map(|b| b as u64);
+    if found != union {
+        warnings.push(format!(
+            "the surface has Betti numbers {found:?}, the union of the primitives {union:?}: crevices, \
+             holes or necks are narrower than --tolerance shows; ask for a finer one"
+        ));
+    }
+    Some(union)
 }
 
 /// The largest and the mean distance of a surface's vertices and face centres from the mesh of a

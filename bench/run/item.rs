@@ -6,12 +6,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 use medial::complex::{self, MedialMesh};
-use medial::metrics::Judge;
+use medial::metrics::{Evaluation, Judge, MetricError};
 use medial::shape::{Cost, Shape};
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError, Work,
 };
 use medial_reports::{Initial, Record, Repetition, Simplify, Stages, Status};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{Input, Lap, Provenance, Stopwatch, peak_bytes};
@@ -100,9 +101,10 @@ pub fn run_item(
             warn_if_different(first, again);
         }
     }
-    let records = answers.into_iter().zip(repetitions).zip(&item.levels);
+    let measured = measure_all(measure.judge, &answers);
+    let records = answers.into_iter().zip(measured).zip(repetitions).zip(&item.levels);
     records
-        .map(|((answer, raw), &level)| {
+        .map(|(((answer, measured), raw), &level)| {
             let simplify = Simplify {
                 params: item.params.clone(),
                 seed: options.seed,
@@ -123,7 +125,7 @@ pub fn run_item(
                 repetitions: raw,
                 ..blank_record(measure.input.name.clone(), simplify, provenance)
             };
-            fill(&mut record, answer.outcome, measure, options);
+            fill(&mut record, answer.outcome, measured, measure, options);
             record
         })
         .collect()
@@ -273,10 +275,32 @@ fn blank_record(mesh: String, simplify: Simplify, provenance: &Provenance) -> Re
     }
 }
 
-/// Checks, measures and saves a result, and writes it into its record.
+/// An evaluation, and the seconds it took.
+type Measured = (Result<Evaluation, MetricError>, f64);
+
+/// Measures what came of each level, side by side, after all of them were timed. Levels with the
+/// same result are measured once.
+fn measure_all(judge: &Judge, answers: &[Answer]) -> Vec<Option<Measured>> {
+    let mesh = |answer: &Answer| answer.outcome.as_ref().ok().map(|simplified| &simplified.mesh);
+    let meshes: Vec<Option<&MedialMesh>> = answers.iter().map(mesh).collect();
+    // Its own index for the first of equal results.
+    let first = |index: usize| meshes[..index].iter().position(|&m| m == meshes[index]);
+    let firsts: Vec<usize> = (0..meshes.len()).map(|index| first(index).unwrap_or(index)).collect();
+    let measure = |index: usize| -> Option<Measured> {
+        let mesh = meshes[index].filter(|_| firsts[index] == index)?;
+        mesh.check().ok()?;
+        let (evaluation, lap) = Stopwatch::time(|| judge.evaluate(mesh));
+        Some((evaluation, lap.seconds))
+    };
+    let measured: Vec<Option<Measured>> = (0..meshes.len()).into_par_iter().map(measure).collect();
+    firsts.into_iter().map(|first| measured[first].clone()).collect()
+}
+
+/// Checks and saves a result, and writes it with its evaluation into its record.
 fn fill(
     record: &mut Record,
     outcome: Result<Simplified, Failure>,
+    measured: Option<Measured>,
     measure: &Measure<'_>,
     options: &RunOptions,
 ) {
@@ -308,11 +332,12 @@ fn fill(
     simplify.faces = Some(simplified.mesh.faces.len());
     simplify.warnings = simplified.diagnostics.warnings;
     simplify.diagnostics = simplified.diagnostics.counts.into_iter().collect();
-    let (evaluation, lap) = Stopwatch::time(|| measure.judge.evaluate(&simplified.mesh));
-    record.evaluate_seconds = Some(lap.seconds);
-    match evaluation {
-        Ok(evaluation) => record.evaluate = Some(evaluation),
-        Err(error) => record.simplify.warnings.push(format!("not measured: {error}")),
+    if let Some((evaluation, seconds)) = measured {
+        record.evaluate_seconds = Some(seconds);
+        match evaluation {
+            Ok(evaluation) => record.evaluate = Some(evaluation),
+            Err(error) => record.simplify.warnings.push(format!("not measured: {error}")),
+        }
     }
     if let Some(out) = &options.out {
         match save(&simplified.mesh, record, measure, out) {

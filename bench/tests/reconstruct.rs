@@ -151,6 +151,18 @@ fn what_makes_no_surface_is_said() {
     let (code, object) = json(&[&["reconstruct", &grown][..], &words].concat());
     assert!(code == 0 && object["warnings"].to_string().contains("in its units"), "{object}");
 
+    // A ring with a hole that is much narrower than the tolerance.
+    let ring: String = (0..6)
+        .map(|k| (f64::from(k) * std::f64::consts::TAU / 6.0).sin_cos())
+        .map(|(y, x)| format!("v {x} {y} 0 0.85\n"))
+        .chain((0..6).map(|k| format!("e {k} {}\n", (k + 1) % 6)))
+        .collect();
+    let ring = write("ring.ma", &format!("6 6 0\n{ring}"));
+    let (code, object) = json(&["reconstruct", &ring, "-o", &out, "--tolerance", "0.05"]);
+    assert_eq!((code, &object["union_betti"]), (0, &serde_json::json!([1, 1, 0])), "{object}");
+    assert_eq!(object["betti"], serde_json::json!([1, 0, 0]), "{object}");
+    assert!(object["warnings"].to_string().contains("narrower than --tolerance"), "{object}");
+
     // Lone spheres, one of them a point, are no error.
     let lone = write("lone.ma", "3 0 0\nv 0 0 0 1\nv 5 0 0 1\nv 9 0 0 0\n");
     let (code, object) = json(&["reconstruct", &lone, "-o", &out]);

@@ -20,7 +20,10 @@ use super::FacetAngle;
 use crate::ranked_facets::{FacetSet, RankedFacets};
 
 /// Ranks the Voronoi facets. `O(n)` for their vertices.
-pub(super) fn prepare(shape: &Shape, at: FacetAngle) -> Result<RankedFacets, SimplifyError> {
+pub(super) fn prepare(
+    shape: &Shape,
+    at: FacetAngle,
+) -> Result<RankedFacets<'static>, SimplifyError> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
     let value = |facet: usize| {
@@ -35,7 +38,7 @@ pub(super) fn prepare(shape: &Shape, at: FacetAngle) -> Result<RankedFacets, Sim
             FacetAngle::Minimum => vertices.map(|x| angle_from(x, ends)).fold(180.0, f64::min),
         }
     };
-    let values = (0..set.facets.len()).into_par_iter().map(value).collect();
+    let values: Vec<f64> = (0..set.facets.len()).into_par_iter().map(value).collect();
     Ok(RankedFacets::new(set, values, super::scale(), None, Diagnostics::default()))
 }
 

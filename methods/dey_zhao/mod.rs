@@ -35,18 +35,20 @@
 
 mod umbrella;
 
-use medial::Vec3;
+use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
+
+use medial::complex::VoronoiFacets;
 use medial::geometry::{Delaunay, VertexId};
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, RunContext,
     Simplification, SimplifyError,
 };
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::ranked::Scale;
-use crate::ranked_facets::{FacetSet, RankedFacets};
+use crate::ranked_facets::{FacetSet, FacetValue, RankedFacets};
 use umbrella::Umbrellas;
 
 /// The Voronoi subcomplex as a method.
@@ -158,58 +160,70 @@ impl MedialSimplifier for DeyZhao {
         let set = FacetSet::of(shape)?;
         let delaunay = shape.delaunay()?;
         let umbrellas = Umbrellas::new(&delaunay, shape.cells()?.circumspheres());
-        let value = (0..set.facets.len())
-            .into_par_iter()
-            .map(|facet| strength(&delaunay, &umbrellas, &params, set.facets.ends(facet)))
-            .collect();
         let mut diagnostics = Diagnostics::default();
         diagnostics.count("samples_without_umbrella", umbrellas.missing());
         diagnostics.count("umbrella_triangles_without_area", umbrellas.flat());
         let scale =
             Scale { name: "strength", range: 0.0..=f64::MAX, inclusive: false, no_published: "" };
-        Ok(Box::new(RankedFacets::new(set, value, scale, Some(1.0), diagnostics)))
+        let strength = Strength { facets: set.facets.clone(), delaunay, umbrellas, params };
+        Ok(Box::new(RankedFacets::new(set, strength, scale, Some(1.0), diagnostics)))
     }
 }
 
-/// The largest strength at which the facet dual to a Delaunay edge is kept: from either end, by
-/// either condition.
-fn strength(
-    delaunay: &Delaunay,
-    umbrellas: &Umbrellas,
-    params: &DeyZhaoParams,
-    [p, q]: [VertexId; 2],
-) -> f64 {
-    let edge = delaunay.point(q) - delaunay.point(p);
-    let from_p = one_sided(umbrellas, params, p, q, edge);
-    from_p.max(one_sided(umbrellas, params, q, p, edge))
+/// Step 3.
+struct Strength {
+    facets: Arc<VoronoiFacets>,
+    delaunay: Arc<Delaunay>,
+    umbrellas: Umbrellas,
+    params: DeyZhaoParams,
 }
 
-/// The same from `p` alone: 0 for an edge of its umbrella.
-fn one_sided(
-    umbrellas: &Umbrellas,
-    params: &DeyZhaoParams,
-    p: VertexId,
-    q: VertexId,
-    edge: Vec3,
-) -> f64 {
-    let umbrella = umbrellas.of(p);
-    if umbrella.is_empty() || umbrella.iter().any(|triangle| triangle.others.contains(&q)) {
-        return 0.0;
+impl FacetValue for Strength {
+    /// The largest strength at which the facet dual to a Delaunay edge is kept: from either end, by
+    /// either condition.
+    fn value(&self, facet: usize) -> f64 {
+        let [p, q] = self.facets.ends(facet);
+        self.from(p, q, 0.0).max(self.from(q, p, 0.0))
     }
-    let length = edge.length();
-    let by_angle = || {
-        // The least cosine belongs to the largest angle.
-        let cosines = umbrella.iter().map(|triangle| triangle.normal.dot(edge).abs() / length);
-        let least = cosines.fold(1.0, f64::min);
-        least.asin() / params.theta.to_radians()
-    };
-    let by_ratio = || {
-        let radii = umbrella.iter().map(|triangle| triangle.circumradius);
-        length / radii.fold(0.0, f64::max) / params.rho
-    };
-    match params.condition {
-        Condition::Both => by_angle().max(by_ratio()),
-        Condition::Angle => by_angle(),
-        Condition::Ratio => by_ratio(),
+
+    fn is_above(&self, facet: usize, level: f64) -> bool {
+        let [p, q] = self.facets.ends(facet);
+        self.from(p, q, level) > level || self.from(q, p, level) > level
+    }
+}
+
+impl Strength {
+    /// The strength from `p` alone, 0 for an edge of its umbrella. Where it is not above `level`
+    /// anything up to `level` may be returned.
+    fn from(&self, p: VertexId, q: VertexId, level: f64) -> f64 {
+        let DeyZhaoParams { theta, rho, condition } = self.params;
+        let edge = self.delaunay.point(q) - self.delaunay.point(p);
+        let length = edge.length();
+        let mut strength = match condition {
+            Condition::Angle => 0.0,
+            _ => length / self.umbrellas.largest_circumradius(p) / rho,
+        };
+        // The angles cannot bring it above the level if the cosine of one is no more than this.
+        let theta = theta.to_radians();
+        let enough = (level * theta).min(FRAC_PI_2).sin() * (1.0 - 1e-12);
+        let (mut least, by_angle) = (1.0, condition != Condition::Ratio);
+        let mut triangles = self.umbrellas.of(p).peekable();
+        if triangles.peek().is_none() {
+            return 0.0;
+        }
+        for triangle in triangles {
+            if triangle.corners.contains(&q) {
+                return 0.0;
+            }
+            // The least cosine belongs to the largest angle.
+            least = f64::min(least, triangle.normal.dot(edge).abs() / length);
+            if least <= enough && strength <= level && level > 0.0 {
+                return 0.0;
+            }
+        }
+        if by_angle && least > enough {
+            strength = f64::max(strength, least.asin() / theta);
+        }
+        strength
     }
 }

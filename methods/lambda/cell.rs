@@ -95,7 +95,7 @@ pub(super) fn prepare(shape: &Shape) -> Result<Cells, SimplifyError> {
 }
 
 /// The facets alone.
-pub(super) fn prepare_facets(shape: &Shape) -> Result<RankedFacets, SimplifyError> {
+pub(super) fn prepare_facets(shape: &Shape) -> Result<RankedFacets<'static>, SimplifyError> {
     let set = FacetSet::of(shape)?;
     let value = facet_values(shape, &set.facets)?;
     Ok(RankedFacets::new(set, value, super::scale(), None, Diagnostics::default()))

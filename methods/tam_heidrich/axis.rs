@@ -7,6 +7,8 @@ use medial::metrics::enclosed_volume;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
+use super::duplicates::{DistinctBalls, tetrahedron};
+use super::fins::without_fins;
 use super::merge;
 use super::params::{AxisChoice, TamHeidrichParams};
 use crate::perturb::perturbed;
@@ -117,24 +119,31 @@ fn of_union(
     run: &RunContext,
     diagnostics: &mut Diagnostics,
 ) -> Result<Axis, SimplifyError> {
-    let balls = shape.inner_balls()?;
+    let poles = match shape.has_given_initial() {
+        true => DistinctBalls::given(&shape.inner_balls()?.spheres),
+        false => DistinctBalls::of_samples(shape)?,
+    };
     run.step(0, 1)?;
-    let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
+    let spheres = perturbed(&poles.balls, params.radius_factor, params.jitter, run.seed);
     let union = UnionAxis::of_balls(&spheres).map_err(ShapeError::from)?;
+    run.step(0, 1)?;
     let whole = union.mesh();
-    let (mesh, into) = merge::merged(&whole, params.merge, run)?;
+    let at = poles.samples_of_corners(shape, &spheres, &union);
+    let is_fin = fins_of(&whole, &union, &at);
+    let (finless, first_into, fins_left) = without_fins(&whole, &is_fin);
+    run.step(0, 1)?;
+    let (mesh, into) = merge::merged(&finless, params.merge, run)?;
     let mut axis = Axis::of_mesh(mesh);
-    if let Some(contacts) = balls.contacts.as_ref().filter(|_| !shape.has_given_initial()) {
-        // The first vertices of the axis are centres of balls.
-        let poles = union.balls().iter().map(|&ball| ball as usize);
-        for (volume, &v) in volumes(contacts, poles).into_iter().zip(&into) {
-            axis.at_sphere[v as usize] += volume;
-        }
+    // The first vertices of the axis are centres of balls.
+    for (&ball, &v) in union.balls().iter().zip(&first_into) {
+        axis.at_sphere[into[v as usize] as usize] += poles.volumes[ball as usize];
     }
+    diagnostics.count("fins", is_fin.iter().filter(|&&fin| fin).count());
+    diagnostics.count("fins_left", fins_left);
     diagnostics.count("balls", spheres.len());
     diagnostics.count("balls_on_the_axis", union.balls().len());
     diagnostics.count("vertices", whole.spheres.len());
-    diagnostics.count("vertices_merged", whole.spheres.len() - axis.mesh.spheres.len());
+    diagnostics.count("vertices_merged", finless.spheres.len() - axis.mesh.spheres.len());
     diagnostics.count("facets_left_open", union.tally().open);
     diagnostics.count("doubtful_groups", union.tally().doubtful);
     let found = betti(&axis.mesh);
@@ -151,12 +160,19 @@ fn of_union(
     Ok(axis)
 }
 
+/// Which triangles of the axis of a union are between two corners at one sample.
+fn fins_of(mesh: &MedialMesh, union: &UnionAxis, at: &[Option<u32>]) -> Vec<bool> {
+    let sample = |corner: u32| at.get(corner as usize).copied().flatten();
+    let is_between = |[a, b]: [u32; 2]| sample(a).is_some() && sample(a) == sample(b);
+    let facets = union.facets().filter(|f| is_between(f.between));
+    let mut fins: Vec<[u32; 3]> = facets.flat_map(|f| f.fan()).collect();
+    fins.iter_mut().for_each(|fin| fin.sort_unstable());
+    fins.sort_unstable();
+    mesh.faces.iter().map(|face| fins.binary_search(face).is_ok()).collect()
+}
+
 /// The volumes of the Delaunay tetrahedra of some poles.
 fn volumes(contacts: &Contacts, poles: impl Iterator<Item = usize>) -> Vec<f64> {
     let corners = |pole: usize| contacts.of_sphere[pole].map(|s| contacts.samples[s as usize]);
     poles.map(|pole| tetrahedron(corners(pole))).collect()
-}
-
-fn tetrahedron([a, b, c, d]: [Vec3; 4]) -> f64 {
-    (b - a).dot((c - a).cross(d - a)).abs() / 6.0
 }

@@ -4,7 +4,9 @@
 //! Visualization, <https://doi.org/10.1109/VISUAL.2003.1250410>.
 //!
 //! 1. Sections 2.1 and 3: the medial axis of the union of the inner polar balls, triangulated (file
-//!    `axis.rs`), duplicate vertices merged (file `merge.rs`).
+//!    `axis.rs`). Duplicates are merged as the samples tell: polar balls of cospherical samples before it
+//!    is made (file `duplicates.rs`), facets between corners at one sample after (file `fins.rs`), and
+//!    vertices that are left nearly at one position (file `merge.rs`).
 //! 2. Section 4.2: each inner pole is the circumcentre of a Delaunay tetrahedron. The volume of a part
 //!    is that of the tetrahedra whose poles lie on it, divided by the volume of the solid. A pole on
 //!    several parts counts for each.
@@ -24,12 +26,12 @@
 //! So results of fewer spheres are always part of those of more, and a part is the smallest step.
 //!
 //! # What does not reproduce
-//! - On an exact axis of a box there are twelve parts of level 1 and one of level 2, as in figure 5. On a
-//!   box that is sampled on a grid of an eighth of its height, rounds by triangle count leave nine parts that
-//!   cover all sheets, but not one part for each: where an edge of a seam has two triangles, the sheets
-//!   there grow together, by the rule of section 4.1. The axis of the perturbed balls has such edges on
-//!   its seams from the start, and each round without a test makes more. Corners merged by the samples
-//!   that they stem from, before the axis is made, as in the paper, may cure it; that was not tried.
+//! - On an exact axis of a box there are twelve parts of level 1 and one of level 2, as in figure 5, and
+//!   so there are on a box that is sampled on a grid: 162 parts at first, these 13 after one round by
+//!   triangle count. On a box of 3,000 random samples there are not: neighbouring polar balls often share no
+//!   sample, so that their union has dimples, and its exact axis has 12,600 parts. The
+//!   rounds by triangle count leave 66, but where one of the small parts ended at a seam, that has an edge of
+//!   two triangles, and sheets grow together over it, by the rule of section 4.1.
 //! - Rounds without a test of topology are not harmless: on the double torus they cut both loops, on a bear
 //!   of 35,000 samples they leave eleven components. `topology=all` tests there too.
 //! - Pruning ends where all that is left is one sheet for each body, or sheets that hold loops, often
@@ -44,11 +46,15 @@
 //!   (`graph_loops`; `refused_leaves`: parts that only the exact test kept).
 //! - Edges without triangles stay: on tubes they carry the loops. A part that is a whole component
 //!   stays, also in the rounds without a test.
-//! - Radii times 1.002 and centres moved by up to `1e-4 r` before step 1 (`methods/perturb.rs`).
-//!   The paper merges equal corners by the samples that tetrahedra share; without the perturbation
-//!   rounding still tears the axis, see [`medial::complex::union_axis`]. The results are 0.2 % larger. Of
-//!   the vertices that are duplicates but for the perturbation those nearer than `merge` radii are
-//!   merged; elsewhere more parts are left than the paper has, and the first round removes most of them.
+//! - Inner poles that are equally far from their sample, up to rounding, are all taken. On a grid which of
+//!   them is farthest is decided by rounding, and sheets would end in other places at each corner of a box.
+//! - Radii times 1.002 and centres moved by up to `1e-4 r` before the axis is made (`methods/perturb.rs`),
+//!   because rounding tears the axis of polar balls as they are, see [`medial::complex::union_axis`].
+//!   The results are 0.2 % larger. The paper merges equal corners before it makes the Voronoi diagram of
+//!   them; here those that stem from one sample are a little apart, and what the merging would not have
+//!   made is removed afterwards, as far as that keeps the topology: the facets between two of them
+//!   (`fins.rs`), and the vertices nearer than `merge` radii. Merged before, they contradict the dual complex
+//!   of the balls: on the box 86 facets stayed open, on a bear 2,000.
 //! - The axis of the union is exact, not the subset of the Voronoi diagram of the corners that
 //!   intersects the power shape.
 //! - Inner and outer poles are told apart by the surface.
@@ -62,6 +68,8 @@
 //!   `medial reconstruct --method power-crust`.
 
 mod axis;
+mod duplicates;
+mod fins;
 mod graph;
 mod merge;
 mod params;

@@ -10,6 +10,7 @@ use rand_pcg::Pcg64;
 
 use super::TamHeidrichParams;
 use super::axis::Axis;
+use super::fins::without_fins;
 use super::graph::{Graph, levels};
 use super::merge;
 use super::parts::{Parts, Remaining};
@@ -208,6 +209,30 @@ fn merging_duplicate_vertices_keeps_the_topology() {
         }
     }
     assert!(gone > 1_000, "{gone}");
+}
+
+#[test]
+fn taking_fins_away_keeps_the_topology() {
+    let mut rng = Pcg64::seed_from_u64(75);
+    let mut gone = 0;
+    for round in 0..600 {
+        let whole = if round % 2 == 0 { random_complex(&mut rng) } else { random_sheets(&mut rng) };
+        let is_fin: Vec<bool> = whole.faces.iter().map(|_| rng.random_range(0..3) > 0).collect();
+        let (mesh, into, left) = without_fins(&whole, &is_fin);
+        mesh.check().expect("a valid complex");
+        assert_eq!(betti(&mesh), betti(&whole), "{whole:?} {is_fin:?}");
+        // What is no fin stays, and so does what is left of the fins.
+        let others = is_fin.iter().filter(|fin| !**fin).count();
+        assert_eq!(mesh.faces.len(), others + left);
+        let numbers: BTreeSet<u32> = into.iter().copied().collect();
+        assert!(numbers.into_iter().eq(0..mesh.spheres.len() as u32));
+        for (face, _) in whole.faces.iter().zip(&is_fin).filter(|(_, fin)| !**fin) {
+            let face = face.map(|v| into[v as usize]);
+            assert!(mesh.faces.contains(&face), "{whole:?} {is_fin:?}");
+        }
+        gone += whole.faces.len() - mesh.faces.len();
+    }
+    assert!(gone > 500, "{gone}");
 }
 
 #[test]

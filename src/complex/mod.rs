@@ -14,7 +14,9 @@ pub mod union_axis;
 mod voronoi;
 mod voronoi_facets;
 
-pub use contour::{ContourError, UnionSurface, union_surface, union_surface_within};
+pub use contour::{
+    ContourError, UnionSurface, union_surface, union_surface_while, union_surface_within,
+};
 pub use cubical::cubical_betti;
 pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
 pub use incidence::Incidence;

@@ -69,6 +69,36 @@ impl Cone {
         }
     }
 
+    /// Centre of the first ball.
+    pub(crate) fn start(&self) -> Vec3 {
+        self.start
+    }
+
+    /// `u`; zero when one ball holds the other.
+    pub(crate) fn axis(&self) -> Vec3 {
+        self.axis
+    }
+
+    /// `l`; zero when one ball holds the other.
+    pub(crate) fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// Radius of the first ball.
+    pub(crate) fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// `s`.
+    pub(crate) fn slope(&self) -> f64 {
+        self.slope
+    }
+
+    /// `s / sqrt(1 - s^2)`.
+    pub(crate) fn lead(&self) -> f64 {
+        self.lead
+    }
+
     /// Which ball (0 or 1) holds the other, if one does.
     pub fn larger(&self) -> Option<usize> {
         self.larger

@@ -22,6 +22,7 @@ pub mod union_boundary;
 
 pub(crate) use bvh::{Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order, morton_order};
 pub use bvh::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree};
+pub(crate) use bvh::{ConeBlock, FaceBlock, Lanes, Measure, Query, ReachTree};
 pub use cone::Cone;
 pub use delaunay::Delaunay;
 pub use dual_complex::DualComplex;

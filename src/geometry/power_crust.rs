@@ -34,7 +34,7 @@ use rayon::prelude::*;
 use super::triangulation::{CellId, VertexId};
 use super::{Regular, Sphere, TriangulationError};
 use crate::Vec3;
-use crate::surface::{Contraction, Folds, TriMesh, contract_short_edges};
+use crate::surface::{Contraction, Folds, TriMesh, contract_short_edges_while};
 
 /// The facets of the power diagram that separate inner from outer balls.
 ///
@@ -166,8 +166,18 @@ impl PowerCrust {
     /// rounding, which flat groups of balls amplify to some 1e-8 of the diagonal, any value well below
     /// the distance of samples will do.
     pub fn surface(&self, coincident: f64) -> Contraction {
+        self.surface_while(coincident, || true).expect("nobody stops it")
+    }
+
+    /// [`PowerCrust::surface`] for as long as `go_on` says so, which is asked every few thousand edges;
+    /// `None` if it was stopped.
+    pub fn surface_while(
+        &self,
+        coincident: f64,
+        go_on: impl FnMut() -> bool,
+    ) -> Option<Contraction> {
         let limits = vec![coincident; self.corners.len()];
-        contract_short_edges(&self.triangles(), &limits, Folds::Ignored)
+        contract_short_edges_while(&self.triangles(), &limits, Folds::Ignored, go_on)
     }
 }
 

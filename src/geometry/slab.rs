@@ -133,6 +133,26 @@ impl SlabFace {
         })
     }
 
+    /// The plane of the centres.
+    pub(crate) fn frame(&self) -> &PlanarFrame {
+        &self.frame
+    }
+
+    /// Radius at the origin of the frame.
+    pub(crate) fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// `g` in the frame.
+    pub(crate) fn gradient(&self) -> [f64; 2] {
+        self.gradient
+    }
+
+    /// `1 / k`.
+    pub(crate) fn lead(&self) -> f64 {
+        self.lead
+    }
+
     /// Signed distance to the slab where its nearest sphere is inside the triangle; `None` where
     /// that sphere is on a side.
     #[inline]

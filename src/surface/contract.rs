@@ -66,13 +66,31 @@ pub enum Folds {
 /// # Panics
 /// If there are fewer limits than vertices, or a face names a vertex that does not exist.
 pub fn contract_short_edges(mesh: &TriMesh, limits: &[f64], folds: Folds) -> Contraction {
+    contract_short_edges_while(mesh, limits, folds, || true).expect("nobody stops it")
+}
+
+/// [`contract_short_edges`] for as long as `go_on` says so, which is asked every few thousand edges;
+/// `None` if it was stopped.
+///
+/// # Panics
+/// As [`contract_short_edges`].
+pub fn contract_short_edges_while(
+    mesh: &TriMesh,
+    limits: &[f64],
+    folds: Folds,
+    mut go_on: impl FnMut() -> bool,
+) -> Option<Contraction> {
     let mut surface = Shrinking::new(mesh, limits, folds);
     let mut queue: BinaryHeap<_> = surface.short_edges().collect();
     let mut contracted = 0;
     loop {
         let mut refused = Vec::new();
-        let before = contracted;
+        let (before, mut asked) = (contracted, 0);
         while let Some(Reverse(edge)) = queue.pop() {
+            if asked % 4096 == 0 && !go_on() {
+                return None;
+            }
+            asked += 1;
             let (_, a, b) = edge;
             if !surface.is_edge(a, b) {
                 continue;
@@ -92,7 +110,7 @@ pub fn contract_short_edges(mesh: &TriMesh, limits: &[f64], folds: Folds) -> Con
             let dropped = surface.drop_specks();
             refused.retain(|&(_, a, b)| surface.is_edge(a, b));
             let mesh = surface.finish();
-            return Contraction { mesh, contracted, refused: refused.len(), dropped };
+            return Some(Contraction { mesh, contracted, refused: refused.len(), dropped });
         }
         queue = refused.into_iter().map(Reverse).collect();
     }

@@ -34,7 +34,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-pub use contract::{Contraction, Folds, contract_short_edges};
+pub use contract::{Contraction, Folds, contract_short_edges, contract_short_edges_while};
 pub use error::{Fault, Place, SurfaceError, VertexName};
 pub use inside::{InsideTest, Side};
 pub use mesh::{Normalisation, TriMesh};

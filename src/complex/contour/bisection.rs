@@ -60,13 +60,21 @@ pub(super) struct Bisection {
     vertex_at: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
 }
 
-/// The subdivision has more tetrahedra than are allowed, or would have many times as many.
-pub(super) struct TooMany {
-    /// Bisections of the finest one when that was found.
-    pub generation: u8,
-    /// Tetrahedra then.
-    pub leaves: usize,
+/// Why the subdivision is not finished.
+pub(super) enum Unfinished {
+    /// It has more tetrahedra than are allowed, or would have many times as many.
+    TooMany {
+        /// Bisections of the finest one when that was found.
+        generation: u8,
+        /// Tetrahedra then.
+        leaves: usize,
+    },
+    /// It was stopped.
+    Stopped,
 }
+
+/// Vertices whose values are found between two questions whether to go on.
+const CHUNK: usize = 1 << 16;
 
 /// How many times too many tetrahedra have to be foreseen for giving up at once.
 const HOPELESS: f64 = 8.0;
@@ -113,23 +121,30 @@ impl Bisection {
     }
 
     /// Bisects until no tetrahedron is wanted and all are conforming. `values` gives the values at
-    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary.
+    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary. `go_on` is asked
+    /// in every round, and every so many vertices.
     ///
     /// # Errors
     /// When there are more than `most` tetrahedra, or will be by far: near a surface, three bisections
-    /// make four of one.
+    /// make four of one. When `go_on` stops it.
     pub(super) fn refine(
         &mut self,
         goal: u8,
         most: usize,
         values: impl Fn(&[Vec3]) -> Vec<Value>,
         wanted: impl Fn(&Leaf, [Value; 4]) -> bool + Sync,
-    ) -> Result<(), TooMany> {
+        mut go_on: impl FnMut() -> bool,
+    ) -> Result<(), Unfinished> {
         let mut finest = 0;
         loop {
             let new: Vec<Vec3> =
                 (self.values.len()..self.keys.len()).map(|v| self.position(v as u32)).collect();
-            self.values.extend(values(&new));
+            for chunk in new.chunks(CHUNK) {
+                if !go_on() {
+                    return Err(Unfinished::Stopped);
+                }
+                self.values.extend(values(chunk));
+            }
             let is_split = |leaf: &Leaf| {
                 let may = leaf.generation < MOST_BISECTIONS;
                 let wanted = !leaf.settled && may && wanted(leaf, self.values_of(leaf));
@@ -145,7 +160,7 @@ impl Bisection {
             let foreseen = if finest < FORESIGHT { 0.0 } else { more as f64 * to_come.exp2() };
             let leaves = self.leaves.len() + more;
             if leaves > most || foreseen > HOPELESS * most as f64 {
-                return Err(TooMany { generation: finest, leaves });
+                return Err(Unfinished::TooMany { generation: finest, leaves });
             }
             self.round += 1;
             let old = std::mem::take(&mut self.leaves);
@@ -261,7 +276,7 @@ mod tests {
             let size = sizes[usize::from(leaf.generation)];
             size > smallest && values.iter().all(|v| v.signed <= size)
         };
-        assert!(all.refine(0, 1 << 20, values, wanted).is_ok());
+        assert!(all.refine(0, 1 << 20, values, wanted, || true).is_ok());
         all
     }
 

@@ -8,7 +8,7 @@
 //!    tolerance, or than the radius of the union's balls there where that is less (file `bisection.rs`).
 //! 2. Marching tetrahedra: a closed manifold with its vertices on the boundary (file `march.rs`).
 //! 3. Edges shorter than a quarter of the tetrahedron's edge are contracted: a closed manifold stays one,
-//!    and vertices stay on the boundary ([`contract_short_edges`]).
+//!    and vertices stay on the boundary ([`contract_short_edges_while`]).
 //!
 //! # What the tolerance means
 //!
@@ -21,16 +21,18 @@
 //! So no point of the surface is farther than the tolerance from the union, or deeper in it. On smooth
 //! parts the distance is much less, about `d^2 / 8 r` for curvature radius `r`. What is thinner than a
 //! tetrahedron can be missed: parts of the union with a radius below 1/20 of the tolerance
-//! ([`UnionSurface::lost`]), and crevices and holes narrower than the tolerance.
+//! ([`UnionSurface::lost`]), and crevices and holes narrower than the tolerance. A crevice that is missed
+//! in some places and not in others has bridges, and the surface has loops that the union has not:
+//! [`union_betti`](crate::metrics::union_betti) tells.
 
 mod bisection;
 mod march;
 
-use bisection::{Bisection, Leaf, MOST_BISECTIONS, Value};
+use bisection::{Bisection, Leaf, MOST_BISECTIONS, Unfinished, Value};
 
 use super::{MedialMesh, MedialUnion, UnionError};
 use crate::Vec3;
-use crate::surface::{Folds, TriMesh, contract_short_edges};
+use crate::surface::{Folds, TriMesh, contract_short_edges_while};
 
 /// The boundary surface of a union, see [`union_surface`].
 #[derive(Clone, Debug, PartialEq)]
@@ -81,6 +83,9 @@ pub enum ContourError {
     /// All radii are zero.
     #[error("all spheres have radius zero: their union has no inside")]
     NoInside,
+    /// It was stopped.
+    #[error("cancelled")]
+    Cancelled,
 }
 
 /// Tetrahedra's edges as a share of the tolerance; contraction takes the rest.
@@ -131,6 +136,20 @@ pub fn union_surface_within(
     tolerance: f64,
     most: usize,
 ) -> Result<UnionSurface, ContourError> {
+    union_surface_while(mesh, tolerance, most, || true)
+}
+
+/// [`union_surface_within`] for as long as `go_on` says so, which is asked every few ten thousand
+/// vertices: of a [`RunContext`](crate::simplifier::RunContext), `|| run.step(0, 1).is_ok()`.
+///
+/// # Errors
+/// As [`union_surface`], and [`ContourError::Cancelled`] if it was stopped.
+pub fn union_surface_while(
+    mesh: &MedialMesh,
+    tolerance: f64,
+    most: usize,
+    mut go_on: impl FnMut() -> bool,
+) -> Result<UnionSurface, ContourError> {
     let union = MedialUnion::new(mesh)?;
     if !(tolerance > 0.0 && tolerance.is_finite()) {
         return Err(ContourError::Tolerance(tolerance));
@@ -153,11 +172,14 @@ pub fn union_surface_within(
         let found = union.deepest_ball_batch(points).into_iter();
         found.map(|(signed, radius)| Value { signed, radius }).collect()
     };
-    grid.refine(goal, most, values, wanted).map_err(|many| {
-        // Enough even if everything is thin and has to be refined as far as that goes.
-        let size = sizes[usize::from(many.generation)] / THINNEST;
-        let feasible = size / EDGE_SHARE * f64::max(1.0, (many.leaves as f64 / most as f64).sqrt());
-        ContourError::TooFine { tolerance, most, feasible }
+    grid.refine(goal, most, values, wanted, &mut go_on).map_err(|unfinished| match unfinished {
+        Unfinished::TooMany { generation, leaves } => {
+            // Enough even if everything is thin and has to be refined as far as that goes.
+            let size = sizes[usize::from(generation)] / THINNEST;
+            let feasible = size / EDGE_SHARE * f64::max(1.0, (leaves as f64 / most as f64).sqrt());
+            ContourError::TooFine { tolerance, most, feasible }
+        }
+        Unfinished::Stopped => ContourError::Cancelled,
     })?;
     if sizes[usize::from(goal)] > longest {
         let feasible = sizes[usize::from(goal)] / EDGE_SHARE;
@@ -170,7 +192,8 @@ pub fn union_surface_within(
         return Err(ContourError::TooThin { smallest, feasible });
     }
     let limits: Vec<f64> = edges.iter().map(|length| CONTRACTED * length).collect();
-    let mesh_of = contract_short_edges(&raw, &limits, Folds::Refused).mesh;
+    let contracted = contract_short_edges_while(&raw, &limits, Folds::Refused, go_on);
+    let mesh_of = contracted.ok_or(ContourError::Cancelled)?.mesh;
     let lost = mesh.spheres.iter().filter(|m| m.radius < smallest).count();
     Ok(UnionSurface { mesh: mesh_of, tetrahedra: grid.leaves.len(), lost, smallest })
 }

@@ -7,12 +7,14 @@ use crate::Vec3;
 use crate::geometry::dual_complex::Class;
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{
-    CellId, Delaunay, DualComplex, Sphere, TriangulationError, UnionBoundary, VertexId,
+    CellId, Delaunay, DualComplex, Sphere, TriangulationError, UnionBoundary, UnionVertex, VertexId,
 };
 
 /// The corners of a union of balls and their Delaunay triangulation.
 pub(super) struct Corners {
     points: Vec<Vec3>,
+    /// The first vertex of the boundary at each corner.
+    vertices: Vec<UnionVertex>,
     /// The balls of corner `i` are `balls[start[i]..start[i + 1]]`, ascending.
     start: Vec<u32>,
     balls: Vec<u32>,
@@ -32,6 +34,13 @@ impl Corners {
         let boundary = UnionBoundary::new(complex);
         let merged = boundary.merge(|_| None);
         let points = merged.points().to_vec();
+        // Points are numbered in the order of their first vertices.
+        let mut vertices: Vec<UnionVertex> = Vec::with_capacity(points.len());
+        for (vertex, &point) in boundary.vertices().iter().zip(merged.point_of()) {
+            if point as usize == vertices.len() {
+                vertices.push(*vertex);
+            }
+        }
         let same = same_position(&points);
         let of_vertex = merged.point_of().iter().map(|&point| same[point as usize]);
         let of_vertex: Vec<u32> = of_vertex.collect();
@@ -42,7 +51,7 @@ impl Corners {
         };
         let at = corners_of_sides(complex, &boundary, &of_vertex);
         let centres = balls.iter().map(|b| b.centre).collect();
-        Ok(Self { points, start, balls: meeting, at, centres, delaunay })
+        Ok(Self { points, vertices, start, balls: meeting, at, centres, delaunay })
     }
 
     /// The number of different corners.
@@ -50,8 +59,17 @@ impl Corners {
         self.start.windows(2).filter(|pair| pair[0] < pair[1]).count()
     }
 
+    /// One more than the largest index of a corner or an anchor.
+    pub(super) fn with_anchors(&self) -> usize {
+        self.delaunay.as_ref().map_or(0, Delaunay::point_count).max(self.points.len())
+    }
+
     pub(super) fn point(&self, corner: u32) -> Vec3 {
         self.points[corner as usize]
+    }
+
+    pub(super) fn vertices(&self) -> &[UnionVertex] {
+        &self.vertices
     }
 
     pub(super) fn centre(&self, ball: u32) -> Vec3 {

@@ -37,11 +37,15 @@ impl Polygon {
 
     /// Triangles from the smallest vertex.
     pub(super) fn fan(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
-        let v = &self.vertices;
-        let first = (0..v.len()).min_by_key(|&k| v[k]).unwrap_or(0);
-        let at = move |k: usize| v[(first + k) % v.len()];
-        (1..v.len().saturating_sub(1)).map(move |k| [at(0), at(k), at(k + 1)])
+        fan(&self.vertices)
     }
+}
+
+/// Triangles of a polygon from its smallest vertex.
+pub(super) fn fan(v: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    let first = (0..v.len()).min_by_key(|&k| v[k]).unwrap_or(0);
+    let at = move |k: usize| v[(first + k) % v.len()];
+    (1..v.len().saturating_sub(1)).map(move |k| [at(0), at(k), at(k + 1)])
 }
 
 /// The sides along edges of the dual complex.
@@ -89,20 +93,70 @@ pub(super) fn voronoi_sides(
     sides.extend(found);
 }
 
-/// Joins the sides of each facet to polygons.
-pub(super) fn close_up(sides: &mut [Side], tally: &mut AxisTally) -> Vec<Polygon> {
-    let pair = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
-    // In the order of the fields.
-    sides.par_sort_unstable_by_key(|s| (pair(s.corners[0], s.corners[1]), pair(s.from, s.to)));
+/// Joins the sides of each facet to polygons. `corners` is their number, anchors included.
+pub(super) fn close_up(sides: &[Side], corners: usize, tally: &mut AxisTally) -> Vec<Polygon> {
+    let mut sides = by_first_corner(sides, corners);
+    sides.par_chunk_by_mut(|a, b| a.corners[0] == b.corners[0]).for_each(<[Side]>::sort_unstable);
     let facets: Vec<&[Side]> = sides.chunk_by(|a, b| a.corners == b.corners).collect();
-    let traced: Vec<(Vec<Polygon>, bool)> =
-        facets.par_iter().with_min_len(1 << 9).map(|sides| trace(sides)).collect();
-    tally.open += traced.iter().filter(|t| t.1).count();
-    traced.into_iter().flat_map(|t| t.0).collect()
+    let chunks = facets.par_iter().with_min_len(1 << 9);
+    let traced: Vec<Traced> = chunks
+        .map(|sides| match single(sides) {
+            Some(polygon) => Traced { single: Some(polygon), ..Traced::default() },
+            None => trace(sides),
+        })
+        .collect();
+    tally.open += traced.iter().filter(|t| t.open).count();
+    traced.into_iter().flat_map(|t| t.single.into_iter().chain(t.several)).collect()
 }
 
-/// The simple polygons of one facet, and whether some sides were left over.
-fn trace(sides: &[Side]) -> (Vec<Polygon>, bool) {
+/// The sides in the order of their smaller corners: a comparison sort of them all is the slowest part of
+/// the whole axis.
+fn by_first_corner(sides: &[Side], corners: usize) -> Vec<Side> {
+    let mut next = vec![0_u32; corners + 1];
+    for side in sides {
+        next[side.corners[0] as usize + 1] += 1;
+    }
+    for corner in 0..corners {
+        next[corner + 1] += next[corner];
+    }
+    let mut sorted = vec![Side { corners: [NONE; 2], from: NONE, to: NONE }; sides.len()];
+    for side in sides {
+        let place = &mut next[side.corners[0] as usize];
+        sorted[*place as usize] = *side;
+        *place += 1;
+    }
+    sorted
+}
+
+/// The polygons of one facet.
+#[derive(Default)]
+struct Traced {
+    single: Option<Polygon>,
+    several: Vec<Polygon>,
+    /// Whether some sides were left over.
+    open: bool,
+}
+
+/// The polygon of sides that are one, through different vertices: almost all facets are.
+fn single(sides: &[Side]) -> Option<Polygon> {
+    if sides.len() < 3 || sides.windows(2).any(|pair| pair[0].from == pair[1].from) {
+        return None;
+    }
+    let mut vertices = Vec::with_capacity(sides.len());
+    let mut at = 0;
+    while vertices.len() < sides.len() {
+        vertices.push(sides[at].from);
+        at = sides.binary_search_by_key(&sides[at].to, |side| side.from).ok()?;
+        if at == 0 {
+            break;
+        }
+    }
+    let is_whole = at == 0 && vertices.len() == sides.len();
+    is_whole.then(|| Polygon { between: sides[0].corners, vertices, ..Polygon::default() })
+}
+
+/// The simple polygons of any facet.
+fn trace(sides: &[Side]) -> Traced {
     let sides = without_opposites(sides);
     let between = sides.first().map_or([NONE; 2], |s| s.corners);
     // Sides from one vertex follow each other; the first of them stands for the vertex.
@@ -138,7 +192,7 @@ fn trace(sides: &[Side]) -> (Vec<Polygon>, bool) {
             on_path[vertex(v)] = NONE;
         }
     }
-    (polygons, open)
+    Traced { single: None, several: polygons, open }
 }
 
 /// The sides whose opposite is not among them, in order.

@@ -57,7 +57,7 @@ use rayon::prelude::*;
 use super::MedialMesh;
 use crate::Vec3;
 use crate::geometry::dual_complex::Class;
-use crate::geometry::{CellId, DualComplex, Sphere, TriangulationError};
+use crate::geometry::{CellId, DualComplex, Sphere, TriangulationError, UnionVertex};
 
 use corners::Corners;
 use facets::Polygon;
@@ -85,6 +85,7 @@ pub struct UnionAxis {
     balls: Vec<u32>,
     edges: Vec<[u32; 2]>,
     polygons: Vec<Polygon>,
+    corners: Vec<UnionVertex>,
     union_betti: [u64; 3],
     tally: AxisTally,
 }
@@ -113,8 +114,17 @@ pub struct AxisTally {
 pub struct AxisFacet<'a> {
     /// The two points of the boundary of the union that are nearest to each point of it.
     pub corners: [Vec3; 2],
+    /// The same as indices of [`UnionAxis::corners`].
+    pub between: [u32; 2],
     /// The vertices in order, as indices of spheres.
     pub polygon: &'a [u32],
+}
+
+impl<'a> AxisFacet<'a> {
+    /// The facet as triangles, those of [`UnionAxis::mesh`].
+    pub fn fan(self) -> impl Iterator<Item = [u32; 3]> + 'a {
+        facets::fan(self.polygon)
+    }
 }
 
 impl UnionAxis {
@@ -137,7 +147,7 @@ impl UnionAxis {
         let voronoi = sides::classify(&corners, &sectors, &mut tally);
         let mut sides = facets::solid_sides(&sectors);
         facets::voronoi_sides(&corners, &voronoi, balls.len() as u32, &mut sides);
-        let polygons = facets::close_up(&mut sides, &mut tally);
+        let polygons = facets::close_up(&sides, corners.with_anchors(), &mut tally);
         let mut edges: Vec<[u32; 2]> = lone_edges(&complex);
         edges.extend(voronoi.edges(&corners, balls.len() as u32));
         Ok(Self::assemble(balls, &complex, &corners, edges, polygons, tally))
@@ -189,7 +199,8 @@ impl UnionAxis {
         edges.par_sort_unstable_by_key(|&[a, b]| u64::from(a) << 32 | u64::from(b));
         edges.dedup();
         let union_betti = complex.betti();
-        Self { spheres, balls: of_ball, edges, polygons, union_betti, tally }
+        let corners = corners.vertices().to_vec();
+        Self { spheres, balls: of_ball, edges, polygons, corners, union_betti, tally }
     }
 
     /// The vertices: centres of balls with their radii, ascending, then Voronoi vertices with their
@@ -210,7 +221,16 @@ impl UnionAxis {
 
     /// The facets, by corners.
     pub fn facets(&self) -> impl ExactSizeIterator<Item = AxisFacet<'_>> {
-        self.polygons.iter().map(|p| AxisFacet { corners: p.corners, polygon: &p.vertices })
+        self.polygons.iter().map(|p| AxisFacet {
+            corners: p.corners,
+            between: p.between,
+            polygon: &p.vertices,
+        })
+    }
+
+    /// The vertices of the boundary of the union, those at one position once, by any of them.
+    pub fn corners(&self) -> &[UnionVertex] {
+        &self.corners
     }
 
     /// The Betti numbers of the union, exact: those of the axis, but for what is said in

@@ -16,7 +16,9 @@
 mod block;
 mod build;
 mod expansion;
+mod hulls;
 mod morton;
+mod reach;
 mod search;
 mod solid_angle;
 mod triangles;
@@ -24,10 +26,12 @@ mod wide;
 mod winding;
 
 pub(crate) use build::Plan;
+pub(crate) use hulls::{ConeBlock, FaceBlock};
 pub(crate) use morton::{in_morton_order, morton_order};
+pub(crate) use reach::{Measure, ReachTree};
 pub(crate) use search::Search;
 pub use triangles::{BvhError, Closest, Feature, TriangleBvh};
-pub(crate) use wide::WideTree;
+pub(crate) use wide::{Lanes, Query, WideTree};
 pub use winding::{Winding, WindingTree};
 
 use triangles::check_corners;
@@ -114,6 +118,18 @@ impl Tree {
             };
         }
         ranges
+    }
+
+    /// The places of the items below a node.
+    pub fn places(&self, node: usize) -> Range<u32> {
+        let (mut first, mut last) = (&self.nodes[node], &self.nodes[node]);
+        while first.count == 0 {
+            first = &self.nodes[first.first as usize];
+        }
+        while last.count == 0 {
+            last = &self.nodes[last.first as usize + 1];
+        }
+        first.first..last.first + last.count
     }
 
     /// Box of everything.

@@ -21,7 +21,13 @@ impl Tree {
     /// Shows the leaves to a search, roughly from near to far.
     #[inline]
     pub fn search(&self, search: &mut impl Search) {
-        let Some(root) = self.nodes.first() else {
+        self.search_below(0, search);
+    }
+
+    /// As [`Tree::search`], the leaves below a node only.
+    #[inline]
+    pub fn search_below(&self, root: usize, search: &mut impl Search) {
+        let Some(root) = self.nodes.get(root) else {
             return;
         };
         // A node is popped before its two children are pushed, so the stack grows by one a level.

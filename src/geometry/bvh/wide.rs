@@ -21,15 +21,18 @@ use crate::Vec3;
 /// Bound of the error of distances in single precision, to boxes and to triangles. The longest
 /// computation, a triangle's, makes less than 25 roundings of 2^-24 each.
 const BLUR: f64 = 6e-6;
+/// Errors of signed distances to hulls of balls and to boxes with radii, over those of distances:
+/// they add the rounding of a radius, which is no larger than the frame, and of three dot products.
+const HULL: f64 = 2.0;
 /// Queries farther away than this, in half sides, would prune too little.
 const FARTHEST: f64 = 64.0;
 const LEAF: u32 = 1 << 31;
 
 /// Four values, one for each child.
-pub(super) type Lanes = f32x4;
+pub(crate) type Lanes = f32x4;
 
 #[derive(Clone, Copy, Debug)]
-struct Node {
+pub(super) struct Node {
     lo: [Lanes; 3],
     hi: [Lanes; 3],
     /// A node, or with [`LEAF`] a leaf. Lanes without a child have an empty box.
@@ -42,13 +45,15 @@ pub(crate) struct WideTree {
     nodes: Vec<Node>,
     /// Places of each leaf's items.
     leaves: Vec<Range<u32>>,
+    /// For each leaf the node of the binary tree that it was.
+    sources: Vec<u32>,
     root: u32,
     frame: Frame,
 }
 
 /// The similarity to single precision.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
+pub(crate) struct Frame {
     centre: Vec3,
     pub scale: f64,
 }
@@ -74,6 +79,18 @@ pub(crate) struct Query {
 }
 
 impl Query {
+    /// The value up to which computed signed distances to hulls of balls may mean `signed` or less.
+    #[inline]
+    pub fn signed_limit(&self, signed: f64) -> f32 {
+        ((signed * self.scale + HULL * self.blur) as f32).next_up()
+    }
+
+    /// Largest error of coordinates in a plane.
+    #[inline]
+    pub fn blur(&self) -> f32 {
+        self.blur as f32
+    }
+
     /// The square up to which computed distances may mean `distance` or less.
     #[inline]
     pub fn limit(&self, distance: f64) -> f32 {
@@ -83,12 +100,26 @@ impl Query {
 }
 
 impl WideTree {
-    /// Collapses a tree whose leaves hold four items at most.
+    /// Collapses a tree.
     pub fn new(tree: &Tree) -> Self {
-        let frame = Frame::new(tree.bounds());
-        let mut wide = Self { nodes: Vec::new(), leaves: Vec::new(), root: 0, frame };
+        Self::within(tree, tree.bounds(), 0.0, |_| ())
+    }
+
+    /// Collapses a tree in the frame of a box around its own. Boxes no larger than `least` half
+    /// sides of the frame are leaves, whatever they hold. `each` is told the children of every node,
+    /// up to four, in the order of the nodes.
+    pub(super) fn within(
+        tree: &Tree,
+        frame: Bounds,
+        least: f64,
+        mut each: impl FnMut(&[&super::Node]),
+    ) -> Self {
+        let frame = Frame::new(frame);
+        let least = least / frame.scale;
+        let (nodes, leaves, sources) = (Vec::new(), Vec::new(), Vec::new());
+        let mut wide = Self { nodes, leaves, sources, root: 0, frame };
         if !tree.nodes.is_empty() {
-            wide.root = wide.collapse(tree, 0);
+            wide.root = wide.collapse(tree, 0, least, &mut each);
         }
         wide
     }
@@ -98,17 +129,34 @@ impl WideTree {
         &self.leaves
     }
 
-    pub(super) fn frame(&self) -> &Frame {
+    /// The node of the binary tree that a leaf was.
+    pub(super) fn source(&self, leaf: usize) -> usize {
+        self.sources[leaf] as usize
+    }
+
+    pub(super) fn node(&self, place: usize) -> &Node {
+        &self.nodes[place]
+    }
+
+    pub fn frame(&self) -> &Frame {
         &self.frame
     }
 
-    fn collapse(&mut self, tree: &Tree, index: usize) -> u32 {
+    fn collapse(
+        &mut self,
+        tree: &Tree,
+        index: usize,
+        least: f64,
+        each: &mut impl FnMut(&[&super::Node]),
+    ) -> u32 {
         let node = &tree.nodes[index];
-        if node.count > 0 {
-            self.leaves.push(node.first..node.first + node.count);
+        if node.count > 0 || (node.bounds.hi - node.bounds.lo).max_element() < least {
+            self.leaves.push(tree.places(index));
+            self.sources.push(index as u32);
             return LEAF | (self.leaves.len() - 1) as u32;
         }
         let children = descendants(tree, index);
+        each(&children.iter().map(|&child| &tree.nodes[child]).collect::<Vec<_>>());
         let place = self.nodes.len();
         let empty = Lanes::splat(f32::INFINITY);
         self.nodes.push(Node { lo: [empty; 3], hi: [-empty; 3], children: [0; 4] });
@@ -120,7 +168,7 @@ impl WideTree {
                 lo[axis][lane] = (l[axis] as f32).next_down();
                 hi[axis][lane] = (h[axis] as f32).next_up();
             }
-            self.nodes[place].children[lane] = self.collapse(tree, child);
+            self.nodes[place].children[lane] = self.collapse(tree, child, least, each);
         }
         self.nodes[place].lo = lo.map(Lanes::from);
         self.nodes[place].hi = hi.map(Lanes::from);
@@ -140,24 +188,36 @@ impl WideTree {
     }
 
     /// Shows the leaves within a limit, roughly from near to far. `visit` gets the leaf and the
-    /// limit, and returns the new one.
+    /// limit, and returns the new one. Limits are squared distances.
     #[inline]
-    pub fn nearest(&self, query: &Query, mut limit: f32, mut visit: impl FnMut(usize, f32) -> f32) {
+    pub fn nearest(&self, query: &Query, limit: f32, visit: impl FnMut(usize, f32) -> f32) {
+        self.search(limit, |place| self.nodes[place].distance_squared(query), visit);
+    }
+
+    /// As [`WideTree::nearest`], in whatever measure `bounds` of the children of a node, given by
+    /// its place, and the limits are in. A bound that is not a number is beyond every limit.
+    #[inline]
+    pub(super) fn search(
+        &self,
+        mut limit: f32,
+        bounds: impl Fn(usize) -> Lanes,
+        mut visit: impl FnMut(usize, f32) -> f32,
+    ) {
         let mut stack = [(0.0_f32, 0_u32); 3 * MAX_DEPTH + 4];
         let mut height = 0;
         let mut current = self.root;
         loop {
             if current & LEAF == 0 {
-                let node = &self.nodes[current as usize];
-                let squared = node.distance_squared(query);
-                let mut hits = squared.simd_le(Lanes::splat(limit)).to_bitmask();
-                let squared = squared.to_array();
+                let bounds = bounds(current as usize);
+                let children = &self.nodes[current as usize].children;
+                let mut hits = bounds.simd_le(Lanes::splat(limit)).to_bitmask();
+                let bounds = bounds.to_array();
                 let bottom = height;
                 while hits != 0 {
                     let lane = hits.trailing_zeros() as usize;
                     hits &= hits - 1;
                     // Sorted in: the nearest on top.
-                    let entry = (squared[lane], node.children[lane]);
+                    let entry = (bounds[lane], children[lane]);
                     let mut at = height;
                     while at > bottom && stack[at - 1].0 < entry.0 {
                         stack[at] = stack[at - 1];
@@ -225,8 +285,16 @@ impl Node {
             & p[2].simd_le(self.hi[2])
     }
 
+    /// Squared distances from the query to the farthest corners.
     #[inline]
-    fn distance_squared(&self, query: &Query) -> Lanes {
+    pub(super) fn farthest_squared(&self, query: &Query) -> Lanes {
+        let across = |k: usize| (query.p[k] - self.lo[k]).fast_max(self.hi[k] - query.p[k]);
+        let [x, y, z] = [across(0), across(1), across(2)];
+        x * x + y * y + z * z
+    }
+
+    #[inline]
+    pub(super) fn distance_squared(&self, query: &Query) -> Lanes {
         let beyond = |k: usize| {
             let outside = (self.lo[k] - query.p[k]).fast_max(query.p[k] - self.hi[k]);
             outside.fast_max(Lanes::ZERO)

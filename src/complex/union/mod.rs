@@ -13,11 +13,17 @@
 //! mesh, so a face adds only the part between its two tangent triangles. A sphere with an edge
 //! lies in that edge's cone.
 
-use std::ops::Range;
+mod parts;
+mod search;
+#[cfg(test)]
+mod tests;
 
 use super::{ComplexError, MedialMesh};
 use crate::Vec3;
-use crate::geometry::{Bounds, Cone, Node, Plan, Search, SlabFace, Sphere, Tree, in_morton_order};
+use crate::geometry::{Bounds, Cone, SlabFace, Sphere, in_morton_order};
+
+use parts::{Part, Parts, Shape};
+use search::{Buried, Nearer, Signed, Unsigned};
 
 /// The union of the medial primitives of a mesh, prepared for distance queries.
 ///
@@ -34,15 +40,9 @@ use crate::geometry::{Bounds, Cone, Node, Plan, Search, SlabFace, Sphere, Tree, 
 /// ```
 #[derive(Clone, Debug)]
 pub struct MedialUnion {
-    tree: Tree,
-    /// In leaf order.
-    shapes: Vec<Shape>,
-    /// In leaf order.
-    primitives: Vec<Primitive>,
+    parts: Parts,
     /// Box around all balls.
     balls: Bounds,
-    /// More than rounding can contribute to a distance, beside its share of that distance.
-    slack: f64,
 }
 
 /// A simplex of the mesh, which stands for its medial primitive. Ordered as evaluated: of equally
@@ -75,12 +75,6 @@ pub struct Readings {
     pub mu: f64,
 }
 
-/// More than the rounding errors of a bound and of a signed distance together, relative to the
-/// distances and lengths that they are computed from: the distance itself, the radius, and how far
-/// the primitive extends. These are differences of coordinates, so where the union lies does not
-/// matter. Counted operation by operation, a slab has about 30 units of 2^-53 and a box 5.
-const ROUNDING: f64 = 32.0 * f64::EPSILON;
-
 /// Coordinates and radii beyond this would overflow when squared.
 const LARGEST: f64 = 1e150;
 
@@ -102,42 +96,6 @@ pub enum UnionError {
         /// Index of the sphere.
         sphere: usize,
     },
-}
-
-#[derive(Clone, Debug)]
-enum Shape {
-    Sphere(Sphere),
-    Cone(Cone),
-    Slab(SlabFace),
-}
-
-impl Shape {
-    /// Signed distance, infinite where a slab leaves the answer to the cones of its sides.
-    #[inline]
-    fn signed(&self, p: Vec3) -> f64 {
-        match self {
-            Self::Sphere(sphere) => sphere.signed_distance(p),
-            Self::Cone(cone) => cone.signed_distance(p),
-            Self::Slab(face) => face.signed_distance(p).unwrap_or(f64::INFINITY),
-        }
-    }
-
-    /// As [`Shape::signed`], with the centre of the interpolated sphere that attains it; `None`
-    /// where a slab leaves the answer to the cones of its sides.
-    #[inline]
-    fn nearest_centre(&self, p: Vec3) -> Option<(f64, Vec3)> {
-        match self {
-            Self::Sphere(sphere) => Some((sphere.signed_distance(p), sphere.centre)),
-            Self::Cone(cone) => Some(cone.nearest_centre(p)),
-            Self::Slab(face) => face.nearest_centre(p),
-        }
-    }
-
-    /// Radius of the interpolated sphere that attains the signed distance.
-    fn radius_towards(&self, p: Vec3) -> f64 {
-        let radius = |(signed, centre): (f64, Vec3)| (p.distance(centre) - signed).max(0.0);
-        self.nearest_centre(p).map_or(f64::INFINITY, radius)
-    }
 }
 
 impl MedialUnion {
@@ -167,18 +125,23 @@ impl MedialUnion {
             for v in ends {
                 covered[v as usize] = true;
             }
-            parts.push((Primitive::Edge(e), Shape::Cone(cone), bounds(&[a, b])));
+            parts.push(Part::new(Primitive::Edge(e), Shape::Cone(cone), &[a, b]));
         }
         for (f, corners) in (0..).zip(&mesh.faces) {
             let corners = corners.map(sphere);
             // Without tangent planes the slab is the union of its cones.
             if let Some(face) = SlabFace::new(corners) {
-                parts.push((Primitive::Face(f), Shape::Slab(face), bounds(&corners)));
+                parts.push(Part::new(Primitive::Face(f), Shape::Slab(face), &corners));
             }
         }
         let alone = (0..).zip(&mesh.spheres).filter(|&(v, _): &(u32, _)| !covered[v as usize]);
-        parts.extend(alone.map(|(v, &m)| (Primitive::Sphere(v), Shape::Sphere(m), bounds(&[m]))));
-        Self::over(&parts, ball_box(&mesh.spheres))
+        let part = |(v, &m)| Part::new(Primitive::Sphere(v), Shape::Sphere(m), &[m]);
+        parts.extend(alone.map(part));
+        if parts.is_empty() {
+            return Err(UnionError::Empty);
+        }
+        let balls = ball_box(&mesh.spheres);
+        Ok(Self { parts: Parts::new(parts, balls), balls })
     }
 
     /// The union of the spheres alone, without cones and slabs.
@@ -188,25 +151,6 @@ impl MedialUnion {
     pub fn of_spheres(spheres: &[Sphere]) -> Result<Self, UnionError> {
         let mesh = MedialMesh { spheres: spheres.to_vec(), ..MedialMesh::default() };
         Self::new(&mesh)
-    }
-
-    fn over(
-        parts: &[(Primitive, Shape, (Bounds, f64))],
-        balls: Bounds,
-    ) -> Result<Self, UnionError> {
-        if parts.is_empty() {
-            return Err(UnionError::Empty);
-        }
-        let boxes: Vec<_> = parts.iter().map(|&(_, _, bounds)| bounds).collect();
-        let sides = boxes.iter().map(|(b, _)| (b.hi - b.lo).max_element());
-        let padding = sides.sum::<f64>() / boxes.len() as f64;
-        let tree = Tree::build(&boxes, Plan { max_leaf: 2, group: 1, padding });
-        let in_order = || tree.order().iter().map(|&part| &parts[part as usize]);
-        let shapes = in_order().map(|(_, shape, _)| shape.clone()).collect();
-        let primitives = in_order().map(|&(primitive, _, _)| primitive).collect();
-        let extent = |(b, radius): &(Bounds, f64)| (b.hi - b.lo).length() + radius;
-        let slack = ROUNDING * boxes.iter().map(extent).fold(0.0, f64::max);
-        Ok(Self { tree, shapes, primitives, balls, slack })
     }
 
     /// Smallest and largest corner of an axis-parallel box around the union.
@@ -225,7 +169,7 @@ impl MedialUnion {
     /// `sigma(p)`, beginning with the primitive that the last call with the same `near` found:
     /// faster for points that follow each other, with the same answer.
     pub(super) fn signed_from(&self, p: Vec3, near: &mut usize) -> f64 {
-        let (nearest, place) = self.query::<Signed>(p, *near);
+        let (nearest, place) = self.parts.nearest::<Signed>(p, *near);
         *near = place;
         nearest.signed
     }
@@ -237,18 +181,18 @@ impl MedialUnion {
 
     /// The primitive of least signed distance.
     pub fn deepest(&self, p: Vec3) -> NearestPrimitive {
-        self.query::<Signed>(p, 0).0
+        self.parts.nearest::<Signed>(p, 0).0
     }
 
     /// The primitive whose surface is nearest.
     pub fn nearest_surface(&self, p: Vec3) -> NearestPrimitive {
-        self.query::<Unsigned>(p, 0).0
+        self.parts.nearest::<Unsigned>(p, 0).0
     }
 
     /// [`signed`](Self::signed) for many points, in their order, in parallel.
     pub fn signed_batch(&self, points: &[Vec3]) -> Vec<f64> {
         in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.query::<Signed>(p, *last);
+            let (nearest, place) = self.parts.nearest::<Signed>(p, *last);
             *last = place;
             nearest.signed
         })
@@ -257,7 +201,7 @@ impl MedialUnion {
     /// [`unsigned_nearest`](Self::unsigned_nearest) for many points, in their order, in parallel.
     pub fn unsigned_nearest_batch(&self, points: &[Vec3]) -> Vec<f64> {
         in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.query::<Unsigned>(p, *last);
+            let (nearest, place) = self.parts.nearest::<Unsigned>(p, *last);
             *last = place;
             nearest.signed.abs()
         })
@@ -267,14 +211,14 @@ impl MedialUnion {
     /// [`unsigned_nearest`](Self::unsigned_nearest), in hardly more time than the dearer of the two.
     pub fn readings_batch(&self, points: &[Vec3]) -> Vec<Readings> {
         in_morton_order(points, |last: &mut [usize; 2], p| {
-            let (nearest, place) = self.query::<Signed>(p, last[0]);
+            let (nearest, place) = self.parts.nearest::<Signed>(p, last[0]);
             last[0] = place;
             let sigma = nearest.signed;
             if sigma >= 0.0 {
                 // Outside of all primitives the least distance is the least unsigned one.
                 return Readings { sigma, mu: sigma };
             }
-            let (nearest, place) = self.query::<Unsigned>(p, last[1]);
+            let (nearest, place) = self.parts.nearest::<Unsigned>(p, last[1]);
             last[1] = place;
             Readings { sigma, mu: nearest.signed.abs() }
         })
@@ -283,7 +227,7 @@ impl MedialUnion {
     /// [`deepest`](Self::deepest) for many points, in their order, in parallel.
     pub fn deepest_batch(&self, points: &[Vec3]) -> Vec<NearestPrimitive> {
         in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.query::<Signed>(p, *last);
+            let (nearest, place) = self.parts.nearest::<Signed>(p, *last);
             *last = place;
             nearest
         })
@@ -293,16 +237,16 @@ impl MedialUnion {
     /// ball on the primitive that attains it.
     pub fn deepest_ball_batch(&self, points: &[Vec3]) -> Vec<(f64, f64)> {
         in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.query::<Signed>(p, *last);
+            let (nearest, place) = self.parts.nearest::<Signed>(p, *last);
             *last = place;
-            (nearest.signed, self.shapes[place].radius_towards(p))
+            (nearest.signed, self.parts.shape(place).radius_towards(p))
         })
     }
 
     /// [`nearest_surface`](Self::nearest_surface) for many points, in their order, in parallel.
     pub fn nearest_surface_batch(&self, points: &[Vec3]) -> Vec<NearestPrimitive> {
         in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.query::<Unsigned>(p, *last);
+            let (nearest, place) = self.parts.nearest::<Unsigned>(p, *last);
             *last = place;
             nearest
         })
@@ -328,11 +272,11 @@ impl MedialUnion {
     /// A primitive that holds `p` more than `depth` below its surface, by its place, where one
     /// does; the one at `first` is tried before all others.
     fn burier(&self, p: Vec3, depth: f64, first: Option<usize>) -> Option<usize> {
-        if first.is_some_and(|place| self.shapes[place].signed(p) < -depth) {
+        if first.is_some_and(|place| self.parts.shape(place).signed(p) < -depth) {
             return first;
         }
-        let mut search = Buried { union: self, p, limit: -depth, place: None };
-        self.tree.search(&mut search);
+        let mut search = Buried { parts: &self.parts, p, limit: -depth, place: None };
+        self.parts.search(&mut search);
         search.place
     }
 
@@ -340,193 +284,11 @@ impl MedialUnion {
     /// distance and the centre of the interpolated sphere that attains it. A slab counts where its
     /// nearest sphere is inside the triangle, and is else represented by the cones of its sides.
     pub(crate) fn each_nearer(&self, p: Vec3, limit: f64, each: impl FnMut(f64, Vec3)) {
-        self.tree.search(&mut Nearer { union: self, p, limit, each });
-    }
-
-    fn query<M: Measure>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
-        let signed = self.shapes[start].signed(p);
-        let mut search = Nearest::<M> {
-            union: self,
-            p,
-            place: start,
-            signed,
-            value: M::value(signed),
-            limit: f64::INFINITY,
-            measure: std::marker::PhantomData,
-        };
-        search.tighten();
-        self.tree.search(&mut search);
-        let primitive = self.primitives[search.place];
-        (NearestPrimitive { signed: search.signed, primitive }, search.place)
+        self.parts.search(&mut Nearer { parts: &self.parts, p, limit, each });
     }
 }
 
 fn ball_box(balls: &[Sphere]) -> Bounds {
     let corners = |m: &Sphere| [-m.radius, m.radius].map(|r| m.centre + Vec3::splat(r));
     Bounds::of_points(balls.iter().flat_map(corners))
-}
-
-/// Box around the centres, and the largest radius.
-fn bounds(balls: &[Sphere]) -> (Bounds, f64) {
-    let largest = balls.iter().fold(0.0, |r, m| f64::max(r, m.radius));
-    (Bounds::of_points(balls.iter().map(|m| m.centre)), largest)
-}
-
-/// Lower bound of the signed distances to the primitives below a node.
-///
-/// Every interpolated sphere has its centre in the box of the centres and no larger radius. Boxes
-/// around the balls would hardly differ from one sphere of a sheet to the next.
-#[inline]
-fn signed_bound(node: &Node, p: Vec3) -> f64 {
-    node.bounds.distance_squared(p).sqrt() - node.reach
-}
-
-/// Lower bound of the depths in the primitives below a node, negative where some may not hold `p`.
-///
-/// Each primitive holds its largest ball, whose centre is in the box of the centres.
-#[inline]
-fn depth_bound(node: &Node, p: Vec3) -> f64 {
-    node.least_reach - node.bounds.farthest_squared(p).sqrt()
-}
-
-/// Which of the two distances is minimised.
-trait Measure {
-    fn value(signed: f64) -> f64;
-    /// A lower bound of the values below a node.
-    fn bound(node: &Node, p: Vec3) -> f64;
-}
-
-enum Signed {}
-
-impl Measure for Signed {
-    fn value(signed: f64) -> f64 {
-        signed
-    }
-
-    #[inline]
-    fn bound(node: &Node, p: Vec3) -> f64 {
-        signed_bound(node, p)
-    }
-}
-
-enum Unsigned {}
-
-impl Measure for Unsigned {
-    fn value(signed: f64) -> f64 {
-        signed.abs()
-    }
-
-    /// Outside all primitives of a node the least signed distance counts, inside all of them the
-    /// largest.
-    #[inline]
-    fn bound(node: &Node, p: Vec3) -> f64 {
-        let outside = signed_bound(node, p);
-        if outside > 0.0 { outside } else { depth_bound(node, p).max(0.0) }
-    }
-}
-
-struct Nearest<'a, M> {
-    union: &'a MedialUnion,
-    p: Vec3,
-    place: usize,
-    signed: f64,
-    value: f64,
-    limit: f64,
-    measure: std::marker::PhantomData<M>,
-}
-
-impl<M: Measure> Nearest<'_, M> {
-    /// Sets the limit above the best value by more than both can be rounded.
-    #[inline]
-    fn tighten(&mut self) {
-        self.limit = self.value + self.value.abs() * ROUNDING + self.union.slack;
-    }
-}
-
-impl<M: Measure> Search for Nearest<'_, M> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        M::bound(node, self.p)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit
-    }
-
-    #[inline]
-    fn visit(&mut self, places: Range<usize>) {
-        let union = self.union;
-        for place in places {
-            let signed = union.shapes[place].signed(self.p);
-            let value = M::value(signed);
-            let first =
-                value == self.value && union.primitives[place] < union.primitives[self.place];
-            if value < self.value || first {
-                (self.place, self.signed, self.value) = (place, signed, value);
-                self.tighten();
-            }
-        }
-    }
-}
-
-/// Search for any primitive that holds the point deeply.
-struct Buried<'a> {
-    union: &'a MedialUnion,
-    p: Vec3,
-    /// Minus the depth, and minus infinity once a primitive is found.
-    limit: f64,
-    place: Option<usize>,
-}
-
-impl Search for Buried<'_> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        signed_bound(node, self.p)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit
-    }
-
-    #[inline]
-    fn visit(&mut self, mut places: Range<usize>) {
-        let holds = |&place: &usize| self.union.shapes[place].signed(self.p) < self.limit;
-        if let Some(place) = places.find(holds) {
-            self.place = Some(place);
-            self.limit = f64::NEG_INFINITY;
-        }
-    }
-}
-
-/// Search for all primitives nearer than a limit.
-struct Nearer<'a, F> {
-    union: &'a MedialUnion,
-    p: Vec3,
-    limit: f64,
-    each: F,
-}
-
-impl<F: FnMut(f64, Vec3)> Search for Nearer<'_, F> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        signed_bound(node, self.p)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit + self.union.slack
-    }
-
-    #[inline]
-    fn visit(&mut self, places: Range<usize>) {
-        for place in places {
-            if let Some((signed, centre)) = self.union.shapes[place].nearest_centre(self.p)
-                && signed < self.limit
-            {
-                (self.each)(signed, centre);
-            }
-        }
-    }
 }

@@ -1,0 +1,258 @@
+//! The primitives of a union, in a tree, in the order in which a search meets them.
+//!
+//! A search runs on four boxes and four primitives at a time in single precision ([`ReachTree`],
+//! [`ConeBlock`], [`FaceBlock`]), which only tells what is worth measuring: each primitive that
+//! could matter by more than their errors is measured in double precision. A query too far away
+//! for single precision searches the tree of two children a node.
+
+use super::{NearestPrimitive, Primitive};
+use crate::Vec3;
+use crate::geometry::{
+    Bounds, Cone, ConeBlock, FaceBlock, Lanes, Plan, Query, ReachTree, SlabFace, Sphere, Tree,
+};
+
+use super::search::{Nearest, Reading, UnionSearch};
+
+/// More than the rounding errors of a bound and of a signed distance together, relative to the
+/// distances and lengths that they are computed from: the distance itself, the radius, and how far
+/// the primitive extends. These are differences of coordinates, so where the union lies does not
+/// matter. Counted operation by operation, a slab has about 30 units of 2^-53 and a box 5.
+pub(super) const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
+/// Leaves hold up to so many primitives, clusters aside.
+const LEAF: usize = 12;
+
+/// Primitives measured together.
+const LANES: usize = 4;
+
+#[derive(Clone, Debug)]
+pub(super) enum Shape {
+    Sphere(Sphere),
+    Cone(Cone),
+    Slab(SlabFace),
+}
+
+impl Shape {
+    /// Signed distance, infinite where a slab leaves the answer to the cones of its sides.
+    #[inline]
+    pub fn signed(&self, p: Vec3) -> f64 {
+        match self {
+            Self::Sphere(sphere) => sphere.signed_distance(p),
+            Self::Cone(cone) => cone.signed_distance(p),
+            Self::Slab(face) => face.signed_distance(p).unwrap_or(f64::INFINITY),
+        }
+    }
+
+    /// As [`Shape::signed`], with the centre of the interpolated sphere that attains it; `None`
+    /// where a slab leaves the answer to the cones of its sides.
+    #[inline]
+    pub fn nearest_centre(&self, p: Vec3) -> Option<(f64, Vec3)> {
+        match self {
+            Self::Sphere(sphere) => Some((sphere.signed_distance(p), sphere.centre)),
+            Self::Cone(cone) => Some(cone.nearest_centre(p)),
+            Self::Slab(face) => face.nearest_centre(p),
+        }
+    }
+
+    /// Radius of the interpolated sphere that attains the signed distance.
+    pub fn radius_towards(&self, p: Vec3) -> f64 {
+        let radius = |(signed, centre): (f64, Vec3)| (p.distance(centre) - signed).max(0.0);
+        self.nearest_centre(p).map_or(f64::INFINITY, radius)
+    }
+}
+
+/// A primitive to be put in the tree.
+pub(super) struct Part {
+    primitive: Primitive,
+    shape: Shape,
+    /// Box around the centres.
+    centres: Bounds,
+    largest_radius: f64,
+}
+
+impl Part {
+    pub fn new(primitive: Primitive, shape: Shape, balls: &[Sphere]) -> Self {
+        let largest_radius = balls.iter().fold(0.0, |r, m| f64::max(r, m.radius));
+        let centres = Bounds::of_points(balls.iter().map(|m| m.centre));
+        Self { primitive, shape, centres, largest_radius }
+    }
+}
+
+/// The primitives of a union.
+#[derive(Clone, Debug)]
+pub(super) struct Parts {
+    tree: Tree,
+    quick: ReachTree,
+    /// For each leaf of the quick tree its first block of each kind, and one more: those of the
+    /// leaf after the last.
+    leaves: Vec<Leaf>,
+    cones: Vec<ConeBlock>,
+    faces: Vec<FaceBlock>,
+    /// In leaf order, in each leaf those without faces first.
+    shapes: Vec<Shape>,
+    /// In the order of the shapes.
+    primitives: Vec<Primitive>,
+    /// More than rounding can contribute to a distance, beside its share of that distance.
+    slack: f64,
+}
+
+/// Where a leaf begins.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    /// A node of the tree, to be searched in double precision, instead of blocks.
+    cluster: Option<u32>,
+    /// Place of its first shape, and of its first face.
+    first: [u32; 2],
+    cone: u32,
+    face: u32,
+}
+
+impl Parts {
+    /// A tree over parts, at least one; all balls are within a box.
+    pub fn new(parts: Vec<Part>, balls: Bounds) -> Self {
+        let boxes: Vec<_> = parts.iter().map(|part| (part.centres, part.largest_radius)).collect();
+        let sides = boxes.iter().map(|(b, _)| (b.hi - b.lo).max_element());
+        let padding = sides.sum::<f64>() / boxes.len() as f64;
+        let tree = Tree::build(&boxes, Plan { max_leaf: LEAF, group: LANES, padding });
+        let quick = ReachTree::new(&tree, balls);
+        let extent = |(b, radius): &(Bounds, f64)| (b.hi - b.lo).length() + radius;
+        let slack = ROUNDING * boxes.iter().map(extent).fold(0.0, f64::max);
+        let mut order = tree.order().to_vec();
+        let mut this = Self {
+            leaves: Vec::with_capacity(quick.wide().leaves().len() + 1),
+            cones: Vec::new(),
+            faces: Vec::new(),
+            shapes: Vec::new(),
+            primitives: Vec::new(),
+            tree,
+            quick,
+            slack,
+        };
+        this.fill(&parts, &mut order);
+        let in_order = || order.iter().map(|&part| &parts[part as usize]);
+        this.shapes = in_order().map(|part| part.shape.clone()).collect();
+        this.primitives = in_order().map(|part| part.primitive).collect();
+        this
+    }
+
+    /// Makes the blocks, and brings the parts of each leaf into their order.
+    fn fill(&mut self, parts: &[Part], order: &mut [u32]) {
+        let frame = self.quick.wide().frame();
+        for (leaf, range) in self.quick.wide().leaves().iter().enumerate() {
+            let cluster = self.quick.cluster(leaf, &self.tree, LANES);
+            let (cone, face) = (self.cones.len() as u32, self.faces.len() as u32);
+            if cluster.is_some() {
+                self.leaves.push(Leaf { cluster, first: [0; 2], cone, face });
+                continue;
+            }
+            let here = &mut order[range.start as usize..range.end as usize];
+            let is_face = |&part: &u32| matches!(parts[part as usize].shape, Shape::Slab(_));
+            here.sort_by_key(is_face);
+            let middle = here.partition_point(|part| !is_face(part));
+            let first = [range.start, range.start + middle as u32];
+            self.leaves.push(Leaf { cluster, first, cone, face });
+            let (mut cones, mut faces) = (vec![], vec![]);
+            for &part in &*here {
+                match &parts[part as usize].shape {
+                    // A cone of two equal balls is the ball.
+                    Shape::Sphere(m) => cones.push(Cone::new(*m, *m)),
+                    Shape::Cone(cone) => cones.push(*cone),
+                    Shape::Slab(face) => faces.push(*face),
+                }
+            }
+            self.cones.extend(cones.chunks(LANES).map(|cones| ConeBlock::new(cones, frame)));
+            self.faces.extend(faces.chunks(LANES).map(|faces| FaceBlock::new(faces, frame)));
+        }
+        let (cone, face) = (self.cones.len() as u32, self.faces.len() as u32);
+        self.leaves.push(Leaf { cluster: None, first: [0; 2], cone, face });
+    }
+
+    /// The shape at a place.
+    #[inline]
+    pub fn shape(&self, place: usize) -> &Shape {
+        &self.shapes[place]
+    }
+
+    /// The primitive at a place.
+    #[inline]
+    pub fn primitive(&self, place: usize) -> Primitive {
+        self.primitives[place]
+    }
+
+    /// All primitives that have a part of their own.
+    #[cfg(test)]
+    pub fn primitives(&self) -> &[Primitive] {
+        &self.primitives
+    }
+
+    /// More than rounding can contribute to a distance, beside its share of that distance.
+    #[inline]
+    pub fn slack(&self) -> f64 {
+        self.slack
+    }
+
+    /// The nearest primitive by a reading of the distance, and its place. Begins with the one at
+    /// `start`.
+    pub fn nearest<R: Reading>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
+        let mut search = Nearest::<R>::from(self, p, start);
+        self.search(&mut search);
+        search.answer()
+    }
+
+    /// Shows to a search all primitives within its limit, and some others.
+    #[inline]
+    pub fn search(&self, search: &mut impl UnionSearch) {
+        match self.quick.wide().query(search.point()) {
+            Some(query) => self.search_quickly(&query, search),
+            None => self.tree.search(search),
+        }
+    }
+
+    #[inline]
+    fn search_quickly<S: UnionSearch>(&self, query: &Query, search: &mut S) {
+        let limit = query.signed_limit(search.limit());
+        self.quick.search(query, S::MEASURE, limit, |leaf, mut limit| {
+            let [here, next] = [self.leaves[leaf], self.leaves[leaf + 1]];
+            if let Some(node) = here.cluster {
+                self.tree.search_below(node as usize, search);
+                return query.signed_limit(search.limit());
+            }
+            let mut look = |first: u32, block: u32, signed: Lanes| {
+                let place = (first as usize) + LANES * block as usize;
+                limit = self.look(query, search, place, S::MEASURE.of(signed), limit);
+            };
+            for (block, cones) in (0..).zip(&self.cones[here.cone as usize..next.cone as usize]) {
+                look(here.first[0], block, cones.signed(query));
+            }
+            for (block, faces) in (0..).zip(&self.faces[here.face as usize..next.face as usize]) {
+                look(here.first[1], block, faces.signed(query));
+            }
+            limit
+        });
+    }
+
+    /// Shows the primitives from a place on to a search that are within a limit, and returns the
+    /// new one.
+    #[inline]
+    fn look<S: UnionSearch>(
+        &self,
+        query: &Query,
+        search: &mut S,
+        place: usize,
+        values: Lanes,
+        mut limit: f32,
+    ) -> f32 {
+        // What is no number may be within.
+        let mut near = !values.simd_gt(Lanes::splat(limit)).to_bitmask() & 0xf;
+        let values = values.to_array();
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize;
+            near &= near - 1;
+            if !(values[lane] > limit) {
+                search.look(place + lane);
+                limit = query.signed_limit(search.limit());
+            }
+        }
+        limit
+    }
+}

@@ -1,0 +1,240 @@
+//! What is looked for among the primitives of a union.
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use super::NearestPrimitive;
+use super::parts::{Parts, ROUNDING};
+use crate::Vec3;
+use crate::geometry::{Measure, Node, Search};
+
+/// A search among the primitives around a point.
+pub(super) trait UnionSearch: Search {
+    /// Which distance its limit is in.
+    const MEASURE: Measure;
+
+    /// The point.
+    fn point(&self) -> Vec3;
+
+    /// Looks at the primitive at a place.
+    fn look(&mut self, place: usize);
+}
+
+/// Lower bound of the signed distances to the primitives below a node.
+///
+/// Every interpolated sphere has its centre in the box of the centres and no larger radius. Boxes
+/// around the balls would hardly differ from one sphere of a sheet to the next.
+#[inline]
+fn signed_bound(node: &Node, p: Vec3) -> f64 {
+    node.bounds.distance_squared(p).sqrt() - node.reach
+}
+
+/// Lower bound of the depths in the primitives below a node, negative where some may not hold `p`.
+///
+/// Each primitive holds its largest ball, whose centre is in the box of the centres.
+#[inline]
+fn depth_bound(node: &Node, p: Vec3) -> f64 {
+    node.least_reach - node.bounds.farthest_squared(p).sqrt()
+}
+
+/// Which of the two distances is minimised.
+pub(super) trait Reading {
+    const MEASURE: Measure;
+    fn value(signed: f64) -> f64;
+    /// A lower bound of the values below a node.
+    fn bound(node: &Node, p: Vec3) -> f64;
+}
+
+pub(super) enum Signed {}
+
+impl Reading for Signed {
+    const MEASURE: Measure = Measure::Signed;
+
+    #[inline]
+    fn value(signed: f64) -> f64 {
+        signed
+    }
+
+    #[inline]
+    fn bound(node: &Node, p: Vec3) -> f64 {
+        signed_bound(node, p)
+    }
+}
+
+pub(super) enum Unsigned {}
+
+impl Reading for Unsigned {
+    const MEASURE: Measure = Measure::Unsigned;
+
+    #[inline]
+    fn value(signed: f64) -> f64 {
+        signed.abs()
+    }
+
+    /// Outside all primitives of a node the least signed distance counts, inside all of them the
+    /// largest.
+    #[inline]
+    fn bound(node: &Node, p: Vec3) -> f64 {
+        let outside = signed_bound(node, p);
+        if outside > 0.0 { outside } else { depth_bound(node, p).max(0.0) }
+    }
+}
+
+/// Search for the nearest primitive.
+pub(super) struct Nearest<'a, R> {
+    parts: &'a Parts,
+    p: Vec3,
+    place: usize,
+    signed: f64,
+    value: f64,
+    limit: f64,
+    reading: PhantomData<R>,
+}
+
+impl<'a, R: Reading> Nearest<'a, R> {
+    /// Begins with the primitive at a place.
+    #[inline]
+    pub fn from(parts: &'a Parts, p: Vec3, place: usize) -> Self {
+        let signed = parts.shape(place).signed(p);
+        let (value, limit) = (R::value(signed), f64::INFINITY);
+        let mut search = Self { parts, p, place, signed, value, limit, reading: PhantomData };
+        search.tighten();
+        search
+    }
+
+    /// The nearest primitive and its place.
+    #[inline]
+    pub fn answer(&self) -> (NearestPrimitive, usize) {
+        let primitive = self.parts.primitive(self.place);
+        (NearestPrimitive { signed: self.signed, primitive }, self.place)
+    }
+
+    /// Sets the limit above the best value by more than both can be rounded.
+    #[inline]
+    fn tighten(&mut self) {
+        self.limit = self.value + self.value.abs() * ROUNDING + self.parts.slack();
+    }
+}
+
+impl<R: Reading> Search for Nearest<'_, R> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        R::bound(node, self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        places.for_each(|place| self.look(place));
+    }
+}
+
+impl<R: Reading> UnionSearch for Nearest<'_, R> {
+    const MEASURE: Measure = R::MEASURE;
+
+    #[inline]
+    fn point(&self) -> Vec3 {
+        self.p
+    }
+
+    #[inline]
+    fn look(&mut self, place: usize) {
+        let signed = self.parts.shape(place).signed(self.p);
+        let value = R::value(signed);
+        let smaller = || self.parts.primitive(place) < self.parts.primitive(self.place);
+        if value < self.value || (value == self.value && smaller()) {
+            (self.place, self.signed, self.value) = (place, signed, value);
+            self.tighten();
+        }
+    }
+}
+
+/// Search for any primitive that holds the point deeply.
+pub(super) struct Buried<'a> {
+    pub parts: &'a Parts,
+    pub p: Vec3,
+    /// Minus the depth, and minus infinity once a primitive is found.
+    pub limit: f64,
+    pub place: Option<usize>,
+}
+
+impl Search for Buried<'_> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        signed_bound(node, self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        places.for_each(|place| self.look(place));
+    }
+}
+
+impl UnionSearch for Buried<'_> {
+    const MEASURE: Measure = Measure::Signed;
+
+    #[inline]
+    fn point(&self) -> Vec3 {
+        self.p
+    }
+
+    #[inline]
+    fn look(&mut self, place: usize) {
+        if self.parts.shape(place).signed(self.p) < self.limit {
+            self.place = Some(place);
+            self.limit = f64::NEG_INFINITY;
+        }
+    }
+}
+
+/// Search for all primitives nearer than a limit.
+pub(super) struct Nearer<'a, F> {
+    pub parts: &'a Parts,
+    pub p: Vec3,
+    pub limit: f64,
+    pub each: F,
+}
+
+impl<F: FnMut(f64, Vec3)> Search for Nearer<'_, F> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        signed_bound(node, self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit + self.parts.slack()
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        places.for_each(|place| self.look(place));
+    }
+}
+
+impl<F: FnMut(f64, Vec3)> UnionSearch for Nearer<'_, F> {
+    const MEASURE: Measure = Measure::Signed;
+
+    #[inline]
+    fn point(&self) -> Vec3 {
+        self.p
+    }
+
+    #[inline]
+    fn look(&mut self, place: usize) {
+        if let Some((signed, centre)) = self.parts.shape(place).nearest_centre(self.p)
+            && signed < self.limit
+        {
+            (self.each)(signed, centre);
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Single precision only tells what is worth measuring: answers are those of all primitives
+//! measured in double precision, bit by bit.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::parts::Shape;
+use super::*;
+
+fn vector(rng: &mut Pcg64) -> Vec3 {
+    Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - Vec3::ONE
+}
+
+/// A ball that is nearly tangent to another from inside, so that their cone is as steep as can be.
+fn steep(m: Sphere, rng: &mut Pcg64) -> Sphere {
+    let radius = m.radius * rng.random::<f64>();
+    let away = vector(rng).normalize() * (m.radius - radius) * (1.0 + 1e-9 * rng.random::<f64>());
+    Sphere::new(m.centre + away, radius)
+}
+
+/// A mesh of random triangles and edges among spheres of a kind.
+fn mesh(kind: &str, count: u32, rng: &mut Pcg64) -> MedialMesh {
+    let mut spheres = vec![Sphere::new(Vec3::ZERO, 0.3)];
+    for _ in 1..count {
+        let last = spheres[spheres.len() - 1];
+        let centre = vector(rng);
+        spheres.push(match kind {
+            "scattered" => Sphere::new(centre, 0.2 * rng.random::<f64>()),
+            "points" => Sphere::new(centre, 0.0),
+            "steep" => steep(last, rng),
+            "flat" => Sphere::new(centre * Vec3::new(1.0, 1.0, 1e-13), 0.1 + 1e-7 * centre.z),
+            "collinear" => Sphere::new(Vec3::X * centre.x + 1e-9 * centre, 0.1),
+            "cluster" => Sphere::new(1e-14 * centre, 1.0 + 1e-14 * centre.y),
+            "clusters" => {
+                let at = Vec3::X * f64::from(rng.random_range(0..3_u8));
+                Sphere::new(at + 1e-7 * centre, 0.2 + 1e-6 * rng.random::<f64>())
+            }
+            "nested" => Sphere::new(1e-9 * centre, rng.random()),
+            "far apart" => Sphere::new(centre * 10.0_f64.powi(rng.random_range(-6..7)), 1e-3),
+            _ => unreachable!("{kind}"),
+        });
+    }
+    let mut pick = || rng.random_range(0..count);
+    let edges = (0..count).map(|_| [pick(), pick()]).filter(|[a, b]| a != b).collect();
+    let faces: Vec<[u32; 3]> = (0..count).map(|_| [pick(), pick(), pick()]).collect();
+    let faces = faces.into_iter().filter(|[a, b, c]| a != b && b != c && c != a).collect();
+    MedialMesh::from_simplices(spheres, edges, faces).unwrap()
+}
+
+/// The signed distances to all primitives, one after the other.
+fn all(mesh: &MedialMesh, p: Vec3) -> Vec<(f64, Primitive)> {
+    let sphere = |v: u32| mesh.spheres[v as usize];
+    let mut all = vec![];
+    let mut add = |primitive, shape: Shape| all.push((shape.signed(p), primitive));
+    for (v, &m) in (0..).zip(&mesh.spheres) {
+        add(Primitive::Sphere(v), Shape::Sphere(m));
+    }
+    for (e, &[a, b]) in (0..).zip(&mesh.edges) {
+        add(Primitive::Edge(e), Shape::Cone(Cone::new(sphere(a), sphere(b))));
+    }
+    for (f, &corners) in (0..).zip(&mesh.faces) {
+        if let Some(face) = SlabFace::new(corners.map(sphere)) {
+            add(Primitive::Face(f), Shape::Slab(face));
+        }
+    }
+    all
+}
+
+#[test]
+fn answers_are_those_of_all_primitives() {
+    let mut rng = Pcg64::seed_from_u64(7);
+    let kinds = [
+        "scattered",
+        "points",
+        "steep",
+        "flat",
+        "collinear",
+        "cluster",
+        "clusters",
+        "nested",
+        "far apart",
+    ];
+    for kind in kinds {
+        for count in [1, 2, 5, 40, 120] {
+            let mesh = mesh(kind, count, &mut rng);
+            let union = MedialUnion::new(&mesh).unwrap();
+            for query in 0..60 {
+                let p = match query % 4 {
+                    0 => vector(&mut rng),
+                    1 => mesh.spheres[rng.random_range(0..mesh.spheres.len())].centre,
+                    // On a surface.
+                    2 => {
+                        let m = mesh.spheres[rng.random_range(0..mesh.spheres.len())];
+                        m.centre + m.radius * vector(&mut rng).normalize()
+                    }
+                    _ => vector(&mut rng) * 10.0_f64.powi(rng.random_range(-3..5)),
+                };
+                // Spheres that another part covers have none of their own; they are nearer by
+                // rounding at most.
+                let own = all(&mesh, p);
+                let own = || own.iter().filter(|part| has_part(&union, part.1));
+                let least = own().map(|part| part.0).fold(f64::INFINITY, f64::min);
+                let deepest = union.deepest(p);
+                assert_eq!(deepest.signed.to_bits(), least.to_bits(), "{kind}, {count}, {p}");
+                let first = own().filter(|part| part.0 == least).map(|part| part.1).min();
+                assert_eq!(Some(deepest.primitive), first, "{kind}, {count}, {p}");
+                let nearest = own().map(|part| part.0.abs()).fold(f64::INFINITY, f64::min);
+                assert_eq!(union.unsigned_nearest(p).to_bits(), nearest.to_bits(), "{kind}, {p}");
+                let depth = least + vector(&mut rng).x * 1e-7;
+                assert_eq!(union.buries(p, -depth), least < depth, "{kind}, {count}, {p}");
+                let mut near = 0;
+                union.each_nearer(p, 0.1, |_, _| near += 1);
+                assert_eq!(near, own().filter(|part| part.0 < 0.1).count(), "{kind}, {p}");
+            }
+        }
+    }
+}
+
+fn has_part(union: &MedialUnion, primitive: Primitive) -> bool {
+    union.parts.primitives().contains(&primitive)
+}
