@@ -281,8 +281,9 @@ type Measured = (Result<Evaluation, MetricError>, f64);
 /// Measures what came of each level, side by side, after all of them were timed. Levels with the
 /// same result are measured once.
 fn measure_all(judge: &Judge, answers: &[Answer]) -> Vec<Option<Measured>> {
-    let mesh = |answer: &Answer| answer.outcome.as_ref().ok().map(|simplified| &simplified.mesh);
-    let meshes: Vec<Option<&MedialMesh>> = answers.iter().map(mesh).collect();
+    let outcomes = answers.iter().map(|answer| answer.outcome.as_ref().ok());
+    let meshes: Vec<Option<&MedialMesh>> =
+        outcomes.map(|outcome| outcome.map(|simplified| &simplified.mesh)).collect();
     // Its own index for the first of equal results.
     let first = |index: usize| meshes[..index].iter().position(|&m| m == meshes[index]);
     let firsts: Vec<usize> = (0..meshes.len()).map(|index| first(index).unwrap_or(index)).collect();

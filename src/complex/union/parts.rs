@@ -248,7 +248,7 @@ impl Parts {
         while near != 0 {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
-            if !(values[lane] > limit) {
+            if values[lane] <= limit || values[lane].is_nan() {
                 search.look(place + lane);
                 limit = query.signed_limit(search.limit());
             }
