@@ -71,7 +71,7 @@ fn a_baseline_is_beside_the_methods_and_in_no_mean() {
     let table = read(folder.path(), "tables/baseline.md");
     assert!(table.contains("| 2,000 | baseline | decimator 1.0 | 2 | 1.23 |"), "{table}");
     // Not every mesh has a baseline of 400 numbers, and another mesh's is of no use.
-    assert!(!table.contains("| 400 | baseline") && !table.contains("90"), "{table}");
+    assert!(!table.contains("| 400 | baseline") && !table.contains("another"), "{table}");
     assert!(table.contains("| bear | 400 | 399 |"), "{table}");
     let page = read(folder.path(), "index.html");
     assert!(page.contains("id=\"baseline\"") && page.contains("not a medial method"));
