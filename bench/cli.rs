@@ -58,6 +58,10 @@ pub enum Verb {
     Datasets(cmd::datasets::Arguments),
     /// Repeat tables and figures of the papers, published values beside ours.
     Paper(cmd::paper::Arguments),
+    /// Measure decimated surfaces, as a baseline beside the methods of a report.
+    Baseline(cmd::baseline::Arguments),
+    /// Run methods on noisy surfaces, and measure against the clean ones.
+    Stability(cmd::stability::Arguments),
     /// Rebuild the report of a folder of results.
     Report(cmd::report::Arguments),
     /// Say what this machine lacks for oracles and baselines.
@@ -92,6 +96,8 @@ fn run(verb: Verb, global: &Global) -> Result<cmd::Exit, cmd::Failure> {
         Verb::Methods(arguments) => cmd::methods::run(&arguments, global),
         Verb::Datasets(arguments) => cmd::datasets::run(&arguments, global),
         Verb::Paper(arguments) => cmd::paper::run(&arguments, global),
+        Verb::Baseline(arguments) => cmd::baseline::run(&arguments, global),
+        Verb::Stability(arguments) => cmd::stability::run(&arguments, global),
         Verb::Report(arguments) => cmd::report::run(&arguments, global),
         Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
         Verb::Completions(arguments) => cmd::completions::run(&arguments),

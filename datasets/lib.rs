@@ -28,4 +28,7 @@ pub use catalogue::{BuiltIn, KnownAxis, MAX_RESOLUTION, catalogue, find};
 pub use noise::add_noise;
 
 #[cfg(test)]
+#[allow(clippy::print_stdout)]
+mod spikes_tests;
+#[cfg(test)]
 mod tests;

@@ -28,6 +28,8 @@ pub(crate) struct Comparison<'a> {
     pub(crate) entries: Vec<Entry<'a>>,
     /// Records that a later one of the same item replaced.
     pub(crate) superseded: usize,
+    /// The keys behind [`Comparison::series`], in that order.
+    keys: Vec<SeriesKey<'a>>,
 }
 
 /// One record and where it belongs: indices into the lists of [`Comparison`].
@@ -123,7 +125,14 @@ impl<'a> Comparison<'a> {
             levels,
             superseded: records.len() - entries.len(),
             entries,
+            keys: series_keys.0,
         }
+    }
+
+    /// The series that a record belongs to.
+    pub(crate) fn series_of(&self, record: &Record) -> Option<usize> {
+        let key = SeriesKey::of(record);
+        self.keys.iter().position(|other| *other == key)
     }
 
     /// The entries of one mesh, by level and series.

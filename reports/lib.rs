@@ -9,12 +9,14 @@
 //! | `summary` | means over meshes at equal numbers of spheres |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
+//! | `extras` | baselines, stability under noise, oracles: from files of their own |
 //! | `terminal` | the summary in plain text |
 //! | [`published`] | tables and figures of the papers as data, and ours beside them |
 //! | `page` | the self-contained `index.html` |
 //! | `write` | [`write_report`], all of it into one folder |
 
 mod comparison;
+mod extras;
 mod header;
 mod journal;
 mod metric;
@@ -28,6 +30,9 @@ mod terminal;
 mod text;
 mod write;
 
+pub use extras::{
+    AxisShift, BASELINES, Baseline, NoiseRecord, ORACLES, STABILITY, read_lines, write_lines,
+};
 pub use header::{Header, MethodNote};
 pub use journal::{BadLine, Journal, JournalError, Journaled, read_records, write_records};
 pub use record::{Initial, Machine, Record, Repetition, Simplify, Stages, Status};

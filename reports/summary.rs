@@ -161,6 +161,21 @@ pub(crate) fn pick(metric: &Metric, a: f64, b: f64) -> f64 {
     if metric.better.prefers(b, a) { b } else { a }
 }
 
+/// The area under a series' curve of Hausdorff error against spheres, both as logarithms, over the
+/// whole range of counts, told as the error of the level line with the same area: in % of the diagonal.
+/// `None` where the series was not compared at some count, or there is only one.
+pub(crate) fn curve_level(summaries: &[CountSummary], series: usize) -> Option<f64> {
+    let point = |summary: &CountSummary| {
+        let row = summary.rows.iter().find(|row| row.series == series && row.compared)?;
+        Some(((summary.count as f64).ln(), row.mean(&HAUSDORFF)?.max(1e-6).ln()))
+    };
+    let points: Vec<(f64, f64)> = summaries.iter().map(point).collect::<Option<_>>()?;
+    let width = points.first()?.0 - points.last()?.0;
+    let trapezium = |pair: &[(f64, f64)]| (pair[0].0 - pair[1].0) * (pair[0].1 + pair[1].1) / 2.0;
+    let area: f64 = points.windows(2).map(trapezium).sum();
+    (width > 0.0).then(|| (area / width).exp())
+}
+
 /// The fewest spheres at which a series stayed within an error bound.
 pub(crate) struct Fewest {
     /// Median over the meshes, where a mesh that never got there counts as infinitely many.

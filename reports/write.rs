@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::comparison::Comparison;
+use crate::extras::extras;
 use crate::header::Header;
 use crate::journal::replace_file;
 use crate::page::{MeshPart, Page};
@@ -17,6 +18,9 @@ use crate::text::file_stems;
 /// Writes the report of some records into a folder, which is created where it is missing:
 /// `results.csv`, `tables/*.md`, `tables/*.tex`, `plots/*.svg`, `header.json` and `index.html`.
 /// Returns the paths that were written, `index.html` last.
+///
+/// What stands in the folder in [`BASELINES`](crate::BASELINES), [`STABILITY`](crate::STABILITY) and
+/// [`ORACLES`](crate::ORACLES) is shown beside the comparison; these files are read, never written.
 ///
 /// Each file is written under a temporary name and renamed. The same records and header give the
 /// same bytes. Files in `tables/` and `plots/` that an earlier report left there under a name
@@ -46,6 +50,13 @@ pub fn write_report(
     for plot in &overview_plots {
         files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
     }
+    let extras = extras(dir, &comparison, &summaries)?;
+    for extra in &extras {
+        files.write_tables(extra.stem, extra.title, &extra.tables)?;
+        for plot in extra.plots.iter().chain(extra.mesh_plots.iter().map(|(_, plot)| plot)) {
+            files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
+        }
+    }
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     let mut meshes = Vec::new();
     for (mesh, stem) in stems.into_iter().enumerate() {
@@ -72,6 +83,7 @@ pub fn write_report(
         overview_plots: &overview_plots,
         meshes: &meshes,
         summary_tables: &summary_tables,
+        extras: &extras,
     };
     files.write("index.html", page.to_html().as_bytes())?;
     Ok(files.written)

@@ -95,6 +95,14 @@ pub fn print_evaluation(evaluation: &Evaluation) {
                 .volume_error
                 .map_or_else(|| "-".to_owned(), |e| format!("{:.3} % of the volume", 100.0 * e)),
         ),
+        (
+            "outside the solid, max",
+            format!(
+                "{}; {:.1} % of the centres",
+                evaluation.protrusion.map_or_else(|| "-".to_owned(), percent),
+                100.0 * evaluation.centres_outside.unwrap_or(0.0)
+            ),
+        ),
         ("mean smallest angle", format!("{} degrees", or_dash(quality.min_angle_mean))),
         ("Betti numbers", betti),
     ];

@@ -16,6 +16,7 @@ use crate::cli::{Dual, Global, MeasureArguments, SubstrateArguments};
 use crate::run::{InputError, Source};
 
 pub mod axis;
+pub mod baseline;
 pub mod compare;
 pub mod completions;
 pub mod convert;
@@ -29,6 +30,7 @@ pub mod paper;
 pub mod reconstruct;
 pub mod report;
 pub mod simplify;
+pub mod stability;
 pub mod triangulate;
 pub mod voxels;
 

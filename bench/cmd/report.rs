@@ -1,6 +1,6 @@
 //! `medial report DIR`: rebuilds tables, plots and page from the records of a folder.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
@@ -23,37 +23,51 @@ pub struct Arguments {
 /// # Errors
 /// When the folder has no readable records, or the report cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let journaled = read_records(&arguments.dir.join(RESULTS)).map_err(Failure::input)?;
+    let Rebuilt { records, files, warnings } = rebuild(&arguments.dir)?;
+    if global.json {
+        print_json(&json!({ "records": records, "files": files }), &warnings);
+    } else {
+        for warning in &warnings {
+            print_line(&format!("warning: {warning}"));
+        }
+        let page = arguments.dir.join("index.html");
+        print_line(&format!("{records} records; page: {}", page.display()));
+    }
+    Ok(Exit::Done)
+}
+
+/// A report that was rebuilt.
+pub struct Rebuilt {
+    /// Number of records.
+    pub records: usize,
+    /// The files that were written.
+    pub files: Vec<PathBuf>,
+    /// Lines that hold no record.
+    pub warnings: Vec<String>,
+}
+
+/// Rebuilds the report of a folder from its files.
+///
+/// # Errors
+/// As [`run`].
+pub fn rebuild(dir: &Path) -> Result<Rebuilt, Failure> {
+    let journaled = read_records(&dir.join(RESULTS)).map_err(Failure::input)?;
     let warnings: Vec<String> = journaled.bad_lines.iter().map(ToString::to_string).collect();
     if journaled.records.is_empty() {
         return Err(Failure {
             code: Exit::NothingMeasured,
             message: match warnings.first() {
-                None => format!("{}: no record in {RESULTS}", arguments.dir.display()),
+                None => format!("{}: no record in {RESULTS}", dir.display()),
                 Some(first) => {
-                    format!("{}: no readable record in {RESULTS}; {first}", arguments.dir.display())
+                    format!("{}: no readable record in {RESULTS}; {first}", dir.display())
                 }
             },
         });
     }
-    let mut header = read_header(&arguments.dir).unwrap_or_else(|_| header_of(&journaled.records));
+    let mut header = read_header(dir).unwrap_or_else(|_| header_of(&journaled.records));
     header.notes.clone_from(&warnings);
-    let files =
-        write_report(&arguments.dir, &journaled.records, &header).map_err(Failure::input)?;
-    if global.json {
-        let object = json!({ "records": journaled.records.len(), "files": files });
-        print_json(&object, &warnings);
-    } else {
-        for warning in &warnings {
-            print_line(&format!("warning: {warning}"));
-        }
-        print_line(&format!(
-            "{} records; page: {}",
-            journaled.records.len(),
-            arguments.dir.join("index.html").display()
-        ));
-    }
-    Ok(Exit::Done)
+    let files = write_report(dir, &journaled.records, &header).map_err(Failure::input)?;
+    Ok(Rebuilt { records: journaled.records.len(), files, warnings })
 }
 
 /// A header from the records alone, for a run that was interrupted before its report.

@@ -27,7 +27,11 @@ pub(crate) fn table(table: &Table) -> String {
 }
 
 /// Plots side by side, as far as the page is wide.
-pub(crate) fn plots(plots: &[Plot]) -> String {
+pub(crate) fn plots<'a>(plots: impl IntoIterator<Item = &'a Plot>) -> String {
+    let mut plots = plots.into_iter().peekable();
+    if plots.peek().is_none() {
+        return String::new();
+    }
     let mut html = String::from("<div class=\"plots\">\n");
     for plot in plots {
         let label = format!(

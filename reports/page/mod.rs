@@ -3,6 +3,7 @@
 //! Plots are inline SVG, the style sheet and the script are our own. Without the script the page
 //! still shows everything; the script sorts and filters.
 
+mod extras;
 mod html;
 mod meshes;
 mod overview;
@@ -10,6 +11,7 @@ mod reference;
 mod results;
 
 use crate::comparison::Comparison;
+use crate::extras::Extra;
 use crate::header::Header;
 use crate::plots::Plot;
 use crate::record::Machine;
@@ -26,6 +28,7 @@ pub(crate) struct Page<'a> {
     /// In the order of the meshes.
     pub(crate) meshes: &'a [MeshPart],
     pub(crate) summary_tables: &'a [Table],
+    pub(crate) extras: &'a [Extra],
 }
 
 /// What the page shows of one mesh.
@@ -56,6 +59,7 @@ impl Page<'_> {
             html.push_str(&overview::section(self));
         }
         if !self.comparison.entries.is_empty() {
+            html.push_str(&extras::sections(self));
             html.push_str(&results::section(self));
             html.push_str(&meshes::section(self));
         }
@@ -107,6 +111,9 @@ impl Page<'_> {
         html.push_str("<nav>");
         if comparison.measured() > 0 {
             html.push_str("<a href=\"#overview\">Overview</a>");
+        }
+        for extra in self.extras {
+            html.push_str(&format!("<a href=\"#{}\">{}</a>", extra.stem, extra.title));
         }
         if !comparison.entries.is_empty() {
             html.push_str("<a href=\"#results\">Results</a><a href=\"#meshes\">Meshes</a>");

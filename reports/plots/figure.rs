@@ -8,7 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::plots::PlotError;
 use crate::plots::axis::{Axis, Scale};
-use crate::plots::palette::{GRID, INK, Marker, PAPER, style};
+use crate::plots::palette::{BASELINE, GRID, INK, Marker, PAPER, style};
 use crate::text::{printable, shortened};
 
 /// The backend draws at whole pixels: everything is drawn at twice its size and shown at half.
@@ -112,9 +112,13 @@ impl Figure {
         for (row, curve) in self.curves.iter().enumerate() {
             let y = 18 * RESOLUTION + row as i32 * LEGEND_ROW;
             let (colour, marker) = style(curve.series);
-            let line = vec![(0, y), (24 * RESOLUTION, y)];
-            area.draw(&PathElement::new(line, colour.stroke_width(2 * RESOLUTION as u32)))
-                .map_err(PlotError::new)?;
+            let dashes: &[(i32, i32)] =
+                if curve.series == BASELINE { &[(0, 5), (19, 24)] } else { &[(0, 24)] };
+            for (from, to) in dashes {
+                let line = vec![(from * RESOLUTION, y), (to * RESOLUTION, y)];
+                area.draw(&PathElement::new(line, colour.stroke_width(2 * RESOLUTION as u32)))
+                    .map_err(PlotError::new)?;
+            }
             for shape in shapes::<B>(marker, (12 * RESOLUTION, y), colour) {
                 area.draw(&shape).map_err(PlotError::new)?;
             }
@@ -136,9 +140,13 @@ fn draw_curve<B: DrawingBackend>(
 ) -> Result<(), PlotError> {
     let (colour, marker) = style(curve.series);
     let line = colour.stroke_width(2 * RESOLUTION as u32);
-    chart
-        .draw_series(LineSeries::new(curve.points.iter().copied(), line))
-        .map_err(PlotError::new)?;
+    let points = curve.points.iter().copied();
+    if curve.series == BASELINE {
+        let dashes = DashedLineSeries::new(points, 7 * RESOLUTION, 5 * RESOLUTION, line);
+        chart.draw_series(dashes).map_err(PlotError::new)?;
+    } else {
+        chart.draw_series(LineSeries::new(points, line)).map_err(PlotError::new)?;
+    }
     let area = chart.plotting_area().strip_coord_spec();
     let origin = area.get_base_pixel();
     let pixel = |point: &(f64, f64)| {

@@ -98,6 +98,7 @@ fn sizes() -> Vec<Column> {
         column("nonmanifold_edges", |r| {
             Some(r.evaluate.as_ref()?.counts.nonmanifold_edges.to_string())
         }),
+        column("stored_bytes", |r| Some(r.evaluate.as_ref()?.counts.bytes().to_string())),
         column("peak_bytes", |r| r.simplify.peak_bytes.map(|bytes| bytes.to_string())),
         column("threads", move |r| count(r.simplify.threads)),
     ]
@@ -152,6 +153,8 @@ fn distances() -> Vec<Column> {
         samples,
         reverse_samples
     );
+    columns.push(column("protrusion", |r| r.evaluate.as_ref()?.protrusion.map(number)));
+    columns.push(column("centres_outside", |r| r.evaluate.as_ref()?.centres_outside.map(number)));
     columns.push(column("volume_error", |r| r.evaluate.as_ref()?.volume_error.map(number)));
     columns.push(column("diagonal", |r| Some(number(r.evaluate.as_ref()?.diagonal))));
     columns.push(column("evaluation_seed", |r| Some(r.evaluate.as_ref()?.seed.to_string())));

@@ -2,7 +2,9 @@
 
 use crate::comparison::Comparison;
 use crate::metric::COMPARED;
-use crate::summary::{CountSummary, ERROR_BOUNDS, Fewest, SeriesSummary, best, fewest_spheres};
+use crate::summary::{
+    CountSummary, ERROR_BOUNDS, Fewest, SeriesSummary, best, curve_level, fewest_spheres,
+};
 use crate::tables::{Cell, Column, Row, Table};
 use crate::text::{counted, grouped, significant};
 
@@ -12,7 +14,7 @@ pub(crate) fn summary_tables(
     summaries: &[CountSummary],
     how: &str,
 ) -> Vec<Table> {
-    vec![means_table(comparison, summaries, how), bounds_table(comparison, how)]
+    vec![means_table(comparison, summaries, how), bounds_table(comparison, summaries, how)]
 }
 
 fn means_table(comparison: &Comparison<'_>, summaries: &[CountSummary], how: &str) -> Table {
@@ -90,15 +92,22 @@ pub(crate) fn without_result(row: &SeriesSummary) -> String {
 }
 
 /// The fewest spheres for each error bound.
-pub(crate) fn bounds_table(comparison: &Comparison<'_>, how: &str) -> Table {
+pub(crate) fn bounds_table(
+    comparison: &Comparison<'_>,
+    summaries: &[CountSummary],
+    how: &str,
+) -> Table {
     let mut columns = vec![Column::text("method")];
     columns.extend(ERROR_BOUNDS.map(|bound| Column::number(format!("up to {bound} % ↓"))));
+    columns.push(Column::number("level of the curve (%) ↓"));
     let rows = (0..comparison.series.len()).map(|series| {
         let mut cells = vec![Cell::new(comparison.series[series].as_str())];
         cells.extend(
             ERROR_BOUNDS
                 .map(|bound| Cell::new(fewest_text(&fewest_spheres(comparison, series, bound)))),
         );
+        let level = curve_level(summaries, series);
+        cells.push(Cell::optional(level.map(|level| significant(level, 3))));
         Row { cells, starts_group: false }
     });
     Table {
@@ -109,6 +118,10 @@ pub(crate) fn bounds_table(comparison: &Comparison<'_>, how: &str) -> Table {
             "Median over the meshes of the fewest spheres with a Hausdorff error within the bound, \
              in % of the bounding-box diagonal; in parentheses the meshes that stayed within it at \
              some level. Where less than half did there is no median."
+                .to_owned(),
+            "Level of the curve: the area under the curve of mean Hausdorff error against spheres, \
+             both as logarithms, told as the constant error with the same area; over the counts \
+             that were run, where the method was compared at all of them."
                 .to_owned(),
         ],
         rows: rows.collect(),

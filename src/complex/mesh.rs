@@ -217,6 +217,39 @@ impl MedialMesh {
         }
     }
 
+    /// The same complex with its spheres numbered by coordinates and radius, so that two numberings
+    /// of it give the same mesh, bit for bit. Equal spheres stay in their order.
+    pub fn in_order(&self) -> Self {
+        let key = |s: &Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
+        let mut order: Vec<u32> = (0..self.spheres.len() as u32).collect();
+        order.sort_by(|&a, &b| {
+            let [a, b] = [a, b].map(|v| key(&self.spheres[v as usize]));
+            let pairs = a.iter().zip(&b).map(|(a, b)| a.total_cmp(b));
+            pairs.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+        });
+        let mut new = vec![0; order.len()];
+        for (to, &from) in (0..).zip(&order) {
+            new[from as usize] = to;
+        }
+        let mut edges: Vec<[u32; 2]> =
+            self.edges.iter().map(|e| e.map(|v| new[v as usize])).collect();
+        edges.iter_mut().for_each(|e| e.sort_unstable());
+        edges.sort_unstable();
+        let mut faces: Vec<[u32; 3]> =
+            self.faces.iter().map(|f| f.map(|v| new[v as usize])).collect();
+        faces.iter_mut().for_each(|f| f.sort_unstable());
+        faces.sort_unstable();
+        Self {
+            spheres: order.iter().map(|&v| self.spheres[v as usize]).collect(),
+            edges,
+            faces,
+            contacts: self.contacts.as_ref().map(|c| Contacts {
+                samples: Arc::clone(&c.samples),
+                of_sphere: order.iter().map(|&v| c.of_sphere[v as usize]).collect(),
+            }),
+        }
+    }
+
     /// The mesh with every sphere (and contact sample) carried through `map`, a similarity that
     /// multiplies lengths by `scale`.
     pub fn transformed(&self, scale: f64, map: impl Fn(Vec3) -> Vec3) -> Self {

@@ -18,6 +18,12 @@ pub struct Evaluation {
     pub certified: Option<Certificate>,
     /// Volume of the symmetric difference of solid and union, over the solid's volume.
     pub volume_error: Option<f64>,
+    /// Largest distance from the surface of a boundary point of the union that is outside the solid.
+    #[serde(default)]
+    pub protrusion: Option<f64>,
+    /// Share of the centres that are outside the solid.
+    #[serde(default)]
+    pub centres_outside: Option<f64>,
     /// Angles of the medial triangles.
     pub quality: TriangleQuality,
     /// Spike measures.
@@ -134,6 +140,19 @@ pub struct Counts {
     pub isolated: u64,
     /// Edges with three faces or more.
     pub nonmanifold_edges: u64,
+}
+
+impl Counts {
+    /// Floats that are stored: four for each sphere.
+    pub fn numbers(&self) -> u64 {
+        4 * self.spheres
+    }
+
+    /// Bytes in the plainest binary form: 8 for each float, 4 for each index; three indices for each
+    /// face, two for each edge without one, since the sides of faces need not be stored.
+    pub fn bytes(&self) -> u64 {
+        8 * self.numbers() + 4 * (3 * self.faces + 2 * self.lone_edges)
+    }
 }
 
 /// Distances between a computed medial axis and the true one.

@@ -3,13 +3,24 @@
 use std::sync::Arc;
 
 use super::{
-    AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
-    VolumeOptions, axis_distance, certify, counts, distances, spikes, triangle_quality,
+    AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, EnvelopeOptions,
+    Evaluation, MetricError, SurfaceDistances, VolumeOptions, axis_distance, centres_outside,
+    certify, counts, distances, protrusion, spikes, surface_distances, triangle_quality,
     volume_error,
 };
-use crate::complex::{MedialMesh, MedialUnion, betti, euler};
+use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
 use crate::geometry::TriangleBvh;
 use crate::surface::{InsideTest, Side, TriMesh};
+
+/// Depth, as a fraction of the diagonal, from which a point is buried: as in [`distances`].
+const BURIAL: f64 = 1e-7;
+
+/// Mean error from which radii that do not fit the surface are named. Below, the result is right
+/// whatever its radii.
+const LARGE_MEAN: f64 = 0.005;
+
+/// Centres nearer to the surface than this say nothing about radii.
+const ON_SURFACE: f64 = 1e-6;
 
 /// How results are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,25 +82,32 @@ impl Judge {
         &self.truth
     }
 
-    /// Every metric of a medial mesh in normalised units.
+    /// Every metric of a medial mesh in normalised units: the same values for every numbering of its
+    /// spheres.
     ///
     /// # Errors
     /// When the mesh has no sphere or is not valid.
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
+        mesh.check().map_err(UnionError::from)?;
+        // Random numbers and sums follow the order of the spheres.
+        let mesh = &mesh.in_order();
         let union = MedialUnion::new(mesh)?;
         let axis = || self.truth.axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
         let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
         // Side by side, because parts of each run on one thread.
-        let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
+        let ((distances, volume_error), (axis, (complex, protrusion))) = rayon::join(
             || rayon::join(|| self.distances(mesh), || self.volume_error(&union)),
-            || rayon::join(axis, complex),
+            || rayon::join(axis, || (complex(), self.protrusion(mesh, &union))),
         );
         let (distances, axis) = (distances?, axis.transpose()?);
+        let (quality, spikes, betti) = complex;
         Ok(Evaluation {
             warnings: self.misfits(mesh, &union, &distances),
             distances,
             certified: None,
             volume_error: volume_error?,
+            protrusion: Some(protrusion?),
+            centres_outside: Some(centres_outside(mesh, &self.inside)),
             quality,
             spikes,
             betti,
@@ -115,13 +133,38 @@ impl Judge {
         distances(&self.surface, &self.tree, mesh, &options)
     }
 
+    /// Distances of another surface in normalised units, such as one that was decimated, by the same
+    /// samples as those of a medial mesh.
+    ///
+    /// # Errors
+    /// When it has no area.
+    pub fn surface_distances(&self, other: &TriMesh) -> Result<SurfaceDistances, MetricError> {
+        let options = DistanceOptions {
+            surface_samples: self.options.samples,
+            envelope_samples: self.options.samples,
+            seed: self.options.seed,
+        };
+        surface_distances(&self.surface, &self.tree, other, &options)
+    }
+
     /// An interval no wider than `tolerance` that holds the Hausdorff distance of
     /// [`certify`](super::certify), as fractions of the diagonal.
     ///
     /// # Errors
     /// As [`Judge::evaluate`], and when the tolerance is out of range or too fine.
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
-        certify(&self.surface, &self.tree, mesh, tolerance)
+        mesh.check().map_err(UnionError::from)?;
+        certify(&self.surface, &self.tree, &mesh.in_order(), tolerance)
+    }
+
+    /// By the same points as the reverse distance.
+    fn protrusion(&self, mesh: &MedialMesh, union: &MedialUnion) -> Result<f64, MetricError> {
+        let options = EnvelopeOptions {
+            samples: self.options.samples,
+            burial: BURIAL,
+            seed: self.options.seed,
+        };
+        protrusion(mesh, union, &self.tree, &self.inside, &options)
     }
 
     fn volume_error(&self, union: &MedialUnion) -> Result<Option<f64>, MetricError> {
@@ -174,15 +217,36 @@ impl Judge {
                 mesh.spheres.len()
             ));
         }
-        let depth = |s: &crate::complex::Sphere| self.tree.closest(s.centre).distance;
-        let shallow = mesh.spheres.iter().filter(|s| s.radius < 0.5 * depth(s)).count();
-        if 2 * shallow > mesh.spheres.len() && distances.mean > 0.005 {
-            misfits.push(format!(
-                "{shallow} of {} radii are less than half the distance to the surface: \
-                 are the radii scaled, or squared?",
-                mesh.spheres.len()
-            ));
+        if let Some([low, median, high]) = self.radius_quartiles(mesh)
+            && distances.mean > LARGE_MEAN
+        {
+            let off = !(2.0 / 3.0..=1.5).contains(&median);
+            // One factor for all, which no simplification gives.
+            let scaled = (median - 1.0).abs() > 0.1 && high < 1.1 * low;
+            if off || scaled {
+                let times = match median {
+                    0.01..1000.0 => format!("{median:.3}"),
+                    _ => format!("{median:.1e}"),
+                };
+                misfits.push(format!(
+                    "the radii are {times} times the distances of their centres to the surface \
+                     (the median of {}): are the radii scaled, or squared?",
+                    mesh.spheres.len()
+                ));
+            }
         }
         misfits
+    }
+
+    /// Quartiles of the radii over the distances of their centres to the surface; `None` where all
+    /// centres lie on it.
+    fn radius_quartiles(&self, mesh: &MedialMesh) -> Option<[f64; 3]> {
+        let centres: Vec<_> = mesh.spheres.iter().map(|s| s.centre).collect();
+        let depths = self.tree.distance_batch(&centres);
+        let off_surface = mesh.spheres.iter().zip(depths).filter(|&(_, depth)| depth > ON_SURFACE);
+        let mut ratios: Vec<f64> = off_surface.map(|(s, depth)| s.radius / depth).collect();
+        ratios.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| ratios.get((share * ratios.len() as f64) as usize).copied();
+        Some([at(0.25)?, at(0.5)?, at(0.75)?])
     }
 }

@@ -10,8 +10,10 @@ mod evaluation;
 mod hausdorff;
 mod judge;
 mod lifted_axis;
+mod protrusion;
 mod quality;
 mod spikes;
+mod surface_distance;
 mod union_topology;
 mod volume;
 
@@ -25,7 +27,9 @@ pub use evaluation::{
 };
 pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{Judge, JudgeOptions, Truth};
+pub use protrusion::{centres_outside, protrusion};
 pub use quality::triangle_quality;
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
+pub use surface_distance::{SurfaceDistances, surface_distances};
 pub use union_topology::union_betti;
 pub use volume::{VolumeOptions, enclosed_volume, volume_error};

@@ -94,6 +94,17 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
     load(path).and_then(accept).map_err(|fault| in_file(path, fault))
 }
 
+/// Reads a surface that need not bound a solid, such as one that a simplifier tore: the triangles
+/// after the same repairs, oriented as far as that is possible.
+///
+/// # Errors
+/// When the file cannot be read, is not what its extension says, or has no triangle with an area.
+pub fn read_any(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
+    let path = path.as_ref();
+    let examined = load(path).map_err(|fault| in_file(path, fault))?;
+    Ok(Loaded { mesh: examined.mesh, report: examined.report })
+}
+
 /// [`read`] for the content of a file.
 ///
 /// # Errors

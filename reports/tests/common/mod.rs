@@ -94,6 +94,8 @@ pub fn ok(mesh: &str, method: &str, count: usize, shape: usize, rank: usize) -> 
         },
         certified: None,
         volume_error: Some(error),
+        protrusion: Some(error * 0.7),
+        centres_outside: Some(0.0),
         quality: TriangleQuality {
             min_angle_mean: Some(38.0 - 2.0 * rank as f64 * wobble - 10.0 * steep),
             max_angle_mean: Some(82.0),

@@ -67,6 +67,100 @@ fn the_interval_holds_known_distances() {
     holds(&surface, &slab, below.max(0.75 - 0.2));
 }
 
+/// The octahedron with every face divided `levels` times and carried to the unit sphere.
+fn geodesic(levels: u32) -> TriMesh {
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
+    let octants = (0..8_u32).map(|k| {
+        let pick = |axis: u32| axis + 3 * (k >> axis & 1);
+        let [a, b, c] = [0, 1, 2].map(pick);
+        if k.count_ones() % 2 == 0 { [a, b, c] } else { [a, c, b] }
+    });
+    let mut mesh = TriMesh { vertices: axes.to_vec(), faces: octants.collect() };
+    for _ in 0..levels {
+        let mut middles = std::collections::BTreeMap::new();
+        let mut faces = Vec::new();
+        for [a, b, c] in mesh.faces.clone() {
+            let mut middle = |i: u32, j: u32| {
+                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                    let sum = mesh.vertices[i as usize] + mesh.vertices[j as usize];
+                    mesh.vertices.push(sum.normalize());
+                    mesh.vertices.len() as u32 - 1
+                })
+            };
+            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+            faces.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        mesh.faces = faces;
+    }
+    mesh
+}
+
+#[test]
+fn the_interval_holds_the_distance_of_balls_and_spheres() {
+    for levels in [0, 2, 3] {
+        let surface = geodesic(levels);
+        // Every face is acute: the foot of the centre lies in it.
+        let plane = |f: usize| {
+            let [a, b, c] = surface.triangle(f);
+            (b - a).cross(c - a).normalize().dot(a)
+        };
+        let inradius = (0..surface.faces.len()).map(plane).fold(1.0, f64::min);
+        let ball = |r| medial(&[(Vec3::ZERO, r)], &[], &[]);
+        // Within: the vertices are farthest. Around: the points over the middles of faces.
+        holds(&surface, &ball(0.3), 1.0 - 0.3);
+        holds(&surface, &ball(1.25), 1.25 - inradius);
+        // Two balls, one of them buried: nothing changes.
+        let two = medial(&[(Vec3::ZERO, 1.25), (0.2 * Vec3::X, 0.9)], &[], &[]);
+        holds(&surface, &two, 1.25 - inradius);
+    }
+}
+
+/// A polyhedron with its vertices on a cone that is thicker by `t` everywhere is `t` away from it.
+#[test]
+fn the_interval_holds_the_distance_of_a_cone() {
+    let (length, radii, steps) = (0.8_f64, [0.1, 0.25], 24_u32);
+    // Angle from the axis at which the lateral meets both spheres.
+    let meet = (-(radii[1] - radii[0]) / length).acos();
+    let angle = |k: u32, from: f64, to: f64| from + (to - from) * f64::from(k) / 8.0;
+    let pi = std::f64::consts::PI;
+    let mut profile: Vec<(f64, f64)> = (1..=8)
+        .map(|k| angle(k, 0.0, pi - meet))
+        .map(|a| (-radii[0] * a.cos(), radii[0] * a.sin()))
+        .collect();
+    profile.extend(
+        (0..8)
+            .map(|k| angle(k, pi - meet, pi))
+            .map(|a| (length - radii[1] * a.cos(), radii[1] * a.sin())),
+    );
+    let mut vertices = vec![-radii[0] * Vec3::X];
+    for &(x, rho) in &profile {
+        vertices.extend((0..steps).map(|k| {
+            let (sin, cos) = (2.0 * pi * f64::from(k) / f64::from(steps)).sin_cos();
+            Vec3::new(x, rho * cos, rho * sin)
+        }));
+    }
+    vertices.push((length + radii[1]) * Vec3::X);
+    let last = vertices.len() as u32 - 1;
+    let id = |ring: u32, k: u32| 1 + ring * steps + k % steps;
+    let mut faces = Vec::new();
+    for k in 0..steps {
+        faces.extend([[0, id(0, k + 1), id(0, k)]]);
+        faces.push([last, id(profile.len() as u32 - 1, k), id(profile.len() as u32 - 1, k + 1)]);
+        for ring in 1..profile.len() as u32 {
+            let [a, b] = [id(ring - 1, k), id(ring - 1, k + 1)];
+            let [c, d] = [id(ring, k + 1), id(ring, k)];
+            faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let surface = TriMesh { vertices, faces };
+    let on = Cone::new(Sphere::new(Vec3::ZERO, radii[0]), Sphere::new(length * Vec3::X, radii[1]));
+    assert!(surface.vertices.iter().all(|&v| on.signed_distance(v).abs() < 1e-14));
+    for t in [0.05, 0.09] {
+        let ends = [(Vec3::ZERO, radii[0] - t), (length * Vec3::X, radii[1] - t)];
+        holds(&surface, &medial(&ends, &[[0, 1]], &[]), t);
+    }
+}
+
 /// The boundary of a ball that another one mostly covers counts only where it is not covered.
 #[test]
 fn buried_parts_do_not_count() {

@@ -1,0 +1,246 @@
+//! Metrics under rigid motion, scaling and renumbering of what is measured.
+//!
+//! Samples of the surface are places on its triangles, and move along with it. Samples of the union
+//! are laid out along the axes, and a random point of the volume has coordinates: they move along when
+//! both are translated and scaled, not when they are rotated. What they estimate must be the same
+//! then too: the certified intervals of both have a value in common, at every tolerance.
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, Sphere, betti, euler};
+use medial::geometry::TriangleBvh;
+use medial::metrics::{
+    AxisOptions, Certificate, DistanceOptions, Distances, Judge, JudgeOptions, Truth,
+    axis_distance, certify, counts, distances, spikes, triangle_quality,
+};
+use medial::surface::TriMesh;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// A solid without symmetries: a box with bumps, of diagonal 1 or so, 768 triangles.
+fn solid() -> TriMesh {
+    let n = 8_u32;
+    let mut mesh = TriMesh::default();
+    let mut ids = std::collections::BTreeMap::new();
+    let mut id = |at: [u32; 3], mesh: &mut TriMesh| {
+        *ids.entry(at).or_insert_with(|| {
+            let [x, y, z] = at.map(|k| f64::from(k) / f64::from(n) - 0.5);
+            let bump = 1.0 + 0.2 * (3.0 * x + 1.0).sin() * (4.0 * y - 0.5).cos() + 0.1 * z;
+            mesh.vertices.push(bump * Vec3::new(0.7 * x, 0.55 * y, 0.4 * z));
+            mesh.vertices.len() as u32 - 1
+        })
+    };
+    for axis in 0..3 {
+        for side in [0, n] {
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                let at = |i: u32, j: u32| {
+                    let mut at = [side; 3];
+                    at[(axis + 1) % 3] = i;
+                    at[(axis + 2) % 3] = j;
+                    at
+                };
+                let square = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                let [a, b, c, d] = square.map(|at| id(at, &mut mesh));
+                let faces = [[a, b, c], [a, c, d]];
+                let flip = |[a, b, c]: [u32; 3]| if side == 0 { [a, c, b] } else { [a, b, c] };
+                mesh.faces.extend(faces.map(flip));
+            }
+        }
+    }
+    mesh
+}
+
+/// A medial mesh that is roughly right: sheets, a dangling edge, a lone sphere.
+fn axis(seed: u64) -> MedialMesh {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut spheres = Vec::new();
+    for (i, j) in (0..5_u32).flat_map(|i| (0..4_u32).map(move |j| (i, j))) {
+        let [x, y] = [f64::from(i) / 4.0 - 0.5, f64::from(j) / 3.0 - 0.5];
+        let jitter = 0.02 * Vec3::new(rng.random(), rng.random(), rng.random());
+        let radius = 0.1 + 0.05 * rng.random::<f64>();
+        spheres.push(Sphere::new(Vec3::new(0.5 * x, 0.35 * y, 0.0) + jitter, radius));
+    }
+    let at = |i: u32, j: u32| 4 * i + j;
+    let squares = (0..4).flat_map(|i| (0..3).map(move |j| (i, j)));
+    let faces = squares.flat_map(|(i, j)| {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    });
+    let faces = faces.collect();
+    spheres.push(Sphere::new(Vec3::new(0.3, 0.2, 0.1), 0.06));
+    spheres.push(Sphere::new(Vec3::new(-0.25, 0.15, 0.08), 0.05));
+    MedialMesh::from_simplices(spheres, vec![[19, 20]], faces).unwrap()
+}
+
+/// A rotation, a scale and a translation.
+struct Motion {
+    rotation: glam::DQuat,
+    scale: f64,
+    shift: Vec3,
+}
+
+impl Motion {
+    fn point(&self, p: Vec3) -> Vec3 {
+        self.rotation * (p * self.scale) + self.shift
+    }
+
+    fn surface(&self, mesh: &TriMesh) -> TriMesh {
+        let vertices = mesh.vertices.iter().map(|&v| self.point(v)).collect();
+        TriMesh { vertices, faces: mesh.faces.clone() }
+    }
+
+    fn medial(&self, mesh: &MedialMesh) -> MedialMesh {
+        mesh.transformed(self.scale, |p| self.point(p))
+    }
+}
+
+fn motions() -> [Motion; 4] {
+    let turn = glam::DQuat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), 1.1);
+    let shift = Vec3::new(3.0, -1.5, 0.7);
+    let none = glam::DQuat::IDENTITY;
+    [
+        Motion { rotation: none, scale: 1.0, shift },
+        Motion { rotation: none, scale: 254.0, shift: 100.0 * shift },
+        Motion { rotation: turn, scale: 1.0, shift: Vec3::ZERO },
+        Motion { rotation: turn, scale: 0.013, shift },
+    ]
+}
+
+fn measured(surface: &TriMesh, mesh: &MedialMesh) -> Distances {
+    let bvh = TriangleBvh::new(surface).unwrap();
+    let options = DistanceOptions { surface_samples: 5_000, envelope_samples: 5_000, seed: 3 };
+    distances(surface, &bvh, mesh, &options).unwrap()
+}
+
+fn interval(surface: &TriMesh, mesh: &MedialMesh, tolerance: f64) -> Certificate {
+    certify(surface, &TriangleBvh::new(surface).unwrap(), mesh, tolerance).unwrap()
+}
+
+#[test]
+fn nothing_changes_when_both_are_moved_and_scaled() {
+    let (surface, mesh, other) = (solid(), axis(1), axis(2));
+    let before = measured(&surface, &mesh);
+    let options = AxisOptions { samples: 2_000, seed: 1 };
+    let apart = axis_distance(&mesh, &other, &options).unwrap();
+    let quality = triangle_quality(&mesh);
+    for Motion { rotation, scale, shift } in motions() {
+        let motion = Motion { rotation, scale, shift };
+        let (moved, moved_mesh) = (motion.surface(&surface), motion.medial(&mesh));
+        let after = measured(&moved, &moved_mesh);
+        let same = |a: f64, b: f64, what: &str| {
+            assert!((a - b).abs() <= 1e-9, "{what}: {a} {b}, scale {scale}, shift {shift}");
+        };
+        let d = |of: fn(&Distances) -> f64, what: &str| same(of(&before), of(&after) / scale, what);
+        d(|d| d.epsilon, "epsilon");
+        d(|d| d.epsilon_union, "epsilon_union");
+        d(|d| d.mean, "mean");
+        d(|d| d.rms, "rms");
+        d(|d| d.p95, "p95");
+        d(|d| d.p99, "p99");
+        d(|d| d.spheres_only, "spheres_only");
+        if rotation == glam::DQuat::IDENTITY {
+            d(|d| d.reverse, "reverse");
+            d(|d| d.reverse_mean, "reverse_mean");
+            d(|d| d.hausdorff, "hausdorff");
+        } else {
+            let near = (before.reverse_mean - after.reverse_mean / scale).abs();
+            assert!(near < 0.05 * before.reverse_mean, "{before:?} {after:?}");
+        }
+
+        let moved_other = motion.medial(&other);
+        let moved_apart = axis_distance(&moved_mesh, &moved_other, &options).unwrap();
+        for (a, b) in
+            [(apart.in_space, moved_apart.in_space), (apart.with_radius, moved_apart.with_radius)]
+        {
+            same(a.computed_to_true_max, b.computed_to_true_max / scale, "axis, max");
+            same(a.computed_to_true_mean, b.computed_to_true_mean / scale, "axis, mean");
+            same(a.true_to_computed_max, b.true_to_computed_max / scale, "axis back, max");
+            same(a.true_to_computed_mean, b.true_to_computed_mean / scale, "axis back, mean");
+        }
+        let moved_quality = triangle_quality(&moved_mesh);
+        same(quality.min_angle_mean.unwrap(), moved_quality.min_angle_mean.unwrap(), "angles");
+        same(quality.max_angle_mean.unwrap(), moved_quality.max_angle_mean.unwrap(), "angles");
+        assert_eq!(quality.below_30, moved_quality.below_30);
+        // Lengths within the spike measures are fractions of the diagonal.
+        let unit = moved_mesh.transformed(1.0 / scale, |p| p / scale);
+        let (spikes, moved_spikes) = (spikes(&mesh), spikes(&unit));
+        assert_eq!(spikes.idle_spheres, moved_spikes.idle_spheres);
+        assert_eq!((spikes.fins, spikes.dangling_edges), (moved_spikes.fins, 1));
+        for (a, b) in spikes.by_ratio.iter().zip(&moved_spikes.by_ratio) {
+            assert_eq!((a.edge_share, a.spikes), (b.edge_share, b.spikes));
+            same(a.length_share, b.length_share, "length share");
+        }
+        assert_eq!((betti(&mesh), euler(&mesh)), (betti(&moved_mesh), euler(&moved_mesh)));
+    }
+}
+
+/// The exact distance behind the certificate is invariant: the intervals before and after share a
+/// value, however narrow they are.
+#[test]
+fn certified_intervals_meet_when_both_are_moved() {
+    let (surface, mesh) = (solid(), axis(1));
+    for tolerance in [1e-2, 1e-3, 1e-4] {
+        let before = interval(&surface, &mesh, tolerance);
+        for motion in motions() {
+            let moved = motion.surface(&surface);
+            let after = interval(&moved, &motion.medial(&mesh), tolerance * motion.scale.min(1.0));
+            let (lower, upper) = (after.lower / motion.scale, after.upper / motion.scale);
+            assert!(
+                lower <= before.upper + 1e-9 && before.lower <= upper + 1e-9,
+                "{before:?} and {lower} to {upper}, scale {}",
+                motion.scale
+            );
+        }
+    }
+}
+
+/// The same complex with its spheres in another order.
+fn renumbered(mesh: &MedialMesh, rng: &mut Pcg64) -> MedialMesh {
+    let mut order: Vec<usize> = (0..mesh.spheres.len()).collect();
+    order.shuffle(rng);
+    let mut new = vec![0; order.len()];
+    for (to, &from) in (0..).zip(&order) {
+        new[from] = to;
+    }
+    let edges = mesh.edges.iter().map(|e| e.map(|v| new[v as usize])).collect();
+    let faces = mesh.faces.iter().map(|f| f.map(|v| new[v as usize])).collect();
+    let spheres = order.iter().map(|&v| mesh.spheres[v]).collect();
+    MedialMesh::from_simplices(spheres, edges, faces).unwrap()
+}
+
+#[test]
+fn renumbering_changes_nothing_at_all() {
+    let (surface, mesh) = (solid(), axis(1));
+    let judge_of = |surface: &TriMesh| {
+        let truth = Truth { betti: Some([1, 0, 0]), axis: Some(axis(2)), diagonal: 1.0 };
+        let options = JudgeOptions { samples: 3_000, volume_depth: 4, seed: 2 };
+        let tree = TriangleBvh::new(surface).unwrap().into();
+        Judge::new(surface.clone(), tree, truth, options)
+    };
+    let judge = judge_of(&surface);
+    let (before, certified) = (judge.evaluate(&mesh).unwrap(), judge.certify(&mesh, 1e-3).unwrap());
+    let mut rng = Pcg64::seed_from_u64(5);
+    for _ in 0..5 {
+        let other = renumbered(&mesh, &mut rng);
+        assert_ne!(other, mesh);
+        assert_eq!(other.in_order(), mesh.in_order());
+        assert_eq!(judge.evaluate(&other).unwrap(), before);
+        assert_eq!(judge.certify(&other, 1e-3).unwrap(), certified);
+        assert_eq!(counts(&other), counts(&mesh));
+    }
+    // The vertices of the surface in another order, its faces as they were.
+    let mut order: Vec<u32> = (0..surface.vertices.len() as u32).collect();
+    order.shuffle(&mut rng);
+    let mut vertices = surface.vertices.clone();
+    for (from, &to) in order.iter().enumerate() {
+        vertices[to as usize] = surface.vertices[from];
+    }
+    let faces = surface.faces.iter().map(|f| f.map(|v| order[v as usize])).collect();
+    let moved = TriMesh { vertices, faces };
+    assert_eq!(judge_of(&moved).evaluate(&mesh).unwrap(), before);
+    // The faces in another order carry other samples; the exact distance is the same.
+    let mut shuffled = surface.clone();
+    shuffled.faces.shuffle(&mut rng);
+    let after = judge_of(&shuffled).certify(&mesh, 1e-3).unwrap();
+    assert!(after.lower <= certified.upper && certified.lower <= after.upper, "{after:?}");
+}
