@@ -115,6 +115,23 @@ pub fn distances(
     options: &DistanceOptions,
 ) -> Result<Distances, MetricError> {
     let union = MedialUnion::new(mesh)?;
+    distances_with_envelope(surface, bvh, mesh, &union, options).map(|(distances, _)| distances)
+}
+
+/// Samples of the boundary of a union, with their distances from the surface.
+pub(super) struct Envelope {
+    pub points: Vec<Vec3>,
+    pub distances: Vec<f64>,
+}
+
+/// As [`distances`], with the samples of the reverse distance; `union` is that of `mesh`.
+pub(super) fn distances_with_envelope(
+    surface: &TriMesh,
+    bvh: &TriangleBvh,
+    mesh: &MedialMesh,
+    union: &MedialUnion,
+    options: &DistanceOptions,
+) -> Result<(Distances, Envelope), MetricError> {
     let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
     let readings = union.readings_batch(&samples.points);
     let sigma: Vec<f64> = readings.iter().map(|r| r.sigma.abs()).collect();
@@ -122,7 +139,7 @@ pub fn distances(
     let spheres = absolute(MedialUnion::of_spheres(&mesh.spheres)?.signed_batch(&samples.points));
     let envelope = sample_envelope(
         mesh,
-        &union,
+        union,
         &EnvelopeOptions {
             samples: options.envelope_samples,
             burial: BURIAL * diagonal(surface),
@@ -132,7 +149,7 @@ pub fn distances(
     let reverse = bvh.distance_batch(&envelope);
     let uniform = Summary::new(&sigma[..samples.uniform]);
     let (epsilon_union, reverse_max) = (largest(&sigma), largest(&reverse));
-    Ok(Distances {
+    let distances = Distances {
         epsilon: largest(&mu),
         epsilon_union,
         reverse: reverse_max,
@@ -145,7 +162,8 @@ pub fn distances(
         spheres_only: largest(&spheres),
         samples: samples.points.len(),
         reverse_samples: reverse.len(),
-    })
+    };
+    Ok((distances, Envelope { points: envelope, distances: reverse }))
 }
 
 /// Depth, as a fraction of the surface's diagonal, from which a point of one primitive's surface

@@ -2,18 +2,16 @@
 
 use std::sync::Arc;
 
+use super::hausdorff::distances_with_envelope;
+use super::protrusion::{centres_outside, protrusion};
 use super::{
-    AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, EnvelopeOptions,
-    Evaluation, MetricError, SurfaceDistances, VolumeOptions, axis_distance, centres_outside,
-    certify, counts, distances, protrusion, spikes, surface_distances, triangle_quality,
-    volume_error,
+    AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
+    SurfaceDistances, VolumeOptions, axis_distance, certify, counts, distances, spikes,
+    surface_distances, triangle_quality, volume_error,
 };
 use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
 use crate::geometry::TriangleBvh;
 use crate::surface::{InsideTest, Side, TriMesh};
-
-/// Depth, as a fraction of the diagonal, from which a point is buried: as in [`distances`].
-const BURIAL: f64 = 1e-7;
 
 /// Mean error from which radii that do not fit the surface are named. Below, the result is right
 /// whatever its radii.
@@ -95,18 +93,21 @@ impl Judge {
         let axis = || self.truth.axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
         let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
         // Side by side, because parts of each run on one thread.
-        let ((distances, volume_error), (axis, (complex, protrusion))) = rayon::join(
-            || rayon::join(|| self.distances(mesh), || self.volume_error(&union)),
-            || rayon::join(axis, || (complex(), self.protrusion(mesh, &union))),
+        let distances = || {
+            let (surface, options) = (&self.surface, self.distance_options());
+            distances_with_envelope(surface, &self.tree, mesh, &union, &options)
+        };
+        let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
+            || rayon::join(distances, || self.volume_error(&union)),
+            || rayon::join(axis, complex),
         );
-        let (distances, axis) = (distances?, axis.transpose()?);
-        let (quality, spikes, betti) = complex;
+        let ((distances, envelope), axis) = (distances?, axis.transpose()?);
         Ok(Evaluation {
             warnings: self.misfits(mesh, &union, &distances),
             distances,
             certified: None,
             volume_error: volume_error?,
-            protrusion: Some(protrusion?),
+            protrusion: Some(protrusion(&envelope, &self.inside)),
             centres_outside: Some(centres_outside(mesh, &self.inside)),
             quality,
             spikes,
@@ -125,12 +126,15 @@ impl Judge {
     /// # Errors
     /// As [`Judge::evaluate`].
     pub fn distances(&self, mesh: &MedialMesh) -> Result<Distances, MetricError> {
-        let options = DistanceOptions {
+        distances(&self.surface, &self.tree, mesh, &self.distance_options())
+    }
+
+    fn distance_options(&self) -> DistanceOptions {
+        DistanceOptions {
             surface_samples: self.options.samples,
             envelope_samples: self.options.samples,
             seed: self.options.seed,
-        };
-        distances(&self.surface, &self.tree, mesh, &options)
+        }
     }
 
     /// Distances of another surface in normalised units, such as one that was decimated, by the same
@@ -139,12 +143,7 @@ impl Judge {
     /// # Errors
     /// When it has no area.
     pub fn surface_distances(&self, other: &TriMesh) -> Result<SurfaceDistances, MetricError> {
-        let options = DistanceOptions {
-            surface_samples: self.options.samples,
-            envelope_samples: self.options.samples,
-            seed: self.options.seed,
-        };
-        surface_distances(&self.surface, &self.tree, other, &options)
+        surface_distances(&self.surface, &self.tree, other, &self.distance_options())
     }
 
     /// An interval no wider than `tolerance` that holds the Hausdorff distance of
@@ -155,16 +154,6 @@ impl Judge {
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
         mesh.check().map_err(UnionError::from)?;
         certify(&self.surface, &self.tree, &mesh.in_order(), tolerance)
-    }
-
-    /// By the same points as the reverse distance.
-    fn protrusion(&self, mesh: &MedialMesh, union: &MedialUnion) -> Result<f64, MetricError> {
-        let options = EnvelopeOptions {
-            samples: self.options.samples,
-            burial: BURIAL,
-            seed: self.options.seed,
-        };
-        protrusion(mesh, union, &self.tree, &self.inside, &options)
     }
 
     fn volume_error(&self, union: &MedialUnion) -> Result<Option<f64>, MetricError> {

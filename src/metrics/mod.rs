@@ -27,7 +27,6 @@ pub use evaluation::{
 };
 pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{Judge, JudgeOptions, Truth};
-pub use protrusion::{centres_outside, protrusion};
 pub use quality::triangle_quality;
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
 pub use surface_distance::{SurfaceDistances, surface_distances};

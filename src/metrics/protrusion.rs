@@ -1,13 +1,10 @@
 //! How far the union of the medial primitives leaves the solid.
 //!
-//! 1. The boundary of the union is sampled as for the reverse distance: with the same number and seed
-//!    the same points.
-//! 2. From the farthest from the surface on, the first one outside the solid gives the protrusion.
+//! Of the samples of the union's boundary at which the reverse distance is measured, the first one
+//! outside the solid, from the farthest from the surface on, gives the protrusion.
 
-use super::envelope::{EnvelopeOptions, sample_envelope};
-use super::hausdorff::MetricError;
-use crate::complex::{MedialMesh, MedialUnion};
-use crate::geometry::TriangleBvh;
+use super::hausdorff::Envelope;
+use crate::complex::MedialMesh;
 use crate::surface::{InsideTest, Side};
 
 /// Points that are tested together.
@@ -15,32 +12,22 @@ const BATCH: usize = 1024;
 
 /// Largest distance from the surface of a boundary point of the union that is outside the solid, 0
 /// where none is. A sampled maximum: a lower bound.
-///
-/// # Errors
-/// When no samples are asked for.
-pub fn protrusion(
-    mesh: &MedialMesh,
-    union: &MedialUnion,
-    tree: &TriangleBvh,
-    inside: &InsideTest,
-    options: &EnvelopeOptions,
-) -> Result<f64, MetricError> {
-    let points = sample_envelope(mesh, union, options)?;
-    let distances = tree.distance_batch(&points);
+pub(super) fn protrusion(envelope: &Envelope, inside: &InsideTest) -> f64 {
+    let Envelope { points, distances } = envelope;
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| distances[b].total_cmp(&distances[a]).then(a.cmp(&b)));
     for batch in order.chunks(BATCH) {
         let tested: Vec<_> = batch.iter().map(|&k| points[k]).collect();
         let sides = inside.sides(&tested);
         if let Some(first) = sides.iter().position(|side| *side == Side::Outside) {
-            return Ok(distances[batch[first]]);
+            return distances[batch[first]];
         }
     }
-    Ok(0.0)
+    0.0
 }
 
 /// Share of the centres that are outside the solid.
-pub fn centres_outside(mesh: &MedialMesh, inside: &InsideTest) -> f64 {
+pub(super) fn centres_outside(mesh: &MedialMesh, inside: &InsideTest) -> f64 {
     let centres: Vec<_> = mesh.spheres.iter().map(|s| s.centre).collect();
     let outside = inside.sides(&centres).into_iter().filter(|side| *side == Side::Outside).count();
     outside as f64 / centres.len().max(1) as f64
@@ -48,9 +35,11 @@ pub fn centres_outside(mesh: &MedialMesh, inside: &InsideTest) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{EnvelopeOptions, sample_envelope};
     use super::*;
     use crate::Vec3;
-    use crate::complex::Sphere;
+    use crate::complex::{MedialUnion, Sphere};
+    use crate::geometry::TriangleBvh;
     use crate::surface::TriMesh;
 
     #[test]
@@ -66,7 +55,9 @@ mod tests {
             let spheres = spheres.iter().map(|&(x, r)| Sphere::new(Vec3::X * x, r)).collect();
             let mesh = MedialMesh::from_simplices(spheres, vec![], vec![]).unwrap();
             let union = MedialUnion::new(&mesh).unwrap();
-            let far = protrusion(&mesh, &union, &tree, &inside, &options).unwrap();
+            let points = sample_envelope(&mesh, &union, &options).unwrap();
+            let distances = tree.distance_batch(&points);
+            let far = protrusion(&Envelope { points, distances }, &inside);
             (far, centres_outside(&mesh, &inside))
         };
         assert_eq!(of(&[(0.0, 0.4)]), (0.0, 0.0));
