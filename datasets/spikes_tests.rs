@@ -1,4 +1,4 @@
-//! The spike measures on exact axes, which is their floor, and their growth with noise.
+//! The spike measures on exact axes, which is their floor, and what noise adds.
 
 use medial::complex::MedialMesh;
 use medial::metrics::{Spikes, spikes};
@@ -27,7 +27,6 @@ fn exact(id: &str) -> Option<[f64; 5]> {
     Some(measures(&spikes(&axis.transformed(1.0 / normal.diagonal, |p| normal.forward(p)))))
 }
 
-/// METHODOLOGY.md has these values.
 #[test]
 fn floors_on_exact_axes() {
     for shape in catalogue() {
@@ -46,33 +45,33 @@ fn initial(mesh: &TriMesh) -> MedialMesh {
 }
 
 /// Means over three random versions of each level.
-fn at_noise(id: &str, noise: f64) -> [f64; 6] {
+fn at_noise(id: &str, noise: f64) -> [f64; 5] {
     let shape = find(id).unwrap();
     let clean = shape.mesh(shape.default_resolution);
-    let mut sum = [0.0; 6];
+    let mut sum = [0.0; 5];
     for seed in 1..=3 {
         let mesh = initial(&add_noise(&clean, noise, seed));
         let found = spikes(&mesh);
-        let [weak, count, dangling, fins, idle] = measures(&found);
-        let angle = found.angle_spikes.unwrap() as f64;
-        let spheres = mesh.spheres.len() as f64;
-        let of = [weak, count, dangling, fins, idle, angle / spheres];
+        let of = measures(&found);
         sum.iter_mut().zip(of).for_each(|(sum, value)| *sum += value / 3.0);
     }
     sum
 }
 
+/// Any noise, however small, makes the spikes that the samples allow: on a clean symmetric surface
+/// there are few or none. More noise makes none more, since ratios do not know amplitudes.
 #[test]
-fn spikes_grow_with_noise() {
-    for id in ["box", "bracket"] {
+fn noise_makes_spikes() {
+    for id in ["box", "bracket", "torus", "capsule"] {
         let levels = [0.0, 1e-4, 3e-4, 1e-3].map(|noise| at_noise(id, noise));
         for found in levels {
             println!("{id:8} {found:.4?}");
         }
-        // The share of weak edges, the spikes, and the spheres with a small separation angle.
-        for measure in [0, 1, 5] {
-            let values = levels.map(|found| found[measure]);
-            assert!(values.windows(2).all(|pair| pair[0] < pair[1]), "{id}, {measure}: {values:?}");
+        // The share of weak edges, and the fins.
+        for measure in [0, 3] {
+            let [clean, noisy @ ..] = levels.map(|found| found[measure]);
+            let grown = noisy.iter().all(|&value| value > clean + 0.1 * clean);
+            assert!(grown, "{id}, {measure}: {clean}, {noisy:?}");
         }
     }
 }
