@@ -11,7 +11,7 @@ use crate::geometry::{
     Bounds, Cone, ConeBlock, FaceBlock, Lanes, Plan, Query, ReachTree, SlabFace, Sphere, Tree,
 };
 
-use super::search::{Nearest, Reading, UnionSearch};
+use super::search::{Exactly, Nearest, Reading, UnionSearch};
 
 /// More than the rounding errors of a bound and of a signed distance together, relative to the
 /// distances and lengths that they are computed from: the distance itself, the radius, and how far
@@ -204,7 +204,7 @@ impl Parts {
     pub fn search(&self, search: &mut impl UnionSearch) {
         match self.quick.wide().query(search.point()) {
             Some(query) => self.search_quickly(&query, search),
-            None => self.tree.search(search),
+            None => self.tree.search(&mut Exactly(search)),
         }
     }
 
@@ -214,7 +214,7 @@ impl Parts {
         self.quick.search(query, S::MEASURE, limit, |leaf, mut limit| {
             let [here, next] = [self.leaves[leaf], self.leaves[leaf + 1]];
             if let Some(node) = here.cluster {
-                self.tree.search_below(node as usize, search);
+                self.tree.search_below(node as usize, &mut Exactly(search));
                 return query.signed_limit(search.limit());
             }
             let mut look = |first: u32, block: u32, signed: Lanes| {

@@ -9,15 +9,45 @@ use crate::Vec3;
 use crate::geometry::{Measure, Node, Search};
 
 /// A search among the primitives around a point.
-pub(super) trait UnionSearch: Search {
+pub(super) trait UnionSearch {
     /// Which distance its limit is in.
     const MEASURE: Measure;
 
     /// The point.
     fn point(&self) -> Vec3;
 
+    /// Primitives farther away than this are of no interest.
+    fn limit(&self) -> f64;
+
     /// Looks at the primitive at a place.
     fn look(&mut self, place: usize);
+}
+
+/// The same search in the tree of two children a node, in double precision.
+pub(super) struct Exactly<'a, S>(pub &'a mut S);
+
+impl<S: UnionSearch> Search for Exactly<'_, S> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        let p = self.0.point();
+        let outside = signed_bound(node, p);
+        match S::MEASURE {
+            // Outside all primitives of a node the least signed distance counts, inside all of
+            // them the largest.
+            Measure::Unsigned if outside <= 0.0 => depth_bound(node, p).max(0.0),
+            _ => outside,
+        }
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.0.limit()
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        places.for_each(|place| self.0.look(place));
+    }
 }
 
 /// Lower bound of the signed distances to the primitives below a node.
@@ -41,8 +71,6 @@ fn depth_bound(node: &Node, p: Vec3) -> f64 {
 pub(super) trait Reading {
     const MEASURE: Measure;
     fn value(signed: f64) -> f64;
-    /// A lower bound of the values below a node.
-    fn bound(node: &Node, p: Vec3) -> f64;
 }
 
 pub(super) enum Signed {}
@@ -54,11 +82,6 @@ impl Reading for Signed {
     fn value(signed: f64) -> f64 {
         signed
     }
-
-    #[inline]
-    fn bound(node: &Node, p: Vec3) -> f64 {
-        signed_bound(node, p)
-    }
 }
 
 pub(super) enum Unsigned {}
@@ -69,14 +92,6 @@ impl Reading for Unsigned {
     #[inline]
     fn value(signed: f64) -> f64 {
         signed.abs()
-    }
-
-    /// Outside all primitives of a node the least signed distance counts, inside all of them the
-    /// largest.
-    #[inline]
-    fn bound(node: &Node, p: Vec3) -> f64 {
-        let outside = signed_bound(node, p);
-        if outside > 0.0 { outside } else { depth_bound(node, p).max(0.0) }
     }
 }
 
@@ -116,29 +131,17 @@ impl<'a, R: Reading> Nearest<'a, R> {
     }
 }
 
-impl<R: Reading> Search for Nearest<'_, R> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        R::bound(node, self.p)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit
-    }
-
-    #[inline]
-    fn visit(&mut self, places: Range<usize>) {
-        places.for_each(|place| self.look(place));
-    }
-}
-
 impl<R: Reading> UnionSearch for Nearest<'_, R> {
     const MEASURE: Measure = R::MEASURE;
 
     #[inline]
     fn point(&self) -> Vec3 {
         self.p
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
     }
 
     #[inline]
@@ -162,29 +165,17 @@ pub(super) struct Buried<'a> {
     pub place: Option<usize>,
 }
 
-impl Search for Buried<'_> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        signed_bound(node, self.p)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit
-    }
-
-    #[inline]
-    fn visit(&mut self, places: Range<usize>) {
-        places.for_each(|place| self.look(place));
-    }
-}
-
 impl UnionSearch for Buried<'_> {
     const MEASURE: Measure = Measure::Signed;
 
     #[inline]
     fn point(&self) -> Vec3 {
         self.p
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
     }
 
     #[inline]
@@ -204,29 +195,17 @@ pub(super) struct Nearer<'a, F> {
     pub each: F,
 }
 
-impl<F: FnMut(f64, Vec3)> Search for Nearer<'_, F> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        signed_bound(node, self.p)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit + self.parts.slack()
-    }
-
-    #[inline]
-    fn visit(&mut self, places: Range<usize>) {
-        places.for_each(|place| self.look(place));
-    }
-}
-
 impl<F: FnMut(f64, Vec3)> UnionSearch for Nearer<'_, F> {
     const MEASURE: Measure = Measure::Signed;
 
     #[inline]
     fn point(&self) -> Vec3 {
         self.p
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit + self.parts.slack()
     }
 
     #[inline]

@@ -4,8 +4,8 @@
 //! The tree knows boxes only. What is in a leaf, and how far it is, is the business of the
 //! [`Search`]: triangles in [`TriangleBvh`], spheres, cones and slabs in
 //! [`MedialUnion`](crate::complex::MedialUnion). Closest triangles and columns of triangles are
-//! looked for in a copy with four children a node and boxes in single precision ([`WideTree`]);
-//! [`WindingTree`] sums solid angles.
+//! looked for in a copy with four children a node and boxes in single precision ([`WideTree`]), hulls of
+//! balls in one that knows radii too ([`ReachTree`]); [`WindingTree`] sums solid angles.
 //!
 //! # Deviations from the literature
 //! Answers are independent of the order in which the tree is searched and of the bound that a
