@@ -216,7 +216,8 @@ fn sources(arguments: &Arguments) -> Result<Vec<Source>, Failure> {
     Ok(distinct)
 }
 
-fn methods(ids: &[String]) -> Result<Vec<Box<dyn MedialSimplifier>>, Failure> {
+/// The methods of some ids, each once; without any, all.
+pub(super) fn methods(ids: &[String]) -> Result<Vec<Box<dyn MedialSimplifier>>, Failure> {
     if ids.is_empty() {
         return Ok(medial_methods::registry());
     }
@@ -224,18 +225,23 @@ fn methods(ids: &[String]) -> Result<Vec<Box<dyn MedialSimplifier>>, Failure> {
     distinct.map(|(_, id)| medial_methods::find(id).ok_or_else(|| unknown_method(id))).collect()
 }
 
-/// One item for each method: its parameters, and the levels from fine to coarse.
-fn items(
-    arguments: &Arguments,
-    methods: &[Box<dyn MedialSimplifier>],
-) -> Result<Vec<Item>, Failure> {
-    let mut counts = arguments.spheres.clone();
+/// Levels of numbers of spheres, each once, from fine to coarse.
+pub(super) fn sphere_levels(counts: &[usize]) -> Result<Vec<Level>, Failure> {
+    let mut counts = counts.to_vec();
     counts.sort_unstable_by(|a, b| b.cmp(a));
     counts.dedup();
     if counts.last() == Some(&0) {
         return Err(Failure::usage("--spheres 0: ask for at least one sphere"));
     }
-    let mut levels: Vec<Level> = counts.into_iter().map(Level::Spheres).collect();
+    Ok(counts.into_iter().map(Level::Spheres).collect())
+}
+
+/// One item for each method: its parameters, and the levels from fine to coarse.
+fn items(
+    arguments: &Arguments,
+    methods: &[Box<dyn MedialSimplifier>],
+) -> Result<Vec<Item>, Failure> {
+    let mut levels = sphere_levels(&arguments.spheres)?;
     if arguments.published {
         levels.insert(0, Level::Published);
     }

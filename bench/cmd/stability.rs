@@ -12,7 +12,7 @@ use clap::Args;
 use medial::complex::{self, MedialMesh};
 use medial::metrics::{AxisOptions, Judge, JudgeOptions, axis_distance};
 use medial::shape::Shape;
-use medial::simplifier::{Level, MedialSimplifier, Params};
+use medial::simplifier::{MedialSimplifier, Params};
 use medial::surface::{self, Normalisation};
 use medial_reports::{
     AxisShift, Header, Initial, NoiseRecord, Record, STABILITY, write_lines, write_records,
@@ -20,8 +20,7 @@ use medial_reports::{
 };
 use serde_json::json;
 
-use super::compare::RESULTS;
-use super::methods::unknown_method;
+use super::compare::{RESULTS, methods, sphere_levels};
 use super::report::{rebuild, today};
 use super::{Exit, Failure, judge_options, print_json, print_line, shape_options};
 use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
@@ -63,6 +62,9 @@ pub struct Arguments {
 
 /// Folder of the medial meshes below that of the results.
 const FOLDER: &str = "stability";
+
+/// More random versions of each surface would not end.
+const MOST_SEEDS: u64 = 10_000;
 
 /// What is the same for all meshes.
 struct Study {
@@ -132,26 +134,16 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 }
 
 fn study(arguments: &Arguments) -> Result<Study, Failure> {
-    let methods = match arguments.methods.as_slice() {
-        [] => medial_methods::registry(),
-        ids => ids
-            .iter()
-            .map(|id| medial_methods::find(id).ok_or_else(|| unknown_method(id)))
-            .collect::<Result<_, _>>()?,
-    };
-    let mut counts = arguments.spheres.clone();
-    counts.sort_unstable_by(|a, b| b.cmp(a));
-    counts.dedup();
-    if counts.last() == Some(&0) {
-        return Err(Failure::usage("--spheres 0: ask for at least one sphere"));
-    }
+    let methods = methods(&arguments.methods)?;
+    let levels = sphere_levels(&arguments.spheres)?;
     if let Some(noise) = arguments.noise.iter().find(|&&noise| !(noise > 0.0 && noise <= 1.0)) {
         return Err(Failure::usage(format!("--noise {noise}: a fraction above 0, at most 1")));
     }
-    if arguments.noise_seeds == 0 {
-        return Err(Failure::usage("--noise-seeds 0: ask for at least one"));
+    if !(1..=MOST_SEEDS).contains(&arguments.noise_seeds) {
+        let seeds = arguments.noise_seeds;
+        let message = format!("--noise-seeds {seeds}: ask for at least one, at most {MOST_SEEDS}");
+        return Err(Failure::usage(message));
     }
-    let levels: Vec<Level> = counts.into_iter().map(Level::Spheres).collect();
     let item = |method: &dyn MedialSimplifier| Item {
         method: method.info().id.to_owned(),
         params: Params::none(),

@@ -16,6 +16,7 @@ use medial::simplifier::LatticeVoxels;
 use serde_json::json;
 
 use super::{Failure, check_folder, extension};
+use crate::run::write_npy_header;
 
 const EXTENSIONS: [&str; 3] = ["ply", "npy", "csv"];
 const COLUMNS: [&str; 8] = ["x", "y", "z", "distance", "flux", "i", "j", "k"];
@@ -86,15 +87,7 @@ fn ply(out: &mut dyn Write, rows: &[[f64; 8]]) -> io::Result<()> {
 }
 
 fn npy(out: &mut dyn Write, rows: &[[f64; 8]]) -> io::Result<()> {
-    let shape = format!("({}, {})", rows.len(), COLUMNS.len());
-    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
-    // Magic, version and length take ten bytes; numbers begin at a multiple of 64.
-    let padded = (10 + header.len() + 1).next_multiple_of(64) - 10;
-    header.extend(std::iter::repeat_n(' ', padded - header.len() - 1));
-    header.push('\n');
-    out.write_all(b"\x93NUMPY\x01\x00")?;
-    out.write_all(&(header.len() as u16).to_le_bytes())?;
-    out.write_all(header.as_bytes())?;
+    write_npy_header(out, "<f8", [rows.len(), COLUMNS.len()])?;
     rows.iter().flatten().try_for_each(|value| out.write_all(&value.to_le_bytes()))
 }
 

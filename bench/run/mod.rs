@@ -16,7 +16,7 @@ mod stopwatch;
 
 pub use input::{Input, InputError, Source};
 pub use item::{Item, Measure, RunOptions, refused_records, run_item};
-pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells};
+pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_npy_header};
 pub use npy_header::HeaderError;
 pub use progress::Progress;
 pub use provenance::{Provenance, hex_digest, peak_bytes};

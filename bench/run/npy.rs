@@ -9,7 +9,7 @@
 //! with what the file holds, never with what its header claims.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use medial::write_atomically;
@@ -188,6 +188,26 @@ fn read_values(
     Ok(values)
 }
 
+/// Writes all of an array's file that comes before its numbers, which are little-endian, of the kind
+/// `descr` and in C order.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_npy_header(
+    out: &mut dyn Write,
+    descr: &str,
+    [rows, columns]: [usize; 2],
+) -> io::Result<()> {
+    let dictionary =
+        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    out.write_all(MAGIC)?;
+    out.write_all(&[1, 0])?;
+    // The numbers begin at a multiple of 64 bytes, as the format asks.
+    let padded = header_length(dictionary.len());
+    out.write_all(&(padded as u16).to_le_bytes())?;
+    writeln!(out, "{dictionary:<width$}", width = padded - 1)
+}
+
 /// Writes rows of four vertices as an array of uint32 in C order.
 ///
 /// The file is written under a temporary name and renamed.
@@ -200,14 +220,7 @@ pub fn write_cells(
 ) -> Result<(), NpyError> {
     let length = cells.len();
     let written = write_atomically(path, |out| {
-        let dictionary =
-            format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({length}, 4), }}");
-        out.write_all(MAGIC)?;
-        out.write_all(&[1, 0])?;
-        // The numbers begin at a multiple of 64 bytes, as the format asks.
-        let padded = header_length(dictionary.len());
-        out.write_all(&(padded as u16).to_le_bytes())?;
-        writeln!(out, "{dictionary:<width$}", width = padded - 1)?;
+        write_npy_header(out, "<u4", [length, 4])?;
         for cell in cells {
             let mut bytes = [0; 16];
             for (place, vertex) in bytes.chunks_exact_mut(4).zip(cell) {

@@ -11,6 +11,8 @@
 
 use medial::complex::{Incidence, MedialMesh};
 
+use super::parts::kept_part;
+
 /// The mesh without the triangles that `is_fin` names, as far as they can go; for each sphere of
 /// `mesh` the one that it went into; and how many of these triangles are left.
 pub(super) fn without_fins(mesh: &MedialMesh, is_fin: &[bool]) -> (MedialMesh, Vec<u32>, usize) {
@@ -41,7 +43,9 @@ pub(super) fn without_fins(mesh: &MedialMesh, is_fin: &[bool]) -> (MedialMesh, V
         number[v as usize]
     };
     let into_new = (0..into.len() as u32).map(last).collect();
-    (shrinking.mesh(&number), into_new, left)
+    let sphere_kept: Vec<bool> = number.iter().map(|&n| n != u32::MAX).collect();
+    let Shrinking { edge_kept, face_kept, .. } = &shrinking;
+    (kept_part(mesh, &sphere_kept, edge_kept, face_kept), into_new, left)
 }
 
 /// A mesh during collapses.
@@ -134,18 +138,5 @@ impl<'a> Shrinking<'a> {
                 next = Some(self.edge_xor[stays as usize] as usize);
             }
         }
-    }
-
-    /// What is left, with new numbers for its spheres.
-    fn mesh(&self, number: &[u32]) -> MedialMesh {
-        let whole = self.mesh;
-        let kept: Vec<bool> = number.iter().map(|&n| n != u32::MAX).collect();
-        let mut mesh = whole.induced(&kept);
-        let number = |v: u32| number[v as usize];
-        let edges = whole.edges.iter().zip(&self.edge_kept).filter(|e| *e.1);
-        mesh.edges = edges.map(|(edge, _)| edge.map(number)).collect();
-        let faces = whole.faces.iter().zip(&self.face_kept).filter(|f| *f.1);
-        mesh.faces = faces.map(|(face, _)| face.map(number)).collect();
-        mesh
     }
 }
