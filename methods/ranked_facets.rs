@@ -42,9 +42,10 @@ pub(crate) trait FacetValue: Send + Sync {
     /// The value of a facet, in native units; larger values are kept longer.
     fn value(&self, facet: usize) -> f64;
 
-    /// Whether the value is above a level. To be overridden where that is known sooner.
-    fn is_above(&self, facet: usize, level: f64) -> bool {
-        self.value(facet) > level
+    /// Whether the value of a facet is above a level. To be overridden where that is known sooner
+    /// than the value.
+    fn is_above(&self, level: f64) -> Box<dyn Fn(usize) -> bool + Sync + '_> {
+        Box::new(move |facet| self.value(facet) > level)
     }
 }
 
@@ -58,14 +59,19 @@ impl FacetValue for Vec<f64> {
 pub(crate) struct RankedFacets<'s> {
     set: FacetSet,
     value: Box<dyn FacetValue + 's>,
-    /// Values and facets by descending value, then ascending id; only levels that ask for spheres
-    /// need it.
+    /// Values and facets by descending value; only levels that ask for spheres need it.
     order: OnceCell<Vec<(f64, u32)>>,
     scale: Scale,
     /// The level of [`Level::Published`], where there is one.
     published: Option<f64>,
     /// Counts and warnings of the preparation, repeated with every level.
     prepared: Diagnostics,
+}
+
+/// The order of facets of equal value. Ids follow a curve: the first of them would be one end of the
+/// shape. Multiples of the golden ratio, modulo one, spread any number of facets over all of it.
+fn spread(facet: u32) -> u32 {
+    facet.wrapping_mul(0x9e37_79b9)
 }
 
 impl<'s> RankedFacets<'s> {
@@ -86,7 +92,9 @@ impl<'s> RankedFacets<'s> {
             let facets = (0..self.set.facets.len()).into_par_iter().with_min_len(256);
             let mut ranked: Vec<(f64, u32)> =
                 facets.map(|facet| (self.value.value(facet), facet as u32)).collect();
-            ranked.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            ranked.par_sort_unstable_by(|a, b| {
+                b.0.total_cmp(&a.0).then(spread(a.1).cmp(&spread(b.1)))
+            });
             ranked
         })
     }
@@ -110,9 +118,10 @@ impl<'s> RankedFacets<'s> {
     fn by_level(&self, level: f64) -> Result<Vec<u32>, SimplifyError> {
         self.scale.check(level)?;
         let (value, inclusive) = (&self.value, self.scale.inclusive);
+        let is_above = value.is_above(level);
         let kept = |&facet: &u32| {
             let facet = facet as usize;
-            value.is_above(facet, level) || (inclusive && value.value(facet) == level)
+            is_above(facet) || (inclusive && value.value(facet) == level)
         };
         let facets = (0..self.set.facets.len() as u32).into_par_iter().with_min_len(256);
         Ok(facets.filter(kept).collect())

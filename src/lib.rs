@@ -18,6 +18,7 @@ mod atomic;
 pub mod complex;
 mod disjoint;
 pub mod geometry;
+mod hash;
 pub mod metrics;
 pub mod shape;
 pub mod simplifier;

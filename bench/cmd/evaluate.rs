@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use medial::metrics::{Evaluation, JudgeOptions, MetricError};
+use medial::metrics::{Certificate, Evaluation, JudgeOptions, MetricError, Witness, WitnessSide};
 use medial::shape::ShapeOptions;
 
 use super::{
@@ -51,7 +51,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         _ => Failure::input(format!("{}: {error}", arguments.axis.display())),
     };
     let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
-    let certified = certified.transpose().map_err(refused)?;
+    let mut certified = certified.transpose().map_err(refused)?;
+    if let Some(Certificate { witness, .. }) = &mut certified {
+        witness.point = to_normal.backward(witness.point);
+    }
     let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(refused)? };
     warnings.extend(input.report.warnings);
     if global.json {
@@ -112,5 +115,14 @@ pub fn print_evaluation(evaluation: &Evaluation) {
     if let Some(certified) = evaluation.certified {
         let (lower, upper) = (percent(certified.lower), percent(certified.upper));
         print_line(&format!("  {:<24} {lower} to {upper}", "Hausdorff, certified"));
+        let Witness { point, on } = certified.witness;
+        let on = match on {
+            WitnessSide::Surface => "surface",
+            WitnessSide::Union => "union",
+        };
+        print_line(&format!(
+            "  {:<24} on the {on}: {} {} {}",
+            "  farthest point", point.x, point.y, point.z
+        ));
     }
 }

@@ -38,8 +38,8 @@ mod umbrella;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
+use medial::Vec3;
 use medial::complex::VoronoiFacets;
-use medial::geometry::{Delaunay, VertexId};
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, RunContext,
@@ -49,7 +49,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ranked::Scale;
 use crate::ranked_facets::{FacetSet, FacetValue, RankedFacets};
-use umbrella::Umbrellas;
+use umbrella::{Place, Umbrellas};
 
 /// The Voronoi subcomplex as a method.
 pub struct DeyZhao {
@@ -165,7 +165,7 @@ impl MedialSimplifier for DeyZhao {
         diagnostics.count("umbrella_triangles_without_area", umbrellas.flat());
         let scale =
             Scale { name: "strength", range: 0.0..=f64::MAX, inclusive: false, no_published: "" };
-        let strength = Strength { facets: set.facets.clone(), delaunay, umbrellas, params };
+        let strength = Strength { facets: set.facets.clone(), umbrellas, params };
         Ok(Box::new(RankedFacets::new(set, strength, scale, Some(1.0), diagnostics)))
     }
 }
@@ -173,7 +173,6 @@ impl MedialSimplifier for DeyZhao {
 /// Step 3.
 struct Strength {
     facets: Arc<VoronoiFacets>,
-    delaunay: Arc<Delaunay>,
     umbrellas: Umbrellas,
     params: DeyZhaoParams,
 }
@@ -182,48 +181,106 @@ impl FacetValue for Strength {
     /// The largest strength at which the facet dual to a Delaunay edge is kept: from either end, by
     /// either condition.
     fn value(&self, facet: usize) -> f64 {
-        let [p, q] = self.facets.ends(facet);
-        self.from(p, q, 0.0).max(self.from(q, p, 0.0))
+        let [p, q] = self.ends(facet);
+        self.from(p, q).max(self.from(q, p))
     }
 
-    fn is_above(&self, facet: usize, level: f64) -> bool {
-        let [p, q] = self.facets.ends(facet);
-        self.from(p, q, level) > level || self.from(q, p, level) > level
+    fn is_above(&self, level: f64) -> Box<dyn Fn(usize) -> bool + Sync + '_> {
+        let DeyZhaoParams { theta, rho, .. } = self.params;
+        let cosine = (level * theta.to_radians()).min(FRAC_PI_2).sin();
+        // An edge of an umbrella is perpendicular to a normal and no longer than two circumradii.
+        let rims = cosine < 1e-6 || level * rho < 2.0 + 1e-6;
+        let threshold = Threshold { level, cosine, ratio: level * rho, rims };
+        Box::new(move |facet| {
+            let [p, q] = self.ends(facet);
+            let edge = self.umbrellas.position(q) - self.umbrellas.position(p);
+            let length = edge.length();
+            let passes = |p, q| self.passes_from(p, q, edge, length, &threshold);
+            passes(p, q) || passes(q, p)
+        })
     }
 }
 
+/// A strength as the cosine and the ratio that decide without an angle or a quotient, but within
+/// [`ROUNDING`] of them.
+struct Threshold {
+    level: f64,
+    cosine: f64,
+    ratio: f64,
+    /// Whether an edge of an umbrella could pass.
+    rims: bool,
+}
+
+/// Relative, more than what a strength and a threshold are rounded by.
+const ROUNDING: f64 = 1e-12;
+
 impl Strength {
-    /// The strength from `p` alone, 0 for an edge of its umbrella. Where it is not above `level`
-    /// anything up to `level` may be returned.
-    fn from(&self, p: VertexId, q: VertexId, level: f64) -> f64 {
-        let DeyZhaoParams { theta, rho, condition } = self.params;
-        let edge = self.delaunay.point(q) - self.delaunay.point(p);
-        let length = edge.length();
-        let mut strength = match condition {
-            Condition::Angle => 0.0,
-            _ => length / self.umbrellas.largest_circumradius(p) / rho,
-        };
-        // The angles cannot bring it above the level if the cosine of one is no more than this.
-        let theta = theta.to_radians();
-        let enough = (level * theta).min(FRAC_PI_2).sin() * (1.0 - 1e-12);
-        let (mut least, by_angle) = (1.0, condition != Condition::Ratio);
-        let mut triangles = self.umbrellas.of(p).peekable();
-        if triangles.peek().is_none() {
+    fn ends(&self, facet: usize) -> [Place; 2] {
+        self.facets.ends(facet).map(|v| self.umbrellas.place(v))
+    }
+
+    /// The strength from `p` alone, 0 for an edge of its umbrella.
+    fn from(&self, p: Place, q: Place) -> f64 {
+        let normals = self.umbrellas.normals(p);
+        if normals.is_empty() || self.umbrellas.has_edge(p, q) {
             return 0.0;
         }
-        for triangle in triangles {
-            if triangle.corners.contains(&q) {
-                return 0.0;
-            }
-            // The least cosine belongs to the largest angle.
-            least = f64::min(least, triangle.normal.dot(edge).abs() / length);
-            if least <= enough && strength <= level && level > 0.0 {
-                return 0.0;
-            }
+        let edge = self.umbrellas.position(q) - self.umbrellas.position(p);
+        let length = edge.length();
+        let least = normals.iter().map(|n| n.dot(edge).abs()).fold(length, f64::min);
+        let [by_angle, by_ratio] = [self.by_angle(least, length), self.by_ratio(p, length)];
+        match self.params.condition {
+            Condition::Both => by_angle.max(by_ratio),
+            Condition::Angle => by_angle,
+            Condition::Ratio => by_ratio,
         }
-        if by_angle && least > enough {
-            strength = f64::max(strength, least.asin() / theta);
+    }
+
+    /// Whether [`Strength::from`] is above a level. `edge` is `pq` or `qp`.
+    #[inline]
+    fn passes_from(
+        &self,
+        p: Place,
+        q: Place,
+        edge: Vec3,
+        length: f64,
+        threshold: &Threshold,
+    ) -> bool {
+        let condition = self.params.condition;
+        let normals = self.umbrellas.normals(p);
+        if normals.is_empty() {
+            return false;
         }
-        strength
+        let is_steep = || {
+            let bound = threshold.cosine * length;
+            let mut least = length;
+            for normal in normals {
+                least = f64::min(least, normal.dot(edge).abs());
+                if least <= bound * (1.0 - ROUNDING) {
+                    return false;
+                }
+            }
+            least > bound * (1.0 + ROUNDING) || self.by_angle(least, length) > threshold.level
+        };
+        let is_long = || {
+            let bound = threshold.ratio * self.umbrellas.largest_circumradius(p);
+            length > bound * (1.0 - ROUNDING)
+                && (length > bound * (1.0 + ROUNDING) || self.by_ratio(p, length) > threshold.level)
+        };
+        let passes = (condition != Condition::Angle && is_long())
+            || (condition != Condition::Ratio && is_steep());
+        passes && !(threshold.rims && self.umbrellas.has_edge(p, q))
+    }
+
+    /// The strength by the angle condition: `least` is the smallest product of the edge with a normal,
+    /// which belongs to the largest angle.
+    fn by_angle(&self, least: f64, length: f64) -> f64 {
+        (least / length).asin() / self.params.theta.to_radians()
+    }
+
+    /// The strength by the ratio condition.
+    #[inline]
+    fn by_ratio(&self, p: Place, length: f64) -> f64 {
+        length / self.umbrellas.largest_circumradius(p) / self.params.rho
     }
 }

@@ -1,31 +1,33 @@
 //! Step 2: the umbrellas.
 
-use medial::Vec3;
-use medial::geometry::{CellId, Delaunay, Pole, Sphere, VertexId, first_poles};
-use rayon::prelude::*;
+use std::ops::Range;
 
-/// A triangle of the umbrellas of some of its corners.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Triangle {
-    pub corners: [VertexId; 3],
-    /// The corners, as bits, to whose umbrellas it belongs.
-    members: u8,
-    /// Unit normal, of either sign.
-    pub normal: Vec3,
-    circumradius: f64,
-}
+use medial::Vec3;
+use medial::geometry::{CellId, Delaunay, Sphere, VertexId, unbounded_directions};
+use rayon::prelude::*;
+use wide::u32x4;
+
+/// Cells that one task looks at.
+const CHUNK: u32 = 1024;
+
+/// A sample by the place of its first cell among those of all samples: what is close in the
+/// triangulation is close in memory, in whatever order the samples came.
+pub(super) type Place = u32;
 
 /// The umbrellas of all samples: about `p` the Delaunay triangles whose dual Voronoi edge has its
 /// ends on both sides of the plane through `p` normal to the pole vector.
 pub(super) struct Umbrellas {
-    /// Each once, in the order of the cells.
-    triangles: Vec<Triangle>,
-    /// `of_sample[start[p]..start[p + 1]]` are the triangles of sample `p`.
+    /// Of each sample; that of one that is no vertex is never asked for.
+    places: Vec<Place>,
+    positions: Vec<Vec3>,
+    /// The triangles of sample `p` are those in `start[p]..start[p + 1]`, in the order of the cells.
     start: Vec<u32>,
-    of_sample: Vec<u32>,
+    /// Unit normals, of either sign.
+    normals: Vec<Vec3>,
+    /// The corners beside the sample.
+    rims: Vec<[Place; 2]>,
     /// Largest circumradius about each sample.
     largest: Vec<f64>,
-    missing: usize,
     flat: usize,
 }
 
@@ -33,48 +35,92 @@ impl Umbrellas {
     /// From the circumspheres of all finite cells. Cost `O(n)` in the number of cells; parallel, the
     /// same for any number of threads.
     pub fn new(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Self {
-        let pole_vectors = pole_vectors(delaunay, spheres);
-        let ahead = corners_ahead(delaunay, spheres, &pole_vectors);
-        let parts: Vec<(Vec<Triangle>, usize)> = (0..delaunay.finite_cell_count() as u32)
+        let places = Places::by_first_cell(delaunay);
+        let samples = with_poles(delaunay, spheres, &places);
+        let sides = sides_of_cells(spheres, places.corners, &samples);
+        let cells = delaunay.finite_cell_count() as u32;
+        let parts: Vec<Crossing> = (0..cells)
             .into_par_iter()
-            .chunks(4096)
-            .map(|cells| {
-                let (mut found, mut flat) = (Vec::new(), 0);
-                for cell in cells {
-                    let cell = CellId(cell);
-                    crossing(delaunay, &ahead, &pole_vectors, cell, &mut found, &mut flat);
-                }
-                (found, flat)
-            })
+            .step_by(CHUNK as usize)
+            .map(|first| first..cells.min(first + CHUNK))
+            .map(|part| Crossing::of(delaunay, &sides, &samples, part))
             .collect();
-        let flat = parts.iter().map(|part| part.1).sum();
-        let triangles: Vec<Triangle> = parts.into_iter().flat_map(|part| part.0).collect();
-        let (start, of_sample) = by_sample(&triangles, delaunay.point_count());
-        let mut umbrellas = Self { triangles, start, of_sample, largest: vec![], missing: 0, flat };
-        let samples = (0..delaunay.point_count() as u32).map(VertexId);
-        let missing = |p: &VertexId| delaunay.is_vertex(*p) && umbrellas.of(*p).next().is_none();
-        umbrellas.missing = samples.clone().filter(missing).count();
-        let radii = |p| umbrellas.of(p).map(|triangle| triangle.circumradius);
-        umbrellas.largest = samples.map(|p| radii(p).fold(0.0, f64::max)).collect();
-        umbrellas
+        let positions = samples.into_iter().map(|sample| sample.position).collect();
+        Self::of_triangles(places.of_sample, positions, &parts)
     }
 
-    /// The umbrella of a sample.
+    /// The triangles by samples: counted, then each put in its place.
+    fn of_triangles(places: Vec<Place>, positions: Vec<Vec3>, parts: &[Crossing]) -> Self {
+        let triangles = || parts.iter().flat_map(|part| &part.triangles);
+        // Shifted by one while the lists are filled, so that in the end each start is where it
+        // belongs.
+        let mut start = vec![0_u32; positions.len() + 2];
+        for triangle in triangles() {
+            for (k, p) in triangle.corners.into_iter().enumerate() {
+                start[p as usize + 2] += u32::from(triangle.members >> k & 1);
+            }
+        }
+        for p in 2..start.len() {
+            start[p] += start[p - 1];
+        }
+        let all = start[positions.len() + 1] as usize;
+        let mut normals = vec![Vec3::ZERO; all];
+        let mut rims = vec![[0; 2]; all];
+        let mut largest = vec![0.0; positions.len()];
+        for triangle in triangles() {
+            let [a, b, c] = triangle.corners;
+            for (k, (p, rim)) in [(a, [b, c]), (b, [c, a]), (c, [a, b])].into_iter().enumerate() {
+                if triangle.members >> k & 1 == 0 {
+                    continue;
+                }
+                let next = &mut start[p as usize + 1];
+                (normals[*next as usize], rims[*next as usize]) = (triangle.normal, rim);
+                *next += 1;
+                largest[p as usize] = f64::max(largest[p as usize], triangle.circumradius);
+            }
+        }
+        start.pop();
+        let flat = parts.iter().map(|part| part.flat).sum();
+        Self { places, positions, start, normals, rims, largest, flat }
+    }
+
+    /// The place of a vertex, by which all else is asked.
     #[inline]
-    pub fn of(&self, p: VertexId) -> impl Iterator<Item = &Triangle> {
-        let range = self.start[p.index()] as usize..self.start[p.index() + 1] as usize;
-        self.of_sample[range].iter().map(|&triangle| &self.triangles[triangle as usize])
+    pub fn place(&self, v: VertexId) -> Place {
+        self.places[v.index()]
+    }
+
+    /// Where a sample is.
+    #[inline]
+    pub fn position(&self, p: Place) -> Vec3 {
+        self.positions[p as usize]
+    }
+
+    /// The unit normals of a sample's triangles, of either sign.
+    #[inline]
+    pub fn normals(&self, p: Place) -> &[Vec3] {
+        &self.normals[self.range(p)]
+    }
+
+    /// Whether `pq` is an edge of the umbrella of `p`.
+    #[inline]
+    pub fn has_edge(&self, p: Place, q: Place) -> bool {
+        self.rims[self.range(p)].as_flattened().contains(&q)
     }
 
     /// Largest circumradius of an umbrella, 0 where it has no triangle.
     #[inline]
-    pub fn largest_circumradius(&self, p: VertexId) -> f64 {
-        self.largest[p.index()]
+    pub fn largest_circumradius(&self, p: Place) -> f64 {
+        self.largest[p as usize]
+    }
+
+    fn range(&self, p: Place) -> Range<usize> {
+        self.start[p as usize] as usize..self.start[p as usize + 1] as usize
     }
 
     /// Samples without a triangle.
     pub fn missing(&self) -> usize {
-        self.missing
+        self.start.windows(2).filter(|range| range[0] == range[1]).count()
     }
 
     /// Triangles that were left out because they have no normal, once for each sample.
@@ -83,124 +129,195 @@ impl Umbrellas {
     }
 }
 
-/// The triangles of each sample by their indices, in their order: starts, and all lists.
-fn by_sample(triangles: &[Triangle], samples: usize) -> (Vec<u32>, Vec<u32>) {
-    // Shifted by one while the lists are filled, so that in the end each start is where it belongs.
-    let mut start = vec![0_u32; samples + 2];
-    let members = |t: &Triangle| {
-        let (corners, members) = (t.corners, t.members);
-        (0..3).filter(move |k| members >> k & 1 == 1).map(move |k| corners[k].index())
-    };
-    for p in triangles.iter().flat_map(members) {
-        start[p + 2] += 1;
-    }
-    for p in 2..start.len() {
-        start[p] += start[p - 1];
-    }
-    let mut lists = vec![0; start[start.len() - 1] as usize];
-    for (index, triangle) in (0..).zip(triangles) {
-        for p in members(triangle) {
-            lists[start[p + 1] as usize] = index;
-            start[p + 1] += 1;
-        }
-    }
-    start.pop();
-    (start, lists)
+/// The places of all samples.
+struct Places {
+    of_sample: Vec<Place>,
+    /// The sample of each place.
+    samples: Vec<VertexId>,
+    /// The corners of all cells.
+    corners: Vec<[Place; 4]>,
 }
 
-/// For each sample the vector to its pole; of any length where the pole is at infinity. Zero for
-/// one without a pole.
-fn pole_vectors(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Vec<Vec3> {
-    let vector = |(sample, pole): (usize, Option<Pole>)| match pole {
-        Some(Pole::Vertex(cell)) => {
-            let p = delaunay.point(VertexId(sample as u32));
-            spheres[cell.index()].map_or(Vec3::ZERO, |sphere| sphere.centre - p)
+impl Places {
+    fn by_first_cell(delaunay: &Delaunay) -> Self {
+        let mut of_sample = vec![NO_CORNER; delaunay.point_count()];
+        let mut samples = Vec::with_capacity(delaunay.vertex_count());
+        let mut corners: Vec<[Place; 4]> = Vec::with_capacity(delaunay.cell_count());
+        for cell in delaunay.finite_cells() {
+            let vertices = delaunay.vertices(cell);
+            for v in vertices {
+                if of_sample[v.index()] == NO_CORNER {
+                    of_sample[v.index()] = samples.len() as Place;
+                    samples.push(v);
+                }
+            }
+            corners.push(vertices.map(|v| of_sample[v.index()]));
         }
-        Some(Pole::Infinite(direction)) => direction,
-        None => Vec3::ZERO,
-    };
-    first_poles(delaunay, spheres).into_iter().enumerate().map(vector).collect()
+        // The last is the vertex at infinity.
+        corners.extend(delaunay.infinite_cells().map(|cell| {
+            let [a, b, c, _] = delaunay.vertices(cell);
+            let [a, b, c] = [a, b, c].map(|v| of_sample[v.index()]);
+            [a, b, c, NO_CORNER]
+        }));
+        Self { of_sample, samples, corners }
+    }
 }
 
-/// In place of the corners of a cell whose Voronoi vertex is not representable.
-const NO_VERTEX: u8 = 0xff;
+/// A sample with the vector to its pole, the farthest vertex of its Voronoi cell; of unit length
+/// where that is at infinity, zero without a pole.
+#[derive(Clone, Copy)]
+struct Sample {
+    position: Vec3,
+    pole_vector: Vec3,
+}
 
-/// For each finite cell the corners, as bits, to which its Voronoi vertex is on the pole's side, or
-/// [`NO_VERTEX`].
-fn corners_ahead(
+fn with_poles(
     delaunay: &Delaunay,
     spheres: &[Option<Sphere>],
-    pole_vectors: &[Vec3],
-) -> Vec<u8> {
-    let of_cell = |(cell, sphere): (usize, &Option<Sphere>)| {
-        let Some(Sphere { centre, .. }) = *sphere else { return NO_VERTEX };
-        let corners = delaunay.vertices(CellId(cell as u32)).into_iter().enumerate();
-        corners.fold(0, |bits, (k, v)| {
-            let ahead = (centre - delaunay.point(v)).dot(pole_vectors[v.index()]) >= 0.0;
-            bits | u8::from(ahead) << k
-        })
-    };
-    spheres.par_iter().enumerate().with_min_len(1024).map(of_cell).collect()
+    Places { of_sample, samples, corners }: &Places,
+) -> Vec<Sample> {
+    // How far the Voronoi cells reach first: that needs no branch that cannot be foreseen.
+    let mut reach = vec![f64::NEG_INFINITY; samples.len()];
+    for (sphere, corners) in spheres.iter().zip(corners) {
+        let Some(Sphere { radius, .. }) = *sphere else { continue };
+        for &p in corners {
+            reach[p as usize] = reach[p as usize].max(radius);
+        }
+    }
+    let plain = |&v: &VertexId| Sample { position: delaunay.point(v), pole_vector: Vec3::ZERO };
+    let mut with_poles: Vec<Sample> = samples.iter().map(plain).collect();
+    // Backwards: of equally far ones that of the smallest cell is what remains.
+    for (sphere, corners) in spheres.iter().zip(corners).rev() {
+        let Some(Sphere { centre, radius }) = *sphere else { continue };
+        for &p in corners {
+            if radius == reach[p as usize] {
+                let sample = &mut with_poles[p as usize];
+                sample.pole_vector = centre - sample.position;
+            }
+        }
+    }
+    for (v, direction) in unbounded_directions(delaunay) {
+        with_poles[of_sample[v.index()] as usize].pole_vector = direction;
+    }
+    with_poles
 }
 
-/// Adds the facets of a cell, each from its smaller cell, to the umbrellas that they belong to.
-fn crossing(
-    delaunay: &Delaunay,
-    ahead: &[u8],
-    pole_vectors: &[Vec3],
-    cell: CellId,
-    found: &mut Vec<Triangle>,
-    flat: &mut usize,
-) {
-    let here = ahead[cell.index()];
-    if here == NO_VERTEX {
-        return;
+/// The corners of a cell as places, those with [`AHEAD`] to which its Voronoi vertex is on the
+/// pole's side: two cells of a facet are on different sides of a corner if and only if their numbers
+/// for it differ in that bit, which four lanes find at once, whatever the corners' order.
+type Sides = [u32; 4];
+
+/// Places are smaller.
+const AHEAD: u32 = 1 << 31;
+
+/// No corner: of a cell whose Voronoi vertex is not representable, and the vertex at infinity.
+const NO_CORNER: u32 = AHEAD - 2;
+
+/// The sides of all cells. The Voronoi vertex of an infinite cell is at infinity, outwards.
+fn sides_of_cells(
+    spheres: &[Option<Sphere>],
+    corners: Vec<[Place; 4]>,
+    samples: &[Sample],
+) -> Vec<Sides> {
+    let finite = |(sides, sphere): (&mut Sides, &Option<Sphere>)| match sphere {
+        Some(Sphere { centre, .. }) => {
+            *sides = sides.map(|p| {
+                let Sample { position, pole_vector } = samples[p as usize];
+                tagged(p, (*centre - position).dot(pole_vector))
+            });
+        }
+        None => *sides = [NO_CORNER; 4],
+    };
+    let mut sides = corners;
+    sides.par_iter_mut().zip(spheres).with_min_len(1024).for_each(finite);
+    for sides in &mut sides[spheres.len()..] {
+        let [a, b, c, _] = *sides;
+        let [p, q, r] = [a, b, c].map(|p| samples[p as usize].position);
+        let outwards = (q - p).cross(r - p);
+        let [a, b, c] = [a, b, c].map(|p| tagged(p, outwards.dot(samples[p as usize].pole_vector)));
+        *sides = [a, b, c, NO_CORNER];
     }
-    let (vertices, neighbours) = (delaunay.vertices(cell), delaunay.neighbours(cell));
-    for opposite in 0..4 {
-        let other = neighbours[opposite];
-        if other < cell {
-            continue;
-        }
-        let places = [1, 2, 3].map(|k| (opposite + k) % 4);
-        let facet = places.map(|k| vertices[k]);
-        // Whether the other end is on the pole's side of each corner.
-        let there = match ahead.get(other.index()) {
-            Some(&NO_VERTEX) => continue,
-            Some(&bits) => {
-                let corners = delaunay.vertices(other);
-                // Without branches: which corner is which cannot be foreseen.
-                facet.map(|v| {
-                    (0..4).fold(0, |bit, k| bit | u8::from(corners[k] == v) & bits >> k) & 1 == 1
-                })
+    sides
+}
+
+/// A place, with [`AHEAD`] for a product with the pole vector that is not negative.
+#[inline]
+fn tagged(place: Place, product: f64) -> u32 {
+    place | if product >= 0.0 { AHEAD } else { 0 }
+}
+
+/// A triangle of the umbrellas of some of its corners.
+struct Triangle {
+    corners: [Place; 3],
+    /// The corners, as bits, to whose umbrellas it belongs.
+    members: u8,
+    normal: Vec3,
+    circumradius: f64,
+}
+
+/// The triangles of the umbrellas from a part of the cells.
+#[derive(Default)]
+struct Crossing {
+    triangles: Vec<Triangle>,
+    flat: usize,
+}
+
+impl Crossing {
+    /// Of a range of cells, no more than [`CHUNK`].
+    fn of(delaunay: &Delaunay, sides: &[Sides], samples: &[Sample], cells: Range<u32>) -> Self {
+        // First which facets cross, without a branch, since that cannot be foreseen; then these.
+        let first = cells.start;
+        let mut facets = [0_u32; 4 * CHUNK as usize];
+        let mut count = 0;
+        for cell in cells {
+            for (opposite, crossed) in (0..).zip(crossing(delaunay, sides, CellId(cell))) {
+                facets[count] = (cell - first) << 8 | opposite << 4 | crossed;
+                count += usize::from(crossed != 0);
             }
-            None => {
-                let corners = facet.map(|v| delaunay.point(v));
-                let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-                let inwards = delaunay.point(vertices[opposite]) - corners[0];
-                let outwards = if normal.dot(inwards) > 0.0 { -normal } else { normal };
-                facet.map(|v| outwards.dot(pole_vectors[v.index()]) >= 0.0)
-            }
-        };
-        let crosses = |k: &usize| (here >> places[*k] & 1 == 1) != there[*k];
-        let members = (0..3).filter(crosses).fold(0, |bits, k| bits | 1 << k);
-        if members == 0 {
-            continue;
         }
-        match measure(facet.map(|v| delaunay.point(v))) {
+        let mut part = Self { triangles: Vec::with_capacity(count), flat: 0 };
+        for &facet in &facets[..count] {
+            let sides = sides[(first + (facet >> 8)) as usize];
+            let others = [1, 2, 3].map(|k| ((facet >> 4 & 15) as usize + k) % 4);
+            let corners = others.map(|k| sides[k] & !AHEAD);
+            let members = (0..3).fold(0, |bits, k| bits | ((facet >> others[k] & 1) as u8) << k);
+            part.add(samples, corners, members);
+        }
+        part
+    }
+
+    #[inline]
+    fn add(&mut self, samples: &[Sample], corners: [Place; 3], members: u8) {
+        match measure(corners.map(|p| samples[p as usize].position)) {
             Some((normal, circumradius)) => {
-                found.push(Triangle { corners: facet, members, normal, circumradius });
+                self.triangles.push(Triangle { corners, members, normal, circumradius });
             }
-            None => *flat += members.count_ones() as usize,
+            None => self.flat += members.count_ones() as usize,
         }
     }
+}
+
+/// For each facet of a cell, the one opposite to each vertex, the vertices as bits to whose
+/// umbrellas it belongs; none where it is the other cell's to tell, the one with the smaller id.
+#[inline]
+fn crossing(delaunay: &Delaunay, sides: &[Sides], cell: CellId) -> [u32; 4] {
+    let here = u32x4::from(sides[cell.index()]) ^ u32x4::splat(AHEAD);
+    delaunay.neighbours(cell).map(|other| {
+        // Against itself, whose sides are at hand, nothing crosses.
+        let other = if other > cell { other } else { cell };
+        let there = sides[other.index()].map(|side| here.simd_eq(u32x4::splat(side)));
+        ((there[0] | there[1]) | (there[2] | there[3])).to_bitmask()
+    })
 }
 
 /// Unit normal and circumradius; `None` without area.
+#[inline]
 fn measure([a, b, c]: [Vec3; 3]) -> Option<(Vec3, f64)> {
     let (u, v) = (b - a, c - a);
     let normal = u.cross(v);
     let area = normal.length();
-    let circumradius = u.length() * v.length() * (c - b).length() / (2.0 * area);
-    (area > 0.0 && circumradius.is_finite()).then(|| (normal / area, circumradius))
+    // Two roots instead of three; the products are as large as those for the area.
+    let sides = (u.length_squared() * v.length_squared()).sqrt() * (c - b).length();
+    let circumradius = sides / (2.0 * area);
+    (area > 0.0 && circumradius.is_finite()).then(|| (normal * area.recip(), circumradius))
 }

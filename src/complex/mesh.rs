@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::closure::{ascending_edge, ascending_face, closure};
 use crate::Vec3;
 use crate::geometry::Sphere;
 
@@ -101,20 +102,20 @@ impl MedialMesh {
         mut edges: Vec<[u32; 2]>,
         mut faces: Vec<[u32; 3]>,
     ) -> Result<Self, ComplexError> {
-        for edge in &mut edges {
-            edge.sort_unstable();
+        check_spheres(&spheres)?;
+        let count = spheres.len();
+        edges.iter_mut().for_each(|edge| *edge = ascending_edge(*edge));
+        let spans = |&[a, b]: &[u32; 2]| a < b && (b as usize) < count;
+        if let Some(edge) = edges.iter().position(|edge| !spans(edge)) {
+            return Err(ComplexError::Edge { edge, ends: edges[edge], spheres: count });
         }
-        for face in &mut faces {
-            face.sort_unstable();
+        faces.iter_mut().for_each(|face| *face = ascending_face(*face));
+        let spans = |&[a, b, c]: &[u32; 3]| a < b && b < c && (c as usize) < count;
+        if let Some(face) = faces.iter().position(|face| !spans(face)) {
+            return Err(ComplexError::Face { face, corners: faces[face], spheres: count });
         }
-        sort_simplices(&mut faces, spheres.len());
-        faces.dedup();
-        edges.extend(faces.iter().flat_map(sides));
-        sort_simplices(&mut edges, spheres.len());
-        edges.dedup();
-        let mesh = Self { spheres, edges, faces, contacts: None };
-        mesh.check()?;
-        Ok(mesh)
+        let (edges, faces) = closure(&edges, &faces, count);
+        Ok(Self { spheres, edges, faces, contacts: None })
     }
 
     /// Verifies the canonical form and the validity of every sphere.
@@ -123,11 +124,7 @@ impl MedialMesh {
     /// The first violation found. Cost `O(n log n)`.
     pub fn check(&self) -> Result<(), ComplexError> {
         let spheres = self.spheres.len();
-        for (sphere, s) in self.spheres.iter().enumerate() {
-            if !(s.centre.is_finite() && s.radius.is_finite() && s.radius >= 0.0) {
-                return Err(ComplexError::Sphere { sphere, centre: s.centre, radius: s.radius });
-            }
-        }
+        check_spheres(&self.spheres)?;
         for (edge, &ends) in self.edges.iter().enumerate() {
             if ends[0] >= ends[1] || ends[1] as usize >= spheres {
                 return Err(ComplexError::Edge { edge, ends, spheres });
@@ -275,28 +272,6 @@ fn sides(face: &[u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [a, c], [b, c]]
 }
 
-/// Sorts simplices lexicographically: into runs by their first sphere, then each run. `O(n)` where
-/// few simplices begin at the same sphere.
-fn sort_simplices<const N: usize>(simplices: &mut Vec<[u32; N]>, spheres: usize) {
-    // Ids that are out of range are found later; few simplices are not worth a list of all spheres.
-    if simplices.len() < spheres / 8 || simplices.iter().any(|s| s[0] as usize >= spheres) {
-        simplices.sort_unstable();
-        return;
-    }
-    let start = run_starts(simplices, spheres);
-    let mut next = start.clone();
-    let mut sorted = vec![[0; N]; simplices.len()];
-    for &simplex in simplices.iter() {
-        let place = &mut next[simplex[0] as usize];
-        sorted[*place as usize] = simplex;
-        *place += 1;
-    }
-    for run in start.windows(2) {
-        sorted[run[0] as usize..run[1] as usize].sort_unstable();
-    }
-    *simplices = sorted;
-}
-
 /// For each sphere the number of simplices that begin at a smaller one, then the number of all.
 fn run_starts<const N: usize>(simplices: &[[u32; N]], spheres: usize) -> Vec<u32> {
     let mut start = vec![0; spheres + 1];
@@ -307,6 +282,17 @@ fn run_starts<const N: usize>(simplices: &[[u32; N]], spheres: usize) -> Vec<u32
         start[sphere + 1] += start[sphere];
     }
     start
+}
+
+fn check_spheres(spheres: &[Sphere]) -> Result<(), ComplexError> {
+    let is_valid = |s: &Sphere| s.centre.is_finite() && s.radius.is_finite() && s.radius >= 0.0;
+    match spheres.iter().position(|s| !is_valid(s)) {
+        Some(sphere) => {
+            let Sphere { centre, radius } = spheres[sphere];
+            Err(ComplexError::Sphere { sphere, centre, radius })
+        }
+        None => Ok(()),
+    }
 }
 
 fn check_order<T: Ord>(what: &'static str, simplices: &[T]) -> Result<(), ComplexError> {

@@ -1,5 +1,6 @@
 //! The medial mesh: a simplicial complex of dimension at most two on medial spheres.
 
+mod closure;
 pub mod collapse;
 mod contour;
 mod cubical;

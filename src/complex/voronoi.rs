@@ -30,7 +30,8 @@ const GUARD_BAND: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DualTriangulation {
-    /// A fan from the vertex of the smallest Delaunay cell, as published.
+    /// A fan from one vertex, as published: from that of the smallest number. Spheres are numbered
+    /// along a curve through their centres, so the numbering of the samples does not matter.
     #[default]
     Fan,
     /// The planar Delaunay triangulation: larger smallest angles.
@@ -127,7 +128,8 @@ pub fn voronoi_medial_mesh(
             .filter(move |&other| other > cell && cells.is_inside(other))
             .map(move |other| [sphere(cell), sphere(other)])
     });
-    let faces = facets.triangles(&spheres, dual);
+    let all: Vec<u32> = (0..facets.len() as u32).collect();
+    let faces = facets.triangles(&all, &spheres, dual);
     let mut mesh = MedialMesh::from_simplices(spheres, edges.collect(), faces)
         .expect("circumspheres are finite and ids in range");
     mesh.contacts = Some(Contacts {
@@ -137,24 +139,23 @@ pub fn voronoi_medial_mesh(
     mesh
 }
 
-/// A dual polygon, given by its spheres in rotational order, in triangles.
-pub(super) fn triangulated(
+/// Adds the triangles of a dual polygon that is given by its spheres in rotational order.
+pub(super) fn triangulate(
     polygon: &[u32],
     spheres: &[Sphere],
     dual: DualTriangulation,
-) -> Vec<[u32; 3]> {
-    match dual {
-        DualTriangulation::Fan => fan(polygon),
-        DualTriangulation::Delaunay if polygon.len() == 3 => fan(polygon),
-        DualTriangulation::Delaunay => {
-            planar_delaunay(polygon, spheres).unwrap_or_else(|| fan(polygon))
-        }
+    triangles: &mut Vec<[u32; 3]>,
+) {
+    if dual == DualTriangulation::Delaunay
+        && polygon.len() > 3
+        && let Some(planar) = planar_delaunay(polygon, spheres)
+    {
+        triangles.extend(planar);
+        return;
     }
-}
-
-/// A fan from the first vertex, which is the one of the smallest cell.
-fn fan(polygon: &[u32]) -> Vec<[u32; 3]> {
-    polygon[1..].windows(2).map(|pair| [polygon[0], pair[0], pair[1]]).collect()
+    let start = (0..polygon.len()).min_by_key(|&k| polygon[k]).unwrap_or(0);
+    let vertex = |k: usize| polygon[(start + k) % polygon.len()];
+    triangles.extend((2..polygon.len()).map(|k| [vertex(0), vertex(k - 1), vertex(k)]));
 }
 
 /// The Delaunay triangulation of a convex planar polygon, or `None` where coincident or collinear

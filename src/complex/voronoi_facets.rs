@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::voronoi::{CellSpheres, DualTriangulation, triangulated};
+use super::voronoi::{CellSpheres, DualTriangulation, triangulate};
 use super::{Contacts, MedialMesh};
 use crate::geometry::triangulation::Triangulation;
 use crate::geometry::{CellId, Delaunay, VertexId};
@@ -100,14 +100,21 @@ impl VoronoiFacets {
         &self.polygons[self.start[facet] as usize..self.start[facet + 1] as usize]
     }
 
-    /// The facets in triangles, in the order of the facets.
+    /// Some facets in triangles, in the order of the facets.
     pub(super) fn triangles(
         &self,
+        facets: &[u32],
         spheres: &[super::Sphere],
         dual: DualTriangulation,
     ) -> Vec<[u32; 3]> {
-        let each = (0..self.len()).into_par_iter();
-        each.flat_map_iter(|facet| triangulated(self.polygon(facet), spheres, dual)).collect()
+        let parts = facets.par_chunks(1024).map(|part| {
+            let mut triangles = Vec::with_capacity(4 * part.len());
+            for &facet in part {
+                triangulate(self.polygon(facet as usize), spheres, dual, &mut triangles);
+            }
+            triangles
+        });
+        parts.collect::<Vec<_>>().concat()
     }
 
     /// The closure of some facets, and of further edges and vertices, as a complex of its own:
@@ -134,13 +141,11 @@ impl VoronoiFacets {
             renumbered[old as usize] = new;
         }
         let new = |old: u32| renumbered[old as usize];
-        let triangles = facets
-            .par_iter()
-            .flat_map_iter(|&facet| triangulated(self.polygon(facet as usize), &mesh.spheres, dual))
-            .map(|triangle| triangle.map(new));
+        let mut triangles = self.triangles(facets, &mesh.spheres, dual);
+        triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(new));
         let spheres = ids.iter().map(|&id| mesh.spheres[id as usize]).collect();
         let edges = edges.iter().map(|edge| edge.map(new)).collect();
-        let mut sub = MedialMesh::from_simplices(spheres, edges, triangles.collect())
+        let mut sub = MedialMesh::from_simplices(spheres, edges, triangles)
             .expect("a part of a valid complex");
         sub.contacts = mesh.contacts.as_ref().map(|contacts| Contacts {
             samples: contacts.samples.clone(),

@@ -28,7 +28,7 @@ pub use delaunay::Delaunay;
 pub use dual_complex::DualComplex;
 pub use enclosing::enclosing_ball;
 pub use nearby::{NearBatch, NearPoint, NearSet, NearbyTriangles};
-pub use poles::{PolarBall, Pole, Poles, SamplePoles, first_poles};
+pub use poles::{PolarBall, Pole, Poles, SamplePoles, unbounded_directions};
 pub use power_crust::PowerCrust;
 pub use regular::Regular;
 pub use separation::separation_angle;

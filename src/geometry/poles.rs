@@ -129,9 +129,8 @@ impl Poles {
     }
 }
 
-/// The first poles alone (step 1), of all samples, from the circumspheres of all finite cells, see
-/// [`Delaunay::circumspheres`]. Repeated samples have none.
-pub fn first_poles(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Vec<Option<Pole>> {
+/// Step 1, from the circumspheres of all finite cells. Repeated samples have none.
+fn first_poles(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Vec<Option<Pole>> {
     let mut first = vec![None; delaunay.point_count()];
     let mut farthest = vec![f64::NEG_INFINITY; first.len()];
     for cell in delaunay.finite_cells() {
@@ -149,8 +148,9 @@ pub fn first_poles(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Vec<Optio
     first
 }
 
-/// The hull's vertices, ascending, with the average direction of their cells' unbounded edges.
-fn unbounded_directions(delaunay: &Delaunay) -> Vec<(VertexId, Vec3)> {
+/// The hull's vertices, ascending, with the average direction of their cells' unbounded edges, of
+/// unit length: where their first poles are.
+pub fn unbounded_directions(delaunay: &Delaunay) -> Vec<(VertexId, Vec3)> {
     let mut normals: Vec<(VertexId, Vec3)> = Vec::with_capacity(3 * delaunay.infinite_cell_count());
     for cell in delaunay.infinite_cells() {
         let [a, b, c, _] = delaunay.vertices(cell);

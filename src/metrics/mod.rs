@@ -18,7 +18,7 @@ mod union_topology;
 mod volume;
 
 pub use axis_distance::{AxisOptions, COVERED, axis_distance};
-pub use certificate::{Certificate, FINEST, ROUNDING, certify};
+pub use certificate::{Certificate, FINEST, ROUNDING, Witness, WitnessSide, certify};
 pub use counts::counts;
 pub use envelope::{EnvelopeOptions, sample_envelope};
 pub use evaluation::{

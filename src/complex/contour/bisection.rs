@@ -16,6 +16,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use rayon::prelude::*;
 
 use crate::Vec3;
+use crate::hash::splitmix;
 
 /// The side of the cube is cut into so many steps of the integer grid that vertices are on.
 pub(super) const STEPS: u32 = 1 << 20;
@@ -253,11 +254,7 @@ impl Hasher for KeyHasher {
     }
 
     fn write_u64(&mut self, key: u64) {
-        // The finaliser of SplitMix64 (Steele, Lea, Flood 2014), whose high and low bits both mix.
-        let mut z = key.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        self.0 = z ^ z >> 31;
+        self.0 = splitmix(key);
     }
 }
 

@@ -6,7 +6,8 @@
 //! [`super::regular::Regular`] build it.
 //!
 //! Vertex ids are indices of the input points. Cell ids count finite cells first, then infinite
-//! ones, in an order that depends on the input alone, not on the number of threads that build it.
+//! ones, along a space-filling curve, so that neighbours are close in memory; the order depends on
+//! the input alone, not on the number of threads that build it.
 
 mod build;
 mod cells;
@@ -98,7 +99,8 @@ fn triangulate_dividing<M: Metric>(
     if sites.len() >= cells::MAX_CELLS {
         return Err(TriangulationError::TooLarge { points: sites.len(), limit: cells::MAX_CELLS });
     }
-    let order::Order { inserted: mut ids, rounds, repeated } = order::insertion_order(sites);
+    let order::Order { inserted: mut ids, rounds, repeated, along_curve } =
+        order::insertion_order(sites);
     if ids.len() < 4 {
         let distinct = ids.len();
         return Err(TriangulationError::TooFewPoints { points: sites.len(), distinct });
@@ -109,7 +111,7 @@ fn triangulate_dividing<M: Metric>(
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
     build::bring_independent_to_front(&mut ordered, &mut ids)?;
     let cells = Builder::<M>::build(&ordered, &rounds, divided_round, filter)?.cells;
-    let triangulation = freeze::freeze(cells, &ids, sites.len());
+    let triangulation = freeze::freeze(&cells, &ids, &along_curve);
     Ok(Triangulated { triangulation, repeated, filter })
 }
 

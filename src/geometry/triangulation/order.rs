@@ -18,6 +18,7 @@ use std::cmp::Ordering;
 use rayon::prelude::*;
 
 use crate::geometry::predicates::{Site, lexicographic};
+use crate::hash::splitmix;
 
 /// Bits of a Hilbert index for each axis.
 const BITS: u32 = 16;
@@ -145,6 +146,8 @@ pub(crate) struct Order {
     pub(crate) rounds: Vec<u32>,
     /// Pairs (site, the kept site at the same position), ascending.
     pub(crate) repeated: Vec<(u32, u32)>,
+    /// For each site that is inserted its place along the curve.
+    pub(crate) along_curve: Vec<u32>,
 }
 
 /// The order of insertion of `sites`; of equal positions the one with the largest weight is kept,
@@ -153,8 +156,12 @@ pub(crate) fn insertion_order(sites: &[Site]) -> Order {
     let mut sorted: Vec<u32> = (0..sites.len() as u32).collect();
     hilbert_sort(sites, &mut sorted);
     let repeated = remove_repeated(sites, &mut sorted);
+    let mut along_curve = vec![0; sites.len()];
+    for (place, &site) in (0..).zip(&sorted) {
+        along_curve[site as usize] = place;
+    }
     let (inserted, rounds) = into_rounds(sorted);
-    Order { inserted, rounds, repeated }
+    Order { inserted, rounds, repeated, along_curve }
 }
 
 fn remove_repeated(sites: &[Site], sorted: &mut Vec<u32>) -> Vec<(u32, u32)> {
@@ -213,14 +220,6 @@ fn into_rounds(sorted: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
     // Each start has moved to the end of its round.
     let ends = starts[..rounds as usize].iter().map(|&end| end as u32 + 1).collect();
     (ordered, ends)
-}
-
-/// Steele, Lea, Flood: *Fast splittable pseudorandom number generators*, OOPSLA 2014.
-fn splitmix(seed: u64) -> u64 {
-    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]

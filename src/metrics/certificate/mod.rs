@@ -62,7 +62,7 @@ const MOST_PIECES: usize = 1 << 24;
 /// An interval that holds the Hausdorff distance between a surface and the boundary of a union.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
-    /// No more than the distance.
+    /// No more than the distance: that of the witness, but for rounding.
     pub lower: f64,
     /// No less than the distance.
     pub upper: f64,
@@ -70,6 +70,27 @@ pub struct Certificate {
     pub tolerance: f64,
     /// Pieces that were looked at.
     pub pieces: u64,
+    /// A point that is as far from the other surface as `lower` says.
+    pub witness: Witness,
+}
+
+/// A point on one of the two surfaces, by which the lower end of an interval can be checked.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Witness {
+    /// Where it is.
+    pub point: Vec3,
+    /// The surface that it is on.
+    pub on: WitnessSide,
+}
+
+/// The surface that a [`Witness`] is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WitnessSide {
+    /// The surface, where `|sigma|` is the distance.
+    Surface,
+    /// The boundary of the union, whose distance to the surface it is.
+    Union,
 }
 
 /// Encloses the Hausdorff distance in an interval no wider than `tolerance`, in the unit of both,
@@ -97,9 +118,10 @@ pub fn certify(
     let hulls = Hulls::new(mesh);
     // A little less than both sides add, for the rounding of these sums.
     let goal = tolerance - 2.5 * ROUNDING;
-    let mut search = Search { lower: 0.0, upper: 0.0, goal, pieces: 0 };
     let side = SurfaceSide { union: &union, hulls: &hulls };
-    search.lower = side.largest_at(&surface.vertices);
+    let (lower, point) = side.farthest_of(&surface.vertices);
+    let witness = Witness { point, on: WitnessSide::Surface };
+    let mut search = Search { lower, witness, upper: 0.0, goal, pieces: 0 };
     search.run(&side, side.pieces(surface))?;
     let side = UnionSide::new(surface, bvh, mesh, &union, &hulls);
     search.run(&side, side.pieces())?;
@@ -108,6 +130,7 @@ pub fn certify(
         upper: search.upper.max(search.lower) + ROUNDING,
         tolerance,
         pieces: search.pieces,
+        witness: search.witness,
     })
 }
 
@@ -115,6 +138,9 @@ pub fn certify(
 trait Side: Sync {
     /// A part of this surface.
     type Piece: Copy + Send + Sync;
+
+    /// Which surface this is.
+    const SIDE: WitnessSide;
 
     /// What can be said about the distances in a piece. `known` is reached somewhere; an upper bound
     /// needs to be no better than `enough`.
@@ -127,8 +153,10 @@ trait Side: Sync {
 /// Bounds of the largest distance in a piece.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
-    /// Reached at some point of the piece; 0 where none is known.
+    /// Reached at `centre`; 0 where that is not known to be on the surface.
     reached: f64,
+    /// A point of the piece.
+    centre: Vec3,
     /// Not exceeded in the piece.
     upper: f64,
 }
@@ -136,6 +164,8 @@ struct Bound {
 /// The state of the branch and bound.
 struct Search {
     lower: f64,
+    /// Where `lower` is reached.
+    witness: Witness,
     upper: f64,
     goal: f64,
     pieces: u64,
@@ -151,7 +181,12 @@ impl Search {
                 .with_min_len(64)
                 .map(|piece| side.bound(piece, known, enough))
                 .collect();
-            self.lower = bounds.iter().fold(self.lower, |lower, b| lower.max(b.reached));
+            for bound in &bounds {
+                if bound.reached > self.lower {
+                    self.lower = bound.reached;
+                    self.witness = Witness { point: bound.centre, on: S::SIDE };
+                }
+            }
             let enough = self.lower + self.goal;
             let mut parts = Vec::new();
             for (piece, bound) in pieces.iter().zip(&bounds) {

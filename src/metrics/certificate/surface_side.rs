@@ -1,6 +1,6 @@
 //! The first side: `|sigma|` over the triangles of the surface.
 
-use super::{Bound, Hulls, Side, farthest, quartered};
+use super::{Bound, Hulls, Side, WitnessSide, farthest, quartered};
 use crate::Vec3;
 use crate::complex::MedialUnion;
 use crate::surface::TriMesh;
@@ -19,9 +19,15 @@ impl SurfaceSide<'_> {
         (0..surface.faces.len()).map(|face| surface.triangle(face)).collect()
     }
 
-    /// The largest distance at some points of the surface.
-    pub fn largest_at(&self, points: &[Vec3]) -> f64 {
-        self.union.signed_batch(points).into_iter().fold(0.0, |far, s| f64::max(far, s.abs()))
+    /// The farthest of some points of the surface, the first of equally far ones, and its distance.
+    pub fn farthest_of(&self, points: &[Vec3]) -> (f64, Vec3) {
+        let mut farthest = (0.0, points[0]);
+        for (signed, &point) in self.union.signed_batch(points).into_iter().zip(points) {
+            if signed.abs() > farthest.0 {
+                farthest = (signed.abs(), point);
+            }
+        }
+        farthest
     }
 
     /// A bound of `sigma` over a triangle: of the primitives that are deepest at the centre or
@@ -58,6 +64,8 @@ impl SurfaceSide<'_> {
 impl Side for SurfaceSide<'_> {
     type Piece = [Vec3; 3];
 
+    const SIDE: WitnessSide = WitnessSide::Surface;
+
     fn bound(&self, triangle: &[Vec3; 3], _: f64, enough: f64) -> Bound {
         let centre = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
         let reach = farthest(centre, triangle);
@@ -65,17 +73,17 @@ impl Side for SurfaceSide<'_> {
         let reached = deepest.signed.abs();
         let lipschitz = reached + reach;
         if lipschitz <= enough {
-            return Bound { reached, upper: lipschitz };
+            return Bound { reached, centre, upper: lipschitz };
         }
         let first = self.hulls.largest_over(deepest.primitive, triangle);
         let above = self.above(triangle, enough, first.min(deepest.signed + reach));
         if above > enough {
-            return Bound { reached, upper: above };
+            return Bound { reached, centre, upper: above };
         }
         // Primitives that are not looked at are no deeper than `enough`.
         let unseen = enough.min(reach - deepest.signed);
         let below = self.below(triangle, centre, reach, enough).max(unseen);
-        Bound { reached, upper: above.max(below) }
+        Bound { reached, centre, upper: above.max(below) }
     }
 
     fn divide(&self, triangle: &[Vec3; 3], parts: &mut Vec<[Vec3; 3]>) {

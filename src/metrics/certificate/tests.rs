@@ -25,6 +25,16 @@ fn certified(surface: &TriMesh, mesh: &MedialMesh, tolerance: f64) -> Certificat
     let bvh = TriangleBvh::new(surface).unwrap();
     let certificate = certify(surface, &bvh, mesh, tolerance).unwrap();
     assert!(certificate.upper - certificate.lower <= tolerance, "{certificate:?}");
+    // The lower end is the distance of the witness, which is where it is said to be.
+    let Witness { point, on } = certificate.witness;
+    let signed = MedialUnion::new(mesh).unwrap().signed(point);
+    let to_surface = bvh.closest(point).distance;
+    let (off, distance) = match on {
+        WitnessSide::Surface => (to_surface, signed.abs()),
+        WitnessSide::Union => (signed.abs(), to_surface),
+    };
+    assert!(off <= ROUNDING, "the witness is {off} off the {on:?}");
+    assert!((distance - certificate.lower).abs() <= 2.0 * ROUNDING, "{certificate:?}: {distance}");
     certificate
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Bound, Hulls, Side, farthest, quartered};
+use super::{Bound, Hulls, Side, WitnessSide, farthest, quartered};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion};
 use crate::geometry::planar_frame::PlanarFrame;
@@ -155,6 +155,8 @@ impl Enclosure {
 impl Side for UnionSide<'_> {
     type Piece = Piece;
 
+    const SIDE: WitnessSide = WitnessSide::Union;
+
     fn bound(&self, piece: &Piece, known: f64, enough: f64) -> Bound {
         let enclosure = self.enclose(piece);
         let (centre, corners) = (enclosure.centre, enclosure.corners());
@@ -162,21 +164,21 @@ impl Side for UnionSide<'_> {
         let closest = self.bvh.closest(centre);
         let lipschitz = closest.distance + reach;
         if lipschitz <= enough && closest.distance <= known {
-            return Bound { reached: 0.0, upper: lipschitz };
+            return Bound { reached: 0.0, centre, upper: lipschitz };
         }
         let deepest = self.union.deepest(centre);
         let held = || self.hulls.largest_over(deepest.primitive, corners) < -EXPOSED;
         if deepest.signed < -EXPOSED && (deepest.signed + reach < -EXPOSED || held()) {
-            return Bound { reached: 0.0, upper: 0.0 };
+            return Bound { reached: 0.0, centre, upper: 0.0 };
         }
         let reached = if deepest.signed >= -EXPOSED { closest.distance } else { 0.0 };
         if lipschitz <= enough {
-            return Bound { reached, upper: lipschitz };
+            return Bound { reached, centre, upper: lipschitz };
         }
         let triangle = &self.triangles[closest.face as usize];
         let squared = |&corner: &Vec3| triangle.distance_squared(corner);
         let convex = corners.iter().map(squared).fold(0.0, f64::max).sqrt();
-        Bound { reached, upper: lipschitz.min(convex) }
+        Bound { reached, centre, upper: lipschitz.min(convex) }
     }
 
     fn divide(&self, piece: &Piece, parts: &mut Vec<Piece>) {
