@@ -249,3 +249,50 @@ fn headline(comparison: &Comparison<'_>, summary: &CountSummary) -> Option<Strin
     text.push('.');
     Some(text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One series whose mean Hausdorff error is known at some counts.
+    fn curve(errors: &[(usize, Option<f64>)]) -> Vec<CountSummary> {
+        let summary = |&(count, error): &(usize, Option<f64>)| CountSummary {
+            count,
+            common: 1,
+            rows: vec![SeriesSummary {
+                series: 0,
+                compared: error.is_some(),
+                asked: 1,
+                reached: 1,
+                missed: 0,
+                failed: 0,
+                unsupported: 0,
+                means: COMPARED
+                    .map(|metric| if metric.key == HAUSDORFF.key { error } else { None }),
+                stages: None,
+                topology: (0, 0),
+            }],
+        };
+        errors.iter().map(summary).collect()
+    }
+
+    #[test]
+    fn the_level_of_a_curve_is_that_of_the_same_area() {
+        let level = |errors: &[(usize, Option<f64>)]| curve_level(&curve(errors), 0);
+        let close =
+            |a: Option<f64>, b: f64| assert!((a.unwrap() / b - 1.0).abs() < 1e-12, "{a:?} {b}");
+        let constant = [1000, 500, 100].map(|count| (count, Some(0.7)));
+        close(level(&constant), 0.7);
+        // A power law is a straight line: the geometric mean of its ends, whatever lies between.
+        let power = |count: usize| (count, Some(40.0 * (count as f64).powf(-0.8)));
+        let ends = (power(1000).1.unwrap() * power(50).1.unwrap()).sqrt();
+        close(level(&[1000, 50].map(power)), ends);
+        close(level(&[1000, 700, 90, 50].map(power)), ends);
+        // A rise over the last third: half of its logarithm there.
+        let steps = [(800, Some(1.0)), (400, Some(1.0)), (200, Some(1.0)), (100, Some(16.0))];
+        close(level(&steps), 16_f64.powf(0.5 / 3.0));
+        assert_eq!(level(&[(1000, Some(1.0)), (500, None), (100, Some(2.0))]), None);
+        assert_eq!(level(&[(1000, Some(1.0))]), None);
+        assert_eq!(level(&[]), None);
+    }
+}
