@@ -35,6 +35,9 @@ use crate::geometry::separation_angle;
 pub const RATIO_THRESHOLDS: [f64; 3] = [0.05, 0.1, 0.2];
 /// How far an idle sphere may stick out, as a fraction of the bounding-box diagonal.
 pub const IDLE_PROTRUSION: f64 = 1e-3;
+/// Radii that differ by less are equal, so that rounding does not decide about plates and tubes, whose
+/// radii are all the same; as a fraction of the bounding-box diagonal.
+pub const EQUAL_RADII: f64 = 1e-9;
 /// Smallest angle of a fin, in degrees.
 pub const FIN_ANGLE: f64 = 10.0;
 /// Separation angle of an angle spike, in degrees.
@@ -156,10 +159,11 @@ fn idle_spheres(mesh: &MedialMesh, boundary: &[bool]) -> u64 {
     idle.into_iter().filter(|&i| i).count() as u64
 }
 
-/// Whether a ball sticks out of another, at least as large, by less than [`IDLE_PROTRUSION`].
+/// Whether a ball sticks out of another, at least as large but for [`EQUAL_RADII`], by less than
+/// [`IDLE_PROTRUSION`].
 fn is_idle_beside(ball: Sphere, neighbour: Sphere) -> bool {
     let growth = neighbour.radius - ball.radius;
-    growth >= 0.0 && ball.centre.distance(neighbour.centre) - growth < IDLE_PROTRUSION
+    growth > -EQUAL_RADII && ball.centre.distance(neighbour.centre) - growth < IDLE_PROTRUSION
 }
 
 /// Measure 6. A sphere without radius touches everywhere at its centre and subtends nothing.
