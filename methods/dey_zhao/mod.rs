@@ -33,6 +33,8 @@
 //! - A facet of the box of the samples, which the paper adds to bound cells, is not needed: an
 //!   unbounded Voronoi edge has the outward normal of its hull triangle for its far end.
 
+#[cfg(test)]
+mod tests;
 mod umbrella;
 
 use std::f64::consts::FRAC_PI_2;

@@ -31,7 +31,8 @@ const GUARD_BAND: f64 = 1e-9;
 #[serde(rename_all = "snake_case")]
 pub enum DualTriangulation {
     /// A fan from one vertex, as published: from that of the smallest number. Spheres are numbered
-    /// along a curve through their centres, so the numbering of the samples does not matter.
+    /// along a curve through their centres, so the numbering of the samples matters only to centres
+    /// that coincide.
     #[default]
     Fan,
     /// The planar Delaunay triangulation: larger smallest angles.

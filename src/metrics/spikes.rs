@@ -8,7 +8,7 @@
 //! 3. dangling edges: no face, and an end with no other edge; all, and those with `G < tau`;
 //! 4. fins: faces with two or three boundary edges and a smallest angle below 10 degrees;
 //! 5. idle spheres: on the boundary, with a ball that sticks out of a neighbour's at least as
-//!    large by less than `eta`;
+//!    large, but for rounding, by less than `eta`;
 //! 6. angle spikes: spheres whose contact points subtend less than 20 degrees at the centre.
 //!
 //! Spheres that coincide (edges below [`ZERO_LENGTH`], triangles without area) make no spike: such
