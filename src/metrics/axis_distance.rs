@@ -50,13 +50,21 @@ pub fn axis_distance(
     truth: &MedialMesh,
     options: &AxisOptions,
 ) -> Result<AxisDistances, MetricError> {
+    let [computed, truth] = [PreparedAxis::new(computed)?, PreparedAxis::new(truth)?];
+    prepared_axis_distance(&computed, &truth, options)
+}
+
+/// As [`axis_distance`], of axes that may have been measured before.
+pub(super) fn prepared_axis_distance(
+    computed: &PreparedAxis,
+    truth: &PreparedAxis,
+    options: &AxisOptions,
+) -> Result<AxisDistances, MetricError> {
     if options.samples == 0 {
         return Err(MetricError::NoSamples("samples"));
     }
-    let sheet_of_face = sheets(truth);
-    let [computed, truth] = [AxisParts::new(computed)?, AxisParts::new(truth)?];
-    let there = directed(&computed, &truth, options)?;
-    let back = directed(&truth, &computed, options)?;
+    let there = directed(computed, truth, options);
+    let back = directed(truth, computed, options);
     let span = |there: Extent, back: Extent| AxisSpan {
         computed_to_true_max: there.max,
         computed_to_true_mean: there.mean,
@@ -64,7 +72,7 @@ pub fn axis_distance(
         true_to_computed_mean: back.mean,
     };
     Ok(AxisDistances {
-        coverage: coverage(&truth, &sheet_of_face, &back),
+        coverage: coverage(truth, &back),
         in_space: span(there.in_space, back.in_space),
         with_radius: span(there.with_radius, back.with_radius),
     })
@@ -94,7 +102,8 @@ fn sheets(mesh: &MedialMesh) -> Vec<u32> {
 }
 
 /// The covered share of each sheet, the largest sheet first.
-fn coverage(truth: &AxisParts, sheet_of_face: &[u32], back: &Directed) -> Vec<SheetCoverage> {
+fn coverage(truth: &PreparedAxis, back: &Directed) -> Vec<SheetCoverage> {
+    let PreparedAxis { parts: truth, sheet_of_face, .. } = truth;
     let mut sheets: Vec<(u32, SheetCoverage, [usize; 2])> = Vec::new();
     let mut index = vec![usize::MAX; sheet_of_face.len()];
     for (face, &sheet) in sheet_of_face.iter().enumerate() {
@@ -168,6 +177,30 @@ impl AxisParts {
     }
 }
 
+/// An axis, prepared to be sampled and to be measured against.
+pub(super) struct PreparedAxis {
+    parts: AxisParts,
+    sheet_of_face: Vec<u32>,
+    in_space: TriangleBvh,
+    with_radius: LiftedAxis,
+}
+
+impl PreparedAxis {
+    /// # Errors
+    /// When the mesh is empty or not valid.
+    pub fn new(mesh: &MedialMesh) -> Result<Self, MetricError> {
+        let parts = AxisParts::new(mesh)?;
+        let simplices = parts.simplices();
+        let flat: Vec<_> = simplices.iter().map(|s| s.map(DVec4::truncate)).collect();
+        Ok(Self {
+            parts,
+            sheet_of_face: sheets(mesh),
+            in_space: TriangleBvh::from_triangles(&flat).map_err(MetricError::Tree)?,
+            with_radius: LiftedAxis::new(&simplices),
+        })
+    }
+}
+
 /// Distances from one axis to another.
 struct Directed {
     in_space: Extent,
@@ -192,28 +225,21 @@ impl Extent {
     }
 }
 
-fn directed(
-    from: &AxisParts,
-    to: &AxisParts,
-    options: &AxisOptions,
-) -> Result<Directed, MetricError> {
+fn directed(from: &PreparedAxis, to: &PreparedAxis, options: &AxisOptions) -> Directed {
+    let from = &from.parts;
     let in_space: Vec<_> = from.triangles.iter().map(|t| t.map(DVec4::truncate)).collect();
     let placed = place_on_triangles(&in_space, options.samples, options.seed).unwrap_or_default();
     let sheets = placed.iter().map(|placed| placed.on(&from.triangles)).collect();
     let curves = sample_segments(&from.segments, options.samples);
     let sets: [Vec<DVec4>; 3] = [sheets, curves, from.spheres.clone()];
-    let simplices = to.simplices();
-    let flat: Vec<_> = simplices.iter().map(|s| s.map(DVec4::truncate)).collect();
-    let tree = TriangleBvh::from_triangles(&flat).map_err(MetricError::Tree)?;
-    let axis = LiftedAxis::new(&simplices);
-    let with_radius = [0, 1, 2].map(|k| axis.distances(&sets[k]));
+    let with_radius = [0, 1, 2].map(|k| to.with_radius.distances(&sets[k]));
     let in_space = sets.map(|set| {
         let points: Vec<Vec3> = set.into_iter().map(DVec4::truncate).collect();
-        tree.distance_batch(&points)
+        to.in_space.distance_batch(&points)
     });
     let (with_radius, extent) = (Extent::of(&with_radius), Extent::of(&in_space));
     let [of_triangles, ..] = in_space;
-    Ok(Directed { in_space: extent, with_radius, on_triangles: placed, of_triangles })
+    Directed { in_space: extent, with_radius, on_triangles: placed, of_triangles }
 }
 
 /// `count` points, equally spaced along the list of segments; none when they have no length.

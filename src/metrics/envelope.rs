@@ -5,7 +5,7 @@
 //! another primitive are dropped:
 //!
 //! 1. Patches and their areas: `4 pi r^2`; `pi (1 - s^2) l (r_1 + r_2)`; two triangles for a slab.
-//! 2. A pilot run, as dense as if nothing were buried, tells which share survives.
+//! 2. A pilot run with an eighth of the samples tells which share survives.
 //! 3. The run proper is denser by that share, so that about the asked number survives.
 //!
 //! Spheres are sampled along an equal-area spiral, cones and triangles by low-discrepancy
@@ -34,6 +34,10 @@ pub struct EnvelopeOptions {
     /// Seed of the turns and shifts.
     pub seed: u64,
 }
+
+/// The pilot run has so many times fewer candidates than samples are asked, but not fewer than this.
+const PILOT: f64 = 8.0;
+const LEAST_PILOT: f64 = 1000.0;
 
 /// The run proper makes at most this many candidates for each sample asked: beyond, nearly all of
 /// the patches' area is buried, and fewer samples than asked are returned.
@@ -75,14 +79,10 @@ pub(super) fn sample_envelope_along(
         return Ok(mesh.spheres.iter().map(|m| m.centre).collect());
     }
     let asked = options.samples as f64;
-    let sampled = |density| sample_patches(&patches, axes, density, union, options);
-    let mut points = sampled(asked / total);
-    let share = points.len() as f64 / asked;
-    if share < 0.9 {
-        let candidates = asked * (1.0 / share).min(MOST_CANDIDATES);
-        points = sampled(candidates / total);
-    }
-    Ok(points)
+    let sampled = |candidates| sample_patches(&patches, axes, candidates / total, union, options);
+    let pilot = (asked / PILOT).max(LEAST_PILOT);
+    let share = sampled(pilot).len() as f64 / pilot;
+    Ok(sampled(asked * (1.0 / share).clamp(1.0, MOST_CANDIDATES)))
 }
 
 /// A piece of the boundary of one primitive.
@@ -184,7 +184,7 @@ impl Patch {
                     let radius = (a.radius * a.radius + share * (b.radius - a.radius) * sum).sqrt();
                     let m = a.lerp(*b, share * sum / (a.radius + radius));
                     m.centre + m.radius * frame.normal(cos * v + sin * w)
-                }))
+                }));
             }
             Self::Triangle([a, b, c]) => points.extend((0..count).map(|i| {
                 let [mut s, mut t] = [0, 1].map(|k| (i as f64 * PLASTIC[k] + shift[k]).fract());

@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
+use super::axis_distance::{PreparedAxis, prepared_axis_distance};
 use super::hausdorff::distances_with_envelope;
 use super::pose::Pose;
 use super::protrusion::{centres_outside, protrusion};
 use super::volume::{Sides, box_in, volume_error_in};
 use super::{
     AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
-    SurfaceDistances, VolumeOptions, axis_distance, certify, counts, distances, spikes,
-    surface_distances, triangle_quality,
+    SurfaceDistances, VolumeOptions, certify, counts, distances, spikes, surface_distances,
+    triangle_quality,
 };
 use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
 use crate::geometry::TriangleBvh;
@@ -57,6 +58,9 @@ pub struct Judge {
     tree: Arc<TriangleBvh>,
     inside: InsideTest,
     truth: Truth,
+    /// The true axis, prepared at once and not on demand: waiting for another thread to do so, a
+    /// worker would wait for itself.
+    true_axis: Option<Result<PreparedAxis, MetricError>>,
     options: JudgeOptions,
 }
 
@@ -69,7 +73,8 @@ impl Judge {
         options: JudgeOptions,
     ) -> Self {
         let inside = InsideTest::new(&surface);
-        Self { surface, tree, inside, truth, options }
+        let true_axis = truth.axis.as_ref().map(PreparedAxis::new);
+        Self { surface, tree, inside, truth, true_axis, options }
     }
 
     /// How results are measured.
@@ -93,7 +98,7 @@ impl Judge {
         let pose = Pose::new(&self.surface, mesh);
         let mesh = &pose.in_order(mesh);
         let union = MedialUnion::new(mesh)?;
-        let axis = || self.truth.axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
+        let axis = || self.true_axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
         let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
         // Side by side, because parts of each run on one thread.
         let distances = || {
@@ -179,10 +184,11 @@ impl Judge {
     fn axis_distances(
         &self,
         mesh: &MedialMesh,
-        truth: &MedialMesh,
+        truth: &Result<PreparedAxis, MetricError>,
     ) -> Result<AxisDistances, MetricError> {
         let options = AxisOptions { samples: self.options.samples, seed: self.options.seed };
-        axis_distance(mesh, truth, &options)
+        let truth = truth.as_ref().map_err(Clone::clone)?;
+        prepared_axis_distance(&PreparedAxis::new(mesh)?, truth, &options)
     }
 
     /// Signs that the medial mesh does not belong to this surface: published files have had the

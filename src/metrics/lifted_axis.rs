@@ -36,15 +36,23 @@ impl LiftedAxis {
         Self { tree, simplices }
     }
 
-    /// Distances of some points, in their order, in parallel.
+    /// Distances of some points, in their order, in parallel. Quicker where each point is close to the
+    /// one before, whose nearest simplex is tried first.
     pub fn distances(&self, points: &[DVec4]) -> Vec<f64> {
-        points.par_iter().with_min_len(64).map(|&p| self.distance(p)).collect()
-    }
-
-    fn distance(&self, p: DVec4) -> f64 {
-        let mut search = Nearest { axis: self, p, place: p.truncate(), distance: f64::INFINITY };
-        self.tree.search(&mut search);
-        search.distance
+        let along = |chunk: &[DVec4]| {
+            let mut nearest = None;
+            let distance = |&p: &DVec4| {
+                let mut search = Nearest::of(self, p);
+                if let Some(last) = nearest {
+                    search.visit(last..last + 1);
+                }
+                self.tree.search(&mut search);
+                nearest = search.simplex;
+                search.distance
+            };
+            chunk.iter().map(distance).collect::<Vec<f64>>()
+        };
+        points.par_chunks(256).flat_map_iter(along).collect()
     }
 }
 
@@ -53,6 +61,25 @@ struct Nearest<'a> {
     p: DVec4,
     place: Vec3,
     distance: f64,
+    /// The simplex at that distance.
+    simplex: Option<usize>,
+    /// From the point to the nearest one of that simplex.
+    to: DVec4,
+}
+
+impl<'a> Nearest<'a> {
+    fn of(axis: &'a LiftedAxis, p: DVec4) -> Self {
+        let distance = f64::INFINITY;
+        Self { axis, p, place: p.truncate(), distance, simplex: None, to: DVec4::ZERO }
+    }
+
+    /// Whether all corners lie beyond the plane through the nearest point so far, across the way to
+    /// it: then so does the simplex, and a quick look will do.
+    #[inline]
+    fn is_beyond(&self, corners: &[DVec4; 3]) -> bool {
+        let most = self.distance * self.distance;
+        corners.iter().all(|&corner| (corner - self.p).dot(self.to) >= most)
+    }
 }
 
 impl Search for Nearest<'_> {
@@ -67,15 +94,23 @@ impl Search for Nearest<'_> {
     }
 
     fn visit(&mut self, places: Range<usize>) {
-        for simplex in &self.axis.simplices[places] {
-            self.distance = self.distance.min(squared_distance(self.p, simplex).sqrt());
+        for simplex in places {
+            let corners = &self.axis.simplices[simplex];
+            if self.simplex.is_some() && self.is_beyond(corners) {
+                continue;
+            }
+            let to = towards(self.p, corners);
+            let distance = to.length();
+            if distance < self.distance {
+                (self.distance, self.simplex, self.to) = (distance, Some(simplex), to);
+            }
         }
     }
 }
 
-/// Squared distance of a point to a triangle, in any position.
+/// From a point to the nearest one of a triangle, in any position.
 #[inline]
-fn squared_distance(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> f64 {
+fn towards(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> DVec4 {
     let (u, v, w) = (b - a, c - a, p - a);
     let [uu, uv, vv] = [u.dot(u), u.dot(v), v.dot(v)];
     let [wu, wv] = [w.dot(u), w.dot(v)];
@@ -83,20 +118,21 @@ fn squared_distance(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> f64 {
     if determinant > THIN * uu * vv {
         let (s, t) = ((wu * vv - wv * uv) / determinant, (wv * uu - wu * uv) / determinant);
         if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
-            return (w - s * u - t * v).length_squared();
+            return s * u + t * v - w;
         }
     }
-    let sides = to_segment(p, a, b).min(to_segment(p, c, a));
-    sides.min(to_segment(p, b, c))
+    let shorter = |x: DVec4, y: DVec4| if y.length_squared() < x.length_squared() { y } else { x };
+    let sides = shorter(towards_segment(p, a, b), towards_segment(p, c, a));
+    shorter(sides, towards_segment(p, b, c))
 }
 
-/// Squared distance of a point to a segment.
+/// From a point to the nearest one of a segment.
 #[inline]
-fn to_segment(p: DVec4, from: DVec4, to: DVec4) -> f64 {
+fn towards_segment(p: DVec4, from: DVec4, to: DVec4) -> DVec4 {
     let (along, w) = (to - from, p - from);
     let squared = along.length_squared();
     let share = if squared > 0.0 { (w.dot(along) / squared).clamp(0.0, 1.0) } else { 0.0 };
-    (w - share * along).length_squared()
+    share * along - w
 }
 
 #[cfg(test)]

@@ -11,8 +11,10 @@
 //!
 //! Each edge is evaluated once and not once for every face: the sides of a face are edges of the
 //! mesh, so a face adds only the part between its two tangent triangles. A sphere with an edge
-//! lies in that edge's cone.
+//! lies in that edge's cone. Of primitives on spheres that are equal up to rounding one is evaluated
+//! ([`coincident`]).
 
+mod coincident;
 mod parts;
 mod search;
 #[cfg(test)]
@@ -22,6 +24,7 @@ use super::{ComplexError, MedialMesh};
 use crate::Vec3;
 use crate::geometry::{Bounds, Cone, SlabFace, Sphere, in_morton_order};
 
+use coincident::Distinct;
 use parts::{Part, Parts, Shape};
 use search::{Buried, Nearer, Signed, Unsigned};
 
@@ -113,28 +116,40 @@ impl MedialUnion {
         let sphere = |v: u32| mesh.spheres[v as usize];
         // Spheres that need no part of their own: ends of proper cones, and those that lie in a
         // neighbour, whose own parts are then nearer everywhere.
+        let mut distinct = Distinct::new(mesh);
         let mut covered = vec![false; mesh.spheres.len()];
         let mut parts = Vec::with_capacity(mesh.edges.len() + mesh.faces.len());
         for (e, &ends) in (0..).zip(&mesh.edges) {
-            let [a, b] = ends.map(sphere);
-            let cone = Cone::new(a, b);
-            if let Some(larger) = cone.larger() {
-                covered[ends[1 - larger] as usize] = true;
+            if !distinct.is_proper(ends) {
                 continue;
             }
-            for v in ends {
-                covered[v as usize] = true;
+            let balls = ends.map(sphere);
+            let [a, b] = balls;
+            let cone = Cone::new(a, b);
+            if let Some(larger) = cone.larger() {
+                if distinct.is_smaller(&balls[1 - larger], &balls[larger]) {
+                    covered[distinct.sphere(ends[1 - larger]) as usize] = true;
+                }
+            } else if distinct.is_first(ends) {
+                for v in ends {
+                    covered[distinct.sphere(v) as usize] = true;
+                }
+                parts.push(Part::new(Primitive::Edge(e), Shape::Cone(cone), &balls));
             }
-            parts.push(Part::new(Primitive::Edge(e), Shape::Cone(cone), &[a, b]));
         }
-        for (f, corners) in (0..).zip(&mesh.faces) {
-            let corners = corners.map(sphere);
+        for (f, &corners) in (0..).zip(&mesh.faces) {
+            let is_proper = distinct.is_proper(corners);
+            let balls = corners.map(sphere);
             // Without tangent planes the slab is the union of its cones.
-            if let Some(face) = SlabFace::new(corners) {
-                parts.push(Part::new(Primitive::Face(f), Shape::Slab(face), &corners));
+            if is_proper
+                && let Some(face) = SlabFace::new(balls)
+                && distinct.is_first(corners)
+            {
+                parts.push(Part::new(Primitive::Face(f), Shape::Slab(face), &balls));
             }
         }
-        let alone = (0..).zip(&mesh.spheres).filter(|&(v, _): &(u32, _)| !covered[v as usize]);
+        let is_alone = |v: u32| distinct.sphere(v) == v && !covered[v as usize];
+        let alone = (0..).zip(&mesh.spheres).filter(|&(v, _)| is_alone(v));
         let part = |(v, &m)| Part::new(Primitive::Sphere(v), Shape::Sphere(m), &[m]);
         parts.extend(alone.map(part));
         if parts.is_empty() {
@@ -255,26 +270,34 @@ impl MedialUnion {
     /// Whether some primitive holds `p` more than `depth` below its surface; with a negative depth,
     /// whether one is nearer than that. Ends at the first that is found.
     pub fn buries(&self, p: Vec3, depth: f64) -> bool {
-        self.burier(p, depth, None).is_some()
+        self.burier(p, depth).is_some()
     }
 
     /// Keeps of some points those that no primitive [`buries`](Self::buries) deeper than `depth`.
-    /// Quicker where each point is close to the one before.
+    /// Quicker where few primitives bury them all, as on the surface of another one.
     pub fn retain_unburied(&self, points: &mut Vec<Vec3>, depth: f64) {
-        let mut last = None;
+        // Those that buried a point are tried first, the last one before the others.
+        let mut recent = [None; RECENT];
         points.retain(|&p| {
-            let burier = self.burier(p, depth, last);
-            last = burier.or(last);
+            let holds = |place: &Option<usize>| {
+                place.is_some_and(|place| self.parts.shape(place).signed(p) < -depth)
+            };
+            let again = recent.iter().position(holds);
+            let burier = match again {
+                Some(turn) => recent[turn],
+                None => self.burier(p, depth),
+            };
+            if burier.is_some() {
+                recent[..=again.unwrap_or(RECENT - 1)].rotate_right(1);
+                recent[0] = burier;
+            }
             burier.is_none()
         });
     }
 
     /// A primitive that holds `p` more than `depth` below its surface, by its place, where one
-    /// does; the one at `first` is tried before all others.
-    fn burier(&self, p: Vec3, depth: f64, first: Option<usize>) -> Option<usize> {
-        if first.is_some_and(|place| self.parts.shape(place).signed(p) < -depth) {
-            return first;
-        }
+    /// does.
+    fn burier(&self, p: Vec3, depth: f64) -> Option<usize> {
         let mut search = Buried { parts: &self.parts, p, limit: -depth, place: None };
         self.parts.search(&mut search);
         search.place
@@ -287,6 +310,9 @@ impl MedialUnion {
         self.parts.search(&mut Nearer { parts: &self.parts, p, limit, each });
     }
 }
+
+/// How many primitives are remembered that buried a point.
+const RECENT: usize = 4;
 
 fn ball_box(balls: &[Sphere]) -> Bounds {
     let corners = |m: &Sphere| [-m.radius, m.radius].map(|r| m.centre + Vec3::splat(r));

@@ -116,6 +116,28 @@ fn answers_are_those_of_all_primitives() {
     }
 }
 
+/// The parts that stand for equal ones are as near as any, up to what equal means.
+#[test]
+fn no_primitive_is_nearer_than_its_part() {
+    let mut rng = Pcg64::seed_from_u64(11);
+    for (kind, fewer) in [("cluster", true), ("nested", false), ("steep", false), ("points", false)]
+    {
+        for count in [1, 2, 5, 40, 120] {
+            let mesh = mesh(kind, count, &mut rng);
+            let union = MedialUnion::new(&mesh).unwrap();
+            let primitives = mesh.spheres.len() + mesh.edges.len() + mesh.faces.len();
+            assert!(!fewer || 2 * union.parts.primitives().len() <= primitives.max(2), "{count}");
+            for _ in 0..100 {
+                let p = vector(&mut rng) * 10.0_f64.powi(rng.random_range(-2..2));
+                let least = all(&mesh, p).iter().map(|part| part.0).fold(f64::INFINITY, f64::min);
+                let told = union.signed(p);
+                let off = 6.0 * coincident::EQUAL + 1e-15 * (1.0 + p.length());
+                assert!((told - least).abs() <= off, "{kind}, {count}, {p}: {told} {least}");
+            }
+        }
+    }
+}
+
 fn has_part(union: &MedialUnion, primitive: Primitive) -> bool {
     union.parts.primitives().contains(&primitive)
 }
