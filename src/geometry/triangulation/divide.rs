@@ -252,7 +252,11 @@ impl<'s, M: Metric> Builder<'s, M> {
         if self.last == FRONTIER {
             self.last = second.builder.last + offset;
         }
-        let moved = |cell: &Cell| Cell { v: cell.v, n: cell.n.map(|n| n.moved(offset)) };
+        let moved = |cell: &Cell| {
+            let [a, b, c, d] = cell.n;
+            let n = [a.moved(offset), b.moved(offset), c.moved(offset), d.moved(offset)];
+            Cell { v: cell.v, n }
+        };
         self.cells.par_extend(second.builder.cells[1..].par_iter().map(moved));
         self.state.resize(self.cells.len(), UNKNOWN);
         self.free.extend(second.builder.free.iter().map(|id| id + offset));
