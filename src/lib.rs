@@ -22,6 +22,7 @@ mod hash;
 pub mod metrics;
 pub mod shape;
 pub mod simplifier;
+mod sum;
 pub mod surface;
 
 pub use atomic::write_atomically;

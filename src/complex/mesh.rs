@@ -214,18 +214,14 @@ impl MedialMesh {
         }
     }
 
-    /// The same complex with its spheres numbered by coordinates and radius, so that two numberings
-    /// of it give the same mesh, bit for bit. Equal spheres stay in their order.
-    pub fn in_order(&self) -> Self {
-        let key = |s: &Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
-        let mut order: Vec<u32> = (0..self.spheres.len() as u32).collect();
-        order.sort_by(|&a, &b| {
-            let [a, b] = [a, b].map(|v| key(&self.spheres[v as usize]));
-            let pairs = a.iter().zip(&b).map(|(a, b)| a.total_cmp(b));
-            pairs.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
-        });
+    /// The same complex with its spheres in another order: first sphere `order[0]`, and so on.
+    ///
+    /// # Panics
+    /// When `order` does not name every sphere, or names more.
+    pub fn renumbered(&self, order: &[u32]) -> Self {
+        assert_eq!(order.len(), self.spheres.len(), "an order of all spheres");
         let mut new = vec![0; order.len()];
-        for (to, &from) in (0..).zip(&order) {
+        for (to, &from) in (0..).zip(order) {
             new[from as usize] = to;
         }
         let mut edges: Vec<[u32; 2]> =

@@ -20,7 +20,9 @@ mod tangent_planes;
 pub mod triangulation;
 pub mod union_boundary;
 
-pub(crate) use bvh::{Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order, morton_order};
+pub(crate) use bvh::{
+    Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order, morton_code, morton_order,
+};
 pub use bvh::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree};
 pub(crate) use bvh::{ConeBlock, FaceBlock, Lanes, Measure, Query, ReachTree};
 pub use cone::Cone;

@@ -55,6 +55,17 @@ pub fn sample_envelope(
     union: &MedialUnion,
     options: &EnvelopeOptions,
 ) -> Result<Vec<Vec3>, MetricError> {
+    sample_envelope_along(Vec3::AXES, mesh, union, options)
+}
+
+/// As [`sample_envelope`], laid out along orthonormal, right-handed `axes` instead of those of the
+/// coordinates.
+pub(super) fn sample_envelope_along(
+    axes: [Vec3; 3],
+    mesh: &MedialMesh,
+    union: &MedialUnion,
+    options: &EnvelopeOptions,
+) -> Result<Vec<Vec3>, MetricError> {
     if options.samples == 0 {
         return Err(MetricError::NoSamples("envelope_samples"));
     }
@@ -64,11 +75,12 @@ pub fn sample_envelope(
         return Ok(mesh.spheres.iter().map(|m| m.centre).collect());
     }
     let asked = options.samples as f64;
-    let mut points = sample_patches(&patches, asked / total, union, options);
+    let sampled = |density| sample_patches(&patches, axes, density, union, options);
+    let mut points = sampled(asked / total);
     let share = points.len() as f64 / asked;
     if share < 0.9 {
         let candidates = asked * (1.0 / share).min(MOST_CANDIDATES);
-        points = sample_patches(&patches, candidates / total, union, options);
+        points = sampled(candidates / total);
     }
     Ok(points)
 }
@@ -103,6 +115,7 @@ fn patches(mesh: &MedialMesh) -> Vec<Patch> {
 /// The candidates of all patches at one density (points per area) that are not buried.
 fn sample_patches(
     patches: &[Patch],
+    axes: [Vec3; 3],
     density: f64,
     union: &MedialUnion,
     options: &EnvelopeOptions,
@@ -125,7 +138,8 @@ fn sample_patches(
             let stream = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let mut points = Vec::new();
             if count > 0 {
-                patch.sample(count, &mut Pcg64::seed_from_u64(options.seed ^ stream), &mut points);
+                let mut rng = Pcg64::seed_from_u64(options.seed ^ stream);
+                patch.sample(axes, count, &mut rng, &mut points);
                 union.retain_unburied(&mut points, options.burial);
             }
             points
@@ -145,12 +159,13 @@ impl Patch {
         }
     }
 
-    fn sample(&self, count: usize, rng: &mut Pcg64, points: &mut Vec<Vec3>) {
+    fn sample(&self, axes: [Vec3; 3], count: usize, rng: &mut Pcg64, points: &mut Vec<Vec3>) {
         let shift = [rng.random::<f64>(), rng.random::<f64>()];
         let level = |i: usize| (i as f64 + 0.5) / count as f64;
         match self {
             Self::Sphere(m) => {
-                let turn = random_rotation(rng);
+                let turn = glam::DMat3::from_cols_array_2d(&axes.map(|axis| axis.to_array()))
+                    * glam::DMat3::from_quat(random_rotation(rng));
                 points.extend((0..count).map(|i| {
                     let z = 1.0 - 2.0 * level(i);
                     let (sin, cos) = (TAU * (i as f64 * GOLDEN).fract()).sin_cos();
@@ -158,15 +173,19 @@ impl Patch {
                     m.centre + m.radius * (turn * Vec3::new(rho * cos, rho * sin, z))
                 }));
             }
-            Self::Lateral(a, b, frame) => points.extend((0..count).map(|i| {
-                let share = (level(i) + shift[0]).fract();
-                let (sin, cos) = (TAU * (i as f64 * GOLDEN + shift[1]).fract()).sin_cos();
-                // Area grows with the radius; this form does not cancel for equal radii.
-                let sum = a.radius + b.radius;
-                let radius = (a.radius * a.radius + share * (b.radius - a.radius) * sum).sqrt();
-                let m = a.lerp(*b, share * sum / (a.radius + radius));
-                m.centre + m.radius * frame.normal(cos * frame.v + sin * frame.w)
-            })),
+            Self::Lateral(a, b, frame) => {
+                let v = across(frame, axes);
+                let w = frame.u.cross(v);
+                points.extend((0..count).map(|i| {
+                    let share = (level(i) + shift[0]).fract();
+                    let (sin, cos) = (TAU * (i as f64 * GOLDEN + shift[1]).fract()).sin_cos();
+                    // Area grows with the radius; this form does not cancel for equal radii.
+                    let sum = a.radius + b.radius;
+                    let radius = (a.radius * a.radius + share * (b.radius - a.radius) * sum).sqrt();
+                    let m = a.lerp(*b, share * sum / (a.radius + radius));
+                    m.centre + m.radius * frame.normal(cos * v + sin * w)
+                }))
+            }
             Self::Triangle([a, b, c]) => points.extend((0..count).map(|i| {
                 let [mut s, mut t] = [0, 1].map(|k| (i as f64 * PLASTIC[k] + shift[k]).fract());
                 if s + t > 1.0 {
@@ -176,6 +195,16 @@ impl Patch {
             })),
         }
     }
+}
+
+/// The unit vector orthogonal to a cone's axis in the direction of the first of `axes` that is not
+/// nearly along it.
+fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
+    let [x, y, _] = axes;
+    // Below one half, so that the second will do where the first does not; and no simple fraction, so
+    // that rounding does not decide.
+    let is_across = |axis: Vec3| axis.reject_from_normalized(frame.u).length_squared() > 0.2137;
+    frame.across(if is_across(x) { x } else { y }).unwrap_or(frame.v)
 }
 
 /// Uniform over all rotations (Shoemake 1992, "Uniform random rotations", Graphics Gems III).

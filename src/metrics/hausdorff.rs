@@ -25,7 +25,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::Distances;
-use super::envelope::{EnvelopeOptions, sample_envelope};
+use super::envelope::{EnvelopeOptions, sample_envelope_along};
+use super::pose::Pose;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
 use crate::geometry::TriangulationError;
@@ -114,8 +115,12 @@ pub fn distances(
     mesh: &MedialMesh,
     options: &DistanceOptions,
 ) -> Result<Distances, MetricError> {
+    mesh.check().map_err(UnionError::from)?;
+    let pose = Pose::new(surface, mesh);
+    let mesh = &pose.in_order(mesh);
     let union = MedialUnion::new(mesh)?;
-    distances_with_envelope(surface, bvh, mesh, &union, options).map(|(distances, _)| distances)
+    let (distances, _) = distances_with_envelope(surface, bvh, mesh, &union, &pose, options)?;
+    Ok(distances)
 }
 
 /// Samples of the boundary of a union, with their distances from the surface.
@@ -124,28 +129,27 @@ pub(super) struct Envelope {
     pub distances: Vec<f64>,
 }
 
-/// As [`distances`], with the samples of the reverse distance; `union` is that of `mesh`.
+/// As [`distances`], with the samples of the reverse distance; `union` is that of `mesh`, whose spheres
+/// are in the order of `pose`.
 pub(super) fn distances_with_envelope(
     surface: &TriMesh,
     bvh: &TriangleBvh,
     mesh: &MedialMesh,
     union: &MedialUnion,
+    pose: &Pose,
     options: &DistanceOptions,
 ) -> Result<(Distances, Envelope), MetricError> {
-    let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
+    let samples = SurfaceSamples::new(surface, pose, options.surface_samples, options.seed)?;
     let readings = union.readings_batch(&samples.points);
     let sigma: Vec<f64> = readings.iter().map(|r| r.sigma.abs()).collect();
     let mu: Vec<f64> = readings.iter().map(|r| r.mu).collect();
     let spheres = absolute(MedialUnion::of_spheres(&mesh.spheres)?.signed_batch(&samples.points));
-    let envelope = sample_envelope(
-        mesh,
-        union,
-        &EnvelopeOptions {
-            samples: options.envelope_samples,
-            burial: BURIAL * diagonal(surface),
-            seed: options.seed,
-        },
-    )?;
+    let envelope = EnvelopeOptions {
+        samples: options.envelope_samples,
+        burial: BURIAL * pose.diameter(),
+        seed: options.seed,
+    };
+    let envelope = sample_envelope_along(pose.axes(), mesh, union, &envelope)?;
     let reverse = bvh.distance_batch(&envelope);
     let uniform = Summary::new(&sigma[..samples.uniform]);
     let (epsilon_union, reverse_max) = (largest(&sigma), largest(&reverse));
@@ -166,13 +170,9 @@ pub(super) fn distances_with_envelope(
     Ok((distances, Envelope { points: envelope, distances: reverse }))
 }
 
-/// Depth, as a fraction of the surface's diagonal, from which a point of one primitive's surface
+/// Depth, as a fraction of the surface's diameter, from which a point of one primitive's surface
 /// counts as buried in another primitive and not as a point of the union's boundary.
 const BURIAL: f64 = 1e-7;
-
-fn diagonal(surface: &TriMesh) -> f64 {
-    surface.bounding_box().map_or(0.0, |(lo, hi)| lo.distance(hi))
-}
 
 fn absolute(mut values: Vec<f64>) -> Vec<f64> {
     for value in &mut values {
@@ -195,11 +195,16 @@ pub(super) struct SurfaceSamples {
 }
 
 impl SurfaceSamples {
-    pub fn new(surface: &TriMesh, count: usize, seed: u64) -> Result<Self, MetricError> {
+    pub fn new(
+        surface: &TriMesh,
+        pose: &Pose,
+        count: usize,
+        seed: u64,
+    ) -> Result<Self, MetricError> {
         if count == 0 {
             return Err(MetricError::NoSamples("surface_samples"));
         }
-        let triangles: Vec<_> = (0..surface.faces.len()).map(|f| surface.triangle(f)).collect();
+        let triangles = pose.triangles(surface);
         let mut points = sample_triangles(&triangles, count, seed).ok_or(MetricError::NoArea)?;
         let mut used = vec![false; surface.vertices.len()];
         for &v in surface.faces.iter().flatten() {
@@ -325,7 +330,8 @@ mod tests {
             faces: vec![[0, 1, 2], [0, 2, 3]],
         };
         let sampled = sample(&surface, &Sampling::AreaUniform { count: 500, seed: 3 });
-        let measured = SurfaceSamples::new(&surface, 500, 3).unwrap();
+        let pose = Pose::new(&surface, &MedialMesh::default());
+        let measured = SurfaceSamples::new(&surface, &pose, 500, 3).unwrap();
         assert_eq!((measured.uniform, measured.points.len()), (500, 504));
         let apart = |p: &&Vec3| sampled.iter().all(|q| p.distance(*q) > 1e-9);
         assert_eq!(measured.points[..500].iter().filter(apart).count(), 500);

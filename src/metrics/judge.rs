@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use super::hausdorff::distances_with_envelope;
+use super::pose::Pose;
 use super::protrusion::{centres_outside, protrusion};
+use super::volume::{Sides, box_in, volume_error_in};
 use super::{
     AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
     SurfaceDistances, VolumeOptions, axis_distance, certify, counts, distances, spikes,
-    surface_distances, triangle_quality, volume_error,
+    surface_distances, triangle_quality,
 };
 use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
 use crate::geometry::TriangleBvh;
@@ -88,17 +90,18 @@ impl Judge {
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
         mesh.check().map_err(UnionError::from)?;
         // Random numbers and sums follow the order of the spheres.
-        let mesh = &mesh.in_order();
+        let pose = Pose::new(&self.surface, mesh);
+        let mesh = &pose.in_order(mesh);
         let union = MedialUnion::new(mesh)?;
         let axis = || self.truth.axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
         let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
         // Side by side, because parts of each run on one thread.
         let distances = || {
             let (surface, options) = (&self.surface, self.distance_options());
-            distances_with_envelope(surface, &self.tree, mesh, &union, &options)
+            distances_with_envelope(surface, &self.tree, mesh, &union, &pose, &options)
         };
         let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
-            || rayon::join(distances, || self.volume_error(&union)),
+            || rayon::join(distances, || self.volume_error(mesh, &union, &pose)),
             || rayon::join(axis, complex),
         );
         let ((distances, envelope), axis) = (distances?, axis.transpose()?);
@@ -153,16 +156,24 @@ impl Judge {
     /// As [`Judge::evaluate`], and when the tolerance is out of range or too fine.
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
         mesh.check().map_err(UnionError::from)?;
-        certify(&self.surface, &self.tree, &mesh.in_order(), tolerance)
+        let mesh = Pose::new(&self.surface, mesh).in_order(mesh);
+        certify(&self.surface, &self.tree, &mesh, tolerance)
     }
 
-    fn volume_error(&self, union: &MedialUnion) -> Result<Option<f64>, MetricError> {
+    fn volume_error(
+        &self,
+        mesh: &MedialMesh,
+        union: &MedialUnion,
+        pose: &Pose,
+    ) -> Result<Option<f64>, MetricError> {
         if self.options.volume_depth == 0 {
             return Ok(None);
         }
         let options = VolumeOptions { depth: self.options.volume_depth, seed: self.options.seed };
         let inside = |p| self.inside.side(p) == Side::Inside;
-        volume_error(&self.surface, &self.tree, inside, union, &options).map(Some)
+        let sides = Sides { surface: &self.surface, bvh: &self.tree, union, inside };
+        let bounds = box_in(pose, &self.surface, &mesh.spheres);
+        volume_error_in(pose, bounds, &sides, &options).map(Some)
     }
 
     fn axis_distances(

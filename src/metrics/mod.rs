@@ -10,6 +10,7 @@ mod evaluation;
 mod hausdorff;
 mod judge;
 mod lifted_axis;
+mod pose;
 mod protrusion;
 mod quality;
 mod spikes;

@@ -12,6 +12,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::hausdorff::{DistanceOptions, MetricError, SurfaceSamples};
+use super::pose::Pose;
+use crate::complex::MedialMesh;
 use crate::geometry::TriangleBvh;
 use crate::surface::TriMesh;
 
@@ -69,8 +71,12 @@ pub fn surface_distances(
     other: &TriMesh,
     options: &DistanceOptions,
 ) -> Result<SurfaceDistances, MetricError> {
-    let on_surface = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
-    let on_other = SurfaceSamples::new(other, options.envelope_samples, options.seed)?;
+    let samples = |of: &TriMesh, count: usize| {
+        let pose = Pose::new(of, &MedialMesh::default());
+        SurfaceSamples::new(of, &pose, count, options.seed)
+    };
+    let on_surface = samples(surface, options.surface_samples)?;
+    let on_other = samples(other, options.envelope_samples)?;
     let other_tree = TriangleBvh::new(other).map_err(MetricError::Tree)?;
     let there = other_tree.distance_batch(&on_surface.points);
     let back = tree.distance_batch(&on_other.points);

@@ -1,6 +1,6 @@
 //! Volume of the symmetric difference between a solid and the union of its medial primitives.
 //!
-//! 1. A box around both is divided into cells. A cell that neither the surface nor the boundary of
+//! 1. A box around both, along the axes of their pose, is divided into cells. A cell that neither the surface nor the boundary of
 //!    the union can reach is wholly in the difference or wholly out: distances are 1-Lipschitz, so
 //!    one query at its centre tells. Other cells are divided into eight.
 //! 2. At the finest level each cell is decided by one random point.
@@ -13,9 +13,12 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::MetricError;
+use super::pose::Pose;
 use crate::Vec3;
 use crate::complex::MedialUnion;
-use crate::geometry::TriangleBvh;
+use crate::geometry::{Sphere, TriangleBvh};
+use crate::hash::splitmix;
+use crate::sum::Sum;
 use crate::surface::TriMesh;
 
 /// How finely to divide space.
@@ -37,16 +40,20 @@ impl Default for VolumeOptions {
 const COARSE: u32 = 2;
 
 /// Signed volume that a closed surface encloses, exact up to rounding by the divergence theorem;
-/// positive when its faces are counter-clockwise seen from outside.
+/// positive when its faces are counter-clockwise seen from outside. The same for any order of the
+/// faces.
 pub fn enclosed_volume(surface: &TriMesh) -> f64 {
     let origin = surface.bounding_box().map_or(Vec3::ZERO, |(lo, hi)| lo.midpoint(hi));
-    let six_times: f64 = (0..surface.faces.len())
+    let mut terms: Vec<f64> = (0..surface.faces.len())
         .map(|face| {
             let [a, b, c] = surface.triangle(face).map(|v| v - origin);
             a.dot(b.cross(c))
         })
-        .sum();
-    six_times / 6.0
+        .collect();
+    terms.sort_unstable_by(f64::total_cmp);
+    let mut six_times = Sum::default();
+    terms.into_iter().for_each(|term| six_times.add(term));
+    six_times.value() / 6.0
 }
 
 /// Volume of the symmetric difference of the solid and the union, over the solid's volume.
@@ -63,26 +70,49 @@ pub fn volume_error(
     union: &MedialUnion,
     options: &VolumeOptions,
 ) -> Result<f64, MetricError> {
-    let volume = enclosed_volume(surface);
+    let mut bounds = union.bounding_box();
+    if let Some((lo, hi)) = surface.bounding_box() {
+        bounds = (bounds.0.min(lo), bounds.1.max(hi));
+    }
+    let sides = Sides { surface, bvh, union, inside };
+    volume_error_in(&Pose::coordinates(), bounds, &sides, options)
+}
+
+/// The box around a surface and balls in the coordinates of a pose.
+pub(super) fn box_in(pose: &Pose, surface: &TriMesh, balls: &[Sphere]) -> (Vec3, Vec3) {
+    let points = surface.vertices.iter().map(|&v| (pose.local(v), 0.0));
+    let balls = balls.iter().map(|ball| (pose.local(ball.centre), ball.radius));
+    points.chain(balls).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), (p, r)| {
+        (lo.min(p - Vec3::splat(r)), hi.max(p + Vec3::splat(r)))
+    })
+}
+
+/// What lies in a solid, and what in a union.
+pub(super) struct Sides<'a, F> {
+    pub surface: &'a TriMesh,
+    pub bvh: &'a TriangleBvh,
+    pub union: &'a MedialUnion,
+    /// Whether a point lies in the solid.
+    pub inside: F,
+}
+
+/// As [`volume_error`], by cells along the axes of `pose` in the box `bounds` of its coordinates.
+pub(super) fn volume_error_in(
+    pose: &Pose,
+    bounds: (Vec3, Vec3),
+    sides: &Sides<'_, impl Fn(Vec3) -> bool + Sync>,
+    options: &VolumeOptions,
+) -> Result<f64, MetricError> {
+    let volume = enclosed_volume(sides.surface);
     if !(volume > 0.0 && volume.is_finite()) {
         return Err(MetricError::NoVolume(volume));
     }
-    let (mut lo, mut hi) = union.bounding_box();
-    if let Some((surface_lo, surface_hi)) = surface.bounding_box() {
-        (lo, hi) = (lo.min(surface_lo), hi.max(surface_hi));
-    }
-    let division = Division { bvh, inside: &inside, union, depth: options.depth };
-    let root = Cell { lo, size: hi - lo, level: 0 };
+    let (lo, hi) = bounds;
+    let division = Division { pose, sides, depth: options.depth, seed: options.seed };
+    let root = Cell { lo, size: hi - lo, level: 0, path: 1 };
     let coarse = (0..options.depth.min(COARSE))
         .fold(vec![root], |cells, _| cells.iter().flat_map(Cell::children).collect());
-    let parts: Vec<f64> = coarse
-        .par_iter()
-        .enumerate()
-        .map(|(index, cell)| {
-            let seed = options.seed ^ (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            division.difference(cell, &mut Pcg64::seed_from_u64(seed))
-        })
-        .collect();
+    let parts: Vec<f64> = coarse.par_iter().map(|cell| division.difference(cell)).collect();
     Ok(parts.iter().sum::<f64>() / volume)
 }
 
@@ -91,6 +121,8 @@ struct Cell {
     lo: Vec3,
     size: Vec3,
     level: u32,
+    /// The octants that lead here from the root, three bits each behind a leading one.
+    path: u64,
 }
 
 impl Cell {
@@ -98,7 +130,8 @@ impl Cell {
         let size = self.size * 0.5;
         std::array::from_fn(|k| {
             let offset = Vec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
-            Self { lo: self.lo + offset * size, size, level: self.level + 1 }
+            let (level, path) = (self.level + 1, self.path << 3 | k as u64);
+            Self { lo: self.lo + offset * size, size, level, path }
         })
     }
 
@@ -108,31 +141,36 @@ impl Cell {
 }
 
 struct Division<'a, F> {
-    bvh: &'a TriangleBvh,
-    inside: &'a F,
-    union: &'a MedialUnion,
+    pose: &'a Pose,
+    sides: &'a Sides<'a, F>,
     depth: u32,
+    seed: u64,
 }
 
 impl<F: Fn(Vec3) -> bool> Division<'_, F> {
     /// Volume of the part of the difference in a cell.
-    fn difference(&self, cell: &Cell, rng: &mut Pcg64) -> f64 {
+    fn difference(&self, cell: &Cell) -> f64 {
+        let Sides { bvh, union, inside, .. } = self.sides;
         if cell.level >= self.depth {
+            // Of the cell's own, so that it does not matter which others were divided: a boundary that
+            // just touches a cell does so or not by rounding.
+            let mut rng = Pcg64::seed_from_u64(splitmix(self.seed) ^ cell.path);
             let jitter = Vec3::new(rng.random(), rng.random(), rng.random());
-            let point = cell.lo + jitter * cell.size;
-            let differs = (self.inside)(point) != self.union.buries(point, 0.0);
+            let point = self.pose.world(cell.lo + jitter * cell.size);
+            let differs = inside(point) != union.buries(point, 0.0);
             return if differs { cell.volume() } else { 0.0 };
         }
         let (centre, reach) = (cell.lo + cell.size * 0.5, cell.size.length() * 0.5);
+        let centre = self.pose.world(centre);
         // Most cells are near the surface, which is the quickest to find out; and none of these
         // questions needs the distance itself.
-        if !self.bvh.any_within(centre, reach) {
-            let covered = self.union.buries(centre, reach);
-            if covered || !self.union.buries(centre, -reach) {
-                let differs = (self.inside)(centre) != covered;
+        if !bvh.any_within(centre, reach) {
+            let covered = union.buries(centre, reach);
+            if covered || !union.buries(centre, -reach) {
+                let differs = inside(centre) != covered;
                 return if differs { cell.volume() } else { 0.0 };
             }
         }
-        cell.children().iter().map(|child| self.difference(child, rng)).sum()
+        cell.children().iter().map(|child| self.difference(child)).sum()
     }
 }

@@ -3,12 +3,13 @@
 use super::error::{Fault, VertexName, counted};
 use super::intersect::{Intersections, intersections};
 use super::mesh::{Normalisation, TriMesh};
-use super::orient::{self, Shell, Sum};
+use super::orient::{self, Shell};
 use super::predicates::Unit;
 use super::repair::Repaired;
 use super::report::SurfaceReport;
 use super::topology::Topology;
 use crate::Vec3;
+use crate::sum::Sum;
 
 /// A mesh with its report, and why it may not be used.
 pub(super) struct Examined {

@@ -12,6 +12,7 @@ use super::predicates::Unit;
 use super::report::Repair;
 use super::topology::Topology;
 use crate::Vec3;
+use crate::sum::Sum;
 
 /// How a component is oriented, and how it should be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,25 +121,4 @@ fn volumes(points: &[Vec3], faces: &[[u32; 3]], topology: &Topology) -> Vec<Shel
             depth: 0,
         })
         .collect()
-}
-
-/// Sum with the correction of A. Neumaier (10.1002/zamm.19740540106).
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sum {
-    sum: f64,
-    lost: f64,
-}
-
-impl Sum {
-    pub(super) fn add(&mut self, term: f64) {
-        let sum = self.sum + term;
-        let (large, small) =
-            if self.sum.abs() >= term.abs() { (self.sum, term) } else { (term, self.sum) };
-        self.lost += (large - sum) + small;
-        self.sum = sum;
-    }
-
-    pub(super) fn value(self) -> f64 {
-        self.sum + self.lost
-    }
 }

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::eliminate::eliminate;
 use super::mesh::TriMesh;
-use super::orient::Sum;
 use super::predicates::Unit;
 use crate::Vec3;
+use crate::sum::Sum;
 
 /// How a surface is sampled.
 ///

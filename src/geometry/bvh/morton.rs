@@ -40,15 +40,18 @@ where
 pub(crate) fn morton_order(points: &[Vec3]) -> Vec<(u64, u32)> {
     let Bounds { lo, hi } = Bounds::of_points(points.iter().copied());
     let scale = (hi - lo).map(|extent| if extent > 0.0 { (1 << 21) as f64 / extent } else { 0.0 });
-    let code = |p: Vec3| {
-        // The casts saturate: points that are not numbers have a code too.
-        let cell = ((p - lo) * scale).to_array().map(|c| spread((c as u64).min((1 << 21) - 1)));
-        cell[0] | cell[1] << 1 | cell[2] << 2
-    };
+    let code = |p: Vec3| morton_code((p - lo) * scale);
     let mut order: Vec<(u64, u32)> =
         (0..points.len()).into_par_iter().map(|i| (code(points[i]), i as u32)).collect();
     order.par_sort_unstable();
     order
+}
+
+/// The Morton code of a point with coordinates from 0 to `2^21`.
+pub(crate) fn morton_code(p: Vec3) -> u64 {
+    // The casts saturate: points that are not numbers have a code too.
+    let cell = p.to_array().map(|c| spread((c as u64).min((1 << 21) - 1)));
+    cell[0] | cell[1] << 1 | cell[2] << 2
 }
 
 /// The 21 bits of a number, each followed by two zeros.
