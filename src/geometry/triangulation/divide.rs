@@ -8,8 +8,8 @@
 //! 3. The parts are put together along the frontier, and the deferred sites are inserted.
 //!
 //! The parts are the same whatever the number of threads, and so is the result, to the order of
-//! cells: a single thread grows one part after the other. Since the perturbed triangulation is
-//! unique, the set of cells is that of any order of insertion.
+//! cells: a single thread grows one part after the other, the second behind the first. Since the
+//! perturbed triangulation is unique, the set of cells is that of any order of insertion.
 //!
 //! The plane halves the sites. Of 13 directions, and of two kinds of centres, those are taken that
 //! the fewest conflict zones of a sample of the sites straddle. Orthocentres suit samples
@@ -107,6 +107,8 @@ struct Part<'s, M> {
     /// Its facets on the frontier, each with the same facet before the division as seen from the
     /// other part.
     frontier: Vec<(Face, Face)>,
+    /// By how much its records have been moved, see [`Part::follow`].
+    offset: u32,
 }
 
 impl<'s, M: Metric> Builder<'s, M> {
@@ -116,11 +118,18 @@ impl<'s, M: Metric> Builder<'s, M> {
             self.reserve(range.len());
             return self.insert_all(range);
         };
-        let (mut parts, places) = self.divide(cut, &range);
-        let [first, second] = &mut parts;
-        let (one, other) = rayon::join(|| first.grow(), || second.grow());
-        one.and(other)?;
-        let deferred = self.unite(parts, &places)?;
+        let ([mut first, mut second], places) = self.divide(cut, &range);
+        if rayon::current_num_threads() == 1 {
+            // In one array from the start: fresh memory would cost, and so would moving.
+            first.grow()?;
+            second.follow(&mut first)?;
+            second.grow()?;
+        } else {
+            let (one, other) = rayon::join(|| first.grow(), || second.grow());
+            one.and(other)?;
+            second.follow(&mut first)?;
+        }
+        let deferred = self.unite(first, second, &places);
         self.insert_all(deferred)
     }
 
@@ -197,7 +206,7 @@ impl<'s, M: Metric> Builder<'s, M> {
             // The first part will take in the second.
             let room = if part == 0 { range.end as usize } else { sites.len() };
             builder.reserve(room + counts[part] as usize / 8);
-            Part { builder, sites, hints, frontier: Vec::new() }
+            Part { builder, sites, hints, frontier: Vec::new(), offset: 0 }
         });
         let cells = std::mem::take(&mut self.cells);
         let [mut first, mut second] = parts;
@@ -235,39 +244,23 @@ impl<'s, M: Metric> Builder<'s, M> {
         sites.iter().step_by(HINT_STRIDE).map(hint).collect()
     }
 
-    /// Step 3 of the head; returns the deferred sites.
-    fn unite(
-        &mut self,
-        parts: [Part<'s, M>; 2],
-        places: &[Place],
-    ) -> Result<Vec<u32>, TriangulationError> {
-        let [first, second] = parts;
-        // The second part's records follow the first's, without its frontier.
-        let offset = first.builder.cells.len() as u32 - 1;
-        if first.builder.cells.len() + second.builder.cells.len() > MAX_CELLS {
-            let points = self.sites.len() - 1;
-            return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
+    /// Step 3 of the head, once the second part follows the first; returns the deferred sites.
+    fn unite(&mut self, first: Part<'s, M>, second: Part<'s, M>, places: &[Place]) -> Vec<u32> {
+        let offset = second.offset;
+        *self = second.builder;
+        if first.builder.last != FRONTIER {
+            self.last = first.builder.last;
         }
-        *self = first.builder;
-        if self.last == FRONTIER {
-            self.last = second.builder.last + offset;
-        }
-        let moved = |cell: &Cell| Cell { v: cell.v, n: cell.n.map(|n| n.moved(offset)) };
-        self.cells.par_extend(second.builder.cells[1..].par_iter().map(moved));
-        self.state.resize(self.cells.len(), UNKNOWN);
-        self.free.extend(second.builder.free.iter().map(|id| id + offset));
-        for (part, frontier) in [&first.frontier, &second.frontier].into_iter().enumerate() {
-            for &(face, before) in frontier {
-                let face = if part == 0 { face } else { face.moved(offset) };
-                let place = places[before.cell() as usize];
-                let other = Face::new(place.record(), before.index());
-                let other = if place.part() == 0 { other } else { other.moved(offset) };
-                self.cells[face.cell() as usize].n[face.index()] = other;
-            }
+        self.free.splice(..0, first.builder.free);
+        for &(face, before) in first.frontier.iter().chain(&second.frontier) {
+            let place = places[before.cell() as usize];
+            let other = Face::new(place.record(), before.index());
+            let other = if place.part() == 0 { other } else { other.moved(offset) };
+            self.cells[face.cell() as usize].n[face.index()] = other;
         }
         let mut deferred = [first.sites, second.sites].concat();
         deferred.sort_unstable();
-        Ok(deferred)
+        deferred
     }
 }
 
@@ -292,6 +285,33 @@ impl<M: Metric> Part<'_, M> {
             builder.cells.push(copy);
         }
         builder.state.resize(builder.cells.len(), UNKNOWN);
+    }
+
+    /// Takes over the records of the first part, and puts its own behind, without its frontier.
+    fn follow(&mut self, first: &mut Self) -> Result<(), TriangulationError> {
+        let Self { builder, hints, frontier, .. } = self;
+        let mut cells = std::mem::take(&mut first.builder.cells);
+        if cells.len() + builder.cells.len() > MAX_CELLS {
+            let points = builder.sites.len() - 1;
+            return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
+        }
+        let offset = cells.len() as u32 - 1;
+        let id = |id: u32| if id == FRONTIER { id } else { id + offset };
+        let face = |face: Face| if face.cell() == FRONTIER { face } else { face.moved(offset) };
+        let moved = |&Cell { v, n: [a, b, c, d] }: &Cell| {
+            let n = [face(a), face(b), face(c), face(d)];
+            Cell { v, n }
+        };
+        cells.par_extend(builder.cells[1..].par_iter().map(moved));
+        builder.cells = cells;
+        builder.state = std::mem::take(&mut first.builder.state);
+        builder.state.resize(builder.cells.len(), UNKNOWN);
+        builder.last = id(builder.last);
+        builder.free.iter_mut().for_each(|free| *free = id(*free));
+        hints.iter_mut().for_each(|hint| *hint = id(*hint));
+        frontier.iter_mut().for_each(|(here, _)| *here = face(*here));
+        self.offset = offset;
+        Ok(())
     }
 
     /// Step 2 of the head.

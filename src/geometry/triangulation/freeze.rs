@@ -1,9 +1,13 @@
 //! From a grown triangulation to its final form.
 //!
-//! 1. Records that no cell uses are left out. Finite cells come first, then infinite ones, both by
-//!    the vertex that is first along the curve of insertion: what is close in the triangulation is
-//!    close in memory, which all that walks from cell to cell needs.
-//! 2. Neighbours are renamed to this order, and vertices to the indices of the input.
+//! 1. Finite cells come first, then infinite ones, both by the vertex that is first along the curve
+//!    of insertion: what is close in the triangulation is close in memory, which all that walks from
+//!    cell to cell needs. Records that no cell uses go last, and away.
+//! 2. Neighbours are renamed to this order, and the cells brought into it.
+//! 3. Vertices are renamed to the indices of the input.
+//!
+//! All in place: to touch fresh memory for the cells would take longer than to move them. One pass
+//! does one thing, since accesses that depend on each other wait for each other.
 
 use rayon::prelude::*;
 
@@ -11,74 +15,130 @@ use super::Triangulation;
 use super::cells::{Cell, Face, INFINITE, UNUSED};
 use super::{CellId, VertexId};
 
+/// Cells handed to a thread at once.
+const MIN_LEN: usize = 1024;
+
+/// About so many segments exchange cells: so few that the ends of all of them stay in cache.
+const SEGMENTS: usize = 16;
+
+/// The fewest cells of a segment.
+const SMALLEST_SEGMENT: usize = 4096;
+
 /// Brings `cells` over sites `1..=ids.len()` into final form; `ids[s - 1]` is the input index of
 /// site `s`, and `along_curve` has for each input point its place on the curve.
-pub(super) fn freeze(cells: &[Cell], ids: &[u32], along_curve: &[u32]) -> Triangulation {
-    let Order { order, new, finite } = order_along_curve(cells, ids, along_curve);
-    let vertex = |v: u32| match v {
-        INFINITE => VertexId::INFINITE.0,
-        site => ids[site as usize - 1],
-    };
-    let renamed = |&old: &u32| {
-        let Cell { v, n } = cells[old as usize];
-        let n = n.map(|face| Face::new(new[face.cell() as usize], face.index()));
-        Cell { v: v.map(vertex), n }
-    };
-    let cells: Vec<Cell> = order.par_iter().with_min_len(1024).map(renamed).collect();
-    let mut incident = vec![CellId::NONE; along_curve.len()];
-    // Backwards, so that the first cell is what remains; infinite ones have the last vertex at
-    // infinity.
-    for (c, cell) in cells.iter().enumerate().rev() {
-        for &v in &cell.v[..if c < finite { 4 } else { 3 }] {
-            incident[v as usize] = CellId(c as u32);
+pub(super) fn freeze(mut cells: Vec<Cell>, ids: &[u32], along_curve: &[u32]) -> Triangulation {
+    let Order { places, finite, used } = order_along_curve(&cells, ids, along_curve);
+    cells.par_iter_mut().with_min_len(MIN_LEN).for_each(|cell| {
+        if cell.v[0] != UNUSED {
+            for n in &mut cell.n {
+                *n = Face::new(places[n.cell() as usize], n.index());
+            }
         }
-    }
+    });
+    permute(&mut cells, places);
+    cells.truncate(used);
+    let incident = first_cells(&cells, ids, along_curve.len());
+    cells.par_iter_mut().with_min_len(MIN_LEN).for_each(|cell| {
+        for v in &mut cell.v {
+            *v = if *v == INFINITE { VertexId::INFINITE.0 } else { ids[*v as usize - 1] };
+        }
+    });
     // Hidden sites have none.
     let vertices = incident.iter().filter(|&&c| c != CellId::NONE).count();
     Triangulation { cells, finite, vertices, incident }
 }
 
-/// The final order of the cells.
+/// The final order of the records.
 struct Order {
-    /// The records in use.
-    order: Vec<u32>,
-    /// For each record its place in the order.
-    new: Vec<u32>,
+    /// For each record its place.
+    places: Vec<u32>,
     /// The number of finite cells.
     finite: usize,
+    /// The number of cells; records that none uses have the places after them.
+    used: usize,
 }
 
 fn order_along_curve(cells: &[Cell], ids: &[u32], along_curve: &[u32]) -> Order {
-    let places: Vec<u32> = ids.iter().map(|&id| along_curve[id as usize]).collect();
-    let place = |&site: &u32| places[site as usize - 1];
+    let curve: Vec<u32> = ids.iter().map(|&id| along_curve[id as usize]).collect();
+    let on_curve = |&site: &u32| curve[site as usize - 1];
     let points = along_curve.len();
-    // Infinite cells are counted behind all finite ones.
-    let key = |cell: &Cell| {
-        let first = |sites: &[u32]| sites.iter().map(place).min().map_or(0, |k| k as usize);
-        match (cell.v[0], cell.is_infinite()) {
-            (UNUSED, _) => None,
-            (_, true) => Some(points + first(&cell.v[..3])),
-            (_, false) => Some(first(&cell.v)),
-        }
+    let first = |sites: &[u32]| sites.iter().map(on_curve).min().unwrap_or(0);
+    // Infinite cells are counted behind all finite ones, and unused records behind these.
+    let key = |cell: &Cell| match (cell.v[0], cell.is_infinite()) {
+        (UNUSED, _) => 2 * points as u32,
+        (_, true) => points as u32 + first(&cell.v[..3]),
+        (_, false) => first(&cell.v),
     };
-    let keys: Vec<u32> = cells
-        .par_iter()
-        .with_min_len(1024)
-        .map(|cell| key(cell).map_or(u32::MAX, |key| key as u32))
-        .collect();
-    let mut next = vec![0_u32; 2 * points + 1];
-    for &key in keys.iter().filter(|&&key| key != u32::MAX) {
+    let mut places: Vec<u32> = cells.par_iter().with_min_len(MIN_LEN).map(key).collect();
+    let mut next = vec![0_u32; 2 * points + 2];
+    for &key in &places {
         next[key as usize + 1] += 1;
     }
-    for key in 0..2 * points {
+    for key in 0..=2 * points {
         next[key + 1] += next[key];
     }
     let (finite, used) = (next[points] as usize, next[2 * points] as usize);
-    let (mut order, mut new) = (vec![0; used], vec![u32::MAX; cells.len()]);
-    for (old, &key) in keys.iter().enumerate().filter(|&(_, &key)| key != u32::MAX) {
-        let place = &mut next[key as usize];
-        (order[*place as usize], new[old]) = (old as u32, *place);
-        *place += 1;
+    for place in &mut places {
+        let next = &mut next[*place as usize];
+        *place = *next;
+        *next += 1;
     }
-    Order { order, new, finite }
+    Order { places, finite, used }
+}
+
+/// Brings each cell to its place: by exchange into its segment of the places, and there through a
+/// copy of the segment.
+///
+/// P. M. McIlroy, K. Bostic, M. D. McIlroy: *Engineering radix sort*, Computing Systems 6 (1993)
+/// (*American flag sort*).
+fn permute(cells: &mut [Cell], mut places: Vec<u32>) {
+    let size = (cells.len() / SEGMENTS).next_power_of_two().max(SMALLEST_SEGMENT);
+    exchange(cells, &mut places, size);
+    // One copy for each thread.
+    let each = cells.len().div_ceil(size) / rayon::current_num_threads();
+    let segments = cells.par_chunks_mut(size).zip(places.par_chunks(size));
+    segments.with_min_len(each.max(1)).for_each_init(Vec::new, |copy, (cells, places)| {
+        copy.clear();
+        copy.extend_from_slice(cells);
+        for (cell, &place) in copy.iter().zip(places) {
+            cells[place as usize & (size - 1)] = *cell;
+        }
+    });
+}
+
+/// Exchanges cells until each is in its segment, of so many places, a power of two.
+fn exchange(cells: &mut [Cell], places: &mut [u32], size: usize) {
+    let segment = |place: u32| place as usize >> size.trailing_zeros();
+    // Before its head, a segment has its own cells alone.
+    let mut heads: Vec<usize> = (0..cells.len()).step_by(size).collect();
+    for s in 0..heads.len() {
+        let end = cells.len().min((s + 1) * size);
+        while heads[s] < end {
+            let (mut cell, mut place) = (cells[heads[s]], places[heads[s]]);
+            while segment(place) != s {
+                let head = &mut heads[segment(place)];
+                std::mem::swap(&mut cell, &mut cells[*head]);
+                std::mem::swap(&mut place, &mut places[*head]);
+                *head += 1;
+            }
+            (cells[heads[s]], places[heads[s]]) = (cell, place);
+            heads[s] += 1;
+        }
+    }
+}
+
+/// For each input point its first cell.
+fn first_cells(cells: &[Cell], ids: &[u32], points: usize) -> Vec<CellId> {
+    // By site, and for the vertex at infinity, which is 0; backwards, so that the first remains.
+    let mut first = vec![CellId::NONE; ids.len() + 1];
+    for (c, cell) in cells.iter().enumerate().rev() {
+        for v in cell.v {
+            first[v as usize] = CellId(c as u32);
+        }
+    }
+    let mut incident = vec![CellId::NONE; points];
+    for (&id, &cell) in ids.iter().zip(&first[1..]) {
+        incident[id as usize] = cell;
+    }
+    incident
 }

@@ -111,7 +111,7 @@ fn triangulate_dividing<M: Metric>(
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
     build::bring_independent_to_front(&mut ordered, &mut ids)?;
     let cells = Builder::<M>::build(&ordered, &rounds, divided_round, filter)?.cells;
-    let triangulation = freeze::freeze(&cells, &ids, &along_curve);
+    let triangulation = freeze::freeze(cells, &ids, &along_curve);
     Ok(Triangulated { triangulation, repeated, filter })
 }
 

@@ -1,6 +1,9 @@
 //! Divided rounds of insertion give what undivided ones give.
 
+use std::sync::LazyLock;
+
 use proptest::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::*;
 use crate::Vec3;
@@ -18,10 +21,29 @@ fn cell_set(t: &Triangulation) -> Vec<[VertexId; 4]> {
     cells
 }
 
+/// Divided on one thread, which grows one part behind the other, and on two, side by side.
+fn divided<M: Metric>(
+    sites: &[Site],
+    smallest: u32,
+) -> [Result<Triangulated, TriangulationError>; 2] {
+    static POOLS: LazyLock<[ThreadPool; 2]> =
+        LazyLock::new(|| [1, 2].map(|n| ThreadPoolBuilder::new().num_threads(n).build().unwrap()));
+    POOLS.each_ref().map(|pool| pool.install(|| triangulate_dividing::<M>(sites, smallest)))
+}
+
 fn agrees<M: Metric>(sites: &[Site]) -> Result<(), TestCaseError> {
     let undivided = triangulate_dividing::<M>(sites, u32::MAX);
     for smallest in [1, 16, 64] {
-        match (&undivided, triangulate_dividing::<M>(sites, smallest)) {
+        let [one, two] = divided::<M>(sites, smallest);
+        prop_assert_eq!(one.is_ok(), two.is_ok());
+        if let (Ok(one), Ok(two)) = (&one, &two) {
+            let bytes = |t: &Triangulation| -> Vec<_> {
+                t.records().iter().map(|cell| (cell.v, cell.n)).collect()
+            };
+            prop_assert_eq!(bytes(&one.triangulation), bytes(&two.triangulation));
+            prop_assert_eq!(&one.triangulation.incident, &two.triangulation.incident);
+        }
+        match (&undivided, one) {
             (Ok(whole), Ok(divided)) => {
                 let t = divided.triangulation;
                 prop_assert_eq!(t.check_combinatorics(), Ok(()));
