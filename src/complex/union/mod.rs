@@ -30,6 +30,9 @@ use search::{Buried, Nearer, Signed, Unsigned};
 
 /// The union of the medial primitives of a mesh, prepared for distance queries.
 ///
+/// Distances are those of all primitives, each measured in double precision. Spheres that agree to 1e-13 of
+/// their radius count as one, which changes distances by at most six times as much.
+///
 /// ```
 /// use medial::Vec3;
 /// use medial::complex::{MedialMesh, MedialUnion, Sphere};
