@@ -26,8 +26,10 @@ use super::flux::{Probe, Sphere};
 use super::grid::Grid;
 use super::params::{AofParams, Start};
 
-/// Coarse voxels along a side of a block.
+/// Coarse voxels along a side of a block, at most.
 const BLOCK: u32 = 4;
+/// Blocks along the longest side of a small lattice, so that there is work for several threads.
+const BLOCKS: u32 = 4;
 /// Half the diagonal of a unit cube.
 const HALF_DIAGONAL: f64 = 0.866_025_403_784_438_6;
 
@@ -163,11 +165,13 @@ fn blocks(surface: &Surface, grid: &Grid, levels: &Levels) -> Vec<Block> {
             .triangles
             .all(grid.origin + Vec3::from(grid.size.map(f64::from)) * 0.5 * grid.side),
     };
+    let longest = whole.hi.into_iter().max().unwrap_or(0);
+    let most = (longest / BLOCKS).clamp(1, BLOCK);
     let (mut open, mut done) = (vec![whole], Vec::new());
     while let Some(block) = open.pop() {
         let extent = [0, 1, 2].map(|axis| block.hi[axis] - block.lo[axis]);
         let longest = (0..3).max_by_key(|&axis| (extent[axis], 2 - axis)).unwrap_or(0);
-        if extent[longest] <= BLOCK {
+        if extent[longest] <= most {
             done.push(block);
             continue;
         }
