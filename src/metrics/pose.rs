@@ -20,7 +20,7 @@
 //! What is ordered is ordered along a Morton curve in this frame, through cells set off from all round
 //! numbers, so that the rounding of a rotation moves nothing into another cell.
 
-use std::cell::OnceCell;
+use std::cell::LazyCell;
 use std::cmp::Ordering;
 
 use rayon::prelude::*;
@@ -37,9 +37,11 @@ const EQUAL: f64 = 1e-9;
 /// Sums over everything that agree to this belong to symmetric frames.
 const SYMMETRIC: f64 = 1e-10;
 
-/// At most this many candidates are compared. A polyhedral group has 120 elements, and the rim of
-/// a finely meshed solid of revolution some hundreds of vertices.
-const MOST: usize = 2048;
+/// Candidates times what they are compared by: a fraction of a second. A polyhedral group has 120
+/// elements, the rim of a solid of revolution some hundreds of vertices. Of more candidates the first by
+/// coordinates are compared, so that samples may depend on the orientation where a million triangles have
+/// more than a hundred symmetries.
+const WORK: usize = 1 << 27;
 
 /// Axes and origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -195,7 +197,6 @@ impl Corners {
             .collect();
         farthest.sort_unstable_by(by_coordinates);
         farthest.dedup();
-        farthest.truncate(MOST);
         farthest
     }
 }
@@ -232,55 +233,39 @@ struct Shape<'a> {
 
 impl Shape<'_> {
     fn pose(&self, size: f64) -> Option<Pose> {
+        let medial = LazyCell::new(|| self.medial_marks(size));
+        let surface = LazyCell::new(|| self.surface_marks(size));
+        let marks = |turn: usize| if turn == 0 { medial.as_slice() } else { surface.as_slice() };
+        let direction = |p: Vec3| (p - self.origin).try_normalize();
         let first = self.corners.farthest(|v| v.distance(self.origin));
-        let marks = OnceCell::new();
-        let marks = || marks.get_or_init(|| self.marks(size)).as_slice();
-        let direction = |p: &Vec3| (*p - self.origin).try_normalize();
-        // What is the same all around the axis.
-        let first = if first.len() < 2 {
-            first
-        } else {
-            let marks = marks();
-            least(first, |p| {
-                let axis = direction(p).unwrap_or(Vec3::X);
-                sum(marks, |d, tag| {
-                    let along = axis.dot(d);
-                    1.732 * along + 2.236 * (d.length_squared() - along * along) + tag
-                })
-            })
-        };
-        let frames = |p: &Vec3| {
-            let x = direction(p);
-            let across = move |v: Vec3| x.map(|x| (v - self.origin).reject_from_normalized(x));
-            let second = self.corners.farthest(|v| across(v).map_or(0.0, Vec3::length));
-            let frame = move |v: Vec3| {
-                let (x, y) = (x?, across(v)?.try_normalize()?);
-                Some([x, y, x.cross(y)])
-            };
+        // By what is the same all around the axis.
+        let first = first.into_iter().filter_map(direction).collect();
+        let first = least(first, marks, |axis: &Vec3, d, tag| {
+            let along = axis.dot(d);
+            1.732 * along + 2.236 * (d.length_squared() - along * along) + tag
+        });
+        let frames = |&x: &Vec3| {
+            let across = move |v: Vec3| (v - self.origin).reject_from_normalized(x);
+            let second = self.corners.farthest(|v| across(v).length());
+            let frame = move |v: Vec3| across(v).try_normalize().map(|y| [x, y, x.cross(y)]);
             second.into_iter().filter_map(frame).collect::<Vec<_>>()
         };
-        let mut frames: Vec<[Vec3; 3]> = first.par_iter().flat_map_iter(frames).collect();
-        frames.truncate(MOST);
-        if frames.len() > 1 {
-            let marks = marks();
-            frames = least(frames, |axes| {
-                let weights = axes[0] * 1.732 + axes[1] * 2.236 - axes[2] * 1.26;
-                sum(marks, |d, tag| weights.dot(d) + d.length_squared() + tag)
-            });
-        }
+        let most = (WORK / self.corners.points.len()).max(1);
+        let frames = first[..first.len().min(most)].par_iter().flat_map_iter(frames).collect();
+        let frames = least(frames, marks, |[x, y, z]: &[Vec3; 3], d, tag| {
+            (1.732 * *x + 2.236 * *y - 1.26 * *z).dot(d) + d.length_squared() + tag
+        });
         let axes = *frames.first()?;
         Some(Pose { origin: self.origin, axes, size })
     }
 
-    /// Everything that may break a symmetry, as points from the origin, in units of the size, with a
-    /// number that tells what it is.
-    fn marks(&self, size: f64) -> Vec<(Vec3, f64)> {
-        let place = |p: Vec3| (p - self.origin) / size;
+    fn place(&self, p: Vec3, size: f64) -> Vec3 {
+        (p - self.origin) / size
+    }
+
+    fn medial_marks(&self, size: f64) -> Vec<Mark> {
         let sphere = |v: u32| self.mesh.spheres[v as usize];
-        let centroid = |f: usize| {
-            let [a, b, c] = self.surface.triangle(f);
-            (place((a + b + c) / 3.0), 0.0)
-        };
+        let place = |p: Vec3| self.place(p, size);
         let spheres = self.mesh.spheres.iter().map(|s| (place(s.centre), 1.0 + s.radius / size));
         let edges = self.mesh.edges.iter().map(|e| {
             let [a, b] = e.map(|v| sphere(v).centre);
@@ -290,28 +275,48 @@ impl Shape<'_> {
             let [a, b, c] = f.map(|v| sphere(v).centre);
             (place((a + b + c) / 3.0), 0.7)
         });
-        let triangles = (0..self.surface.faces.len()).map(centroid);
-        triangles.chain(spheres).chain(edges).chain(faces).collect()
+        spheres.chain(edges).chain(faces).collect()
+    }
+
+    fn surface_marks(&self, size: f64) -> Vec<Mark> {
+        let centroid = |f: usize| {
+            let [a, b, c] = self.surface.triangle(f);
+            (self.place((a + b + c) / 3.0, size), 0.0)
+        };
+        (0..self.surface.faces.len()).map(centroid).collect()
     }
 }
 
-/// The candidates with the least value, up to rounding.
-fn least<T: Copy + Send + Sync>(
-    candidates: Vec<T>,
-    value: impl Fn(&T) -> f64 + Send + Sync,
+/// What may break a symmetry: a point from the origin, in units of the size, with a number that tells
+/// what it is.
+type Mark = (Vec3, f64);
+
+/// Of several candidates those with the least sum over all marks, up to rounding; the sum is that of a
+/// function that is neither odd nor even of `argument`. First over the medial mesh, which is smaller and
+/// rarely symmetric, then over the surface.
+fn least<'m, T: Copy + Send + Sync>(
+    mut candidates: Vec<T>,
+    marks: impl Fn(usize) -> &'m [Mark],
+    argument: impl Fn(&T, Vec3, f64) -> f64 + Send + Sync,
 ) -> Vec<T> {
-    let values: Vec<f64> = candidates.par_iter().map(value).collect();
-    let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let is_least = |&(_, value): &(T, f64)| value <= smallest + SYMMETRIC;
-    candidates.into_iter().zip(values).filter(is_least).map(|(c, _)| c).collect()
-}
-
-/// The sum of a function that is neither odd nor even of `argument`.
-fn sum(marks: &[(Vec3, f64)], argument: impl Fn(Vec3, f64) -> f64) -> f64 {
-    let mut sum = Sum::default();
-    for &(d, tag) in marks {
-        let t = argument(d, tag);
-        sum.add(t / (2.0 + t * t));
+    for turn in 0..2 {
+        if candidates.len() < 2 {
+            break;
+        }
+        let marks = marks(turn);
+        candidates.truncate((WORK / marks.len().max(1)).max(1));
+        let value = |candidate: &T| {
+            let mut sum = Sum::default();
+            for &(d, tag) in marks {
+                let t = argument(candidate, d, tag);
+                sum.add(t / (2.0 + t * t));
+            }
+            sum.value()
+        };
+        let values: Vec<f64> = candidates.par_iter().map(value).collect();
+        let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let is_least = |&(_, value): &(T, f64)| value <= smallest + SYMMETRIC;
+        candidates = candidates.into_iter().zip(values).filter(is_least).map(|(c, _)| c).collect();
     }
-    sum.value()
+    candidates
 }
