@@ -126,18 +126,19 @@ say("spheres_only", "NumPy, all vertices and fewer samples", f"{theirs:.5f}, {fo
     0.8 * found["spheres_only"] <= theirs <= 1.02 * found["spheres_only"])
 
 # The boundary of the union: the point of it that is closest to a point outside is on the ball closest to that.
-# Points outside are taken from random directions and heights over the balls.
+# Points outside are taken from random directions and heights over the balls. Both maxima are over samples, and
+# fall short where the farthest point is the tip of a small ball; the certified interval below may not be left.
 scene = scene_of(vertices, faces)
-picked = rng.choice(len(ball_at), 12000, p=ball_r**2 / (ball_r**2).sum())
-direction = rng.normal(size=(12000, 3))
+picked = rng.choice(len(ball_at), 30000, p=ball_r**2 / (ball_r**2).sum())
+direction = rng.normal(size=(30000, 3))
 direction /= np.linalg.norm(direction, axis=1)[:, None]
-above = ball_at[picked] + (ball_r[picked] + 0.1 * rng.random(12000) ** 2)[:, None] * direction
+above = ball_at[picked] + (ball_r[picked] + 0.1 * rng.random(30000) ** 2)[:, None] * direction
 above = above[signed(above) > 0]
 candidates = onto_union(above)
 theirs = distances(scene, candidates).max()
 say("reverse", "Open3D distances, own points on the union",
     f"{theirs:.5f} by {len(candidates)} points, {found['reverse']:.5f}",
-    0.8 * found["reverse"] <= theirs <= found["reverse"] + 1e-3)
+    0.75 * found["reverse"] <= theirs <= found["reverse"] / 0.75)
 if found.get("certified"):
     both = max(theirs, sigma.max(), at_vertices)
     low_, high_ = found["certified"]["lower"], found["certified"]["upper"]
