@@ -129,7 +129,9 @@ say("spheres_only", "NumPy, all vertices and fewer samples", f"{theirs:.5f}, {fo
 # Points outside are taken from random directions and heights over the balls. Both maxima are over samples, and
 # fall short where the farthest point is the tip of a small ball; the certified interval below may not be left.
 scene = scene_of(vertices, faces)
-picked = rng.choice(len(ball_at), 30000, p=ball_r**2 / (ball_r**2).sum())
+# Half of them by area, half with all balls alike, for the tips of small ones.
+picked = np.concatenate((rng.choice(len(ball_at), 15000, p=ball_r**2 / (ball_r**2).sum()),
+                         rng.choice(len(ball_at), 15000)))
 direction = rng.normal(size=(30000, 3))
 direction /= np.linalg.norm(direction, axis=1)[:, None]
 above = ball_at[picked] + (ball_r[picked] + 0.1 * rng.random(30000) ** 2)[:, None] * direction
@@ -138,7 +140,7 @@ candidates = onto_union(above)
 theirs = distances(scene, candidates).max()
 say("reverse", "Open3D distances, own points on the union",
     f"{theirs:.5f} by {len(candidates)} points, {found['reverse']:.5f}",
-    0.75 * found["reverse"] <= theirs <= found["reverse"] / 0.75)
+    0.8 * found["reverse"] <= theirs <= found["reverse"] + 1e-3)
 if found.get("certified"):
     both = max(theirs, sigma.max(), at_vertices)
     low_, high_ = found["certified"]["lower"], found["certified"]["upper"]

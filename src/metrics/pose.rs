@@ -11,8 +11,8 @@
 //!    vertex `q` that is farthest from that axis. Distances are weighted by the area around a
 //!    vertex (up to a tenth), so that the vertices of a round shape are not all equally far. The
 //!    third is the cross product: reflections are told apart.
-//! 3. A shape with symmetries has several such pairs, equal up to rounding. The least of a sum of
-//!    odd functions over everything in the frame decides: the surface's triangles, and the spheres,
+//! 3. A shape with symmetries has several such pairs, equal up to rounding. The least of a sum
+//!    of one function, neither odd nor even, over everything in the frame decides: the surface's triangles, and the spheres,
 //!    edges and faces of the medial mesh, which need not share the surface's symmetries. Where all
 //!    is equal even then, the frames are images of each other under a symmetry of the whole, and any
 //!    of them gives the same numbers; the first by coordinates is taken.
@@ -42,6 +42,9 @@ const SYMMETRIC: f64 = 1e-10;
 /// coordinates are compared, so that samples may depend on the orientation where a million triangles have
 /// more than a hundred symmetries.
 const WORK: usize = 1 << 27;
+
+/// Second axes that are compared for a first one, the first by coordinates: bounds the memory.
+const MOST: usize = 1024;
 
 /// Axes and origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -209,11 +212,11 @@ fn by_coordinates(a: &Vec3, b: &Vec3) -> Ordering {
 /// The mean of some points, the same for any order of them.
 fn mean(points: &[Vec3]) -> Vec3 {
     let largest = points.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
-    if !(largest > 0.0 && largest.is_finite()) {
+    // Integers up to 2^62, of which 2^65 can be summed.
+    let unit = largest / (1_u64 << 62) as f64;
+    if !(unit > 0.0 && unit.is_finite()) {
         return Vec3::ZERO;
     }
-    // Integers up to 2^63, of which 2^64 can be summed.
-    let unit = largest / (1_u64 << 62) as f64;
     let mut sum = [0_i128; 3];
     for p in points {
         for (sum, c) in sum.iter_mut().zip(p.to_array()) {
@@ -248,7 +251,7 @@ impl Shape<'_> {
             let across = move |v: Vec3| (v - self.origin).reject_from_normalized(x);
             let second = self.corners.farthest(|v| across(v).length());
             let frame = move |v: Vec3| across(v).try_normalize().map(|y| [x, y, x.cross(y)]);
-            second.into_iter().filter_map(frame).collect::<Vec<_>>()
+            second.into_iter().take(MOST).filter_map(frame).collect::<Vec<_>>()
         };
         let most = (WORK / self.corners.points.len()).max(1);
         let frames = first[..first.len().min(most)].par_iter().flat_map_iter(frames).collect();

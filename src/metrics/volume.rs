@@ -1,6 +1,7 @@
 //! Volume of the symmetric difference between a solid and the union of its medial primitives.
 //!
-//! 1. A box around both, along the axes of their pose, is divided into cells. A cell that neither the surface nor the boundary of
+//! 1. A box around both, along the coordinate axes or (for [`super::Judge`]) those of their pose, is
+//!    divided into cells. A cell that neither the surface nor the boundary of
 //!    the union can reach is wholly in the difference or wholly out: distances are 1-Lipschitz, so
 //!    one query at its centre tells. Other cells are divided into eight.
 //! 2. At the finest level each cell is decided by one random point.

@@ -15,8 +15,9 @@ use crate::geometry::Sphere;
 /// and in radius, and that one from the sphere that is measured.
 pub(super) const EQUAL: f64 = 1e-13;
 
-/// A direction that is none of a mesh: equal places along it mean equal places.
-const GENERIC: [f64; 3] = [0.612_372_4, 0.573_576_4, 0.543_988_1];
+/// A direction in space and radius that is none of a mesh: spheres in the same place along it are
+/// likely the same, and concentric ones of other radii are not.
+const GENERIC: [f64; 4] = [0.612_372_4, 0.573_576_4, 0.543_988_1, 0.518_304_7];
 
 /// The simplices of a mesh that are to be measured.
 pub(super) struct Distinct {
@@ -33,14 +34,16 @@ impl Distinct {
     pub fn new(mesh: &MedialMesh) -> Self {
         let spheres = &mesh.spheres;
         let along = |m: &Sphere| {
-            let [x, y, z] = GENERIC;
-            x * m.centre.x + y * m.centre.y + z * m.centre.z
+            let [x, y, z, r] = GENERIC;
+            x * m.centre.x + y * m.centre.y + z * m.centre.z + r * m.radius
         };
         let mut order: Vec<(f64, u32)> = (0..).zip(spheres).map(|(v, m)| (along(m), v)).collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         // Rounding of the place itself is a share of the coordinates.
-        let reach =
-            |m: &Sphere| 2.0 * EQUAL * m.radius + 8.0 * f64::EPSILON * m.centre.abs().max_element();
+        let reach = |m: &Sphere| {
+            let largest = m.centre.abs().max_element().max(m.radius);
+            3.0 * EQUAL * m.radius + 16.0 * f64::EPSILON * largest
+        };
         let mut group: Vec<u32> = (0..spheres.len() as u32).collect();
         let mut any = false;
         // Of each group the first sphere along the direction.

@@ -117,9 +117,9 @@ impl MedialUnion {
             return Err(UnionError::TooLarge { sphere });
         }
         let sphere = |v: u32| mesh.spheres[v as usize];
+        let mut distinct = Distinct::new(mesh);
         // Spheres that need no part of their own: ends of proper cones, and those that lie in a
         // neighbour, whose own parts are then nearer everywhere.
-        let mut distinct = Distinct::new(mesh);
         let mut covered = vec![false; mesh.spheres.len()];
         let mut parts = Vec::with_capacity(mesh.edges.len() + mesh.faces.len());
         for (e, &ends) in (0..).zip(&mesh.edges) {
