@@ -1,11 +1,13 @@
 //! The arguments of the command, and the way from a verb to an exit code.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
+use crate::args::Global;
 use crate::cmd;
+use crate::exit::{Exit, Failure};
+use crate::output::print_failure;
 
 /// Simplify the 3D medial axis transform, and compare the published methods that do.
 #[derive(Debug, Parser)]
@@ -17,20 +19,6 @@ pub struct Cli {
     /// The verb.
     #[command(subcommand)]
     pub verb: Verb,
-}
-
-/// Options of every verb.
-#[derive(Clone, Debug, Args)]
-pub struct Global {
-    /// Print one JSON object on standard output, and nothing else there.
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Number of threads [default: all processors].
-    #[arg(long, global = true, value_name = "N")]
-    pub threads: Option<usize>,
-    /// No progress on standard error.
-    #[arg(long, short, global = true)]
-    pub quiet: bool,
 }
 
 /// The verbs.
@@ -77,13 +65,13 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(code) => code.into(),
         Err(failure) => {
-            cmd::print_failure(&failure, &cli.global);
+            print_failure(&failure, &cli.global);
             failure.code.into()
         }
     }
 }
 
-fn run(verb: Verb, global: &Global) -> Result<cmd::Exit, cmd::Failure> {
+fn run(verb: Verb, global: &Global) -> Result<Exit, Failure> {
     match verb {
         Verb::Compare(arguments) => cmd::compare::run(&arguments, global),
         Verb::Info(arguments) => cmd::info::run(&arguments, global),
@@ -107,49 +95,14 @@ fn run(verb: Verb, global: &Global) -> Result<cmd::Exit, cmd::Failure> {
 /// More threads than this serve nobody and can exhaust the system.
 const MOST_THREADS: usize = 1024;
 
-fn set_threads(threads: Option<usize>) -> Result<(), cmd::Failure> {
+fn set_threads(threads: Option<usize>) -> Result<(), Failure> {
     let Some(threads) = threads else {
         return Ok(());
     };
     if !(1..=MOST_THREADS).contains(&threads) {
         let message = format!("--threads {threads}: ask for 1 to {MOST_THREADS} threads");
-        return Err(cmd::Failure::usage(message));
+        return Err(Failure::usage(message));
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-    pool.map_err(|error| cmd::Failure::usage(format!("--threads {threads}: {error}")))
+    pool.map_err(|error| Failure::usage(format!("--threads {threads}: {error}")))
 }
-
-/// How the substrates of a shape are built.
-#[derive(Clone, Debug, Args)]
-pub struct SubstrateArguments {
-    /// Boundary samples: `vertices`, `uniform:COUNT` or `blue:COUNT`.
-    #[arg(long, value_name = "SAMPLING", default_value = "vertices")]
-    pub sampling: String,
-    /// Triangulation of the dual Voronoi polygons.
-    #[arg(long, value_enum, default_value_t = Dual::Fan)]
-    pub dual: Dual,
-    /// Seed of every random choice.
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
-}
-
-/// Triangulation of the dual Voronoi polygons.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Dual {
-    /// A fan, as published.
-    Fan,
-    /// Planar Delaunay.
-    Delaunay,
-}
-
-/// How results are measured.
-#[derive(Clone, Debug, Args)]
-pub struct MeasureArguments {
-    /// Surface samples for the error, beside the mesh's vertices; as many on the reconstruction
-    /// [default: 50000, `compare` 10000].
-    #[arg(long, value_name = "N")]
-    pub samples: Option<usize>,
-}
-
-/// A mesh argument: a file, or `builtin:ID[:RESOLUTION]`.
-pub type MeshArgument = PathBuf;

@@ -1,8 +1,13 @@
 //! The runner behind the command `medial`, and the command itself.
 //!
-//! [`run`] knows inputs, items and records, and nothing of the command line; [`cmd`] holds one
-//! file for each verb; [`cli`] describes the arguments.
+//! From below: [`run`] knows inputs, items and records, and nothing of the command line; [`args`],
+//! [`exit`], [`output`] and [`files`] are what verbs share; [`cmd`] holds one file for each verb;
+//! [`cli`] lists them.
 
+pub mod args;
 pub mod cli;
 pub mod cmd;
+pub mod exit;
+pub mod files;
+pub mod output;
 pub mod run;

@@ -9,8 +9,10 @@ use medial::metrics;
 use medial::shape::Cost;
 use serde_json::json;
 
-use super::{Exit, Failure, check_output, counted, print_json, print_line, shape_options};
-use crate::cli::{Global, MeshArgument, SubstrateArguments};
+use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
+use crate::exit::{Exit, Failure};
+use crate::files::check_output;
+use crate::output::{counted, print_json, print_line};
 use crate::run::{Input, Source, Stopwatch, peak_bytes};
 
 /// Arguments of `axis`.

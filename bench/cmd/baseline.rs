@@ -16,8 +16,9 @@ use serde_json::json;
 
 use super::compare::RESULTS;
 use super::report::rebuild;
-use super::{Exit, Failure, judge_options, percent, print_json, print_line};
-use crate::cli::{Global, MeasureArguments, MeshArgument};
+use crate::args::{Global, MeasureArguments, MeshArgument, judge_options};
+use crate::exit::{Exit, Failure};
+use crate::output::{percent, print_json, print_line};
 use crate::run::{Input, Provenance, Source};
 
 /// Arguments of `baseline`.

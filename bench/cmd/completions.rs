@@ -5,8 +5,8 @@ use std::io;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 
-use super::{Exit, Failure};
 use crate::cli::Cli;
+use crate::exit::{Exit, Failure};
 
 /// Arguments of `completions`.
 #[derive(Debug, Args)]

@@ -8,8 +8,10 @@ use clap::Args;
 use medial::{complex, surface};
 use serde_json::json;
 
-use super::{Exit, Failure, extension, print_json, print_line};
-use crate::cli::Global;
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::files::extension;
+use crate::output::{print_json, print_line};
 
 /// No header of a PLY file is longer, in bytes.
 const HEADER_LIMIT: u64 = 1 << 20;

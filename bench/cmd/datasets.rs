@@ -7,8 +7,9 @@ use medial::surface;
 use medial_datasets::BuiltIn;
 use serde_json::{Value, json};
 
-use super::{Exit, Failure, print_json, print_line};
-use crate::cli::Global;
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::output::{print_json, print_line};
 use crate::run::{Input, Source};
 
 /// Arguments of `datasets`.

@@ -6,8 +6,9 @@ use std::process::Command;
 use clap::Args;
 use serde_json::json;
 
-use super::{Exit, Failure, print_json, print_line};
-use crate::cli::Global;
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::output::{print_json, print_line};
 use crate::run::Provenance;
 
 /// Arguments of `doctor`.

@@ -6,10 +6,10 @@ use clap::Args;
 use medial::metrics::{Certificate, Evaluation, JudgeOptions, MetricError, Witness, WitnessSide};
 use medial::shape::ShapeOptions;
 
-use super::{
-    Exit, Failure, counted, judge_options, medial_mesh_for, percent, print_json, print_line,
-};
-use crate::cli::{Global, MeasureArguments, MeshArgument};
+use crate::args::{Global, MeasureArguments, MeshArgument, judge_options};
+use crate::exit::{Exit, Failure};
+use crate::files::medial_mesh_for;
+use crate::output::{counted, percent, print_json, print_line};
 use crate::run::{Input, Source};
 
 /// Arguments of `evaluate`.

@@ -9,7 +9,8 @@ use medial::shape::Shape;
 use medial::simplifier::{MedialSimplifier, Params, Simplification};
 use serde::{Deserialize, Serialize};
 
-use super::{Failure, version};
+use crate::exit::Failure;
+use crate::output::version;
 use crate::run::{Input, Lap, Stopwatch};
 
 /// What a hierarchy was made from, and by which method.

@@ -3,8 +3,9 @@
 use clap::Args;
 use medial::surface::{self, SurfaceReport};
 
-use super::{Exit, Failure, note, print_json, print_line};
-use crate::cli::{Global, MeshArgument};
+use crate::args::{Global, MeshArgument};
+use crate::exit::{Exit, Failure};
+use crate::output::{note, print_json, print_line};
 use crate::run::{Input, Source};
 
 /// Arguments of `info`.

@@ -4,8 +4,9 @@ use clap::Args;
 use medial::simplifier::MethodInfo;
 use serde_json::json;
 
-use super::{Exit, Failure, print_json, print_line};
-use crate::cli::Global;
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::output::{print_json, print_line};
 
 /// Arguments of `methods`.
 #[derive(Debug, Args)]

@@ -8,8 +8,9 @@ use clap::Args;
 use medial_reports::published::{Exhibit, ReproducedRow, Reproduction, published};
 use serde_json::json;
 
-use super::{Exit, Failure, print_json, print_line};
-use crate::cli::Global;
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::output::{print_json, print_line};
 use crate::run::{Progress, Provenance, Reproducer};
 
 /// Arguments of `paper`.

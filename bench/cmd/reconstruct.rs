@@ -10,11 +10,10 @@ use medial::shape::Shape;
 use medial::surface::{self, Normalisation, SurfaceReport, TriMesh};
 use serde_json::{Map, Value, json};
 
-use super::{
-    Exit, Failure, check_folder, counted, extension, medial_mesh_for, percent, print_json,
-    print_line, shape_options,
-};
-use crate::cli::{Global, MeshArgument, SubstrateArguments};
+use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
+use crate::exit::{Exit, Failure};
+use crate::files::{check_folder, extension, medial_mesh_for};
+use crate::output::{counted, percent, print_json, print_line};
 use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes};
 
 /// Arguments of `reconstruct`.

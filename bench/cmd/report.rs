@@ -8,8 +8,9 @@ use medial_reports::{Header, Record, read_header, read_records, write_report};
 use serde_json::json;
 
 use super::compare::RESULTS;
-use super::{Exit, Failure, print_json, print_line};
-use crate::cli::Global;
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::output::{print_json, print_line};
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]

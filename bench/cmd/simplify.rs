@@ -15,11 +15,14 @@ use serde::Serialize;
 
 use super::hierarchy::{self, Loaded, Origin};
 use super::methods::unknown_method;
-use super::{
-    Exit, Failure, check_folder, check_output, counted, judge_options, medial_mesh_for, params,
-    percent, print_json, print_line, shape_options, voxels,
+use super::voxels;
+use crate::args::{
+    Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options, params,
+    shape_options,
 };
-use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
+use crate::exit::{Exit, Failure};
+use crate::files::{check_folder, check_output, medial_mesh_for};
+use crate::output::{counted, percent, print_json, print_line};
 use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes, search_error};
 
 /// What a search over sphere counts found, for the answer to `--max-error`.
@@ -311,7 +314,7 @@ fn describe(
         threads: Some(rayon::current_num_threads()),
         diagnostics: simplified.diagnostics.counts.iter().cloned().collect(),
         warnings: simplified.diagnostics.warnings.clone(),
-        version: super::version().to_owned(),
+        version: crate::output::version().to_owned(),
         ..Simplify::asked(&arguments.method, simplified.asked, Status::Ok)
     }
 }

@@ -22,8 +22,11 @@ use serde_json::json;
 
 use super::compare::{RESULTS, methods, sphere_levels};
 use super::report::{rebuild, today};
-use super::{Exit, Failure, judge_options, print_json, print_line, shape_options};
-use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
+use crate::args::{
+    Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options, shape_options,
+};
+use crate::exit::{Exit, Failure};
+use crate::output::{print_json, print_line};
 use crate::run::{
     Input, Item, Measure, Progress, Provenance, RunOptions, Source, refused_records, run_item,
 };

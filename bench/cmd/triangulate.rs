@@ -9,8 +9,9 @@ use medial::geometry::regular::Regular;
 use medial::geometry::triangulation::{Triangulation, TriangulationError};
 use serde_json::{Map, json};
 
-use super::{Exit, Failure, print_json, print_line};
-use crate::cli::Global;
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::output::{print_json, print_line};
 use crate::run::{Lap, Matrix, Stopwatch, peak_bytes, read_matrix, write_cells};
 
 /// Arguments of `triangulate`.

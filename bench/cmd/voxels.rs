@@ -15,7 +15,8 @@ use medial::shape::Shape;
 use medial::simplifier::LatticeVoxels;
 use serde_json::json;
 
-use super::{Failure, check_folder, extension};
+use crate::exit::Failure;
+use crate::files::{check_folder, extension};
 use crate::run::write_npy_header;
 
 const EXTENSIONS: [&str; 3] = ["ply", "npy", "csv"];

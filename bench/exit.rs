@@ -1,0 +1,63 @@
+//! How a verb ends: its exit code, and the sentence that says what went wrong.
+
+use std::process::ExitCode;
+
+use crate::run::{InputError, Source};
+
+/// Exit codes of the command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All was done.
+    Done = 0,
+    /// The user's input is wrong.
+    Input = 1,
+    /// The command line is wrong.
+    Usage = 2,
+    /// Some runs failed or are unsupported, the rest are reported.
+    SomeFailed = 3,
+    /// Nothing was measured.
+    NothingMeasured = 5,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// A verb that could not do its work.
+#[derive(Debug)]
+pub struct Failure {
+    /// The exit code.
+    pub code: Exit,
+    /// What is wrong and what to do, one sentence.
+    pub message: String,
+}
+
+impl Failure {
+    /// The user's input is wrong.
+    pub fn input(message: impl ToString) -> Self {
+        Self { code: Exit::Input, message: message.to_string() }
+    }
+
+    /// The command line is wrong.
+    pub fn usage(message: impl ToString) -> Self {
+        Self { code: Exit::Usage, message: message.to_string() }
+    }
+
+    /// The user's input is wrong, and the message does not name it by itself.
+    pub fn of(source: &Source, message: impl ToString) -> Self {
+        Self::input(format!("{source}: {}", message.to_string()))
+    }
+}
+
+impl From<InputError> for Failure {
+    fn from(error: InputError) -> Self {
+        match error {
+            InputError::Read { .. } | InputError::Surface(_) => Self::input(error),
+            InputError::NoSuchShape(_)
+            | InputError::Resolution(_)
+            | InputError::OutOfRange { .. } => Self::usage(error),
+        }
+    }
+}

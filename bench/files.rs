@@ -1,0 +1,74 @@
+//! Medial meshes that a user names, and outputs that are checked before the work for them is done.
+
+use std::path::Path;
+
+use medial::complex::{self, MedialMesh};
+use medial::shape::Shape;
+
+use crate::exit::Failure;
+
+/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it: next to its
+/// spheres the whole surface is less than a rounding error.
+const LARGEST_SPHERE: f64 = 1e12;
+
+/// Reads a medial mesh that was made for a shape: the mesh in input units, and what was repaired.
+///
+/// # Errors
+/// When it cannot be read, has no sphere, or cannot belong to the shape.
+pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<(MedialMesh, Vec<String>), Failure> {
+    let loaded = complex::read(path).map_err(Failure::input)?;
+    if loaded.mesh.spheres.is_empty() {
+        return Err(Failure::input(format!("{}: no sphere", path.display())));
+    }
+    let to_normal = shape.normalisation();
+    for (id, sphere) in loaded.mesh.spheres.iter().enumerate() {
+        let centre = to_normal.forward(sphere.centre);
+        let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
+        // An overflow gives a size that is infinite or not a number.
+        if size.is_nan() || size > LARGEST_SPHERE {
+            return Err(Failure::input(format!(
+                "{}: sphere {id} reaches {size:.1e} diagonals of the surface away from it: the \
+                 medial mesh is in other units, or of another surface",
+                path.display()
+            )));
+        }
+    }
+    Ok((loaded.mesh, loaded.notes))
+}
+
+/// Refuses an output that could not be written anyway, before the work for it is done.
+///
+/// # Errors
+/// When the extension is none of a medial mesh, or the folder does not exist.
+pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
+    let Some(path) = output else { return Ok(()) };
+    let known = ["ma", "ply", "obj"];
+    let extension = extension(path);
+    if !known.contains(&extension.as_str()) {
+        return Err(Failure::input(format!(
+            "{}: the extension {extension:?} is not one of .ma, .ply, .obj",
+            path.display()
+        )));
+    }
+    check_folder(path)
+}
+
+/// Refuses a file in a folder that does not exist.
+///
+/// # Errors
+/// When the folder does not exist.
+pub fn check_folder(path: &Path) -> Result<(), Failure> {
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        Some(folder) if !folder.is_dir() => Err(Failure::input(format!(
+            "{}: there is no folder {}; make it first",
+            path.display(),
+            folder.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Lower-case extension of a path, or nothing.
+pub fn extension(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
