@@ -9,6 +9,7 @@ use medial::simplifier::Params;
 use medial::surface::Sampling;
 
 use crate::exit::Failure;
+use crate::run::{Dual, Study};
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]
@@ -22,29 +23,52 @@ pub struct Global {
     /// No progress on standard error.
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// Methods that are programs of their own, declared in a TOML file; can be given several times.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub plugins: Vec<PathBuf>,
 }
 
 /// How the substrates of a shape are built.
 #[derive(Clone, Debug, Args)]
 pub struct SubstrateArguments {
-    /// Boundary samples: `vertices`, `uniform:COUNT` or `blue:COUNT`.
-    #[arg(long, value_name = "SAMPLING", default_value = "vertices")]
-    pub sampling: String,
-    /// Triangulation of the dual Voronoi polygons.
-    #[arg(long, value_enum, default_value_t = Dual::Fan)]
-    pub dual: Dual,
-    /// Seed of every random choice.
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
+    /// Boundary samples: `vertices`, `uniform:COUNT` or `blue:COUNT` [default: vertices].
+    #[arg(long, value_name = "SAMPLING")]
+    pub sampling: Option<String>,
+    /// Triangulation of the dual Voronoi polygons [default: fan].
+    #[arg(long, value_enum)]
+    pub dual: Option<Dual>,
+    /// Seed of every random choice [default: 0].
+    #[arg(long)]
+    pub seed: Option<u64>,
 }
 
-/// Triangulation of the dual Voronoi polygons.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Dual {
-    /// A fan, as published.
-    Fan,
-    /// Planar Delaunay.
-    Delaunay,
+impl SubstrateArguments {
+    /// The seed of every random choice.
+    pub fn seed(&self) -> u64 {
+        self.seed.unwrap_or(0)
+    }
+
+    /// Boundary samples, with the run's seed where the sampling itself names none.
+    fn sampling(&self) -> Result<Sampling, Failure> {
+        let Some(text) = &self.sampling else { return Ok(Sampling::default()) };
+        let sampling: Sampling =
+            text.parse().map_err(|error| Failure::usage(format!("--sampling: {error}")))?;
+        let seeded = text.split(':').count() > 2;
+        Ok(if seeded { sampling } else { sampling.with_seed(self.seed()) })
+    }
+
+    /// Puts what is given into a study.
+    ///
+    /// # Errors
+    /// When the sampling is not understood.
+    pub fn apply(&self, study: &mut Study) -> Result<(), Failure> {
+        study.seed = self.seed.unwrap_or(study.seed);
+        study.dual = self.dual.unwrap_or(study.dual);
+        if self.sampling.is_some() {
+            study.sampling = self.sampling()?;
+        }
+        Ok(())
+    }
 }
 
 /// How results are measured.
@@ -56,6 +80,18 @@ pub struct MeasureArguments {
     pub samples: Option<usize>,
 }
 
+impl MeasureArguments {
+    /// Puts what is given into a study.
+    ///
+    /// # Errors
+    /// When no sample is asked for, or more than fit into memory.
+    pub fn apply(&self, study: &mut Study) -> Result<(), Failure> {
+        let defaults = JudgeOptions { samples: study.samples, ..JudgeOptions::default() };
+        study.samples = judge_options(self, defaults, 0)?.samples;
+        Ok(())
+    }
+}
+
 /// A mesh argument: a file, or `builtin:ID[:RESOLUTION]`.
 pub type MeshArgument = PathBuf;
 
@@ -64,17 +100,8 @@ pub type MeshArgument = PathBuf;
 /// # Errors
 /// When the sampling is not understood.
 pub fn shape_options(arguments: &SubstrateArguments) -> Result<ShapeOptions, Failure> {
-    let text = &arguments.sampling;
-    let sampling: Sampling =
-        text.parse().map_err(|error| Failure::usage(format!("--sampling: {error}")))?;
-    // A seed within the sampling wins over the run's.
-    let seeded = text.split(':').count() > 2;
-    let sampling = if seeded { sampling } else { sampling.with_seed(arguments.seed) };
-    let dual = match arguments.dual {
-        Dual::Fan => medial::complex::DualTriangulation::Fan,
-        Dual::Delaunay => medial::complex::DualTriangulation::Delaunay,
-    };
-    Ok(ShapeOptions { sampling, dual })
+    let dual = arguments.dual.unwrap_or_default().into();
+    Ok(ShapeOptions { sampling: arguments.sampling()?, dual })
 }
 
 /// The options of the judge from the command line.

@@ -3,11 +3,14 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use medial::simplifier::MedialSimplifier;
 
 use crate::args::Global;
 use crate::cmd;
 use crate::exit::{Exit, Failure};
+use crate::interrupt;
 use crate::output::print_failure;
+use crate::run::Registry;
 
 /// Simplify the 3D medial axis transform, and compare the published methods that do.
 #[derive(Debug, Parser)]
@@ -54,14 +57,24 @@ pub enum Verb {
     Report(cmd::report::Arguments),
     /// Say what this machine lacks for oracles and baselines.
     Doctor(cmd::doctor::Arguments),
+    /// Run one item of a comparison, and print its records.
+    RunItem(cmd::run_item::Arguments),
     /// Print shell completions.
     Completions(cmd::completions::Arguments),
+    /// Serve items on standard input: what `compare` starts.
+    #[command(hide = true)]
+    Worker(cmd::worker::Arguments),
 }
 
-/// Parses the command line, runs the verb, and turns the outcome into an exit code.
-pub fn main() -> ExitCode {
+/// The command with these methods: parses the command line, runs the verb, and turns the outcome
+/// into an exit code.
+pub fn main_with(methods: Vec<Box<dyn MedialSimplifier>>) -> ExitCode {
     let cli = Cli::parse();
-    let outcome = set_threads(cli.global.threads).and_then(|()| run(cli.verb, &cli.global));
+    interrupt::install();
+    let registry = registry(methods, &cli.global);
+    let outcome = set_threads(cli.global.threads)
+        .and(registry)
+        .and_then(|mut registry| run(cli.verb, &cli.global, &mut registry));
     match outcome {
         Ok(code) => code.into(),
         Err(failure) => {
@@ -71,24 +84,34 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn run(verb: Verb, global: &Global) -> Result<Exit, Failure> {
+fn registry(methods: Vec<Box<dyn MedialSimplifier>>, global: &Global) -> Result<Registry, Failure> {
+    let mut registry = Registry::new(methods).map_err(Failure::usage)?;
+    for file in &global.plugins {
+        registry.add_plugins(file).map_err(Failure::usage)?;
+    }
+    Ok(registry)
+}
+
+fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Failure> {
     match verb {
-        Verb::Compare(arguments) => cmd::compare::run(&arguments, global),
+        Verb::Compare(arguments) => cmd::compare::run(&arguments, global, registry),
         Verb::Info(arguments) => cmd::info::run(&arguments, global),
         Verb::Axis(arguments) => cmd::axis::run(&arguments, global),
-        Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global),
+        Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global, registry),
         Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Triangulate(arguments) => cmd::triangulate::run(&arguments, global),
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
-        Verb::Methods(arguments) => cmd::methods::run(&arguments, global),
+        Verb::Methods(arguments) => cmd::methods::run(&arguments, global, registry),
         Verb::Datasets(arguments) => cmd::datasets::run(&arguments, global),
-        Verb::Paper(arguments) => cmd::paper::run(&arguments, global),
-        Verb::Baseline(arguments) => cmd::baseline::run(&arguments, global),
-        Verb::Stability(arguments) => cmd::stability::run(&arguments, global),
-        Verb::Report(arguments) => cmd::report::run(&arguments, global),
+        Verb::Paper(arguments) => cmd::paper::run(&arguments, global, registry),
+        Verb::Baseline(arguments) => cmd::baseline::run(&arguments, global, registry),
+        Verb::Stability(arguments) => cmd::stability::run(&arguments, global, registry),
+        Verb::Report(arguments) => cmd::report::run(&arguments, global, registry),
         Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
         Verb::Completions(arguments) => cmd::completions::run(&arguments),
+        Verb::RunItem(arguments) => cmd::run_item::run(&arguments, global, registry),
+        Verb::Worker(arguments) => cmd::worker::run(&arguments, registry),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use crate::run::{InputError, Source};
+use crate::run::{InputError, PlanError, RunError, Source, StoreError, StudyError};
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +17,8 @@ pub enum Exit {
     SomeFailed = 3,
     /// Nothing was measured.
     NothingMeasured = 5,
+    /// The user interrupted: what shells give for a program ended from the keyboard.
+    Interrupted = 130,
 }
 
 impl From<Exit> for ExitCode {
@@ -48,6 +50,43 @@ impl Failure {
     /// The user's input is wrong, and the message does not name it by itself.
     pub fn of(source: &Source, message: impl ToString) -> Self {
         Self::input(format!("{source}: {}", message.to_string()))
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Input(error) => error.into(),
+            StudyError::File { .. } => Self::input(error),
+            StudyError::Value(_) | StudyError::Method { .. } | StudyError::Registry(_) => {
+                Self::usage(error)
+            }
+        }
+    }
+}
+
+impl From<StoreError> for Failure {
+    fn from(error: StoreError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        let code = match error {
+            RunError::Interrupted => Exit::Interrupted,
+            RunError::Start(_) => Exit::NothingMeasured,
+        };
+        Self { code, message: error.to_string() }
+    }
+}
+
+impl From<PlanError> for Failure {
+    fn from(error: PlanError) -> Self {
+        match error {
+            PlanError::Run(error) => error.into(),
+            PlanError::Store(error) => error.into(),
+        }
     }
 }
 

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    medial_bench::cli::main()
+    medial_bench::main_with(medial_methods::registry())
 }

@@ -27,6 +27,11 @@ pub fn print_line(line: &str) {
     let _ = writeln!(io::stdout(), "{line}");
 }
 
+/// Prints a line on standard error, also with `--quiet`.
+pub fn say(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
 /// Prints a line on standard error unless `--quiet`.
 pub fn note(global: &Global, line: &str) {
     if !global.quiet {

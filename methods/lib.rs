@@ -24,16 +24,16 @@ pub mod tam_heidrich;
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
     vec![
-        Box::new(angle::AngleFilter::new()),
-        Box::new(lambda::LambdaMedialAxis::new()),
-        Box::new(dey_zhao::DeyZhao::new()),
-        Box::new(qmat::Qmat::new()),
-        Box::new(pmat::Pmat::new()),
-        Box::new(hem::Hem::new()),
-        Box::new(sat::Sat::new()),
-        Box::new(sat_pairwise::SatPairwise::new()),
-        Box::new(tam_heidrich::TamHeidrich::new()),
-        Box::new(aof::AverageOutwardFlux::new()),
+        Box::new(angle::method()),
+        Box::new(lambda::method()),
+        Box::new(dey_zhao::method()),
+        Box::new(qmat::method()),
+        Box::new(pmat::method()),
+        Box::new(hem::method()),
+        Box::new(sat::method()),
+        Box::new(sat_pairwise::method()),
+        Box::new(tam_heidrich::method()),
+        Box::new(aof::method()),
     ]
 }
 

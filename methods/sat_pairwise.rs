@@ -23,75 +23,41 @@ mod containment;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext, Simplification,
+    Diagnostics, Method, MethodInfo, NativeLevel, NoParams, RunContext, Simplification,
     SimplifyError,
 };
-use serde::Deserialize;
 
 use crate::ranked::{Ranked, Scale};
 
 /// The pairwise scale filter as a method.
-pub struct SatPairwise {
-    info: MethodInfo,
+pub fn method() -> Method<NoParams> {
+    let info = MethodInfo::new("sat-pairwise", "Pairwise scale filter (not SAT)")
+        .citation(
+            "After the description in Li et al. 2015, Q-MAT, ACM Transactions on Graphics 35(1), \
+             https://doi.org/10.1145/2753755, of Miklos, Giesen, Pauly 2010, \
+             https://doi.org/10.1145/1778765.1778838",
+        )
+        .summary("Removes the spheres that another sphere contains once both are scaled.")
+        .native(NativeLevel::larger_is_coarser("s", "scale factor"))
+        .published("unsupported: it is described, not published, as a method");
+    Method::new(info, prepare)
 }
 
-/// The pairwise scale filter has no parameter beside its level.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SatPairwiseParams {}
-
-impl SatPairwise {
-    /// The method with its description.
-    pub fn new() -> Self {
-        Self {
-            info: MethodInfo {
-                id: "sat-pairwise",
-                title: "Pairwise scale filter (not SAT)",
-                citation: "After the description in Li et al. 2015, Q-MAT, ACM Transactions on \
-                           Graphics 35(1), https://doi.org/10.1145/2753755, of Miklos, Giesen, Pauly \
-                           2010, https://doi.org/10.1145/1778765.1778838",
-                summary: "Removes the spheres that another sphere contains once both are scaled.",
-                native: Some(NativeLevel {
-                    name: "s",
-                    unit: "scale factor",
-                    larger_is_coarser: true,
-                }),
-                published: "unsupported: it is described, not published, as a method",
-                params: vec![],
-            },
-        }
-    }
-}
-
-impl Default for SatPairwise {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl MedialSimplifier for SatPairwise {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        _run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let SatPairwiseParams {} = params.typed()?;
-        let mesh = shape.initial()?;
-        let value = containment::critical_scales(&mesh.spheres);
-        let scale = Scale {
-            name: "s",
-            range: 0.0..=f64::MAX,
-            inclusive: false,
-            no_published: "this filter is described, not published, as a method; ask for a number of \
-                           spheres or for a scale (1.1 to 2 is usual for the transform)",
-        };
-        Ok(Box::new(Ranked::new(mesh, value, scale, Diagnostics::default())))
-    }
+fn prepare<'s>(
+    shape: &'s Shape,
+    _: NoParams,
+    _run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let mesh = shape.initial()?;
+    let value = containment::critical_scales(&mesh.spheres);
+    let scale = Scale {
+        name: "s",
+        range: 0.0..=f64::MAX,
+        inclusive: false,
+        no_published: "this filter is described, not published, as a method; ask for a number of \
+                       spheres or for a scale (1.1 to 2 is usual for the transform)",
+    };
+    Ok(Box::new(Ranked::new(mesh, value, scale, Diagnostics::default())))
 }
 
 #[cfg(test)]

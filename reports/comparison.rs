@@ -60,7 +60,7 @@ impl Entry<'_> {
 
 /// Whether a record holds a result and its measures.
 pub(crate) fn measured(record: &Record) -> bool {
-    record.status.is_ok() && record.evaluate.is_some()
+    record.status.has_result() && record.evaluate.is_some()
 }
 
 /// The number of spheres of the result.
@@ -98,15 +98,18 @@ fn compare_levels(a: Level, b: Level) -> Ordering {
 impl<'a> Comparison<'a> {
     /// Arranges records. Of several records of one item the last one counts.
     pub(crate) fn new(records: &'a [Record]) -> Self {
-        let mesh_keys = first_seen(records.iter().map(MeshKey::of));
-        let series_keys = first_seen(records.iter().map(SeriesKey::of));
-        let mut levels: Vec<Level> = records.iter().map(|record| record.simplify.level).collect();
+        let hashes = Hashes::of(records);
+        let counted = counted_records(records, &hashes);
+        let superseded = records.len() - counted.len();
+        let mesh_keys = first_seen(counted.iter().map(|record| hashes.key(record)));
+        let series_keys = first_seen(counted.iter().copied().map(SeriesKey::of));
+        let mut levels: Vec<Level> = counted.iter().map(|record| record.simplify.level).collect();
         levels.sort_by(|&a, &b| compare_levels(a, b));
         levels.dedup_by(|a, b| compare_levels(*a, *b).is_eq());
 
         let mut by_item = BTreeMap::new();
-        for record in records {
-            let mesh = mesh_keys.1[&MeshKey::of(record)];
+        for record in counted {
+            let mesh = mesh_keys.1[&hashes.key(record)];
             let series = series_keys.1[&SeriesKey::of(record)];
             let level = levels
                 .iter()
@@ -123,7 +126,7 @@ impl<'a> Comparison<'a> {
             series: series_labels(&series_keys.0),
             methods: series_keys.0.iter().map(|key| key.method).collect(),
             levels,
-            superseded: records.len() - entries.len(),
+            superseded,
             entries,
             keys: series_keys.0,
         }
@@ -191,13 +194,25 @@ impl<'a> Comparison<'a> {
         let unmeasured = self
             .entries
             .iter()
-            .filter(|entry| entry.record.status.is_ok() && !entry.measured())
+            .filter(|entry| entry.record.status.has_result() && !entry.measured())
             .count();
         if unmeasured > 0 {
             cautions.push(format!("{unmeasured} results were never evaluated."));
         }
         cautions
     }
+}
+
+/// The records that count: of one mesh, row and level the last one, whatever build made it. Records
+/// of an older build stay where the newer one has none.
+fn counted_records<'a>(records: &'a [Record], hashes: &Hashes<'a>) -> Vec<&'a Record> {
+    let mut last = BTreeMap::new();
+    for (index, record) in records.iter().enumerate() {
+        let level = serde_json::to_string(&record.simplify.level).unwrap_or_default();
+        last.insert((hashes.key(record), SeriesKey::of(record).asked(), level), index);
+    }
+    let counted: BTreeSet<usize> = last.into_values().collect();
+    counted.into_iter().map(|index| &records[index]).collect()
 }
 
 /// The distinct keys in the order of their first appearance, and the index of each.
@@ -220,9 +235,26 @@ struct MeshKey<'a> {
     hash: Option<&'a str>,
 }
 
-impl<'a> MeshKey<'a> {
-    fn of(record: &'a Record) -> Self {
-        Self { name: &record.mesh, hash: record.mesh_hash.as_deref() }
+/// The contents that meshes of one name have.
+struct Hashes<'a>(BTreeMap<&'a str, BTreeSet<&'a str>>);
+
+impl<'a> Hashes<'a> {
+    fn of(records: &'a [Record]) -> Self {
+        let mut hashes: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for record in records {
+            hashes.entry(&record.mesh).or_default().extend(record.mesh_hash.as_deref());
+        }
+        Self(hashes)
+    }
+
+    /// The mesh of a record. A run that ended before its input was read has no hash: it belongs to
+    /// the one mesh of its name, where there is just one.
+    fn key(&self, record: &'a Record) -> MeshKey<'a> {
+        let only = || {
+            let all = self.0.get(record.mesh.as_str()).filter(|all| all.len() == 1)?;
+            all.first().copied()
+        };
+        MeshKey { name: &record.mesh, hash: record.mesh_hash.as_deref().or_else(only) }
     }
 }
 
@@ -236,44 +268,90 @@ fn mesh_labels(keys: &[MeshKey<'_>]) -> Vec<String> {
     keys.iter().map(label).collect()
 }
 
-/// A method, its parameters in the order of their names, and its seed.
+/// What makes a row of its own: the method with its parameters, and the conditions under which it
+/// ran. Records of two builds, of two samplings or of two accuracies of measuring are never in one
+/// mean.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct SeriesKey<'a> {
     method: &'a str,
+    variant: Option<&'a str>,
     params: String,
     seed: u64,
+    build: &'a str,
+    plugin: Option<&'a str>,
+    sampling: &'a str,
+    dual: &'a str,
+    samples: usize,
+    threads: Option<usize>,
 }
 
 impl<'a> SeriesKey<'a> {
     fn of(record: &'a Record) -> Self {
+        let simplify = &record.simplify;
         let params: BTreeMap<&String, String> =
-            record.simplify.params.0.iter().map(|(key, value)| (key, value.to_string())).collect();
+            simplify.params.0.iter().map(|(key, value)| (key, value.to_string())).collect();
         let params: Vec<String> = params
             .iter()
             .map(|(key, value)| format!("{key}={}", value.trim_matches('"')))
             .collect();
+        let conditions = record.conditions.as_ref();
         Self {
-            method: &record.simplify.method,
+            method: &simplify.method,
+            variant: simplify.variant.as_deref(),
             params: params.join(" "),
-            seed: record.simplify.seed,
+            seed: simplify.seed,
+            build: &record.binary_hash,
+            plugin: conditions.and_then(|c| c.fingerprint.as_deref()),
+            sampling: conditions.map_or("", |c| &c.sampling),
+            dual: conditions.map_or("", |c| &c.dual),
+            samples: conditions.map_or(0, |c| c.samples),
+            threads: simplify.threads,
         }
+    }
+
+    /// The row as the user asked for it, whatever build or plug-in answered.
+    fn asked(&self) -> Self {
+        Self { build: "", plugin: None, ..self.clone() }
     }
 }
 
-/// Method and parameters, and the seed where it makes a difference.
+/// Method and parameters, and each condition that differs between the rows of one name.
 fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
+    let name = |key: &SeriesKey<'_>| match key.variant {
+        Some(variant) => variant.to_owned(),
+        None if key.params.is_empty() => key.method.to_owned(),
+        None => format!("{} {}", key.method, key.params),
+    };
     let label = |key: &SeriesKey<'_>| {
-        let mut label = key.method.to_owned();
-        if !key.params.is_empty() {
-            label.push(' ');
-            label.push_str(&key.params);
-        }
-        let seeds = keys
-            .iter()
-            .filter(|other| (other.method, &other.params) == (key.method, &key.params))
-            .count();
-        if seeds > 1 {
-            label.push_str(&format!(" seed {}", key.seed));
+        let mut label = name(key);
+        let namesakes: Vec<&SeriesKey<'_>> =
+            keys.iter().filter(|other| name(other) == label).collect();
+        let short = |hash: &str| -> String { hash.chars().take(8).collect() };
+        let conditions = [
+            (key.variant.is_some(), format!("{} {}", key.method, key.params)),
+            (true, format!("seed {}", key.seed)),
+            (true, format!("sampling {}", key.sampling)),
+            (true, format!("dual {}", key.dual)),
+            (true, format!("{} samples", key.samples)),
+            (true, format!("{} threads", key.threads.unwrap_or(0))),
+            (true, format!("build {}", short(key.build))),
+            (true, format!("plug-in {}", short(key.plugin.unwrap_or("none")))),
+        ];
+        let of = |other: &SeriesKey<'_>, index: usize| match index {
+            0 => format!("{} {}", other.method, other.params),
+            1 => other.seed.to_string(),
+            2 => other.sampling.to_owned(),
+            3 => other.dual.to_owned(),
+            4 => other.samples.to_string(),
+            5 => format!("{:?}", other.threads),
+            6 => other.build.to_owned(),
+            _ => other.plugin.unwrap_or_default().to_owned(),
+        };
+        for (index, (applies, text)) in conditions.into_iter().enumerate() {
+            let differs = namesakes.iter().any(|other| of(other, index) != of(key, index));
+            if applies && differs {
+                label.push_str(&format!(", {}", text.trim_end()));
+            }
         }
         printable(&label)
     };

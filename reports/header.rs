@@ -11,22 +11,36 @@ use crate::record::Machine;
 pub struct Header {
     /// Title of the page.
     pub title: String,
-    /// The command line that made the records.
-    pub command: String,
-    /// Version of the program.
-    pub version: String,
-    /// When the comparison was run, as it is to be shown.
+    /// The runs that made the records, in their order.
     #[serde(default)]
-    pub date: Option<String>,
-    /// Where it was run; taken from the records where absent.
-    #[serde(default)]
-    pub machine: Option<Machine>,
+    pub runs: Vec<RunNote>,
     /// The methods that were run, for their names and citations.
     #[serde(default)]
     pub methods: Vec<MethodNote>,
-    /// Remarks on the whole run, such as lines of the results that could not be read.
+    /// The study that was asked last, as a file.
+    #[serde(default)]
+    pub study: Option<String>,
+    /// Remarks on all of it, such as lines of the results that could not be read.
     #[serde(default)]
     pub notes: Vec<String>,
+}
+
+/// One run of the program that added records.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunNote {
+    /// The command line.
+    pub command: String,
+    /// Version of the program.
+    pub version: String,
+    /// SHA-256 of the program.
+    #[serde(default)]
+    pub binary_hash: String,
+    /// When it ran, as it is to be shown.
+    #[serde(default)]
+    pub date: Option<String>,
+    /// Where it ran.
+    #[serde(default)]
+    pub machine: Option<Machine>,
 }
 
 /// What the page says of a method.
@@ -47,11 +61,11 @@ pub struct MethodNote {
 impl From<&MethodInfo> for MethodNote {
     fn from(info: &MethodInfo) -> Self {
         Self {
-            id: info.id.to_owned(),
-            title: info.title.to_owned(),
-            citation: info.citation.to_owned(),
-            summary: info.summary.to_owned(),
-            published: info.published.to_owned(),
+            id: info.id.to_string(),
+            title: info.title.to_string(),
+            citation: info.citation.to_string(),
+            summary: info.summary.to_string(),
+            published: info.published.to_string(),
         }
     }
 }
@@ -59,13 +73,18 @@ impl From<&MethodInfo> for MethodNote {
 impl Header {
     /// How the files were made: a sentence that stands in each of them.
     pub(crate) fn how(&self) -> String {
+        let Some(run) = self.runs.last() else { return "Made by medial.".to_owned() };
         let version =
-            if self.version.is_empty() { String::new() } else { format!(" {}", self.version) };
-        let date = self.date.as_ref().map_or(String::new(), |date| format!(", {date}"));
-        if self.command.is_empty() {
-            format!("Made by medial{version}{date}.")
+            if run.version.is_empty() { String::new() } else { format!(" {}", run.version) };
+        let date = run.date.as_ref().map_or(String::new(), |date| format!(", {date}"));
+        let earlier = match self.runs.len() {
+            1 => String::new(),
+            runs => format!(" in {runs} runs, the last one"),
+        };
+        if run.command.is_empty() {
+            format!("Made by medial{version}{earlier}{date}.")
         } else {
-            format!("Made by medial{version}{date}, with: {}", self.command)
+            format!("Made by medial{version}{earlier}{date}, with: {}", run.command)
         }
     }
 }

@@ -9,6 +9,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use medial::write_atomically;
+use serde::Serialize;
 
 use crate::record::Record;
 
@@ -43,6 +44,22 @@ impl Journal {
             Ok(file) => Ok(Self { file, path }),
             Err(source) => Err(JournalError::Io { path, source }),
         }
+    }
+
+    /// Adds lines in one piece, and waits until they are on the disk. They must hold no number
+    /// that is not finite: JSON has none.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`] when writing fails.
+    pub fn append_lines(&mut self, lines: &[impl Serialize]) -> Result<(), JournalError> {
+        let failed = |source| JournalError::Io { path: self.path.clone(), source };
+        let mut bytes = Vec::new();
+        for line in lines {
+            serde_json::to_writer(&mut bytes, line).map_err(|error| failed(error.into()))?;
+            bytes.push(b'\n');
+        }
+        let mut file = &self.file;
+        file.write_all(&bytes).and_then(|()| file.sync_data()).map_err(failed)
     }
 
     /// Adds one record and waits until it is on the disk.

@@ -33,9 +33,12 @@ mod write;
 pub use extras::{
     AxisShift, BASELINES, Baseline, NoiseRecord, ORACLES, STABILITY, read_lines, write_lines,
 };
-pub use header::{Header, MethodNote};
+pub use header::{Header, MethodNote, RunNote};
 pub use journal::{BadLine, Journal, JournalError, Journaled, read_records, write_records};
-pub use record::{Initial, Machine, Record, Repetition, Simplify, Stages, Status};
+pub use record::{
+    Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status,
+    UnionTopology,
+};
 pub use terminal::summary_text;
 pub use text::file_stem;
 pub use write::{ReportError, read_header, write_report};

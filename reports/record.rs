@@ -22,6 +22,8 @@ use crate::text::{counted, megabytes};
 pub enum Status {
     /// A valid medial mesh came out.
     Ok,
+    /// A valid medial mesh came out, with a number of spheres more than 2 % off the one asked.
+    OtherCount,
     /// The method does not do this: an answer, not a failure.
     Unsupported,
     /// The input was refused before the method saw it, or by a check of the method's own.
@@ -40,8 +42,9 @@ pub enum Status {
 
 impl Status {
     /// Every status, in the order of the enumeration.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Ok,
+        Self::OtherCount,
         Self::Unsupported,
         Self::Refused,
         Self::Failed,
@@ -51,20 +54,26 @@ impl Status {
         Self::InvalidOutput,
     ];
 
-    /// Whether there is a result to measure.
+    /// Whether the result is as it was asked.
     pub fn is_ok(self) -> bool {
         self == Self::Ok
     }
 
+    /// Whether there is a result to measure, at the count that was asked or another.
+    pub fn has_result(self) -> bool {
+        matches!(self, Self::Ok | Self::OtherCount)
+    }
+
     /// Whether something went wrong: neither a result nor the plain answer "unsupported".
     pub fn is_failure(self) -> bool {
-        !matches!(self, Self::Ok | Self::Unsupported)
+        !matches!(self, Self::Ok | Self::OtherCount | Self::Unsupported)
     }
 
     /// The word that stands in the JSON.
     pub fn key(self) -> &'static str {
         match self {
             Self::Ok => "ok",
+            Self::OtherCount => "other_count",
             Self::Unsupported => "unsupported",
             Self::Refused => "refused",
             Self::Failed => "failed",
@@ -86,6 +95,10 @@ impl fmt::Display for Status {
 /// One line of `results.jsonl`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
+    /// Key of the level of the item: records with the same key are of the same work, and the last
+    /// one counts. Empty in records of older builds.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub key: String,
     /// Name of the mesh, as the user or the catalogue calls it.
     pub mesh: String,
     /// The dataset that the mesh comes from.
@@ -112,6 +125,15 @@ pub struct Record {
     /// The medial mesh that every simplifier of this shape starts from.
     #[serde(default)]
     pub initial: Option<Initial>,
+    /// What the result depends on beside input, method and level.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub conditions: Option<Conditions>,
+    /// SHA-256 of the resulting medial mesh: equal results are equal here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub result_hash: Option<String>,
+    /// Betti numbers of the union of the result's primitives, where they were asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub union: Option<UnionTopology>,
     /// Every seed by its purpose, such as `sampling`, `method`, `evaluation`.
     #[serde(default)]
     pub seeds: BTreeMap<String, u64>,
@@ -144,6 +166,9 @@ pub struct Simplify {
     pub status: Status,
     /// Id of the method.
     pub method: String,
+    /// Name of the method with these parameters in tables, where it was given one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variant: Option<String>,
     /// Parameters as the user gave them; an empty object stands for the paper's values.
     #[serde(default)]
     pub params: Params,
@@ -176,9 +201,13 @@ pub struct Simplify {
     /// Seconds of the process on all processors, by stage.
     #[serde(default)]
     pub cpu_seconds: Option<Stages>,
-    /// Largest resident size of the process, in bytes.
+    /// The most memory that the run needed at one time, in bytes: live bytes of the heap with the
+    /// substrates that the method used, as if it had been alone.
     #[serde(default)]
     pub peak_bytes: Option<u64>,
+    /// Seconds by the method's own clock, for programs that tell them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own_seconds: Option<OwnSeconds>,
     /// Threads that the method was given.
     #[serde(default)]
     pub threads: Option<usize>,
@@ -199,6 +228,7 @@ impl Simplify {
         Self {
             status,
             method: method.into(),
+            variant: None,
             params: Params::none(),
             seed: 0,
             level,
@@ -211,12 +241,47 @@ impl Simplify {
             seconds: None,
             cpu_seconds: None,
             peak_bytes: None,
+            own_seconds: None,
             threads: None,
             diagnostics: BTreeMap::new(),
             warnings: Vec::new(),
             version: String::new(),
         }
     }
+}
+
+/// Seconds by the clock of an external program, beside the runner's own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OwnSeconds {
+    /// The method's work that does not depend on the level.
+    pub prepare: Option<f64>,
+    /// From there to this level.
+    pub simplify: Option<f64>,
+}
+
+/// What a result depends on beside input, method and level.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Conditions {
+    /// Boundary samples.
+    pub sampling: String,
+    /// Triangulation of the dual Voronoi polygons.
+    pub dual: String,
+    /// Surface samples of the evaluation.
+    pub samples: usize,
+    /// Limit of time, in seconds.
+    pub seconds_limit: f64,
+    /// Limit of memory, in bytes.
+    pub bytes_limit: u64,
+    /// Hash of the declaration and the files of a plug-in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fingerprint: Option<String>,
+}
+
+/// Topology of a union of spheres, cones and slabs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UnionTopology {
+    /// Betti numbers; `None` where they could not be computed.
+    pub betti: Option<[u64; 3]>,
 }
 
 /// Seconds by stage.

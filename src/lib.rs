@@ -19,6 +19,7 @@ pub mod complex;
 mod disjoint;
 pub mod geometry;
 mod hash;
+pub mod heap;
 pub mod metrics;
 pub mod shape;
 pub mod simplifier;

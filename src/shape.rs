@@ -5,13 +5,8 @@
 //! substrates that the method used, and a filter does not look free beside a method that starts
 //! from the mesh. [`Shape::view`] opens a fresh view on the same store.
 
-use std::collections::{BTreeMap, HashMap};
-use std::hash::Hash;
-use std::sync::{Arc, Mutex, OnceLock};
-use std::time::Instant;
-
-use cpu_time::ProcessTime;
-use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
 
 use crate::Vec3;
 use crate::complex::{
@@ -26,24 +21,20 @@ mod contacts;
 mod error;
 mod inner_balls;
 mod power_crust;
+mod substrate;
 
 pub use contacts::ContactSets;
 pub use error::ShapeError;
 pub use inner_balls::InnerBalls;
 pub use power_crust::PolarBalls;
+pub use substrate::{Cost, Substrate};
+
+use substrate::{Cache, Use};
 
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
 pub struct Shape {
     store: Arc<Store>,
     used: Mutex<BTreeMap<Substrate, Use>>,
-}
-
-/// What a view remembers of a substrate.
-#[derive(Clone, Copy)]
-struct Use {
-    cost: Cost,
-    /// Whether it was built through this view, rather than found.
-    built_here: bool,
 }
 
 /// How the substrates of a shape are built; the same for every method in a comparison.
@@ -53,69 +44,6 @@ pub struct ShapeOptions {
     pub sampling: Sampling,
     /// How dual Voronoi polygons are triangulated.
     pub dual: DualTriangulation,
-}
-
-/// A substrate that methods share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Substrate {
-    /// Boundary samples.
-    Samples,
-    /// Delaunay triangulation of the samples.
-    Delaunay,
-    /// Circumspheres of the cells, each classified as inside or outside.
-    Inside,
-    /// Voronoi facets inside.
-    Facets,
-    /// Voronoi medial mesh.
-    MedialMesh,
-    /// Poles of the samples, and the polar balls inside.
-    Poles,
-    /// Bounding-volume tree of the surface.
-    SurfaceTree,
-    /// Contact points of a medial mesh that came without them.
-    Contacts,
-}
-
-impl Substrate {
-    /// Name in records.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Samples => "samples",
-            Self::Delaunay => "delaunay",
-            Self::Inside => "inside",
-            Self::Facets => "facets",
-            Self::MedialMesh => "medial_mesh",
-            Self::Poles => "poles",
-            Self::SurfaceTree => "surface_tree",
-            Self::Contacts => "contacts",
-        }
-    }
-}
-
-/// What a piece of work, such as building a substrate, cost when it was done.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Cost {
-    /// Wall-clock seconds.
-    pub seconds: f64,
-    /// Seconds of the whole process on all processors.
-    pub cpu_seconds: f64,
-}
-
-impl Cost {
-    /// Does `work` and says what it cost.
-    pub fn of<T>(work: impl FnOnce() -> T) -> (T, Self) {
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
-        let value = work();
-        let (seconds, cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-        (value, Self { seconds, cpu_seconds })
-    }
-}
-
-impl std::ops::AddAssign for Cost {
-    fn add_assign(&mut self, other: Self) {
-        self.seconds += other.seconds;
-        self.cpu_seconds += other.cpu_seconds;
-    }
 }
 
 struct Store {
@@ -132,6 +60,7 @@ struct Store {
     medial: Cache<Sampling, Arc<MedialMesh>>,
     balls: Cache<Sampling, Arc<InnerBalls>>,
     tree: Cache<(), Arc<TriangleBvh>>,
+    inside: Cache<(), Arc<InsideTest>>,
 }
 
 impl Shape {
@@ -166,6 +95,7 @@ impl Shape {
             medial: Cache::default(),
             balls: Cache::default(),
             tree: Cache::default(),
+            inside: Cache::default(),
         };
         Ok(Self { store: Arc::new(store), used: Mutex::default() })
     }
@@ -231,11 +161,9 @@ impl Shape {
     /// The part of the cost of [`Shape::used`] that was spent through this view.
     pub fn spent(&self) -> Cost {
         let used = self.used.lock().expect("no panic while held");
-        let built = used.values().filter(|used| used.built_here);
-        built.fold(Cost::default(), |sum, used| Cost {
-            seconds: sum.seconds + used.cost.seconds,
-            cpu_seconds: sum.cpu_seconds + used.cost.cpu_seconds,
-        })
+        let mut sum = Cost::default();
+        used.values().filter(|used| used.built_here).for_each(|used| sum += used.cost);
+        sum
     }
 
     /// The boundary samples of the shape's own sampling.
@@ -269,8 +197,8 @@ impl Shape {
     pub fn cells(&self) -> Result<Arc<CellSpheres>, ShapeError> {
         let delaunay = self.delaunay()?;
         let tree = self.surface_tree()?;
+        let inside = self.inside_test();
         let built = self.store.cells.get(self.store.options.sampling, || {
-            let inside = InsideTest::new(&self.store.mesh);
             Ok(Arc::new(CellSpheres::classify(&delaunay, &inside, &tree)))
         });
         self.take(Substrate::Inside, built)
@@ -382,6 +310,12 @@ impl Shape {
         self.take(Substrate::SurfaceTree, built)
     }
 
+    /// The inside test of the surface.
+    pub fn inside_test(&self) -> Arc<InsideTest> {
+        let built = self.store.inside.get((), || Ok(Arc::new(InsideTest::new(&self.store.mesh))));
+        self.take(Substrate::InsideTest, built).expect("a test of any mesh can be built")
+    }
+
     /// A judge of medial meshes of this shape. `axis` is its exactly known medial axis, in input
     /// units. What the judge needs counts as nobody's use.
     ///
@@ -398,7 +332,9 @@ impl Shape {
             axis: axis.map(|a| a.transformed(1.0 / normal.diagonal, |p| normal.forward(p))),
             diagonal: normal.diagonal,
         };
-        Ok(Judge::new(self.store.mesh.clone(), self.view().surface_tree()?, truth, options))
+        let unseen = self.view();
+        let (tree, inside) = (unseen.surface_tree()?, unseen.inside_test());
+        Ok(Judge::new(self.store.mesh.clone(), tree, inside, truth, options))
     }
 
     fn take<T>(
@@ -414,39 +350,5 @@ impl Shape {
         let mut all = self.used.lock().expect("no panic while held");
         // The first use tells whether it was built here.
         all.entry(substrate).or_insert(used);
-    }
-}
-
-/// Values that are built once for each key, with what building them cost.
-struct Cache<K, T> {
-    /// Looked up by key only, never iterated.
-    slots: Mutex<HashMap<K, Arc<Slot<T>>>>,
-}
-
-type Slot<T> = OnceLock<(Result<T, ShapeError>, Cost)>;
-
-impl<K, T> Default for Cache<K, T> {
-    fn default() -> Self {
-        Self { slots: Mutex::default() }
-    }
-}
-
-impl<K: Eq + Hash, T: Clone> Cache<K, T> {
-    /// The value for a key; a second asker waits for the first.
-    fn get(
-        &self,
-        key: K,
-        build: impl FnOnce() -> Result<T, ShapeError>,
-    ) -> (Result<T, ShapeError>, Use) {
-        let slot =
-            Arc::clone(self.slots.lock().expect("no panic while held").entry(key).or_default());
-        let mut built_here = false;
-        let (value, cost) = slot
-            .get_or_init(|| {
-                built_here = true;
-                Cost::of(build)
-            })
-            .clone();
-        (value, Use { cost, built_here })
     }
 }

@@ -5,20 +5,99 @@
 //! methods continue from finer levels.
 
 use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::Vec3;
-use crate::complex::collapse::Hierarchy;
-use crate::complex::{ComplexError, MedialMesh, cubical_betti};
-use crate::shape::{Cost, Shape, ShapeError};
+use crate::complex::MedialMesh;
+use crate::shape::{Cost, Shape};
+
+mod error;
+mod extras;
+mod info;
+mod method;
+mod params;
+mod run;
+
+pub use error::SimplifyError;
+pub use extras::Extras;
+pub use info::{Capability, MethodInfo, NativeLevel, ParamInfo};
+pub use method::{Method, Prepare};
+pub use params::{NoParams, Params};
+pub use run::{Progress, RunContext};
 
 /// A method that simplifies the medial axis of a shape.
+///
+/// Most methods are a [`Method`]: a description and a function. This is a whole one, which keeps the
+/// largest balls with the edges and faces between them:
+///
+/// ```
+/// use medial::shape::Shape;
+/// use medial::simplifier::{
+///     Level, Method, MethodInfo, ParamInfo, RunContext, Simplification, Simplified, SimplifyError,
+/// };
+/// use serde::Deserialize;
+///
+/// #[derive(Deserialize)]
+/// #[serde(default, deny_unknown_fields)]
+/// struct LargestParams {
+///     /// Balls below this radius, a fraction of the diagonal, are never kept.
+///     least: f64,
+/// }
+///
+/// impl Default for LargestParams {
+///     fn default() -> Self {
+///         Self { least: 0.0 }
+///     }
+/// }
+///
+/// fn largest() -> Method<LargestParams> {
+///     let info = MethodInfo::new("largest", "Largest balls first")
+///         .summary("Keeps the largest balls, with the edges and faces between them.")
+///         .param(ParamInfo::new("least", 0.0, "fraction of the diagonal", "least radius"));
+///     Method::new(info, prepare)
+/// }
+///
+/// fn prepare<'s>(
+///     shape: &'s Shape,
+///     params: LargestParams,
+///     _run: &RunContext,
+/// ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+///     let initial = shape.initial()?;
+///     let radius = |i: usize| initial.spheres[i].radius;
+///     let mut order: Vec<usize> = (0..initial.spheres.len()).collect();
+///     order.retain(|&i| radius(i) >= params.least);
+///     order.sort_by(|&a, &b| radius(b).total_cmp(&radius(a)).then(a.cmp(&b)));
+///     Ok(Box::new(move |level: Level| {
+///         let Level::Spheres(count) = level else {
+///             return Err(SimplifyError::unsupported("ask for a number of spheres"));
+///         };
+///         let mut keep = vec![false; initial.spheres.len()];
+///         order.iter().take(count).for_each(|&i| keep[i] = true);
+///         Ok(Simplified::new(initial.induced(&keep), level))
+///     }))
+/// }
+///
+/// use medial::simplifier::{MedialSimplifier, Params};
+///
+/// # let tetrahedron = medial::surface::read_bytes(
+/// #     b"OFF 4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n",
+/// #     medial::surface::Format::Off,
+/// # )?;
+/// # let options = medial::shape::ShapeOptions {
+/// #     sampling: "uniform:300".parse()?,
+/// #     ..Default::default()
+/// # };
+/// # let shape = Shape::new("tetrahedron", &tetrahedron.mesh, tetrahedron.report, options)?;
+/// let mut levels = largest().prepare(&shape, &Params::none(), &RunContext::default())?;
+/// assert_eq!(levels.at(Level::Spheres(20))?.mesh.spheres.len(), 20);
+/// # let mut wrong = Params::none();
+/// # wrong.set("most", "1");
+/// # assert!(largest().prepare(&shape, &wrong, &RunContext::default()).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait MedialSimplifier: Send + Sync {
-    /// Id, title, citation, native level, parameters with units and defaults.
+    /// Id, title, citation, native level, parameters with units and defaults, and what its answers
+    /// carry beside the medial mesh.
     fn info(&self) -> &MethodInfo;
 
     /// All work that does not depend on the level. Timed as `prepare`.
@@ -33,34 +112,6 @@ pub trait MedialSimplifier: Send + Sync {
         params: &Params,
         run: &RunContext,
     ) -> Result<Box<dyn Simplification + 's>, SimplifyError>;
-
-    /// Whether the answers carry a hierarchy in [`Extras`] that [`MedialSimplifier::resume`] can go
-    /// on from.
-    fn has_hierarchy(&self) -> bool {
-        false
-    }
-
-    /// Whether the answers carry voxels in [`Extras`].
-    fn has_voxels(&self) -> bool {
-        false
-    }
-
-    /// The levels of a hierarchy that an earlier run of this method gave in [`Extras`], in place
-    /// of [`MedialSimplifier::prepare`].
-    ///
-    /// # Errors
-    /// [`SimplifyError::Unsupported`] when the method has no hierarchy,
-    /// [`SimplifyError::Hierarchy`] when this one is not of this method,
-    /// [`SimplifyError::Parameter`] as in [`MedialSimplifier::prepare`].
-    fn resume(
-        &self,
-        hierarchy: Arc<Hierarchy>,
-        params: &Params,
-    ) -> Result<Box<dyn Simplification>, SimplifyError> {
-        let _ = (hierarchy, params);
-        let why = format!("{} has no hierarchy to go on from", self.info().title);
-        Err(SimplifyError::Unsupported { why })
-    }
 }
 
 /// One shape, prepared once, asked for many levels.
@@ -72,6 +123,16 @@ pub trait Simplification: Send {
     /// [`SimplifyError::Unsupported`] when the method has no such level,
     /// [`SimplifyError::Cancelled`] when the run was cancelled.
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError>;
+}
+
+/// A closure is enough where a method needs no helper beside [`Simplification::at`].
+impl<F> Simplification for F
+where
+    F: FnMut(Level) -> Result<Simplified, SimplifyError> + Send,
+{
+    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        self(level)
+    }
 }
 
 /// How far to simplify.
@@ -96,145 +157,6 @@ impl fmt::Display for Level {
     }
 }
 
-/// What a method says of itself.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MethodInfo {
-    /// Short name for the command line, such as `qmat`.
-    pub id: &'static str,
-    /// Full name.
-    pub title: &'static str,
-    /// Authors, year, title, venue, DOI.
-    pub citation: &'static str,
-    /// One sentence on what the method does.
-    pub summary: &'static str,
-    /// The method's own level, where it has a scalar one.
-    pub native: Option<NativeLevel>,
-    /// What [`Level::Published`] means here.
-    pub published: &'static str,
-    /// Parameters, in the order of the paper.
-    pub params: Vec<ParamInfo>,
-}
-
-/// The scalar that a method is controlled by in its paper.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct NativeLevel {
-    /// Name in the paper, such as `theta`.
-    pub name: &'static str,
-    /// Unit, such as `degrees` or `fraction of the diagonal`.
-    pub unit: &'static str,
-    /// Whether a larger value leaves fewer spheres.
-    pub larger_is_coarser: bool,
-}
-
-/// One parameter of a method.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ParamInfo {
-    /// Key for `--set key=value`.
-    pub name: &'static str,
-    /// Default, as it would be written on the command line.
-    pub default: String,
-    /// Unit, or the list of allowed words.
-    pub unit: &'static str,
-    /// One sentence.
-    pub help: &'static str,
-}
-
-/// Parameters as given by the user, not yet typed: a JSON object.
-///
-/// Each method turns them into its own struct (`Default` = the paper's values, unknown keys
-/// refused) by [`Params::typed`]; this is the one place where the type is erased.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Params(pub serde_json::Map<String, serde_json::Value>);
-
-impl Params {
-    /// No parameter set: the paper's values.
-    pub fn none() -> Self {
-        Self::default()
-    }
-
-    /// Sets one parameter from text: a JSON scalar where the text is one, else a string.
-    pub fn set(&mut self, key: &str, value: &str) {
-        let value = serde_json::from_str(value).unwrap_or_else(|_| value.into());
-        self.0.insert(key.to_owned(), value);
-    }
-
-    /// The method's own parameter struct.
-    ///
-    /// # Errors
-    /// [`SimplifyError::Parameter`] with serde's message when a key is unknown or a value is of
-    /// the wrong type; it names the key.
-    pub fn typed<T: DeserializeOwned>(&self) -> Result<T, SimplifyError> {
-        let parse = |map: &serde_json::Map<String, serde_json::Value>| {
-            serde_json::from_value::<T>(serde_json::Value::Object(map.clone()))
-                .map_err(|error| error.to_string())
-        };
-        parse(&self.0).map_err(|message| {
-            // Serde does not say which key a wrong value belongs to: the one that fails alone too.
-            let fails_alone = |&(key, value): &(&String, &serde_json::Value)| {
-                let alone = serde_json::Map::from_iter([(key.clone(), value.clone())]);
-                parse(&alone).is_err_and(|error| error == message)
-            };
-            let named = match self.0.iter().find(fails_alone) {
-                Some((key, value)) => format!("{key} = {value}: {message}"),
-                None => message,
-            };
-            SimplifyError::Parameter(named)
-        })
-    }
-}
-
-/// What surrounds a run: seed, cancellation, progress. The number of threads is that of the
-/// rayon pool in which the method is called.
-#[derive(Clone, Default)]
-pub struct RunContext {
-    /// Seed of every random choice.
-    pub seed: u64,
-    cancelled: Arc<AtomicBool>,
-    progress: Option<Arc<dyn Fn(Progress) + Send + Sync>>,
-}
-
-/// A step towards the end of the current stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
-    /// Steps done.
-    pub done: usize,
-    /// Steps in all.
-    pub total: usize,
-}
-
-impl RunContext {
-    /// A context with a seed, never cancelled, that reports to nobody.
-    pub fn with_seed(seed: u64) -> Self {
-        Self { seed, ..Self::default() }
-    }
-
-    /// The same context, reporting to `progress`.
-    pub fn on_progress(mut self, progress: impl Fn(Progress) + Send + Sync + 'static) -> Self {
-        self.progress = Some(Arc::new(progress));
-        self
-    }
-
-    /// The flag that cancels the run once it is set.
-    pub fn cancel_flag(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.cancelled)
-    }
-
-    /// Reports progress and asks whether to go on. Called every few thousand steps.
-    ///
-    /// # Errors
-    /// [`SimplifyError::Cancelled`] once the flag is set.
-    pub fn step(&self, done: usize, total: usize) -> Result<(), SimplifyError> {
-        if let Some(progress) = &self.progress {
-            progress(Progress { done, total });
-        }
-        if self.cancelled.load(Ordering::Relaxed) {
-            return Err(SimplifyError::Cancelled);
-        }
-        Ok(())
-    }
-}
-
 /// A simplified medial mesh and what is to be known of it.
 #[derive(Clone, Debug)]
 pub struct Simplified {
@@ -248,76 +170,16 @@ pub struct Simplified {
     pub work: Work,
     /// Why fewer or more spheres than asked were returned, rejected collapses, and the like.
     pub diagnostics: Diagnostics,
-    /// What only some methods have.
+    /// What only some methods have; [`MethodInfo::extras`] announces it.
     pub extras: Extras,
 }
 
-/// What some methods give beside the medial mesh, each `None` where a method has no such thing.
-#[derive(Clone, Debug, Default)]
-pub struct Extras {
-    /// All levels of the method at once. [`MedialSimplifier::resume`] of the same method goes on
-    /// from it without the shape.
-    pub hierarchy: Option<Arc<Hierarchy>>,
-    /// The parts that the medial mesh was decomposed into, by id.
-    pub parts: Option<Vec<PartInfo>>,
-    /// The voxels of a cubic lattice that the spheres stand for, one for each sphere in the same
-    /// order.
-    pub voxels: Option<Arc<LatticeVoxels>>,
-}
-
-/// Voxels of a cubic lattice.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LatticeVoxels {
-    /// Lower corner of the lattice, in normalised units.
-    pub origin: Vec3,
-    /// Side of a voxel, in normalised units.
-    pub side: f64,
-    /// Voxels of the lattice along each axis.
-    pub size: [u32; 3],
-    /// The voxels, by `z`, then `y`, then `x`.
-    pub voxels: Vec<LatticeVoxel>,
-}
-
-/// A voxel with what was measured there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LatticeVoxel {
-    /// Indices along the axes, from the lower corner.
-    pub place: [u32; 3],
-    /// Distance of its centre to the surface, in normalised units, to single precision.
-    pub distance: f64,
-    /// Average outward flux of the gradient of the distance, `AOF'`; 0 where it was not measured.
-    pub flux: f64,
-}
-
-impl LatticeVoxels {
-    /// Centre of a voxel, in normalised units.
-    pub fn centre(&self, voxel: &LatticeVoxel) -> Vec3 {
-        self.origin + (Vec3::from(voxel.place.map(f64::from)) + 0.5) * self.side
+impl Simplified {
+    /// A medial mesh made anew for a level, with nothing else to say of it.
+    pub fn new(mesh: MedialMesh, asked: Level) -> Self {
+        let (diagnostics, extras) = (Diagnostics::default(), Extras::default());
+        Self { mesh, asked, native_level: None, work: Work::Anew, diagnostics, extras }
     }
-
-    /// Betti numbers of the union of the closed voxels.
-    pub fn betti(&self) -> [u64; 3] {
-        cubical_betti(&self.voxels.iter().map(|voxel| voxel.place).collect::<Vec<_>>())
-    }
-}
-
-/// A part of a medial mesh, for methods that decompose it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PartInfo {
-    /// Consecutive from 0, the largest part first.
-    pub id: u32,
-    /// 1 at a free edge, 2 beside a part of level 1, and so on; 0 where no free edge can be reached.
-    pub level: u32,
-    /// Number of faces.
-    pub triangles: usize,
-    /// Volume of the feature that the part stands for, as a fraction of the solid's.
-    pub volume: f64,
-    /// Centroid, in normalised units.
-    pub centre: [f64; 3],
-    /// Whether removing it leaves components and loops of the whole as they are.
-    pub removable: bool,
-    /// Whether it was removed on demand, and is not in the medial mesh any more.
-    pub removed: bool,
 }
 
 /// How the work of one level relates to earlier levels; decides what counts into its seconds.
@@ -352,33 +214,4 @@ impl Diagnostics {
     pub fn warn(&mut self, warning: impl Into<String>) {
         self.warnings.push(warning.into());
     }
-}
-
-/// Why a method gave no result.
-#[derive(Debug, thiserror::Error)]
-pub enum SimplifyError {
-    /// The method does not do this: an answer, not a failure.
-    #[error("unsupported: {why}")]
-    Unsupported {
-        /// What it does not do, and what it does instead.
-        why: String,
-    },
-    /// A parameter is unknown, of the wrong type or out of range.
-    #[error("parameter: {0}")]
-    Parameter(String),
-    /// A level is out of range.
-    #[error("level: {0}")]
-    Level(String),
-    /// A substrate could not be built for this shape.
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
-    /// The method returned a complex that is not valid.
-    #[error("invalid output: {0}")]
-    InvalidOutput(#[from] ComplexError),
-    /// A hierarchy cannot be built, or is not one of the method that was asked to go on from it.
-    #[error("hierarchy: {0}")]
-    Hierarchy(String),
-    /// The run was cancelled.
-    #[error("cancelled")]
-    Cancelled,
 }

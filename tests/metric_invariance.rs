@@ -14,7 +14,7 @@ use medial::metrics::{
     AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, Judge, JudgeOptions, Truth,
     axis_distance, certify, counts, distances, spikes, triangle_quality,
 };
-use medial::surface::TriMesh;
+use medial::surface::{InsideTest, TriMesh};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -213,9 +213,10 @@ fn symmetric() -> Vec<(&'static str, TriMesh, MedialMesh)> {
 
 fn judged(surface: &TriMesh, mesh: &MedialMesh) -> Evaluation {
     let tree = TriangleBvh::new(surface).unwrap().into();
+    let inside = InsideTest::new(surface).into();
     let truth = Truth { betti: None, axis: None, diagonal: 1.0 };
     let options = JudgeOptions { samples: 3_000, volume_depth: 5, seed: 4 };
-    Judge::new(surface.clone(), tree, truth, options).evaluate(mesh).unwrap()
+    Judge::new(surface.clone(), tree, inside, truth, options).evaluate(mesh).unwrap()
 }
 
 #[test]
@@ -292,7 +293,8 @@ fn renumbering_changes_nothing_at_all() {
         let truth = Truth { betti: Some([1, 0, 0]), axis: Some(axis(2)), diagonal: 1.0 };
         let options = JudgeOptions { samples: 3_000, volume_depth: 4, seed: 2 };
         let tree = TriangleBvh::new(surface).unwrap().into();
-        Judge::new(surface.clone(), tree, truth, options)
+        let inside = InsideTest::new(surface).into();
+        Judge::new(surface.clone(), tree, inside, truth, options)
     };
     let judge = judge_of(&surface);
     let (before, certified) = (judge.evaluate(&mesh).unwrap(), judge.certify(&mesh, 1e-3).unwrap());

@@ -4,7 +4,7 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::TriangleBvh;
 use medial::metrics::{Judge, JudgeOptions, Truth};
-use medial::surface::TriMesh;
+use medial::surface::{InsideTest, TriMesh};
 
 /// A box of diagonal 1 around the origin, and its exact axis.
 fn cuboid() -> (TriMesh, MedialMesh) {
@@ -33,8 +33,9 @@ fn cuboid() -> (TriMesh, MedialMesh) {
 fn warnings(mesh: &MedialMesh) -> Vec<String> {
     let (surface, _) = cuboid();
     let tree = TriangleBvh::new(&surface).unwrap().into();
+    let inside = InsideTest::new(&surface).into();
     let options = JudgeOptions { samples: 2_000, volume_depth: 3, seed: 0 };
-    Judge::new(surface, tree, Truth::default(), options).evaluate(mesh).unwrap().warnings
+    Judge::new(surface, tree, inside, Truth::default(), options).evaluate(mesh).unwrap().warnings
 }
 
 fn with_radii(of: impl Fn(f64) -> f64) -> MedialMesh {

@@ -22,7 +22,7 @@ fn methods(criterion: &mut Criterion) {
     let run = RunContext::default();
     for method in medial_methods::registry() {
         let prepare = || method.prepare(&shape, &Params::none(), &run).expect("prepared");
-        let mut group = criterion.benchmark_group(method.info().id);
+        let mut group = criterion.benchmark_group(&*method.info().id);
         group.bench_function("prepare", |b| b.iter_with_large_drop(|| black_box(prepare())));
         group.bench_function(format!("to {SPHERES} spheres"), |b| {
             let level = Level::Spheres(SPHERES);
@@ -51,7 +51,7 @@ fn hierarchy(criterion: &mut Criterion) {
     let run = RunContext::default();
     let mut levels = pmat.prepare(&shape, &Params::none(), &run).expect("prepared");
     let end = levels.at(Level::Published).expect("the end");
-    let hierarchy = end.extras.hierarchy.expect("PMAT has a hierarchy");
+    let hierarchy = end.extras.get_shared::<Hierarchy>().expect("PMAT has a hierarchy");
     let last = hierarchy.last_stage();
     let mut group = criterion.benchmark_group("hierarchy");
     let ways = [

@@ -13,7 +13,7 @@ use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
 use crate::exit::{Exit, Failure};
 use crate::files::check_output;
 use crate::output::{counted, print_json, print_line};
-use crate::run::{Input, Source, Stopwatch, peak_bytes};
+use crate::run::{Input, Source, peak_bytes};
 
 /// Arguments of `axis`.
 #[derive(Debug, Args)]
@@ -35,23 +35,23 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let options = shape_options(&arguments.substrate)?;
     check_output(arguments.output.as_deref())?;
-    let (input, read) = Stopwatch::time(|| Input::load(&source));
+    let (input, read) = Cost::of(|| Input::load(&source));
     let input = input?;
     let shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mesh = shape.voronoi().map_err(|error| Failure::of(&source, error))?;
-    let (betti, _) = Stopwatch::time(|| complex::betti(&mesh));
+    let (betti, _) = Cost::of(|| complex::betti(&mesh));
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
         complex::write(output, &mesh).map_err(Failure::input)?;
     }
     let counts = metrics::counts(&mesh);
-    let read = Cost { seconds: read.seconds, cpu_seconds: read.cpu_seconds };
     let mut stages = BTreeMap::from([("read", read)]);
     let mut total = read;
     for (substrate, cost) in shape.used() {
         let stage = match substrate.name() {
             "facets" | "medial_mesh" => "extract",
+            "inside_test" => "inside",
             name => name,
         };
         *stages.entry(stage).or_default() += cost;

@@ -14,12 +14,11 @@ use medial_reports::{BASELINES, Baseline, read_lines, write_lines};
 use serde::Deserialize;
 use serde_json::json;
 
-use super::compare::RESULTS;
 use super::report::rebuild;
 use crate::args::{Global, MeasureArguments, MeshArgument, judge_options};
 use crate::exit::{Exit, Failure};
 use crate::output::{percent, print_json, print_line};
-use crate::run::{Input, Provenance, Source};
+use crate::run::{Input, Provenance, RESULTS, Registry, Source};
 
 /// Arguments of `baseline`.
 #[derive(Debug, Args)]
@@ -62,7 +61,7 @@ struct Listed {
 ///
 /// # Errors
 /// When the mesh, the list or one of its surfaces is refused, or the results cannot be written.
-pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let quick = JudgeOptions { samples: 10_000, volume_depth: 0, seed: 0 };
     let options = judge_options(&arguments.measure, quick, arguments.seed)?;
@@ -100,7 +99,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     keep(&arguments.out.join(BASELINES), &new)?;
     let reported = arguments.out.join(RESULTS).exists();
     if reported {
-        rebuild(&arguments.out)?;
+        rebuild(&arguments.out, registry)?;
     }
     if global.json {
         print_json(&json!({ "baselines": new, "report": reported }), &[]);

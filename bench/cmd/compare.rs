@@ -1,30 +1,21 @@
 //! `medial compare [MESH ...]`: the main job. Methods x meshes x levels, measured and reported.
 
-use std::path::{Component, Path, PathBuf};
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use medial::metrics::JudgeOptions;
-use medial::shape::ShapeOptions;
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, SimplifyError};
-use medial_reports::{Header, Initial, Journal, Record, Status, read_records, write_report};
+use medial_reports::{Record, Status};
 use serde_json::json;
 
-use super::methods::unknown_method;
-use crate::args::{
-    Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options, shape_options,
-};
+use super::report::{self, Rebuilt};
+use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
-use crate::output::{print_json, print_line};
+use crate::interrupt;
+use crate::output::{note, print_json, print_line};
 use crate::run::{
-    Input, Item, Measure, Progress, Provenance, RunOptions, Source, refused_records, run_item,
+    AXES, Here, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
+    Study, StudyMethod, Supervisor, Tally, count, missing, run_items,
 };
-
-/// Name of the append-only list of records in the folder of the results.
-pub const RESULTS: &str = "results.jsonl";
-
-/// How a comparison measures unless told otherwise: coarser than `evaluate`, since it measures
-/// hundreds of results. Sample counts are in every record.
-const QUICK: JudgeOptions = JudgeOptions { samples: 10_000, volume_depth: 5, seed: 0 };
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -34,24 +25,44 @@ pub struct Arguments {
     /// A set of meshes beside those named: `builtin`.
     #[arg(long, value_name = "SET")]
     dataset: Option<String>,
-    /// Methods, separated by commas [default: all].
-    #[arg(long, value_name = "IDS", value_delimiter = ',')]
+    /// Take meshes, methods, levels and limits from a TOML file; what else is given wins over it.
+    #[arg(long, value_name = "FILE")]
+    study: Option<PathBuf>,
+    /// Methods, separated by commas, each with parameters of its own if wanted: `qmat,qmat:k=0`
+    /// [default: all].
+    #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Sphere counts, separated by commas.
-    #[arg(long, value_name = "COUNTS", value_delimiter = ',', default_values_t = [1000, 500, 200, 100])]
+    /// Sphere counts, separated by commas [default: 1000,500,200,100].
+    #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
+    /// Levels of a method's own beside the counts; can be given several times.
+    #[arg(long, value_name = "ID=X,Y")]
+    levels: Vec<String>,
     /// Also run each method at its published level.
     #[arg(long)]
     published: bool,
     /// Set a parameter of one method; can be given several times.
     #[arg(long = "set", value_name = "METHOD.KEY=VALUE")]
     set: Vec<String>,
-    /// Time each item so many times; the median is reported, all are kept.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    repeat: usize,
-    /// Folder of the results.
+    /// Time each item so many times, the methods in turn; the median is reported, all are kept
+    /// [default: 1].
+    #[arg(long, value_name = "N")]
+    repeat: Option<usize>,
+    /// Folder of the results. What is there already is not run again.
     #[arg(long, value_name = "DIR", default_value = "medial-report")]
     out: PathBuf,
+    /// Remove the results in the folder first.
+    #[arg(long)]
+    fresh: bool,
+    /// Run again what failed.
+    #[arg(long)]
+    retry_failed: bool,
+    /// End an item after so many seconds [default: 300].
+    #[arg(long, value_name = "SECONDS")]
+    timeout: Option<f64>,
+    /// End an item that needs more megabytes [default: three quarters of the machine's].
+    #[arg(long, value_name = "MB")]
+    memory: Option<u64>,
     #[command(flatten)]
     substrate: SubstrateArguments,
     #[command(flatten)]
@@ -61,263 +72,181 @@ pub struct Arguments {
 /// Runs the verb.
 ///
 /// # Errors
-/// When the command line is wrong or the results cannot be written. Meshes that are refused and
-/// methods that fail are rows of the results.
-pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let sources = sources(arguments)?;
-    let methods = methods(&arguments.methods)?;
-    let items = items(arguments, &methods)?;
-    let names = unique_names(&sources);
-    let shape_options = shape_options(&arguments.substrate)?;
-    let judge_options = judge_options(&arguments.measure, QUICK, arguments.substrate.seed)?;
-    if arguments.repeat == 0 {
-        return Err(Failure::usage("--repeat 0: time each item at least once"));
+/// When the command line or the study is wrong, an input does not exist, or the results cannot be
+/// written: then nothing was run and nothing is lost. Meshes that are refused and methods that fail
+/// are rows of the results.
+pub fn run(
+    arguments: &Arguments,
+    global: &Global,
+    registry: &mut Registry,
+) -> Result<Exit, Failure> {
+    let mut study = study(arguments, global)?;
+    for file in &study.plugins {
+        registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
-    check_params(&methods, &items)?;
-    let options = RunOptions {
-        seed: arguments.substrate.seed,
-        repeat: arguments.repeat,
-        out: Some(arguments.out.clone()),
-    };
+    arguments.apply_to_methods(&mut study, registry)?;
     let provenance = Provenance::here();
-    let journal_path = fresh_journal(&arguments.out)?;
-    let mut journal = Journal::open(&journal_path).map_err(Failure::input)?;
-    let mut records = Vec::new();
-    let mut progress = Progress::new(global.quiet, sources.len() * items.len());
-
-    for (source, name) in sources.iter().zip(names) {
-        let mut keep = |new: Vec<Record>| -> Result<(), Failure> {
-            for record in new {
-                journal.append(&record).map_err(Failure::input)?;
-                records.push(record);
-            }
-            Ok(())
-        };
-        let prepared = Input::load(source).map_err(|error| error.to_string()).and_then(|input| {
-            let input = Input { name: name.clone(), ..input };
-            let shape = input.shape(shape_options.clone()).map_err(|error| error.to_string())?;
-            Ok((input, shape))
-        });
-        let (input, shape) = match prepared {
-            Ok(ready) => ready,
-            Err(reason) => {
-                progress.remark(&format!("{name}: refused: {reason}"));
-                for item in &items {
-                    keep(refused_records(&name, item, &reason, &provenance))?;
-                    progress.done();
-                }
-                continue;
-            }
-        };
-        progress.at(&format!("{}: initial medial mesh", input.name));
-        let judge = shape
-            .judge(input.axis.as_ref(), judge_options)
-            .map_err(|error| Failure::of(source, error))?;
-        let initial =
-            shape.view().initial().ok().map(|mesh| Initial::of(&mesh, judge.truth().betti));
-        let measure = Measure { input: &input, shape: &shape, judge: &judge, initial };
-        for (method, item) in methods.iter().zip(&items) {
-            progress.at(&format!("{}: {}", input.name, item.method));
-            let new = run_item(method.as_ref(), item, &measure, &options, &provenance);
-            failures(&new).iter().for_each(|remark| progress.remark(remark));
-            keep(new)?;
-            progress.done();
-        }
+    let here = Here::of(&provenance);
+    let items = study.items(registry, &here)?;
+    let interrupted = interrupt::listen();
+    let axes = Some(arguments.out.join(AXES));
+    let mut supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);
+    check_params(&items, &mut supervisor)?;
+    // Nothing is touched before this line.
+    let mut store = Store::open(&arguments.out, RESULTS, &provenance.command)?;
+    store.remarks.iter().for_each(|remark| note(global, remark));
+    if arguments.fresh {
+        store.clear(RESULTS)?;
     }
+    let (left, mut tally) = missing(&items, &store, arguments.retry_failed);
+    if !left.is_empty() {
+        report::write_study(&arguments.out, &study)?;
+    }
+    let mut progress = Progress::new(global.quiet, left.len());
+    let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Kept]| {
+        tally.run += kept.len();
+        let records: Vec<&Record> = kept.iter().map(|kept| &kept.record).collect();
+        store.keep(&records)
+    });
     drop(progress);
-    let header = Header {
-        title: "Medial axis simplification: a comparison".into(),
-        command: provenance.command.clone(),
-        version: provenance.version.clone(),
-        date: Some(super::report::today()),
-        machine: Some(provenance.machine.clone()),
-        methods: methods.iter().map(|method| method.info().into()).collect(),
-        notes: vec![],
-    };
-    let files = write_report(&arguments.out, &records, &header).map_err(Failure::input)?;
-    finish(&records, &arguments.out, &files, global)
+    drop(supervisor);
+    match ended {
+        Err(PlanError::Run(RunError::Interrupted)) => return Ok(interrupt_message(&left, tally)),
+        ended => ended?,
+    }
+    let Rebuilt { records, files, .. } =
+        report::refresh(&arguments.out, registry, &provenance, tally.run > 0)?;
+    finish(&of_items(records, &items), tally, &arguments.out, &files, global)
 }
 
-/// One remark for each failure, or a single one where all levels failed for the same reason.
-fn failures(records: &[Record]) -> Vec<String> {
-    let failed: Vec<&Record> = records.iter().filter(|r| r.status.is_failure()).collect();
-    let alike = failed.len() == records.len()
-        && failed.iter().all(|r| r.status == failed[0].status && r.reason == failed[0].reason);
-    let remark = |record: &&Record| {
-        let Record { mesh, simplify, status, reason, .. } = record;
-        let reason = reason.as_deref().unwrap_or("no reason");
-        let level = match records.len() {
-            2.. if alike => "all levels".to_owned(),
-            _ => simplify.level.to_string(),
-        };
-        format!("{mesh}, {}, {level}: {status}: {reason}", simplify.method)
+/// The study that the command line asks for, on top of the file where one is given.
+fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
+    let mut study = match &arguments.study {
+        Some(path) => Study::read(path)?,
+        None => Study::default(),
     };
-    failed.iter().take(if alike { 1 } else { failed.len() }).map(remark).collect()
+    let absolute = |path: &PathBuf| match path.to_string_lossy().starts_with("builtin:") {
+        true => path.clone(),
+        // Relative paths of the command line start at the working folder.
+        false => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
+    };
+    if !arguments.meshes.is_empty() {
+        study.meshes = arguments.meshes.iter().map(absolute).collect();
+        study.dataset = None;
+    }
+    if arguments.dataset.is_some() {
+        study.dataset.clone_from(&arguments.dataset);
+    }
+    if !arguments.methods.is_empty() {
+        let methods = arguments.methods.iter().map(|text| StudyMethod::parse(text));
+        study.methods = methods.collect::<Result<_, _>>()?;
+    }
+    if !arguments.spheres.is_empty() {
+        study.spheres.clone_from(&arguments.spheres);
+    }
+    study.published |= arguments.published;
+    study.repeat = arguments.repeat.unwrap_or(study.repeat);
+    study.timeout = arguments.timeout.unwrap_or(study.timeout);
+    study.memory = arguments.memory.or(study.memory);
+    study.threads = global.threads.or(study.threads);
+    study.plugins.extend(global.plugins.iter().map(absolute));
+    arguments.substrate.apply(&mut study)?;
+    arguments.measure.apply(&mut study)?;
+    Ok(study)
+}
+
+impl Arguments {
+    /// Applies `--set` and `--levels`, which name methods, once it is known which run.
+    fn apply_to_methods(&self, study: &mut Study, registry: &Registry) -> Result<(), Failure> {
+        if self.set.is_empty() && self.levels.is_empty() {
+            return Ok(());
+        }
+        study.methods = study.entries(registry)?.into_iter().map(|(method, _)| method).collect();
+        for word in &self.set {
+            let parts = word.split_once('=').and_then(|(name, value)| {
+                let (method, key) = name.split_once('.')?;
+                Some((method, key, value))
+            });
+            let (id, key, value) = parts
+                .ok_or_else(|| Failure::usage(format!("--set {word}: write METHOD.KEY=VALUE")))?;
+            for method in named(study, id, &format!("--set {word}"))? {
+                method.params.set(key, value);
+            }
+        }
+        for word in &self.levels {
+            let wrong =
+                || Failure::usage(format!("--levels {word}: write METHOD=LEVEL[,LEVEL...]"));
+            let (id, list) = word.split_once('=').ok_or_else(wrong)?;
+            let levels = list.split(',').map(|level| level.trim().parse::<f64>());
+            let levels: Vec<f64> = levels.collect::<Result<_, _>>().map_err(|_| wrong())?;
+            for method in named(study, id, &format!("--levels {word}"))? {
+                method.levels.extend(&levels);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// All rows of a study that are of one method.
+fn named<'s>(
+    study: &'s mut Study,
+    id: &str,
+    option: &str,
+) -> Result<Vec<&'s mut StudyMethod>, Failure> {
+    let rows: Vec<_> = study.methods.iter_mut().filter(|method| method.id == id).collect();
+    if rows.is_empty() {
+        return Err(Failure::usage(format!("{option}: `{id}` is not among the methods that run")));
+    }
+    Ok(rows)
 }
 
 /// Finds wrong parameters before anything is run, by preparing on the smallest of shapes.
-fn check_params(methods: &[Box<dyn MedialSimplifier>], items: &[Item]) -> Result<(), Failure> {
-    if items.iter().all(|item| item.params.0.is_empty()) {
-        return Ok(());
-    }
-    let resolution = medial_datasets::find("sphere").map(|shape| *shape.resolutions().start());
-    let probe = Input::load(&Source::BuiltIn { id: "sphere".into(), resolution })?;
-    let probe = probe.shape(ShapeOptions::default()).map_err(Failure::input)?;
-    for (method, item) in methods.iter().zip(items) {
-        let prepared = method.prepare(&probe, &item.params, &RunContext::default());
-        if let Err(error @ SimplifyError::Parameter(_)) = prepared {
-            return Err(Failure::usage(format!("{}: {error}", item.method)));
+fn check_params(items: &[Item], supervisor: &mut Supervisor<'_>) -> Result<(), Failure> {
+    let mut seen = HashSet::new();
+    for item in items.iter().filter(|item| !item.method.params.0.is_empty()) {
+        let method = serde_json::to_string(&item.method).map_err(Failure::usage)?;
+        if seen.insert(method)
+            && let Some(why) = supervisor.refused_params(item)?
+        {
+            return Err(Failure::usage(format!("{}: {why}", item.method.id)));
         }
     }
     Ok(())
 }
 
-/// A name for each source, unlike every other even as the stem of a file: the file's stem, where
-/// that is not enough its name with the extension, then with its folder, then a number.
-fn unique_names(sources: &[Source]) -> Vec<String> {
-    let key = |name: &String| medial_reports::file_stem(name).to_ascii_lowercase();
-    let mut names: Vec<String> = sources.iter().map(Source::name).collect();
-    for depth in 1..=2 {
-        let keys: Vec<String> = names.iter().map(key).collect();
-        for (name, source) in names.iter_mut().zip(sources) {
-            if keys.iter().filter(|&other| *other == key(name)).count() > 1 {
-                *name = source.long_name(depth);
-            }
-        }
-    }
-    for index in 0..names.len() {
-        let base = names[index].clone();
-        let mut number = 2;
-        while names[..index].iter().any(|other| key(other) == key(&names[index])) {
-            names[index] = format!("{base}-{number}");
-            number += 1;
-        }
-    }
-    names
+fn interrupt_message(left: &[Item], tally: Tally) -> Exit {
+    let levels: usize = left.iter().map(|item| item.levels.len()).sum();
+    crate::output::say(&format!(
+        "interrupted: {} of {levels} results were made and are kept; the same command goes on from there",
+        tally.run
+    ));
+    Exit::Interrupted
 }
 
-fn sources(arguments: &Arguments) -> Result<Vec<Source>, Failure> {
-    let mut sources = Vec::new();
-    for mesh in &arguments.meshes {
-        sources.push(Source::parse(mesh).map_err(Failure::usage)?);
-    }
-    match arguments.dataset.as_deref() {
-        None if sources.is_empty() => sources = Source::built_ins(),
-        None => {}
-        Some("builtin") => sources.extend(Source::built_ins()),
-        Some(other) => {
-            return Err(Failure::usage(format!("--dataset {other}: the one set is `builtin`")));
-        }
-    }
-    // The same mesh twice would be one row with twice the weight.
-    let mut distinct: Vec<Source> = Vec::with_capacity(sources.len());
-    for source in sources {
-        if !distinct.contains(&source) {
-            distinct.push(source);
-        }
-    }
-    Ok(distinct)
-}
-
-/// The methods of some ids, each once; without any, all.
-pub(super) fn methods(ids: &[String]) -> Result<Vec<Box<dyn MedialSimplifier>>, Failure> {
-    if ids.is_empty() {
-        return Ok(medial_methods::registry());
-    }
-    let distinct = ids.iter().enumerate().filter(|&(index, id)| !ids[..index].contains(id));
-    distinct.map(|(_, id)| medial_methods::find(id).ok_or_else(|| unknown_method(id))).collect()
-}
-
-/// Levels of numbers of spheres, each once, from fine to coarse.
-pub(super) fn sphere_levels(counts: &[usize]) -> Result<Vec<Level>, Failure> {
-    let mut counts = counts.to_vec();
-    counts.sort_unstable_by(|a, b| b.cmp(a));
-    counts.dedup();
-    if counts.last() == Some(&0) {
-        return Err(Failure::usage("--spheres 0: ask for at least one sphere"));
-    }
-    Ok(counts.into_iter().map(Level::Spheres).collect())
-}
-
-/// One item for each method: its parameters, and the levels from fine to coarse.
-fn items(
-    arguments: &Arguments,
-    methods: &[Box<dyn MedialSimplifier>],
-) -> Result<Vec<Item>, Failure> {
-    let mut levels = sphere_levels(&arguments.spheres)?;
-    if arguments.published {
-        levels.insert(0, Level::Published);
-    }
-    let mut items: Vec<Item> = methods
-        .iter()
-        .map(|method| Item {
-            method: method.info().id.to_owned(),
-            params: Params::none(),
-            levels: levels.clone(),
-        })
-        .collect();
-    for word in &arguments.set {
-        let parts = word.split_once('=').and_then(|(name, value)| {
-            let (method, key) = name.split_once('.')?;
-            Some((method, key, value))
-        });
-        let (method, key, value) =
-            parts.ok_or_else(|| Failure::usage(format!("--set {word}: write METHOD.KEY=VALUE")))?;
-        let item = items.iter_mut().find(|item| item.method == method);
-        let item = item.ok_or_else(|| {
-            Failure::usage(format!("--set {word}: `{method}` is not among the methods that run"))
-        })?;
-        item.params.set(key, value);
-    }
-    Ok(items)
-}
-
-/// Makes the folder and removes the records of an earlier run.
-fn fresh_journal(out: &Path) -> Result<PathBuf, Failure> {
-    let fail = |error: std::io::Error| Failure::input(format!("{}: {error}", out.display()));
-    if out.exists() && !out.is_dir() {
-        return Err(Failure::input(format!("{}: not a folder", out.display())));
-    }
-    std::fs::create_dir_all(out).map_err(fail)?;
-    let path = out.join(RESULTS);
-    remove_artifacts(out, &path);
-    match std::fs::remove_file(&path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(fail(error)),
-        _ => Ok(path),
-    }
-}
-
-/// Removes the medial meshes that the records of an earlier run name, so that none is taken for
-/// a result of this one. What cannot be removed stays: it is no result either way.
-fn remove_artifacts(out: &Path, results: &Path) {
-    let Ok(earlier) = read_records(results) else { return };
-    for artifact in earlier.records.iter().filter_map(|record| record.artifact.as_deref()) {
-        let inside = Path::new(artifact).components().all(|c| matches!(c, Component::Normal(_)));
-        if inside && artifact.ends_with(".ma") {
-            let path = out.join(artifact);
-            let _ = std::fs::remove_file(&path);
-            // Succeeds for a folder that is empty now.
-            let _ = path.parent().map(std::fs::remove_dir);
-        }
-    }
+/// The records of some items, in the order of the items.
+fn of_items(records: Vec<Record>, items: &[Item]) -> Vec<Record> {
+    // The last record of a key counts.
+    let mut by_key: HashMap<String, Record> =
+        records.into_iter().map(|record| (record.key.clone(), record)).collect();
+    items.iter().flat_map(Item::keys).filter_map(|key| by_key.remove(&key)).collect()
 }
 
 /// Prints the summary and decides the exit code.
 fn finish(
     records: &[Record],
+    tally: Tally,
     out: &Path,
     files: &[PathBuf],
     global: &Global,
 ) -> Result<Exit, Failure> {
-    let count = |status: Status| records.iter().filter(|r| r.status == status).count();
-    let ok = count(Status::Ok);
+    let ok = count(records, Status::Ok);
     let page = out.join("index.html");
     if global.json {
         let by_status: serde_json::Map<String, serde_json::Value> =
-            Status::ALL.iter().map(|&s| (s.key().to_owned(), count(s).into())).collect();
+            Status::ALL.iter().map(|&s| (s.key().to_owned(), count(records, s).into())).collect();
         let object = json!({
-            "out": out, "records": records.len(), "status": by_status,
-            "results": out.join(RESULTS), "page": page, "files": files,
+            "out": out, "records": records.len(), "run": tally.run, "found": tally.found,
+            "status": by_status, "results": out.join(RESULTS), "page": page, "files": files,
         });
         print_json(&object, &[]);
     } else {
@@ -325,14 +254,26 @@ fn finish(
             print_line(&medial_reports::summary_text(records));
         }
         print_line(&format!(
-            "{ok} of {} results measured; page: {}",
+            "{ok} of {} results as asked{}; {} run now, {} found; page: {}",
             records.len(),
+            others(records),
+            tally.run,
+            tally.found,
             page.display()
         ));
     }
-    Ok(match ok {
+    let measured = records.iter().filter(|record| record.status.has_result()).count();
+    Ok(match measured {
         0 => Exit::NothingMeasured,
         _ if ok < records.len() => Exit::SomeFailed,
         _ => Exit::Done,
     })
+}
+
+/// What became of the results that are not as asked: `, 2 other count, 1 failed`.
+fn others(records: &[Record]) -> String {
+    let others = Status::ALL.into_iter().filter(|&status| status != Status::Ok);
+    let counted = others.map(|status| (status, count(records, status)));
+    let counted = counted.filter(|&(_, count)| count > 0);
+    counted.map(|(status, count)| format!(", {count} {status}")).collect()
 }

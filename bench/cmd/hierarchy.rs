@@ -6,12 +6,13 @@ use std::sync::Arc;
 use medial::complex::DualTriangulation;
 use medial::complex::collapse::Hierarchy;
 use medial::shape::Shape;
-use medial::simplifier::{MedialSimplifier, Params, Simplification};
+use medial::simplifier::{MedialSimplifier, Params, Simplification, SimplifyError};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
 use crate::output::version;
-use crate::run::{Input, Lap, Stopwatch};
+use crate::run::Input;
+use medial::shape::Cost;
 
 /// What a hierarchy was made from, and by which method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,11 +76,10 @@ impl Origin {
 
 /// A hierarchy from a file.
 pub struct Loaded {
-    file: String,
     /// The hierarchy.
     pub hierarchy: Arc<Hierarchy>,
     /// What reading and checking it took.
-    pub read: Lap,
+    pub read: Cost,
 }
 
 impl Loaded {
@@ -91,9 +91,15 @@ impl Loaded {
         &self,
         method: &dyn MedialSimplifier,
         params: &Params,
-    ) -> Result<Box<dyn Simplification>, Failure> {
-        let resumed = method.resume(Arc::clone(&self.hierarchy), params);
-        resumed.map_err(|error| Failure::input(format!("{}: {error}", self.file)))
+    ) -> Result<Box<dyn Simplification>, SimplifyError> {
+        // One method has hierarchies so far; another will bring its own way to go on from them.
+        match &*method.info().id {
+            "pmat" => medial_methods::pmat::resume(Arc::clone(&self.hierarchy), params),
+            _ => Err(SimplifyError::unsupported(format!(
+                "{} has no hierarchy to go on from",
+                method.info().title
+            ))),
+        }
     }
 }
 
@@ -103,7 +109,7 @@ impl Loaded {
 /// When the file cannot be read, is damaged, or was made from something else.
 pub fn load(path: &Path, origin: &Origin, shape: &Shape) -> Result<Loaded, Failure> {
     let file = path.display().to_string();
-    let (read, lap) = Stopwatch::time(|| Hierarchy::read(path));
+    let (read, lap) = Cost::of(|| Hierarchy::read(path));
     let (hierarchy, label) = read.map_err(Failure::input)?;
     let refuse = |why: String| Failure::input(format!("{file}: {why}"));
     let known: Origin = serde_json::from_str(&label)
@@ -123,7 +129,7 @@ pub fn load(path: &Path, origin: &Origin, shape: &Shape) -> Result<Loaded, Failu
             )));
         }
     }
-    Ok(Loaded { file, hierarchy: Arc::new(hierarchy), read: lap })
+    Ok(Loaded { hierarchy: Arc::new(hierarchy), read: lap })
 }
 
 /// Writes a hierarchy with its origin.

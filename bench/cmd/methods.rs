@@ -1,12 +1,13 @@
 //! `medial methods [ID]`: what methods there are.
 
 use clap::Args;
-use medial::simplifier::MethodInfo;
+use medial::simplifier::{MedialSimplifier, MethodInfo};
 use serde_json::json;
 
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
+use crate::run::{Entry, Registry, no_such_method};
 
 /// Arguments of `methods`.
 #[derive(Debug, Args)]
@@ -19,12 +20,13 @@ pub struct Arguments {
 ///
 /// # Errors
 /// When no method has the id.
-pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let all = medial_methods::registry();
-    let wanted = |info: &MethodInfo| arguments.id.as_ref().is_none_or(|id| info.id == id);
-    let infos: Vec<&MethodInfo> = all.iter().map(|m| m.info()).filter(|i| wanted(i)).collect();
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
+    let all = registry.entries();
+    let wanted = |info: &MethodInfo| arguments.id.as_ref().is_none_or(|id| info.id == *id);
+    let infos: Vec<&MethodInfo> =
+        all.iter().map(|entry| entry.method().info()).filter(|i| wanted(i)).collect();
     if let (Some(id), true) = (&arguments.id, infos.is_empty()) {
-        return Err(unknown_method(id));
+        return Err(unknown_method(registry, id));
     }
     if global.json {
         print_json(&json!({ "methods": infos }), &[]);
@@ -39,10 +41,18 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
+/// The method with an id.
+///
+/// # Errors
+/// When no method has it; those that exist are named.
+pub fn method<'r>(registry: &'r Registry, id: &str) -> Result<&'r dyn MedialSimplifier, Failure> {
+    registry.entry(id).map(Entry::method).ok_or_else(|| unknown_method(registry, id))
+}
+
 /// The failure for an id that no method has, naming those that exist.
-pub fn unknown_method(id: &str) -> Failure {
-    let known: Vec<&str> = medial_methods::registry().iter().map(|m| m.info().id).collect();
-    Failure::usage(format!("no method is called `{id}`; there are: {}", known.join(", ")))
+fn unknown_method(registry: &Registry, id: &str) -> Failure {
+    let known: Vec<String> = registry.entries().iter().map(|e| e.id().to_owned()).collect();
+    Failure::usage(no_such_method(id, &known))
 }
 
 fn describe(info: &MethodInfo) {

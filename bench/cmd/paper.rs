@@ -10,8 +10,9 @@ use serde_json::json;
 
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
+use crate::interrupt;
 use crate::output::{print_json, print_line};
-use crate::run::{Progress, Provenance, Reproducer};
+use crate::run::{Here, Progress, Provenance, Registry, Reproducer, Study, Supervisor};
 
 /// Arguments of `paper`.
 #[derive(Debug, Args)]
@@ -30,13 +31,16 @@ pub struct Arguments {
     /// Surface samples for errors, beside the mesh's vertices.
     #[arg(long, value_name = "N", default_value_t = 50_000)]
     samples: usize,
+    /// End a run after so many seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 3600.0)]
+    timeout: f64,
 }
 
 /// Runs the verb.
 ///
 /// # Errors
 /// When an id is unknown or the output cannot be written. Rows that cannot be run say why.
-pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let exhibits = published();
     if arguments.ids.is_empty() && !arguments.all {
         list(&exhibits, global);
@@ -54,13 +58,17 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let provenance = Provenance::here();
     let rows = chosen.iter().map(|exhibit| exhibit.rows.len()).sum();
     let mut progress = Progress::new(global.quiet, rows);
-    let mut reproducer = Reproducer::new(&folder, arguments.samples, &provenance);
+    let here = Here::of(&provenance);
+    let limits = Study { timeout: arguments.timeout, ..Study::default() }.limits(&here);
+    let supervisor = Supervisor::new(registry.files(), &provenance, None, interrupt::listen());
+    let mut reproducer =
+        Reproducer::new(&folder, arguments.samples, (registry, here), supervisor, limits);
     let mut done: Vec<Reproduction> = Vec::with_capacity(chosen.len());
     for exhibit in &chosen {
         let mut rows: Vec<ReproducedRow> = Vec::with_capacity(exhibit.rows.len());
         for row in &exhibit.rows {
             progress.at(&format!("{}: {}", exhibit.id, row.id));
-            rows.push(reproducer.row(exhibit, row));
+            rows.push(reproducer.row(exhibit, row)?);
             progress.done();
         }
         done.push(Reproduction::new(exhibit, rows));

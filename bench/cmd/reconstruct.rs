@@ -14,7 +14,8 @@ use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_folder, extension, medial_mesh_for};
 use crate::output::{counted, percent, print_json, print_line};
-use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes};
+use crate::run::{Input, Source, peak_bytes};
+use medial::shape::Cost;
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
@@ -73,11 +74,11 @@ struct Made {
 struct Stages {
     seconds: Map<String, Value>,
     cpu_seconds: Map<String, Value>,
-    total: Lap,
+    total: Cost,
 }
 
 impl Stages {
-    fn add(&mut self, stage: &str, lap: Lap) {
+    fn add(&mut self, stage: &str, lap: Cost) {
         self.seconds.insert(stage.into(), lap.seconds.into());
         self.cpu_seconds.insert(stage.into(), lap.cpu_seconds.into());
         self.total += lap;
@@ -92,7 +93,7 @@ impl Stages {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_arguments(arguments)?;
     let mut stages = Stages::default();
-    let (read, lap) = Stopwatch::time(|| read(arguments));
+    let (read, lap) = Cost::of(|| read(arguments));
     let (shape, axis, mut warnings) = read?;
     stages.add("read", lap);
     let made = match arguments.method {
@@ -100,7 +101,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         Method::PowerCrust => of_poles(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
     }?;
     warnings.extend(made.warnings);
-    let (written, lap) = Stopwatch::time(|| surface::write(&arguments.output, &made.mesh));
+    let (written, lap) = Cost::of(|| surface::write(&arguments.output, &made.mesh));
     written.map_err(Failure::input)?;
     stages.add("write", lap);
     let (seconds, cpu_seconds) = (stages.total.seconds, stages.total.cpu_seconds);
@@ -248,7 +249,7 @@ fn of_union(
     let diagonal = diagonal
         .or_else(of_balls)
         .ok_or_else(|| of_file("its spheres have no extent, or one that is not finite".into()))?;
-    let (made, lap) = Stopwatch::time(|| union_surface(axis, arguments.tolerance * diagonal));
+    let (made, lap) = Cost::of(|| union_surface(axis, arguments.tolerance * diagonal));
     stages.add("reconstruct", lap);
     let made = made.map_err(|error| {
         of_file(match error {
@@ -297,7 +298,7 @@ fn of_poles(
         unreachable!("checked before")
     };
     let of_mesh = |message: String| Failure::input(format!("{}: {message}", mesh.display()));
-    let (balls, lap) = Stopwatch::time(|| shape.polar_balls());
+    let (balls, lap) = Cost::of(|| shape.polar_balls());
     stages.add("poles", lap);
     let balls = balls.map_err(|error| of_mesh(error.to_string()))?;
     let to_normal = shape.normalisation();
@@ -308,7 +309,7 @@ fn of_poles(
     let (counts, named) =
         ([inner.len(), balls.outer.len()], arguments.axis.as_ref().unwrap_or(mesh));
     let of_named = |message: String| Failure::input(format!("{}: {message}", named.display()));
-    let (crust, lap) = Stopwatch::time(|| {
+    let (crust, lap) = Cost::of(|| {
         let crust = PowerCrust::new(&inner, &balls.outer)?;
         Ok((crust.facet_count(), crust.surface(COINCIDENT)))
     });

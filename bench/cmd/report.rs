@@ -4,13 +4,16 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
-use medial_reports::{Header, Record, read_header, read_records, write_report};
+use medial_reports::{Header, Record, RunNote, read_header, read_records, write_report};
 use serde_json::json;
 
-use super::compare::RESULTS;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
+use crate::run::{Provenance, RESULTS, Registry, Store, Study};
+
+/// Name of the file with the study that was asked last.
+const STUDY: &str = "study.toml";
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
@@ -22,25 +25,32 @@ pub struct Arguments {
 /// Runs the verb.
 ///
 /// # Errors
-/// When the folder has no readable records, or the report cannot be written.
-pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let Rebuilt { records, files, warnings } = rebuild(&arguments.dir)?;
+/// When the folder has no readable records, another process adds to it, or the report cannot be
+/// written.
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
+    // A page of records that are just being added to would be of no moment in particular.
+    let held = match arguments.dir.is_dir() {
+        true => Some(Store::open(&arguments.dir, RESULTS, "medial report")?),
+        false => None,
+    };
+    let Rebuilt { records, files, warnings } = rebuild(&arguments.dir, registry)?;
+    drop(held);
     if global.json {
-        print_json(&json!({ "records": records, "files": files }), &warnings);
+        print_json(&json!({ "records": records.len(), "files": files }), &warnings);
     } else {
         for warning in &warnings {
             print_line(&format!("warning: {warning}"));
         }
         let page = arguments.dir.join("index.html");
-        print_line(&format!("{records} records; page: {}", page.display()));
+        print_line(&format!("{} records; page: {}", records.len(), page.display()));
     }
     Ok(Exit::Done)
 }
 
-/// A report that was rebuilt.
+/// A report that was rebuilt, or found as it should be.
 pub struct Rebuilt {
-    /// Number of records.
-    pub records: usize,
+    /// The records.
+    pub records: Vec<Record>,
     /// The files that were written.
     pub files: Vec<PathBuf>,
     /// Lines that hold no record.
@@ -51,38 +61,110 @@ pub struct Rebuilt {
 ///
 /// # Errors
 /// As [`run`].
-pub fn rebuild(dir: &Path) -> Result<Rebuilt, Failure> {
-    let journaled = read_records(&dir.join(RESULTS)).map_err(Failure::input)?;
-    let warnings: Vec<String> = journaled.bad_lines.iter().map(ToString::to_string).collect();
-    if journaled.records.is_empty() {
-        return Err(Failure {
-            code: Exit::NothingMeasured,
-            message: match warnings.first() {
-                None => format!("{}: no record in {RESULTS}", dir.display()),
-                Some(first) => {
-                    format!("{}: no readable record in {RESULTS}; {first}", dir.display())
-                }
-            },
-        });
+pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
+    let (records, warnings) = records(dir)?;
+    if records.is_empty() {
+        let message = match warnings.first() {
+            None => format!("{}: no record in {RESULTS}", dir.display()),
+            Some(first) => format!("{}: no readable record in {RESULTS}; {first}", dir.display()),
+        };
+        return Err(Failure { code: Exit::NothingMeasured, message });
     }
-    let mut header = read_header(dir).unwrap_or_else(|_| header_of(&journaled.records));
-    header.notes.clone_from(&warnings);
-    let files = write_report(dir, &journaled.records, &header).map_err(Failure::input)?;
-    Ok(Rebuilt { records: journaled.records.len(), files, warnings })
+    let header = header(dir, &records, registry, &warnings);
+    let files = write_report(dir, &records, &header).map_err(Failure::input)?;
+    Ok(Rebuilt { records, files, warnings })
 }
 
-/// A header from the records alone, for a run that was interrupted before its report.
-fn header_of(records: &[Record]) -> Header {
-    let last = records.last();
-    Header {
-        title: "Medial axis simplification: a comparison".into(),
-        command: last.map(|r| r.command.clone()).unwrap_or_default(),
-        version: last.map(|r| r.version.clone()).unwrap_or_default(),
-        date: None,
-        machine: last.map(|r| r.machine.clone()),
-        methods: medial_methods::registry().iter().map(|method| method.info().into()).collect(),
-        notes: vec![],
+/// After a run of `compare`: notes the run where it has added records, and rebuilds the report where
+/// that is needed. Without anything new the page stays as it is.
+///
+/// # Errors
+/// When the records cannot be read, or the report cannot be written.
+pub fn refresh(
+    dir: &Path,
+    registry: &Registry,
+    provenance: &Provenance,
+    added: bool,
+) -> Result<Rebuilt, Failure> {
+    let (records, warnings) = records(dir)?;
+    if !added && dir.join("index.html").exists() {
+        return Ok(Rebuilt { records, files: vec![], warnings });
     }
+    let mut header = header(dir, &records, registry, &warnings);
+    let this = |run: &&mut RunNote| {
+        run.command == provenance.command && run.binary_hash == provenance.binary_hash
+    };
+    if let Some(run) = header.runs.iter_mut().find(this) {
+        run.date = run.date.take().or_else(|| Some(today()));
+    }
+    let files = write_report(dir, &records, &header).map_err(Failure::input)?;
+    Ok(Rebuilt { records, files, warnings })
+}
+
+/// Writes the study that is asked beside the results.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_study(dir: &Path, study: &Study) -> Result<(), Failure> {
+    let path = dir.join(STUDY);
+    let text = study.to_text();
+    medial::write_atomically(&path, |out| out.write_all(text.as_bytes()))
+        .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}
+
+fn records(dir: &Path) -> Result<(Vec<Record>, Vec<String>), Failure> {
+    let journaled = read_records(&dir.join(RESULTS)).map_err(Failure::input)?;
+    let warnings = journaled.bad_lines.iter().map(ToString::to_string).collect();
+    Ok((journaled.records, warnings))
+}
+
+/// The header of the earlier report, brought up to date, or one from the records alone.
+fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[String]) -> Header {
+    let earlier = read_header(dir).unwrap_or_default();
+    let mut header = Header {
+        title: "Medial axis simplification: a comparison".into(),
+        runs: earlier.runs,
+        methods: earlier.methods,
+        study: std::fs::read_to_string(dir.join(STUDY)).ok(),
+        notes: warnings.to_vec(),
+    };
+    for run in runs_of(records) {
+        let same =
+            |known: &RunNote| known.command == run.command && known.binary_hash == run.binary_hash;
+        if !header.runs.iter().any(same) {
+            header.runs.push(run);
+        }
+    }
+    // Methods of this program are described as they are now; those of plug-ins that are not named
+    // this time stay as they were.
+    for entry in registry.entries() {
+        let note = entry.method().info().into();
+        match header.methods.iter_mut().find(|known| known.id == entry.id()) {
+            Some(known) => *known = note,
+            None => header.methods.push(note),
+        }
+    }
+    let ran = |id: &str| records.iter().any(|record| record.simplify.method == id);
+    header.methods.retain(|method| ran(&method.id));
+    header
+}
+
+/// The runs that the records themselves tell of.
+fn runs_of(records: &[Record]) -> Vec<RunNote> {
+    let mut runs: Vec<RunNote> = Vec::new();
+    for record in records {
+        let run = RunNote {
+            command: record.command.clone(),
+            version: record.version.clone(),
+            binary_hash: record.binary_hash.clone(),
+            date: None,
+            machine: Some(record.machine.clone()),
+        };
+        if !runs.contains(&run) {
+            runs.push(run);
+        }
+    }
+    runs
 }
 
 /// Today's date in UTC, as `YYYY-MM-DD`.

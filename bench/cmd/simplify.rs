@@ -4,17 +4,20 @@ use std::path::PathBuf;
 
 use clap::Args;
 use medial::complex;
+use medial::complex::collapse::Hierarchy;
 use medial::metrics::JudgeOptions;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Level, MedialSimplifier, Params, PartInfo, RunContext, Simplification, Simplified,
-    SimplifyError, Work,
+    Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError,
 };
-use medial_reports::{Simplify, Stages, Status};
+use medial_methods::aof::{self, LatticeVoxels};
+use medial_methods::pmat;
+use medial_methods::tam_heidrich::PartInfo;
+use medial_reports::{Simplify, Status};
 use serde::Serialize;
 
 use super::hierarchy::{self, Loaded, Origin};
-use super::methods::unknown_method;
+use super::methods::method;
 use super::voxels;
 use crate::args::{
     Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options, params,
@@ -22,8 +25,9 @@ use crate::args::{
 };
 use crate::exit::{Exit, Failure};
 use crate::files::{check_folder, check_output, medial_mesh_for};
-use crate::output::{counted, percent, print_json, print_line};
-use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes, search_error};
+use crate::output::{counted, percent, print_json, print_line, version};
+use crate::run::record::fill_result;
+use crate::run::{Fault, Input, LevelRun, Registry, Source, answer, search_error};
 
 /// What a search over sphere counts found, for the answer to `--max-error`.
 #[derive(Debug, Serialize)]
@@ -34,6 +38,8 @@ struct Search {
     hausdorff: f64,
     /// Number of sphere counts that were tried.
     tried: usize,
+    /// Spheres of the result.
+    spheres: usize,
 }
 
 /// Arguments of `simplify`.
@@ -82,15 +88,14 @@ pub struct Arguments {
 ///
 /// # Errors
 /// When the input is refused, the level is not met at all, or the output cannot be written.
-pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
-    let method =
-        medial_methods::find(&arguments.method).ok_or_else(|| unknown_method(&arguments.method))?;
+    let method = method(registry, &arguments.method)?;
     let options = shape_options(&arguments.substrate)?;
     check_output(arguments.output.as_deref())?;
     check_bound(arguments)?;
-    check_hierarchy(arguments, method.as_ref())?;
-    check_voxels(arguments, method.as_ref())?;
+    check_hierarchy(arguments, method)?;
+    check_voxels(arguments, method)?;
     let input = Input::load(&source)?;
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
@@ -104,25 +109,20 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let origin = Origin::new(&arguments.method, &params, &input, &shape, given);
     let loaded = arguments.hierarchy.as_deref();
     let loaded = loaded.map(|path| hierarchy::load(path, &origin, &shape)).transpose()?;
-    let start = Start { method: method.as_ref(), params, shape: &shape, loaded };
-    let (simplified, simplify, search) =
-        simplify(arguments, &start, &input).map_err(|error| match error {
-            Error::Method(error) => failure(&source, error),
-            Error::Other(failure) => failure,
-        })?;
-    simplified.mesh.check().map_err(|error| Failure::of(&source, error))?;
-    if simplified.mesh.spheres.is_empty() {
-        return Err(Failure::of(&source, nothing_left(&simplified)));
-    }
+    let start = Start { method, params, shape: &shape, loaded };
+    let (run, search) = simplify(arguments, &start, &input)?;
+    let simplify = describe(arguments, &start, &run);
+    let simplified = run.outcome.map_err(|fault| failure(&source, fault))?;
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = simplified.mesh.transformed(back.diagonal, |p| back.backward(p));
         complex::write(output, &mesh).map_err(Failure::input)?;
     }
-    if let (Some(path), Some(all)) = (&arguments.save_hierarchy, &simplified.extras.hierarchy) {
+    let extras = &simplified.extras;
+    if let (Some(path), Some(all)) = (&arguments.save_hierarchy, extras.get::<Hierarchy>()) {
         hierarchy::save(path, all, &origin)?;
     }
-    let voxels = simplified.extras.voxels.as_deref();
+    let voxels = extras.get::<LatticeVoxels>();
     if let (Some(path), Some(voxels)) = (&arguments.voxels, voxels) {
         voxels::write(path, voxels, &shape)?;
     }
@@ -131,7 +131,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         if let Some(search) = &search {
             object["max_error"] = serde_json::to_value(search).map_err(Failure::input)?;
         }
-        if let Some(parts) = &simplified.extras.parts {
+        if let Some(parts) = extras.get::<Vec<PartInfo>>() {
             object["parts"] = in_input_units(parts, &shape).map_err(Failure::input)?;
         }
         if let Some(voxels) = voxels {
@@ -140,7 +140,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         print_json(&object, &warnings);
     } else {
         print_result(&simplify, search.as_ref(), arguments);
-        if let Some(parts) = &simplified.extras.parts {
+        if let Some(parts) = extras.get::<Vec<PartInfo>>() {
             print_line(&format!("  {}, listed by --json", counted(parts.len() as u64, "part")));
         }
         for warning in simplify.warnings.iter().chain(&warnings) {
@@ -160,24 +160,6 @@ fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde
     serde_json::to_value(parts.iter().map(carried).collect::<Vec<_>>())
 }
 
-/// A method that does not answer, or anything else that went wrong.
-enum Error {
-    Method(SimplifyError),
-    Other(Failure),
-}
-
-impl From<SimplifyError> for Error {
-    fn from(error: SimplifyError) -> Self {
-        Self::Method(error)
-    }
-}
-
-impl From<Failure> for Error {
-    fn from(failure: Failure) -> Self {
-        Self::Other(failure)
-    }
-}
-
 fn check_bound(arguments: &Arguments) -> Result<(), Failure> {
     match arguments.max_error {
         Some(bound) if !(bound.is_finite() && bound > 0.0) => {
@@ -189,12 +171,6 @@ fn check_bound(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Why a result has no sphere. That is no success: there is nothing to write.
-fn nothing_left(simplified: &Simplified) -> String {
-    let why = simplified.diagnostics.warnings.join("; ");
-    format!("the result has no sphere ({why}); ask for a finer level")
-}
-
 /// What a method starts from.
 struct Start<'a> {
     method: &'a dyn MedialSimplifier,
@@ -204,11 +180,16 @@ struct Start<'a> {
 }
 
 impl<'a> Start<'a> {
-    fn simplification(&self, run: &RunContext) -> Result<Box<dyn Simplification + 'a>, Error> {
-        let Self { method, params, shape, loaded } = self;
+    /// Begins on a view of the shape.
+    fn begin<'v>(
+        &self,
+        view: &'v Shape,
+        run: &RunContext,
+    ) -> Result<Box<dyn Simplification + 'v>, SimplifyError> {
+        let Self { method, params, loaded, .. } = self;
         match loaded {
-            Some(loaded) => Ok(loaded.resume(*method, params)?),
-            None => Ok(method.prepare(shape, params, run)?),
+            Some(loaded) => loaded.resume(*method, params),
+            None => method.prepare(view, params, run),
         }
     }
 
@@ -225,9 +206,9 @@ fn check_hierarchy(arguments: &Arguments, method: &dyn MedialSimplifier) -> Resu
     let asked =
         [("--hierarchy", &arguments.hierarchy), ("--save-hierarchy", &arguments.save_hierarchy)];
     if let Some((option, _)) = asked.iter().find(|(_, path)| path.is_some())
-        && !method.has_hierarchy()
+        && !method.info().has_extra(pmat::HIERARCHY)
     {
-        let id = method.info().id;
+        let id = &method.info().id;
         return Err(Failure::usage(format!("{option}: {id} has no hierarchy of levels")));
     }
     arguments.save_hierarchy.as_deref().map_or(Ok(()), check_folder)
@@ -235,97 +216,96 @@ fn check_hierarchy(arguments: &Arguments, method: &dyn MedialSimplifier) -> Resu
 
 fn check_voxels(arguments: &Arguments, method: &dyn MedialSimplifier) -> Result<(), Failure> {
     let Some(path) = &arguments.voxels else { return Ok(()) };
-    if !method.has_voxels() {
-        let id = method.info().id;
+    if !method.info().has_extra(aof::VOXELS) {
+        let id = &method.info().id;
         return Err(Failure::usage(format!("--voxels: {id} has no voxels")));
     }
     voxels::check(path)
 }
 
+/// Runs the method at the level that is asked, or at the one that a search finds.
 fn simplify(
     arguments: &Arguments,
     start: &Start<'_>,
     input: &Input,
-) -> Result<(Simplified, Simplify, Option<Search>), Error> {
-    let Start { shape, loaded, .. } = start;
-    let seed = arguments.substrate.seed;
+) -> Result<(LevelRun, Option<Search>), Failure> {
+    let seed = arguments.substrate.seed();
     let run = RunContext::with_seed(seed);
-    let (prepared, mut prepare) = Stopwatch::time(|| start.simplification(&run));
-    let mut simplification = prepared?;
-    let spent = shape.spent();
-    prepare.seconds = (prepare.seconds - spent.seconds).max(0.0);
-    prepare.cpu_seconds = (prepare.cpu_seconds - spent.cpu_seconds).max(0.0);
-    if let Some(loaded) = loaded {
-        prepare += loaded.read;
-    }
-    let mut search = None;
-    let (answer, lap) = if let Some(bound) = arguments.max_error {
-        let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
-        let judge = shape.judge(input.axis.as_ref(), options).map_err(SimplifyError::from)?;
-        let found = search_error(simplification.as_mut(), &judge, start.spheres()?, bound)?;
-        search = Some(Search { bound, hausdorff: found.hausdorff, tried: found.tried });
-        // The seconds are those of the level found, asked alone.
-        let count = found.simplified.mesh.spheres.len();
-        let mut alone = start.simplification(&run)?;
-        Stopwatch::time(|| alone.at(Level::Spheres(count)))
-    } else {
-        let level = match (arguments.spheres, arguments.level) {
-            (Some(count), _) => Level::Spheres(count),
-            (None, Some(value)) => Level::Native(value),
-            (None, None) => Level::Published,
-        };
-        Stopwatch::time(|| simplification.at(level))
-    };
-    let simplified = answer?;
-    debug_assert!(simplified.work == Work::Anew || lap.seconds >= 0.0);
-    let mut record = describe(arguments, shape, &simplified, prepare, lap);
-    record.params.clone_from(&start.params);
-    Ok((simplified, record, search))
-}
-
-fn describe(
-    arguments: &Arguments,
-    shape: &Shape,
-    simplified: &Simplified,
-    prepare: Lap,
-    lap: Lap,
-) -> Simplify {
-    let used = shape.used();
-    // From +0: the sum of nothing is -0 otherwise, and prints so.
-    let sum = |part: fn(&medial::shape::Cost) -> f64| {
-        used.iter().fold(0.0, |sum, (_, cost)| sum + part(cost))
-    };
-    let mesh = &simplified.mesh;
-    Simplify {
-        seed: arguments.substrate.seed,
-        reached: Some(mesh.spheres.len()),
-        native_level: simplified.native_level,
-        spheres: Some(mesh.spheres.len()),
-        edges: Some(mesh.edges.len()),
-        faces: Some(mesh.faces.len()),
-        substrates: used.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect(),
-        seconds: Some(Stages::new(sum(|c| c.seconds), prepare.seconds, lap.seconds)),
-        cpu_seconds: Some(Stages::new(
-            sum(|c| c.cpu_seconds),
-            prepare.cpu_seconds,
-            lap.cpu_seconds,
-        )),
-        peak_bytes: peak_bytes(),
-        threads: Some(rayon::current_num_threads()),
-        diagnostics: simplified.diagnostics.counts.iter().cloned().collect(),
-        warnings: simplified.diagnostics.warnings.clone(),
-        version: crate::output::version().to_owned(),
-        ..Simplify::asked(&arguments.method, simplified.asked, Status::Ok)
-    }
-}
-
-fn failure(source: &Source, error: SimplifyError) -> Failure {
-    match error {
-        SimplifyError::Unsupported { .. } => {
-            Failure { code: Exit::SomeFailed, message: error.to_string() }
+    let (level, search) = match (arguments.spheres, arguments.level, arguments.max_error) {
+        (Some(count), ..) => (Level::Spheres(count), None),
+        (_, Some(value), _) => (Level::Native(value), None),
+        (.., Some(bound)) => {
+            let search = search(arguments, start, input, bound)?;
+            // The seconds are those of the level found, asked alone.
+            (Level::Spheres(search.spheres), Some(search))
         }
-        SimplifyError::Parameter(_) | SimplifyError::Level(_) => Failure::usage(error),
-        _ => Failure::of(source, error),
+        _ => (Level::Published, None),
+    };
+    let view = start.shape.view();
+    let mut runs = answer(&view, || start.begin(&view, &run), &[level], |_| ());
+    let mut run = runs.pop().ok_or_else(|| Failure::input("no level was run"))?;
+    if let Some(loaded) = &start.loaded {
+        run.times.prepare += loaded.read;
+    }
+    Ok((run, search))
+}
+
+/// Searches the fewest spheres within an error bound.
+fn search(
+    arguments: &Arguments,
+    start: &Start<'_>,
+    input: &Input,
+    bound: f64,
+) -> Result<Search, Failure> {
+    let seed = arguments.substrate.seed();
+    let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
+    let refused = |error: SimplifyError| failure_of(input, error.into());
+    let judge = start.shape.judge(input.axis.as_ref(), options);
+    let judge = judge.map_err(|error| refused(error.into()))?;
+    let view = start.shape.view();
+    let mut simplification = start.begin(&view, &RunContext::with_seed(seed)).map_err(refused)?;
+    let initial = start.spheres().map_err(refused)?;
+    let found = search_error(simplification.as_mut(), &judge, initial, bound).map_err(refused)?;
+    let spheres = found.simplified.mesh.spheres.len();
+    Ok(Search { bound, hausdorff: found.hausdorff, tried: found.tried, spheres })
+}
+
+fn describe(arguments: &Arguments, start: &Start<'_>, run: &LevelRun) -> Simplify {
+    let times = &run.times;
+    let mut simplify = Simplify {
+        params: start.params.clone(),
+        seed: arguments.substrate.seed(),
+        substrates: times
+            .substrates
+            .iter()
+            .map(|(substrate, cost)| (substrate.name().to_owned(), cost.seconds))
+            .collect(),
+        seconds: Some(times.seconds()),
+        cpu_seconds: Some(times.cpu_seconds()),
+        peak_bytes: Some(times.peak_bytes),
+        threads: Some(rayon::current_num_threads()),
+        version: version().to_owned(),
+        ..Simplify::asked(&arguments.method, run.level, Status::Ok)
+    };
+    if let Ok(result) = &run.outcome {
+        fill_result(&mut simplify, result);
+    }
+    simplify
+}
+
+fn failure_of(input: &Input, fault: Fault) -> Failure {
+    failure_named(&input.name, fault)
+}
+
+fn failure(source: &Source, fault: Fault) -> Failure {
+    failure_named(&source.to_string(), fault)
+}
+
+fn failure_named(name: &str, Fault { status, reason }: Fault) -> Failure {
+    match status {
+        Status::Unsupported => Failure { code: Exit::SomeFailed, message: reason },
+        Status::Refused => Failure::usage(reason),
+        _ => Failure::input(format!("{name}: {reason}")),
     }
 }
 

@@ -5,30 +5,23 @@
 //!    the method runs on the noisy surface as on any other.
 //! 3. The noisy result is carried into the clean surface's unit and measured against the clean surface, its
 //!    known axis where it has one, and the method's own clean result.
+//!
+//! Each of these is an item like those of `compare`, with noise: of 0 for the clean surface.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use medial::complex::{self, MedialMesh};
-use medial::metrics::{AxisOptions, Judge, JudgeOptions, axis_distance};
-use medial::shape::Shape;
-use medial::simplifier::{MedialSimplifier, Params};
-use medial::surface::{self, Normalisation};
-use medial_reports::{
-    AxisShift, Header, Initial, NoiseRecord, Record, STABILITY, write_lines, write_records,
-    write_report,
-};
+use medial_reports::{NoiseRecord, Record, STABILITY, read_lines, write_records};
 use serde_json::json;
 
-use super::compare::{RESULTS, methods, sphere_levels};
-use super::report::{rebuild, today};
-use crate::args::{
-    Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options, shape_options,
-};
+use super::report::{Rebuilt, rebuild};
+use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
-use crate::output::{print_json, print_line};
+use crate::interrupt;
+use crate::output::{note, print_json, print_line, say};
 use crate::run::{
-    Input, Item, Measure, Progress, Provenance, RunOptions, Source, refused_records, run_item,
+    Here, Item, Kept, Noise, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
+    Study, StudyMethod, Supervisor, missing, run_items,
 };
 
 /// Arguments of `stability`.
@@ -36,8 +29,8 @@ use crate::run::{
 pub struct Arguments {
     /// Surface files (OFF, OBJ, PLY, STL) or `builtin:ID[:RESOLUTION]` [default: all built-in shapes].
     meshes: Vec<MeshArgument>,
-    /// Methods, separated by commas [default: all].
-    #[arg(long, value_name = "IDS", value_delimiter = ',')]
+    /// Methods, separated by commas, each with parameters of its own if wanted [default: all].
+    #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
     /// Sphere counts, separated by commas.
     #[arg(long, value_name = "COUNTS", value_delimiter = ',', default_values_t = [500, 100])]
@@ -54,9 +47,13 @@ pub struct Arguments {
     /// Random versions of each surface at each level.
     #[arg(long, value_name = "N", default_value_t = 3)]
     noise_seeds: u64,
-    /// Folder of the results; a report that is there already gets a section on stability.
+    /// Folder of the results; a report that is there already gets a section on stability. What is
+    /// there is not run again.
     #[arg(long, value_name = "DIR", default_value = "medial-report")]
     out: PathBuf,
+    /// Run again what failed.
+    #[arg(long)]
+    retry_failed: bool,
     #[command(flatten)]
     substrate: SubstrateArguments,
     #[command(flatten)]
@@ -69,76 +66,46 @@ const FOLDER: &str = "stability";
 /// More random versions of each surface would not end.
 const MOST_SEEDS: u64 = 10_000;
 
-/// What is the same for all meshes.
-struct Study {
-    methods: Vec<Box<dyn MedialSimplifier>>,
-    items: Vec<Item>,
-    judge: JudgeOptions,
-    options: RunOptions,
-    provenance: Provenance,
-}
-
-/// A mesh without noise, and what noisy results are measured against.
-struct Clean<'a> {
-    input: &'a Input,
-    shape: &'a Shape,
-    judge: &'a Judge,
-    /// Spheres of the initial medial mesh.
-    initial: Option<u64>,
-    /// By item and level.
-    results: Vec<Vec<Option<MedialMesh>>>,
-}
-
 /// Runs the verb.
 ///
 /// # Errors
-/// When the command line is wrong, a mesh is refused, or the results cannot be written. A noisy
+/// When the command line is wrong, an input does not exist, or the results cannot be written. A
 /// surface that is refused and a method that fails are rows of the results.
-pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let sources = match arguments.meshes.as_slice() {
-        [] => Source::built_ins(),
-        named => named
-            .iter()
-            .map(|mesh| Source::parse(mesh).map_err(Failure::usage))
-            .collect::<Result<_, _>>()?,
-    };
-    let study = study(arguments)?;
-    std::fs::create_dir_all(&arguments.out)
-        .map_err(|error| Failure::input(format!("{}: {error}", arguments.out.display())))?;
-    let versions = 1 + arguments.noise.len() * arguments.noise_seeds as usize;
-    let mut progress = Progress::new(global.quiet, sources.len() * versions * study.methods.len());
-    let mut all = Vec::new();
-    for source in &sources {
-        let input = Input::load(source)?;
-        let substrate = shape_options(&arguments.substrate)?;
-        let shape = input.shape(substrate.clone()).map_err(|error| Failure::of(source, error))?;
-        let judge = shape
-            .judge(input.axis.as_ref(), study.judge)
-            .map_err(|error| Failure::of(source, error))?;
-        let mut clean =
-            Clean { input: &input, shape: &shape, judge: &judge, initial: None, results: vec![] };
-        run_clean(&study, &mut clean, &mut all, &mut progress);
-        for &noise in &arguments.noise {
-            for seed in 1..=arguments.noise_seeds {
-                progress.at(&format!("{}: noise {noise}, seed {seed}", input.name));
-                let noisy = noisy_input(&input, noise, seed);
-                let noisy = noisy.and_then(|noisy| {
-                    let shape = noisy.shape(substrate.clone()).map_err(|e| e.to_string())?;
-                    Ok((noisy, shape))
-                });
-                run_noisy(&study, &clean, (noise, seed), noisy, &mut all, &mut progress);
-            }
-        }
-    }
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
+    let provenance = Provenance::here();
+    let items = items(arguments, global, registry, &Here::of(&provenance))?;
+    let mut store = Store::open(&arguments.out, STABILITY, &provenance.command)?;
+    store.remarks.iter().for_each(|remark| note(global, remark));
+    let (left, _) = missing(&items, &store, arguments.retry_failed);
+    let mut progress = Progress::new(global.quiet, left.len());
+    let axes = Some(arguments.out.join(FOLDER));
+    let interrupted = interrupt::listen();
+    let mut supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);
+    let ended = run_items(&left, &mut supervisor, &mut progress, &mut |item, kept: &[Kept]| {
+        let records: Vec<NoiseRecord> = kept.iter().map(|kept| noise_record(item, kept)).collect();
+        store.keep(&records)
+    });
     drop(progress);
-    write_lines(&arguments.out.join(STABILITY), &all).map_err(Failure::input)?;
-    report(arguments, &study, &all)?;
-    finish(arguments, global, &all)
+    match ended {
+        Err(PlanError::Run(RunError::Interrupted)) => {
+            say("interrupted: what was made is kept; the same command goes on from there");
+            return Ok(Exit::Interrupted);
+        }
+        ended => ended?,
+    }
+    let all: Vec<NoiseRecord> =
+        read_lines(&arguments.out.join(STABILITY)).map_err(Failure::input)?;
+    report(arguments, registry, &all)?;
+    finish(arguments, global, &items, &all)
 }
 
-fn study(arguments: &Arguments) -> Result<Study, Failure> {
-    let methods = methods(&arguments.methods)?;
-    let levels = sphere_levels(&arguments.spheres)?;
+/// The items of the clean surface and of each noisy one, mesh by mesh.
+fn items(
+    arguments: &Arguments,
+    global: &Global,
+    registry: &Registry,
+    here: &Here,
+) -> Result<Vec<Item>, Failure> {
     if let Some(noise) = arguments.noise.iter().find(|&&noise| !(noise > 0.0 && noise <= 1.0)) {
         return Err(Failure::usage(format!("--noise {noise}: a fraction above 0, at most 1")));
     }
@@ -147,175 +114,89 @@ fn study(arguments: &Arguments) -> Result<Study, Failure> {
         let message = format!("--noise-seeds {seeds}: ask for at least one, at most {MOST_SEEDS}");
         return Err(Failure::usage(message));
     }
-    let item = |method: &dyn MedialSimplifier| Item {
-        method: method.info().id.to_owned(),
-        params: Params::none(),
-        levels: levels.clone(),
+    let methods = arguments.methods.iter().map(|text| StudyMethod::parse(text));
+    let mut study = Study {
+        meshes: arguments.meshes.clone(),
+        spheres: arguments.spheres.clone(),
+        methods: methods.collect::<Result<_, _>>()?,
+        threads: global.threads,
+        ..Study::default()
     };
-    let seed = arguments.substrate.seed;
-    let quick = JudgeOptions { samples: 10_000, volume_depth: 5, seed: 0 };
-    Ok(Study {
-        items: methods.iter().map(|method| item(method.as_ref())).collect(),
-        methods,
-        judge: judge_options(&arguments.measure, quick, seed)?,
-        options: RunOptions { seed, repeat: 1, out: Some(arguments.out.join(FOLDER)) },
-        provenance: Provenance::here(),
-    })
-}
-
-fn initial_of(shape: &Shape) -> Option<Initial> {
-    shape.view().initial().ok().map(|mesh| Initial::of(&mesh, shape.expected_betti()))
-}
-
-fn run_clean(
-    study: &Study,
-    clean: &mut Clean<'_>,
-    all: &mut Vec<NoiseRecord>,
-    progress: &mut Progress,
-) {
-    let initial = initial_of(clean.shape);
-    clean.initial = initial.map(|initial| initial.spheres);
-    let measure = Measure { input: clean.input, shape: clean.shape, judge: clean.judge, initial };
-    for (method, item) in study.methods.iter().zip(&study.items) {
-        progress.at(&format!("{}: {}", clean.input.name, item.method));
-        let records = run_item(method.as_ref(), item, &measure, &study.options, &study.provenance);
-        let normal = clean.shape.normalisation();
-        clean.results.push(records.iter().map(|record| saved(study, record, normal)).collect());
-        all.extend(records.into_iter().map(|record| NoiseRecord {
-            noise: 0.0,
-            noise_seed: 0,
-            growth: clean.initial.map(|_| 1.0),
-            shift: None,
-            record: placed(record),
-        }));
-        progress.done();
-    }
-}
-
-/// The noisy surface, or why it does not bound a solid.
-fn noisy_input(clean: &Input, noise: f64, seed: u64) -> Result<Input, String> {
-    let mesh = medial_datasets::add_noise(&clean.mesh, noise, seed);
-    let report = surface::validate(&mesh).map_err(|error| error.to_string())?;
-    let mut input = Input {
-        name: format!("{}-noise-{noise}-seed-{seed}", clean.name),
-        dataset: clean.dataset.clone(),
-        hash: String::new(),
-        mesh,
-        report,
-        axis: None,
+    arguments.substrate.apply(&mut study)?;
+    arguments.measure.apply(&mut study)?;
+    let clean = study.items(registry, here)?;
+    let versions: Vec<Noise> = arguments
+        .noise
+        .iter()
+        .flat_map(|&eta| (1..=arguments.noise_seeds).map(move |seed| Noise { eta, seed }))
+        .collect();
+    let with = |items: &[Item], noise: Noise| -> Vec<Item> {
+        let mut items = items.to_vec();
+        items.iter_mut().for_each(|item| item.scene.noise = Some(noise));
+        items
     };
-    input.hash = input.surface_hash();
-    Ok(input)
-}
-
-fn run_noisy(
-    study: &Study,
-    clean: &Clean<'_>,
-    (noise, noise_seed): (f64, u64),
-    noisy: Result<(Input, Shape), String>,
-    all: &mut Vec<NoiseRecord>,
-    progress: &mut Progress,
-) {
-    // Only the measures against the clean surface count; those against the noisy one are made as
-    // cheap as can be.
-    let cheap = JudgeOptions { samples: 1, volume_depth: 0, seed: 0 };
-    let ready = noisy.and_then(|(input, shape)| {
-        let judge = shape.judge(None, cheap).map_err(|error| error.to_string())?;
-        Ok((input, shape, judge))
-    });
-    let initial = ready.as_ref().ok().and_then(|(_, shape, _)| initial_of(shape));
-    let spheres = initial.map(|initial| initial.spheres);
-    let growth = spheres.zip(clean.initial).map(|(noisy, clean)| noisy as f64 / clean as f64);
-    for (index, (method, item)) in study.methods.iter().zip(&study.items).enumerate() {
-        let records = match &ready {
-            Ok((input, shape, judge)) => {
-                let measure = Measure { input, shape, judge, initial };
-                run_item(method.as_ref(), item, &measure, &study.options, &study.provenance)
-            }
-            Err(reason) => refused_records(&clean.input.name, item, reason, &study.provenance),
-        };
-        for (level, record) in records.into_iter().enumerate() {
-            let reference = clean.results[index][level].as_ref();
-            let (record, shift) = against_clean(study, clean, record, reference);
-            all.push(NoiseRecord { noise, noise_seed, growth, shift, record });
-        }
-        progress.done();
-    }
-}
-
-/// A record of a noisy run with its measures against the clean surface, and its distances to the
-/// clean result.
-fn against_clean(
-    study: &Study,
-    clean: &Clean<'_>,
-    mut record: Record,
-    reference: Option<&MedialMesh>,
-) -> (Record, Option<AxisShift>) {
-    record.mesh.clone_from(&clean.input.name);
-    record.mesh_hash = Some(clean.input.hash.clone());
-    record.evaluate = None;
-    let Some(mesh) = saved(study, &record, clean.shape.normalisation()) else {
-        return (placed(record), None);
+    // All versions of a mesh follow each other, so that a worker has its clean results at hand.
+    let of_mesh = |items: &[Item]| -> Vec<Item> {
+        let all = [Noise { eta: 0.0, seed: 0 }].into_iter().chain(versions.iter().copied());
+        all.flat_map(|noise| with(items, noise)).collect()
     };
-    match clean.judge.evaluate(&mesh) {
-        Ok(evaluation) => record.evaluate = Some(evaluation),
-        Err(error) => record.simplify.warnings.push(format!("not measured: {error}")),
+    Ok(clean.chunk_by(|a, b| a.scene == b.scene).flat_map(of_mesh).collect())
+}
+
+fn noise_record(item: &Item, kept: &Kept) -> NoiseRecord {
+    let Noise { eta, seed } = item.scene.noise.unwrap_or(Noise { eta: 0.0, seed: 0 });
+    let part = kept.noise.as_ref();
+    NoiseRecord {
+        noise: eta,
+        noise_seed: seed,
+        growth: part.and_then(|part| part.growth),
+        shift: part.and_then(|part| part.shift),
+        record: kept.record.clone(),
     }
-    let options = AxisOptions { samples: study.judge.samples, seed: study.judge.seed };
-    let shift = reference.and_then(|clean| axis_distance(&mesh, clean, &options).ok());
-    (placed(record), shift.map(|s| AxisShift { in_space: s.in_space, with_radius: s.with_radius }))
-}
-
-/// The result of a record, in the unit of the clean surface.
-fn saved(study: &Study, record: &Record, normal: &Normalisation) -> Option<MedialMesh> {
-    let path = study.options.out.as_deref()?.join(record.artifact.as_deref()?);
-    let mesh = complex::read(path).ok()?.mesh;
-    Some(mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p)))
-}
-
-/// The record with the path of its medial mesh from the folder of the results.
-fn placed(mut record: Record) -> Record {
-    record.artifact = record.artifact.map(|path| format!("{FOLDER}/{path}"));
-    record
 }
 
 /// Adds the section to the report that is there, or writes one of the clean runs.
-fn report(arguments: &Arguments, study: &Study, all: &[NoiseRecord]) -> Result<(), Failure> {
-    let out: &Path = &arguments.out;
-    if out.join(RESULTS).exists() {
-        return rebuild(out).map(|_| ());
+fn report(
+    arguments: &Arguments,
+    registry: &Registry,
+    all: &[NoiseRecord],
+) -> Result<Rebuilt, Failure> {
+    let results = arguments.out.join(RESULTS);
+    if !results.exists() {
+        let clean = all.iter().filter(|noisy| noisy.noise == 0.0);
+        let clean: Vec<Record> = clean.map(|noisy| noisy.record.clone()).collect();
+        write_records(&results, &clean).map_err(Failure::input)?;
     }
-    let clean = all.iter().filter(|noisy| noisy.noise == 0.0);
-    let clean: Vec<Record> = clean.map(|noisy| noisy.record.clone()).collect();
-    write_records(&out.join(RESULTS), &clean).map_err(Failure::input)?;
-    let header = Header {
-        title: "Medial axis simplification: stability under noise".into(),
-        command: study.provenance.command.clone(),
-        version: study.provenance.version.clone(),
-        date: Some(today()),
-        machine: Some(study.provenance.machine.clone()),
-        methods: study.methods.iter().map(|method| method.info().into()).collect(),
-        notes: vec![],
-    };
-    write_report(out, &clean, &header).map(|_| ()).map_err(Failure::input)
+    rebuild(&arguments.out, registry)
 }
 
-fn finish(arguments: &Arguments, global: &Global, all: &[NoiseRecord]) -> Result<Exit, Failure> {
-    let measured = all.iter().filter(|noisy| noisy.record.evaluate.is_some()).count();
-    let page = arguments.out.join("index.html");
+fn finish(
+    arguments: &Arguments,
+    global: &Global,
+    items: &[Item],
+    all: &[NoiseRecord],
+) -> Result<Exit, Failure> {
+    let keys: std::collections::HashSet<String> = items.iter().flat_map(Item::keys).collect();
+    // The last record of a key counts.
+    let asked: std::collections::BTreeMap<&str, &NoiseRecord> = all
+        .iter()
+        .filter(|noisy| keys.contains(&noisy.record.key))
+        .map(|noisy| (noisy.record.key.as_str(), noisy))
+        .collect();
+    let measured = asked.values().filter(|noisy| noisy.record.evaluate.is_some()).count();
+    let (total, page) = (asked.len(), arguments.out.join("index.html"));
     if global.json {
         let records = arguments.out.join(STABILITY);
         let object = json!({
-            "records": all.len(), "measured": measured, "results": records, "page": page,
+            "records": total, "measured": measured, "results": records, "page": page,
         });
         print_json(&object, &[]);
     } else {
-        let total = all.len();
         print_line(&format!("{measured} of {total} results measured; page: {}", page.display()));
     }
     Ok(match measured {
         0 => Exit::NothingMeasured,
-        _ if measured < all.len() => Exit::SomeFailed,
+        _ if measured < total => Exit::SomeFailed,
         _ => Exit::Done,
     })
 }

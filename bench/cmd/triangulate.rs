@@ -12,7 +12,8 @@ use serde_json::{Map, json};
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
-use crate::run::{Lap, Matrix, Stopwatch, peak_bytes, read_matrix, write_cells};
+use crate::run::{Matrix, peak_bytes, read_matrix, write_cells};
+use medial::shape::Cost;
 
 /// Arguments of `triangulate`.
 #[derive(Debug, Args)]
@@ -41,16 +42,16 @@ struct Outcome {
 /// When the file is not an array of such rows, the points have no triangulation, or the output
 /// cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let (read, reading) = Stopwatch::time(|| read_points(arguments));
+    let (read, reading) = Cost::of(|| read_points(arguments));
     let (points, weights) = read?;
     let count = points.len();
-    let (outcome, triangulating) = Stopwatch::time(|| triangulate(&points, weights.as_deref()));
+    let (outcome, triangulating) = Cost::of(|| triangulate(&points, weights.as_deref()));
     let outcome = outcome.map_err(|error| failure(arguments, &error))?;
     let triangulation = &outcome.triangulation;
     let mut laps = vec![("read", reading), ("triangulate", triangulating)];
     if let Some(output) = &arguments.output {
         let rows = triangulation.finite_cells().map(|c| triangulation.vertices(c).map(|v| v.0));
-        let (written, writing) = Stopwatch::time(|| write_cells(output, rows));
+        let (written, writing) = Cost::of(|| write_cells(output, rows));
         written.map_err(Failure::input)?;
         laps.push(("write", writing));
     }
@@ -60,7 +61,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         warnings.push(format!("{n} of {count} points repeat another one and are in no cell"));
     }
     if global.json {
-        let by_stage = |value: fn(&Lap) -> f64| -> Map<_, _> {
+        let by_stage = |value: fn(&Cost) -> f64| -> Map<_, _> {
             laps.iter().map(|(stage, lap)| ((*stage).to_owned(), value(lap).into())).collect()
         };
         let object = json!({

@@ -12,7 +12,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use medial::shape::Shape;
-use medial::simplifier::LatticeVoxels;
+use medial_methods::aof::LatticeVoxels;
 use serde_json::json;
 
 use crate::exit::Failure;

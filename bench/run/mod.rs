@@ -1,25 +1,56 @@
-//! Inputs, items and records: what is run, how it is timed, what is written down.
+//! Inputs, items, workers, records: what is run, how it is timed, what is kept.
 //!
-//! A comparison is a list of [`Item`]s: one method on one input at some levels. [`run_item`] runs
-//! one and gives a [`medial_reports::Record`] for each level. An item is plain data, so that it can
-//! be handed to another process as it is.
+//! A run is a list of [`Item`]s, each plain data that decides its records. In a worker process an
+//! item takes three steps: the method answers on the clock ([`answer()`], a [`LevelRun`] for each
+//! level), its results are measured ([`judge`]), and both become records ([`record::record`]). The
+//! [`Supervisor`] gives items to workers and turns every end of one into records; the [`Store`]
+//! keeps them for ever.
+//!
+//! | files | step |
+//! |---|---|
+//! | `source`, `item`, `registry` | what is run |
+//! | `scene`, `answer`, `verdict`, `record` | the path of one item, inside a worker |
+//! | `protocol`, `serve`, `worker` | processes and what they say |
+//! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
+//! | `store` | the folder of results |
 
-mod input;
+mod answer;
+mod ending;
 mod item;
 mod npy;
 mod npy_header;
+mod plan;
 mod progress;
+mod protocol;
 mod provenance;
+pub mod record;
+mod registry;
 mod reproduce;
+mod scene;
 mod search;
-mod stopwatch;
+mod serve;
+mod source;
+mod store;
+mod study;
+mod supervise;
+mod verdict;
+mod worker;
 
-pub use input::{Input, InputError, Source};
-pub use item::{Item, Measure, RunOptions, refused_records, run_item};
+pub use answer::{Fault, LevelRun, Times, answer};
+pub use item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
 pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_npy_header};
 pub use npy_header::HeaderError;
+pub use plan::{PlanError, Tally, count, missing, run_items};
 pub use progress::Progress;
-pub use provenance::{Provenance, hex_digest, peak_bytes};
+pub use provenance::{Provenance, hex, hex_digest, peak_bytes};
+pub use record::Kept;
+pub use registry::{Entry, Registry, RegistryError};
 pub use reproduce::Reproducer;
+pub use scene::Scene;
 pub use search::{Found, search_error};
-pub use stopwatch::{Lap, Stopwatch};
+pub use serve::serve;
+pub use source::{Input, InputError, Source};
+pub use store::{AXES, RESULTS, Store, StoreError};
+pub use study::{Here, MOST_REPEATS, Study, StudyError, StudyMethod, no_such_method};
+pub use supervise::{RunError, Supervisor};
+pub use verdict::{Verdict, judge};

@@ -6,10 +6,11 @@ use std::fs;
 use std::thread;
 
 use medial_reports::Machine;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// What is the same for every record of a run.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Provenance {
     /// The machine.
     pub machine: Machine,
@@ -79,7 +80,12 @@ fn command_line() -> String {
 
 /// SHA-256 in hexadecimal.
 pub fn hex_digest(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+    hex(&Sha256::digest(bytes))
+}
+
+/// Bytes in hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
         let _ = write!(text, "{byte:02x}");
         text
     })

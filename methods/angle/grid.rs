@@ -95,7 +95,7 @@ pub(super) fn prepare(
     run: &RunContext,
 ) -> Result<Faces, SimplifyError> {
     let tree = shape.surface_tree()?;
-    let inside = InsideTest::new(shape.mesh());
+    let inside = shape.inside_test();
     let grid = Grid::new(shape, resolution);
     let toward = directions(&grid, &tree, &inside, run)?;
     let mut faces = diverging(&grid, &toward);

@@ -26,17 +26,11 @@ mod vertex;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, RunContext, Simplification,
-    SimplifyError,
+    Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::ranked::Scale;
-
-/// The angle filter as a method.
-pub struct AngleFilter {
-    info: MethodInfo,
-}
 
 /// Parameters of the angle filter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -93,29 +87,23 @@ impl AngleParams {
     }
 
     fn describe() -> Vec<ParamInfo> {
-        let param = |name, default: &str, unit, help| ParamInfo {
-            name,
-            default: default.to_owned(),
-            unit,
-            help,
-        };
         vec![
-            param(
+            ParamInfo::new(
                 "variant",
                 "vertex",
                 "vertex, facet, grid or homotopy",
                 "filter Voronoi vertices, Voronoi facets, faces between voxels, or sheets whose \
                  removal changes no topology",
             ),
-            param(
+            ParamInfo::new(
                 "at",
                 "barycentre",
                 "barycentre or minimum",
                 "facet: angle at the mean of a facet's vertices, or the smallest of the facet",
             ),
-            param(
+            ParamInfo::new(
                 "resolution",
-                &Self::default().resolution.to_string(),
+                Self::default().resolution,
                 "voxels",
                 "grid: voxels along the longest side of the bounding box",
             ),
@@ -134,53 +122,31 @@ fn scale() -> Scale {
     }
 }
 
-impl AngleFilter {
-    /// The method with its description.
-    pub fn new() -> Self {
-        Self {
-            info: MethodInfo {
-                id: "angle",
-                title: "Angle filter",
-                citation: "Attali, Montanvert 1996, Modeling noise for a better simplification of \
-                           skeletons, ICIP, doi:10.1109/ICIP.1996.560357; Foskey, Lin, Manocha 2003, \
-                           Efficient computation of a simplified medial axis, JCISE 3(4), \
-                           doi:10.1115/1.1631582",
-                summary: "Keeps the spheres whose contact points subtend the largest angles.",
-                native: Some(NativeLevel {
-                    name: "theta",
-                    unit: "degrees of separation angle",
-                    larger_is_coarser: true,
-                }),
-                published: "unsupported: the papers choose theta for each model",
-                params: AngleParams::describe(),
-            },
-        }
-    }
+/// The angle filter as a method.
+pub fn method() -> Method<AngleParams> {
+    let info = MethodInfo::new("angle", "Angle filter")
+        .citation(
+            "Attali, Montanvert 1996, Modeling noise for a better simplification of skeletons, \
+             ICIP, doi:10.1109/ICIP.1996.560357; Foskey, Lin, Manocha 2003, Efficient computation \
+             of a simplified medial axis, JCISE 3(4), doi:10.1115/1.1631582",
+        )
+        .summary("Keeps the spheres whose contact points subtend the largest angles.")
+        .native(NativeLevel::larger_is_coarser("theta", "degrees of separation angle"))
+        .published("unsupported: the papers choose theta for each model")
+        .params(AngleParams::describe());
+    Method::new(info, prepare)
 }
 
-impl Default for AngleFilter {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl MedialSimplifier for AngleFilter {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let params = params.typed::<AngleParams>()?.validate()?;
-        Ok(match params.variant {
-            Variant::Vertex => Box::new(vertex::prepare(shape)?),
-            Variant::Facet => Box::new(facet::prepare(shape, params.at)?),
-            Variant::Grid => Box::new(grid::prepare(shape, params.resolution, run)?),
-            Variant::Homotopy => Box::new(homotopy::prepare(shape, run)?),
-        })
-    }
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: AngleParams,
+    run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let params = params.validate()?;
+    Ok(match params.variant {
+        Variant::Vertex => Box::new(vertex::prepare(shape)?),
+        Variant::Facet => Box::new(facet::prepare(shape, params.at)?),
+        Variant::Grid => Box::new(grid::prepare(shape, params.resolution, run)?),
+        Variant::Homotopy => Box::new(homotopy::prepare(shape, run)?),
+    })
 }

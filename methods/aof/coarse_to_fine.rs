@@ -13,6 +13,7 @@
 //!
 //! Blocks are independent; they run in parallel and are collected in order.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use medial::Vec3;
@@ -38,7 +39,7 @@ pub struct Surface {
     /// Closest points.
     pub triangles: NearbyTriangles,
     /// Which side.
-    pub inside: InsideTest,
+    pub inside: Arc<InsideTest>,
 }
 
 /// What to find out about the voxels.

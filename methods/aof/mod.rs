@@ -13,7 +13,8 @@
 //! 5. At the finest level voxels with `AOF' <= -1/8 sin alpha` are kept (proposition 5.1), or the
 //!    others deleted where they are simple (section 6.3), or the voxels thinned by flux.
 //! 6. A sphere for each voxel, moved onto the axis; edges and triangles between neighbours, with
-//!    the Betti numbers of the voxels. The voxels themselves are in [`Extras`].
+//!    the Betti numbers of the voxels. The voxels themselves are in [`Extras`], as
+//!    [`LatticeVoxels`].
 //!
 //! # Notation
 //!
@@ -52,6 +53,7 @@ mod coarse_to_fine;
 mod count;
 mod flux;
 mod grid;
+mod lattice;
 mod output;
 mod params;
 mod queue;
@@ -67,10 +69,9 @@ use std::sync::Arc;
 use medial::geometry::{NearbyTriangles, TriangleBvh};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext, Simplification,
+    Capability, Extras, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification,
     Simplified, SimplifyError,
 };
-use medial::surface::InsideTest;
 
 use count::Lattices;
 
@@ -78,6 +79,7 @@ pub use bricks::{Bricks, Place, Voxel};
 pub use coarse_to_fine::{Descent, Surface, Tally, Wanted, coarse_to_fine};
 pub use flux::{Probe, Sphere};
 pub use grid::Grid;
+pub use lattice::{LatticeVoxel, LatticeVoxels};
 pub use params::{AofParams, Start, Variant};
 pub use refine::{Refined, refine};
 pub use simple::{SimpleTable, is_simple};
@@ -85,68 +87,43 @@ pub use solid::{Axis, Base, Solid};
 pub use spiral::Spiral;
 pub use thinning::{Order, is_end_point, thin};
 
+/// Name of the extra that holds the [`LatticeVoxels`].
+pub const VOXELS: &str = "voxels";
+
 /// The average outward flux as a method.
 ///
 /// Answers every level. Cost `O(V N)` closest points for `V` voxels, memory `O(V)`.
-#[derive(Clone, Debug)]
-pub struct AverageOutwardFlux {
-    info: MethodInfo,
+pub fn method() -> Method<AofParams> {
+    let info = MethodInfo::new("aof", "Average outward flux")
+        .citation(
+            "Svetlana Stolpner, Kaleem Siddiqi 2006. Revealing Significant Medial Structure in \
+             Polyhedral Meshes. 3DPVT. https://doi.org/10.1109/3DPVT.2006.117",
+        )
+        .summary(
+            "Keeps the voxels into which the gradient of the distance flows, coarse to fine, \
+             straight from the surface.",
+        )
+        .native(NativeLevel::larger_is_coarser("alpha", "degrees of object angle"))
+        .published(
+            "the object angle of the parameter `angle`: the paper chooses one for each model",
+        )
+        .params(AofParams::describe())
+        .extra(Capability::new(VOXELS, "the voxels that the spheres stand for, with their flux"));
+    Method::new(info, prepare)
 }
 
-impl Default for AverageOutwardFlux {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl AverageOutwardFlux {
-    /// The method.
-    pub fn new() -> Self {
-        let info = MethodInfo {
-            id: "aof",
-            title: "Average outward flux",
-            citation: "Svetlana Stolpner, Kaleem Siddiqi 2006. Revealing Significant Medial \
-                       Structure in Polyhedral Meshes. 3DPVT. https://doi.org/10.1109/3DPVT.2006.117",
-            summary: "Keeps the voxels into which the gradient of the distance flows, coarse to \
-                      fine, straight from the surface.",
-            native: Some(NativeLevel {
-                name: "alpha",
-                unit: "degrees of object angle",
-                larger_is_coarser: true,
-            }),
-            published: "the object angle of the parameter `angle`: the paper chooses one for each \
-                        model",
-            params: AofParams::describe(),
-        };
-        Self { info }
-    }
-}
-
-impl MedialSimplifier for AverageOutwardFlux {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn has_voxels(&self) -> bool {
-        true
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let params = params.typed::<AofParams>()?.validate()?;
-        let tree = shape.surface_tree()?;
-        let surface = Surface {
-            triangles: NearbyTriangles::new(shape.mesh()),
-            inside: InsideTest::new(shape.mesh()),
-        };
-        let solid = Solid::new(shape, surface, params, run.clone());
-        let base = solid.base()?;
-        Ok(Box::new(Prepared { solid, tree, base, lattices: Lattices::new() }))
-    }
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: AofParams,
+    run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let params = params.validate()?;
+    let tree = shape.surface_tree()?;
+    let surface =
+        Surface { triangles: NearbyTriangles::new(shape.mesh()), inside: shape.inside_test() };
+    let solid = Solid::new(shape, surface, params, run.clone());
+    let base = solid.base()?;
+    Ok(Box::new(Prepared { solid, tree, base, lattices: Lattices::new() }))
 }
 
 /// One shape at the resolution of the parameters.
@@ -186,7 +163,7 @@ impl Simplification for Prepared<'_> {
             native_level: native,
             work: lattices.work(),
             diagnostics,
-            extras: Extras { voxels: Some(axis.lattice_voxels().into()), ..Extras::default() },
+            extras: Extras::with(axis.lattice_voxels()),
         })
     }
 }

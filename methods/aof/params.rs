@@ -154,68 +154,67 @@ impl AofParams {
 
     pub(super) fn describe() -> Vec<ParamInfo> {
         let defaults = Self::default();
-        let info = |name, default: String, unit, help| ParamInfo { name, default, unit, help };
         vec![
-            info(
+            ParamInfo::new(
                 "resolution",
-                defaults.resolution.to_string(),
+                defaults.resolution,
                 "voxels",
                 "voxels along the longest side of the bounding box, at the finest level",
             ),
-            info("d", defaults.d.to_string(), "number", "each voxel is split into d x d x d"),
-            info(
+            ParamInfo::new("d", defaults.d, "number", "each voxel is split into d x d x d"),
+            ParamInfo::new(
                 "levels",
-                defaults.levels.to_string(),
+                defaults.levels,
                 "number",
                 "levels of resolution, from coarse to fine",
             ),
-            info(
+            ParamInfo::new(
                 "samples",
                 defaults.samples,
                 "numbers",
                 "samples on each sphere, from the coarsest level to the finest",
             ),
-            info(
+            ParamInfo::new(
                 "angle",
-                defaults.angle.to_string(),
+                defaults.angle,
                 "degrees",
                 "object angle of the sheets that are kept, when no level names one",
             ),
-            info(
+            ParamInfo::new(
                 "mu",
-                defaults.mu.to_string(),
+                defaults.mu,
                 "pure number",
                 "factor of the threshold -mu sin(angle); 0 is 0.125 for plain and homotopy, where a \
                  sheet anywhere in a voxel keeps it, and 0.375 for the end points of thinning",
             ),
-            info(
+            ParamInfo::new(
                 "variant",
-                "thinning".into(),
+                "thinning",
                 "plain, homotopy or thinning",
                 "keep by threshold; delete simple voxels alone, outermost first; or thin by flux",
             ),
-            info(
+            ParamInfo::new(
                 "spiral",
-                "equal-area".into(),
+                "equal-area",
                 "equal-area or classic",
                 "how the samples lie on the sphere",
             ),
-            info(
+            ParamInfo::new(
                 "start",
-                "fine".into(),
+                "fine",
                 "fine or coarse",
                 "begin with the voxels whose spheres fit inside at the finest level, or at the \
                  coarsest as in the paper",
             ),
-            info(
+            ParamInfo::new(
                 "refine",
-                defaults.refine.to_string(),
+                defaults.refine,
                 "true or false",
                 "move centres onto the axis, between opposite closest points",
             ),
-            info(
+            ParamInfo::new(
                 "max_memory",
-                defaults.max_memory.to_string(),
+                defaults.max_memory,
                 "megabytes",
                 "limit of the memory for voxels",
             ),

@@ -4,7 +4,7 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere as Ball, cubical_betti};
 use medial::geometry::TriangleBvh;
 use medial::shape::Shape;
-use medial::simplifier::{Diagnostics, LatticeVoxel, LatticeVoxels, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
 use rayon::prelude::*;
 
@@ -12,6 +12,7 @@ use super::bricks::{Bricks, Place, Voxel};
 use super::coarse_to_fine::{Descent, Surface, Wanted, coarse_to_fine};
 use super::flux::Sphere;
 use super::grid::Grid;
+use super::lattice::{LatticeVoxel, LatticeVoxels};
 use super::output::{medial_mesh, sorted};
 use super::params::{AofParams, Variant};
 use super::refine::refine;

@@ -44,19 +44,14 @@ use medial::Vec3;
 use medial::complex::VoronoiFacets;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, RunContext,
-    Simplification, SimplifyError,
+    Diagnostics, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification,
+    SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::ranked::Scale;
 use crate::ranked_facets::{FacetSet, FacetValue, RankedFacets};
 use umbrella::{Place, Umbrellas};
-
-/// The Voronoi subcomplex as a method.
-pub struct DeyZhao {
-    info: MethodInfo,
-}
 
 /// Parameters of the Voronoi subcomplex; the default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,13 +98,12 @@ impl DeyZhaoParams {
 
     fn describe() -> Vec<ParamInfo> {
         let Self { theta, rho, .. } = Self::default();
-        let param = |name, default: String, unit, help| ParamInfo { name, default, unit, help };
         vec![
-            param("theta", theta.to_string(), "degrees", "theta_0 of the angle condition"),
-            param("rho", rho.to_string(), "", "rho_0 of the ratio condition"),
-            param(
+            ParamInfo::new("theta", theta, "degrees", "theta_0 of the angle condition"),
+            ParamInfo::new("rho", rho, "", "rho_0 of the ratio condition"),
+            ParamInfo::new(
                 "condition",
-                "both".into(),
+                "both",
                 "both | angle | ratio",
                 "conditions that are tested; the paper's figures show each alone",
             ),
@@ -117,59 +111,45 @@ impl DeyZhaoParams {
     }
 }
 
-impl DeyZhao {
-    /// The method with its description.
-    pub fn new() -> Self {
-        Self {
-            info: MethodInfo {
-                id: "dey-zhao",
-                title: "Dey-Zhao Voronoi subcomplex",
-                citation: "Dey, Zhao 2002, Approximate medial axis as a Voronoi subcomplex, ACM \
-                           Solid Modeling, doi:10.1145/566282.566333",
-                summary: "Keeps the Voronoi facets whose Delaunay edge is steep to the surface, or \
-                          long beside the samples' spacing.",
-                native: Some(NativeLevel {
-                    name: "strength",
-                    unit: "multiple of the paper's two thresholds",
-                    larger_is_coarser: true,
-                }),
-                published: "the paper's constants, strength 1; for other counts both thresholds \
-                            are strengthened together, which is not in the paper",
-                params: DeyZhaoParams::describe(),
-            },
-        }
-    }
+/// The Voronoi subcomplex as a method.
+pub fn method() -> Method<DeyZhaoParams> {
+    let info = MethodInfo::new("dey-zhao", "Dey-Zhao Voronoi subcomplex")
+        .citation(
+            "Dey, Zhao 2002, Approximate medial axis as a Voronoi subcomplex, ACM Solid Modeling, \
+             doi:10.1145/566282.566333",
+        )
+        .summary(
+            "Keeps the Voronoi facets whose Delaunay edge is steep to the surface, or long beside \
+             the samples' spacing.",
+        )
+        .native(NativeLevel::larger_is_coarser(
+            "strength",
+            "multiple of the paper's two thresholds",
+        ))
+        .published(
+            "the paper's constants, strength 1; for other counts both thresholds are strengthened \
+             together, which is not in the paper",
+        )
+        .params(DeyZhaoParams::describe());
+    Method::new(info, prepare)
 }
 
-impl Default for DeyZhao {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl MedialSimplifier for DeyZhao {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        _run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let params = params.typed::<DeyZhaoParams>()?.validate()?;
-        let set = FacetSet::of(shape)?;
-        let delaunay = shape.delaunay()?;
-        let umbrellas = Umbrellas::new(&delaunay, shape.cells()?.circumspheres());
-        let mut diagnostics = Diagnostics::default();
-        diagnostics.count("samples_without_umbrella", umbrellas.missing());
-        diagnostics.count("umbrella_triangles_without_area", umbrellas.flat());
-        let scale =
-            Scale { name: "strength", range: 0.0..=f64::MAX, inclusive: false, no_published: "" };
-        let strength = Strength { facets: set.facets.clone(), umbrellas, params };
-        Ok(Box::new(RankedFacets::new(set, strength, scale, Some(1.0), diagnostics)))
-    }
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: DeyZhaoParams,
+    _run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let params = params.validate()?;
+    let set = FacetSet::of(shape)?;
+    let delaunay = shape.delaunay()?;
+    let umbrellas = Umbrellas::new(&delaunay, shape.cells()?.circumspheres());
+    let mut diagnostics = Diagnostics::default();
+    diagnostics.count("samples_without_umbrella", umbrellas.missing());
+    diagnostics.count("umbrella_triangles_without_area", umbrellas.flat());
+    let scale =
+        Scale { name: "strength", range: 0.0..=f64::MAX, inclusive: false, no_published: "" };
+    let strength = Strength { facets: set.facets.clone(), umbrellas, params };
+    Ok(Box::new(RankedFacets::new(set, strength, scale, Some(1.0), diagnostics)))
 }
 
 /// Step 3.

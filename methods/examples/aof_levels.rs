@@ -11,7 +11,7 @@ use std::time::Instant;
 use medial::geometry::NearbyTriangles;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Params, RunContext};
-use medial::surface::{self, InsideTest};
+use medial::surface;
 use medial_methods::aof::{AofParams, Solid, Surface, Wanted};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -31,10 +31,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     for name in names {
         let params: AofParams = given.typed()?;
         let shape = shape(name)?;
-        let surface = Surface {
-            triangles: NearbyTriangles::new(shape.mesh()),
-            inside: InsideTest::new(shape.mesh()),
-        };
+        let surface =
+            Surface { triangles: NearbyTriangles::new(shape.mesh()), inside: shape.inside_test() };
         let solid = Solid::new(&shape, surface, params.clone(), RunContext::default());
         let (clock, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
         let wanted = if params.variant == medial_methods::aof::Variant::Plain {

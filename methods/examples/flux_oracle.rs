@@ -22,7 +22,7 @@ use medial::Vec3;
 use medial::geometry::{NearBatch, NearSet, NearbyTriangles};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::RunContext;
-use medial::surface::{self, InsideTest, TriMesh};
+use medial::surface::{self, TriMesh};
 use medial_methods::aof::{AofParams, Probe, Solid, Sphere, Spiral, Surface, Variant, Wanted};
 
 /// Samples of the finest level.
@@ -62,10 +62,8 @@ fn shape(name: &str) -> Result<Shape, Box<dyn Error>> {
 }
 
 fn solid(shape: &Shape) -> Solid<'_> {
-    let surface = Surface {
-        triangles: NearbyTriangles::new(shape.mesh()),
-        inside: InsideTest::new(shape.mesh()),
-    };
+    let surface =
+        Surface { triangles: NearbyTriangles::new(shape.mesh()), inside: shape.inside_test() };
     let params = AofParams {
         levels: 1,
         samples: SAMPLES.to_string(),

@@ -116,8 +116,8 @@ use medial::complex::MedialMesh;
 use medial::complex::collapse::replay;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError, Work,
+    Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification,
+    Simplified, SimplifyError, Work,
 };
 
 pub use params::{HemParams, Inside};
@@ -137,76 +137,51 @@ const PUBLISHED: f64 = 1e-4;
 /// ```
 /// use medial::shape::{Shape, ShapeOptions};
 /// use medial::simplifier::{Level, MedialSimplifier, Params, RunContext};
-/// use medial_methods::hem::Hem;
 ///
 /// let mesh = medial_datasets::find("capsule").unwrap().mesh(16);
 /// let report = medial::surface::validate(&mesh)?;
 /// let shape = Shape::new("capsule", &mesh, report, ShapeOptions::default())?;
-/// let mut hem = Hem::new().prepare(&shape, &Params::none(), &RunContext::default())?;
+/// let mut hem = medial_methods::hem::method().prepare(&shape, &Params::none(), &RunContext::default())?;
 /// let coarse = hem.at(Level::Native(0.02))?;
 /// assert!(coarse.mesh.spheres.len() < 40);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug)]
-pub struct Hem {
-    info: MethodInfo,
+pub fn method() -> Method<HemParams> {
+    let info = MethodInfo::new("hem", "HEM")
+        .citation(
+            "Feng Sun, Yi-King Choi, Yizhou Yu, Wenping Wang 2016. Medial Meshes - A Compact and \
+             Accurate Representation of Medial Axis Transform. IEEE Transactions on Visualization \
+             and Computer Graphics 22(3). https://doi.org/10.1109/TVCG.2015.2448080",
+        )
+        .summary(
+            "Collapses the edges of the medial mesh in the order of the Hausdorff error from the \
+             boundary samples to the primitives around the surviving end.",
+        )
+        .native(NativeLevel::larger_is_coarser("epsilon", "fraction of the diagonal"))
+        .published(
+            "before the first collapse of a local error above 1e-4 of the diagonal, the default \
+             of the authors' code; the error of the whole is measured, not held",
+        )
+        .params(HemParams::describe());
+    Method::new(info, prepare)
 }
 
-impl Default for Hem {
-    fn default() -> Self {
-        Self::new()
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: HemParams,
+    run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let initial = shape.initial()?;
+    if initial.spheres.is_empty() {
+        return Err(ShapeError::EmptyMedialMesh.into());
     }
-}
-
-impl Hem {
-    /// The method.
-    pub fn new() -> Self {
-        let info = MethodInfo {
-            id: "hem",
-            title: "HEM",
-            citation: "Feng Sun, Yi-King Choi, Yizhou Yu, Wenping Wang 2016. Medial Meshes - A \
-                       Compact and Accurate Representation of Medial Axis Transform. IEEE \
-                       Transactions on Visualization and Computer Graphics 22(3). \
-                       https://doi.org/10.1109/TVCG.2015.2448080",
-            summary: "Collapses the edges of the medial mesh in the order of the Hausdorff error \
-                      from the boundary samples to the primitives around the surviving end.",
-            native: Some(NativeLevel {
-                name: "epsilon",
-                unit: "fraction of the diagonal",
-                larger_is_coarser: true,
-            }),
-            published: "before the first collapse of a local error above 1e-4 of the diagonal, the \
-                        default of the authors' code; the error of the whole is measured, not held",
-            params: HemParams::describe(),
-        };
-        Self { info }
-    }
-}
-
-impl MedialSimplifier for Hem {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let params = params.typed::<HemParams>()?;
-        let initial = shape.initial()?;
-        if initial.spheres.is_empty() {
-            return Err(ShapeError::EmptyMedialMesh.into());
-        }
-        run.step(0, initial.spheres.len())?;
-        let mut remarks = Diagnostics::default();
-        let samples = SampleLists::of_contacts(&shape.contacts(&initial, &mut remarks)?);
-        let contraction = Contraction::new(&initial, samples.clone(), params);
-        let run = run.clone();
-        let asked = false;
-        Ok(Box::new(Prepared { initial, samples, params, run, remarks, contraction, asked }))
-    }
+    run.step(0, initial.spheres.len())?;
+    let mut remarks = Diagnostics::default();
+    let samples = SampleLists::of_contacts(&shape.contacts(&initial, &mut remarks)?);
+    let contraction = Contraction::new(&initial, samples.clone(), params);
+    let run = run.clone();
+    let asked = false;
+    Ok(Box::new(Prepared { initial, samples, params, run, remarks, contraction, asked }))
 }
 
 /// One shape, as far as it was contracted.

@@ -25,12 +25,12 @@ pub enum Inside {
 
 impl HemParams {
     pub(super) fn describe() -> Vec<ParamInfo> {
-        vec![ParamInfo {
-            name: "inside",
-            default: "depth".into(),
-            unit: "depth or surface",
-            help: "error of a sample inside the union: its depth in the deepest primitive, or its \
-                   distance to the nearest surface of a primitive, be it buried",
-        }]
+        vec![ParamInfo::new(
+            "inside",
+            "depth",
+            "depth or surface",
+            "error of a sample inside the union: its depth in the deepest primitive, or its \
+             distance to the nearest surface of a primitive, be it buried",
+        )]
     }
 }

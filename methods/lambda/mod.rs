@@ -24,17 +24,11 @@ mod vertex;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, RunContext, Simplification,
-    SimplifyError,
+    Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::ranked::Scale;
-
-/// The lambda-medial axis as a method.
-pub struct LambdaMedialAxis {
-    info: MethodInfo,
-}
 
 /// Parameters of the lambda-medial axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,20 +58,14 @@ impl Default for LambdaParams {
 
 impl LambdaParams {
     fn describe() -> Vec<ParamInfo> {
-        let param = |name, default: &str, unit, help| ParamInfo {
-            name,
-            default: default.to_owned(),
-            unit,
-            help,
-        };
         vec![
-            param(
+            ParamInfo::new(
                 "variant",
                 "vertex",
                 "vertex or cell",
                 "filter Voronoi vertices, or Voronoi facets, edges and vertices each by its value",
             ),
-            param(
+            ParamInfo::new(
                 "leftovers",
                 "true",
                 "true or false",
@@ -99,50 +87,28 @@ fn scale() -> Scale {
     }
 }
 
-impl LambdaMedialAxis {
-    /// The method with its description.
-    pub fn new() -> Self {
-        Self {
-            info: MethodInfo {
-                id: "lambda",
-                title: "Lambda-medial axis",
-                citation: "Chazal, Lieutier 2005, The lambda-medial axis, Graphical Models 67(4), \
-                           doi:10.1016/j.gmod.2005.01.002",
-                summary: "Keeps the spheres whose contact points need the largest enclosing balls.",
-                native: Some(NativeLevel {
-                    name: "lambda",
-                    unit: "fraction of the bounding-box diagonal",
-                    larger_is_coarser: true,
-                }),
-                published: "unsupported: the paper gives no universal lambda",
-                params: LambdaParams::describe(),
-            },
-        }
-    }
+/// The lambda-medial axis as a method.
+pub fn method() -> Method<LambdaParams> {
+    let info = MethodInfo::new("lambda", "Lambda-medial axis")
+        .citation(
+            "Chazal, Lieutier 2005, The lambda-medial axis, Graphical Models 67(4), \
+             doi:10.1016/j.gmod.2005.01.002",
+        )
+        .summary("Keeps the spheres whose contact points need the largest enclosing balls.")
+        .native(NativeLevel::larger_is_coarser("lambda", "fraction of the bounding-box diagonal"))
+        .published("unsupported: the paper gives no universal lambda")
+        .params(LambdaParams::describe());
+    Method::new(info, prepare)
 }
 
-impl Default for LambdaMedialAxis {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl MedialSimplifier for LambdaMedialAxis {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        _run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let params = params.typed::<LambdaParams>()?;
-        Ok(match params.variant {
-            Variant::Vertex => Box::new(vertex::prepare(shape)?),
-            Variant::Cell if params.leftovers => Box::new(cell::prepare(shape)?),
-            Variant::Cell => Box::new(cell::prepare_facets(shape)?),
-        })
-    }
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: LambdaParams,
+    _run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    Ok(match params.variant {
+        Variant::Vertex => Box::new(vertex::prepare(shape)?),
+        Variant::Cell if params.leftovers => Box::new(cell::prepare(shape)?),
+        Variant::Cell => Box::new(cell::prepare_facets(shape)?),
+    })
 }

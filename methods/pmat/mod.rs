@@ -53,95 +53,69 @@ use std::sync::Arc;
 use medial::complex::collapse::Hierarchy;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError, Work,
+    Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, NoParams, Params,
+    RunContext, Simplification, Simplified, SimplifyError, Work,
 };
-use serde::Deserialize;
 
 pub use cost::absorption_scale;
 
 use cost::{Key, absorbed_first};
 
+/// Name of the extra that holds all levels as a [`Hierarchy`], for [`resume`].
+pub const HIERARCHY: &str = "hierarchy";
+
 /// Progressive medial axis filtration as a method.
 ///
 /// Builds the whole hierarchy once, in `O(n log n)` for an initial mesh of bounded degree; then
 /// each level costs in proportion to its own size.
-#[derive(Clone, Debug)]
-pub struct Pmat {
-    info: MethodInfo,
+pub fn method() -> Method<NoParams> {
+    let info = MethodInfo::new("pmat", "PMAT")
+        .citation(
+            "Noura Faraj, Jean-Marc Thiery, Tamy Boubekeur 2013. Progressive Medial Axis \
+             Filtration. SIGGRAPH Asia 2013 Technical Briefs. \
+             https://doi.org/10.1145/2542355.2542359",
+        )
+        .summary(
+            "Collapses each edge into its larger sphere, in the order of the scales at which that \
+             absorbs the smaller one: the scale axis as a hierarchy.",
+        )
+        .native(NativeLevel::larger_is_coarser("s", "factor by which all balls grow, at least 1"))
+        .published(
+            "the end of the algorithm, where no edge is left, with the whole hierarchy; the paper \
+             picks scales by eye for each shape",
+        )
+        .extra(Capability::new(HIERARCHY, "all levels at once, to go on from without the shape"));
+    Method::new(info, prepare)
 }
 
-/// The method is free of parameters, as its paper says.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PmatParams {}
-
-impl Default for Pmat {
-    fn default() -> Self {
-        Self::new()
+fn prepare<'s>(
+    shape: &'s Shape,
+    _: NoParams,
+    run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let initial = shape.initial()?;
+    if initial.spheres.is_empty() {
+        return Err(ShapeError::EmptyMedialMesh.into());
     }
+    run.step(0, initial.spheres.len())?;
+    let steps = contract::contract(&initial, run)?;
+    let hierarchy = Hierarchy::new(initial, steps)
+        .map_err(|error| SimplifyError::Hierarchy(error.to_string()))?;
+    Ok(Box::new(Levels::new(Arc::new(hierarchy))))
 }
 
-impl Pmat {
-    /// The method with its description.
-    pub fn new() -> Self {
-        let info = MethodInfo {
-            id: "pmat",
-            title: "PMAT",
-            citation: "Noura Faraj, Jean-Marc Thiery, Tamy Boubekeur 2013. Progressive Medial Axis \
-                       Filtration. SIGGRAPH Asia 2013 Technical Briefs. \
-                       https://doi.org/10.1145/2542355.2542359",
-            summary: "Collapses each edge into its larger sphere, in the order of the scales at \
-                      which that absorbs the smaller one: the scale axis as a hierarchy.",
-            native: Some(NativeLevel {
-                name: "s",
-                unit: "factor by which all balls grow, at least 1",
-                larger_is_coarser: true,
-            }),
-            published: "the end of the algorithm, where no edge is left, with the whole hierarchy; \
-                        the paper picks scales by eye for each shape",
-            params: vec![],
-        };
-        Self { info }
-    }
-}
-
-impl MedialSimplifier for Pmat {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let PmatParams {} = params.typed()?;
-        let initial = shape.initial()?;
-        if initial.spheres.is_empty() {
-            return Err(ShapeError::EmptyMedialMesh.into());
-        }
-        run.step(0, initial.spheres.len())?;
-        let steps = contract::contract(&initial, run)?;
-        let hierarchy = Hierarchy::new(initial, steps)
-            .map_err(|error| SimplifyError::Hierarchy(error.to_string()))?;
-        Ok(Box::new(Levels::new(Arc::new(hierarchy))))
-    }
-
-    fn has_hierarchy(&self) -> bool {
-        true
-    }
-
-    fn resume(
-        &self,
-        hierarchy: Arc<Hierarchy>,
-        params: &Params,
-    ) -> Result<Box<dyn Simplification>, SimplifyError> {
-        let PmatParams {} = params.typed()?;
-        check_origin(&hierarchy).map_err(SimplifyError::Hierarchy)?;
-        Ok(Box::new(Levels::new(hierarchy)))
-    }
+/// The levels of a hierarchy that an earlier run gave among its extras, without the shape.
+///
+/// # Errors
+/// [`SimplifyError::Hierarchy`] when it is not one of this method, [`SimplifyError::Parameter`]
+/// when a parameter is set.
+pub fn resume(
+    hierarchy: Arc<Hierarchy>,
+    params: &Params,
+) -> Result<Box<dyn Simplification>, SimplifyError> {
+    let NoParams {} = params.typed()?;
+    check_origin(&hierarchy).map_err(SimplifyError::Hierarchy)?;
+    Ok(Box::new(Levels::new(hierarchy)))
 }
 
 /// Whether the steps of a hierarchy are those of this method, as far as each tells for itself.
@@ -239,13 +213,15 @@ impl Simplification for Levels {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let stage = self.stage_of(level)?;
         let scale = self.scale_at(stage);
+        let mut extras = Extras::default();
+        extras.insert_shared(Arc::clone(&self.hierarchy));
         Ok(Simplified {
             mesh: self.hierarchy.stage(stage).to_mesh(),
             asked: level,
             native_level: scale.is_finite().then_some(scale),
             work: Work::Anew,
             diagnostics: self.diagnose(level, stage),
-            extras: Extras { hierarchy: Some(Arc::clone(&self.hierarchy)), ..Extras::default() },
+            extras,
         })
     }
 }

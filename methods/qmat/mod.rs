@@ -69,8 +69,8 @@ use std::sync::Arc;
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, Params, RunContext, Simplification,
-    Simplified, SimplifyError, Work,
+    Diagnostics, Extras, Level, Method, MethodInfo, RunContext, Simplification, Simplified,
+    SimplifyError, Work,
 };
 
 pub use params::{Boundary, QmatParams, TopologyFrom};
@@ -84,57 +84,37 @@ const PUBLISHED: usize = 100;
 ///
 /// Answers [`Level::Spheres`]; a request finer than the one before starts anew. Cost
 /// `O(n log n)` for an initial mesh of bounded degree.
-#[derive(Clone, Debug)]
-pub struct Qmat {
-    info: MethodInfo,
+pub fn method() -> Method<QmatParams> {
+    let info = MethodInfo::new("qmat", "Q-MAT")
+        .citation(
+            "Pan Li, Bin Wang, Feng Sun, Xiaohu Guo, Caiming Zhang, Wenping Wang 2015. Q-MAT: \
+             Computing Medial Axis Transform by Quadratic Error Minimization. ACM Transactions on \
+             Graphics 35(1). https://doi.org/10.1145/2753755",
+        )
+        .summary(
+            "Collapses the edges of the medial mesh by slab quadric error and stability ratio, \
+             each merged sphere placed where its error is least.",
+        )
+        .published(
+            "100 spheres: the paper leaves the count to the user, its Table II compares at 100",
+        )
+        .params(QmatParams::describe());
+    Method::new(info, prepare)
 }
 
-impl Default for Qmat {
-    fn default() -> Self {
-        Self::new()
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: QmatParams,
+    run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let params = params.validate()?;
+    let initial = shape.initial()?;
+    if initial.spheres.is_empty() {
+        return Err(ShapeError::EmptyMedialMesh.into());
     }
-}
-
-impl Qmat {
-    /// The method.
-    pub fn new() -> Self {
-        let info = MethodInfo {
-            id: "qmat",
-            title: "Q-MAT",
-            citation: "Pan Li, Bin Wang, Feng Sun, Xiaohu Guo, Caiming Zhang, Wenping Wang 2015. \
-                       Q-MAT: Computing Medial Axis Transform by Quadratic Error Minimization. ACM \
-                       Transactions on Graphics 35(1). https://doi.org/10.1145/2753755",
-            summary: "Collapses the edges of the medial mesh by slab quadric error and stability \
-                      ratio, each merged sphere placed where its error is least.",
-            native: None,
-            published: "100 spheres: the paper leaves the count to the user, its Table II compares \
-                        at 100",
-            params: QmatParams::describe(),
-        };
-        Self { info }
-    }
-}
-
-impl MedialSimplifier for Qmat {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let params = params.typed::<QmatParams>()?.validate()?;
-        let initial = shape.initial()?;
-        if initial.spheres.is_empty() {
-            return Err(ShapeError::EmptyMedialMesh.into());
-        }
-        run.step(0, initial.spheres.len())?;
-        let contraction = Contraction::new(&initial, params);
-        Ok(Box::new(Prepared { initial, params, run: run.clone(), contraction, asked: false }))
-    }
+    run.step(0, initial.spheres.len())?;
+    let contraction = Contraction::new(&initial, params);
+    Ok(Box::new(Prepared { initial, params, run: run.clone(), contraction, asked: false }))
 }
 
 /// One shape, as far as it was contracted.

@@ -121,33 +121,32 @@ impl QmatParams {
 
     pub(super) fn describe() -> Vec<ParamInfo> {
         let defaults = Self::default();
-        let info = |name, default: String, unit, help| ParamInfo { name, default, unit, help };
         vec![
-            info(
+            ParamInfo::new(
                 "k",
                 format!("{:e}", defaults.k),
                 "squared fraction of the diagonal",
                 "added to the error of every edge: the larger, the earlier spikes go (equation 8)",
             ),
-            info(
+            ParamInfo::new(
                 "boundary",
-                "paper".into(),
+                "paper",
                 "paper, legacy or none",
                 "planes that keep stable boundaries from shrinking (section 4.4)",
             ),
-            info(
+            ParamInfo::new(
                 "k_boundary",
-                defaults.k_boundary.to_string(),
+                defaults.k_boundary,
                 "pure number",
                 "weight k' of the boundary planes",
             ),
-            info(
+            ParamInfo::new(
                 "topology_from",
-                "200".into(),
+                "200",
                 "spheres, or all, or never",
                 "from this count on a collapse has to satisfy the link condition (section 4.5)",
             ),
-            info(
+            ParamInfo::new(
                 "singular_ratio",
                 format!("{:e}", defaults.singular_ratio),
                 "pure number in [0, 1)",

@@ -257,6 +257,6 @@ fn parameters_are_typed_and_checked() {
         assert!(error.starts_with("parameter: "), "{error}");
     }
     for described in QmatParams::describe() {
-        assert_eq!(typed(described.name, &described.default).unwrap(), QmatParams::default());
+        assert_eq!(typed(&described.name, &described.default).unwrap(), QmatParams::default());
     }
 }

@@ -43,8 +43,8 @@ use std::sync::Arc;
 use medial::complex::{AxisTally, MedialMesh, Sphere, UnionAxis, betti};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
 
 use crate::perturb::perturbed;
@@ -62,55 +62,35 @@ const LARGEST_SCALE: f64 = 1e6;
 ///
 /// Answers all levels. Each scale costs one regular and one Delaunay triangulation, and the memory
 /// of its axis for as long as levels can be asked.
-#[derive(Clone, Debug)]
-pub struct Sat {
-    info: MethodInfo,
+pub fn method() -> Method<SatParams> {
+    let info = MethodInfo::new("sat", "Scale axis transform")
+        .citation(
+            "Joachim Giesen, Balint Miklos, Mark Pauly, Camille Wormser 2009. The scale axis \
+             transform. Symposium on Computational Geometry. \
+             https://doi.org/10.1145/1542362.1542388; Balint Miklos, Joachim Giesen, Mark Pauly \
+             2010. Discrete scale axis representations for 3D geometry. ACM Transactions on \
+             Graphics 29(4). https://doi.org/10.1145/1778765.1778838",
+        )
+        .summary(
+            "Grows all polar balls by a factor, takes the medial axis of their union, and shrinks \
+             its balls back.",
+        )
+        .native(NativeLevel::larger_is_coarser("s", "scale factor"))
+        .published("s = 1.1, the default of the authors' tool, without its angle filter")
+        .params(SatParams::describe());
+    Method::new(info, prepare)
 }
 
-impl Default for Sat {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Sat {
-    /// The method with its description.
-    pub fn new() -> Self {
-        let info = MethodInfo {
-            id: "sat",
-            title: "Scale axis transform",
-            citation: "Joachim Giesen, Balint Miklos, Mark Pauly, Camille Wormser 2009. The scale \
-                       axis transform. Symposium on Computational Geometry. \
-                       https://doi.org/10.1145/1542362.1542388; Balint Miklos, Joachim Giesen, Mark \
-                       Pauly 2010. Discrete scale axis representations for 3D geometry. ACM \
-                       Transactions on Graphics 29(4). https://doi.org/10.1145/1778765.1778838",
-            summary: "Grows all polar balls by a factor, takes the medial axis of their union, and \
-                      shrinks its balls back.",
-            native: Some(NativeLevel { name: "s", unit: "scale factor", larger_is_coarser: true }),
-            published: "s = 1.1, the default of the authors' tool, without its angle filter",
-            params: SatParams::describe(),
-        };
-        Self { info }
-    }
-}
-
-impl MedialSimplifier for Sat {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let params = params.typed::<SatParams>()?.validate()?;
-        let balls = shape.inner_balls()?;
-        run.step(0, balls.spheres.len())?;
-        let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
-        Ok(Box::new(Prepared { spheres, params, run: run.clone(), scales: Reuse::new() }))
-    }
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: SatParams,
+    run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let params = params.validate()?;
+    let balls = shape.inner_balls()?;
+    run.step(0, balls.spheres.len())?;
+    let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
+    Ok(Box::new(Prepared { spheres, params, run: run.clone(), scales: Reuse::new() }))
 }
 
 /// The balls of one shape, perturbed.

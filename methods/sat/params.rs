@@ -43,9 +43,9 @@ impl SatParams {
 
     pub(super) fn describe() -> Vec<ParamInfo> {
         let defaults = Self::default();
-        let info = |name, default: f64, unit, help| {
-            let default = format!("{default:?}");
-            ParamInfo { name, default, unit, help }
+        // Debug keeps the point of a whole number, and small numbers short.
+        let info = |name: &'static str, default: f64, unit: &'static str, help: &'static str| {
+            ParamInfo::new(name, format!("{default:?}"), unit, help)
         };
         vec![
             info(

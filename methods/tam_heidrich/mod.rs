@@ -18,7 +18,7 @@
 //! 5. Section 4.3: rounds by volume with a test of topology, parts in ascending order. Only parts of
 //!    level 1 go.
 //! 6. Parts named by hand go in the end (`remove`), as the left ear of figure 12 does. They are
-//!    listed with ids, the largest first, in [`medial::simplifier::Extras`].
+//!    listed with ids, the largest first, in [`medial::simplifier::Extras`], as [`PartInfo`].
 //!
 //! # The level
 //! `t_v` in per cent, for all rounds by volume. A number of spheres ends the published schedule as soon as
@@ -82,68 +82,68 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, PartInfo,
-    RunContext, Simplification, Simplified, SimplifyError, Work,
+    Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, RunContext,
+    Simplification, Simplified, SimplifyError, Work,
 };
+
+use serde::Serialize;
 
 use axis::Axis;
 pub use params::{AxisChoice, Checked, List, TamHeidrichParams};
 use parts::{Parts, Remaining};
 use schedule::Pruning;
 
+/// Name of the extra that lists the parts, a `Vec` of [`PartInfo`].
+pub const PARTS: &str = "parts";
+
+/// A part of the axis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartInfo {
+    /// Consecutive from 0, the largest part first.
+    pub id: u32,
+    /// 1 at a free edge, 2 beside a part of level 1, and so on; 0 where no free edge can be reached.
+    pub level: u32,
+    /// Number of faces.
+    pub triangles: usize,
+    /// Volume of the feature that the part stands for, as a fraction of the solid's.
+    pub volume: f64,
+    /// Centroid, in normalised units.
+    pub centre: [f64; 3],
+    /// Whether removing it leaves components and loops of the whole as they are.
+    pub removable: bool,
+    /// Whether it was removed on demand, and is not in the medial mesh any more.
+    pub removed: bool,
+}
+
 /// Pruning by parts as a method.
 ///
 /// Answers all levels. The axis is computed once for all; a level costs a few passes over it.
-#[derive(Clone, Debug)]
-pub struct TamHeidrich {
-    info: MethodInfo,
+pub fn method() -> Method<TamHeidrichParams> {
+    let info = MethodInfo::new("tam-heidrich", "Tam-Heidrich part pruning")
+        .citation(
+            "Roger Tam, Wolfgang Heidrich 2003. Shape simplification based on the medial axis \
+             transform. IEEE Visualization. https://doi.org/10.1109/VISUAL.2003.1250410",
+        )
+        .summary(
+            "Cuts the axis of the polar balls into its sheets and removes small ones from the \
+             outside in, loops and components kept.",
+        )
+        .native(NativeLevel::larger_is_coarser("t_v", "per cent of the solid's volume"))
+        .published("up to three rounds with t_t = 5 triangles, then two with t_v = 1 %")
+        .params(TamHeidrichParams::describe())
+        .extra(Capability::new(PARTS, "the parts that the axis was cut into, the largest first"));
+    Method::new(info, prepare)
 }
 
-impl Default for TamHeidrich {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl TamHeidrich {
-    /// The method with its description.
-    pub fn new() -> Self {
-        let info = MethodInfo {
-            id: "tam-heidrich",
-            title: "Tam-Heidrich part pruning",
-            citation: "Roger Tam, Wolfgang Heidrich 2003. Shape simplification based on the medial \
-                       axis transform. IEEE Visualization. \
-                       https://doi.org/10.1109/VISUAL.2003.1250410",
-            summary: "Cuts the axis of the polar balls into its sheets and removes small ones from \
-                      the outside in, loops and components kept.",
-            native: Some(NativeLevel {
-                name: "t_v",
-                unit: "per cent of the solid's volume",
-                larger_is_coarser: true,
-            }),
-            published: "up to three rounds with t_t = 5 triangles, then two with t_v = 1 %",
-            params: TamHeidrichParams::describe(),
-        };
-        Self { info }
-    }
-}
-
-impl MedialSimplifier for TamHeidrich {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-        let params = params.typed::<TamHeidrichParams>()?.validate()?;
-        let mut diagnostics = Diagnostics::default();
-        let axis = Axis::of_shape(shape, &params, run, &mut diagnostics)?;
-        Ok(Box::new(Prepared { axis, params, diagnostics, run: run.clone() }))
-    }
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: TamHeidrichParams,
+    run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let params = params.validate()?;
+    let mut diagnostics = Diagnostics::default();
+    let axis = Axis::of_shape(shape, &params, run, &mut diagnostics)?;
+    Ok(Box::new(Prepared { axis, params, diagnostics, run: run.clone() }))
 }
 
 /// The axis of one shape.
@@ -177,7 +177,7 @@ impl Simplification for Prepared {
             native_level,
             work: Work::Anew,
             diagnostics,
-            extras: Extras { parts: Some(listed), ..Extras::default() },
+            extras: Extras::with(listed),
         })
     }
 }

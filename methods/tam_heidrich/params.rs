@@ -134,70 +134,69 @@ impl TamHeidrichParams {
 
     pub(super) fn describe() -> Vec<ParamInfo> {
         let default = Self::default();
-        let param = |name, default: String, unit, help| ParamInfo { name, default, unit, help };
         let t_v: Vec<String> = default.t_v.0.iter().map(f64::to_string).collect();
         vec![
-            param(
+            ParamInfo::new(
                 "t_t",
-                default.t_t.to_string(),
+                default.t_t,
                 "triangles",
                 "parts of at most so many triangles go in the first rounds, topology unchecked",
             ),
-            param(
+            ParamInfo::new(
                 "t_t_rounds",
-                default.t_t_rounds.to_string(),
+                default.t_t_rounds,
                 "rounds",
                 "most rounds by triangle count; 0 for none",
             ),
-            param(
+            ParamInfo::new(
                 "drop",
-                default.drop.to_string(),
+                default.drop,
                 "share",
                 "these rounds end after one that removed less than this share of what the one before \
                  it did; 0 for the full number",
             ),
-            param(
+            ParamInfo::new(
                 "t_v",
                 t_v.join(","),
                 "per cent of the solid's volume, one for each round",
                 "then parts of at most this volume go, as far as topology allows",
             ),
-            param(
+            ParamInfo::new(
                 "topology",
-                "volume".into(),
+                "volume",
                 "volume | all | none",
                 "rounds that keep loops and components: those by volume, as published, all, or none",
             ),
-            param(
+            ParamInfo::new(
                 "axis",
-                "auto".into(),
+                "auto",
                 "auto | union | initial",
                 "the axis of the union of polar balls, or the initial medial mesh; auto takes the \
                  latter where it was given",
             ),
-            param(
+            ParamInfo::new(
                 "remove",
-                String::new(),
+                "",
                 "ids of parts, separated by commas",
                 "parts to remove by hand in the end, unchecked; ids are those of the list of parts \
                  of the same run without this",
             ),
-            param(
+            ParamInfo::new(
                 "radius_factor",
-                default.radius_factor.to_string(),
+                default.radius_factor,
                 "pure number",
                 "radii of polar balls are multiplied by this, so that balls that touch in a sample \
                  overlap",
             ),
-            param(
+            ParamInfo::new(
                 "jitter",
                 format!("{:?}", default.jitter),
                 "fraction of the radius",
                 "polar balls are moved by at most this along each axis, seeded",
             ),
-            param(
+            ParamInfo::new(
                 "merge",
-                default.merge.to_string(),
+                default.merge,
                 "fraction of the radius",
                 "vertices of their axis that are nearer than this are one, as far as topology allows",
             ),

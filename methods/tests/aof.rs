@@ -5,9 +5,9 @@ use medial::complex::{betti, cubical_betti};
 use medial::geometry::{NearSet, NearbyTriangles, TriangleBvh};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::{self, InsideTest, TriMesh};
+use medial::surface::{self, TriMesh};
 use medial_methods::aof::{
-    AofParams, AverageOutwardFlux, Axis, Descent, Grid, Probe, Solid, Sphere, Spiral, Surface,
+    self, AofParams, Axis, Descent, Grid, LatticeVoxels, Probe, Solid, Sphere, Spiral, Surface,
     Variant, Voxel, Wanted, refine,
 };
 
@@ -22,10 +22,8 @@ fn built_in(id: &str) -> Shape {
 }
 
 fn solid<'s>(shape: &'s Shape, params: &AofParams) -> Solid<'s> {
-    let surface = Surface {
-        triangles: NearbyTriangles::new(shape.mesh()),
-        inside: InsideTest::new(shape.mesh()),
-    };
+    let surface =
+        Surface { triangles: NearbyTriangles::new(shape.mesh()), inside: shape.inside_test() };
     Solid::new(shape, surface, params.clone(), RunContext::default())
 }
 
@@ -252,14 +250,14 @@ fn simplified(
 ) -> Result<Simplified, SimplifyError> {
     let mut params = Params::none();
     set.iter().for_each(|(key, value)| params.set(key, value));
-    AverageOutwardFlux::new().prepare(shape, &params, &RunContext::default())?.at(level)
+    aof::method().prepare(shape, &params, &RunContext::default())?.at(level)
 }
 
 #[test]
 fn refined_spheres_are_internal_and_touch_twice() {
     let shape = built_in("bracket");
     let tree = shape.surface_tree().expect("faces");
-    let inside = InsideTest::new(shape.mesh());
+    let inside = shape.inside_test();
     let (axis, _) = axis_at(&shape, &params(Variant::Thinning), 48, 30.0);
     let sphere = Sphere::new(Spiral::EqualArea, 50, axis.grid.side);
     let mut two = 0;
@@ -279,7 +277,7 @@ fn refined_spheres_are_internal_and_touch_twice() {
 
 /// Betti numbers of the medial mesh and of the voxels; `what` names the case.
 fn assert_same_topology(result: &Simplified, what: &str) {
-    let voxels = result.extras.voxels.as_ref().expect("voxels");
+    let voxels = result.extras.get::<LatticeVoxels>().expect("voxels");
     assert_eq!(voxels.voxels.len(), result.mesh.spheres.len(), "{what}");
     assert_eq!(betti(&result.mesh), voxels.betti(), "{what}");
     assert_eq!(result.mesh.check(), Ok(()), "{what}");
@@ -316,7 +314,7 @@ fn voxels_carry_the_distances_of_their_centres_and_their_flux() {
     let tree = shape.surface_tree().expect("faces");
     let set = [("variant", "plain"), ("refine", "false")];
     let result = simplified(&shape, &set, Level::Native(30.0)).expect("an angle");
-    let voxels = result.extras.voxels.expect("voxels");
+    let voxels = result.extras.get::<LatticeVoxels>().expect("voxels");
     for (voxel, ball) in voxels.voxels.iter().zip(&result.mesh.spheres) {
         let centre = voxels.centre(voxel);
         assert!(centre.distance(ball.centre) < 1e-15);
@@ -327,7 +325,7 @@ fn voxels_carry_the_distances_of_their_centres_and_their_flux() {
     let run = RunContext::default();
     let other = medial_methods::find("angle").expect("a method");
     let mut other = other.prepare(&angle, &Params::none(), &run).expect("prepared");
-    assert!(other.at(Level::Spheres(10)).expect("a count").extras.voxels.is_none());
+    assert!(other.at(Level::Spheres(10)).expect("a count").extras.get::<LatticeVoxels>().is_none());
 }
 
 /// Closed forms over one plane, and beside its border.
@@ -360,7 +358,7 @@ fn a_gradient_that_is_the_same_everywhere_needs_no_samples() {
 fn bytes_of(result: &Simplified) -> Vec<u64> {
     let ball = |s: &medial::complex::Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
     let simplices = result.mesh.edges.iter().flatten().chain(result.mesh.faces.iter().flatten());
-    let voxels = result.extras.voxels.iter().flat_map(|voxels| &voxels.voxels);
+    let voxels = result.extras.get::<LatticeVoxels>().into_iter().flat_map(|voxels| &voxels.voxels);
     let balls = result.mesh.spheres.iter().flat_map(ball).map(f64::to_bits);
     balls
         .chain(simplices.map(|&v| u64::from(v)))
@@ -409,7 +407,7 @@ fn larger_angles_leave_fewer_voxels() {
             let mut params = Params::none();
             set.iter().for_each(|(key, value)| params.set(key, value));
             let run = RunContext::default();
-            AverageOutwardFlux::new().prepare(&shape, &params, &run).expect("prepared")
+            aof::method().prepare(&shape, &params, &run).expect("prepared")
         };
         let counts = [5.0, 30.0, 60.0, 90.0]
             .map(|angle| prepared.at(Level::Native(angle)).expect("an angle").mesh.spheres.len());
@@ -479,7 +477,7 @@ fn cancelling_ends_the_run_at_every_stage() {
             assert!(progress.done <= progress.total, "{progress:?}");
             flag.store(counted.fetch_add(1, Relaxed) >= questions, Relaxed);
         });
-        let method = AverageOutwardFlux::new();
+        let method = aof::method();
         let answer = method
             .prepare(&shape, &Params::none(), &run)
             .and_then(|mut prepared| prepared.at(Level::Published));

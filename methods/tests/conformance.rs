@@ -3,7 +3,8 @@
 //! Exceptions: none at present.
 
 use medial::complex::MedialMesh;
-use medial::shape::{Shape, ShapeOptions};
+use medial::metrics::JudgeOptions;
+use medial::shape::{Shape, ShapeOptions, Substrate};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, SimplifyError, Work};
 use medial::surface::{self, TriMesh};
 use medial_methods::registry;
@@ -33,7 +34,7 @@ fn results_are_valid_and_meet_the_count_or_say_why() {
         let shape = shape_of(&built_in(id));
         let initial = shape.initial().expect("an initial medial mesh");
         for method in registry() {
-            let name = method.info().id;
+            let name = &method.info().id;
             let run = RunContext::default();
             let mut simplification =
                 method.prepare(&shape, &Params::none(), &run).expect("prepared");
@@ -65,6 +66,19 @@ fn continuing_gives_what_asking_alone_gives() {
             // Nothing finer can be had by going on.
             assert!(count != 200 || continued.work != Work::Continued, "{}", method.info().id);
         }
+    }
+}
+
+#[test]
+fn every_method_pays_for_the_inside_test_and_the_judge_for_nothing() {
+    let shape = shape_of(&built_in("capsule"));
+    shape.judge(None, JudgeOptions::default()).expect("a judge");
+    assert!(shape.used().is_empty());
+    for method in registry() {
+        let view = shape.view();
+        method.prepare(&view, &Params::none(), &RunContext::default()).expect("prepared");
+        let paid = view.used().iter().any(|(substrate, _)| *substrate == Substrate::InsideTest);
+        assert!(paid, "{}", method.info().id);
     }
 }
 
@@ -101,7 +115,7 @@ fn scale_by_a_power_of_two_changes_nothing() {
 fn unknown_parameters_and_senseless_levels_are_refused() {
     let shape = shape_of(&built_in("sphere"));
     for method in registry() {
-        let name = method.info().id;
+        let name = &method.info().id;
         let mut params = Params::none();
         params.set("no_such_parameter", "1");
         let refused = method.prepare(&shape, &params, &RunContext::default());
@@ -120,7 +134,7 @@ fn documented_defaults_are_the_defaults() {
     for method in registry() {
         let mut params = Params::none();
         for param in &method.info().params {
-            params.set(param.name, &param.default);
+            params.set(&param.name, &param.default);
         }
         let run = RunContext::default();
         let mut spelled = method.prepare(&shape, &params, &run).expect("defaults are accepted");

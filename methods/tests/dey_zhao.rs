@@ -5,7 +5,7 @@ use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
-use medial_methods::dey_zhao::DeyZhao;
+use medial_methods::dey_zhao;
 
 fn shape_of(mesh: &TriMesh, sampling: &str) -> Shape {
     let report = surface::validate(mesh).expect("a solid");
@@ -23,7 +23,8 @@ fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
     for (key, value) in params {
         all.set(key, value);
     }
-    let mut prepared = DeyZhao::new().prepare(shape, &all, &RunContext::default()).expect("ready");
+    let mut prepared =
+        dey_zhao::method().prepare(shape, &all, &RunContext::default()).expect("ready");
     prepared.at(level).expect("a level")
 }
 
@@ -101,6 +102,6 @@ fn a_larger_strength_keeps_less_and_a_given_mesh_is_no_voronoi_diagram() {
     assert!(counts.windows(2).all(|pair| pair[0] >= pair[1]), "{counts:?}");
     let given = MedialMesh::clone(&shape.initial().expect("an initial medial mesh"));
     let shape = shape_of(&mesh, "vertices").with_initial(&given);
-    let refused = DeyZhao::new().prepare(&shape, &Params::none(), &RunContext::default());
+    let refused = dey_zhao::method().prepare(&shape, &Params::none(), &RunContext::default());
     assert!(matches!(refused, Err(SimplifyError::Unsupported { .. })));
 }

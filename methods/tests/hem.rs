@@ -7,7 +7,7 @@ use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError, Work,
 };
 use medial::surface;
-use medial_methods::hem::Hem;
+use medial_methods::hem;
 
 fn shape(id: &str, resolution: u32) -> Shape {
     let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
@@ -19,7 +19,7 @@ fn shape(id: &str, resolution: u32) -> Shape {
 fn prepare<'s>(shape: &'s Shape, inside: &str) -> Box<dyn Simplification + 's> {
     let mut params = Params::none();
     params.set("inside", inside);
-    Hem::new().prepare(shape, &params, &RunContext::default()).expect("prepared")
+    hem::method().prepare(shape, &params, &RunContext::default()).expect("prepared")
 }
 
 fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified {
@@ -215,7 +215,8 @@ fn a_mesh_without_contacts_gets_the_nearest_samples() {
 fn a_cancelled_run_ends_as_cancelled() {
     let shape = shape("capsule", 24);
     let run = RunContext::default();
-    let mut simplification = Hem::new().prepare(&shape, &Params::none(), &run).expect("prepared");
+    let mut simplification =
+        hem::method().prepare(&shape, &Params::none(), &run).expect("prepared");
     run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
     let cancelled = simplification.at(Level::Spheres(10));
     assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));

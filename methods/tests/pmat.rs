@@ -10,7 +10,7 @@ use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError, Work,
 };
 use medial::surface;
-use medial_methods::pmat::Pmat;
+use medial_methods::pmat;
 
 fn shape(id: &str, resolution: u32) -> Shape {
     let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
@@ -20,12 +20,12 @@ fn shape(id: &str, resolution: u32) -> Shape {
 }
 
 fn prepare(shape: &Shape) -> Box<dyn Simplification + '_> {
-    Pmat::new().prepare(shape, &Params::none(), &RunContext::default()).expect("prepared")
+    pmat::method().prepare(shape, &Params::none(), &RunContext::default()).expect("prepared")
 }
 
 fn hierarchy(shape: &Shape) -> Arc<Hierarchy> {
     let end = prepare(shape).at(Level::Published).expect("the end");
-    end.extras.hierarchy.expect("PMAT has a hierarchy")
+    end.extras.get_shared().expect("PMAT has a hierarchy")
 }
 
 #[test]
@@ -103,8 +103,7 @@ fn one_thread_and_two_build_the_same_hierarchy() {
 fn a_hierarchy_is_resumed_where_it_is_of_this_method() {
     let shape = shape("capsule", 24);
     let built = hierarchy(&shape);
-    let resume =
-        |hierarchy: &Arc<Hierarchy>| Pmat::new().resume(Arc::clone(hierarchy), &Params::none());
+    let resume = |hierarchy: &Arc<Hierarchy>| pmat::resume(Arc::clone(hierarchy), &Params::none());
     let mut resumed = resume(&built).expect("its own");
     for level in [Level::Spheres(70), Level::Native(1.5), Level::Published] {
         let [here, there] =
@@ -124,9 +123,9 @@ fn a_hierarchy_is_resumed_where_it_is_of_this_method() {
         let refused = resume(&other(steps)).err().expect("refused").to_string();
         assert!(refused.contains(part), "{refused}");
     }
-    let qmat = medial_methods::find("qmat").expect("registered");
-    let unsupported = qmat.resume(built, &Params::none()).err();
-    assert!(matches!(unsupported, Some(SimplifyError::Unsupported { .. })));
+    let mut params = Params::none();
+    params.set("scale", "2");
+    assert!(matches!(pmat::resume(built, &params), Err(SimplifyError::Parameter(_))));
 }
 
 #[test]
@@ -134,6 +133,6 @@ fn a_cancelled_run_ends_as_cancelled() {
     let shape = shape("capsule", 24);
     let run = RunContext::default();
     run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-    let cancelled = Pmat::new().prepare(&shape, &Params::none(), &run);
+    let cancelled = pmat::method().prepare(&shape, &Params::none(), &run);
     assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));
 }

@@ -10,7 +10,7 @@ use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError, Work,
 };
 use medial::surface;
-use medial_methods::qmat::Qmat;
+use medial_methods::qmat;
 
 fn shape(id: &str, resolution: u32) -> Shape {
     let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
@@ -24,7 +24,7 @@ fn prepare<'s>(shape: &'s Shape, params: &[(&str, &str)]) -> Box<dyn Simplificat
     for (key, value) in params {
         all.set(key, value);
     }
-    Qmat::new().prepare(shape, &all, &RunContext::default()).expect("prepared")
+    qmat::method().prepare(shape, &all, &RunContext::default()).expect("prepared")
 }
 
 fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified {
@@ -119,7 +119,8 @@ fn levels_continue_start_anew_and_say_what_they_cannot_do() {
 fn a_cancelled_run_ends_as_cancelled() {
     let shape = shape("capsule", 24);
     let run = RunContext::default();
-    let mut simplification = Qmat::new().prepare(&shape, &Params::none(), &run).expect("prepared");
+    let mut simplification =
+        qmat::method().prepare(&shape, &Params::none(), &run).expect("prepared");
     run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
     let cancelled = simplification.at(Level::Spheres(10));
     assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));

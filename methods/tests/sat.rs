@@ -10,7 +10,7 @@ use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified};
 use medial::surface::{self, TriMesh};
-use medial_methods::sat::Sat;
+use medial_methods::sat;
 
 fn shape_of(name: &str, mesh: &TriMesh) -> Shape {
     let report = surface::validate(mesh).expect("a solid");
@@ -27,7 +27,7 @@ fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
     for (key, value) in params {
         all.set(key, value);
     }
-    let mut sat = Sat::new().prepare(shape, &all, &RunContext::default()).expect("prepared");
+    let mut sat = sat::method().prepare(shape, &all, &RunContext::default()).expect("prepared");
     sat.at(level).expect("a scale axis")
 }
 

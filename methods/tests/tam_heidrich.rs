@@ -8,11 +8,9 @@ use std::path::PathBuf;
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{
-    Level, MedialSimplifier, Params, PartInfo, RunContext, Simplified, SimplifyError,
-};
+use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
-use medial_methods::tam_heidrich::{TamHeidrich, parts_of_faces};
+use medial_methods::tam_heidrich::{self, PartInfo, parts_of_faces};
 
 fn shape_of(name: &str, mesh: &TriMesh) -> Shape {
     let report = surface::validate(mesh).expect("a solid");
@@ -33,7 +31,7 @@ fn try_at(
     for (key, value) in params {
         all.set(key, value);
     }
-    TamHeidrich::new().prepare(shape, &all, &RunContext::default())?.at(level)
+    tam_heidrich::method().prepare(shape, &all, &RunContext::default())?.at(level)
 }
 
 fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
@@ -60,7 +58,7 @@ fn betti_by_round(result: &Simplified) -> Vec<(bool, [u64; 3])> {
 }
 
 fn parts(result: &Simplified) -> &[PartInfo] {
-    result.extras.parts.as_deref().expect("a list of parts")
+    result.extras.get::<Vec<PartInfo>>().expect("a list of parts")
 }
 
 const NO_ROUNDS: [(&str, &str); 2] = [("t_t_rounds", "0"), ("t_v", "")];
@@ -118,7 +116,7 @@ fn the_largest_parts_of_a_sampled_box_are_its_sheets() {
         let mut params = Params::none();
         params.set("t_v", "");
         params.set("t_t_rounds", rounds);
-        let mut prepared = TamHeidrich::new().prepare(&shape, &params, &run).expect("an axis");
+        let mut prepared = tam_heidrich::method().prepare(&shape, &params, &run).expect("an axis");
         let result = prepared.at(Level::Published).expect("an answer");
         result.mesh.check().expect("a valid complex");
         assert_eq!(count(&result, "fins_left"), 0);
@@ -262,7 +260,7 @@ fn for_threads(name: &str, mesh: &TriMesh, level: Level) -> Simplified {
     });
     let [one, two] = results;
     assert_eq!(one.mesh, two.mesh, "{name}");
-    assert_eq!(one.extras.parts, two.extras.parts, "{name}");
+    assert_eq!(parts(&one), parts(&two), "{name}");
     assert_eq!(one.diagnostics, two.diagnostics, "{name}");
     one
 }

@@ -48,7 +48,7 @@ impl NoiseRecord {
     fn at_count(&self) -> Option<usize> {
         let Level::Spheres(asked) = self.record.simplify.level else { return None };
         let reached = self.record.simplify.reached?;
-        let measured = self.record.status.is_ok() && self.record.evaluate.is_some();
+        let measured = self.record.status.has_result() && self.record.evaluate.is_some();
         let near = reached.abs_diff(asked) as f64 <= 0.02 * asked as f64;
         (measured && near).then_some(asked)
     }

@@ -20,7 +20,8 @@ pub(crate) fn section(page: &Page<'_>) -> String {
 fn of_mesh(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
     let comparison = page.comparison;
     let runs = comparison.of_mesh(mesh).count();
-    let missing = comparison.of_mesh(mesh).filter(|entry| !entry.record.status.is_ok()).count();
+    let missing =
+        comparison.of_mesh(mesh).filter(|entry| !entry.record.status.has_result()).count();
     let mut brief = vec![counted(runs, "run", "runs")];
     if missing > 0 {
         brief.push(format!("{missing} without a result"));

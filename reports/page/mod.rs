@@ -12,7 +12,7 @@ mod results;
 
 use crate::comparison::Comparison;
 use crate::extras::Extra;
-use crate::header::Header;
+use crate::header::{Header, RunNote};
 use crate::plots::Plot;
 use crate::record::Machine;
 use crate::summary::CountSummary;
@@ -91,23 +91,20 @@ impl Page<'_> {
             counted(comparison.meshes.len(), "mesh", "meshes"),
             counted(comparison.levels.len(), "level", "levels"),
         )];
-        facts.extend(self.header.date.clone());
-        if !self.header.version.is_empty() {
-            facts.push(format!("medial {}", self.header.version));
-        }
+        let run = self.header.runs.last();
+        facts.extend(run.and_then(|run| run.date.clone()));
+        facts.extend(
+            run.filter(|run| !run.version.is_empty()).map(|run| format!("medial {}", run.version)),
+        );
         let recorded = || comparison.entries.first().map(|entry| &entry.record.machine);
-        let machine = self.header.machine.as_ref().or_else(recorded).map(Machine::to_string);
+        let machine = run.and_then(|run| run.machine.as_ref()).or_else(recorded);
+        let machine = machine.map(Machine::to_string);
         facts.extend(machine.filter(|text| !text.is_empty()));
         let facts: Vec<String> =
             facts.iter().map(|fact| format!("<li>{}</li>", escape_html(fact))).collect();
         let mut html = format!("<header>\n<h1>{}</h1>\n", escape_html(title));
         html.push_str(&format!("<ul class=\"facts\">{}</ul>\n", facts.concat()));
-        if !self.header.command.is_empty() {
-            html.push_str(&format!(
-                "<pre class=\"command\"><code>{}</code></pre>\n",
-                escape_html(&self.header.command)
-            ));
-        }
+        html.push_str(&self.how());
         html.push_str("<nav>");
         if comparison.measured() > 0 {
             html.push_str("<a href=\"#overview\">Overview</a>");
@@ -122,6 +119,40 @@ impl Page<'_> {
             "<a href=\"#definitions\">Definitions</a><a href=\"#files\">Files</a></nav>\n",
         );
         html.push_str("</header>\n");
+        html
+    }
+
+    /// The commands that made the records, the last one in sight, and the study.
+    fn how(&self) -> String {
+        let mut html = String::new();
+        let runs = &self.header.runs;
+        if let Some(run) = runs.last().filter(|run| !run.command.is_empty()) {
+            let command = escape_html(&run.command);
+            html.push_str(&format!("<pre class=\"command\"><code>{command}</code></pre>\n"));
+        }
+        if let [earlier @ .., _] = runs.as_slice()
+            && !earlier.is_empty()
+        {
+            let line = |run: &RunNote| {
+                let date = run.date.as_deref().unwrap_or("no date");
+                let build: String = run.binary_hash.chars().take(8).collect();
+                let what =
+                    format!("{date}, medial {} (build {build}): {}", run.version, run.command);
+                format!("<li><code>{}</code></li>", escape_html(&what))
+            };
+            let lines: String = earlier.iter().map(line).collect();
+            html.push_str(&format!(
+                "<details><summary>{} that added records</summary><ul>{lines}</ul></details>\n",
+                counted(earlier.len(), "earlier run", "earlier runs")
+            ));
+        }
+        if let Some(study) = &self.header.study {
+            let study = escape_html(study);
+            html.push_str(&format!(
+                "<details><summary>The study that was asked last</summary>\
+                 <pre class=\"command\"><code>{study}</code></pre></details>\n"
+            ));
+        }
         html
     }
 

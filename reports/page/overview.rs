@@ -154,13 +154,17 @@ fn goodness(summary: &CountSummary, metric: &Metric, mean: f64) -> f64 {
     if metric.better.prefers(0.0, 1.0) { 1.0 - share } else { share }
 }
 
-/// Runs without a result, gathered by method, status and reason.
+/// Runs without the result that was asked, gathered by method, status and reason.
 fn failures(page: &Page<'_>) -> String {
     let mut groups: BTreeMap<(usize, Status, &str), Vec<String>> = BTreeMap::new();
     for entry in &page.comparison.entries {
         let record = entry.record;
         if !record.status.is_ok() {
-            let reason = record.reason.as_deref().unwrap_or("no reason was given");
+            let reason = match record.status {
+                // Each such reason has its own number.
+                Status::OtherCount => "another number of spheres than asked: not compared",
+                _ => record.reason.as_deref().unwrap_or("no reason was given"),
+            };
             let level = crate::comparison::level_label(record.simplify.level);
             groups
                 .entry((entry.series, record.status, reason))
@@ -173,7 +177,7 @@ fn failures(page: &Page<'_>) -> String {
     }
     let runs = groups.values().map(Vec::len).sum();
     let mut html = format!(
-        "<details class=\"failures\" open><summary>{} without a result, of {}</summary>\n\
+        "<details class=\"failures\" open><summary>{} without the result that was asked, of {}</summary>\n\
          <div class=\"scroll\"><table>\n<thead><tr><th>method</th><th>status</th><th>reason</th>\
          <th class=\"num\">runs</th><th>meshes (spheres asked)</th></tr></thead>\n<tbody>\n",
         counted(runs, "run", "runs"),

@@ -56,7 +56,7 @@ pub struct Truth {
 pub struct Judge {
     surface: TriMesh,
     tree: Arc<TriangleBvh>,
-    inside: InsideTest,
+    inside: Arc<InsideTest>,
     truth: Truth,
     /// The true axis, prepared at once and not on demand: waiting for another thread to do so, a
     /// worker would wait for itself.
@@ -65,14 +65,15 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// A judge for a closed, oriented surface of bounding-box diagonal 1.
+    /// A judge for a closed, oriented surface of bounding-box diagonal 1, with the surface's tree
+    /// and inside test.
     pub fn new(
         surface: TriMesh,
         tree: Arc<TriangleBvh>,
+        inside: Arc<InsideTest>,
         truth: Truth,
         options: JudgeOptions,
     ) -> Self {
-        let inside = InsideTest::new(&surface);
         let true_axis = truth.axis.as_ref().map(PreparedAxis::new);
         Self { surface, tree, inside, truth, true_axis, options }
     }

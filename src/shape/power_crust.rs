@@ -2,7 +2,7 @@
 
 use crate::Vec3;
 use crate::geometry::{Delaunay, Pole, Poles, Sphere};
-use crate::surface::{InsideTest, Side};
+use crate::surface::Side;
 
 use super::{Shape, ShapeError};
 
@@ -57,7 +57,7 @@ impl Shape {
         let balls: Vec<Sphere> =
             poles.balls().iter().filter(|b| is_pole[b.cell.index()]).map(|b| b.sphere).collect();
         let centres: Vec<Vec3> = balls.iter().map(|b| b.centre).collect();
-        let sides = InsideTest::new(self.mesh()).sides(&centres);
+        let sides = self.inside_test().sides(&centres);
         let tree = self.surface_tree()?;
         let depths = tree.distance_batch(&centres);
         let mut labelled = PolarBalls::default();

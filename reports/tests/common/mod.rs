@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use medial::metrics::{Counts, Distances, Evaluation, RatioSpikes, Spikes, TriangleQuality};
 use medial::simplifier::Level;
 use medial_reports::{
-    Header, Initial, Machine, MethodNote, Record, Repetition, Simplify, Stages, Status,
+    Header, Initial, Machine, MethodNote, Record, Repetition, RunNote, Simplify, Stages, Status,
 };
 
 /// Names of made-up shapes, as many as the published comparison has.
@@ -146,6 +146,7 @@ pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
     simplify.threads = Some(1);
     simplify.version = "0.1.0".to_owned();
     Record {
+        key: String::new(),
         mesh: mesh.to_owned(),
         dataset: Some("made-up".to_owned()),
         mesh_hash: None,
@@ -155,6 +156,9 @@ pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
         evaluate: None,
         evaluate_seconds: None,
         initial: None,
+        conditions: None,
+        result_hash: None,
+        union: None,
         seeds: BTreeMap::from([("evaluation".to_owned(), 7), ("method".to_owned(), 1)]),
         repetitions: Vec::new(),
         machine: machine(),
@@ -191,11 +195,15 @@ pub fn header(methods: &[&str]) -> Header {
     };
     Header {
         title: String::new(),
-        command: "medial compare --spheres 1000,500,200,100".to_owned(),
-        version: "0.1.0".to_owned(),
-        date: Some("2026-01-31 12:00 UTC".to_owned()),
-        machine: None,
+        runs: vec![RunNote {
+            command: "medial compare --spheres 1000,500,200,100".to_owned(),
+            version: "0.1.0".to_owned(),
+            binary_hash: "3f9c0d".to_owned(),
+            date: Some("2026-01-31 12:00 UTC".to_owned()),
+            machine: None,
+        }],
         methods: methods.iter().map(note).collect(),
+        study: None,
         notes: Vec::new(),
     }
 }

@@ -46,6 +46,26 @@ impl Source {
         Ok(Self::BuiltIn { id: id.to_owned(), resolution })
     }
 
+    /// Refuses what cannot be an input before anything is run: a file that is not there or cannot be
+    /// read, a shape or a resolution that does not exist.
+    ///
+    /// # Errors
+    /// [`InputError`], which names it.
+    pub fn check(&self) -> Result<(), InputError> {
+        match self {
+            Self::File(path) => {
+                let failed = |error| InputError::Read { path: path.clone(), error };
+                let kind = fs::metadata(path).map_err(failed)?;
+                // Opening one of these would wait for ever.
+                if !kind.is_file() {
+                    return Err(failed(io::Error::other("not a regular file")));
+                }
+                fs::File::open(path).map(|_| ()).map_err(failed)
+            }
+            Self::BuiltIn { id, resolution } => built_in(id, *resolution).map(|_| ()),
+        }
+    }
+
     /// All built-in shapes at their default resolutions, in the order of the catalogue.
     pub fn built_ins() -> Vec<Self> {
         let shapes = medial_datasets::catalogue();
@@ -60,6 +80,14 @@ impl Source {
                 .map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into()),
             Self::BuiltIn { id, resolution: None } => id.clone(),
             Self::BuiltIn { id, resolution: Some(resolution) } => format!("{id}-{resolution}"),
+        }
+    }
+
+    /// The set that the mesh belongs to, where it does.
+    pub fn dataset(&self) -> Option<&'static str> {
+        match self {
+            Self::File(_) => None,
+            Self::BuiltIn { .. } => Some("builtin"),
         }
     }
 
@@ -92,8 +120,6 @@ impl fmt::Display for Source {
 pub struct Input {
     /// Name for tables.
     pub name: String,
-    /// Set that the mesh belongs to, where it does.
-    pub dataset: Option<String>,
     /// SHA-256 of the file, or of the generated surface.
     pub hash: String,
     /// The surface, in input units.
@@ -120,7 +146,6 @@ impl Input {
                 drop(bytes);
                 Ok(Self {
                     name: source.name(),
-                    dataset: None,
                     hash,
                     mesh: loaded.mesh,
                     report: loaded.report,
@@ -132,22 +157,12 @@ impl Input {
     }
 
     fn generate(source: &Source, id: &str, resolution: Option<u32>) -> Result<Self, InputError> {
-        let shape =
-            medial_datasets::find(id).ok_or_else(|| InputError::NoSuchShape(id.to_owned()))?;
-        let resolution = resolution.unwrap_or(shape.default_resolution);
-        let range = shape.resolutions();
-        if !range.contains(&resolution) {
-            return Err(InputError::OutOfRange {
-                resolution,
-                least: *range.start(),
-                most: *range.end(),
-            });
-        }
+        let (shape, resolution) = built_in(id, resolution)?;
         let mesh = shape.mesh(resolution);
         let report = surface::validate(&mesh)?;
         Ok(Self {
             name: source.name(),
-            dataset: Some("builtin".into()),
+
             hash: hex_digest(&surface_bytes(&mesh)),
             mesh,
             report,
@@ -167,6 +182,21 @@ impl Input {
     pub fn shape(&self, options: ShapeOptions) -> Result<Shape, ShapeError> {
         Shape::new(self.name.clone(), &self.mesh, self.report.clone(), options)
     }
+}
+
+/// A built-in shape and its resolution, the default one unless given.
+fn built_in(
+    id: &str,
+    resolution: Option<u32>,
+) -> Result<(medial_datasets::BuiltIn, u32), InputError> {
+    let shape = medial_datasets::find(id).ok_or_else(|| InputError::NoSuchShape(id.to_owned()))?;
+    let resolution = resolution.unwrap_or(shape.default_resolution);
+    let range = shape.resolutions();
+    if !range.contains(&resolution) {
+        let (least, most) = (*range.start(), *range.end());
+        return Err(InputError::OutOfRange { resolution, least, most });
+    }
+    Ok((shape, resolution))
 }
 
 fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {

@@ -1,0 +1,96 @@
+//! `medial run-item ITEM.json`: one item, and its records, one a line.
+//!
+//! With `--out` the records are kept in a folder of results, and those that are there already are
+//! printed without running anything: calling it again does no harm.
+
+use std::fs;
+use std::path::PathBuf;
+
+use clap::Args;
+use medial_reports::{Record, read_records};
+
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::interrupt;
+use crate::output::{note, print_line};
+use crate::run::{
+    AXES, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
+    Supervisor, missing, run_items,
+};
+
+/// Arguments of `run-item`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The item, as JSON.
+    item: PathBuf,
+    /// Folder of results, for the records and the medial meshes.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the item cannot be read, was planned by another build, or the records cannot be kept.
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
+    let failed = |error: String| Failure::input(format!("{}: {error}", arguments.item.display()));
+    let text = fs::read_to_string(&arguments.item).map_err(|error| failed(error.to_string()))?;
+    let item: Item = serde_json::from_str(&text).map_err(|error| failed(error.to_string()))?;
+    let provenance = Provenance::here();
+    if item.binary != provenance.binary_hash {
+        return Err(failed(format!(
+            "the item was planned by another build of this program ({}, this is {}): plan it again",
+            short(&item.binary),
+            short(&provenance.binary_hash)
+        )));
+    }
+    let axes = arguments.out.as_ref().map(|out| out.join(AXES));
+    let interrupted = interrupt::listen();
+    let mut supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);
+    let mut store = match &arguments.out {
+        Some(out) => Some(Store::open(out, RESULTS, &provenance.command)?),
+        None => None,
+    };
+    let left = match &store {
+        Some(store) => missing(std::slice::from_ref(&item), store, false).0,
+        None => vec![item.clone()],
+    };
+    let mut progress = Progress::new(global.quiet, left.len());
+    let mut records: Vec<Record> = Vec::new();
+    let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Kept]| {
+        records.extend(kept.iter().map(|kept| kept.record.clone()));
+        match &mut store {
+            Some(store) => store.keep(&kept.iter().map(|kept| &kept.record).collect::<Vec<_>>()),
+            None => Ok(()),
+        }
+    });
+    drop(progress);
+    match ended {
+        Err(PlanError::Run(RunError::Interrupted)) => {
+            note(global, "interrupted");
+            return Ok(Exit::Interrupted);
+        }
+        ended => ended?,
+    }
+    if let Some(out) = &arguments.out {
+        records = read_records(&out.join(RESULTS)).map_err(Failure::input)?.records;
+    }
+    print_records(&item, &records)
+}
+
+/// Prints the last record of each level, in the order of the levels.
+fn print_records(item: &Item, records: &[Record]) -> Result<Exit, Failure> {
+    let mut exit = Exit::Done;
+    for key in item.keys() {
+        let Some(record) = records.iter().rev().find(|record| record.key == key) else { continue };
+        print_line(&serde_json::to_string(record).map_err(Failure::input)?);
+        if !record.status.is_ok() {
+            exit = Exit::SomeFailed;
+        }
+    }
+    Ok(exit)
+}
+
+fn short(hash: &str) -> &str {
+    hash.get(..12).unwrap_or(hash)
+}

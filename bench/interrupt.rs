@@ -1,0 +1,30 @@
+//! What an interrupt from the keyboard or a request to end does.
+//!
+//! A verb that works through many items asks to be told ([`listen`]): it ends its workers, keeps
+//! what is done and says how to go on. Every other verb is ended at once.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::exit::Exit;
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+static LISTENING: AtomicBool = AtomicBool::new(false);
+
+/// Takes over interrupts (SIGINT, SIGTERM, SIGHUP) for the rest of the process. A second one always ends
+/// it at once.
+pub fn install() {
+    let handle = || {
+        let again = INTERRUPTED.swap(true, Ordering::Relaxed);
+        if again || !LISTENING.load(Ordering::Relaxed) {
+            std::process::exit(Exit::Interrupted as i32);
+        }
+    };
+    // Without a handler the system's own way of ending is as good.
+    let _ = ctrlc::set_handler(handle);
+}
+
+/// From now on an interrupt only sets the flag, which is given.
+pub fn listen() -> &'static AtomicBool {
+    LISTENING.store(true, Ordering::Relaxed);
+    &INTERRUPTED
+}

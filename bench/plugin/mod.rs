@@ -1,0 +1,55 @@
+//! Plug-ins: programs in any language as methods, declared in a TOML file.
+//!
+//! ```toml
+//! [[method]]
+//! id = "largest"
+//! title = "Largest balls first"
+//! citation = "Who, when, where, DOI"
+//! command = ["python3", "largest.py", "{initial}", "{output}", "--spheres", "{spheres}"]
+//! levels = ["spheres"]
+//! ```
+//!
+//! [`load`] reads such a file; each method is an [`External`]. What a program is given, what it has
+//! to give back and what its exit code means stands in `docs/plugins.md`.
+//!
+//! | file | step |
+//! |---|---|
+//! | `declaration`, `template`, `error` | the file, read and checked |
+//! | `external` | the method: parameters, files for the program, its command |
+//! | `program` | one run of it, to its end |
+//! | `answer`, `report` | what its end, its output and its last words mean |
+
+use std::fs;
+use std::path::Path;
+
+mod answer;
+mod declaration;
+mod error;
+mod external;
+mod program;
+mod report;
+mod template;
+
+pub use answer::ProgramPeak;
+pub use error::{PluginError, PluginFault};
+pub use external::{External, SCRATCH};
+pub use report::OwnSeconds;
+
+/// Reads and checks a file of plug-ins: its methods, in its order.
+///
+/// # Errors
+/// When the file cannot be read or is wrong: the error names the line and says what to do. Ids are
+/// compared within the file; whether one is taken by another method the caller has to check.
+pub fn load(path: &Path) -> Result<Vec<External>, PluginError> {
+    let refuse =
+        |error| PluginError { file: path.to_owned(), line: None, fault: PluginFault::Io(error) };
+    let text = fs::read_to_string(path).map_err(refuse)?;
+    // Absolute, since programs run in this folder, whatever folder we are in by then.
+    let absolute = std::path::absolute(path).map_err(refuse)?;
+    let folder = absolute.parent().unwrap_or(Path::new("/"));
+    let declarations = declaration::read(path, &text, folder)?;
+    declarations
+        .into_iter()
+        .map(|declared| External::new(declared, folder).map_err(refuse))
+        .collect()
+}

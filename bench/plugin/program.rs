@@ -1,0 +1,167 @@
+//! Runs a program to its end, whatever it does.
+//!
+//! 1. It is started in a process group of its own, with nothing on standard input.
+//! 2. Two threads take what it writes, and keep the end of it, so that no pipe ever fills.
+//! 3. Until it ends it is looked at now and then: memory, and whether the run was cancelled.
+//! 4. What it left running is ended. Only then is the end of its output awaited, for a while:
+//!    whoever still holds a pipe would keep it open for ever.
+
+use std::io::{self, Read};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use medial::simplifier::RunContext;
+
+use crate::process_tree::Family;
+
+/// How much of the end of each output is kept.
+const KEPT: usize = 64 * 1024;
+/// Longest time between two looks.
+const LOOK_AGAIN: Duration = Duration::from_millis(10);
+/// First one: programs that are quick to end are not waited for.
+const FIRST_LOOK: Duration = Duration::from_micros(200);
+/// How long outputs may stay open after everything was ended.
+const LONGEST_DRAIN: Duration = Duration::from_secs(2);
+
+/// How a program ended.
+#[derive(Debug)]
+pub(super) struct Ended {
+    pub status: ExitStatus,
+    /// The end of its standard output.
+    pub stdout: String,
+    /// The end of its standard error.
+    pub stderr: String,
+    /// Most resident bytes of it and its descendants together, as far as they were looked at.
+    pub peak: u64,
+    /// Processes that it had left running.
+    pub strays: usize,
+}
+
+/// Why there is no end.
+#[derive(Debug)]
+pub(super) enum NoEnd {
+    /// It cannot be started, or not be waited for.
+    System(io::Error),
+    /// The run was cancelled, and the program with all its descendants ended.
+    Cancelled,
+}
+
+impl From<io::Error> for NoEnd {
+    fn from(error: io::Error) -> Self {
+        Self::System(error)
+    }
+}
+
+/// Runs a program to its end.
+pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, NoEnd> {
+    let mark = Family::mark(&mut command);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn()?;
+    let mut family = Family::of(&child, &mark);
+    let stdout = child.stdout.take().map(Drain::start);
+    let stderr = child.stderr.take().map(Drain::start);
+    let (status, peak) = match watch(&mut child, &mut family, context) {
+        Ok(watched) => watched,
+        Err(none) => {
+            family.end(&mut child);
+            return Err(none);
+        }
+    };
+    let strays = family.end_strays();
+    let deadline = Instant::now() + LONGEST_DRAIN;
+    let text = |drain: Option<Drain>| drain.map_or_else(String::new, |d| d.finish(deadline));
+    Ok(Ended { status, stdout: text(stdout), stderr: text(stderr), peak, strays })
+}
+
+fn watch(
+    child: &mut Child,
+    family: &mut Family,
+    context: &RunContext,
+) -> Result<(ExitStatus, u64), NoEnd> {
+    let (mut peak, mut pause) = (0, FIRST_LOOK);
+    loop {
+        peak = peak.max(family.resident_bytes());
+        if let Some(status) = child.try_wait()? {
+            return Ok((status, peak));
+        }
+        if context.is_cancelled() {
+            return Err(NoEnd::Cancelled);
+        }
+        thread::sleep(pause);
+        pause = (2 * pause).min(LOOK_AGAIN);
+    }
+}
+
+/// A thread that takes an output and keeps its end.
+struct Drain {
+    end: Arc<Mutex<Tail>>,
+    thread: JoinHandle<()>,
+}
+
+impl Drain {
+    fn start(mut output: impl Read + Send + 'static) -> Self {
+        let end = Arc::new(Mutex::new(Tail::default()));
+        let kept = Arc::clone(&end);
+        let thread = thread::spawn(move || {
+            let mut buffer = vec![0; KEPT];
+            loop {
+                match output.read(&mut buffer) {
+                    Ok(0) => break,
+                    Ok(count) => lock(&kept).push(&buffer[..count]),
+                    Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                    Err(_) => break,
+                }
+            }
+        });
+        Self { end, thread }
+    }
+
+    /// What was kept. A thread that is not done by then is left behind; it ends with its output.
+    fn finish(self, deadline: Instant) -> String {
+        while !self.thread.is_finished() && Instant::now() < deadline {
+            thread::sleep(FIRST_LOOK);
+        }
+        lock(&self.end).text()
+    }
+}
+
+fn lock(tail: &Mutex<Tail>) -> std::sync::MutexGuard<'_, Tail> {
+    tail.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The last [`KEPT`] bytes of what was pushed, and up to as many before them.
+#[derive(Default)]
+struct Tail(Vec<u8>);
+
+impl Tail {
+    fn push(&mut self, bytes: &[u8]) {
+        self.0.extend_from_slice(bytes);
+        // Cut at twice the length: each byte is moved once at most.
+        if self.0.len() >= 2 * KEPT {
+            self.0.drain(..self.0.len() - KEPT);
+        }
+    }
+
+    fn text(&self) -> String {
+        let kept = &self.0[self.0.len().saturating_sub(KEPT)..];
+        String::from_utf8_lossy(kept).into_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tail_is_the_end_and_no_longer_than_that() {
+        let mut tail = Tail::default();
+        let bytes: Vec<u8> = (0..5 * KEPT).map(|k| b'a' + (k % 26) as u8).collect();
+        for chunk in bytes.chunks(1000) {
+            tail.push(chunk);
+            assert!(tail.0.len() < 2 * KEPT + 1000);
+        }
+        assert_eq!(tail.text().as_bytes(), &bytes[4 * KEPT..]);
+    }
+}

@@ -1,0 +1,204 @@
+//! First step of a run: a method answers, on the clock.
+//!
+//! The one place where methods are timed. [`answer`] prepares once and asks for every level, each
+//! within a guard against panics, and gives a [`LevelRun`] for each: the mesh, the times, the
+//! memory. Measuring and writing come later and count for nothing.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use medial::heap::Usage;
+use medial::shape::{Cost, Shape, Substrate};
+use medial::simplifier::{Level, Simplification, Simplified, SimplifyError, Work};
+use medial_reports::{Stages, Status};
+use serde::{Deserialize, Serialize};
+
+/// What came of one level.
+pub struct LevelRun {
+    /// The level that was asked.
+    pub level: Level,
+    /// The result, or why there is none.
+    pub outcome: Result<Simplified, Fault>,
+    /// What the level took, and what it stands on.
+    pub times: Times,
+}
+
+/// Seconds and memory of one level, as if it had been asked alone.
+#[derive(Clone, Debug, Default)]
+pub struct Times {
+    /// The substrates that the method used, each with its cost, whoever built it.
+    pub substrates: Vec<(Substrate, Cost)>,
+    /// The method's own work that no level changes.
+    pub prepare: Cost,
+    /// From there to this level.
+    pub simplify: Cost,
+    /// The most live bytes at one time, with the substrates that the method used.
+    pub peak_bytes: u64,
+}
+
+impl Times {
+    /// Wall-clock seconds by stage.
+    pub fn seconds(&self) -> Stages {
+        self.stages(|cost| cost.seconds)
+    }
+
+    /// Processor seconds by stage.
+    pub fn cpu_seconds(&self) -> Stages {
+        self.stages(|cost| cost.cpu_seconds)
+    }
+
+    fn stages(&self, part: fn(&Cost) -> f64) -> Stages {
+        // From +0: the sum of nothing is -0 otherwise, and prints so.
+        let substrates = self.substrates.iter().fold(0.0, |sum, (_, cost)| sum + part(cost));
+        Stages::new(substrates, part(&self.prepare), part(&self.simplify))
+    }
+}
+
+/// Why a level has no result.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fault {
+    /// What became of it.
+    pub status: Status,
+    /// Why, in a sentence.
+    pub reason: String,
+}
+
+impl From<SimplifyError> for Fault {
+    fn from(error: SimplifyError) -> Self {
+        let status = match &error {
+            SimplifyError::Unsupported { .. } => Status::Unsupported,
+            SimplifyError::Parameter(_) | SimplifyError::Level(_) => Status::Refused,
+            SimplifyError::InvalidOutput(_) => Status::InvalidOutput,
+            SimplifyError::Crashed(_) => Status::Panicked,
+            SimplifyError::Shape(_)
+            | SimplifyError::Hierarchy(_)
+            | SimplifyError::Failed(_)
+            | SimplifyError::Cancelled => Status::Failed,
+        };
+        Self { status, reason: error.to_string() }
+    }
+}
+
+/// Starts a simplification on a view of a shape and asks it for every level, from fine to coarse.
+/// `on_level` is told of each level before it is asked.
+///
+/// The view must be fresh: what is used through it is what the answer says was used.
+pub fn answer<'s>(
+    view: &Shape,
+    start: impl FnOnce() -> Result<Box<dyn Simplification + 's>, SimplifyError>,
+    levels: &[Level],
+    mut on_level: impl FnMut(Level),
+) -> Vec<LevelRun> {
+    let (started, mut prepare) = Cost::of(|| guarded(start));
+    // Substrates are shared: what was spent on them here is told apart from the method's own work.
+    let built = view.spent();
+    prepare.seconds = (prepare.seconds - built.seconds).max(0.0);
+    prepare.cpu_seconds = (prepare.cpu_seconds - built.cpu_seconds).max(0.0);
+    // The substrates that were built here are live by now, and are counted with those that were found.
+    prepare.usage = without(prepare.usage, built.usage);
+    let mut clock =
+        Clock { view, prepare, so_far: Cost::default(), held: prepare.usage.held_bytes };
+    let mut simplification = match started {
+        Ok(simplification) => simplification,
+        Err(fault) => {
+            let failed = |&level: &Level| LevelRun {
+                level,
+                outcome: Err(fault.clone()),
+                times: clock.times(),
+            };
+            return levels.iter().map(failed).collect();
+        }
+    };
+    let mut broken: Option<Fault> = None;
+    let ask = |&level: &Level| {
+        if let Some(fault) = &broken {
+            return LevelRun { level, outcome: Err(fault.clone()), times: clock.times() };
+        }
+        on_level(level);
+        let (outcome, lap) = Cost::of(|| guarded(|| simplification.at(level)));
+        clock.add(lap, outcome.as_ref().map_or(Work::Anew, |simplified| simplified.work));
+        let outcome = outcome.and_then(checked);
+        if matches!(&outcome, Err(fault) if fault.status == Status::Panicked) {
+            let reason = format!("not run: the method panicked at {level}");
+            broken = Some(Fault { status: Status::Panicked, reason });
+        }
+        LevelRun { level, outcome, times: clock.times() }
+    };
+    levels.iter().map(ask).collect()
+}
+
+/// Adds up what levels took, as if each had been asked alone.
+struct Clock<'s> {
+    view: &'s Shape,
+    prepare: Cost,
+    so_far: Cost,
+    /// Live bytes of the method itself when the next level begins.
+    held: u64,
+}
+
+impl Clock<'_> {
+    fn add(&mut self, lap: Cost, work: Work) {
+        let peak = self.held + lap.usage.peak_bytes;
+        self.held += lap.usage.held_bytes;
+        match work {
+            Work::Continued => {
+                self.so_far.seconds += lap.seconds;
+                self.so_far.cpu_seconds += lap.cpu_seconds;
+                self.so_far.usage.peak_bytes = self.so_far.usage.peak_bytes.max(peak);
+                return;
+            }
+            Work::Anew => self.so_far = lap,
+            Work::Reused(earlier) => {
+                self.so_far = lap;
+                self.so_far.seconds += earlier.seconds;
+                self.so_far.cpu_seconds += earlier.cpu_seconds;
+            }
+        }
+        self.so_far.usage.peak_bytes = peak;
+    }
+
+    fn times(&self) -> Times {
+        let substrates = self.view.used();
+        // Each needs room for its building above those that are there, and leaves itself.
+        let mut built = Cost::default();
+        substrates.iter().for_each(|(_, cost)| built += *cost);
+        let Usage { held_bytes: held, peak_bytes: peak } = built.usage;
+        let own = self.prepare.usage.peak_bytes.max(self.so_far.usage.peak_bytes);
+        let peak_bytes = peak.max(held + own);
+        Times { substrates, prepare: self.prepare, simplify: self.so_far, peak_bytes }
+    }
+}
+
+fn without(all: Usage, part: Usage) -> Usage {
+    Usage {
+        held_bytes: all.held_bytes.saturating_sub(part.held_bytes),
+        peak_bytes: all.peak_bytes.saturating_sub(part.held_bytes),
+    }
+}
+
+/// A result that is valid and not empty, or why not.
+fn checked(simplified: Simplified) -> Result<Simplified, Fault> {
+    simplified.mesh.check().map_err(SimplifyError::from)?;
+    if simplified.mesh.spheres.is_empty() {
+        let why = simplified.diagnostics.warnings.join("; ");
+        let why = if why.is_empty() { why } else { format!(" ({why})") };
+        let reason = format!("the result has no sphere{why}; ask for a finer level");
+        return Err(Fault { status: Status::Failed, reason });
+    }
+    Ok(simplified)
+}
+
+fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(outcome) => Ok(outcome?),
+        Err(payload) => {
+            Err(Fault { status: Status::Panicked, reason: panic_message(payload.as_ref()) })
+        }
+    }
+}
+
+fn panic_message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
+    format!("panicked: {}", text.unwrap_or_else(|| "no message".into()))
+}

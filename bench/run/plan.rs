@@ -1,0 +1,133 @@
+//! A run: a list of items of which what is missing is run, and every record is kept.
+
+use medial_reports::{Record, Status};
+
+use super::record::{Kept, median};
+use super::store::{Store, StoreError};
+use super::supervise::{RunError, Supervisor, merge};
+use super::{Item, Progress};
+
+/// What came of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Levels that were run now.
+    pub run: usize,
+    /// Levels whose records were there already.
+    pub found: usize,
+}
+
+/// Why a run ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// No worker, or the user wants no more.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A record cannot be kept.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// What is done with the records of an item as soon as they are complete.
+pub type Keep<'a> = dyn FnMut(&Item, &[Kept]) -> Result<(), StoreError> + 'a;
+
+/// The items with the levels that are missing in a store, and what was found there.
+pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>, Tally) {
+    let mut tally = Tally::default();
+    let mut left = Vec::new();
+    for item in items {
+        let levels = store.missing(item, retry_failed);
+        tally.found += item.levels.len() - levels.len();
+        if !levels.is_empty() {
+            left.push(Item { levels, ..item.clone() });
+        }
+    }
+    (left, tally)
+}
+
+/// Runs items and hands their records to `keep`, each item's as soon as it is done. With
+/// repetitions, the items of one scene take turns, so that a slow minute of the machine does not
+/// fall on one method; their records are kept when the last turn is over.
+///
+/// # Errors
+/// When the user interrupts, no worker can be started, or `keep` fails.
+pub fn run_items(
+    items: &[Item],
+    supervisor: &mut Supervisor<'_>,
+    progress: &mut Progress,
+    keep: &mut Keep<'_>,
+) -> Result<(), PlanError> {
+    for scene in items.chunk_by(|a, b| a.scene == b.scene) {
+        let mut waiting: Vec<(&Item, Vec<Kept>)> = Vec::new();
+        for item in scene {
+            progress.at(&format!("{}: {}", item.scene.label(), item.method.label()));
+            let kept = supervisor.run(item)?;
+            let records: Vec<&Record> = kept.iter().map(|kept| &kept.record).collect();
+            failures(&records).iter().for_each(|remark| progress.remark(remark));
+            if item.repeat <= 1 {
+                keep(item, &finished(kept))?;
+            } else {
+                waiting.push((item, kept));
+            }
+            progress.done();
+        }
+        let turns = waiting.iter().map(|(item, _)| item.repeat).max().unwrap_or(1);
+        for turn in 2..=turns {
+            for (item, kept) in &mut waiting {
+                if turn <= item.repeat && kept.iter().any(|k| k.record.status.has_result()) {
+                    progress.at(&format!(
+                        "{}: {}, repetition {turn} of {}",
+                        item.scene.label(),
+                        item.method.label(),
+                        item.repeat
+                    ));
+                    let again = supervisor.again(item)?;
+                    let mut records: Vec<&mut Record> =
+                        kept.iter_mut().map(|kept| &mut kept.record).collect();
+                    merge(&mut records, turn, again);
+                }
+            }
+        }
+        for (item, kept) in waiting {
+            keep(item, &finished(kept))?;
+        }
+    }
+    Ok(())
+}
+
+/// Records whose seconds are those of the median repetition.
+fn finished(mut kept: Vec<Kept>) -> Vec<Kept> {
+    for Kept { record, .. } in &mut kept {
+        if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
+            record.simplify.seconds = Some(seconds);
+            record.simplify.cpu_seconds = median(&record.repetitions, |r| r.cpu_seconds);
+        }
+    }
+    kept
+}
+
+/// One remark for each failure, or a single one where all levels failed for the same reason.
+fn failures(records: &[&Record]) -> Vec<String> {
+    let failed: Vec<&&Record> = records.iter().filter(|r| r.status.is_failure()).collect();
+    let alike = failed.len() == records.len()
+        && failed.iter().all(|r| r.status == failed[0].status && r.reason == failed[0].reason);
+    let remark = |record: &&&Record| {
+        let Record { mesh, simplify, status, reason, .. } = record;
+        let reason = reason.as_deref().unwrap_or("no reason");
+        let level = match records.len() {
+            2.. if alike => "all levels".to_owned(),
+            _ => simplify.level.to_string(),
+        };
+        let method = simplify.variant.as_ref().unwrap_or(&simplify.method);
+        // Some reasons begin with the status themselves.
+        let status = status.to_string();
+        let status =
+            if reason.starts_with(&status) { String::new() } else { format!("{status}: ") };
+        format!("{mesh}, {method}, {level}: {status}{reason}")
+    };
+    failed.iter().take(if alike { 1 } else { failed.len() }).map(remark).collect()
+}
+
+/// How many records have a status.
+pub fn count(records: &[Record], status: Status) -> usize {
+    records.iter().filter(|record| record.status == status).count()
+}

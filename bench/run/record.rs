@@ -1,0 +1,205 @@
+//! Third step of a run: what was asked, answered and measured, as records.
+
+use std::path::Path;
+
+use medial::complex;
+use medial::simplifier::{Level, Simplified};
+use medial_reports::{
+    AxisShift, Conditions, Record, Repetition, Simplify, Stages, Status, file_stem,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::plugin::{self, ProgramPeak};
+
+use super::{Fault, Item, LevelRun, Provenance, Scene, Times, Verdict};
+
+/// Largest relative difference between the spheres reached and the spheres asked at which a result
+/// still has the count that was asked.
+const COUNT_TOLERANCE: f64 = 0.02;
+
+/// A record, and for a noisy input what is told beside it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    /// The record.
+    pub record: Record,
+    /// Comparison with the input without noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoisePart>,
+}
+
+/// How a noisy run differs from the one without noise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoisePart {
+    /// Spheres of the noisy initial medial mesh over those of the clean one.
+    pub growth: Option<f64>,
+    /// Distances to the method's own result without noise.
+    pub shift: Option<AxisShift>,
+}
+
+/// The record of a level that was not run, or not to its end.
+pub fn failure_record(item: &Item, level: Level, fault: &Fault, provenance: &Provenance) -> Record {
+    let Fault { status, reason } = fault;
+    let simplify = Simplify {
+        variant: item.method.name.clone(),
+        params: item.method.params.clone(),
+        seed: item.seed,
+        threads: Some(item.threads),
+        version: provenance.version.clone(),
+        ..Simplify::asked(&item.method.id, level, *status)
+    };
+    let scene = &item.scene;
+    let seeds = [("method", item.seed), ("evaluation", scene.measure.seed)];
+    Record {
+        key: item.key(level),
+        mesh: scene.mesh.clone(),
+        dataset: scene.source.dataset().map(str::to_owned),
+        mesh_hash: scene.hash.clone(),
+        status: *status,
+        reason: Some(reason.clone()),
+        simplify,
+        evaluate: None,
+        evaluate_seconds: None,
+        initial: None,
+        conditions: Some(conditions(item)),
+        result_hash: None,
+        union: None,
+        seeds: seeds.map(|(purpose, seed)| (purpose.to_owned(), seed)).into(),
+        repetitions: vec![],
+        machine: provenance.machine.clone(),
+        binary_hash: item.binary.clone(),
+        command: provenance.command.clone(),
+        version: provenance.version.clone(),
+        artifact: None,
+    }
+}
+
+fn conditions(item: &Item) -> Conditions {
+    let scene = &item.scene;
+    Conditions {
+        sampling: scene.sampling.to_string(),
+        dual: scene.dual.to_string(),
+        samples: scene.measure.samples,
+        seconds_limit: item.limits.seconds,
+        bytes_limit: item.limits.bytes,
+        fingerprint: item.method.fingerprint.clone(),
+    }
+}
+
+/// The record of one level. A result is saved as `.ma` in input units below `axes`, where that is
+/// given: a folder whose own name begins the path in the record.
+pub fn record(
+    item: &Item,
+    scene: &Scene,
+    run: &LevelRun,
+    verdict: Option<Verdict>,
+    provenance: &Provenance,
+    axes: Option<&Path>,
+) -> Record {
+    let fault = match &run.outcome {
+        Ok(result) => count_fault(run.level, result),
+        Err(fault) => fault.clone(),
+    };
+    let mut record = failure_record(item, run.level, &fault, provenance);
+    record.mesh_hash = Some(scene.input.hash.clone());
+    record.initial = scene.initial();
+    record.repetitions = vec![repetition(&run.times)];
+    record.simplify.substrates =
+        run.times.substrates.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect();
+    record.simplify.seconds = Some(run.times.seconds());
+    record.simplify.cpu_seconds = Some(run.times.cpu_seconds());
+    record.simplify.peak_bytes = Some(run.times.peak_bytes);
+    let Ok(result) = &run.outcome else { return record };
+    if record.status == Status::Ok {
+        record.reason = None;
+    }
+    fill_result(&mut record.simplify, result);
+    if let Some(ProgramPeak(bytes)) = result.extras.get() {
+        // The program ran beside the heap of this process, which held what it was given.
+        record.simplify.peak_bytes = Some(run.times.peak_bytes + bytes);
+    }
+    if let Some(Verdict { evaluation, seconds, union, hash }) = verdict {
+        record.result_hash = Some(hash);
+        record.union = union;
+        match evaluation {
+            Some(Ok(evaluation)) => {
+                record.evaluate = Some(evaluation);
+                record.evaluate_seconds = Some(seconds);
+            }
+            Some(Err(error)) => record.simplify.warnings.push(format!("not measured: {error}")),
+            None => {}
+        }
+    }
+    if let Some(axes) = axes {
+        match save(result, &record, scene, axes) {
+            Ok(artifact) => record.artifact = Some(artifact),
+            Err(error) => record.simplify.warnings.push(format!("not saved: {error}")),
+        }
+    }
+    record
+}
+
+/// What the result itself says: counts, level, remarks.
+pub fn fill_result(simplify: &mut Simplify, result: &Simplified) {
+    let mesh = &result.mesh;
+    simplify.reached = Some(mesh.spheres.len());
+    simplify.native_level = result.native_level;
+    simplify.spheres = Some(mesh.spheres.len());
+    simplify.edges = Some(mesh.edges.len());
+    simplify.faces = Some(mesh.faces.len());
+    simplify.warnings.clone_from(&result.diagnostics.warnings);
+    simplify.diagnostics = result.diagnostics.counts.iter().cloned().collect();
+    simplify.own_seconds = result.extras.get().map(|&plugin::OwnSeconds { prepare, simplify }| {
+        medial_reports::OwnSeconds { prepare, simplify }
+    });
+}
+
+/// `ok`, or that the result has another count than the one asked, and why.
+fn count_fault(level: Level, result: &Simplified) -> Fault {
+    let reached = result.mesh.spheres.len();
+    match level {
+        Level::Spheres(asked)
+            if reached.abs_diff(asked) as f64 > COUNT_TOLERANCE * asked as f64 =>
+        {
+            let why = result.diagnostics.warnings.join("; ");
+            let why = if why.is_empty() { why } else { format!(": {why}") };
+            let reason = format!("{reached} spheres where {asked} were asked{why}");
+            Fault { status: Status::OtherCount, reason }
+        }
+        _ => Fault { status: Status::Ok, reason: String::new() },
+    }
+}
+
+/// One timed repetition.
+pub fn repetition(times: &Times) -> Repetition {
+    Repetition { seconds: times.seconds(), cpu_seconds: times.cpu_seconds() }
+}
+
+/// The stages of the repetition with the median total; the lower one of an even number.
+pub fn median(repetitions: &[Repetition], part: fn(&Repetition) -> Stages) -> Option<Stages> {
+    let mut stages: Vec<Stages> = repetitions.iter().map(part).collect();
+    stages.sort_by(|a, b| a.total.total_cmp(&b.total));
+    stages.get(stages.len().saturating_sub(1) / 2).copied()
+}
+
+/// Saves a result and returns its path from the folder above `axes`, with `/`.
+fn save(
+    result: &Simplified,
+    record: &Record,
+    scene: &Scene,
+    axes: &Path,
+) -> Result<String, Box<dyn std::error::Error>> {
+    let level = match record.simplify.level {
+        Level::Published => "published".to_owned(),
+        Level::Spheres(count) => count.to_string(),
+        Level::Native(value) => format!("level-{value}"),
+    };
+    let mesh = file_stem(&record.mesh);
+    let method = file_stem(record.simplify.variant.as_ref().unwrap_or(&record.simplify.method));
+    // The key tells apart what else decides the result: parameters, seed, sampling, build.
+    let key = &record.key[..12];
+    let name = format!("{method}-{level}-{key}.ma");
+    std::fs::create_dir_all(axes.join(&mesh))?;
+    complex::write(axes.join(&mesh).join(&name), &scene.in_input_units(&result.mesh))?;
+    let folder = axes.file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
+    Ok(format!("{folder}/{mesh}/{name}"))
+}

@@ -1,0 +1,121 @@
+//! The methods that there are: those of the program, and those of plug-in files.
+
+use std::path::{Path, PathBuf};
+
+use medial::simplifier::MedialSimplifier;
+
+use crate::plugin::{self, PluginError};
+
+/// Methods by id, in the order of the tables.
+pub struct Registry {
+    entries: Vec<Entry>,
+    /// The plug-in files that were added, as absolute paths.
+    files: Vec<PathBuf>,
+}
+
+/// A method, and what it is made of where it is not part of the program.
+pub struct Entry {
+    method: Box<dyn MedialSimplifier>,
+    fingerprint: Option<String>,
+}
+
+impl Entry {
+    /// The method.
+    pub fn method(&self) -> &dyn MedialSimplifier {
+        self.method.as_ref()
+    }
+
+    /// Its id.
+    pub fn id(&self) -> &str {
+        &self.method.info().id
+    }
+
+    /// Hash of the declaration and the files of a plug-in; `None` for a method of the program,
+    /// which the program's own hash decides.
+    pub fn fingerprint(&self) -> Option<&str> {
+        self.fingerprint.as_deref()
+    }
+}
+
+/// Why a registry cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RegistryError {
+    /// Two methods have one id.
+    #[error("{}two methods are called `{id}`; give one of them another id", in_file(file))]
+    Duplicate {
+        /// The id.
+        id: String,
+        /// The plug-in file with the second one; `None` for a method of the program.
+        file: Option<PathBuf>,
+    },
+    /// A plug-in file is wrong.
+    #[error(transparent)]
+    Plugin(#[from] PluginError),
+}
+
+fn in_file(file: &Option<PathBuf>) -> String {
+    file.as_ref().map_or_else(String::new, |file| format!("{}: ", file.display()))
+}
+
+impl Registry {
+    /// The methods of a program.
+    ///
+    /// # Errors
+    /// [`RegistryError::Duplicate`] when two have one id.
+    pub fn new(methods: Vec<Box<dyn MedialSimplifier>>) -> Result<Self, RegistryError> {
+        let mut registry = Self { entries: Vec::new(), files: Vec::new() };
+        for method in methods {
+            registry.add(method, None, None)?;
+        }
+        Ok(registry)
+    }
+
+    /// Adds the methods of a plug-in file.
+    ///
+    /// # Errors
+    /// When the file is wrong, or an id is taken.
+    pub fn add_plugins(&mut self, file: &Path) -> Result<(), RegistryError> {
+        let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+        if self.files.contains(&file) {
+            return Ok(());
+        }
+        for external in plugin::load(&file)? {
+            let fingerprint = external.fingerprint().to_owned();
+            self.add(Box::new(external), Some(fingerprint), Some(&file))?;
+        }
+        self.files.push(file);
+        Ok(())
+    }
+
+    fn add(
+        &mut self,
+        method: Box<dyn MedialSimplifier>,
+        fingerprint: Option<String>,
+        file: Option<&Path>,
+    ) -> Result<(), RegistryError> {
+        let id = method.info().id.clone();
+        if self.entry(&id).is_some() {
+            return Err(RegistryError::Duplicate {
+                id: id.into_owned(),
+                file: file.map(Path::to_owned),
+            });
+        }
+        self.entries.push(Entry { method, fingerprint });
+        Ok(())
+    }
+
+    /// The method with an id.
+    pub fn entry(&self, id: &str) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.id() == id)
+    }
+
+    /// All methods.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// The plug-in files that were added.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+}

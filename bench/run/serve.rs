@@ -1,0 +1,221 @@
+//! The worker: a child process that runs items one after another and tells what came of them.
+//!
+//! It keeps the scene of its last item, so that substrates and judge are built once for all items
+//! of a mesh. It ends when its standard input ends, in the middle of an item too: nobody waits for
+//! the answer then.
+
+use std::io::{self, BufRead};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::mpsc::{self, Receiver};
+use std::thread;
+use std::time::Duration;
+
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{MedialSimplifier, RunContext, SimplifyError};
+use medial_reports::Status;
+
+use crate::plugin::SCRATCH;
+use crate::process_tree;
+
+use super::protocol::{Event, Request, send};
+use super::record::{Kept, NoisePart, record, repetition};
+use super::scene::{Scene, reference_key};
+use super::verdict::{judge, mesh_hash};
+use super::{Fault, Input, Item, LevelRun, Provenance, Registry, Source, answer};
+
+/// Serves until nobody asks any more. `bytes` is the limit of memory of this process.
+pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
+    limit(bytes);
+    process_tree::adopt_strays();
+    let mut scene = None;
+    for request in requests() {
+        let served = match request {
+            Request::Run { item, axes, provenance } => {
+                run(registry, &mut scene, &item, axes.as_deref(), &provenance)
+            }
+            Request::Probe { item } => probe(registry, &item),
+            Request::Again { item } => again(registry, &mut scene, &item),
+        };
+        if served.and_then(|()| send(&Event::Finished)).is_err() {
+            break;
+        }
+    }
+    process_tree::end_descendants();
+    ExitCode::SUCCESS
+}
+
+/// No core files, and no more memory than allowed: an allocation beyond it fails at once, where
+/// watching from outside might be too late. What the system cannot limit is only watched.
+fn limit(bytes: u64) {
+    #[cfg(unix)]
+    {
+        use rlimit::Resource;
+        let _ = Resource::CORE.set(0, 0);
+        #[cfg(target_os = "linux")]
+        let _ = Resource::DATA.set(bytes, bytes);
+    }
+    let _ = bytes;
+}
+
+/// The requests, until standard input ends. It is read by a thread of its own, so that its end is
+/// noticed in the middle of an item.
+fn requests() -> Receiver<Request> {
+    let (sender, receiver) = mpsc::channel();
+    thread::spawn(move || {
+        for line in io::stdin().lock().lines() {
+            let request = line.ok().and_then(|line| serde_json::from_str(&line).ok());
+            let Some(request) = request else { break };
+            if sender.send(request).is_err() {
+                break;
+            }
+        }
+        drop(sender);
+        // Time to end by itself, where it is idle.
+        thread::sleep(Duration::from_millis(200));
+        process_tree::end_descendants();
+        // The supervisor removes it too, unless it was ended by force.
+        if let Some(scratch) = std::env::var_os(SCRATCH) {
+            let _ = std::fs::remove_dir_all(scratch);
+        }
+        std::process::exit(0);
+    });
+    receiver
+}
+
+/// The scene of an item: the one that is there, or a new one in its place.
+fn enter<'s>(scene: &'s mut Option<Scene>, item: &Item) -> Result<&'s mut Scene, String> {
+    if !scene.as_ref().is_some_and(|scene| scene.serves(&item.scene)) {
+        // The old one goes first, so that two are never there together.
+        *scene = None;
+        *scene = Some(Scene::load(&item.scene)?);
+    }
+    let scene = scene.as_mut().expect("just made");
+    scene.set_noise(item.scene.noise)?;
+    Ok(scene)
+}
+
+fn run(
+    registry: &Registry,
+    scene: &mut Option<Scene>,
+    item: &Item,
+    axes: Option<&Path>,
+    provenance: &Provenance,
+) -> io::Result<()> {
+    send(&Event::Loading)?;
+    let scene = match enter(scene, item) {
+        Ok(scene) => scene,
+        Err(why) => return send(&Event::Refused(why)),
+    };
+    send(&Event::Preparing(scene.input.hash.clone()))?;
+    let runs = answer_item(registry, item, &scene.shape().view());
+    send(&Event::Measuring)?;
+    let verdicts = judge(scene, &runs);
+    let noise = noise_parts(registry, scene, item, &runs);
+    for ((run, verdict), noise) in runs.iter().zip(verdicts).zip(noise) {
+        let record = record(item, scene, run, verdict, provenance, axes);
+        send(&Event::Record(Box::new(Kept { record, noise })))?;
+    }
+    Ok(())
+}
+
+fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Result<()> {
+    send(&Event::Loading)?;
+    let scene = match enter(scene, item) {
+        Ok(scene) => scene,
+        Err(why) => return send(&Event::Refused(why)),
+    };
+    send(&Event::Preparing(scene.input.hash.clone()))?;
+    for LevelRun { level, outcome, times } in answer_item(registry, item, &scene.shape().view()) {
+        let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
+        send(&Event::Repeated(level, outcome))?;
+    }
+    Ok(())
+}
+
+/// Prepares the method of an item on the smallest of shapes.
+fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
+    let resolution = medial_datasets::find("sphere").map(|shape| *shape.resolutions().start());
+    let source = Source::BuiltIn { id: "sphere".into(), resolution };
+    let Ok(input) = Input::load(&source) else { return Ok(()) };
+    let Ok(shape) = input.shape(ShapeOptions::default()) else { return Ok(()) };
+    send(&Event::Preparing(input.hash))?;
+    let Ok(method) = find(registry, item) else { return Ok(()) };
+    let context = RunContext::with_seed(item.seed);
+    // A panic is for the run itself to report.
+    let prepared = catch_unwind(AssertUnwindSafe(|| {
+        method.prepare(&shape, &item.method.params, &context).map(|_| ())
+    }));
+    match prepared {
+        Ok(Err(error @ SimplifyError::Parameter(_))) => {
+            send(&Event::WrongParameter(error.to_string()))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn answer_item(registry: &Registry, item: &Item, view: &Shape) -> Vec<LevelRun> {
+    let context = RunContext::with_seed(item.seed);
+    let method = find(registry, item);
+    let start = || match method {
+        Ok(method) => method.prepare(view, &item.method.params, &context),
+        Err(why) => Err(SimplifyError::Failed(why)),
+    };
+    answer(view, start, &item.levels, |level| {
+        // The supervisor notices by itself when the pipe is closed.
+        let _ = send(&Event::Asked(level));
+    })
+}
+
+/// The method of an item, which must be the one that it was planned with.
+fn find<'r>(registry: &'r Registry, item: &Item) -> Result<&'r dyn MedialSimplifier, String> {
+    let id = &item.method.id;
+    let entry = registry.entry(id).ok_or_else(|| format!("no method is called `{id}`"))?;
+    if entry.fingerprint() != item.method.fingerprint.as_deref() {
+        return Err(format!(
+            "{id}: its plug-in file or program has changed since the run was planned"
+        ));
+    }
+    Ok(entry.method())
+}
+
+/// The comparison of noisy results with those without noise, which are made where they are not
+/// there yet; `None` for items without noise.
+fn noise_parts(
+    registry: &Registry,
+    scene: &mut Scene,
+    item: &Item,
+    runs: &[LevelRun],
+) -> Vec<Option<NoisePart>> {
+    let Some(noise) = item.scene.noise else { return vec![None; runs.len()] };
+    let key = |level| reference_key(&item.method, item.seed, level);
+    let results = |runs: &[LevelRun]| -> Vec<_> {
+        let results = runs.iter().filter_map(|run| Some((run.level, run.outcome.as_ref().ok()?)));
+        results.map(|(level, result)| (key(level), result.mesh.clone())).collect()
+    };
+    if noise.eta == 0.0 {
+        results(runs).into_iter().for_each(|(key, mesh)| scene.remember(key, mesh));
+        return vec![Some(NoisePart { growth: Some(1.0), shift: None }); runs.len()];
+    }
+    if runs.iter().any(|run| run.outcome.is_ok() && scene.reference(&key(run.level)).is_none()) {
+        let clean = scene.clean().expect("there is noise").view();
+        let clean = results(&answer_item(registry, item, &clean));
+        clean.into_iter().for_each(|(key, mesh)| scene.remember(key, mesh));
+    }
+    let part = |run: &LevelRun| {
+        let reference = scene.reference(&key(run.level));
+        let shift = run.outcome.as_ref().ok().zip(reference);
+        let shift =
+            shift.and_then(|(result, clean)| scene.shift(&scene.carried(&result.mesh), clean));
+        Some(NoisePart { growth: scene.growth(), shift })
+    };
+    runs.iter().map(part).collect()
+}
+
+impl Fault {
+    /// Whether a worker that reported this may be in a broken state.
+    pub fn taints(&self) -> bool {
+        self.status == Status::Panicked
+    }
+}

@@ -1,0 +1,314 @@
+//! The folder of results: records that accumulate, and what may be done to them.
+//!
+//! `results.jsonl` is only ever appended to, one line for each level of each item, and a key on
+//! each line tells what was run. One process at a time adds to a store; the lock goes with the
+//! process that holds it, however that ends.
+
+use std::collections::HashMap;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use medial::simplifier::Level;
+use medial_reports::{Journal, JournalError, Status};
+use serde::{Deserialize, Serialize};
+
+use super::Item;
+
+/// Name of the append-only list of records of a comparison.
+pub const RESULTS: &str = "results.jsonl";
+/// Name of the folder of the results as `.ma`.
+pub const AXES: &str = "axes";
+/// Name of the file that names the process that holds a store.
+const LOCK: &str = ".lock";
+
+/// A folder of results that this process may add to.
+pub struct Store {
+    dir: PathBuf,
+    /// Held as long as the store is open.
+    _lock: File,
+    journal: Journal,
+    known: HashMap<String, Known>,
+    /// Whether the page is of an earlier state of the records.
+    page_withdrawn: bool,
+    /// What is to be said of the folder as it was found.
+    pub remarks: Vec<String>,
+}
+
+/// What decides whether a level has to be run again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Known {
+    status: Status,
+    repetitions: usize,
+    seconds_limit: f64,
+    bytes_limit: u64,
+}
+
+/// As much of a record as a store needs to know.
+#[derive(Deserialize)]
+struct Stub {
+    #[serde(default)]
+    key: String,
+    status: Status,
+    #[serde(default)]
+    repetitions: Vec<serde::de::IgnoredAny>,
+    #[serde(default)]
+    conditions: Option<StubConditions>,
+}
+
+#[derive(Deserialize)]
+struct StubConditions {
+    #[serde(default)]
+    seconds_limit: f64,
+    #[serde(default)]
+    bytes_limit: u64,
+}
+
+/// Why a folder cannot be used as a store.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// It is a file.
+    #[error("{}: not a folder", .0.display())]
+    NotAFolder(PathBuf),
+    /// Another process adds to it.
+    #[error(
+        "{}: {holder} is adding results to this folder; wait for it, or take another with --out",
+        dir.display()
+    )]
+    Held {
+        /// The folder.
+        dir: PathBuf,
+        /// Who holds it, as it says itself.
+        holder: String,
+    },
+    /// A record cannot be written.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+}
+
+impl Store {
+    /// Opens or makes a folder of results, for `journal`, one of its lists of records.
+    ///
+    /// What an interrupted process left unfinished is removed and said: temporary files, and a last
+    /// line that stops in the middle.
+    ///
+    /// # Errors
+    /// When it is no folder, is not writable, or another process holds it.
+    pub fn open(dir: &Path, journal: &str, command: &str) -> Result<Self, StoreError> {
+        if dir.exists() && !dir.is_dir() {
+            return Err(StoreError::NotAFolder(dir.to_owned()));
+        }
+        let failed = |path: &Path| {
+            let path = path.to_owned();
+            move |source| StoreError::Io { path, source }
+        };
+        fs::create_dir_all(dir).map_err(failed(dir))?;
+        let lock = lock(dir, command)?;
+        let path = dir.join(journal);
+        let mut remarks = Vec::new();
+        if cut_torn_line(&path).map_err(failed(&path))? {
+            remarks.push(format!(
+                "{}: its last line was incomplete, the trace of a process that was ended while it \
+                 wrote; it was removed, and its item is run again",
+                path.display()
+            ));
+        }
+        remove_temporaries(dir);
+        let known = read_known(&path).map_err(failed(&path))?;
+        let journal = Journal::open(&path)?;
+        Ok(Self {
+            dir: dir.to_owned(),
+            _lock: lock,
+            journal,
+            known,
+            page_withdrawn: false,
+            remarks,
+        })
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Removes all results and what was made of them.
+    ///
+    /// # Errors
+    /// When a file cannot be removed.
+    pub fn clear(&mut self, journal: &str) -> Result<(), StoreError> {
+        let failed = |path: &Path, source| StoreError::Io { path: path.to_owned(), source };
+        self.withdraw_page()?;
+        for name in [journal, "header.json", "study.toml", "results.csv"] {
+            remove(&self.dir.join(name)).map_err(|error| failed(&self.dir.join(name), error))?;
+        }
+        for name in [AXES, "tables", "plots"] {
+            let path = self.dir.join(name);
+            match fs::remove_dir_all(&path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(failed(&path, error));
+                }
+                _ => {}
+            }
+        }
+        self.known.clear();
+        self.journal = Journal::open(self.dir.join(journal))?;
+        Ok(())
+    }
+
+    /// The levels of an item that have to be run: those without a record, and those that a limit
+    /// ended that is wider now, or that failed, where failures are to be repeated.
+    pub fn missing(&self, item: &Item, retry_failed: bool) -> Vec<Level> {
+        let missing = |key: &String| match self.known.get(key) {
+            None => true,
+            Some(known) => known.is_incomplete(item, retry_failed),
+        };
+        let keys = item.keys();
+        let levels = item.levels.iter().zip(&keys);
+        levels.filter(|(_, key)| missing(key)).map(|(&level, _)| level).collect()
+    }
+
+    /// Adds lines: records, or what holds a record with what belongs beside it.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn keep(&mut self, lines: &[impl Serialize]) -> Result<(), StoreError> {
+        self.withdraw_page()?;
+        Ok(self.journal.append_lines(lines)?)
+    }
+
+    /// A page of an earlier state of the records must not stand beside them.
+    fn withdraw_page(&mut self) -> Result<(), StoreError> {
+        if !self.page_withdrawn {
+            let path = self.dir.join("index.html");
+            remove(&path).map_err(|source| StoreError::Io { path, source })?;
+            self.page_withdrawn = true;
+        }
+        Ok(())
+    }
+}
+
+impl Known {
+    fn is_incomplete(&self, item: &Item, retry_failed: bool) -> bool {
+        match self.status {
+            Status::TimedOut if item.limits.seconds > self.seconds_limit => true,
+            Status::OutOfMemory if item.limits.bytes > self.bytes_limit => true,
+            status if status.is_failure() => retry_failed,
+            status => status.has_result() && self.repetitions < item.repeat,
+        }
+    }
+}
+
+/// Takes the lock and writes down who holds it.
+fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
+    let path = dir.join(LOCK);
+    let failed = |source| StoreError::Io { path: path.clone(), source };
+    let mut options = OpenOptions::new();
+    let mut file =
+        options.read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+    match file.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => {
+            let mut holder = String::new();
+            let _ = file.read_to_string(&mut holder);
+            let holder = match holder.trim() {
+                "" => "another process".to_owned(),
+                holder => holder.to_owned(),
+            };
+            return Err(StoreError::Held { dir: dir.to_owned(), holder });
+        }
+        // Some file systems have no locks; two runs into one folder cannot be told there.
+        Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
+        Err(TryLockError::Error(error)) => return Err(failed(error)),
+    }
+    let holder = format!("process {} (`{command}`)", std::process::id());
+    file.set_len(0).map_err(failed)?;
+    file.rewind().map_err(failed)?;
+    file.write_all(holder.as_bytes()).map_err(failed)?;
+    Ok(file)
+}
+
+/// Cuts off a last line without its end, and says whether there was one.
+fn cut_torn_line(path: &Path) -> io::Result<bool> {
+    let bytes = match fs::read(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        bytes => bytes?,
+    };
+    let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+    if whole == bytes.len() {
+        return Ok(false);
+    }
+    // A complete record that only lacks its line break is kept.
+    let file = OpenOptions::new().append(true).open(path)?;
+    if serde_json::from_slice::<serde::de::IgnoredAny>(&bytes[whole..]).is_ok() {
+        (&file).write_all(b"\n")?;
+        return Ok(false);
+    }
+    file.set_len(whole as u64)?;
+    Ok(true)
+}
+
+/// What is known of each key, from its last line.
+fn read_known(path: &Path) -> io::Result<HashMap<String, Known>> {
+    let bytes = match fs::read(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(HashMap::new()),
+        bytes => bytes?,
+    };
+    let mut known = HashMap::new();
+    for line in bytes.split(|&byte| byte == b'\n') {
+        let Some(stub) = stub(line) else { continue };
+        let limits = stub.conditions;
+        let (seconds_limit, bytes_limit) =
+            limits.map_or((0.0, 0), |limits| (limits.seconds_limit, limits.bytes_limit));
+        let repetitions = stub.repetitions.len();
+        known.insert(
+            stub.key,
+            Known { status: stub.status, repetitions, seconds_limit, bytes_limit },
+        );
+    }
+    Ok(known)
+}
+
+fn stub(line: &[u8]) -> Option<Stub> {
+    /// A line of another journal than that of a comparison holds its record one level deeper.
+    #[derive(Deserialize)]
+    struct Nested {
+        record: Stub,
+    }
+    let nested = || serde_json::from_slice::<Nested>(line).ok().map(|nested| nested.record);
+    let stub = serde_json::from_slice::<Stub>(line).ok().or_else(nested);
+    stub.filter(|stub| !stub.key.is_empty())
+}
+
+/// Removes what writers left under temporary names. The lock is held: none is in use.
+fn remove_temporaries(dir: &Path) {
+    let mut folders = vec![dir.to_owned()];
+    while let Some(folder) = folders.pop() {
+        let Ok(entries) = fs::read_dir(&folder) else { continue };
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            match entry.file_type() {
+                Ok(kind) if kind.is_dir() => folders.push(entry.path()),
+                Ok(kind) if kind.is_file() && name.starts_with('.') && name.ends_with(".tmp") => {
+                    let _ = fs::remove_file(entry.path());
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        other => other,
+    }
+}

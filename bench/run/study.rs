@@ -1,0 +1,443 @@
+//! A study: which methods run on which meshes at which levels, as a TOML file.
+//!
+//! ```toml
+//! meshes = ["bear.off", "builtin:torus"]   # relative paths start at this file
+//! spheres = [1000, 500, 100]
+//! repeat = 3
+//! plugins = ["largest.toml"]
+//!
+//! [[method]]
+//! id = "qmat"
+//!
+//! [[method]]
+//! id = "qmat"
+//! name = "qmat, no scale term"
+//! params = { k = 0 }
+//! levels = []                              # native levels beside the counts
+//! ```
+//!
+//! The command line gives one too; what it names wins over the file. The study that was asked last
+//! lies beside its results.
+
+use std::path::{Path, PathBuf};
+
+use medial::simplifier::{Level, Params};
+use medial::surface::Sampling;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Dual, Entry, InputError, Item, Limits, Measure, MethodSpec, Provenance, Registry,
+    RegistryError, SceneSpec, Source, hex_digest,
+};
+
+/// Items are ended after so many seconds unless told otherwise.
+pub const TIMEOUT: f64 = 300.0;
+
+/// More repetitions than this are taken for a slip.
+pub const MOST_REPEATS: usize = 10_000;
+
+/// Surface samples of a comparison unless told otherwise: fewer than `evaluate` takes, since it
+/// measures hundreds of results.
+const SAMPLES: usize = 10_000;
+/// Depth of the volume difference in a comparison, likewise.
+const VOLUME_DEPTH: u32 = 5;
+
+/// The matrix of a comparison.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Study {
+    /// Folder where relative paths start; the study file's own unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub folder: Option<PathBuf>,
+    /// Surface files, or `builtin:ID[:RESOLUTION]`.
+    pub meshes: Vec<PathBuf>,
+    /// A set of meshes beside those named: `builtin`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dataset: Option<String>,
+    /// Numbers of spheres.
+    pub spheres: Vec<usize>,
+    /// Whether each method also runs at its published level.
+    pub published: bool,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// How often each level is timed.
+    pub repeat: usize,
+    /// Boundary samples.
+    pub sampling: Sampling,
+    /// Triangulation of the dual Voronoi polygons.
+    pub dual: Dual,
+    /// Surface samples of the evaluation, beside the vertices.
+    pub samples: usize,
+    /// Number of threads; all processors unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threads: Option<usize>,
+    /// Limit of time for each item, in seconds.
+    pub timeout: f64,
+    /// Limit of memory in megabytes; three quarters of the machine's unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<u64>,
+    /// Plug-in files.
+    pub plugins: Vec<PathBuf>,
+    /// Methods with their parameters; all methods unless given.
+    #[serde(rename = "method")]
+    pub methods: Vec<StudyMethod>,
+}
+
+/// A method of a study: a row of its own in tables and plots.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StudyMethod {
+    /// Id of the method.
+    pub id: String,
+    /// Name in tables.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Parameters.
+    #[serde(default)]
+    pub params: Params,
+    /// Numbers of spheres, in place of the study's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spheres: Option<Vec<usize>>,
+    /// Levels of the method's own, beside the counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<f64>,
+    /// Whether it also runs at its published level, in place of the study's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub published: Option<bool>,
+}
+
+impl Default for Study {
+    fn default() -> Self {
+        Self {
+            folder: None,
+            meshes: vec![],
+            dataset: None,
+            spheres: vec![1000, 500, 200, 100],
+            published: false,
+            seed: 0,
+            repeat: 1,
+            sampling: Sampling::default(),
+            dual: Dual::default(),
+            samples: SAMPLES,
+            threads: None,
+            timeout: TIMEOUT,
+            memory: None,
+            plugins: vec![],
+            methods: vec![],
+        }
+    }
+}
+
+/// What is wrong with a study.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// The file cannot be read, or is no study.
+    #[error("{}: {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the line.
+        message: String,
+    },
+    /// A value makes no sense.
+    #[error("{0}")]
+    Value(String),
+    /// No such method.
+    #[error("{}", no_such_method(id, known))]
+    Method {
+        /// What was asked.
+        id: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// An input is wrong.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A plug-in file is wrong.
+    #[error(transparent)]
+    Registry(#[from] RegistryError),
+}
+
+/// The message for an id that no method has, naming those that exist.
+pub fn no_such_method(id: &str, known: &[String]) -> String {
+    format!("no method is called `{id}`; there are: {}", known.join(", "))
+}
+
+/// What is the same for all items of this process.
+#[derive(Clone, Debug)]
+pub struct Here {
+    /// SHA-256 of the program.
+    pub binary: String,
+    /// Threads where a study says nothing.
+    pub threads: usize,
+    /// Memory of the machine, in bytes; 0 where it is not known.
+    pub memory: u64,
+}
+
+impl Here {
+    /// What this process is.
+    pub fn of(provenance: &Provenance) -> Self {
+        Self {
+            binary: provenance.binary_hash.clone(),
+            threads: rayon::current_num_threads(),
+            memory: provenance.machine.memory,
+        }
+    }
+}
+
+impl Study {
+    /// Reads a study file. Relative paths in it start at its folder.
+    ///
+    /// # Errors
+    /// [`StudyError::File`], with the line where the text is at fault.
+    pub fn read(path: &Path) -> Result<Self, StudyError> {
+        let failed = |message: String| StudyError::File { path: path.to_owned(), message };
+        let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
+        let mut study: Self = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
+        let own = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+        let folder = study.folder.map_or(own.clone(), |folder| own.join(folder));
+        study.folder = Some(std::path::absolute(&folder).unwrap_or(folder));
+        Ok(study)
+    }
+
+    /// The study as a file.
+    pub fn to_text(&self) -> String {
+        toml::to_string(self).unwrap_or_else(|error| format!("# not written: {error}\n"))
+    }
+
+    /// A path as it is meant.
+    pub fn resolved(&self, path: &Path) -> PathBuf {
+        match &self.folder {
+            // A built-in shape is no path.
+            Some(folder) if !path.to_string_lossy().starts_with("builtin:") => folder.join(path),
+            _ => path.to_owned(),
+        }
+    }
+
+    /// Refuses values that make no sense.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`].
+    pub fn check(&self) -> Result<(), StudyError> {
+        let wrong = |message: String| Err(StudyError::Value(message));
+        if !(1..=MOST_REPEATS).contains(&self.repeat) {
+            return wrong(format!(
+                "--repeat {}: time each item 1 to {MOST_REPEATS} times",
+                self.repeat
+            ));
+        }
+        if !(self.timeout > 0.0 && self.timeout.is_finite()) {
+            return wrong(format!("--timeout {}: a positive number of seconds", self.timeout));
+        }
+        if self.memory == Some(0) {
+            return wrong("--memory 0: a positive number of megabytes".into());
+        }
+        let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
+        if counts.chain([&self.spheres]).any(|counts| counts.contains(&0)) {
+            return wrong("--spheres 0: ask for at least one sphere".into());
+        }
+        Ok(())
+    }
+
+    /// The methods of the study: those named, or all there are.
+    ///
+    /// # Errors
+    /// [`StudyError::Method`] for an id that no method has; [`StudyError::Value`] for two rows of
+    /// one name.
+    pub fn entries<'r>(
+        &self,
+        registry: &'r Registry,
+    ) -> Result<Vec<(StudyMethod, &'r Entry)>, StudyError> {
+        if self.methods.is_empty() {
+            let all = registry.entries().iter();
+            return Ok(all.map(|entry| (StudyMethod::of(entry.id()), entry)).collect());
+        }
+        let mut found: Vec<(StudyMethod, &Entry)> = Vec::new();
+        for method in &self.methods {
+            let entry = registry.entry(&method.id).ok_or_else(|| StudyError::Method {
+                id: method.id.clone(),
+                known: registry.entries().iter().map(|entry| entry.id().to_owned()).collect(),
+            })?;
+            // The same row twice would be one row with twice the weight.
+            if found.iter().any(|(other, _)| other == method) {
+                continue;
+            }
+            if let Some(name) = &method.name
+                && found.iter().any(|(other, _)| other.name.as_ref() == Some(name))
+            {
+                return Err(StudyError::Value(format!("two methods are named `{name}`")));
+            }
+            found.push((method.clone(), entry));
+        }
+        Ok(found)
+    }
+
+    /// The inputs of the study: those named and those of the set; all built-in shapes where there
+    /// are none.
+    ///
+    /// # Errors
+    /// When one does not exist, or is no input.
+    pub fn sources(&self) -> Result<Vec<Source>, StudyError> {
+        let mut sources = Vec::new();
+        for mesh in &self.meshes {
+            sources.push(Source::parse(&self.resolved(mesh))?);
+        }
+        match self.dataset.as_deref() {
+            None if sources.is_empty() => sources = Source::built_ins(),
+            None => {}
+            Some("builtin") => sources.extend(Source::built_ins()),
+            Some(other) => {
+                let message = format!("--dataset {other}: the one set is `builtin`");
+                return Err(StudyError::Value(message));
+            }
+        }
+        let mut distinct: Vec<Source> = Vec::with_capacity(sources.len());
+        for source in sources {
+            source.check()?;
+            // The same mesh twice would be one row with twice the weight.
+            if !distinct.contains(&source) {
+                distinct.push(source);
+            }
+        }
+        Ok(distinct)
+    }
+
+    /// All items, mesh by mesh.
+    ///
+    /// # Errors
+    /// As [`Study::check`], [`Study::entries`] and [`Study::sources`].
+    pub fn items(&self, registry: &Registry, here: &Here) -> Result<Vec<Item>, StudyError> {
+        self.check()?;
+        let methods = self.entries(registry)?;
+        let sources = self.sources()?;
+        let names = unique_names(&sources);
+        let mut items = Vec::new();
+        for (source, mesh) in sources.iter().zip(names) {
+            let hash = match source {
+                Source::File(path) => Some(hash_of(path)?),
+                Source::BuiltIn { .. } => None,
+            };
+            let scene = SceneSpec {
+                mesh,
+                source: source.clone(),
+                hash,
+                displaced: None,
+                noise: None,
+                sampling: self.sampling,
+                dual: self.dual,
+                measure: self.measure(),
+            };
+            for (method, entry) in &methods {
+                items.push(self.item(scene.clone(), method, entry, here));
+            }
+        }
+        Ok(items)
+    }
+
+    fn measure(&self) -> Measure {
+        Measure {
+            samples: self.samples,
+            volume_depth: VOLUME_DEPTH,
+            seed: self.seed,
+            union_spacing: None,
+        }
+    }
+
+    fn item(&self, scene: SceneSpec, method: &StudyMethod, entry: &Entry, here: &Here) -> Item {
+        Item {
+            scene,
+            method: MethodSpec {
+                id: method.id.clone(),
+                name: method.name.clone(),
+                params: method.params.clone(),
+                fingerprint: entry.fingerprint().map(str::to_owned),
+            },
+            levels: self.levels(method, entry),
+            seed: self.seed,
+            repeat: self.repeat,
+            threads: self.threads.unwrap_or(here.threads),
+            limits: self.limits(here),
+            binary: here.binary.clone(),
+        }
+    }
+
+    /// The limits of each item.
+    pub fn limits(&self, here: &Here) -> Limits {
+        let machine = if here.memory == 0 { u64::MAX } else { here.memory / 4 * 3 };
+        let bytes = self.memory.map_or(machine, |megabytes| megabytes.saturating_mul(1_000_000));
+        Limits { seconds: self.timeout, bytes }
+    }
+
+    /// The published level, the counts and the method's own levels, each from fine to coarse.
+    fn levels(&self, method: &StudyMethod, entry: &Entry) -> Vec<Level> {
+        let mut levels = Vec::new();
+        if method.published.unwrap_or(self.published) {
+            levels.push(Level::Published);
+        }
+        let mut counts = method.spheres.as_ref().unwrap_or(&self.spheres).clone();
+        counts.sort_unstable_by(|a, b| b.cmp(a));
+        counts.dedup();
+        levels.extend(counts.into_iter().map(Level::Spheres));
+        let mut native = method.levels.clone();
+        native.sort_by(f64::total_cmp);
+        native.dedup();
+        if entry.method().info().native.as_ref().is_some_and(|native| !native.larger_is_coarser) {
+            native.reverse();
+        }
+        levels.extend(native.into_iter().map(Level::Native));
+        levels
+    }
+}
+
+impl StudyMethod {
+    /// A method with the paper's values.
+    pub fn of(id: &str) -> Self {
+        Self { id: id.to_owned(), ..Self::default() }
+    }
+
+    /// Reads `ID` or `ID:KEY=VALUE[:KEY=VALUE...]`.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`] where a part has no `=`.
+    pub fn parse(text: &str) -> Result<Self, StudyError> {
+        let mut parts = text.split(':');
+        let mut method = Self::of(parts.next().unwrap_or_default());
+        for part in parts {
+            let (key, value) = part.split_once('=').ok_or_else(|| {
+                StudyError::Value(format!("--methods {text}: write ID:KEY=VALUE"))
+            })?;
+            method.params.set(key, value);
+        }
+        Ok(method)
+    }
+}
+
+fn hash_of(path: &Path) -> Result<String, StudyError> {
+    let read = std::fs::read(path);
+    let bytes = read.map_err(|error| InputError::Read { path: path.to_owned(), error })?;
+    Ok(hex_digest(&bytes))
+}
+
+/// A name for each source, unlike every other even as the stem of a file: the file's stem, where
+/// that is not enough its name with the extension, then with its folder, then a number.
+fn unique_names(sources: &[Source]) -> Vec<String> {
+    let key = |name: &String| medial_reports::file_stem(name).to_ascii_lowercase();
+    let mut names: Vec<String> = sources.iter().map(Source::name).collect();
+    for depth in 1..=2 {
+        let keys: Vec<String> = names.iter().map(key).collect();
+        for (name, source) in names.iter_mut().zip(sources) {
+            if keys.iter().filter(|&other| *other == key(name)).count() > 1 {
+                *name = source.long_name(depth);
+            }
+        }
+    }
+    for index in 0..names.len() {
+        let base = names[index].clone();
+        let mut number = 2;
+        while names[..index].iter().any(|other| key(other) == key(&names[index])) {
+            names[index] = format!("{base}-{number}");
+            number += 1;
+        }
+    }
+    names
+}

@@ -1,0 +1,308 @@
+//! The supervisor: gives items to a worker, watches time and memory, and turns every end into
+//! records, so that one broken method never stops the rest.
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use medial::simplifier::Level;
+use medial_reports::{Record, Repetition, Status};
+
+use super::ending::{self, LOOK_AGAIN, Stage};
+use super::protocol::{Event, Request};
+use super::record::{Kept, failure_record};
+use super::worker::{Said, Worker, WorkerOptions};
+use super::{Fault, Item, Provenance, SceneSpec};
+
+/// The user wants no more: what was under way is ended and not recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interrupted;
+
+/// Why items cannot be run at all.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The user interrupted the run.
+    #[error("interrupted")]
+    Interrupted,
+    /// A worker cannot be started.
+    #[error("a worker process cannot be started: {0}")]
+    Start(io::Error),
+}
+
+impl From<Interrupted> for RunError {
+    fn from(_: Interrupted) -> Self {
+        Self::Interrupted
+    }
+}
+
+/// Runs items one after another, in a worker that it replaces when an item has broken it.
+pub struct Supervisor<'a> {
+    plugins: Vec<PathBuf>,
+    provenance: Provenance,
+    /// Folder for results as `.ma`.
+    axes: Option<PathBuf>,
+    /// Set when the user wants no more.
+    interrupted: &'a AtomicBool,
+    worker: Option<Worker>,
+    /// SHA-256 of the input that was ready last.
+    input: Option<(SceneSpec, String)>,
+    /// An input that ended its worker: its other items are not tried.
+    lost: Option<(SceneSpec, Fault)>,
+}
+
+/// What a level took once more, and a hash of its result.
+type Repeated = (Level, Result<(Repetition, String), Fault>);
+
+/// How an attempt at some levels ended.
+enum Attempt {
+    /// The worker told all it had to.
+    Finished,
+    /// The input is refused.
+    Refused(String),
+    /// The worker is gone.
+    Ended(Stage, Fault),
+}
+
+impl<'a> Supervisor<'a> {
+    /// A supervisor whose workers load the same plug-in files. Results are saved below `axes`.
+    pub fn new(
+        plugins: &[PathBuf],
+        provenance: &Provenance,
+        axes: Option<PathBuf>,
+        interrupted: &'a AtomicBool,
+    ) -> Self {
+        crate::process_tree::adopt_strays();
+        Self {
+            plugins: plugins.to_vec(),
+            provenance: provenance.clone(),
+            axes,
+            interrupted,
+            worker: None,
+            input: None,
+            lost: None,
+        }
+    }
+
+    /// Runs an item: a record for each level, in the order of the levels.
+    ///
+    /// A worker that ends takes with it what it had not told. The levels that it had answered are
+    /// asked again, the one that ended it gets the reason, and the coarser ones are not tried.
+    ///
+    /// # Errors
+    /// When the user interrupts, or no worker can be started.
+    pub fn run(&mut self, item: &Item) -> Result<Vec<Kept>, RunError> {
+        let mut kept: Vec<Kept> = Vec::new();
+        let mut groups = vec![item.levels.clone()];
+        while let Some(levels) = groups.pop() {
+            let part = Item { levels, ..item.clone() };
+            let (attempt, told) = self.attempt(&part)?;
+            let untold = |level: &&Level| told.iter().all(|k| k.record.simplify.level != **level);
+            let missing: Vec<Level> = part.levels.iter().filter(untold).copied().collect();
+            kept.extend(told);
+            let mut fail = |levels: &[Level], fault: &Fault| {
+                kept.extend(levels.iter().map(|&level| self.failed(item, level, fault)));
+            };
+            match attempt {
+                Attempt::Finished => {
+                    let reason = "the worker told nothing of this level".to_owned();
+                    fail(&missing, &Fault { status: Status::Failed, reason });
+                }
+                Attempt::Refused(reason) => {
+                    fail(&missing, &Fault { status: Status::Refused, reason });
+                }
+                Attempt::Ended(Stage::Asked(answered), fault) => {
+                    let at = part.levels[answered];
+                    fail(&[at], &fault);
+                    let reason = format!("not run: the method ended its worker at {at}");
+                    fail(&part.levels[answered + 1..], &Fault { reason, ..fault });
+                    if answered > 0 {
+                        groups.push(part.levels[..answered].to_vec());
+                    }
+                }
+                Attempt::Ended(Stage::Measuring, _) if missing.len() > 1 => {
+                    // One by one, to find the one that cannot be measured.
+                    groups.extend(missing.iter().rev().map(|&level| vec![level]));
+                }
+                Attempt::Ended(stage, fault) => {
+                    fail(&missing, &fault);
+                    if stage == Stage::Loading {
+                        self.lost = Some((item.scene.clone(), fault));
+                    }
+                }
+            }
+        }
+        let place = |kept: &Kept| item.levels.iter().position(|&l| l == kept.record.simplify.level);
+        kept.sort_by_key(place);
+        Ok(kept)
+    }
+
+    /// Times all levels of an item once more.
+    ///
+    /// # Errors
+    /// As [`Supervisor::run`].
+    pub fn again(&mut self, item: &Item) -> Result<Result<Vec<Repeated>, Fault>, RunError> {
+        let request = Request::Again { item: item.clone() };
+        let mut repeated = Vec::new();
+        let attempt = self.converse(item, &request, &mut |event| {
+            if let Event::Repeated(level, outcome) = event {
+                repeated.push((level, outcome));
+            }
+        })?;
+        Ok(match attempt {
+            Attempt::Finished => Ok(repeated),
+            Attempt::Refused(reason) => Err(Fault { status: Status::Refused, reason }),
+            Attempt::Ended(_, fault) => Err(fault),
+        })
+    }
+
+    /// Why a method does not take its parameters, found by preparing it on the smallest of shapes.
+    ///
+    /// # Errors
+    /// As [`Supervisor::run`].
+    pub fn refused_params(&mut self, item: &Item) -> Result<Option<String>, RunError> {
+        let request = Request::Probe { item: item.clone() };
+        let mut refused = None;
+        // A method that ends its worker says nothing of its parameters.
+        self.converse(item, &request, &mut |event| {
+            if let Event::WrongParameter(why) = event {
+                refused = Some(why);
+            }
+        })?;
+        Ok(refused)
+    }
+
+    fn failed(&self, item: &Item, level: Level, fault: &Fault) -> Kept {
+        let noise =
+            item.scene.noise.map(|_| super::record::NoisePart { growth: None, shift: None });
+        let mut record = failure_record(item, level, fault, &self.provenance);
+        let ready = self.input.as_ref().filter(|(scene, _)| *scene == item.scene);
+        record.mesh_hash = ready.map(|(_, hash)| hash.clone()).or(record.mesh_hash);
+        Kept { record, noise }
+    }
+
+    fn attempt(&mut self, item: &Item) -> Result<(Attempt, Vec<Kept>), RunError> {
+        if let Some((scene, fault)) = &self.lost
+            && *scene == item.scene
+        {
+            return Ok((Attempt::Ended(Stage::Preparing, fault.clone()), vec![]));
+        }
+        let (axes, provenance) = (self.axes.clone(), Box::new(self.provenance.clone()));
+        let request = Request::Run { item: item.clone(), axes, provenance };
+        let mut told = Vec::new();
+        let attempt = self.converse(item, &request, &mut |event| {
+            if let Event::Record(kept) = event {
+                told.push(*kept);
+            }
+        })?;
+        // A method that panicked may have left locks and caches in any state.
+        if told.iter().any(|kept| kept.record.status == Status::Panicked) {
+            self.worker = None;
+        }
+        Ok((attempt, told))
+    }
+
+    /// Puts a request to a worker and listens until it has finished or is gone.
+    fn converse(
+        &mut self,
+        item: &Item,
+        request: &Request,
+        each: &mut dyn FnMut(Event),
+    ) -> Result<Attempt, RunError> {
+        let mut worker = self.worker_for(item)?;
+        let mut stage = Stage::Loading;
+        let mut refused = None;
+        if worker.ask(request).is_err() {
+            // Gone while it was idle: once more with a new one.
+            drop(worker);
+            worker = self.worker_for(item)?;
+            worker.ask(request).map_err(RunError::Start)?;
+        }
+        let mut since = Instant::now();
+        loop {
+            if self.interrupted.load(Ordering::Relaxed) {
+                worker.end();
+                return Err(RunError::Interrupted);
+            }
+            match worker.listen(LOOK_AGAIN) {
+                Said::Event(event) => match *event {
+                    Event::Finished => {
+                        self.worker = Some(worker);
+                        return Ok(refused.map_or(Attempt::Finished, Attempt::Refused));
+                    }
+                    Event::Refused(why) => refused = Some(why),
+                    Event::Loading => {}
+                    Event::Preparing(hash) => {
+                        self.input = Some((item.scene.clone(), hash));
+                        (stage, since) = (Stage::Preparing, Instant::now());
+                    }
+                    Event::Measuring => (stage, since) = (Stage::Measuring, Instant::now()),
+                    Event::Asked(level) => {
+                        let place = item.levels.iter().position(|&asked| asked == level);
+                        stage = Stage::Asked(place.unwrap_or(0));
+                    }
+                    event => each(event),
+                },
+                Said::Gone => {
+                    let (status, last_words) = worker.collect();
+                    let fault = ending::ended(stage, status, &last_words, &item.limits);
+                    return Ok(Attempt::Ended(stage, fault));
+                }
+                Said::Nothing if since.elapsed() > item.limits.time() => {
+                    worker.end();
+                    return Ok(Attempt::Ended(stage, ending::timed_out(stage, &item.limits)));
+                }
+                Said::Nothing if worker.resident_bytes() > item.limits.bytes => {
+                    worker.end();
+                    return Ok(Attempt::Ended(stage, ending::out_of_memory(stage, &item.limits)));
+                }
+                Said::Nothing => {}
+            }
+        }
+    }
+
+    /// The worker that is there, where it fits the item, or a new one.
+    fn worker_for(&mut self, item: &Item) -> Result<Worker, RunError> {
+        let options = WorkerOptions {
+            threads: item.threads,
+            bytes: item.limits.bytes,
+            plugins: self.plugins.clone(),
+        };
+        match self.worker.take() {
+            Some(worker) if worker.options == options => Ok(worker),
+            _ => Worker::start(options).map_err(RunError::Start),
+        }
+    }
+}
+
+/// Adds a repetition to the records of an item. One that ended otherwise than the first makes the
+/// record say so: a method that sometimes breaks is broken.
+pub fn merge(records: &mut [&mut Record], repetition: usize, again: Result<Vec<Repeated>, Fault>) {
+    for record in records {
+        let level = record.simplify.level;
+        let again = match &again {
+            Ok(all) => {
+                all.iter().find(|(other, _)| *other == level).map(|(_, outcome)| outcome.clone())
+            }
+            Err(fault) => Some(Err(fault.clone())),
+        };
+        match again {
+            Some(Ok((laps, hash))) => {
+                record.repetitions.push(laps);
+                if record.result_hash.as_ref().is_some_and(|first| *first != hash) {
+                    let warning =
+                        "a repetition gave another medial mesh: the method is not deterministic";
+                    if !record.simplify.warnings.iter().any(|known| known == warning) {
+                        record.simplify.warnings.push(warning.to_owned());
+                    }
+                }
+            }
+            Some(Err(fault)) if record.status.has_result() => {
+                record.status = fault.status;
+                record.simplify.status = fault.status;
+                record.reason = Some(format!("repetition {repetition}: {}", fault.reason));
+            }
+            _ => {}
+        }
+    }
+}

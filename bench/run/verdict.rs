@@ -1,0 +1,64 @@
+//! Second step of a run: results are measured. Nothing here is on a method's clock.
+
+use std::time::Instant;
+
+use medial::complex::MedialMesh;
+use medial::metrics::{Evaluation, MetricError, union_betti};
+use medial_reports::UnionTopology;
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+
+use super::{LevelRun, Scene, hex};
+
+/// What was measured on one result.
+#[derive(Clone)]
+pub struct Verdict {
+    /// The evaluation; `None` where none was asked.
+    pub evaluation: Option<Result<Evaluation, MetricError>>,
+    /// Wall-clock seconds of the evaluation.
+    pub seconds: f64,
+    /// Topology of the union, where it was asked.
+    pub union: Option<UnionTopology>,
+    /// SHA-256 of the result.
+    pub hash: String,
+}
+
+/// Measures what came of each level, side by side. Levels with the same result are measured once.
+pub fn judge(scene: &Scene, runs: &[LevelRun]) -> Vec<Option<Verdict>> {
+    let meshes: Vec<Option<&MedialMesh>> =
+        runs.iter().map(|run| run.outcome.as_ref().ok().map(|result| &result.mesh)).collect();
+    // Its own index for the first of equal results.
+    let first = |index: usize| meshes[..index].iter().position(|&m| m == meshes[index]);
+    let firsts: Vec<usize> = (0..meshes.len()).map(|index| first(index).unwrap_or(index)).collect();
+    let measure = |index: usize| {
+        let mesh = meshes[index].filter(|_| firsts[index] == index)?;
+        Some(judge_one(scene, mesh))
+    };
+    let measured: Vec<Option<Verdict>> = (0..meshes.len()).into_par_iter().map(measure).collect();
+    firsts.into_iter().map(|first| measured[first].clone()).collect()
+}
+
+fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
+    let measure = scene.measure();
+    let hash = mesh_hash(mesh);
+    let mesh = scene.carried(mesh);
+    let begun = Instant::now();
+    let evaluation = (measure.samples > 0).then(|| scene.judge.evaluate(&mesh));
+    let seconds = begun.elapsed().as_secs_f64();
+    let union = |spacing| UnionTopology { betti: union_betti(&mesh, spacing).ok() };
+    Verdict { evaluation, seconds, union: measure.union_spacing.map(union), hash }
+}
+
+/// SHA-256 of spheres, edges and faces: equal for equal meshes alone.
+pub fn mesh_hash(mesh: &MedialMesh) -> String {
+    let mut hasher = Sha256::new();
+    let counts = [mesh.spheres.len(), mesh.edges.len(), mesh.faces.len()];
+    counts.iter().for_each(|&count| hasher.update((count as u64).to_le_bytes()));
+    for sphere in &mesh.spheres {
+        let numbers = [sphere.centre.x, sphere.centre.y, sphere.centre.z, sphere.radius];
+        numbers.iter().for_each(|number| hasher.update(number.to_le_bytes()));
+    }
+    let indices = mesh.edges.as_flattened().iter().chain(mesh.faces.as_flattened());
+    indices.for_each(|index| hasher.update(index.to_le_bytes()));
+    hex(&hasher.finalize())
+}

@@ -1,0 +1,180 @@
+//! A worker as its supervisor sees it: a child process, its events, its last words, its end.
+
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+use crate::plugin::SCRATCH;
+use crate::process_tree;
+
+use super::protocol::{Event, Request, receive};
+
+/// So much of what a worker writes on standard error is kept: its last words.
+const LAST_WORDS: usize = 16 << 10;
+
+/// How a worker is started, and what decides whether another item can use it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WorkerOptions {
+    /// Threads of its pool.
+    pub threads: usize,
+    /// Limit of memory, in bytes.
+    pub bytes: u64,
+    /// Plug-in files.
+    pub plugins: Vec<PathBuf>,
+}
+
+/// A running worker.
+pub struct Worker {
+    child: Child,
+    requests: Option<ChildStdin>,
+    events: Receiver<Event>,
+    last_words: Arc<Mutex<VecDeque<u8>>>,
+    /// Folder for the files of the programs that it starts; removed with the worker, however that
+    /// ends.
+    _scratch: TempDir,
+    /// How it was started.
+    pub options: WorkerOptions,
+}
+
+/// What a worker says next.
+pub enum Said {
+    /// An event.
+    Event(Box<Event>),
+    /// Nothing yet.
+    Nothing,
+    /// Nothing any more: the process has ended, or closed its output.
+    Gone,
+}
+
+impl Worker {
+    /// Starts a worker: the running program, with the verb `worker`.
+    ///
+    /// # Errors
+    /// When the process cannot be started.
+    pub fn start(options: WorkerOptions) -> io::Result<Self> {
+        let mut command = Command::new(program()?);
+        command.arg("worker").arg("--threads").arg(options.threads.to_string());
+        command.arg("--bytes").arg(options.bytes.to_string());
+        for file in &options.plugins {
+            command.arg("--plugins").arg(file);
+        }
+        let scratch = tempfile::Builder::new().prefix("medial-").tempdir()?;
+        command.env(SCRATCH, scratch.path());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        // A group of its own: an interrupt from the keyboard goes to the supervisor alone, and one
+        // signal ends the worker with what it started.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut child = command.spawn()?;
+        let pipe = || io::Error::other("a pipe of the worker is missing");
+        let requests = child.stdin.take().ok_or_else(pipe)?;
+        let output = child.stdout.take().ok_or_else(pipe)?;
+        let errors = child.stderr.take().ok_or_else(pipe)?;
+        let (sender, events) = mpsc::channel();
+        thread::spawn(move || {
+            receive(output, |event| {
+                // Nobody listens once the worker is given up.
+                let _ = sender.send(event);
+            });
+        });
+        let last_words = Arc::new(Mutex::new(VecDeque::new()));
+        let kept = Arc::clone(&last_words);
+        thread::spawn(move || keep_last(errors, &kept));
+        Ok(Self { child, requests: Some(requests), events, last_words, _scratch: scratch, options })
+    }
+
+    /// Asks for something.
+    ///
+    /// # Errors
+    /// When the worker does not read any more.
+    pub fn ask(&mut self, request: &Request) -> io::Result<()> {
+        let requests = self.requests.as_mut().ok_or(io::ErrorKind::BrokenPipe)?;
+        let mut line = serde_json::to_vec(request)?;
+        line.push(b'\n');
+        requests.write_all(&line)?;
+        requests.flush()
+    }
+
+    /// What it says within a time.
+    pub fn listen(&self, patience: Duration) -> Said {
+        match self.events.recv_timeout(patience) {
+            Ok(event) => Said::Event(Box::new(event)),
+            Err(RecvTimeoutError::Timeout) => Said::Nothing,
+            Err(RecvTimeoutError::Disconnected) => Said::Gone,
+        }
+    }
+
+    /// Resident bytes of the worker and of what it started, together.
+    pub fn resident_bytes(&self) -> u64 {
+        process_tree::resident_bytes(self.child.id())
+    }
+
+    /// Ends the worker and everything that it started, by force, and gives its exit status.
+    pub fn end(mut self) -> Option<ExitStatus> {
+        process_tree::end_tree(&mut self.child)
+    }
+
+    /// How it ended, after its output did. A process that only closed its output is ended.
+    pub fn collect(mut self) -> (Option<ExitStatus>, String) {
+        let deadline = Instant::now() + Duration::from_millis(500);
+        let mut status = None;
+        while status.is_none() && Instant::now() < deadline {
+            status = self.child.try_wait().ok().flatten();
+            if status.is_none() {
+                thread::sleep(Duration::from_millis(2));
+            }
+        }
+        let killed = process_tree::end_tree(&mut self.child);
+        // The thread that reads the last words needs a moment for the rest of the pipe.
+        thread::sleep(Duration::from_millis(20));
+        (status.or(killed), self.last_words())
+    }
+
+    /// The end of what it wrote on standard error.
+    fn last_words(&self) -> String {
+        let kept = self.last_words.lock().expect("no panic while held");
+        let bytes: Vec<u8> = kept.iter().copied().collect();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+}
+
+impl Drop for Worker {
+    /// An idle worker ends by itself once its standard input ends; a busy one is ended.
+    fn drop(&mut self) {
+        drop(self.requests.take());
+        for _ in 0..100 {
+            if matches!(self.child.try_wait(), Ok(Some(_))) {
+                return;
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+        let _ = process_tree::end_tree(&mut self.child);
+    }
+}
+
+/// The program that is running. On Linux by the link that survives a rebuild in its place.
+fn program() -> io::Result<PathBuf> {
+    let link = PathBuf::from("/proc/self/exe");
+    if cfg!(target_os = "linux") && link.exists() { Ok(link) } else { std::env::current_exe() }
+}
+
+fn keep_last(mut from: impl Read, kept: &Mutex<VecDeque<u8>>) {
+    let mut block = vec![0; 1 << 16];
+    while let Ok(read) = from.read(&mut block) {
+        if read == 0 {
+            return;
+        }
+        let mut kept = kept.lock().expect("no panic while held");
+        let new = &block[read.saturating_sub(LAST_WORDS)..read];
+        kept.extend(new);
+        let excess = kept.len().saturating_sub(LAST_WORDS);
+        kept.drain(..excess);
+    }
+}

@@ -1,0 +1,153 @@
+//! Methods that go wrong in every way: each is classified with its reason, the rest completes, and
+//! nothing is left running.
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use common::{code, example, processes_with, records, run, stderr};
+use serde_json::Value;
+
+/// Status and reason by method and number of spheres.
+fn ends(out: &Path) -> BTreeMap<(String, u64), (String, String)> {
+    let end = |record: &Value| {
+        let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+        let spheres = record["simplify"]["level"]["spheres"].as_u64().expect("a count");
+        let method = text(&record["simplify"]["method"]);
+        ((method, spheres), (text(&record["status"]), text(&record["reason"])))
+    };
+    records(out).iter().map(end).collect()
+}
+
+#[test]
+fn faults_of_methods_are_contained_and_named() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let methods =
+        "panics,loops,allocates,grows,overflows,aborts,exits,invalid,empty,talks,strays,qmat";
+    let arguments = [
+        &["compare", "builtin:box:8", "--methods", methods, "--spheres", "30,20,10"][..],
+        &["--samples", "100", "--timeout", "3", "--memory", "1500", "--quiet"],
+        &["--out", out.to_str().expect("UTF-8")],
+    ];
+    let output = run(example("faulty"), &arguments.concat());
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    let ends = ends(&out);
+    let end = |method: &str, spheres| &ends[&(method.to_owned(), spheres)];
+    // What came before the fault is kept, what came after it says why it was not run.
+    let broken_at_20 = [
+        ("panics", "panicked", "this method panics at 20 spheres"),
+        ("loops", "timed_out", "--timeout"),
+        ("allocates", "out_of_memory", "--memory"),
+    ];
+    for (method, status, part) in broken_at_20 {
+        assert_eq!(end(method, 30).0, "ok", "{method}: {:?}", end(method, 30));
+        assert_eq!(end(method, 20).0, status, "{method}: {:?}", end(method, 20));
+        assert!(end(method, 20).1.contains(part), "{method}: {:?}", end(method, 20));
+        assert_eq!(end(method, 10).0, status);
+        assert!(end(method, 10).1.starts_with("not run"), "{:?}", end(method, 10));
+    }
+    let broken_at_once = [
+        ("grows", "out_of_memory", "1500 MB"),
+        ("overflows", "panicked", "stack overflowed"),
+        ("aborts", "panicked", "SIGABRT"),
+        ("exits", "panicked", "exit code 0"),
+        ("invalid", "invalid_output", "radius NaN"),
+        ("empty", "failed", "no sphere"),
+    ];
+    for (method, status, part) in broken_at_once {
+        let (found, reason) = end(method, 30);
+        assert!(found == status && reason.contains(part), "{method}: {found}, {reason}");
+    }
+    for method in ["talks", "strays", "qmat"] {
+        assert!([30, 20, 10].iter().all(|&count| end(method, count).0 == "ok"), "{method}");
+    }
+    assert_eq!(ends.len(), 36);
+    assert!(processes_with("sleep 7654").is_empty(), "a stray is left");
+}
+
+#[test]
+fn a_method_that_changes_its_mind_is_called_out() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let arguments = [
+        &["compare", "builtin:box:8", "--methods", "random,qmat", "--spheres", "30", "--repeat"][..],
+        &["3", "--samples", "100", "--quiet", "--out", out.to_str().expect("UTF-8")],
+    ];
+    assert_eq!(code(&run(example("faulty"), &arguments.concat())), 0);
+    for record in records(&out) {
+        assert_eq!(record["repetitions"].as_array().map(Vec::len), Some(3));
+        let warnings = record["simplify"]["warnings"].to_string();
+        let random = record["simplify"]["method"] == "random";
+        assert_eq!(warnings.contains("not deterministic"), random, "{warnings}");
+    }
+}
+
+/// A plug-in file with programs that go wrong, each a line for `sh`.
+fn plugins(dir: &Path, programs: &[(&str, &str)]) -> String {
+    let mut text = String::new();
+    for (id, script) in programs {
+        fs::write(dir.join(format!("{id}.sh")), script).expect("written");
+        text += &format!(
+            "[[method]]\nid = \"{id}\"\ntitle = \"{id}\"\nlevels = [\"spheres\"]\n\
+             command = [\"sh\", \"{id}.sh\", \"{{initial}}\", \"{{output}}\", \"{{spheres}}\"]\n"
+        );
+    }
+    let file = dir.join("plugins.toml");
+    fs::write(&file, text).expect("written");
+    file.to_str().expect("UTF-8").to_owned()
+}
+
+#[test]
+#[cfg(unix)]
+fn faults_of_programs_are_contained_and_named() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let programs = [
+        ("p-loops", "while :; do sleep 1; done"),
+        ("p-garbage", "head -c 100000 /dev/urandom > \"$2\""),
+        ("p-nan", "echo '1 0 0\nv 0 0 0 nan' > \"$2\""),
+        ("p-nothing", "exit 0"),
+        ("p-unsupported", "echo 'no such shapes' >&2; exit 65"),
+        ("p-fails", "echo 'out of luck' >&2; exit 3"),
+        ("p-killed", "kill -9 $$"),
+        ("p-loud", "head -c 1000000000 /dev/zero >&2; cp \"$1\" \"$2\""),
+        ("p-stray", "sleep 8765 > /dev/null 2>&1 & cp \"$1\" \"$2\""),
+        ("p-memory", "exec tail -n 1 /dev/zero"),
+        ("p-fine", "cp \"$1\" \"$2\""),
+    ];
+    let file = plugins(dir.path(), &programs);
+    let methods = programs.map(|(id, _)| id).join(",");
+    let arguments = [
+        &["compare", "builtin:box:8", "--methods", &methods, "--spheres", "20", "--plugins", &file]
+            [..],
+        &["--samples", "100", "--timeout", "10", "--memory", "1500", "--quiet"],
+        &["--out", out.to_str().expect("UTF-8")],
+    ];
+    let output = run(example("faulty"), &arguments.concat());
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    let ends = ends(&out);
+    let expected = [
+        ("p-loops", "timed_out", "--timeout"),
+        ("p-garbage", "invalid_output", ""),
+        ("p-nan", "invalid_output", ""),
+        ("p-nothing", "invalid_output", "no file"),
+        ("p-unsupported", "unsupported", "no such shapes"),
+        ("p-fails", "failed", "out of luck"),
+        ("p-killed", "panicked", "SIGKILL"),
+        ("p-loud", "other_count", "where 20 were asked"),
+        ("p-stray", "other_count", ""),
+        ("p-memory", "out_of_memory", "1500 MB"),
+        ("p-fine", "other_count", ""),
+    ];
+    for (method, status, part) in expected {
+        let (found, reason) = &ends[&(method.to_owned(), 20)];
+        assert!(found == status && reason.contains(part), "{method}: {found}, {reason}");
+    }
+    assert!(processes_with("sleep 8765").is_empty(), "a stray is left");
+    let stray = records(&out).into_iter().find(|r| r["simplify"]["method"] == "p-stray");
+    let warnings = stray.expect("a record")["simplify"]["warnings"].to_string();
+    assert!(warnings.contains("process"), "{warnings}");
+}

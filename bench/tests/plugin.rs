@@ -1,0 +1,318 @@
+//! Plug-ins: programs that do what they should, or anything else.
+//!
+//! Programs are shell scripts, so these tests need a POSIX `sh` and say so where there is none.
+#![cfg(unix)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use medial::complex::MedialMesh;
+use medial::shape::{Shape, ShapeOptions, Substrate};
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError, Work,
+};
+use medial::surface;
+use medial_bench::plugin::{self, External, OwnSeconds, ProgramPeak, SCRATCH};
+use tempfile::TempDir;
+
+mod plugins;
+use plugins::{VALID, entry, written};
+
+#[expect(clippy::print_stderr, reason = "a test that was skipped says so")]
+fn say(line: &str) {
+    eprintln!("{line}");
+}
+
+fn shape() -> Shape {
+    let mesh = medial_datasets::find("capsule").expect("in the catalogue").mesh(12);
+    let report = surface::validate(&mesh).expect("a solid");
+    Shape::new("capsule", &mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+/// A plug-in that is a shell script, called with the output and the number of spheres.
+fn script(text: &str) -> (TempDir, External) {
+    let command = r#"["sh", "run.sh", "{output}", "{spheres}"]"#;
+    let (folder, path) = written(&entry(command, r#"["spheres"]"#, ""), &[("run.sh", text)]);
+    let mut loaded = plugin::load(&path).expect("a plug-in");
+    (folder, loaded.remove(0))
+}
+
+fn ask(
+    method: &External,
+    shape: &Shape,
+    set: &[(&str, &str)],
+    level: Level,
+) -> Result<Simplified, SimplifyError> {
+    let mut params = Params::none();
+    set.iter().for_each(|(key, value)| params.set(key, value));
+    method.prepare(shape, &params, &RunContext::with_seed(7))?.at(level)
+}
+
+/// What comes of a script that is asked for ten spheres.
+fn outcome(text: &str) -> Result<Simplified, SimplifyError> {
+    let (_folder, method) = script(text);
+    ask(&method, &shape(), &[], Level::Spheres(10))
+}
+
+fn valid_and(more: &str) -> Result<Simplified, SimplifyError> {
+    outcome(&format!("{VALID}{more}"))
+}
+
+fn example(id: &str) -> External {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/plugins/largest.toml");
+    let all = plugin::load(Path::new(path)).expect("the example");
+    all.into_iter().find(|method| method.info().id == id).expect("in the example")
+}
+
+/// The largest balls of the initial mesh, as the examples keep them.
+fn largest(shape: &Shape, count: usize) -> MedialMesh {
+    let initial = shape.initial().expect("an initial mesh");
+    let mut order: Vec<usize> = (0..initial.spheres.len()).collect();
+    // Radii as they are written, in input units.
+    let diagonal = shape.normalisation().diagonal;
+    let radius = |i: usize| initial.spheres[i].radius * diagonal;
+    order.sort_by(|&a, &b| radius(b).total_cmp(&radius(a)).then(a.cmp(&b)));
+    let mut keep = vec![false; order.len()];
+    order[..count].iter().for_each(|&i| keep[i] = true);
+    initial.induced(&keep)
+}
+
+fn assert_keeps_the_largest(method: &External) -> Simplified {
+    let shape = shape();
+    let view = shape.view();
+    let result = ask(method, &view, &[], Level::Spheres(40)).expect("forty spheres");
+    let expected = largest(&shape, 40);
+    assert_eq!(result.mesh.edges, expected.edges);
+    assert_eq!(result.mesh.faces, expected.faces);
+    for (here, there) in result.mesh.spheres.iter().zip(&expected.spheres) {
+        assert!(here.centre.distance(there.centre) < 1e-15);
+        assert!((here.radius - there.radius).abs() < 1e-15);
+    }
+    assert!(view.used().iter().any(|(substrate, _)| *substrate == Substrate::MedialMesh));
+    assert_eq!((result.work, result.native_level), (Work::Anew, None));
+    assert!(result.diagnostics.warnings.is_empty(), "{:?}", result.diagnostics.warnings);
+    assert!(result.extras.get::<ProgramPeak>().is_some());
+    result
+}
+
+#[test]
+fn the_example_in_shell_keeps_the_largest_balls() {
+    assert_keeps_the_largest(&example("largest-awk"));
+}
+
+#[test]
+fn the_example_in_python_keeps_the_largest_balls_and_says_its_seconds() {
+    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
+    if !numpy.is_ok_and(|output| output.status.success()) {
+        say("skipped: no python3 with numpy");
+        return;
+    }
+    let method = example("largest");
+    let result = assert_keeps_the_largest(&method);
+    let seconds = result.extras.get::<OwnSeconds>().expect("seconds of its own");
+    assert!(seconds.prepare.is_some() && seconds.simplify.is_some());
+    let none = ask(&method, &shape(), &[("least", "1e9")], Level::Spheres(5));
+    assert!(matches!(none, Err(SimplifyError::Failed(why)) if why.contains("no ball has")));
+}
+
+#[test]
+fn a_program_is_given_what_its_command_names() {
+    let command = r#"["sh", "run.sh", "{surface}", "{output}", "s={spheres},n={native}", "{seed}", "{threads}", "{k}", "{{k}}"]"#;
+    let more = "native = { name = \"t\", unit = \"mm\", larger_is_coarser = true }\n\
+                params = [{ name = \"k\", default = \"1e-5\" }]";
+    let text =
+        "head -n 1 \"$1\" > said; shift\nout=$1; shift\necho \"$@\" >> said\nset -- \"$out\"\n";
+    let script = format!("{text}{VALID}echo '{{\"native_level\": 4}}'\n");
+    let toml = entry(command, r#"["spheres", "native"]"#, more);
+    let (folder, path) = written(&toml, &[("run.sh", &script)]);
+    let method = plugin::load(&path).expect("a plug-in").remove(0);
+    let said = || fs::read_to_string(folder.path().join("said")).expect("said");
+    let view = shape();
+    let threads = rayon::current_num_threads();
+    let result = ask(&method, &view, &[], Level::Spheres(3)).expect("two spheres");
+    assert_eq!(said(), format!("OFF\ns=3,n= 7 {threads} 1e-5 {{k}}\n"));
+    assert_eq!((result.mesh.spheres.len(), result.native_level), (2, Some(4.0)));
+    // Nobody asked for the initial mesh: it is not made.
+    assert!(view.used().is_empty());
+    let native = ask(&method, &view, &[("k", "0.25")], Level::Native(0.5)).expect("a level");
+    assert_eq!(said(), format!("OFF\ns=,n=0.5 7 {threads} 0.25 {{k}}\n"));
+    assert_eq!(native.asked, Level::Native(0.5));
+    let published = ask(&method, &view, &[], Level::Published);
+    assert!(matches!(published, Err(SimplifyError::Unsupported { why }) if why.contains("native")));
+    for set in [("k", "many"), ("k", "[1]"), ("other", "1")] {
+        let refused = ask(&method, &view, &[set], Level::Spheres(3));
+        assert!(matches!(refused, Err(SimplifyError::Parameter(why)) if why.contains(set.0)));
+    }
+    for level in [Level::Spheres(0), Level::Native(f64::NAN)] {
+        assert!(matches!(ask(&method, &view, &[], level), Err(SimplifyError::Level(_))));
+    }
+}
+
+#[test]
+fn results_are_carried_into_normalised_units() {
+    let shape = shape();
+    let result = valid_and("echo '{\"warnings\": [\"thin\"], \"what\": 1}'").expect("two spheres");
+    let normal = shape.normalisation();
+    let ball = result.mesh.spheres[1];
+    assert_eq!(ball.centre, normal.forward(medial::Vec3::new(0.1, 0.0, 0.0)));
+    assert!((ball.radius - 0.5 / normal.diagonal).abs() < 1e-15);
+    let warnings = &result.diagnostics.warnings;
+    assert!(warnings[0] == "thin" && warnings[1].contains("`what`"), "{warnings:?}");
+}
+
+#[test]
+fn exit_codes_and_signals_are_told_apart() {
+    let unsupported = outcome("echo 'only genus 0' >&2; exit 65");
+    assert!(
+        matches!(unsupported, Err(SimplifyError::Unsupported { why }) if why == "only genus 0")
+    );
+    let failed = outcome("echo log >&2; echo 'no such sphere' >&2; exit 3").expect_err("code 3");
+    assert!(matches!(failed, SimplifyError::Failed(_)));
+    assert_eq!(failed.to_string(), "failed: x ended with exit code 3: no such sphere");
+    for (script, words) in [("kill -9 $$", "lack of memory"), ("kill -SEGV $$", "SIGSEGV")] {
+        let crashed = outcome(script).expect_err(script);
+        assert!(
+            matches!(&crashed, SimplifyError::Crashed(why) if why.contains(words)),
+            "{crashed}"
+        );
+    }
+}
+
+#[test]
+fn outputs_that_are_no_medial_mesh_are_invalid() {
+    let cases = [
+        ("exit 0", "no file at {output}"),
+        ("mkdir \"$1\"", "not a file"),
+        ("echo garbage > \"$1\"", "line 1"),
+        ("printf '1 0 0\\nv 0 0 NaN 1\\n' > \"$1\"", "NaN"),
+        ("printf '1 0 0\\nv 0 0 0 -1\\n' > \"$1\"", "negative"),
+        ("printf '2 0 0\\nv 0 0 0 1\\n' > \"$1\"", "announces 2 spheres"),
+        ("printf '1 0 0\\nv 0 0 0 1e30\\n' > \"$1\"", "units"),
+        ("printf '1 0 0\\nv 1e308 0 0 1\\n' > \"$1\"", ""),
+        ("truncate -s 1000000001 \"$1\" || exit 9", "at most"),
+        ("ln -s /dev/zero \"$1\"", "not a file"),
+        ("head -c 100000 /dev/urandom > \"$1\"", ""),
+    ];
+    for (script, words) in cases {
+        let refused = outcome(script).expect_err(script);
+        let text = refused.to_string();
+        assert!(matches!(refused, SimplifyError::InvalidOutput(_)), "{script}: {text}");
+        assert!(text.contains(words) && !text.contains("output.ma"), "{script}: {text}");
+    }
+}
+
+#[test]
+fn an_earlier_output_is_not_taken_for_the_next() {
+    let (_folder, method) = script(&format!("test \"$2\" = 9 && exit 0\n{VALID}"));
+    let shape = shape();
+    let mut prepared =
+        method.prepare(&shape, &Params::none(), &RunContext::default()).expect("prepared");
+    assert!(prepared.at(Level::Spheres(10)).is_ok());
+    assert!(matches!(prepared.at(Level::Spheres(9)), Err(SimplifyError::InvalidOutput(_))));
+}
+
+#[test]
+fn a_gigabyte_of_messages_is_no_problem() {
+    let before = medial_bench::run::peak_bytes().unwrap_or(0);
+    let text = "head -c 1000000000 /dev/zero >&2; echo; echo '{\"native_level\": 1}'";
+    assert_eq!(valid_and(text).expect("two spheres").native_level, Some(1.0));
+    let after = medial_bench::run::peak_bytes().unwrap_or(0);
+    assert!(after < before + 300_000_000, "{before} {after}");
+}
+
+/// Whether a process runs, by its number in a file.
+fn is_running(pid_file: &Path) -> bool {
+    let pid = fs::read_to_string(pid_file).expect("a number");
+    let stat = fs::read_to_string(format!("/proc/{}/stat", pid.trim())).unwrap_or_default();
+    stat.rsplit(')').next().is_some_and(|rest| !rest.is_empty() && !rest.starts_with(" Z"))
+}
+
+#[test]
+fn what_a_program_leaves_behind_is_ended_and_told() {
+    if !Path::new("/proc/self/stat").exists() {
+        say("skipped: no /proc");
+        return;
+    }
+    let has_setsid = Command::new("setsid").arg("true").output().is_ok();
+    // The second is a child of a shell that is gone, the third has also left the process group.
+    let mut ways = vec!["sleep 1000 & echo $! > pid", "(sleep 1000 & echo $! > pid)"];
+    if has_setsid {
+        ways.push("(setsid sh -c 'echo $$ > pid; exec sleep 1000' &) ; sleep 0.2");
+        // Nor does it have the environment any more, but it was seen.
+        ways.push(
+            "env -i PATH=\"$PATH\" setsid sh -c 'echo $$ > pid; exec sleep 1000' & sleep 0.3",
+        );
+    } else {
+        say("skipped in part: no setsid");
+    }
+    for way in ways {
+        let (folder, method) = script(&format!("{VALID}{way}\n"));
+        let start = Instant::now();
+        let result = ask(&method, &shape(), &[], Level::Spheres(10)).expect("two spheres");
+        assert!(start.elapsed() < Duration::from_secs(20), "{way}");
+        let warnings = result.diagnostics.warnings.join("; ");
+        assert!(warnings.contains("left 1 of its processes behind"), "{way}: {warnings}");
+        assert!(!is_running(&folder.path().join("pid")), "{way}");
+    }
+}
+
+#[test]
+fn a_cancelled_program_ends_with_all_that_it_started() {
+    let (folder, method) = script("sleep 1000 & echo $! > pid\nwhile :; do :; done\n");
+    let shape = shape();
+    let run = RunContext::default();
+    let flag = run.cancel_flag();
+    let mut prepared = method.prepare(&shape, &Params::none(), &run).expect("prepared");
+    let pid = folder.path().join("pid");
+    let canceller = std::thread::spawn({
+        let pid = pid.clone();
+        move || {
+            while fs::read_to_string(&pid).map_or(true, |text| text.is_empty()) {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            flag.store(true, Ordering::Relaxed);
+        }
+    });
+    assert!(matches!(prepared.at(Level::Spheres(10)), Err(SimplifyError::Cancelled)));
+    canceller.join().expect("cancelled");
+    assert!(!is_running(&pid));
+}
+
+#[test]
+fn the_memory_of_a_program_and_its_children_is_seen() {
+    if !Path::new("/proc/self/stat").exists() {
+        say("skipped: no /proc");
+        return;
+    }
+    // A child of the shell that holds about 50 MB for a while.
+    let text =
+        "head -c 50000000 /dev/zero | tr '\\0' a | { sort -S 200M -z; sleep 0.3; } > /dev/null";
+    let peak = valid_and(text).expect("two spheres").extras.get::<ProgramPeak>().copied();
+    assert!(peak.is_some_and(|peak| peak.0 > 40_000_000 && peak.0 < 2_000_000_000), "{peak:?}");
+}
+
+/// Run by the test below in a process of its own, since the environment belongs to all tests.
+#[test]
+#[ignore = "asks for a variable of the environment"]
+fn scratch_probe() {
+    let scratch = PathBuf::from(std::env::var_os(SCRATCH).expect("a folder"));
+    let (folder, method) = script(&format!("{VALID}echo \"$1\" > said\n"));
+    ask(&method, &shape(), &[], Level::Spheres(10)).expect("two spheres");
+    let said = fs::read_to_string(folder.path().join("said")).expect("said");
+    assert!(Path::new(said.trim()).starts_with(&scratch), "{said}");
+    assert_eq!(fs::read_dir(scratch).expect("a folder").count(), 0, "files were left there");
+}
+
+#[test]
+fn temporary_files_are_where_they_are_wanted_and_go() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let probe = Command::new(std::env::current_exe().expect("this program"))
+        .args(["--ignored", "--exact", "scratch_probe"])
+        .env(SCRATCH, scratch.path())
+        .output()
+        .expect("runs");
+    assert!(probe.status.success(), "{}", String::from_utf8_lossy(&probe.stdout));
+}

@@ -1,0 +1,266 @@
+//! Results accumulate: nothing is run twice, nothing is lost, whatever ends a run.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use common::{code, example, records, run, stderr, without_timings};
+use medial_bench::process_tree;
+use serde_json::Value;
+
+const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("UTF-8")
+}
+
+/// `compare` with `--json`: the exit code and the object.
+fn compare(arguments: &[&str], out: &Path) -> (i32, Value) {
+    let common = ["--samples", "200", "--quiet", "--json", "--out", text(out)];
+    let output = run(MEDIAL, &[&["compare"], arguments, &common].concat());
+    let object =
+        serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    (code(&output), object)
+}
+
+fn run_and_found(object: &Value) -> (u64, u64) {
+    (object["run"].as_u64().expect("a number"), object["found"].as_u64().expect("a number"))
+}
+
+#[test]
+fn only_what_is_missing_is_run() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let two =
+        ["builtin:box:8", "builtin:torus:16", "--methods", "qmat,lambda", "--spheres", "30,20"];
+    let (code, first) = compare(&two, &out);
+    assert_eq!((code, run_and_found(&first)), (0, (8, 0)));
+    let page = fs::read(out.join("index.html")).expect("a page");
+    let lines = fs::read(out.join("results.jsonl")).expect("results");
+
+    let (code, again) = compare(&two, &out);
+    assert_eq!((code, run_and_found(&again)), (0, (0, 8)));
+    assert_eq!(fs::read(out.join("index.html")).expect("a page"), page);
+    assert_eq!(fs::read(out.join("results.jsonl")).expect("results"), lines);
+
+    // Another method, another level, a variant: each adds to what is there.
+    let more = ["builtin:box:8", "--methods", "qmat,pmat,qmat:k=0", "--spheres", "20,10"];
+    let (_, added) = compare(&more, &out);
+    assert_eq!(run_and_found(&added), (5, 1));
+    let all = fs::read(out.join("results.jsonl")).expect("results");
+    assert!(all.starts_with(&lines), "nothing is rewritten");
+    let page = fs::read_to_string(out.join("index.html")).expect("a page");
+    assert!(page.contains("qmat k=0") && page.contains("torus"), "all of it is shown");
+    for record in records(&out) {
+        let artifact = record["artifact"].as_str().expect("a result");
+        assert!(out.join(artifact).exists(), "{artifact}");
+    }
+
+    // More repetitions than there are: run again, and the last record counts.
+    let repeated = ["builtin:box:8", "--methods", "pmat", "--spheres", "20", "--repeat", "3"];
+    assert_eq!(run_and_found(&compare(&repeated, &out).1), (1, 0));
+    assert_eq!(run_and_found(&compare(&repeated, &out).1), (0, 1));
+}
+
+#[test]
+fn failures_are_run_again_when_asked_or_when_a_limit_is_wider() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let faulty = |more: &[&str]| {
+        let arguments = [
+            &["compare", "builtin:box:8", "--methods", "loops,panics", "--spheres", "20"][..],
+            &["--samples", "100", "--quiet", "--json", "--out", text(&out)],
+            more,
+        ];
+        let output = run(example("faulty"), &arguments.concat());
+        run_and_found(&serde_json::from_slice(&output.stdout).expect("JSON"))
+    };
+    assert_eq!(faulty(&["--timeout", "0.5"]), (2, 0));
+    assert_eq!(faulty(&["--timeout", "0.5"]), (0, 2));
+    assert_eq!(faulty(&["--timeout", "1"]), (1, 1), "the one that had too little time");
+    assert_eq!(faulty(&["--timeout", "1", "--retry-failed"]), (2, 0));
+}
+
+#[test]
+fn two_runs_into_one_folder_lose_nothing() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let arguments = |method: &'static str| {
+        let words = ["compare", "builtin:box:8", "--methods", method, "--spheres", "40,30,20"];
+        let more = ["--samples", "100", "--quiet", "--out"];
+        words.into_iter().chain(more).map(str::to_owned).chain([text(&out).to_owned()])
+    };
+    let program = example("faulty");
+    let mut slow = Command::new(&program);
+    let mut slow =
+        slow.args(arguments("slow")).stdout(Stdio::null()).spawn().expect("the first run starts");
+    let deadline = Instant::now() + Duration::from_secs(20);
+    while !out.join(".lock").exists() && Instant::now() < deadline {
+        thread::sleep(Duration::from_millis(5));
+    }
+    // The lock is taken a moment after its file is made.
+    thread::sleep(Duration::from_millis(50));
+    let second = Command::new(&program).args(arguments("qmat")).output().expect("it starts");
+    let first = slow.wait().expect("it ends").code();
+    assert_eq!(first, Some(0));
+    match second.status.code() {
+        // The first had ended already: both are complete.
+        Some(0) => assert_eq!(records(&out).len(), 6),
+        code => {
+            let message = stderr(&second);
+            assert!(code == Some(1) && message.contains("is adding results"), "{message}");
+            assert!(message.contains("slow"), "it names the other run: {message}");
+            assert_eq!(records(&out).len(), 3);
+        }
+    }
+}
+
+/// Starts a comparison, kills it after a while, and says whether it was still running. Its workers
+/// must notice by themselves, and end.
+fn killed_after(arguments: &[&str], delay: Duration) -> bool {
+    let mut run = Command::new(MEDIAL);
+    run.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = run.spawn().expect("the command starts");
+    thread::sleep(delay);
+    let running = child.try_wait().expect("it can be asked").is_none();
+    let workers = process_tree::descendants(child.id());
+    child.kill().expect("it can be killed");
+    child.wait().expect("it ends");
+    let deadline = Instant::now() + Duration::from_secs(10);
+    let alive = |&pid: &u32| {
+        let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+        String::from_utf8_lossy(&line).contains("worker")
+    };
+    while workers.iter().any(alive) {
+        assert!(Instant::now() < deadline, "a worker is left: {workers:?}");
+        thread::sleep(Duration::from_millis(20));
+    }
+    running
+}
+
+#[test]
+fn a_killed_run_is_continued() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (whole, killed) = (dir.path().join("whole"), dir.path().join("killed"));
+    let words = [
+        "builtin:box:8",
+        "builtin:torus:16",
+        "--methods",
+        "qmat,hem,aof,pmat",
+        "--spheres",
+        "60,30",
+    ];
+    let begun = Instant::now();
+    compare(&words, &whole);
+    let length = begun.elapsed();
+    let common = ["--samples", "200", "--quiet", "--out", text(&killed)];
+    let arguments = [&["compare"], &words[..], &common].concat();
+    let mut running = 0;
+    for share in [0.2, 0.4, 0.5] {
+        running += usize::from(killed_after(&arguments, length.mul_f64(share)));
+        // What is there is whole, but for a last line that may be torn.
+        let text = fs::read_to_string(killed.join("results.jsonl")).unwrap_or_default();
+        let complete = text.rfind('\n').map_or(0, |end| end + 1);
+        for line in text[..complete].lines() {
+            serde_json::from_str::<Value>(line).expect("a whole record");
+        }
+    }
+    assert!(running > 0, "the runs were over before they were killed");
+    let (code, object) = compare(&words, &killed);
+    assert!(code == 0 || code == 3, "{object}");
+    assert_eq!(without_timings(records(&killed)), without_timings(records(&whole)));
+    let files = |out: &Path| {
+        let mut files = vec![];
+        let mut folders = vec![out.join("axes")];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).expect("a folder").flatten() {
+                match entry.path() {
+                    path if path.is_dir() => folders.push(path),
+                    path => files.push((entry.file_name(), fs::read(path).expect("read"))),
+                }
+            }
+        }
+        files.sort();
+        files
+    };
+    assert_eq!(files(&killed), files(&whole), "the same results, and nothing beside them");
+}
+
+#[test]
+fn torn_lines_and_temporary_files_are_removed() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let words = ["builtin:box:8", "--methods", "qmat", "--spheres", "30,20"];
+    compare(&words, &out);
+    let path = out.join("results.jsonl");
+    let whole = fs::read_to_string(&path).expect("results");
+    fs::write(&path, &whole[..whole.len() - 100]).expect("written");
+    let stray = out.join("axes/.x.ma.123-0.tmp");
+    fs::write(&stray, "half").expect("written");
+    let common = ["--samples", "200", "--out", text(&out)];
+    let output = run(MEDIAL, &[&["compare"], &words[..], &common].concat());
+    assert_eq!(code(&output), 0);
+    assert!(stderr(&output).contains("last line was incomplete"), "{}", stderr(&output));
+    assert!(!stray.exists());
+    assert_eq!(records(&out).len(), 2);
+}
+
+#[test]
+fn a_small_item_after_a_large_one_shows_its_own_memory() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let peak = |methods: &str, out: &str| {
+        let out = dir.path().join(out);
+        compare(&["builtin:blob", "--methods", methods, "--spheres", "100"], &out);
+        let records = records(&out);
+        let of = |id: &str| records.iter().find(|r| r["simplify"]["method"] == id).cloned();
+        of("lambda").expect("a record")["simplify"]["peak_bytes"].as_f64().expect("bytes")
+    };
+    let (alone, after) = (peak("lambda", "alone"), peak("aof,hem,lambda", "after"));
+    assert!(alone > 1e6, "{alone}");
+    assert!((after - alone).abs() < 0.05 * alone, "{after} after others, {alone} alone");
+}
+
+#[test]
+fn an_item_is_run_from_its_file_and_only_once_into_a_folder() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (file, out) = (dir.path().join("item.json"), dir.path().join("out"));
+    fs::write(&file, "{}").expect("written");
+    let output = run(MEDIAL, &["run-item", text(&file)]);
+    assert!(code(&output) == 1 && stderr(&output).contains("item.json"), "{}", stderr(&output));
+    let hash = {
+        let (_, object) = compare(&["builtin:box:8", "--methods", "qmat", "--spheres", "9"], &out);
+        assert_eq!(run_and_found(&object), (1, 0));
+        records(&out)[0]["binary_hash"].as_str().expect("a hash").to_owned()
+    };
+    let item = serde_json::json!({
+        "scene": {
+            "mesh": "box-8", "source": { "built_in": { "id": "box", "resolution": 8 } },
+            "hash": null, "sampling": "vertices", "dual": "fan",
+            "measure": { "samples": 200, "volume_depth": 5, "seed": 0 },
+        },
+        "method": { "id": "qmat", "params": {} },
+        "levels": [{ "spheres": 30 }, { "spheres": 20 }],
+        "seed": 0, "repeat": 1, "threads": 2,
+        "limits": { "seconds": 60.0, "bytes": 1_000_000_000_u64 },
+        "binary": hash,
+    });
+    fs::write(&file, item.to_string()).expect("written");
+    let item_out = dir.path().join("item-out");
+    let words = ["run-item", text(&file), "--quiet", "--out", text(&item_out)];
+    let (first, second) = (run(MEDIAL, &words), run(MEDIAL, &words));
+    assert_eq!((code(&first), code(&second)), (0, 0), "{}", stderr(&first));
+    assert_eq!(first.stdout, second.stdout, "the second call runs nothing");
+    assert_eq!(String::from_utf8_lossy(&first.stdout).lines().count(), 2);
+    let alone = run(MEDIAL, &["run-item", text(&file), "--quiet"]);
+    let lines = String::from_utf8_lossy(&alone.stdout).into_owned();
+    let alone = lines.lines().map(|line| serde_json::from_str(line).expect("a record")).collect();
+    let mut kept = records(&item_out);
+    kept.iter_mut().for_each(|record| {
+        record.as_object_mut().expect("an object").remove("artifact");
+    });
+    assert_eq!(without_timings(alone), without_timings(kept));
+}
