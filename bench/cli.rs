@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use medial::simplifier::MedialSimplifier;
 
 use crate::args::Global;
@@ -109,7 +109,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Stability(arguments) => cmd::stability::run(&arguments, global, registry),
         Verb::Report(arguments) => cmd::report::run(&arguments, global, registry),
         Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
-        Verb::Completions(arguments) => cmd::completions::run(&arguments),
+        Verb::Completions(arguments) => cmd::completions::run(&arguments, &mut Cli::command()),
         Verb::RunItem(arguments) => cmd::run_item::run(&arguments, global, registry),
         Verb::Worker(arguments) => cmd::worker::run(&arguments, registry),
     }

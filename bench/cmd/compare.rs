@@ -91,14 +91,17 @@ pub fn run(
     let interrupted = interrupt::listen();
     let axes = Some(arguments.out.join(AXES));
     let mut supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);
-    check_params(&items, &mut supervisor)?;
-    // Nothing is touched before this line.
     let mut store = Store::open(&arguments.out, RESULTS, &provenance.command)?;
     store.remarks.iter().for_each(|remark| note(global, remark));
+    let (left, mut tally) = match arguments.fresh {
+        true => (items.clone(), Tally::default()),
+        false => missing(&items, &store, arguments.retry_failed),
+    };
+    check_params(&left, &mut supervisor)?;
+    // No result is touched before this line.
     if arguments.fresh {
         store.clear(RESULTS)?;
     }
-    let (left, mut tally) = missing(&items, &store, arguments.retry_failed);
     if !left.is_empty() {
         report::write_study(&arguments.out, &study)?;
     }

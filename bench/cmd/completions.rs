@@ -2,10 +2,9 @@
 
 use std::io;
 
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use crate::cli::Cli;
 use crate::exit::{Exit, Failure};
 
 /// Arguments of `completions`.
@@ -16,11 +15,11 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Runs the verb.
+/// Runs the verb for the command as a whole.
 ///
 /// # Errors
 /// Never; the signature is that of every verb.
-pub fn run(arguments: &Arguments) -> Result<Exit, Failure> {
-    clap_complete::generate(arguments.shell, &mut Cli::command(), "medial", &mut io::stdout());
+pub fn run(arguments: &Arguments, command: &mut Command) -> Result<Exit, Failure> {
+    clap_complete::generate(arguments.shell, command, "medial", &mut io::stdout());
     Ok(Exit::Done)
 }

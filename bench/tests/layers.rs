@@ -77,3 +77,100 @@ fn methods_do_not_see_each_other() {
     }
     assert!(read >= ids.len(), "the sources were found");
 }
+
+/// The modules of a crate from below: each may use those of earlier layers and its own.
+type Layers<'a> = &'a [&'a [&'a str]];
+
+/// Inside `medial`. The kernel and the surfaces still know each other (the trees take triangle
+/// meshes, the inside test takes a tree), as do shapes and simplifiers (diagnostics, costs).
+const MEDIAL: Layers<'_> = &[
+    &["atomic", "disjoint", "hash", "heap", "sum"],
+    &["geometry", "surface"],
+    &["complex"],
+    &["metrics"],
+    &["shape", "simplifier"],
+];
+
+/// Inside `medial-bench`.
+const BENCH: Layers<'_> = &[
+    &["process_tree"],
+    &["plugin"],
+    &["run"],
+    &["exit"],
+    &["args", "files", "interrupt"],
+    &["output"],
+    &["cmd"],
+    &["cli"],
+];
+
+#[test]
+fn modules_use_only_those_below_them() {
+    let bench = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    hold(&bench.join("../src"), MEDIAL);
+    hold(bench, BENCH);
+}
+
+fn hold(root: &std::path::Path, layers: Layers<'_>) {
+    let layer_of = |module: &str| layers.iter().position(|layer| layer.contains(&module));
+    let mut read = 0;
+    for (module, path) in sources(root) {
+        let Some(layer) = layer_of(&module) else {
+            panic!("{}: the module {module} has no layer", path.display());
+        };
+        read += 1;
+        for used in used_modules(&std::fs::read_to_string(&path).expect("source text")) {
+            let Some(other) = layer_of(&used) else { continue };
+            assert!(
+                other <= layer,
+                "{} uses `{used}`, which is not below `{module}`",
+                path.display()
+            );
+        }
+    }
+    assert!(read > 10, "the sources were found");
+}
+
+/// The source files of a crate and the top-level module that each belongs to.
+fn sources(root: &std::path::Path) -> Vec<(String, std::path::PathBuf)> {
+    let mut found = Vec::new();
+    let mut folders = vec![root.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder of sources") {
+            let path = entry.expect("an entry").path();
+            let relative = path.strip_prefix(root).expect("below the root");
+            let first = relative.components().next().expect("a name").as_os_str().to_string_lossy();
+            // Crates of their own.
+            if ["tests", "benches", "examples", "lib.rs", "main.rs"].contains(&&*first) {
+                continue;
+            }
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                found.push((first.trim_end_matches(".rs").to_owned(), path));
+            }
+        }
+    }
+    found
+}
+
+/// The modules that code names as `crate::MODULE`, or in the braces of `use crate::{...}`; comments
+/// may name any.
+fn used_modules(text: &str) -> Vec<String> {
+    let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+    let code = code.collect::<Vec<_>>().join("\n");
+    let word = |text: &str| -> String {
+        text.chars().take_while(|&c| c.is_alphanumeric() || c == '_').collect()
+    };
+    let mut used = Vec::new();
+    for (place, _) in code.match_indices("crate::") {
+        let after = &code[place + "crate::".len()..];
+        match after.strip_prefix('{') {
+            Some(list) => {
+                let end = list.find('}').unwrap_or(list.len());
+                used.extend(list[..end].split(',').map(|name| word(name.trim())));
+            }
+            None => used.push(word(after)),
+        }
+    }
+    used
+}

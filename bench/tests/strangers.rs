@@ -1,0 +1,105 @@
+//! Methods from elsewhere, all three ways in: a crate of one's own, a program, a Python script. Each
+//! stands in tables, plots, page and `medial methods` beside the built-in ones.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use common::{code, records, run, stderr};
+
+const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Compares methods on a box, and asks that each has results, a line in the CSV, a curve in a plot,
+/// and its title on the page.
+fn compares(program: &Path, plugins: &[&str], methods: &[(&str, &str)]) {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let ids = methods.iter().map(|(id, _)| *id).collect::<Vec<_>>().join(",") + ",qmat";
+    let arguments = [
+        &["compare", "builtin:box:8", "--methods", &ids, "--spheres", "30,20"][..],
+        &["--samples", "200", "--quiet", "--out", out.to_str().expect("UTF-8")],
+        plugins,
+    ];
+    let output = run(program, &arguments.concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let records = records(&out);
+    let page = fs::read_to_string(out.join("index.html")).expect("a page");
+    let csv = fs::read_to_string(out.join("results.csv")).expect("a table");
+    let table = fs::read_to_string(out.join("tables/summary.md")).expect("a table");
+    let plots = fs::read_dir(out.join("plots")).expect("plots").flatten();
+    let plots: Vec<String> =
+        plots.map(|entry| fs::read_to_string(entry.path()).expect("a plot")).collect();
+    for (id, title) in methods {
+        let ok = |r: &&serde_json::Value| r["simplify"]["method"] == *id && r["status"] == "ok";
+        assert_eq!(records.iter().filter(ok).count(), 2, "{id}");
+        assert!(page.contains(title) && page.contains(id), "{id} is not on the page");
+        assert!(csv.contains(&format!(",{id},")) || csv.contains(id), "{id} is not in the CSV");
+        assert!(table.contains(id), "{id} is not in the table");
+        assert!(plots.iter().any(|plot| plot.contains(id)), "{id} is in no plot");
+    }
+    let listed = run(program, &[&["methods"][..], plugins].concat());
+    let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
+    assert!(methods.iter().all(|(id, title)| listed.contains(id) && listed.contains(title)));
+}
+
+#[test]
+#[cfg(unix)]
+fn a_program() {
+    let file = root().join("examples/plugins/largest.toml");
+    let file = file.to_str().expect("UTF-8");
+    let method = ("largest-awk", "Largest balls first (POSIX shell and awk)");
+    compares(Path::new(MEDIAL), &["--plugins", file], &[method]);
+}
+
+#[test]
+fn a_python_script() {
+    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
+    if !numpy.is_ok_and(|output| output.status.success()) {
+        println!("skipped: there is no python3 with numpy");
+        return;
+    }
+    let file = root().join("examples/plugins/largest.toml");
+    let file = file.to_str().expect("UTF-8");
+    let method = ("largest", "Largest balls first (Python)");
+    compares(Path::new(MEDIAL), &["--plugins", file], &[method]);
+}
+
+#[test]
+fn a_crate_of_ones_own() {
+    let crate_ = root().join("examples/plugin-crate");
+    // Its dependencies are those of this workspace, already there: nothing is fetched.
+    fs::copy(root().join("Cargo.lock"), crate_.join("Cargo.lock")).expect("the lock file");
+    let target = std::env::current_exe().expect("the test knows its file");
+    let target = target.ancestors().nth(3).expect("target/PROFILE/deps/TEST").to_owned();
+    let built = Command::new(env!("CARGO"))
+        .args(["build", "--offline", "--quiet", "--manifest-path"])
+        .arg(crate_.join("Cargo.toml"))
+        .arg("--target-dir")
+        .arg(&target)
+        .output()
+        .expect("cargo runs");
+    assert!(built.status.success(), "{}", stderr(&built));
+    let program = target.join("debug").join("medial-largest");
+    compares(&program, &[], &[("largest-rust", "Largest balls first")]);
+}
+
+#[test]
+fn an_id_that_is_taken_is_refused() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let file = dir.path().join("mine.toml");
+    let text = "[[method]]\nid = \"qmat\"\ntitle = \"Mine\"\nlevels = [\"spheres\"]\n\
+                command = [\"sh\", \"{output}\", \"{spheres}\"]\n";
+    fs::write(&file, text).expect("written");
+    let output = run(MEDIAL, &["methods", "--plugins", file.to_str().expect("UTF-8")]);
+    let message = stderr(&output);
+    assert!(
+        code(&output) == 2 && message.contains("mine.toml") && message.contains("`qmat`"),
+        "{message}"
+    );
+}
