@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use medial::complex::LoadedMa;
 use medial::metrics::{Certificate, Evaluation, JudgeOptions, MetricError, Witness, WitnessSide};
 use medial::shape::ShapeOptions;
 
 use super::{
-    Exit, Failure, counted, judge_options, medial_mesh_for, percent, print_json, print_line,
+    Exit, Failure, counted, judge_options, medial_mesh_for, note, percent, print_json, print_line,
 };
 use crate::cli::{Global, MeasureArguments, MeshArgument};
 use crate::run::{Input, Source};
@@ -39,7 +40,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let input = Input::load(&source)?;
     let shape =
         input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
-    let (mesh, mut warnings) = medial_mesh_for(&arguments.axis, &shape)?;
+    let LoadedMa { mesh, notes, mut warnings, .. } = medial_mesh_for(&arguments.axis, &shape)?;
+    // No number depends on how a file writes its mesh, so the answer does not either.
+    for line in &notes {
+        note(global, &format!("{}: {line}", arguments.axis.display()));
+    }
     let judge =
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
     let to_normal = shape.normalisation();

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-use medial::complex::{self, MedialMesh};
+use medial::complex::{self, LoadedMa};
 use medial::metrics::JudgeOptions;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::Params;
@@ -182,11 +182,11 @@ const MOST_SAMPLES: usize = 10_000_000;
 /// spheres the whole surface is less than a rounding error.
 const LARGEST_SPHERE: f64 = 1e12;
 
-/// Reads a medial mesh that was made for a shape: the mesh in input units, and what was repaired.
+/// Reads a medial mesh that was made for a shape, in input units.
 ///
 /// # Errors
 /// When it cannot be read, has no sphere, or cannot belong to the shape.
-pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<(MedialMesh, Vec<String>), Failure> {
+pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<LoadedMa, Failure> {
     let loaded = complex::read(path).map_err(Failure::input)?;
     if loaded.mesh.spheres.is_empty() {
         return Err(Failure::input(format!("{}: no sphere", path.display())));
@@ -204,7 +204,7 @@ pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<(MedialMesh, Vec<St
             )));
         }
     }
-    Ok((loaded.mesh, loaded.notes))
+    Ok(loaded)
 }
 
 /// Refuses an output that could not be written anyway, before the work for it is done.

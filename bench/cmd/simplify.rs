@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
     if let Some(path) = &arguments.initial {
-        let (initial, notes) = medial_mesh_for(path, &shape)?;
+        let (initial, notes) = medial_mesh_for(path, &shape)?.with_remarks();
         warnings.extend(notes);
         shape = shape.with_initial(&initial);
     }
