@@ -53,6 +53,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         MetricError::Tolerance(_) | MetricError::TooFine { .. } => {
             Failure::usage(format!("--certify: {error}"))
         }
+        MetricError::NoArea | MetricError::NoVolume(_) => Failure::of(&source, error),
         _ => Failure::input(format!("{}: {error}", arguments.axis.display())),
     };
     let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
