@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::{Exit, Failure, print_json, print_line};
 use crate::cli::Global;
+use crate::run::did_you_mean;
 
 /// Arguments of `methods`.
 #[derive(Debug, Args)]
@@ -41,7 +42,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 /// The failure for an id that no method has, naming those that exist.
 pub fn unknown_method(id: &str) -> Failure {
     let known: Vec<&str> = medial_methods::registry().iter().map(|m| m.info().id).collect();
-    Failure::usage(format!("no method is called `{id}`; there are: {}", known.join(", ")))
+    let meant = did_you_mean(id, known.iter().copied());
+    Failure::usage(format!("no method is called `{id}`{meant}; there are: {}", known.join(", ")))
 }
 
 fn describe(info: &MethodInfo) {

@@ -16,8 +16,8 @@ use serde::Serialize;
 use super::hierarchy::{self, Loaded, Origin};
 use super::methods::unknown_method;
 use super::{
-    Exit, Failure, check_folder, check_output, counted, judge_options, medial_mesh_for, params,
-    percent, print_json, print_line, shape_options, voxels,
+    Exit, Failure, check_folder, check_output, counted, judge_options, medial_mesh_for, note,
+    params, percent, print_json, print_line, shape_options, voxels,
 };
 use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes, search_error};
@@ -136,7 +136,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         }
         print_json(&object, &warnings);
     } else {
-        print_result(&simplify, search.as_ref(), arguments);
+        print_result(&simplify, search.as_ref(), arguments, global);
         if let Some(parts) = &simplified.extras.parts {
             print_line(&format!("  {}, listed by --json", counted(parts.len() as u64, "part")));
         }
@@ -181,6 +181,13 @@ fn check_bound(arguments: &Arguments) -> Result<(), Failure> {
             let message = format!("--max-error {bound}: a positive fraction of the diagonal");
             Err(Failure::usage(message))
         }
+        // The whole solid is within one diagonal of anything inside it.
+        Some(bound) if bound >= 1.0 => Err(Failure::usage(format!(
+            "--max-error {bound}: a fraction of the diagonal is meant, and this is {} % of it; \
+             write {} for {bound} %",
+            100.0 * bound,
+            bound / 100.0
+        ))),
         Some(_) => judge_options(&arguments.measure, JudgeOptions::default(), 0).map(|_| ()),
         None => Ok(()),
     }
@@ -326,7 +333,12 @@ fn failure(source: &Source, error: SimplifyError) -> Failure {
     }
 }
 
-fn print_result(simplify: &Simplify, search: Option<&Search>, arguments: &Arguments) {
+fn print_result(
+    simplify: &Simplify,
+    search: Option<&Search>,
+    arguments: &Arguments,
+    global: &Global,
+) {
     let seconds = simplify.seconds.unwrap_or_default();
     print_line(&format!(
         "{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
@@ -356,5 +368,9 @@ fn print_result(simplify: &Simplify, search: Option<&Search>, arguments: &Argume
     }
     if let Some(path) = &arguments.voxels {
         print_line(&format!("  written: {}, a point for each voxel", path.display()));
+    }
+    let outputs = [&arguments.output, &arguments.save_hierarchy, &arguments.voxels];
+    if outputs.iter().all(|output| output.is_none()) {
+        note(global, "medial: the result was not written; -o FILE.ma keeps it");
     }
 }

@@ -12,6 +12,7 @@ mod progress;
 mod provenance;
 mod reproduce;
 mod search;
+mod similar;
 mod stopwatch;
 
 pub use input::{Input, InputError, Source};
@@ -22,4 +23,5 @@ pub use progress::Progress;
 pub use provenance::{Provenance, hex_digest, peak_bytes};
 pub use reproduce::Reproducer;
 pub use search::{Found, search_error};
+pub use similar::did_you_mean;
 pub use stopwatch::{Lap, Stopwatch};
