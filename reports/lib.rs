@@ -37,5 +37,5 @@ pub use header::{Header, MethodNote};
 pub use journal::{BadLine, Journal, JournalError, Journaled, read_records, write_records};
 pub use record::{Initial, Machine, Record, Repetition, Simplify, Stages, Status};
 pub use terminal::summary_text;
-pub use text::file_stem;
+pub use text::{file_stem, printable};
 pub use write::{ReportError, read_header, write_report};
