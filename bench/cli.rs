@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Arg, Args, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::cmd;
+use crate::{cmd, interrupt};
 
 /// Simplify the 3D medial axis transform, and compare the published methods that do.
 #[derive(Debug, Parser)]
@@ -72,14 +72,50 @@ pub enum Verb {
 
 /// Parses the command line, runs the verb, and turns the outcome into an exit code.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let outcome = set_threads(cli.global.threads).and_then(|()| run(cli.verb, &cli.global));
-    match outcome {
-        Ok(code) => code.into(),
-        Err(failure) => {
-            cmd::print_failure(&failure, &cli.global);
-            failure.code.into()
+    interrupt::install();
+    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = match parsed {
+        Ok(cli) => cli,
+        // Help and version are asked for, and belong on standard output.
+        Err(error) if !error.use_stderr() => {
+            cmd::output::print_raw(&error.render().to_string());
+            return cmd::output::exit_after_output(cmd::Exit::Done).into();
         }
+        Err(error) => error.exit(),
+    };
+    let outcome = set_threads(cli.global.threads).and_then(|()| run(cli.verb, &cli.global));
+    let exit = outcome.unwrap_or_else(|failure| {
+        cmd::print_failure(&failure, &cli.global);
+        failure.code
+    });
+    cmd::output::exit_after_output(exit).into()
+}
+
+/// The command line: as derived, but lists of defaults are shown as they would be written.
+pub fn command() -> Command {
+    let with_commas = |verb: Command| verb.mut_args(defaults_with_commas);
+    with_commas(Cli::command()).mut_subcommands(with_commas)
+}
+
+fn defaults_with_commas(argument: Arg) -> Arg {
+    let defaults = argument.get_default_values();
+    let (Some(delimiter), 2..) = (argument.get_value_delimiter(), defaults.len()) else {
+        return argument;
+    };
+    let words: Vec<_> = defaults.iter().map(|word| word.to_string_lossy()).collect();
+    let list = words.join(&delimiter.to_string());
+    let with_list = |help: Option<&clap::builder::StyledStr>| {
+        help.map(|help| format!("{help} [default: {list}]"))
+    };
+    let (short, long) = (with_list(argument.get_help()), with_list(argument.get_long_help()));
+    let argument = argument.hide_default_value(true);
+    let argument = match short {
+        Some(help) => argument.help(help),
+        None => argument,
+    };
+    match long {
+        Some(help) => argument.long_help(help),
+        None => argument,
     }
 }
 

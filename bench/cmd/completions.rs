@@ -1,12 +1,11 @@
 //! `medial completions SHELL`.
 
-use std::io;
-
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_complete::Shell;
 
+use super::output::print_raw;
 use super::{Exit, Failure};
-use crate::cli::Cli;
+use crate::cli;
 
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
@@ -21,6 +20,8 @@ pub struct Arguments {
 /// # Errors
 /// Never; the signature is that of every verb.
 pub fn run(arguments: &Arguments) -> Result<Exit, Failure> {
-    clap_complete::generate(arguments.shell, &mut Cli::command(), "medial", &mut io::stdout());
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut cli::command(), "medial", &mut script);
+    print_raw(&String::from_utf8_lossy(&script));
     Ok(Exit::Done)
 }

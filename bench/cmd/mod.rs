@@ -1,6 +1,5 @@
 //! The verbs of the command, one file each, and what they share: failures, exit codes, output.
 
-use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -9,10 +8,8 @@ use medial::metrics::JudgeOptions;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::Params;
 use medial::surface::Sampling;
-use serde::Serialize;
-use serde_json::{Map, Value, json};
 
-use crate::cli::{Dual, Global, MeasureArguments, SubstrateArguments};
+use crate::cli::{Dual, MeasureArguments, SubstrateArguments};
 use crate::run::{InputError, Source};
 
 pub mod axis;
@@ -26,6 +23,7 @@ pub mod evaluate;
 pub mod hierarchy;
 pub mod info;
 pub mod methods;
+pub mod output;
 pub mod paper;
 pub mod reconstruct;
 pub mod report;
@@ -33,6 +31,8 @@ pub mod simplify;
 pub mod stability;
 pub mod triangulate;
 pub mod voxels;
+
+pub use output::{note, print_failure, print_json, print_line};
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,57 +87,15 @@ impl From<InputError> for Failure {
             InputError::Read { .. } | InputError::Surface(_) => Self::input(error),
             InputError::NoSuchShape(_)
             | InputError::Resolution(_)
-            | InputError::OutOfRange { .. } => Self::usage(error),
+            | InputError::OutOfRange { .. }
+            | InputError::TooManyVertices { .. } => Self::usage(error),
         }
-    }
-}
-
-/// Prints a failure on standard error, and with `--json` as an object on standard output.
-pub fn print_failure(failure: &Failure, global: &Global) {
-    let _ = writeln!(io::stderr(), "medial: {}", failure.message);
-    if global.json {
-        let object = json!({ "error": failure.message, "warnings": [], "version": version() });
-        print_line(&object.to_string());
     }
 }
 
 /// Version of the program.
 pub fn version() -> &'static str {
     env!("CARGO_PKG_VERSION")
-}
-
-/// Prints a line on standard output. A closed pipe is nobody's error.
-pub fn print_line(line: &str) {
-    let _ = writeln!(io::stdout(), "{line}");
-}
-
-/// Prints a line on standard error unless `--quiet`.
-pub fn note(global: &Global, line: &str) {
-    if !global.quiet {
-        let _ = writeln!(io::stderr(), "{line}");
-    }
-}
-
-/// Prints an object on standard output as JSON, with `version` and `warnings`.
-pub fn print_json(object: &impl Serialize, warnings: &[String]) {
-    let mut object = match serde_json::to_value(object) {
-        Ok(Value::Object(map)) => map,
-        Ok(other) => Map::from_iter([("result".to_owned(), other)]),
-        Err(error) => Map::from_iter([("error".to_owned(), error.to_string().into())]),
-    };
-    let known = object.remove("warnings");
-    let mut all = match known {
-        Some(Value::Array(list)) => list,
-        _ => Vec::new(),
-    };
-    for warning in warnings {
-        if !all.iter().any(|known| known == warning) {
-            all.push(Value::from(warning.as_str()));
-        }
-    }
-    object.insert("warnings".to_owned(), Value::Array(all));
-    object.insert("version".to_owned(), version().into());
-    print_line(&Value::Object(object).to_string());
 }
 
 /// The options of a shape from the command line.

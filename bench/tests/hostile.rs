@@ -56,3 +56,157 @@ fn deleted_elements_change_no_byte_of_an_evaluation() {
     assert!(of_flagged.2.contains("1 sphere was dropped: marked as deleted"), "{}", of_flagged.2);
     assert!(of_flagged.2.contains("1 edge was dropped: on a deleted sphere"), "{}", of_flagged.2);
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_is_a_failure() {
+    for arguments in [
+        &["methods"][..],
+        &["methods", "--json"],
+        &["completions", "bash"],
+        &["info", "builtin:sphere:8", "--json"],
+        &["--help"],
+    ] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("a full device");
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_medial"))
+            .args(arguments)
+            .stdout(full)
+            .output()
+            .expect("the command starts");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
+        assert!(stderr.starts_with("medial: standard output: "), "{arguments:?}: {stderr}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    for arguments in [&["methods"][..], &["completions", "bash"]] {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_medial"))
+            .args(arguments)
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{arguments:?}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_leaves_no_temporary_behind() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let names = || {
+        let entries = fs::read_dir(dir.path()).expect("a folder");
+        entries.map(|entry| entry.expect("an entry").file_name()).collect::<Vec<_>>()
+    };
+    let target = dir.path().join("sphere.off");
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_medial"))
+        .args(["datasets", "make", "sphere", "--resolution", "1000", "-o", text_path(&target)])
+        .spawn()
+        .expect("the command starts");
+    while names().is_empty() && child.try_wait().expect("its state").is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let interrupted = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("kill starts");
+    assert!(interrupted.success(), "the file was written before the signal");
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    assert_eq!(names().len(), 0, "{:?}", names());
+}
+
+#[test]
+fn slips_are_refused_with_what_was_meant() {
+    let sphere = "builtin:sphere:8";
+    for (arguments, expected) in [
+        (&["simplify", sphere, "-m", "qmat", "--max-error", "5"][..], "write 0.05 for 5 %"),
+        (&["simplify", sphere, "-m", "qmat", "--max-error", "1"], "write 0.01 for 1 %"),
+        (&["simplify", sphere, "-m", "hem", "--level", "inf"], "inf is not a distance"),
+        (&["simplify", sphere, "-m", "qmta"], "did you mean `qmat`?"),
+        (&["methods", "dey-zhoa"], "did you mean `dey-zhao`?"),
+        (&["info", "builtin:shpere"], "did you mean `sphere`?"),
+        (&["datasets", "make", "shpere", "-o", "x.off"], "did you mean `sphere`?"),
+        (&["info", "builtin:sphere:2000"], "about 4.2e6 vertices"),
+        (&["simplfy", sphere], "'simplify'"),
+    ] {
+        let (code, _, stderr) = run(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {stderr}");
+        assert!(stderr.contains(expected), "{arguments:?}: {stderr}");
+    }
+}
+
+#[test]
+fn a_result_that_is_not_kept_is_told() {
+    let simplify = ["simplify", "builtin:sphere:8", "-m", "qmat", "--spheres", "5"];
+    assert!(run(&simplify).2.contains("the result was not written; -o FILE.ma keeps it"));
+    for quiet in ["--quiet", "--json"] {
+        assert_eq!(run(&[&simplify[..], &[quiet]].concat()).2, "");
+    }
+}
+
+#[test]
+fn lists_of_defaults_are_shown_with_commas() {
+    for option in ["-h", "--help"] {
+        let (_, stdout, _) = run(&["compare", option]);
+        assert!(stdout.contains("[default: 1000,500,200,100]"), "{stdout}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn names_reach_neither_a_terminal_nor_a_spreadsheet_as_commands() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let off = dir.path().join("box.off");
+    assert_eq!(run(&["datasets", "make", "box", "-o", text_path(&off)]).0, 0);
+    let formula = dir.path().join("=cmd|' !A0.off");
+    fs::copy(&off, &formula).expect("copied");
+    let escape = dir.path().join("a\u{1b}[2Jb.off");
+    fs::copy(&off, &escape).expect("copied");
+    let out = dir.path().join("out");
+    let (code, stdout, stderr) = run(&[
+        "compare",
+        text_path(&formula),
+        text_path(&escape),
+        "--methods",
+        "qmat",
+        "--spheres",
+        "20",
+        "--samples",
+        "200",
+        "--out",
+        text_path(&out),
+    ]);
+    assert_eq!(code, 0, "{stderr}");
+    let table = fs::read_to_string(out.join("results.csv")).expect("a table");
+    assert!(table.contains("\n'=cmd|' !A0,"), "{table}");
+    let (_, of_info, _) = run(&["info", text_path(&escape)]);
+    fs::write(&escape, "OFF\n").expect("written");
+    let (_, _, of_error) = run(&["info", text_path(&escape)]);
+    for text in [stdout, stderr, table, of_info, of_error] {
+        assert!(!text.contains('\u{1b}'), "{text:?}");
+    }
+}
+
+#[test]
+fn the_surface_is_named_where_it_is_at_fault() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (off, far, axis) =
+        (dir.path().join("s.off"), dir.path().join("far.off"), dir.path().join("axis.ma"));
+    assert_eq!(run(&["datasets", "make", "sphere", "-o", text_path(&off)]).0, 0);
+    let text = fs::read_to_string(&off).expect("read");
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    lines[2] = "1e8 0 0".into();
+    fs::write(&far, lines.join("\n")).expect("written");
+    fs::write(&axis, "1 0 0\nv 0 0 0 0.5\n").expect("written");
+    // What the other verbs take is evaluated, and what is refused is refused by name.
+    let taken = run(&["info", text_path(&far)]).0;
+    let (code, _, stderr) =
+        run(&["evaluate", text_path(&far), text_path(&axis), "--samples", "99"]);
+    assert_eq!(code, taken, "{stderr}");
+    assert!(code == 0 || stderr.contains("far.off"), "{stderr}");
+}
