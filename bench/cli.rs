@@ -50,6 +50,8 @@ pub enum Verb {
     Reconstruct(cmd::reconstruct::Arguments),
     /// Triangulate an array of points: Delaunay, or regular with weights.
     Triangulate(cmd::triangulate::Arguments),
+    /// Repair a surface: fill its holes, keep its largest part.
+    Repair(cmd::repair::Arguments),
     /// Convert between surface formats, or between medial mesh formats.
     Convert(cmd::convert::Arguments),
     /// List the methods, or describe one.
@@ -128,6 +130,7 @@ fn run(verb: Verb, global: &Global) -> Result<cmd::Exit, cmd::Failure> {
         Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Triangulate(arguments) => cmd::triangulate::run(&arguments, global),
+        Verb::Repair(arguments) => cmd::repair::run(&arguments, global),
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
         Verb::Methods(arguments) => cmd::methods::run(&arguments, global),
         Verb::Datasets(arguments) => cmd::datasets::run(&arguments, global),

@@ -26,6 +26,7 @@ pub mod methods;
 pub mod output;
 pub mod paper;
 pub mod reconstruct;
+pub mod repair;
 pub mod report;
 pub mod simplify;
 pub mod stability;

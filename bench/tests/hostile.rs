@@ -210,3 +210,35 @@ fn the_surface_is_named_where_it_is_at_fault() {
     assert_eq!(code, taken, "{stderr}");
     assert!(code == 0 || stderr.contains("far.off"), "{stderr}");
 }
+
+#[test]
+fn a_surface_with_a_hole_and_a_stray_part_is_repaired() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (whole, open, mended) =
+        (dir.path().join("whole.off"), dir.path().join("open.off"), dir.path().join("mended.off"));
+    assert_eq!(run(&["datasets", "make", "pair", "-o", text_path(&whole)]).0, 0);
+    let text = fs::read_to_string(&whole).expect("read");
+    let mut lines: Vec<String> = text.trim_end().lines().map(str::to_owned).collect();
+    lines.pop();
+    let faces = lines[1].split(' ').nth(1).expect("a count").parse::<usize>().expect("a count");
+    lines[1] = lines[1].replace(&format!(" {faces} "), &format!(" {} ", faces - 1));
+    fs::write(&open, lines.join("\n")).expect("written");
+    let (code, _, stderr) = run(&["info", text_path(&open)]);
+    assert!(code == 1 && stderr.contains("`medial repair --fill-holes`"), "{stderr}");
+    let repair = |more: &[&str]| {
+        let named = ["repair", text_path(&open), "-o", text_path(&mended), "--json"];
+        run(&[&named[..], more].concat())
+    };
+    assert_eq!(repair(&[]).0, 1);
+    assert!(!mended.exists());
+    let (code, stdout, stderr) = repair(&["--fill-holes"]);
+    assert_eq!(code, 0, "{stderr}");
+    let object: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
+    assert_eq!(object["faces"], faces);
+    let filled = serde_json::json!({ "repair": "filled_hole", "edges": 3, "triangles": 1 });
+    assert_eq!(object["repairs"][0], filled, "{object}");
+    assert_eq!(run(&["info", text_path(&mended)]).0, 0);
+    let (code, stdout, _) = repair(&["--fill-holes", "--components", "largest"]);
+    assert_eq!(code, 0);
+    assert!(stdout.contains("\"components\":1,"), "{stdout}");
+}
