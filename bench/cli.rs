@@ -2,14 +2,14 @@
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use medial::simplifier::MedialSimplifier;
 
 use crate::args::Global;
 use crate::cmd;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
-use crate::output::print_failure;
+use crate::output::{exit_after_output, print_failure, print_raw};
 use crate::run::Registry;
 
 /// Simplify the 3D medial axis transform, and compare the published methods that do.
@@ -41,6 +41,8 @@ pub enum Verb {
     Reconstruct(cmd::reconstruct::Arguments),
     /// Triangulate an array of points: Delaunay, or regular with weights.
     Triangulate(cmd::triangulate::Arguments),
+    /// Repair a surface: fill its holes, keep its largest part.
+    Repair(cmd::repair::Arguments),
     /// Convert between surface formats, or between medial mesh formats.
     Convert(cmd::convert::Arguments),
     /// List the methods, or describe one.
@@ -69,18 +71,53 @@ pub enum Verb {
 /// The command with these methods: parses the command line, runs the verb, and turns the outcome
 /// into an exit code.
 pub fn main_with(methods: Vec<Box<dyn MedialSimplifier>>) -> ExitCode {
-    let cli = Cli::parse();
     interrupt::install();
+    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = match parsed {
+        Ok(cli) => cli,
+        // Help and version are asked for, and belong on standard output.
+        Err(error) if !error.use_stderr() => {
+            print_raw(&error.render().to_string());
+            return exit_after_output(Exit::Done).into();
+        }
+        Err(error) => error.exit(),
+    };
     let registry = registry(methods, &cli.global);
     let outcome = set_threads(cli.global.threads)
         .and(registry)
         .and_then(|mut registry| run(cli.verb, &cli.global, &mut registry));
-    match outcome {
-        Ok(code) => code.into(),
-        Err(failure) => {
-            print_failure(&failure, &cli.global);
-            failure.code.into()
-        }
+    let exit = outcome.unwrap_or_else(|failure| {
+        print_failure(&failure, &cli.global);
+        failure.code
+    });
+    exit_after_output(exit).into()
+}
+
+/// The command line: as derived, but lists of defaults are shown as they would be written.
+pub fn command() -> Command {
+    let with_commas = |verb: Command| verb.mut_args(defaults_with_commas);
+    with_commas(Cli::command()).mut_subcommands(with_commas)
+}
+
+fn defaults_with_commas(argument: Arg) -> Arg {
+    let defaults = argument.get_default_values();
+    let (Some(delimiter), 2..) = (argument.get_value_delimiter(), defaults.len()) else {
+        return argument;
+    };
+    let words: Vec<_> = defaults.iter().map(|word| word.to_string_lossy()).collect();
+    let list = words.join(&delimiter.to_string());
+    let with_list = |help: Option<&clap::builder::StyledStr>| {
+        help.map(|help| format!("{help} [default: {list}]"))
+    };
+    let (short, long) = (with_list(argument.get_help()), with_list(argument.get_long_help()));
+    let argument = argument.hide_default_value(true);
+    let argument = match short {
+        Some(help) => argument.help(help),
+        None => argument,
+    };
+    match long {
+        Some(help) => argument.long_help(help),
+        None => argument,
     }
 }
 
@@ -101,6 +138,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Triangulate(arguments) => cmd::triangulate::run(&arguments, global),
+        Verb::Repair(arguments) => cmd::repair::run(&arguments, global),
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
         Verb::Methods(arguments) => cmd::methods::run(&arguments, global, registry),
         Verb::Datasets(arguments) => cmd::datasets::run(&arguments, global),
@@ -109,7 +147,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Stability(arguments) => cmd::stability::run(&arguments, global, registry),
         Verb::Report(arguments) => cmd::report::run(&arguments, global, registry),
         Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
-        Verb::Completions(arguments) => cmd::completions::run(&arguments, &mut Cli::command()),
+        Verb::Completions(arguments) => cmd::completions::run(&arguments, &mut command()),
         Verb::RunItem(arguments) => cmd::run_item::run(&arguments, global, registry),
         Verb::Worker(arguments) => cmd::worker::run(&arguments, registry),
     }

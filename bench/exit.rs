@@ -96,7 +96,8 @@ impl From<InputError> for Failure {
             InputError::Read { .. } | InputError::Surface(_) => Self::input(error),
             InputError::NoSuchShape(_)
             | InputError::Resolution(_)
-            | InputError::OutOfRange { .. } => Self::usage(error),
+            | InputError::OutOfRange { .. }
+            | InputError::TooManyVertices { .. } => Self::usage(error),
         }
     }
 }

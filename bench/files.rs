@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use medial::complex::{self, MedialMesh};
+use medial::complex::{self, LoadedMa};
 use medial::shape::Shape;
 
 use crate::exit::Failure;
@@ -11,11 +11,11 @@ use crate::exit::Failure;
 /// spheres the whole surface is less than a rounding error.
 const LARGEST_SPHERE: f64 = 1e12;
 
-/// Reads a medial mesh that was made for a shape: the mesh in input units, and what was repaired.
+/// Reads a medial mesh that was made for a shape, in input units.
 ///
 /// # Errors
 /// When it cannot be read, has no sphere, or cannot belong to the shape.
-pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<(MedialMesh, Vec<String>), Failure> {
+pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<LoadedMa, Failure> {
     let loaded = complex::read(path).map_err(Failure::input)?;
     if loaded.mesh.spheres.is_empty() {
         return Err(Failure::input(format!("{}: no sphere", path.display())));
@@ -33,7 +33,7 @@ pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<(MedialMesh, Vec<St
             )));
         }
     }
-    Ok((loaded.mesh, loaded.notes))
+    Ok(loaded)
 }
 
 /// Refuses an output that could not be written anyway, before the work for it is done.

@@ -1,20 +1,25 @@
-//! What a verb prints: one JSON object, or lines for people.
+//! Standard output and standard error of the verbs: nothing in a name reaches a terminal as a
+//! command, and nothing that could not be written passes for success.
 
 use std::io::{self, Write};
+use std::sync::OnceLock;
 
+use medial_reports::printable;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::args::Global;
-use crate::exit::Failure;
+use crate::exit::{Exit, Failure};
 
-/// Prints a failure on standard error, and with `--json` as an object on standard output.
-pub fn print_failure(failure: &Failure, global: &Global) {
-    let _ = writeln!(io::stderr(), "medial: {}", failure.message);
-    if global.json {
-        let object = json!({ "error": failure.message, "warnings": [], "version": version() });
-        print_line(&object.to_string());
-    }
+/// Why standard output could not be written, the first time. Verbs print from many places, all of
+/// which would have to hand this up otherwise; `main` asks once, at the end.
+static UNWRITTEN: OnceLock<io::Error> = OnceLock::new();
+
+/// The exit code of a verb that ended with `exit`: an output that could not be written is a failure.
+pub fn exit_after_output(exit: Exit) -> Exit {
+    let Some(error) = UNWRITTEN.get() else { return exit };
+    print_error(&format!("medial: standard output: {error}"));
+    if exit == Exit::Done { Exit::Input } else { exit }
 }
 
 /// Version of the program.
@@ -22,20 +27,39 @@ pub fn version() -> &'static str {
     env!("CARGO_PKG_VERSION")
 }
 
-/// Prints a line on standard output. A closed pipe is nobody's error.
-pub fn print_line(line: &str) {
-    let _ = writeln!(io::stdout(), "{line}");
+/// Prints text on standard output as it is. A closed pipe is nobody's error: who read it has enough.
+pub fn print_raw(text: &str) {
+    let mut out = io::stdout().lock();
+    if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush())
+        && error.kind() != io::ErrorKind::BrokenPipe
+    {
+        let _ = UNWRITTEN.set(error);
+    }
 }
 
-/// Prints a line on standard error, also with `--quiet`.
-pub fn say(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+/// Prints a line on standard output, or several.
+pub fn print_line(line: &str) {
+    print_raw(&(printable_lines(line) + "\n"));
+}
+
+/// Prints a line on standard error. Nobody can be told where that fails.
+pub fn print_error(line: &str) {
+    let _ = writeln!(io::stderr(), "{}", printable_lines(line));
 }
 
 /// Prints a line on standard error unless `--quiet`.
 pub fn note(global: &Global, line: &str) {
     if !global.quiet {
-        let _ = writeln!(io::stderr(), "{line}");
+        print_error(line);
+    }
+}
+
+/// Prints a failure on standard error, and with `--json` as an object on standard output.
+pub fn print_failure(failure: &Failure, global: &Global) {
+    print_error(&format!("medial: {}", failure.message));
+    if global.json {
+        let object = json!({ "error": failure.message, "warnings": [], "version": version() });
+        print_raw(&format!("{object}\n"));
     }
 }
 
@@ -58,7 +82,12 @@ pub fn print_json(object: &impl Serialize, warnings: &[String]) {
     }
     object.insert("warnings".to_owned(), Value::Array(all));
     object.insert("version".to_owned(), version().into());
-    print_line(&Value::Object(object).to_string());
+    print_raw(&format!("{}\n", Value::Object(object)));
+}
+
+/// Lines without control characters.
+fn printable_lines(text: &str) -> String {
+    text.split('\n').map(printable).collect::<Vec<_>>().join("\n")
 }
 
 /// A number with its noun, such as `1 sphere` or `3 faces`.

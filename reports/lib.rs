@@ -40,5 +40,5 @@ pub use record::{
     UnionTopology,
 };
 pub use terminal::summary_text;
-pub use text::file_stem;
+pub use text::{file_stem, printable};
 pub use write::{ReportError, read_header, write_report};

@@ -6,6 +6,7 @@ use crate::comparison::Comparison;
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Metric, TOTAL_SECONDS};
 use crate::record::Record;
 use crate::summary::{CountSummary, SeriesSummary, by_count};
+use crate::text::printable;
 
 /// The columns behind the name of the method: title and width.
 const COLUMNS: [(&str, usize); 6] = [
@@ -65,7 +66,7 @@ fn write_row(text: &mut String, row: &SeriesSummary, label: &str, width: usize) 
         format!("{}/{}", row.reached, row.asked),
         row.failed.to_string(),
     ];
-    let _ = write!(text, "  {label:<width$}");
+    let _ = write!(text, "  {:<width$}", printable(label));
     for (cell, (_, width)) in cells.iter().zip(COLUMNS) {
         let _ = write!(text, "{cell:>width$}");
     }

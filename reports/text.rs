@@ -45,14 +45,17 @@ pub(crate) fn megabytes(bytes: u64) -> String {
     grouped((bytes as f64 / 1e6).round() as u64)
 }
 
-/// Text without control characters, which neither XML nor a table row can carry.
-pub(crate) fn printable(text: &str) -> String {
+/// Text without control characters, which neither XML nor a table row can carry, and which a
+/// terminal would obey.
+pub fn printable(text: &str) -> String {
     text.chars()
         .map(|c| match c {
             '\n' | '\r' | '\t' => ' ',
             c if c.is_control() => '\u{fffd}',
             // Direction marks would reorder everything beside them.
-            '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => '\u{fffd}',
+            '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => {
+                '\u{fffd}'
+            }
             c => c,
         })
         .collect()

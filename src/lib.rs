@@ -26,7 +26,7 @@ pub mod simplifier;
 mod sum;
 pub mod surface;
 
-pub use atomic::write_atomically;
+pub use atomic::{remove_temporaries, write_atomically};
 
 /// A point or a vector in space, double precision.
 pub type Vec3 = glam::DVec3;

@@ -311,3 +311,22 @@ fn positions_are_located() {
     }
     assert!(matches!(d.locate(Vec3::splat(-0.001), None), Location::Outside(_)));
 }
+
+#[test]
+fn points_that_are_flat_but_for_their_exponents_take_no_longer_than_others() {
+    let mut rng = Pcg64::seed_from_u64(5);
+    for height in [1e-100, 1e-290] {
+        let mut random = || rng.random::<f64>();
+        let points: Vec<Vec3> =
+            (0..20_000).map(|_| Vec3::new(random(), random(), random() * height)).collect();
+        let start = std::time::Instant::now();
+        let flat = Delaunay::new(&points).expect("not flat");
+        // A minute or so where every in-sphere test goes to the widest integers.
+        assert!(start.elapsed().as_secs() < 5, "{:?}", start.elapsed());
+        flat.check_geometry().expect("valid");
+    }
+    // Cospherical by fours and more: every test is exact.
+    let lattice: Vec<Vec3> =
+        lattice(10, 1.0).into_iter().map(|p| p * Vec3::new(1.0, 1.0, 1e-100)).collect();
+    check(&lattice);
+}

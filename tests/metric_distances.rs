@@ -316,3 +316,14 @@ fn what_cannot_be_measured_is_refused() {
     assert!(matches!(error, Err(MetricError::NoVolume(_))));
     assert!(axis_distance(&empty, &axis, &AxisOptions::default()).is_err());
 }
+
+#[test]
+fn a_union_whose_area_all_but_underflows_is_its_centres() {
+    // Areas of 1e-309: a finite total, an infinite density.
+    let mesh = complex(&[(Vec3::ZERO, 1e-155), (Vec3::X, 1e-155)], &[], &[]);
+    let union = MedialUnion::new(&mesh).unwrap();
+    for samples in [1, 1000, 10_000_000] {
+        let options = EnvelopeOptions { samples, burial: 0.0, seed: 0 };
+        assert_eq!(sample_envelope(&mesh, &union, &options).unwrap(), [Vec3::ZERO, Vec3::X]);
+    }
+}

@@ -11,7 +11,7 @@ use super::report::{self, Rebuilt};
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
-use crate::output::{note, print_json, print_line};
+use crate::output::{note, print_error, print_json, print_line};
 use crate::run::{
     AXES, Here, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
     Study, StudyMethod, Supervisor, Tally, count, missing, run_items,
@@ -219,7 +219,7 @@ fn check_params(items: &[Item], supervisor: &mut Supervisor<'_>) -> Result<(), F
 
 fn interrupt_message(left: &[Item], tally: Tally) -> Exit {
     let levels: usize = left.iter().map(|item| item.levels.len()).sum();
-    crate::output::say(&format!(
+    print_error(&format!(
         "interrupted: {} of {levels} results were made and are kept; the same command goes on from there",
         tally.run
     ));

@@ -1,11 +1,10 @@
 //! `medial completions SHELL`.
 
-use std::io;
-
 use clap::{Args, Command};
 use clap_complete::Shell;
 
 use crate::exit::{Exit, Failure};
+use crate::output::print_raw;
 
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
@@ -20,6 +19,8 @@ pub struct Arguments {
 /// # Errors
 /// Never; the signature is that of every verb.
 pub fn run(arguments: &Arguments, command: &mut Command) -> Result<Exit, Failure> {
-    clap_complete::generate(arguments.shell, command, "medial", &mut io::stdout());
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, command, "medial", &mut script);
+    print_raw(&String::from_utf8_lossy(&script));
     Ok(Exit::Done)
 }

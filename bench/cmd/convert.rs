@@ -33,7 +33,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (notes, vertices, faces) = if is_medial(&arguments.from)? {
         let loaded = complex::read(&arguments.from).map_err(Failure::input)?;
         complex::write(&arguments.to, &loaded.mesh).map_err(Failure::input)?;
-        (loaded.notes, loaded.mesh.spheres.len(), loaded.mesh.faces.len())
+        let (mesh, notes) = loaded.with_remarks();
+        (notes, mesh.spheres.len(), mesh.faces.len())
     } else if extension(&arguments.to) == "ma" {
         return Err(Failure::usage(format!(
             "a surface is not a medial mesh: `medial axis {} -o {}` computes one",

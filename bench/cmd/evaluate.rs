@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use medial::complex::LoadedMa;
 use medial::metrics::{Certificate, Evaluation, JudgeOptions, MetricError, Witness, WitnessSide};
 use medial::shape::ShapeOptions;
 
 use crate::args::{Global, MeasureArguments, MeshArgument, judge_options};
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
-use crate::output::{counted, percent, print_json, print_line};
+use crate::output::{counted, note, percent, print_json, print_line};
 use crate::run::{Input, Source};
 
 /// Arguments of `evaluate`.
@@ -39,7 +40,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let input = Input::load(&source)?;
     let shape =
         input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
-    let (mesh, mut warnings) = medial_mesh_for(&arguments.axis, &shape)?;
+    let LoadedMa { mesh, notes, mut warnings, .. } = medial_mesh_for(&arguments.axis, &shape)?;
+    // No number depends on how a file writes its mesh, so the answer does not either.
+    for line in &notes {
+        note(global, &format!("{}: {line}", arguments.axis.display()));
+    }
     let judge =
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
     let to_normal = shape.normalisation();
@@ -48,6 +53,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         MetricError::Tolerance(_) | MetricError::TooFine { .. } => {
             Failure::usage(format!("--certify: {error}"))
         }
+        MetricError::NoArea | MetricError::NoVolume(_) => Failure::of(&source, error),
         _ => Failure::input(format!("{}: {error}", arguments.axis.display())),
     };
     let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));

@@ -13,6 +13,7 @@ pub mod info;
 pub mod methods;
 pub mod paper;
 pub mod reconstruct;
+pub mod repair;
 pub mod report;
 pub mod run_item;
 pub mod simplify;

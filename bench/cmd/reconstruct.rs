@@ -220,12 +220,10 @@ fn read(arguments: &Arguments) -> Result<Read, Failure> {
     let axis = match (&arguments.axis, &shape) {
         (None, _) => None,
         (Some(path), Some(shape)) => Some(medial_mesh_for(path, shape)?),
-        (Some(path), None) => {
-            let loaded = complex::read(path).map_err(Failure::input)?;
-            Some((loaded.mesh, loaded.notes))
-        }
+        (Some(path), None) => Some(complex::read(path).map_err(Failure::input)?),
     };
-    let axis = axis.map(|(mesh, notes)| {
+    let axis = axis.map(|loaded| {
+        let (mesh, notes) = loaded.with_remarks();
         warnings.extend(notes);
         mesh
     });

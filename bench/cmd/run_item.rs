@@ -12,7 +12,7 @@ use medial_reports::{Record, read_records};
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
-use crate::output::{note, print_line};
+use crate::output::{note, print_raw};
 use crate::run::{
     AXES, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
     Supervisor, missing, run_items,
@@ -83,7 +83,8 @@ fn print_records(item: &Item, records: &[Record]) -> Result<Exit, Failure> {
     let mut exit = Exit::Done;
     for key in item.keys() {
         let Some(record) = records.iter().rev().find(|record| record.key == key) else { continue };
-        print_line(&serde_json::to_string(record).map_err(Failure::input)?);
+        let line = serde_json::to_string(record).map_err(Failure::input)?;
+        print_raw(&format!("{line}\n"));
         if !record.status.is_ok() {
             exit = Exit::SomeFailed;
         }

@@ -25,7 +25,7 @@ use crate::args::{
 };
 use crate::exit::{Exit, Failure};
 use crate::files::{check_folder, check_output, medial_mesh_for};
-use crate::output::{counted, percent, print_json, print_line, version};
+use crate::output::{counted, note, percent, print_json, print_line, version};
 use crate::run::record::fill_result;
 use crate::run::{Fault, Input, LevelRun, Registry, Source, answer, search_error};
 
@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
     if let Some(path) = &arguments.initial {
-        let (initial, notes) = medial_mesh_for(path, &shape)?;
+        let (initial, notes) = medial_mesh_for(path, &shape)?.with_remarks();
         warnings.extend(notes);
         shape = shape.with_initial(&initial);
     }
@@ -139,7 +139,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         }
         print_json(&object, &warnings);
     } else {
-        print_result(&simplify, search.as_ref(), arguments);
+        print_result(&simplify, search.as_ref(), arguments, global);
         if let Some(parts) = extras.get::<Vec<PartInfo>>() {
             print_line(&format!("  {}, listed by --json", counted(parts.len() as u64, "part")));
         }
@@ -166,6 +166,13 @@ fn check_bound(arguments: &Arguments) -> Result<(), Failure> {
             let message = format!("--max-error {bound}: a positive fraction of the diagonal");
             Err(Failure::usage(message))
         }
+        // The whole solid is within one diagonal of anything inside it.
+        Some(bound) if bound >= 1.0 => Err(Failure::usage(format!(
+            "--max-error {bound}: a fraction of the diagonal is meant, and this is {} % of it; \
+             write {} for {bound} %",
+            100.0 * bound,
+            bound / 100.0
+        ))),
         Some(_) => judge_options(&arguments.measure, JudgeOptions::default(), 0).map(|_| ()),
         None => Ok(()),
     }
@@ -309,7 +316,12 @@ fn failure_named(name: &str, Fault { status, reason }: Fault) -> Failure {
     }
 }
 
-fn print_result(simplify: &Simplify, search: Option<&Search>, arguments: &Arguments) {
+fn print_result(
+    simplify: &Simplify,
+    search: Option<&Search>,
+    arguments: &Arguments,
+    global: &Global,
+) {
     let seconds = simplify.seconds.unwrap_or_default();
     print_line(&format!(
         "{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
@@ -339,5 +351,9 @@ fn print_result(simplify: &Simplify, search: Option<&Search>, arguments: &Argume
     }
     if let Some(path) = &arguments.voxels {
         print_line(&format!("  written: {}, a point for each voxel", path.display()));
+    }
+    let outputs = [&arguments.output, &arguments.save_hierarchy, &arguments.voxels];
+    if outputs.iter().all(|output| output.is_none()) {
+        note(global, "medial: the result was not written; -o FILE.ma keeps it");
     }
 }

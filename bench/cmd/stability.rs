@@ -18,7 +18,7 @@ use super::report::{Rebuilt, rebuild};
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
-use crate::output::{note, print_json, print_line, say};
+use crate::output::{note, print_error, print_json, print_line};
 use crate::run::{
     Here, Item, Kept, Noise, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
     Study, StudyMethod, Supervisor, missing, run_items,
@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     drop(progress);
     match ended {
         Err(PlanError::Run(RunError::Interrupted)) => {
-            say("interrupted: what was made is kept; the same command goes on from there");
+            print_error("interrupted: what was made is kept; the same command goes on from there");
             return Ok(Exit::Interrupted);
         }
         ended => ended?,

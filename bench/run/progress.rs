@@ -3,6 +3,7 @@
 use std::io::{self, IsTerminal, Write};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use medial_reports::printable;
 
 /// Progress through a known number of items.
 pub struct Progress {
@@ -33,7 +34,7 @@ impl Progress {
     /// Names what is being done now.
     pub fn at(&mut self, what: &str) {
         if let Style::Bar(bar) = &self.style {
-            bar.set_message(what.to_owned());
+            bar.set_message(printable(what));
         } else {
             self.line(&format!("[{}/{}] {what}", self.done + 1, self.total));
         }
@@ -50,14 +51,14 @@ impl Progress {
     /// A remark that stays on the screen.
     pub fn remark(&self, text: &str) {
         match &self.style {
-            Style::Bar(bar) => bar.println(text),
+            Style::Bar(bar) => bar.println(printable(text)),
             _ => self.line(text),
         }
     }
 
     fn line(&self, text: &str) {
         if matches!(self.style, Style::Lines) {
-            let _ = writeln!(io::stderr(), "{text}");
+            let _ = writeln!(io::stderr(), "{}", printable(text));
         }
     }
 }

@@ -8,9 +8,11 @@ use std::path::{Component, Path, PathBuf};
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError, ShapeOptions};
 use medial::surface::{self, SurfaceError, SurfaceReport, TriMesh};
+use medial_datasets::BuiltIn;
 use serde::{Deserialize, Serialize};
 
 use super::hex_digest;
+use super::similar::did_you_mean;
 
 /// Where a mesh comes from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -196,7 +198,29 @@ fn built_in(
         let (least, most) = (*range.start(), *range.end());
         return Err(InputError::OutOfRange { resolution, least, most });
     }
+    let vertices = estimated_vertices(&shape, resolution);
+    if vertices > MOST_VERTICES {
+        return Err(InputError::TooManyVertices { resolution, vertices });
+    }
     Ok((shape, resolution))
+}
+
+/// Built-in shapes of more vertices take hours in most verbs and are taken for a slip.
+const MOST_VERTICES: f64 = 2e6;
+
+/// A surface has vertices by the square of its resolution.
+fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
+    let times = f64::from(resolution) / f64::from(shape.default_resolution);
+    if times <= 1.0 {
+        return 0.0;
+    }
+    shape.mesh(shape.default_resolution).vertices.len() as f64 * times * times
+}
+
+/// The shape that may have been meant by an id that none has.
+fn meant(id: &str) -> String {
+    let ids: Vec<_> = medial_datasets::catalogue().into_iter().map(|shape| shape.id).collect();
+    did_you_mean(id, ids)
 }
 
 fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
@@ -220,8 +244,19 @@ pub enum InputError {
     #[error(transparent)]
     Surface(#[from] SurfaceError),
     /// The catalogue has no such shape.
-    #[error("no built-in shape is called `{0}`; `medial datasets list` names them all")]
+    #[error("no built-in shape is called `{0}`{meant}; `medial datasets list` names them all", meant = meant(.0))]
     NoSuchShape(String),
+    /// A built-in shape would be too large at this resolution.
+    #[error(
+        "resolution {resolution} would make about {vertices:.1e} vertices, above the most of \
+         {MOST_VERTICES:.0e}: ask for a coarser one"
+    )]
+    TooManyVertices {
+        /// What was asked.
+        resolution: u32,
+        /// Estimated number of vertices.
+        vertices: f64,
+    },
     /// The resolution of a built-in shape is not a number.
     #[error("`{0}` is not a resolution: write builtin:ID:NUMBER")]
     Resolution(String),

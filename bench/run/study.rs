@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Dual, Entry, InputError, Item, Limits, Measure, MethodSpec, Provenance, Registry,
-    RegistryError, SceneSpec, Source, hex_digest,
+    RegistryError, SceneSpec, Source, did_you_mean, hex_digest,
 };
 
 /// Items are ended after so many seconds unless told otherwise.
@@ -160,7 +160,8 @@ pub enum StudyError {
 
 /// The message for an id that no method has, naming those that exist.
 pub fn no_such_method(id: &str, known: &[String]) -> String {
-    format!("no method is called `{id}`; there are: {}", known.join(", "))
+    let meant = did_you_mean(id, known.iter().map(String::as_str));
+    format!("no method is called `{id}`{meant}; there are: {}", known.join(", "))
 }
 
 /// What is the same for all items of this process.

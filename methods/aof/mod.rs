@@ -48,6 +48,7 @@
 //!   allows while its start set keeps the topology, and its thinned axis is taken down to the count
 //!   by deleting simple voxels, largest `AOF'` first (file `count.rs`).
 
+mod advice;
 mod bricks;
 mod coarse_to_fine;
 mod count;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::spiral::Spiral;
 
 /// Most voxels along a side of the bounding box: places have 16 bits.
-const MAX_RESOLUTION: u32 = 60_000;
+pub(super) const MAX_RESOLUTION: u32 = 60_000;
 /// Most voxels along the longest side of a coarse voxel.
 const MAX_SPLIT: u32 = 1024;
 
@@ -20,8 +20,8 @@ pub struct AofParams {
     pub d: u32,
     /// Number of levels, the finest included.
     pub levels: u32,
-    /// `N`: samples on each sphere, from the coarsest level to the finest, separated by `/`; the
-    /// last one holds for all levels that follow.
+    /// `N`: samples on each sphere, from the coarsest level to the finest, separated by `/`, or one
+    /// number for all levels.
     #[serde(deserialize_with = "number_or_text")]
     pub samples: String,
     /// `alpha`: object angle in degrees of the thinnest sheets that are kept.
@@ -130,12 +130,20 @@ impl AofParams {
         let counts: Option<Vec<usize>> =
             self.samples.split('/').map(|word| word.trim().parse().ok()).collect();
         let mut counts = counts.ok_or_else(refuse)?;
-        if counts.len() > self.levels as usize {
-            // Fewer levels: those that are left out are the coarse ones.
-            counts.drain(..counts.len() - self.levels as usize);
+        let levels = self.levels as usize;
+        // The default is made for its own number of levels; of fewer, the coarse ones are left out.
+        if self.samples == Self::default().samples {
+            counts.drain(..counts.len().saturating_sub(levels));
+        } else if counts.len() != 1 && counts.len() != levels {
+            return Err(SimplifyError::Parameter(format!(
+                "samples = {}: {} numbers for {levels} levels; give one for each, from coarse to \
+                 fine, or one for all",
+                self.samples,
+                counts.len()
+            )));
         }
         let last = *counts.last().ok_or_else(refuse)?;
-        counts.resize(self.levels as usize, last);
+        counts.resize(levels, last);
         if counts.iter().any(|count| !(8..=10_000).contains(count)) {
             return Err(refuse());
         }

@@ -18,19 +18,16 @@ use super::params::{AofParams, Variant};
 use super::refine::refine;
 use super::thinning::{Order, thin};
 
-/// Bytes for each voxel of the start set: values in bricks that are not full, twice while one is
-/// thinned, lists of blocks, the heap.
-const BYTES_PER_VOXEL: f64 = 64.0;
 /// How often the lattice is made finer, half as fine again each time, for the topology of a start set.
 const REFINEMENTS: u32 = 3;
 
 /// A solid, ready for any lattice.
 pub struct Solid<'s> {
-    shape: &'s Shape,
+    pub(super) shape: &'s Shape,
     surface: Surface,
     params: AofParams,
     run: RunContext,
-    volume: f64,
+    pub(super) volume: f64,
 }
 
 /// The lattice that the parameters ask for.
@@ -81,10 +78,11 @@ impl<'s> Solid<'s> {
     /// Flux and distances at a resolution.
     ///
     /// # Errors
-    /// When the voxels would not fit into memory; when the run was cancelled.
+    /// When the lattice is too fine, or its voxels would not fit into memory; when the run was
+    /// cancelled.
     pub fn descend(&self, resolution: u32, wanted: Wanted) -> Result<Descent, SimplifyError> {
         let grid = self.grid(resolution);
-        self.check_memory(resolution)?;
+        self.check_resolution(resolution)?;
         coarse_to_fine(&self.surface, &grid, &self.params, wanted, &self.run)
     }
 
@@ -95,35 +93,6 @@ impl<'s> Solid<'s> {
 
     pub(super) fn wanted(&self) -> Wanted {
         if self.params.variant == Variant::Plain { Wanted::Kept } else { Wanted::All }
-    }
-
-    /// Memory for the voxels of a resolution, in megabytes, and their number.
-    fn megabytes(&self, resolution: u32) -> (f64, f64) {
-        let grid = self.grid(resolution);
-        let voxels = self.volume / grid.side.powi(3);
-        let bricks: f64 = grid.size.iter().map(|&n| f64::from(n) / 8.0).product();
-        ((voxels * BYTES_PER_VOXEL + bricks * 4.0) / 1e6, voxels)
-    }
-
-    fn check_memory(&self, resolution: u32) -> Result<(), SimplifyError> {
-        let (megabytes, voxels) = self.megabytes(resolution);
-        let limit = self.params.max_memory;
-        if megabytes <= limit {
-            return Ok(());
-        }
-        // Not quite a cube root: the lattice is a whole number of coarse voxels.
-        let mut fits = (f64::from(resolution) * (limit / megabytes).cbrt()).ceil() as u32;
-        while fits > 0 && self.megabytes(fits).0 > limit {
-            fits -= 1;
-        }
-        let advice = match fits {
-            0 => format!("give max_memory = {}", megabytes.ceil()),
-            _ => format!("resolution = {fits} fits, or raise max_memory"),
-        };
-        Err(SimplifyError::Parameter(format!(
-            "resolution = {resolution}: about {megabytes:.3} MB for {voxels:.3e} voxels, above \
-             max_memory = {limit}; {advice}"
-        )))
     }
 
     /// The lattice to work at.
@@ -160,32 +129,6 @@ impl<'s> Solid<'s> {
         }
         diagnostics.count("spheres_evaluated", tally.evaluated.iter().sum::<u64>() as usize);
         Ok(Base { resolution, descent, topology, diagnostics })
-    }
-
-    /// The error for a lattice without voxels. It names a resolution that was tried and has some.
-    fn nothing_fits(&self, resolution: u32, deepest: f64) -> SimplifyError {
-        let longest = self.grid(resolution).side * f64::from(resolution);
-        // No voxel can be there while its side is above the largest distance.
-        let (mut tried, mut deepest) = (resolution, deepest);
-        let advice = loop {
-            let least = if deepest > 0.0 { (1.1 * longest / deepest).ceil() } else { 0.0 };
-            tried = least.clamp(1.5 * f64::from(tried), 3.0 * f64::from(tried)).ceil() as u32;
-            match self.descend(tried, Wanted::Places) {
-                Ok(start) if start.tally.start > 0 => break format!("resolution = {tried} does"),
-                Ok(start) => deepest = deepest.max(start.tally.deepest),
-                Err(SimplifyError::Parameter(_)) => {
-                    break format!(
-                        "none up to resolution = {tried} does, where max_memory = {} ends; raise it",
-                        self.params.max_memory
-                    );
-                }
-                Err(error) => return error,
-            }
-        };
-        SimplifyError::Parameter(format!(
-            "resolution = {resolution}: the solid is thinner than a voxel everywhere, no sphere of \
-             a voxel's side lies inside; {advice}"
-        ))
     }
 
     /// The least resolution above the given one on whose start set has the topology of the solid,

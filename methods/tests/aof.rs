@@ -492,3 +492,56 @@ fn cancelling_ends_the_run_at_every_stage() {
         assert!(asked <= k + 1 + rayon::current_num_threads(), "{asked} after {k}");
     }
 }
+
+#[test]
+fn advice_for_thin_and_scattered_solids_is_cheap_and_holds() {
+    let refusal = |mesh: &TriMesh, set: &[(&str, &str)]| {
+        let set = [&[("variant", "plain")], set].concat();
+        match simplified(&shape_of(mesh), &set, Level::Native(20.0)) {
+            Err(SimplifyError::Parameter(message)) => message,
+            other => panic!("{other:?}"),
+        }
+    };
+    let start = std::time::Instant::now();
+    let flat = |height: f64| cuboid(Vec3::new(1.0, 1.0, height));
+    let mut apart = cuboid(HALF);
+    let far = cuboid(HALF);
+    apart.faces.extend(far.faces.iter().map(|face| face.map(|v| v + 8)));
+    apart.vertices.extend(far.vertices.iter().map(|&v| v + Vec3::X * 1e12));
+    for mesh in [flat(1e-6), apart.clone()] {
+        let message = refusal(&mesh, &[]);
+        assert!(message.contains("too thin for a lattice"), "{message}");
+    }
+    // Found by trying, up to a bounded effort.
+    let message = refusal(&flat(1e-2), &[]);
+    let named = message.rsplit("resolution = ").next().and_then(|rest| rest.split(' ').next());
+    let named = named.expect("a resolution");
+    let set = [("variant", "plain"), ("resolution", named)];
+    assert!(simplified(&shape_of(&flat(1e-2)), &set, Level::Native(20.0)).is_ok(), "{message}");
+    let message = refusal(&flat(1e-4), &[]);
+    assert!(message.contains("take too long to be tried"), "{message}");
+    // A lattice that fits into memory but has no voxel is not advised.
+    let message = refusal(&flat(1e-3), &[("resolution", "4000"), ("max_memory", "1")]);
+    assert!(message.contains("give max_memory"), "{message}");
+    apart.vertices[8..].iter_mut().for_each(|v| *v += Vec3::splat(1e12));
+    let message = refusal(&apart, &[]);
+    assert!(message.contains("max_memory ends"), "{message}");
+    // Minutes and gigabytes without the bounds.
+    assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
+}
+
+#[test]
+fn samples_are_one_number_or_one_for_each_level() {
+    let shape = built_in("box");
+    let answer = |samples: &str, levels: &str| {
+        let set = [("samples", samples), ("levels", levels)];
+        simplified(&shape, &set, Level::Spheres(10)).map(|_| ())
+    };
+    for (samples, levels) in [("60/50", "3"), ("80/70/60/50", "3"), ("70/60", "1")] {
+        let message = answer(samples, levels).expect_err("of another length").to_string();
+        assert!(message.contains("one for each"), "{message}");
+    }
+    for (samples, levels) in [("60/50", "2"), ("50", "2"), ("70/60/50", "2")] {
+        assert!(answer(samples, levels).is_ok(), "{samples} for {levels} levels");
+    }
+}

@@ -9,6 +9,7 @@ use medial::simplifier::Level;
 
 use crate::comparison::{Comparison, Entry};
 use crate::record::{Record, Stages};
+use crate::text::printable;
 
 /// A CSV with a header line. The command that made each row stands in the row.
 pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error> {
@@ -16,9 +17,17 @@ pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error>
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(columns.iter().map(|column| column.name.as_str()))?;
     for entry in &comparison.entries {
-        writer.write_record(columns.iter().map(|column| (column.value)(entry)))?;
+        writer.write_record(columns.iter().map(|column| inert((column.value)(entry))))?;
     }
     writer.into_inner().map_err(|error| error.into_error().into())
+}
+
+/// Text that a spreadsheet shows and does not run: a quote goes before what would begin a formula.
+/// Numbers may begin so and stay as they are.
+fn inert(cell: String) -> String {
+    let formula = cell.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    let cell = printable(&cell);
+    if formula && cell.parse::<f64>().is_err() { format!("'{cell}") } else { cell }
 }
 
 /// A column: its name and how to fill it.
@@ -256,4 +265,27 @@ fn provenance() -> Vec<Column> {
 pub(crate) fn warnings(record: &Record) -> Vec<&str> {
     let evaluation = record.evaluate.iter().flat_map(|evaluation| &evaluation.warnings);
     record.simplify.warnings.iter().chain(evaluation).map(String::as_str).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::inert;
+
+    #[test]
+    fn formulas_and_controls_are_inert_and_numbers_stay() {
+        for (cell, shown) in [
+            ("=cmd|' !A0", "'=cmd|' !A0"),
+            ("+1+1", "'+1+1"),
+            ("-2+3", "'-2+3"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("\t=1", "' =1"),
+            ("\r=1", "' =1"),
+            ("a\u{1b}[2Jb", "a\u{fffd}[2Jb"),
+            ("-0.5", "-0.5"),
+            ("+3e-7", "+3e-7"),
+            ("bear", "bear"),
+        ] {
+            assert_eq!(inert(cell.to_owned()), shown);
+        }
+    }
 }

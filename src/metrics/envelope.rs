@@ -75,10 +75,12 @@ pub(super) fn sample_envelope_along(
     }
     let patches = patches(mesh);
     let total = patches.iter().map(Patch::area).sum::<f64>();
-    if !(total > 0.0 && total.is_finite()) {
+    let asked = options.samples as f64;
+    // The densest run's candidates per area: a total so small that this overflows is no area.
+    let densest = (asked * MOST_CANDIDATES).max(LEAST_PILOT) / total;
+    if !(total > 0.0 && total.is_finite() && densest.is_finite()) {
         return Ok(mesh.spheres.iter().map(|m| m.centre).collect());
     }
-    let asked = options.samples as f64;
     let sampled = |candidates| sample_patches(&patches, axes, candidates / total, union, options);
     let pilot = (asked / PILOT).max(LEAST_PILOT);
     let share = sampled(pilot).len() as f64 / pilot;

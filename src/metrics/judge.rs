@@ -111,11 +111,23 @@ impl Judge {
             || rayon::join(axis, complex),
         );
         let ((distances, envelope), axis) = (distances?, axis.transpose()?);
+        let mut warnings = self.misfits(mesh, &union, &distances);
+        let volume_error = match volume_error {
+            // All else is defined, and the surface was taken for a solid.
+            Err(MetricError::NoVolume(volume)) => {
+                warnings.push(format!(
+                    "the surface's volume is lost to rounding ({volume:.1e} of the cube of its \
+                     diagonal): the volume difference is not measured"
+                ));
+                None
+            }
+            other => other?,
+        };
         Ok(Evaluation {
-            warnings: self.misfits(mesh, &union, &distances),
+            warnings,
             distances,
             certified: None,
-            volume_error: volume_error?,
+            volume_error,
             protrusion: Some(protrusion(&envelope, &self.inside)),
             centres_outside: Some(centres_outside(mesh, &self.inside)),
             quality,
@@ -255,5 +267,29 @@ impl Judge {
         ratios.sort_unstable_by(f64::total_cmp);
         let at = |share: f64| ratios.get((share * ratios.len() as f64) as usize).copied();
         Some([at(0.25)?, at(0.5)?, at(0.75)?])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vec3;
+    use crate::complex::Sphere;
+
+    #[test]
+    fn a_volume_that_is_lost_to_rounding_leaves_the_other_measures() {
+        // Two sides that coincide: a volume of zero.
+        let surface = TriMesh {
+            vertices: vec![Vec3::ZERO, Vec3::X * 0.6, Vec3::Y * 0.8],
+            faces: vec![[0, 1, 2], [0, 2, 1]],
+        };
+        let tree = Arc::new(TriangleBvh::new(&surface).unwrap());
+        let options = JudgeOptions { samples: 100, ..JudgeOptions::default() };
+        let judge = Judge::new(surface, tree, Truth::default(), options);
+        let spheres = vec![Sphere::new(Vec3::new(0.2, 0.2, 0.0), 0.1)];
+        let mesh = MedialMesh::from_simplices(spheres, vec![], vec![]).unwrap();
+        let evaluation = judge.evaluate(&mesh).unwrap();
+        assert_eq!(evaluation.volume_error, None);
+        assert!(evaluation.warnings.iter().any(|w| w.contains("volume is lost to rounding")));
     }
 }

@@ -200,7 +200,8 @@ pub enum Fault {
     },
     /// Edges with one face only.
     #[error(
-        "the surface is open: {} with one face only, the first from {} to {}; fill its holes",
+        "the surface is open: {} with one face only, the first from {} to {}; fill its holes \
+         (`medial repair --fill-holes`)",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
     Open {
@@ -208,6 +209,25 @@ pub enum Fault {
         edges: usize,
         /// The first of them.
         first: [VertexName; 2],
+    },
+    /// A hole that is too long to be filled.
+    #[error("the hole at {first} has {edges} edges, and holes of up to {most} are filled")]
+    LongHole {
+        /// Number of edges around it.
+        edges: usize,
+        /// The longest that would be filled.
+        most: usize,
+        /// The vertex around it with the lowest index.
+        first: VertexName,
+    },
+    /// A hole that no triangles close.
+    #[error(
+        "the hole at {first} meets itself or an inner wall, or only edges that are there already \
+         would close it"
+    )]
+    TangledHole {
+        /// A vertex around it.
+        first: VertexName,
     },
     /// Edges with more than two faces.
     #[error(

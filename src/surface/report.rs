@@ -99,6 +99,20 @@ pub enum Repair {
         /// How many.
         faces: usize,
     },
+    /// Parts beside the largest were left out, on demand.
+    DroppedComponents {
+        /// How many.
+        components: usize,
+        /// Their faces.
+        faces: usize,
+    },
+    /// A hole was closed by triangles between its vertices, on demand.
+    FilledHole {
+        /// Edges around the hole.
+        edges: usize,
+        /// Triangles that were added.
+        triangles: usize,
+    },
     /// Outer shells that pointed inward as a whole were turned over.
     TurnedOutward {
         /// How many components.
@@ -123,7 +137,9 @@ impl Repair {
             | Self::DroppedUnreferencedVertices { vertices: n }
             | Self::ReorientedFaces { faces: n }
             | Self::TurnedOutward { components: n }
-            | Self::TurnedInward { components: n } => n,
+            | Self::TurnedInward { components: n }
+            | Self::DroppedComponents { components: n, .. }
+            | Self::FilledHole { triangles: n, .. } => n,
         }
     }
 }
@@ -134,7 +150,10 @@ impl fmt::Display for Repair {
             Self::FlushedCoordinates { .. } => "coordinate",
             Self::WeldedVertices { .. } | Self::DroppedUnreferencedVertices { .. } => "vertex",
             Self::TriangulatedPolygons { .. } => "polygon",
-            Self::TurnedOutward { .. } | Self::TurnedInward { .. } => "component",
+            Self::TurnedOutward { .. }
+            | Self::TurnedInward { .. }
+            | Self::DroppedComponents { .. } => "component",
+            Self::FilledHole { .. } => "triangle",
             _ => "face",
         };
         let what = counted(self.count(), noun);
@@ -159,6 +178,12 @@ impl fmt::Display for Repair {
             }
             Self::ReorientedFaces { .. } => {
                 write!(f, "turned over {what} against the orientation of the neighbours")
+            }
+            Self::DroppedComponents { faces, .. } => {
+                write!(f, "left out {what} with {}", counted(faces, "face"))
+            }
+            Self::FilledHole { edges, .. } => {
+                write!(f, "filled a hole of {} with {what}", counted(edges, "edge"))
             }
             Self::TurnedOutward { .. } => write!(f, "turned {what} outward"),
             Self::TurnedInward { .. } => {

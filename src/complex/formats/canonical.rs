@@ -24,13 +24,13 @@ pub(super) fn canonical(
     flatten_faces(&mut faces, &mut edges, &mut notes);
     let all = edges.len();
     edges.retain(|[a, b]| a != b);
-    note(&mut notes, all - edges.len(), "edge", "dropped: both ends are the same sphere");
+    note(&mut notes, all - edges.len(), "edge", "edges", "dropped: both ends are the same sphere");
     sort_once(&mut edges, "edge", &mut notes);
     sort_once(&mut faces, "face", &mut notes);
     add_missing_edges(&mut edges, &faces, &mut notes);
     let mesh = MedialMesh { spheres, edges, faces, contacts: None };
     debug_assert_eq!(mesh.check(), Ok(()));
-    LoadedMa { mesh, notes }
+    LoadedMa { mesh, notes, warnings: Vec::new(), kept: None }
 }
 
 /// Whether a list is in canonical order matters to nobody but those who compare files.
@@ -40,7 +40,7 @@ fn note_disorder<const N: usize>(
     notes: &mut Vec<String>,
 ) {
     let descending = simplices.iter().filter(|s| s.windows(2).any(|pair| pair[0] > pair[1]));
-    note(notes, descending.count(), what, "written with descending indices");
+    note(notes, descending.count(), what, &format!("{what}s"), "written with descending indices");
     if simplices.windows(2).any(|pair| pair[0] > pair[1]) {
         notes.push(format!("the {what}s were not in ascending order and were sorted"));
     }
@@ -56,14 +56,16 @@ fn flatten_faces(faces: &mut Vec<[u32; 3]>, edges: &mut Vec<[u32; 2]>, notes: &m
         }
         proper
     });
-    note(notes, all - faces.len(), "face", "replaced by an edge: two corners are the same sphere");
+    let verb = "replaced by an edge: two corners are the same sphere";
+    note(notes, all - faces.len(), "face", "faces", verb);
 }
 
 fn sort_once<T: Ord>(simplices: &mut Vec<T>, what: &'static str, notes: &mut Vec<String>) {
     let all = simplices.len();
     simplices.sort_unstable();
     simplices.dedup();
-    note(notes, all - simplices.len(), what, "listed more than once and merged");
+    let many = format!("{what}s");
+    note(notes, all - simplices.len(), what, &many, "listed more than once and merged");
 }
 
 fn add_missing_edges(edges: &mut Vec<[u32; 2]>, faces: &[[u32; 3]], notes: &mut Vec<String>) {
@@ -75,13 +77,15 @@ fn add_missing_edges(edges: &mut Vec<[u32; 2]>, faces: &[[u32; 3]], notes: &mut 
     sides.retain(|side| edges.binary_search(side).is_err());
     edges.append(&mut sides);
     edges.sort_unstable();
-    note(notes, edges.len() - listed, "edge", "added: sides of faces that were not listed");
+    let verb = "added: sides of faces that were not listed";
+    note(notes, edges.len() - listed, "edge", "edges", verb);
 }
 
-fn note(notes: &mut Vec<String>, count: usize, what: &str, verb: &str) {
+/// Says what was done to a number of things, if there were any.
+pub(super) fn note(notes: &mut Vec<String>, count: usize, one: &str, many: &str, verb: &str) {
     match count {
         0 => {}
-        1 => notes.push(format!("1 {what} was {verb}")),
-        _ => notes.push(format!("{count} {what}s were {verb}")),
+        1 => notes.push(format!("1 {one} was {verb}")),
+        _ => notes.push(format!("{count} {many} were {verb}")),
     }
 }

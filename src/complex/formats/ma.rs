@@ -7,12 +7,14 @@
 //! f i j k           nF times: indices of three spheres
 //! ```
 //!
-//! Tools of the field add feature and deletion flags at the end of a line; no two of them agree
-//! on what these mean, so they are read over, and the reader says so.
+//! Tools of the field add types of features and marks of deletion at the end of a line, and a
+//! fourth count with lines `t a b c d` of tetrahedra: `flags.rs` says which. What is marked as
+//! deleted is dropped, with whatever uses it, and counted.
 
 use std::io::{self, Write};
 
-use super::canonical::canonical;
+use super::canonical::{canonical, note};
+use super::flags::{EDGE, FACE, Flags, SPHERE};
 use super::scan::{Line, lines, shortened};
 use super::{LoadedMa, MaError, MaErrorKind};
 use crate::complex::{MedialMesh, Sphere};
@@ -22,9 +24,10 @@ const SHORTEST_RECORD: usize = 5;
 
 /// Reads a medial mesh from the text of a `.ma` file; `name` stands for the file in errors.
 ///
-/// Empty lines, comments (`#`), trailing flags, carriage returns and any order of the lines are
-/// accepted. Edges and faces may be in any order and orientation; missing sides of faces are
-/// added, and [`LoadedMa::notes`] says what was done.
+/// Empty lines, comments (`#`), carriage returns and any order of the lines are accepted. Edges and
+/// faces may be in any order and orientation; missing sides of faces are added. What a trailing flag
+/// marks as deleted is dropped, with the edges and faces that use it. [`LoadedMa::notes`] says what
+/// was done.
 ///
 /// ```
 /// let text = "3 0 1\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 0 1 2\n";
@@ -36,7 +39,8 @@ const SHORTEST_RECORD: usize = 5;
 ///
 /// # Errors
 /// When the header or a line is not as above, a number is not finite, a radius is negative, an
-/// index is out of range, or the lines are not as many as announced.
+/// index is out of range, trailing words are the flags of no known tool, or the lines are not as
+/// many as announced (but for edges and faces of a writer that is known to miscount them).
 pub fn parse_ma(text: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError> {
     let bytes = text.as_ref();
     let mut rest = lines(bytes, name);
@@ -58,23 +62,17 @@ struct Records {
     spheres: Vec<Sphere>,
     edges: Vec<[u32; 2]>,
     faces: Vec<[u32; 3]>,
-    flagged: usize,
-    nonzero_last_flag: usize,
+    tetrahedra: usize,
+    flags: Flags,
+    /// The first record of a kind beyond those announced.
+    excess: [Option<MaError>; 3],
 }
 
-const KINDS: [&str; 3] = ["spheres", "edges", "faces"];
+pub(super) const KINDS: [&str; 3] = ["spheres", "edges", "faces"];
 
 impl Records {
     fn announced(header: &Line<'_>, bytes: usize) -> Result<Self, MaError> {
-        let mut words = header.words();
-        let mut announced = [0; 3];
-        for count in &mut announced {
-            *count = words.next_word().and_then(|word| word.parse().ok()).ok_or_else(|| {
-                let found = shortened(header.text());
-                let why = format!("expected three counts `nV nE nF` first, found {found:?}");
-                header.error(MaErrorKind::Malformed(why))
-            })?;
-        }
+        let (announced, four_counts) = counts(header)?;
         for (what, &announced) in KINDS.into_iter().zip(&announced) {
             let room = bytes / SHORTEST_RECORD;
             if announced > room as u64 || announced > u64::from(u32::MAX) {
@@ -87,59 +85,140 @@ impl Records {
             spheres: Vec::with_capacity(announced[0] as usize),
             edges: Vec::with_capacity(announced[1] as usize),
             faces: Vec::with_capacity(announced[2] as usize),
-            flagged: 0,
-            nonzero_last_flag: 0,
+            tetrahedra: 0,
+            flags: Flags::of(four_counts),
+            excess: [const { None }; 3],
         })
     }
 
     fn take(&mut self, line: &Line<'_>) -> Result<(), MaError> {
-        let spheres = self.announced[0];
+        let spheres = self.announced[SPHERE];
         let mut words = line.words();
         let (kind, found) = match words.next_word() {
             Some("v") => {
                 self.spheres.push(words.sphere()?);
-                (0, self.spheres.len())
+                (SPHERE, self.spheres.len())
             }
             Some("e") => {
                 self.edges.push(words.indices(spheres)?);
-                (1, self.edges.len())
+                (EDGE, self.edges.len())
             }
             Some("f") => {
                 self.faces.push(words.indices(spheres)?);
-                (2, self.faces.len())
+                (FACE, self.faces.len())
+            }
+            Some("t") if self.flags.four_counts() => {
+                words.indices::<4>(spheres)?;
+                self.tetrahedra += 1;
+                return Ok(());
             }
             other => {
                 let found = shortened(other.unwrap_or_default());
                 return Err(line.error(MaErrorKind::Record(found)));
             }
         };
-        if let Some(last) = words.rest().last() {
-            self.flagged += 1;
-            self.nonzero_last_flag += usize::from(last.parse() != Ok(0.0));
-        }
+        self.flags.take(kind, words.rest()).map_err(|kind| line.error(kind))?;
         if found as u64 > self.announced[kind] {
-            return Err(line.error(count_error(kind, self.announced[kind], found)));
+            let error = line.error(count_error(kind, self.announced[kind], found));
+            if kind == SPHERE {
+                return Err(error);
+            }
+            self.excess[kind].get_or_insert(error);
         }
         Ok(())
     }
 
-    fn finish(self, name: &str) -> Result<LoadedMa, MaError> {
-        let found = [self.spheres.len(), self.edges.len(), self.faces.len()];
-        for kind in 0..KINDS.len() {
-            if (found[kind] as u64) < self.announced[kind] {
-                let kind = count_error(kind, self.announced[kind], found[kind]);
-                return Err(MaError { file: name.to_owned(), line: None, kind });
-            }
-        }
+    fn finish(mut self, name: &str) -> Result<LoadedMa, MaError> {
         let mut notes = Vec::new();
-        if self.flagged > 0 {
-            notes.push(format!(
-                "{} lines carry flags after their values, which were ignored; the last one is not \
-                 zero on {} of them (some tools mark deleted elements so)",
-                self.flagged, self.nonzero_last_flag
-            ));
+        self.check_counts(name, &mut notes)?;
+        let mut warnings = Vec::new();
+        self.flags.settle(&mut warnings);
+        if self.flags.flagged() > 0 {
+            let lines = self.flags.flagged();
+            notes.push(format!("{lines} lines carry flags; marks of deletion were obeyed"));
         }
-        Ok(canonical(self.spheres, self.edges, self.faces, notes))
+        note(&mut notes, self.tetrahedra, "tetrahedron", "tetrahedra", "not used");
+        let kept = self.drop_deleted(&mut notes);
+        let loaded = canonical(self.spheres, self.edges, self.faces, notes);
+        Ok(LoadedMa { warnings, kept, ..loaded })
+    }
+
+    fn check_counts(&mut self, name: &str, notes: &mut Vec<String>) -> Result<(), MaError> {
+        let found = [self.spheres.len(), self.edges.len(), self.faces.len()];
+        for kind in [SPHERE, EDGE, FACE] {
+            let announced = self.announced[kind];
+            if found[kind] as u64 == announced {
+                continue;
+            }
+            if kind != SPHERE && self.flags.counts_may_lie() {
+                let (what, found) = (KINDS[kind], found[kind]);
+                notes.push(format!(
+                    "the header announces {announced} {what}, the file holds {found}: taken as \
+                     they are, since writers of these flags count otherwise"
+                ));
+                continue;
+            }
+            return Err(self.excess[kind].take().unwrap_or_else(|| {
+                let kind = count_error(kind, announced, found[kind]);
+                MaError { file: name.to_owned(), line: None, kind }
+            }));
+        }
+        Ok(())
+    }
+
+    /// Drops what is marked as deleted and what uses it; the places that the spheres left had in
+    /// the file, where any were dropped.
+    fn drop_deleted(&mut self, notes: &mut Vec<String>) -> Option<Vec<u32>> {
+        let Self { spheres, edges, faces, flags, .. } = self;
+        let dead = flags.deleted(SPHERE);
+        drop_simplices(edges, EDGE, flags, notes);
+        drop_simplices(faces, FACE, flags, notes);
+        if !dead.contains(&true) {
+            return None;
+        }
+        // Indices fit: the header's counts were checked against 32 bits.
+        let kept: Vec<u32> = (0..dead.len() as u32).filter(|&v| !dead[v as usize]).collect();
+        let number = dead.len() - kept.len();
+        note(notes, number, "sphere", "spheres", "dropped: marked as deleted");
+        let mut renumbered = vec![0; dead.len()];
+        for (new, &old) in kept.iter().enumerate() {
+            renumbered[old as usize] = new as u32;
+        }
+        *spheres = kept.iter().map(|&v| spheres[v as usize]).collect();
+        edges.iter_mut().flatten().for_each(|v| *v = renumbered[*v as usize]);
+        faces.iter_mut().flatten().for_each(|v| *v = renumbered[*v as usize]);
+        Some(kept)
+    }
+}
+
+fn drop_simplices<const N: usize>(
+    simplices: &mut Vec<[u32; N]>,
+    kind: usize,
+    flags: &Flags,
+    notes: &mut Vec<String>,
+) {
+    let [marked, dead] = [flags.deleted(kind), flags.deleted(SPHERE)];
+    let (one, many) = (KINDS[kind].trim_end_matches('s'), KINDS[kind]);
+    let number = marked.iter().filter(|&&deleted| deleted).count();
+    note(notes, number, one, many, "dropped: marked as deleted");
+    let mut marked = marked.iter();
+    simplices.retain(|_| marked.next() != Some(&true));
+    let all = simplices.len();
+    simplices.retain(|simplex| !simplex.iter().any(|&v| dead[v as usize]));
+    note(notes, all - simplices.len(), one, many, "dropped: on a deleted sphere");
+}
+
+/// The counts of the header, and whether there is a fourth one, of tetrahedra.
+fn counts(header: &Line<'_>) -> Result<([u64; 3], bool), MaError> {
+    let words: Vec<Option<u64>> = header.words().rest().map(|word| word.parse().ok()).collect();
+    match words.as_slice() {
+        &[Some(spheres), Some(edges), Some(faces)] => Ok(([spheres, edges, faces], false)),
+        &[Some(spheres), Some(edges), Some(faces), Some(_)] => Ok(([spheres, edges, faces], true)),
+        _ => {
+            let found = shortened(header.text());
+            let why = format!("expected three counts `nV nE nF` first, found {found:?}");
+            Err(header.error(MaErrorKind::Malformed(why)))
+        }
     }
 }
 

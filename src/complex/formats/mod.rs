@@ -11,6 +11,7 @@
 
 mod canonical;
 mod error;
+mod flags;
 mod ma;
 mod obj;
 mod ply;
@@ -32,9 +33,22 @@ use crate::atomic::write_atomically;
 pub struct LoadedMa {
     /// The medial mesh, in the file's unit.
     pub mesh: MedialMesh,
-    /// One sentence for each kind of repair: added edges, dropped repetitions, ignored fields.
+    /// One sentence for each thing done: added edges, dropped repetitions, deleted elements.
     /// Empty for a file that this crate wrote.
     pub notes: Vec<String>,
+    /// One sentence for each doubt: words that could be read in more than one way.
+    pub warnings: Vec<String>,
+    /// Where deleted spheres were dropped: for each sphere left, its index in the file.
+    pub kept: Option<Vec<u32>>,
+}
+
+impl LoadedMa {
+    /// The mesh, and its notes and warnings in one list.
+    pub fn with_remarks(self) -> (MedialMesh, Vec<String>) {
+        let mut remarks = self.notes;
+        remarks.extend(self.warnings);
+        (self.mesh, remarks)
+    }
 }
 
 /// Reads a medial mesh from a `.ma` or an ASCII `.ply` file, told apart by the extension.
@@ -89,5 +103,7 @@ fn load(path: &Path) -> Result<Vec<u8>, MaError> {
     fs::read(path).map_err(|error| MaError::of_file(path, error.into()))
 }
 
+#[cfg(test)]
+mod flags_tests;
 #[cfg(test)]
 mod tests;

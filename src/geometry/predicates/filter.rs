@@ -11,6 +11,8 @@
 //! * In-sphere: `k = 16` (`3 x 3` minors 8, lift 5, product, two sums), 17 with weights. By
 //!   Cauchy-Schwarz `|x y'| + |y x'| <= M^2`, so the permanent is at most `12 M^3 B`, where `B` bounds
 //!   the lifts, and the error at most `17 * 12 u M^3 B`.
+//! * In-sphere where that bound does not decide: the permanent itself, which follows points that
+//!   are flat along an axis, as `M` does not.
 //!
 //! Differences of coordinates may underflow gradually, which is exact; products may underflow
 //! with an absolute error below `2^-1074` each, which [`UNDERFLOW`] covers when `M <= 1` and the slack
@@ -52,6 +54,8 @@ impl Metric for Weighted {
 const U: f64 = f64::EPSILON / 2.0;
 const ORIENTATION_BOUND: f64 = 8.5 * U;
 const IN_SPHERE_BOUND: f64 = 216.0 * U;
+/// 17 roundings of the determinant, and as many of the permanent.
+const PERMANENT_BOUND: f64 = 17.5 * U;
 pub(crate) const UNDERFLOW: f64 = 1e-300;
 
 #[inline(always)]
@@ -144,7 +148,7 @@ impl Filter {
         if det.abs() > bound + UNDERFLOW || bound <= self.exact_power {
             Sign::of(det)
         } else {
-            exact_power_test::<M>(cell, e, self.grid)
+            precise_power_test::<M>(cell, e, self.grid)
         }
     }
 
@@ -209,6 +213,44 @@ fn lifted_determinant<R: Real, M: Metric>(
     }
     let det = (al * bcd - bl * cda) + (cl * dab - dl * abc);
     (det, R::splat(IN_SPHERE_BOUND) * (reach2 * reach2.sqrt()) * lift)
+}
+
+#[cold]
+#[inline(never)]
+fn precise_power_test<M: Metric>(cell: [&Site; 4], e: &Site, grid: Option<Grid>) -> Sign {
+    // On a grid the exact stage is as quick as this filter, and most calls are for zeros.
+    if grid.is_none() {
+        let (det, bound) = permanent_bound::<M>(cell, e);
+        if det.abs() > bound {
+            return Sign::of(det);
+        }
+    }
+    exact_power_test::<M>(cell, e, grid)
+}
+
+/// The determinant of [`Filter::lifted_determinant`], and a bound on its whole error from the
+/// permanent.
+///
+/// A product of degree 2 or 3 that underflows is off by `2^-1075`, and is multiplied by at most
+/// three further differences or by one and a lift; all of these are below `max(1, B)^2`.
+fn permanent_bound<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
+    let (det, _) = Filter::lifted_determinant::<M>(cell, e);
+    let p = cell.map(|s| sub(&s.p, &e.p).map(f64::abs));
+    let lift = |i: usize| {
+        let weight = if M::WEIGHTED { (e.w - cell[i].w).abs() } else { 0.0 };
+        p[i].iter().map(|x| x * x).sum::<f64>() + weight
+    };
+    let minor = |i: usize, j: usize| p[i][0] * p[j][1] + p[j][0] * p[i][1];
+    let triple = |i: usize, j: usize, k: usize| {
+        p[i][2] * minor(j, k) + p[j][2] * minor(i, k) + p[k][2] * minor(i, j)
+    };
+    let lifts = [0, 1, 2, 3].map(lift);
+    let permanent = lifts[0] * triple(1, 2, 3)
+        + lifts[1] * triple(0, 2, 3)
+        + lifts[2] * triple(0, 1, 3)
+        + lifts[3] * triple(0, 1, 2);
+    let reach = lifts.into_iter().fold(1.0, f64::max);
+    (det, PERMANENT_BOUND * permanent + UNDERFLOW * (reach * reach))
 }
 
 #[cold]

@@ -11,6 +11,7 @@
 //!
 //! Coordinates must be finite and at most [`MAX_COORDINATE`] in absolute value.
 
+mod axes;
 mod circumsphere;
 mod exact;
 mod filter;

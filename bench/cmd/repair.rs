@@ -1,0 +1,74 @@
+//! `medial repair IN -o OUT`: a surface that bounds a solid, from one that nearly does.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use medial::surface::{self, Components, MendOptions};
+use serde_json::json;
+
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::files::check_folder;
+use crate::output::{print_json, print_line};
+
+/// Arguments of `repair`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface (OFF, OBJ, PLY, STL).
+    input: PathBuf,
+    /// The repaired surface (OFF, OBJ, PLY).
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Close holes of up to 500 edges by triangles between their vertices.
+    #[arg(long)]
+    fill_holes: bool,
+    /// Which parts to keep.
+    #[arg(long, value_enum, default_value_t = Keep::All)]
+    components: Keep,
+}
+
+/// Which parts to keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Keep {
+    /// The one of the largest area.
+    Largest,
+    /// All of them.
+    All,
+}
+
+/// Runs the verb. Nothing is written unless the result bounds a solid.
+///
+/// # Errors
+/// When the surface cannot be read, is still refused after the repairs, or cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    check_folder(&arguments.output)?;
+    let components = match arguments.components {
+        Keep::Largest => Components::Largest,
+        Keep::All => Components::All,
+    };
+    let options = MendOptions { fill_holes: arguments.fill_holes, components };
+    let mended = surface::mend(&arguments.input, options).map_err(Failure::input)?;
+    surface::write(&arguments.output, &mended.mesh).map_err(Failure::input)?;
+    let report = mended.report;
+    if global.json {
+        let object = json!({
+            "output": arguments.output, "vertices": report.vertices, "faces": report.faces,
+            "components": report.components, "genus": report.genus, "repairs": report.repairs,
+        });
+        print_json(&object, &report.warnings);
+        return Ok(Exit::Done);
+    }
+    print_line(&format!(
+        "{}: {} vertices, {} faces",
+        arguments.output.display(),
+        report.vertices,
+        report.faces
+    ));
+    for repair in &report.repairs {
+        print_line(&format!("  repaired: {repair}"));
+    }
+    for warning in &report.warnings {
+        print_line(&format!("  warning: {warning}"));
+    }
+    Ok(Exit::Done)
+}
