@@ -285,7 +285,8 @@ mod tests {
         };
         let tree = Arc::new(TriangleBvh::new(&surface).unwrap());
         let options = JudgeOptions { samples: 100, ..JudgeOptions::default() };
-        let judge = Judge::new(surface, tree, Truth::default(), options);
+        let inside = Arc::new(InsideTest::new(&surface));
+        let judge = Judge::new(surface, tree, inside, Truth::default(), options);
         let spheres = vec![Sphere::new(Vec3::new(0.2, 0.2, 0.0), 0.1)];
         let mesh = MedialMesh::from_simplices(spheres, vec![], vec![]).unwrap();
         let evaluation = judge.evaluate(&mesh).unwrap();
