@@ -315,45 +315,46 @@ impl<'a> SeriesKey<'a> {
     }
 }
 
-/// Method and parameters, and each condition that differs between the rows of one name.
+/// The name that was given, or method and parameters; and each condition in which rows of one name
+/// differ.
 fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
-    let name = |key: &SeriesKey<'_>| match key.variant {
-        Some(variant) => variant.to_owned(),
-        None if key.params.is_empty() => key.method.to_owned(),
-        None => format!("{} {}", key.method, key.params),
-    };
     let label = |key: &SeriesKey<'_>| {
-        let mut label = name(key);
-        let namesakes: Vec<&SeriesKey<'_>> =
-            keys.iter().filter(|other| name(other) == label).collect();
-        let short = |hash: &str| -> String { hash.chars().take(8).collect() };
-        let conditions = [
-            (key.variant.is_some(), format!("{} {}", key.method, key.params)),
-            (true, format!("seed {}", key.seed)),
-            (true, format!("sampling {}", key.sampling)),
-            (true, format!("dual {}", key.dual)),
-            (true, format!("{} samples", key.samples)),
-            (true, format!("{} threads", key.threads.unwrap_or(0))),
-            (true, format!("build {}", short(key.build))),
-            (true, format!("plug-in {}", short(key.plugin.unwrap_or("none")))),
-        ];
-        let of = |other: &SeriesKey<'_>, index: usize| match index {
-            0 => format!("{} {}", other.method, other.params),
-            1 => other.seed.to_string(),
-            2 => other.sampling.to_owned(),
-            3 => other.dual.to_owned(),
-            4 => other.samples.to_string(),
-            5 => format!("{:?}", other.threads),
-            6 => other.build.to_owned(),
-            _ => other.plugin.unwrap_or_default().to_owned(),
-        };
-        for (index, (applies, text)) in conditions.into_iter().enumerate() {
-            let differs = namesakes.iter().any(|other| of(other, index) != of(key, index));
-            if applies && differs {
-                label.push_str(&format!(", {}", text.trim_end()));
-            }
-        }
+        let name = key.name();
+        let namesakes: Vec<_> = keys.iter().filter(|other| other.name() == name).collect();
+        let namesakes: Vec<_> = namesakes.into_iter().map(SeriesKey::conditions).collect();
+        let own = key.conditions().into_iter().enumerate();
+        let telling =
+            own.filter(|(index, own)| namesakes.iter().any(|other| other[*index] != *own));
+        let label = telling.fold(name, |label, (_, condition)| label + ", " + &condition);
         printable(&label)
     };
     keys.iter().map(label).collect()
+}
+
+impl SeriesKey<'_> {
+    fn name(&self) -> String {
+        match self.variant {
+            Some(variant) => variant.to_owned(),
+            None => self.method_and_params(),
+        }
+    }
+
+    fn method_and_params(&self) -> String {
+        format!("{} {}", self.method, self.params).trim_end().to_owned()
+    }
+
+    /// What tells rows of one name apart, in words.
+    fn conditions(&self) -> [String; 8] {
+        let short = |hash: &str| -> String { hash.chars().take(8).collect() };
+        [
+            self.method_and_params(),
+            format!("seed {}", self.seed),
+            format!("sampling {}", self.sampling),
+            format!("dual {}", self.dual),
+            format!("{} samples", self.samples),
+            self.threads.map_or_else(String::new, |threads| format!("{threads} threads")),
+            format!("build {}", short(self.build)),
+            format!("plug-in {}", short(self.plugin.unwrap_or("none"))),
+        ]
+    }
 }

@@ -103,7 +103,7 @@ pub fn run(
         store.clear(RESULTS)?;
     }
     if !left.is_empty() {
-        report::write_study(&arguments.out, &study)?;
+        report::write_study(&arguments.out, &study, arguments.study.as_deref())?;
     }
     let mut progress = Progress::new(global.quiet, left.len());
     let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Kept]| {

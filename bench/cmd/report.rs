@@ -101,13 +101,13 @@ pub fn refresh(
     Ok(Rebuilt { records, files, warnings })
 }
 
-/// Writes the study that is asked beside the results.
+/// Writes the study that is asked, and may be that of a file, beside the results.
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn write_study(dir: &Path, study: &Study) -> Result<(), Failure> {
+pub fn write_study(dir: &Path, study: &Study, source: Option<&Path>) -> Result<(), Failure> {
     let path = dir.join(STUDY);
-    let text = study.to_text();
+    let text = study.to_text(source)?;
     medial::write_atomically(&path, |out| out.write_all(text.as_bytes()))
         .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
 }

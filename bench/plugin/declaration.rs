@@ -95,11 +95,13 @@ pub(super) struct Declaration {
     pub arguments: Vec<Word>,
 }
 
-/// Reads and checks all plug-ins of a file. `folder` is where its relative paths start.
+/// Reads and checks all plug-ins of a file. `folder` is where its relative paths start, `taken` the
+/// ids of other methods.
 pub(super) fn read(
     file: &Path,
     text: &str,
     folder: &Path,
+    taken: &[&str],
 ) -> Result<Vec<Declaration>, PluginError> {
     let line = |span: Range<usize>| {
         let before = text.as_bytes().get(..span.start).unwrap_or_default();
@@ -120,6 +122,9 @@ pub(super) fn read(
     let mut ids = BTreeSet::new();
     let check = |written: Written| {
         let at = written.id.span();
+        if taken.contains(&written.id.get_ref().as_str()) {
+            return Err(refuse(line(at), PluginFault::TakenId(written.id.into_inner())));
+        }
         if !ids.insert(written.id.get_ref().clone()) {
             let fault = PluginFault::DuplicateId(written.id.into_inner());
             return Err(refuse(line(at), fault));

@@ -46,6 +46,9 @@ pub enum PluginFault {
     /// Two methods of the file have one id.
     #[error("a method above is called `{0}` too; give one of them another id")]
     DuplicateId(String),
+    /// A method of the program, or of another file, has the id.
+    #[error("there is a method called `{0}` already; choose another id")]
+    TakenId(String),
     /// `command = []`.
     #[error("the command is empty; write the program and its arguments, each a word of its own")]
     EmptyCommand,

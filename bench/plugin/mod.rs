@@ -38,16 +38,16 @@ pub use report::OwnSeconds;
 /// Reads and checks a file of plug-ins: its methods, in its order.
 ///
 /// # Errors
-/// When the file cannot be read or is wrong: the error names the line and says what to do. Ids are
-/// compared within the file; whether one is taken by another method the caller has to check.
-pub fn load(path: &Path) -> Result<Vec<External>, PluginError> {
+/// When the file cannot be read or is wrong: the error names the line and says what to do. An id that
+/// is among `taken`, those of the methods that there are, is wrong too.
+pub fn load(path: &Path, taken: &[&str]) -> Result<Vec<External>, PluginError> {
     let refuse =
         |error| PluginError { file: path.to_owned(), line: None, fault: PluginFault::Io(error) };
     let text = fs::read_to_string(path).map_err(refuse)?;
     // Absolute, since programs run in this folder, whatever folder we are in by then.
     let absolute = std::path::absolute(path).map_err(refuse)?;
     let folder = absolute.parent().unwrap_or(Path::new("/"));
-    let declarations = declaration::read(path, &text, folder)?;
+    let declarations = declaration::read(path, &text, folder, taken)?;
     declarations
         .into_iter()
         .map(|declared| External::new(declared, folder).map_err(refuse))

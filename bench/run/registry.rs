@@ -40,21 +40,12 @@ impl Entry {
 /// Why a registry cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RegistryError {
-    /// Two methods have one id.
-    #[error("{}two methods are called `{id}`; give one of them another id", in_file(file))]
-    Duplicate {
-        /// The id.
-        id: String,
-        /// The plug-in file with the second one; `None` for a method of the program.
-        file: Option<PathBuf>,
-    },
+    /// Two methods of the program have one id.
+    #[error("two methods are called `{0}`; give one of them another id")]
+    Duplicate(String),
     /// A plug-in file is wrong.
     #[error(transparent)]
     Plugin(#[from] PluginError),
-}
-
-fn in_file(file: &Option<PathBuf>) -> String {
-    file.as_ref().map_or_else(String::new, |file| format!("{}: ", file.display()))
 }
 
 impl Registry {
@@ -65,7 +56,11 @@ impl Registry {
     pub fn new(methods: Vec<Box<dyn MedialSimplifier>>) -> Result<Self, RegistryError> {
         let mut registry = Self { entries: Vec::new(), files: Vec::new() };
         for method in methods {
-            registry.add(method, None, None)?;
+            let id = &method.info().id;
+            if registry.entry(id).is_some() {
+                return Err(RegistryError::Duplicate(id.clone().into_owned()));
+            }
+            registry.entries.push(Entry { method, fingerprint: None });
         }
         Ok(registry)
     }
@@ -79,28 +74,12 @@ impl Registry {
         if self.files.contains(&file) {
             return Ok(());
         }
-        for external in plugin::load(&file)? {
-            let fingerprint = external.fingerprint().to_owned();
-            self.add(Box::new(external), Some(fingerprint), Some(&file))?;
+        let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
+        for external in plugin::load(&file, &taken)? {
+            let fingerprint = Some(external.fingerprint().to_owned());
+            self.entries.push(Entry { method: Box::new(external), fingerprint });
         }
         self.files.push(file);
-        Ok(())
-    }
-
-    fn add(
-        &mut self,
-        method: Box<dyn MedialSimplifier>,
-        fingerprint: Option<String>,
-        file: Option<&Path>,
-    ) -> Result<(), RegistryError> {
-        let id = method.info().id.clone();
-        if self.entry(&id).is_some() {
-            return Err(RegistryError::Duplicate {
-                id: id.into_owned(),
-                file: file.map(Path::to_owned),
-            });
-        }
-        self.entries.push(Entry { method, fingerprint });
         Ok(())
     }
 

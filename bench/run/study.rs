@@ -201,9 +201,27 @@ impl Study {
         Ok(study)
     }
 
-    /// The study as a file.
-    pub fn to_text(&self) -> String {
-        toml::to_string(self).unwrap_or_else(|error| format!("# not written: {error}\n"))
+    /// The study as a file. One that was read from `source` and is unchanged is that file, its
+    /// comments included, with a line that says where relative paths start.
+    ///
+    /// # Errors
+    /// [`StudyError::File`] when `source` cannot be read again; [`StudyError::Value`] for a number
+    /// that TOML cannot hold.
+    pub fn to_text(&self, source: Option<&Path>) -> Result<String, StudyError> {
+        if let Some(path) = source
+            && Self::read(path)? == *self
+        {
+            let failed = |error: std::io::Error| StudyError::File {
+                path: path.to_owned(),
+                message: error.to_string(),
+            };
+            let text = std::fs::read_to_string(path).map_err(failed)?;
+            let names_folder = text.lines().any(|line| line.trim_start().starts_with("folder"));
+            let folder = self.folder.as_ref().filter(|_| !names_folder);
+            let folder = folder.map(|f| format!("folder = {:?}\n", f.to_string_lossy()));
+            return Ok(folder.unwrap_or_default() + &text);
+        }
+        toml::to_string(self).map_err(|error| StudyError::Value(format!("study: {error}")))
     }
 
     /// A path as it is meant.

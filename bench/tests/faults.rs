@@ -116,6 +116,7 @@ fn faults_of_programs_are_contained_and_named() {
         ("p-loud", "head -c 1000000000 /dev/zero >&2; cp \"$1\" \"$2\""),
         ("p-stray", "sleep 8765 > /dev/null 2>&1 & cp \"$1\" \"$2\""),
         ("p-memory", "exec tail -n 1 /dev/zero"),
+        ("p-killer", "kill -9 $PPID; sleep 5"),
         ("p-fine", "cp \"$1\" \"$2\""),
     ];
     let file = plugins(dir.path(), &programs);
@@ -140,6 +141,7 @@ fn faults_of_programs_are_contained_and_named() {
         ("p-loud", "other_count", "where 20 were asked"),
         ("p-stray", "other_count", ""),
         ("p-memory", "out_of_memory", "1500 MB"),
+        ("p-killer", "panicked", "SIGKILL"),
         ("p-fine", "other_count", ""),
     ];
     for (method, status, part) in expected {

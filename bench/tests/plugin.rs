@@ -36,7 +36,7 @@ fn shape() -> Shape {
 fn script(text: &str) -> (TempDir, External) {
     let command = r#"["sh", "run.sh", "{output}", "{spheres}"]"#;
     let (folder, path) = written(&entry(command, r#"["spheres"]"#, ""), &[("run.sh", text)]);
-    let mut loaded = plugin::load(&path).expect("a plug-in");
+    let mut loaded = plugin::load(&path, &[]).expect("a plug-in");
     (folder, loaded.remove(0))
 }
 
@@ -63,7 +63,7 @@ fn valid_and(more: &str) -> Result<Simplified, SimplifyError> {
 
 fn example(id: &str) -> External {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/plugins/largest.toml");
-    let all = plugin::load(Path::new(path)).expect("the example");
+    let all = plugin::load(Path::new(path), &[]).expect("the example");
     all.into_iter().find(|method| method.info().id == id).expect("in the example")
 }
 
@@ -128,7 +128,7 @@ fn a_program_is_given_what_its_command_names() {
     let script = format!("{text}{VALID}echo '{{\"native_level\": 4}}'\n");
     let toml = entry(command, r#"["spheres", "native"]"#, more);
     let (folder, path) = written(&toml, &[("run.sh", &script)]);
-    let method = plugin::load(&path).expect("a plug-in").remove(0);
+    let method = plugin::load(&path, &[]).expect("a plug-in").remove(0);
     let said = || fs::read_to_string(folder.path().join("said")).expect("said");
     let view = shape();
     let threads = rayon::current_num_threads();

@@ -13,7 +13,7 @@ use plugins::{VALID, entry, written};
 fn a_changed_script_or_declaration_has_another_fingerprint() {
     let toml = entry(r#"["sh", "run.sh", "{output}", "{spheres}"]"#, r#"["spheres"]"#, "");
     let (folder, path) = written(&toml, &[("run.sh", VALID)]);
-    let fingerprint = || plugin::load(&path).expect("a plug-in")[0].fingerprint().to_owned();
+    let fingerprint = || plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint().to_owned();
     let first = fingerprint();
     assert!(first.len() == 64 && first == fingerprint());
     fs::write(folder.path().join("run.sh"), format!("{VALID}#")).expect("written");
@@ -23,13 +23,13 @@ fn a_changed_script_or_declaration_has_another_fingerprint() {
     assert!(first != second && second != third && first != third);
     // Elsewhere it is the same plug-in.
     let (_elsewhere, path) = written(&toml, &[("run.sh", VALID)]);
-    assert_eq!(plugin::load(&path).expect("a plug-in")[0].fingerprint(), first);
+    assert_eq!(plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint(), first);
 }
 
 /// The fault of a declaration and its line.
 fn refused(toml: &str) -> (Option<usize>, PluginFault, String) {
     let (_folder, path) = written(toml, &[("run.sh", VALID)]);
-    let error = plugin::load(&path).expect_err(toml);
+    let error = plugin::load(&path, &[]).expect_err(toml);
     let text = error.to_string();
     assert!(text.contains("plugins.toml"), "{text}");
     (error.line, error.fault, text)
@@ -94,8 +94,8 @@ fn wrong_declarations_are_refused_with_their_line() {
     assert!(matches!(refused("").1, Fault::NoMethod));
     let missing = refused("[[method]]\nid = \"x\"\n").2;
     assert!(missing.contains("missing field"), "{missing}");
-    assert!(plugin::load(Path::new("no/such/file.toml")).is_err());
+    assert!(plugin::load(Path::new("no/such/file.toml"), &[]).is_err());
     let all = r#"["sh", "run.sh", "{output}"]"#;
     let (_folder, path) = written(&entry(all, r#"["published"]"#, ""), &[("run.sh", VALID)]);
-    assert!(plugin::load(&path).is_ok());
+    assert!(plugin::load(&path, &[]).is_ok());
 }

@@ -264,3 +264,75 @@ fn an_item_is_run_from_its_file_and_only_once_into_a_folder() {
     });
     assert_eq!(without_timings(alone), without_timings(kept));
 }
+
+#[test]
+fn a_study_is_a_file_and_lies_beside_its_results() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (file, out) = (dir.path().join("study.toml"), dir.path().join("out"));
+    let study = "# Two rows of one method.\nmeshes = [\"builtin:box:8\"]\nspheres = [30]\n\n\
+                 [[method]]\nid = \"qmat\"\n\n\
+                 [[method]]\nid = \"qmat\"\nname = \"no scale\"\nparams = { k = 0 }\nspheres = [20, 10]\n\n\
+                 [[method]]\nid = \"angle\"\nlevels = [30, 60]\n";
+    fs::write(&file, study).expect("written");
+    let study_of = |path: &Path| ["--study".to_owned(), text(path).to_owned()];
+    let words = study_of(&file);
+    let (status, object) = compare(&words.each_ref().map(String::as_str), &out);
+    assert_eq!((status, run_and_found(&object)), (0, (6, 0)), "{object}");
+    let copied = fs::read_to_string(out.join("study.toml")).expect("a copy");
+    assert!(copied.ends_with(study), "{copied}");
+    let page = fs::read_to_string(out.join("index.html")).expect("a page");
+    assert!(page.contains("no scale") && page.contains("Two rows of one method"));
+    let native = |r: &Value| r["simplify"]["level"]["native"].as_f64();
+    assert_eq!(records(&out).iter().filter_map(native).collect::<Vec<_>>(), [30.0, 60.0]);
+
+    // The copy asks the same again; what the command line names wins.
+    let words = study_of(&out.join("study.toml"));
+    let again = words.each_ref().map(String::as_str);
+    assert_eq!(run_and_found(&compare(&again, &out).1), (0, 6));
+    let fewer = [&again[..], &["--methods", "qmat", "--spheres", "30,20"]].concat();
+    assert_eq!(run_and_found(&compare(&fewer, &out).1), (1, 1));
+
+    for (wrong, part) in [
+        ("spheres = [3]\nsphere = [4]\n", "line 2"),
+        ("spheres = [-3]\n", "line 1"),
+        ("timeout = 0\n", "--timeout 0"),
+        ("[[method]]\nid = \"qmad\"\n", "did you mean `qmat`"),
+        ("[[method]]\nname = \"x\"\n", "id"),
+        ("meshes = [\"nowhere.off\"]\n", "nowhere.off"),
+        ("plugins = [\"nowhere.toml\"]\n", "nowhere.toml"),
+    ] {
+        fs::write(&file, wrong).expect("written");
+        let output = run(MEDIAL, &["compare", "--study", text(&file), "--out", text(&out)]);
+        let message = stderr(&output);
+        assert!([1, 2].contains(&code(&output)) && message.contains(part), "{wrong}: {message}");
+    }
+    assert_eq!(records(&out).len(), 7, "nothing was lost");
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_run_says_how_to_go_on() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let words = ["compare", "builtin:box:8", "--methods", "qmat,loops", "--spheres", "20"];
+    let more = ["--samples", "100", "--out", text(&out)];
+    let mut run = Command::new(example("faulty"));
+    run.args(words).args(more).stdout(Stdio::null()).stderr(Stdio::piped());
+    let child = run.spawn().expect("it starts");
+    let deadline = Instant::now() + Duration::from_secs(20);
+    // The first item is done, the second one loops.
+    while fs::metadata(out.join("results.jsonl")).map_or(0, |file| file.len()) == 0 {
+        assert!(Instant::now() < deadline, "nothing was recorded");
+        thread::sleep(Duration::from_millis(10));
+    }
+    let workers = process_tree::descendants(child.id());
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().expect("kill runs").success());
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+    assert!(stderr(&output).contains("the same command goes on"), "{}", stderr(&output));
+    assert_eq!(records(&out).len(), 1);
+    let alive =
+        |pid: &u32| fs::read(format!("/proc/{pid}/cmdline")).is_ok_and(|line| !line.is_empty());
+    assert!(!workers.iter().any(alive), "a worker is left");
+}

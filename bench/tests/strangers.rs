@@ -99,7 +99,7 @@ fn an_id_that_is_taken_is_refused() {
     let output = run(MEDIAL, &["methods", "--plugins", file.to_str().expect("UTF-8")]);
     let message = stderr(&output);
     assert!(
-        code(&output) == 2 && message.contains("mine.toml") && message.contains("`qmat`"),
+        code(&output) == 2 && message.contains("mine.toml, line 2") && message.contains("`qmat`"),
         "{message}"
     );
 }
