@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::{Exit, Failure, check_output, counted, print_json, print_line, shape_options};
 use crate::cli::{Global, MeshArgument, SubstrateArguments};
-use crate::run::{Input, Source, Stopwatch, peak_bytes};
+use crate::run::{Input, Source, StageLine, Stopwatch, peak_bytes};
 
 /// Arguments of `axis`.
 #[derive(Debug, Args)]
@@ -33,16 +33,21 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let options = shape_options(&arguments.substrate)?;
     check_output(arguments.output.as_deref())?;
+    let line = StageLine::new(global.quiet || global.json);
+    line.at("reading");
     let (input, read) = Stopwatch::time(|| Input::load(&source));
     let input = input?;
     let shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
+    line.at("computing the medial mesh");
     let mesh = shape.voronoi().map_err(|error| Failure::of(&source, error))?;
+    line.at("counting components, loops and voids");
     let (betti, _) = Stopwatch::time(|| complex::betti(&mesh));
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
         complex::write(output, &mesh).map_err(Failure::input)?;
     }
+    drop(line);
     let counts = metrics::counts(&mesh);
     let read = Cost { seconds: read.seconds, cpu_seconds: read.cpu_seconds };
     let mut stages = BTreeMap::from([("read", read)]);

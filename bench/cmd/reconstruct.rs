@@ -15,7 +15,7 @@ use super::{
     print_line, shape_options,
 };
 use crate::cli::{Global, MeshArgument, SubstrateArguments};
-use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes};
+use crate::run::{Input, Lap, Source, StageLine, Stopwatch, peak_bytes};
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
@@ -93,9 +93,12 @@ impl Stages {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_arguments(arguments)?;
     let mut stages = Stages::default();
+    let line = StageLine::new(global.quiet || global.json);
+    line.at("reading");
     let (read, lap) = Stopwatch::time(|| read(arguments));
     let (shape, axis, mut warnings) = read?;
     stages.add("read", lap);
+    line.at("making the surface");
     let made = match arguments.method {
         Method::Union => of_union(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
         Method::PowerCrust => of_poles(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
@@ -110,6 +113,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let peak = peak_bytes();
 
     // Untimed: the verdict.
+    line.at("checking the surface");
     let report = examine(arguments, &made.mesh, &mut warnings)?;
     let union = match (arguments.method, &axis) {
         (Method::Union, Some(axis)) => {
@@ -127,6 +131,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             axis.display()
         ));
     }
+    drop(line);
     let tolerance = match arguments.method {
         Method::Union => arguments.tolerance,
         Method::PowerCrust => COINCIDENT,

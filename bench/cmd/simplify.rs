@@ -20,7 +20,7 @@ use super::{
     params, percent, print_json, print_line, shape_options, voxels,
 };
 use crate::cli::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
-use crate::run::{Input, Lap, Source, Stopwatch, peak_bytes, search_error};
+use crate::run::{Input, Lap, Source, StageLine, Stopwatch, peak_bytes, search_error};
 
 /// What a search over sphere counts found, for the answer to `--max-error`.
 #[derive(Debug, Serialize)]
@@ -88,6 +88,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_bound(arguments)?;
     check_hierarchy(arguments, method.as_ref())?;
     check_voxels(arguments, method.as_ref())?;
+    let line = StageLine::new(global.quiet || global.json);
+    line.at("reading");
     let input = Input::load(&source)?;
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
@@ -103,10 +105,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let loaded = loaded.map(|path| hierarchy::load(path, &origin, &shape)).transpose()?;
     let start = Start { method: method.as_ref(), params, shape: &shape, loaded };
     let (simplified, simplify, search) =
-        simplify(arguments, &start, &input).map_err(|error| match error {
+        simplify(arguments, &start, &input, &line).map_err(|error| match error {
             Error::Method(error) => failure(&source, error),
             Error::Other(failure) => failure,
         })?;
+    line.at("writing");
     simplified.mesh.check().map_err(|error| Failure::of(&source, error))?;
     if simplified.mesh.spheres.is_empty() {
         return Err(Failure::of(&source, nothing_left(&simplified)));
@@ -123,6 +126,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     if let (Some(path), Some(voxels)) = (&arguments.voxels, voxels) {
         voxels::write(path, voxels, &shape)?;
     }
+    drop(line);
     if global.json {
         let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
         if let Some(search) = &search {
@@ -250,10 +254,12 @@ fn simplify(
     arguments: &Arguments,
     start: &Start<'_>,
     input: &Input,
+    line: &StageLine,
 ) -> Result<(Simplified, Simplify, Option<Search>), Error> {
     let Start { shape, loaded, .. } = start;
     let seed = arguments.substrate.seed;
-    let run = RunContext::with_seed(seed);
+    let run = RunContext::with_seed(seed).on_progress(line.steps());
+    line.at(format!("preparing {}", arguments.method));
     let (prepared, mut prepare) = Stopwatch::time(|| start.simplification(&run));
     let mut simplification = prepared?;
     let spent = shape.spent();
@@ -262,14 +268,19 @@ fn simplify(
     if let Some(loaded) = loaded {
         prepare += loaded.read;
     }
+    line.at(format!("simplifying by {}", arguments.method));
     let mut search = None;
     let (answer, lap) = if let Some(bound) = arguments.max_error {
         let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
         let judge = shape.judge(input.axis.as_ref(), options).map_err(SimplifyError::from)?;
-        let found = search_error(simplification.as_mut(), &judge, start.spheres()?, bound)?;
+        let found =
+            search_error(simplification.as_mut(), &judge, start.spheres()?, bound, |count| {
+                line.at(format!("searching the bound: {count} spheres"));
+            })?;
         search = Some(Search { bound, hausdorff: found.hausdorff, tried: found.tried });
         // The seconds are those of the level found, asked alone.
         let count = found.simplified.mesh.spheres.len();
+        line.at(format!("timing {count} spheres alone"));
         let mut alone = start.simplification(&run)?;
         Stopwatch::time(|| alone.at(Level::Spheres(count)))
     } else {

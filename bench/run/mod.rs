@@ -13,6 +13,7 @@ mod provenance;
 mod reproduce;
 mod search;
 mod similar;
+mod stage_line;
 mod stopwatch;
 
 pub use input::{Input, InputError, Source};
@@ -24,4 +25,5 @@ pub use provenance::{Provenance, hex_digest, peak_bytes};
 pub use reproduce::Reproducer;
 pub use search::{Found, search_error};
 pub use similar::did_you_mean;
+pub use stage_line::StageLine;
 pub use stopwatch::{Lap, Stopwatch};
