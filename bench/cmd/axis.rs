@@ -13,7 +13,7 @@ use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
 use crate::exit::{Exit, Failure};
 use crate::files::check_output;
 use crate::output::{counted, print_json, print_line};
-use crate::run::{Input, Source, peak_bytes};
+use crate::run::{Input, Source, StageLine, peak_bytes};
 
 /// Arguments of `axis`.
 #[derive(Debug, Args)]
@@ -35,16 +35,21 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let options = shape_options(&arguments.substrate)?;
     check_output(arguments.output.as_deref())?;
+    let line = StageLine::new(global.quiet || global.json);
+    line.at("reading");
     let (input, read) = Cost::of(|| Input::load(&source));
     let input = input?;
     let shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
+    line.at("computing the medial mesh");
     let mesh = shape.voronoi().map_err(|error| Failure::of(&source, error))?;
+    line.at("counting components, loops and voids");
     let (betti, _) = Cost::of(|| complex::betti(&mesh));
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
         complex::write(output, &mesh).map_err(Failure::input)?;
     }
+    drop(line);
     let counts = metrics::counts(&mesh);
     let mut stages = BTreeMap::from([("read", read)]);
     let mut total = read;

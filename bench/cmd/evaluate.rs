@@ -11,7 +11,7 @@ use crate::args::{Global, MeasureArguments, MeshArgument, judge_options};
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
 use crate::output::{counted, note, percent, print_json, print_line};
-use crate::run::{Input, Source};
+use crate::run::{Input, Source, StageLine};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -37,14 +37,13 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let options = judge_options(&arguments.measure, JudgeOptions::default(), arguments.seed)?;
+    let line = StageLine::new(global.quiet || global.json);
+    line.at("reading");
     let input = Input::load(&source)?;
     let shape =
         input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
     let LoadedMa { mesh, notes, mut warnings, .. } = medial_mesh_for(&arguments.axis, &shape)?;
-    // No number depends on how a file writes its mesh, so the answer does not either.
-    for line in &notes {
-        note(global, &format!("{}: {line}", arguments.axis.display()));
-    }
+    line.at("preparing the surface");
     let judge =
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
     let to_normal = shape.normalisation();
@@ -56,12 +55,21 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         MetricError::NoArea | MetricError::NoVolume(_) => Failure::of(&source, error),
         _ => Failure::input(format!("{}: {error}", arguments.axis.display())),
     };
+    if arguments.certify.is_some() {
+        line.at("certifying the Hausdorff distance");
+    }
     let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
     let mut certified = certified.transpose().map_err(refused)?;
     if let Some(Certificate { witness, .. }) = &mut certified {
         witness.point = to_normal.backward(witness.point);
     }
+    line.at("measuring");
     let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(refused)? };
+    drop(line);
+    // No number depends on how a file writes its mesh, so the answer does not either.
+    for line in &notes {
+        note(global, &format!("{}: {line}", arguments.axis.display()));
+    }
     warnings.extend(input.report.warnings);
     if global.json {
         print_json(&evaluation, &warnings);

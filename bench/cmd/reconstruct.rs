@@ -14,7 +14,7 @@ use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_folder, extension, medial_mesh_for};
 use crate::output::{counted, percent, print_json, print_line};
-use crate::run::{Input, Source, peak_bytes};
+use crate::run::{Input, Source, StageLine, peak_bytes};
 use medial::shape::Cost;
 
 /// Arguments of `reconstruct`.
@@ -93,9 +93,12 @@ impl Stages {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_arguments(arguments)?;
     let mut stages = Stages::default();
+    let line = StageLine::new(global.quiet || global.json);
+    line.at("reading");
     let (read, lap) = Cost::of(|| read(arguments));
     let (shape, axis, mut warnings) = read?;
     stages.add("read", lap);
+    line.at("making the surface");
     let made = match arguments.method {
         Method::Union => of_union(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
         Method::PowerCrust => of_poles(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
@@ -110,6 +113,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let peak = peak_bytes();
 
     // Untimed: the verdict.
+    line.at("checking the surface");
     let report = examine(arguments, &made.mesh, &mut warnings)?;
     let union = match (arguments.method, &axis) {
         (Method::Union, Some(axis)) => {
@@ -127,6 +131,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             axis.display()
         ));
     }
+    drop(line);
     let tolerance = match arguments.method {
         Method::Union => arguments.tolerance,
         Method::PowerCrust => COINCIDENT,

@@ -27,7 +27,7 @@ use crate::exit::{Exit, Failure};
 use crate::files::{check_folder, check_output, medial_mesh_for};
 use crate::output::{counted, note, percent, print_json, print_line, version};
 use crate::run::record::fill_result;
-use crate::run::{Fault, Input, LevelRun, Registry, Source, answer, search_error};
+use crate::run::{Fault, Input, LevelRun, Registry, Source, StageLine, answer, search_error};
 
 /// What a search over sphere counts found, for the answer to `--max-error`.
 #[derive(Debug, Serialize)]
@@ -96,6 +96,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     check_bound(arguments)?;
     check_hierarchy(arguments, method)?;
     check_voxels(arguments, method)?;
+    let line = StageLine::new(global.quiet || global.json);
+    line.at("reading");
     let input = Input::load(&source)?;
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
@@ -110,9 +112,10 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let loaded = arguments.hierarchy.as_deref();
     let loaded = loaded.map(|path| hierarchy::load(path, &origin, &shape)).transpose()?;
     let start = Start { method, params, shape: &shape, loaded };
-    let (run, search) = simplify(arguments, &start, &input)?;
+    let (run, search) = simplify(arguments, &start, &input, &line)?;
     let simplify = describe(arguments, &start, &run);
     let simplified = run.outcome.map_err(|fault| failure(&source, fault))?;
+    line.at("writing");
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = simplified.mesh.transformed(back.diagonal, |p| back.backward(p));
@@ -126,6 +129,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     if let (Some(path), Some(voxels)) = (&arguments.voxels, voxels) {
         voxels::write(path, voxels, &shape)?;
     }
+    drop(line);
     if global.json {
         let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
         if let Some(search) = &search {
@@ -235,21 +239,30 @@ fn simplify(
     arguments: &Arguments,
     start: &Start<'_>,
     input: &Input,
+    line: &StageLine,
 ) -> Result<(LevelRun, Option<Search>), Failure> {
     let seed = arguments.substrate.seed();
-    let run = RunContext::with_seed(seed);
+    let run = RunContext::with_seed(seed).on_progress(line.steps());
     let (level, search) = match (arguments.spheres, arguments.level, arguments.max_error) {
         (Some(count), ..) => (Level::Spheres(count), None),
         (_, Some(value), _) => (Level::Native(value), None),
         (.., Some(bound)) => {
-            let search = search(arguments, start, input, bound)?;
+            let search = search(arguments, start, input, (bound, line))?;
             // The seconds are those of the level found, asked alone.
             (Level::Spheres(search.spheres), Some(search))
         }
         _ => (Level::Published, None),
     };
+    line.at(format!("preparing {}", arguments.method));
     let view = start.shape.view();
-    let mut runs = answer(&view, || start.begin(&view, &run), &[level], |_| ());
+    let mut runs = answer(
+        &view,
+        || start.begin(&view, &run),
+        &[level],
+        |level| {
+            line.at(format!("simplifying to {level} by {}", arguments.method));
+        },
+    );
     let mut run = runs.pop().ok_or_else(|| Failure::input("no level was run"))?;
     if let Some(loaded) = &start.loaded {
         run.times.prepare += loaded.read;
@@ -262,7 +275,7 @@ fn search(
     arguments: &Arguments,
     start: &Start<'_>,
     input: &Input,
-    bound: f64,
+    (bound, line): (f64, &StageLine),
 ) -> Result<Search, Failure> {
     let seed = arguments.substrate.seed();
     let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
@@ -270,9 +283,14 @@ fn search(
     let judge = start.shape.judge(input.axis.as_ref(), options);
     let judge = judge.map_err(|error| refused(error.into()))?;
     let view = start.shape.view();
-    let mut simplification = start.begin(&view, &RunContext::with_seed(seed)).map_err(refused)?;
+    line.at(format!("preparing {}", arguments.method));
+    let run = RunContext::with_seed(seed).on_progress(line.steps());
+    let mut simplification = start.begin(&view, &run).map_err(refused)?;
     let initial = start.spheres().map_err(refused)?;
-    let found = search_error(simplification.as_mut(), &judge, initial, bound).map_err(refused)?;
+    let found = search_error(simplification.as_mut(), &judge, initial, bound, |count| {
+        line.at(format!("searching the bound: {count} spheres"));
+    });
+    let found = found.map_err(refused)?;
     let spheres = found.simplified.mesh.spheres.len();
     Ok(Search { bound, hausdorff: found.hausdorff, tried: found.tried, spheres })
 }

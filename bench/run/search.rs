@@ -16,7 +16,7 @@ pub struct Found {
 /// The smallest sphere count found with a symmetric Hausdorff distance of at most `bound`.
 ///
 /// Halves the count from `initial` until the bound is exceeded, then bisects between the last two
-/// counts. The error does not fall strictly with the count, so a smaller count that happens to
+/// counts; `trying` is told each before it is tried. The error does not fall strictly with the count, so a smaller count that happens to
 /// satisfy the bound can be missed; the returned mesh does satisfy it.
 ///
 /// # Errors
@@ -26,10 +26,12 @@ pub fn search_error(
     judge: &Judge,
     initial: usize,
     bound: f64,
+    trying: impl Fn(usize),
 ) -> Result<Found, SimplifyError> {
     let mut tried = 0;
     let mut probe = |count: usize| -> Result<(Simplified, f64), SimplifyError> {
         tried += 1;
+        trying(count);
         let simplified = simplification.at(Level::Spheres(count))?;
         let distances = judge.distances(&simplified.mesh);
         let hausdorff = distances.map_err(|e| SimplifyError::Level(e.to_string()))?.hausdorff;

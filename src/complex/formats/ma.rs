@@ -211,9 +211,9 @@ fn drop_simplices<const N: usize>(
 /// The counts of the header, and whether there is a fourth one, of tetrahedra.
 fn counts(header: &Line<'_>) -> Result<([u64; 3], bool), MaError> {
     let words: Vec<Option<u64>> = header.words().rest().map(|word| word.parse().ok()).collect();
-    match words.as_slice() {
-        &[Some(spheres), Some(edges), Some(faces)] => Ok(([spheres, edges, faces], false)),
-        &[Some(spheres), Some(edges), Some(faces), Some(_)] => Ok(([spheres, edges, faces], true)),
+    match *words.as_slice() {
+        [Some(spheres), Some(edges), Some(faces)] => Ok(([spheres, edges, faces], false)),
+        [Some(spheres), Some(edges), Some(faces), Some(_)] => Ok(([spheres, edges, faces], true)),
         _ => {
             let found = shortened(header.text());
             let why = format!("expected three counts `nV nE nF` first, found {found:?}");
