@@ -71,7 +71,12 @@ impl Worker {
         // A group of its own: an interrupt from the keyboard goes to the supervisor alone, and one
         // signal ends the worker with what it started.
         #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        {
+            use std::os::unix::process::CommandExt;
+            command.process_group(0);
+            // In a list of processes it is what it is, not the link it was started by.
+            command.arg0("medial");
+        }
         let mut child = command.spawn()?;
         let pipe = || io::Error::other("a pipe of the worker is missing");
         let requests = child.stdin.take().ok_or_else(pipe)?;

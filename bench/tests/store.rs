@@ -269,7 +269,7 @@ fn an_item_is_run_from_its_file_and_only_once_into_a_folder() {
 fn a_study_is_a_file_and_lies_beside_its_results() {
     let dir = tempfile::tempdir().expect("a folder");
     let (file, out) = (dir.path().join("study.toml"), dir.path().join("out"));
-    let study = "# Two rows of one method.\nmeshes = [\"builtin:box:8\"]\nspheres = [30]\n\n\
+    let study = "# Two rows of one method.\nmeshes = [\"builtin:box:8\"]\nspheres = [30]\nsamples = 200\n\n\
                  [[method]]\nid = \"qmat\"\n\n\
                  [[method]]\nid = \"qmat\"\nname = \"no scale\"\nparams = { k = 0 }\nspheres = [20, 10]\n\n\
                  [[method]]\nid = \"angle\"\nlevels = [30, 60]\n";

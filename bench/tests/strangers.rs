@@ -58,6 +58,7 @@ fn a_program() {
 }
 
 #[test]
+#[allow(clippy::print_stdout)] // What was skipped is said.
 fn a_python_script() {
     let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
     if !numpy.is_ok_and(|output| output.status.success()) {
