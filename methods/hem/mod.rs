@@ -204,7 +204,9 @@ impl Simplification for Prepared {
                 Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
             }
             Level::Spheres(count) => self.at_count(count),
-            Level::Native(epsilon) if epsilon >= 0.0 => self.at_bound(epsilon),
+            Level::Native(epsilon) if epsilon >= 0.0 && epsilon.is_finite() => {
+                self.at_bound(epsilon)
+            }
             Level::Native(epsilon) => {
                 Err(SimplifyError::Level(format!("epsilon = {epsilon:?} is not a distance")))
             }
