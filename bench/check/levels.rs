@@ -1,8 +1,8 @@
 //! Levels other than numbers of spheres.
 
-use medial::simplifier::{Level, SimplifyError};
+use medial::simplifier::{Level, Simplification, SimplifyError};
 
-use super::{Answer, Subject, failed, solids};
+use super::{Answer, Miss, Subject, failed, solids, valid};
 
 /// The method's own level: senseless values are refused, the one that it names is taken.
 pub fn native(subject: &Subject<'_>) -> Answer {
@@ -28,14 +28,31 @@ pub fn native(subject: &Subject<'_>) -> Answer {
             Ok(_) => return failed(format!("it answers {level}: refuse that as a `Level`")),
         }
     }
-    // What it says that it used can be asked for.
-    let used = subject.level(simplification.as_mut(), 20)?;
-    let used = subject.ask(simplification.as_mut(), &shape, used)?.native_level;
+    let near = subject.level(simplification.as_mut(), 20)?;
+    let used = subject.ask(simplification.as_mut(), &shape, near)?.native_level;
     let Some(value) = used else {
         return Ok(vec!["its results do not say which native level was used".into()]);
     };
-    subject.ask(subject.prepare(&shape)?.as_mut(), &shape, Level::Native(value))?;
-    Ok(vec![])
+    taken(subject, simplification.as_mut(), Level::Native(value))
+}
+
+/// A level that the method has named itself. It need not lead to the same result: a number of
+/// spheres can divide those that tie for a level, and a bound may be held for the whole only.
+fn taken(subject: &Subject<'_>, simplification: &mut dyn Simplification, level: Level) -> Answer {
+    (subject.doing)(&level.to_string());
+    match simplification.at(level) {
+        // Exception: the bound of a number of spheres may be below what can be held.
+        Err(SimplifyError::Level(why)) => Ok(vec![format!("{level}, its own, is refused: {why}")]),
+        Err(error) => failed(format!("{level}, which it has named itself: {error}")),
+        Ok(result) => {
+            // Exception: where all tie, none is beyond the level. It has to be said.
+            if result.mesh.spheres.is_empty() && !result.diagnostics.warnings.is_empty() {
+                return Ok(vec![]);
+            }
+            valid::sound(&result, level).map_err(|why| Miss::Failed(format!("{level}: {why}")))?;
+            Ok(vec![])
+        }
+    }
 }
 
 /// The published level, which not every paper has.
