@@ -47,6 +47,8 @@ pub enum Verb {
     Convert(cmd::convert::Arguments),
     /// List the methods, or describe one.
     Methods(cmd::methods::Arguments),
+    /// Put methods, your own too, to the conformance corpus, and say what fails.
+    Check(cmd::check::Arguments),
     /// List or write the built-in shapes.
     Datasets(cmd::datasets::Arguments),
     /// Repeat tables and figures of the papers, published values beside ours.
@@ -141,6 +143,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Repair(arguments) => cmd::repair::run(&arguments, global),
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
         Verb::Methods(arguments) => cmd::methods::run(&arguments, global, registry),
+        Verb::Check(arguments) => cmd::check::run(&arguments, global, registry),
         Verb::Datasets(arguments) => cmd::datasets::run(&arguments, global),
         Verb::Paper(arguments) => cmd::paper::run(&arguments, global, registry),
         Verb::Baseline(arguments) => cmd::baseline::run(&arguments, global, registry),

@@ -2,11 +2,12 @@
 //!
 //! A crate of its own gets the whole command with its methods beside the others by [`main_with`].
 //!
-//! From below: [`process_tree`] ends what was started; [`plugin`] makes methods of external programs; [`run`] knows inputs, items, workers
-//! and records, and nothing of the command line; [`args`], [`exit`], [`output`], [`files`] and
+//! From below: [`process_tree`] ends what was started; [`plugin`] makes methods of external programs; [`check`] is what
+//! every method must do; [`run`] knows inputs, items, workers and records, and nothing of the command line; [`args`], [`exit`], [`output`], [`files`] and
 //! [`interrupt`] are what verbs share; [`cmd`] holds one file for each verb; [`cli`] lists them.
 
 pub mod args;
+pub mod check;
 pub mod cli;
 pub mod cmd;
 pub mod exit;

@@ -141,6 +141,12 @@ impl<'s> RankedFacets<'s> {
 
 impl Simplification for RankedFacets<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        if self.set.facets.is_empty() {
+            // A tetrahedron has a Voronoi vertex inside, but no facet around it.
+            let why = "no Voronoi facet lies inside the surface as a whole, so that none can be \
+                       selected: sample more densely, for example --sampling blue:20000";
+            return Err(SimplifyError::unsupported(why));
+        }
         let mut diagnostics = self.prepared.clone();
         let (kept, native) = match level {
             Level::Spheres(0) => {

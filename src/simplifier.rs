@@ -68,8 +68,8 @@ pub use run::{Progress, RunContext};
 ///     order.retain(|&i| radius(i) >= params.least);
 ///     order.sort_by(|&a, &b| radius(b).total_cmp(&radius(a)).then(a.cmp(&b)));
 ///     Ok(Box::new(move |level: Level| {
-///         let Level::Spheres(count) = level else {
-///             return Err(SimplifyError::unsupported("ask for a number of spheres"));
+///         let Level::Spheres(count @ 1..) = level else {
+///             return Err(SimplifyError::unsupported("ask for a number of spheres, at least 1"));
 ///         };
 ///         let mut keep = vec![false; initial.spheres.len()];
 ///         order.iter().take(count).for_each(|&i| keep[i] = true);

@@ -2,6 +2,7 @@
 
 pub mod axis;
 pub mod baseline;
+pub mod check;
 pub mod compare;
 pub mod completions;
 pub mod convert;

@@ -16,8 +16,8 @@ type Prepared<'s> = Result<Box<dyn Simplification + 's>, SimplifyError>;
 /// The largest balls: what the faulty methods give where they are not at fault.
 fn largest(shape: &Shape, level: Level) -> Result<Simplified, SimplifyError> {
     let initial = shape.initial()?;
-    let Level::Spheres(count) = level else {
-        return Err(SimplifyError::unsupported("ask for a number of spheres"));
+    let Level::Spheres(count @ 1..) = level else {
+        return Err(SimplifyError::unsupported("ask for a number of spheres, at least 1"));
     };
     let mut order: Vec<usize> = (0..initial.spheres.len()).collect();
     order.sort_by(|&a, &b| initial.spheres[b].radius.total_cmp(&initial.spheres[a].radius));

@@ -18,6 +18,8 @@ pub enum Stage {
     Asked(usize),
     /// The results were measured.
     Measuring,
+    /// A case of the conformance corpus ran.
+    Checking,
 }
 
 impl Stage {
@@ -27,6 +29,7 @@ impl Stage {
             Self::Preparing => "while the method prepared",
             Self::Asked(_) => "while the method simplified",
             Self::Measuring => "while the results were measured",
+            Self::Checking => "while the case ran",
         }
     }
 }

@@ -44,7 +44,8 @@ pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_np
 pub use npy_header::HeaderError;
 pub use plan::{PlanError, Tally, count, missing, run_items};
 pub use progress::Progress;
-pub use provenance::{Provenance, hex, hex_digest, peak_bytes};
+pub use protocol::CheckItem;
+pub use provenance::{Provenance, hex, hex_digest, peak_bytes, shell_line};
 pub use record::Kept;
 pub use registry::{Entry, Registry, RegistryError};
 pub use reproduce::Reproducer;

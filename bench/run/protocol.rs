@@ -11,7 +11,9 @@ use medial::simplifier::Level;
 use medial_reports::Repetition;
 use serde::{Deserialize, Serialize};
 
-use super::{Fault, Item, Kept, Provenance};
+use crate::check::Outcome;
+
+use super::{Fault, Item, Kept, Limits, MethodSpec, Provenance};
 
 /// The record separator of ASCII, which no text begins with.
 const MARK: u8 = 0x1e;
@@ -41,6 +43,41 @@ pub enum Request {
         /// The item.
         item: Item,
     },
+    /// Put a method to one case of the conformance corpus.
+    Check(CheckItem),
+}
+
+impl Request {
+    /// The item that it is about, where it is about one.
+    pub fn item(&self) -> Option<&Item> {
+        match self {
+            Self::Run { item, .. } | Self::Probe { item } | Self::Again { item } => Some(item),
+            Self::Check(_) => None,
+        }
+    }
+
+    /// Threads of the worker that serves it, and what ends it by force.
+    pub fn terms(&self) -> (usize, Limits) {
+        match self {
+            Self::Run { item, .. } | Self::Probe { item } | Self::Again { item } => {
+                (item.threads, item.limits)
+            }
+            Self::Check(item) => (item.threads, item.limits),
+        }
+    }
+}
+
+/// One case of the conformance corpus on one method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CheckItem {
+    /// The method.
+    pub method: MethodSpec,
+    /// Name of the case.
+    pub case: String,
+    /// Number of threads.
+    pub threads: usize,
+    /// What ends the case by force.
+    pub limits: Limits,
 }
 
 /// What a worker tells.
@@ -62,6 +99,10 @@ pub enum Event {
     Record(Box<Kept>),
     /// What a level took once more, and a hash of its result.
     Repeated(Level, Result<(Repetition, String), Fault>),
+    /// A case of the conformance corpus begins, or goes on to this.
+    Doing(String),
+    /// How the case ended.
+    Checked(Outcome),
     /// The request is done.
     Finished,
 }

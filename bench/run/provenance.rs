@@ -66,16 +66,22 @@ fn kibibytes(value: &str) -> Option<u64> {
 
 /// The command line with the program's bare name, quoted where a shell would need it.
 fn command_line() -> String {
+    let words = env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    let words: Vec<String> = std::iter::once("medial".to_owned()).chain(words).collect();
+    shell_line(&words)
+}
+
+/// Words as a line for a shell, quoted where it would need that.
+pub fn shell_line(words: &[String]) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
-    let words = env::args_os().skip(1).map(|word| {
-        let word = word.to_string_lossy().into_owned();
+    let quoted = words.iter().map(|word| {
         if !word.is_empty() && word.chars().all(plain) {
-            word
+            word.clone()
         } else {
             format!("'{}'", word.replace('\'', r"'\''"))
         }
     });
-    std::iter::once("medial".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+    quoted.collect::<Vec<_>>().join(" ")
 }
 
 /// SHA-256 in hexadecimal.

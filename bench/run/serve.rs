@@ -13,17 +13,21 @@ use std::thread;
 use std::time::Duration;
 
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{MedialSimplifier, RunContext, SimplifyError};
+use medial::simplifier::{RunContext, SimplifyError};
 use medial_reports::Status;
 
+use crate::check::{self, Outcome, Subject};
 use crate::plugin::SCRATCH;
 use crate::process_tree;
 
-use super::protocol::{Event, Request, send};
+use super::answer::panic_message;
+use super::protocol::{CheckItem, Event, Request, send};
 use super::record::{Kept, NoisePart, record, repetition};
 use super::scene::{Scene, reference_key};
 use super::verdict::{judge, mesh_hash};
-use super::{Fault, Input, Item, LevelRun, Provenance, Registry, Source, answer};
+use super::{
+    Entry, Fault, Input, Item, LevelRun, MethodSpec, Provenance, Registry, Source, answer,
+};
 
 /// Serves until nobody asks any more. `bytes` is the limit of memory of this process.
 pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
@@ -37,6 +41,7 @@ pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
             }
             Request::Probe { item } => probe(registry, &item),
             Request::Again { item } => again(registry, &mut scene, &item),
+            Request::Check(item) => put_to(registry, &item),
         };
         if served.and_then(|()| send(&Event::Finished)).is_err() {
             break;
@@ -141,7 +146,8 @@ fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
     let Ok(input) = Input::load(&source) else { return Ok(()) };
     let Ok(shape) = input.shape(ShapeOptions::default()) else { return Ok(()) };
     send(&Event::Preparing(input.hash))?;
-    let Ok(method) = find(registry, item) else { return Ok(()) };
+    let Ok(entry) = find(registry, &item.method) else { return Ok(()) };
+    let method = entry.method();
     let context = RunContext::with_seed(item.seed);
     // A panic is for the run itself to report.
     let prepared = catch_unwind(AssertUnwindSafe(|| {
@@ -157,9 +163,9 @@ fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
 
 fn answer_item(registry: &Registry, item: &Item, view: &Shape) -> Vec<LevelRun> {
     let context = RunContext::with_seed(item.seed);
-    let method = find(registry, item);
-    let start = || match method {
-        Ok(method) => method.prepare(view, &item.method.params, &context),
+    let entry = find(registry, &item.method);
+    let start = || match entry {
+        Ok(entry) => entry.method().prepare(view, &item.method.params, &context),
         Err(why) => Err(SimplifyError::Failed(why)),
     };
     answer(view, start, &item.levels, |level| {
@@ -168,16 +174,37 @@ fn answer_item(registry: &Registry, item: &Item, view: &Shape) -> Vec<LevelRun> 
     })
 }
 
+/// Puts a method to one case of the conformance corpus.
+fn put_to(registry: &Registry, item: &CheckItem) -> io::Result<()> {
+    send(&Event::Doing("starting".into()))?;
+    let outcome = match (find(registry, &item.method), check::find(&item.case)) {
+        (Err(why), _) => Outcome::Failed(why),
+        (_, None) => Outcome::Failed(format!("no case is called `{}`", item.case)),
+        (Ok(entry), Some(case)) => {
+            let subject = Subject {
+                method: entry.method(),
+                params: &item.method.params,
+                external: entry.fingerprint().is_some(),
+                // The supervisor notices by itself when the pipe is closed.
+                doing: &|what| drop(send(&Event::Doing(what.to_owned()))),
+            };
+            let run = catch_unwind(AssertUnwindSafe(|| case.run(&subject)));
+            run.unwrap_or_else(|payload| Outcome::Failed(panic_message(payload.as_ref())))
+        }
+    };
+    send(&Event::Checked(outcome))
+}
+
 /// The method of an item, which must be the one that it was planned with.
-fn find<'r>(registry: &'r Registry, item: &Item) -> Result<&'r dyn MedialSimplifier, String> {
-    let id = &item.method.id;
+fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, String> {
+    let id = &method.id;
     let entry = registry.entry(id).ok_or_else(|| format!("no method is called `{id}`"))?;
-    if entry.fingerprint() != item.method.fingerprint.as_deref() {
+    if entry.fingerprint() != method.fingerprint.as_deref() {
         return Err(format!(
             "{id}: its plug-in file or program has changed since the run was planned"
         ));
     }
-    Ok(entry.method())
+    Ok(entry)
 }
 
 /// The comparison of noisy results with those without noise, which are made where they are not

@@ -9,8 +9,10 @@ use std::time::Instant;
 use medial::simplifier::Level;
 use medial_reports::{Record, Repetition, Status};
 
+use crate::check::Outcome;
+
 use super::ending::{self, LOOK_AGAIN, Stage};
-use super::protocol::{Event, Request};
+use super::protocol::{CheckItem, Event, Request};
 use super::record::{Kept, failure_record};
 use super::worker::{Said, Worker, WorkerOptions};
 use super::{Fault, Item, Provenance, SceneSpec};
@@ -144,7 +146,7 @@ impl<'a> Supervisor<'a> {
     pub fn again(&mut self, item: &Item) -> Result<Result<Vec<Repeated>, Fault>, RunError> {
         let request = Request::Again { item: item.clone() };
         let mut repeated = Vec::new();
-        let attempt = self.converse(item, &request, &mut |event| {
+        let attempt = self.converse(&request, &mut |event| {
             if let Event::Repeated(level, outcome) = event {
                 repeated.push((level, outcome));
             }
@@ -164,12 +166,37 @@ impl<'a> Supervisor<'a> {
         let request = Request::Probe { item: item.clone() };
         let mut refused = None;
         // A method that ends its worker says nothing of its parameters.
-        self.converse(item, &request, &mut |event| {
+        self.converse(&request, &mut |event| {
             if let Event::WrongParameter(why) = event {
                 refused = Some(why);
             }
         })?;
         Ok(refused)
+    }
+
+    /// Puts a method to one case of the conformance corpus. One that ends its worker has failed.
+    ///
+    /// # Errors
+    /// As [`Supervisor::run`].
+    pub fn check(&mut self, item: &CheckItem) -> Result<Outcome, RunError> {
+        let request = Request::Check(item.clone());
+        let (mut outcome, mut at) = (None, String::new());
+        let attempt = self.converse(&request, &mut |event| match event {
+            Event::Doing(what) => at = what,
+            Event::Checked(end) => outcome = Some(end),
+            _ => {}
+        })?;
+        let outcome = match attempt {
+            Attempt::Ended(_, fault) => Outcome::Failed(format!("{} (at: {at})", fault.reason)),
+            Attempt::Refused(why) => Outcome::Failed(why),
+            Attempt::Finished => outcome
+                .unwrap_or_else(|| Outcome::Failed("the worker told nothing of this case".into())),
+        };
+        // A method that went wrong may have left locks and caches in any state.
+        if matches!(outcome, Outcome::Failed(_)) {
+            self.worker = None;
+        }
+        Ok(outcome)
     }
 
     fn failed(&self, item: &Item, level: Level, fault: &Fault) -> Kept {
@@ -190,7 +217,7 @@ impl<'a> Supervisor<'a> {
         let (axes, provenance) = (self.axes.clone(), Box::new(self.provenance.clone()));
         let request = Request::Run { item: item.clone(), axes, provenance };
         let mut told = Vec::new();
-        let attempt = self.converse(item, &request, &mut |event| {
+        let attempt = self.converse(&request, &mut |event| {
             if let Event::Record(kept) = event {
                 told.push(*kept);
             }
@@ -205,17 +232,17 @@ impl<'a> Supervisor<'a> {
     /// Puts a request to a worker and listens until it has finished or is gone.
     fn converse(
         &mut self,
-        item: &Item,
         request: &Request,
         each: &mut dyn FnMut(Event),
     ) -> Result<Attempt, RunError> {
-        let mut worker = self.worker_for(item)?;
+        let (item, (_, limits)) = (request.item(), request.terms());
+        let mut worker = self.worker_for(request)?;
         let mut stage = Stage::Loading;
         let mut refused = None;
         if worker.ask(request).is_err() {
             // Gone while it was idle: once more with a new one.
             drop(worker);
-            worker = self.worker_for(item)?;
+            worker = self.worker_for(request)?;
             worker.ask(request).map_err(RunError::Start)?;
         }
         let mut since = Instant::now();
@@ -233,41 +260,44 @@ impl<'a> Supervisor<'a> {
                     Event::Refused(why) => refused = Some(why),
                     Event::Loading => {}
                     Event::Preparing(hash) => {
-                        self.input = Some((item.scene.clone(), hash));
+                        self.input = item.map(|item| (item.scene.clone(), hash));
                         (stage, since) = (Stage::Preparing, Instant::now());
                     }
                     Event::Measuring => (stage, since) = (Stage::Measuring, Instant::now()),
                     Event::Asked(level) => {
-                        let place = item.levels.iter().position(|&asked| asked == level);
+                        let mut levels = item.iter().flat_map(|item| &item.levels);
+                        let place = levels.position(|&asked| asked == level);
                         stage = Stage::Asked(place.unwrap_or(0));
                     }
-                    event => each(event),
+                    event => {
+                        if matches!(event, Event::Doing(_)) {
+                            stage = Stage::Checking;
+                        }
+                        each(event);
+                    }
                 },
                 Said::Gone => {
                     let (status, last_words) = worker.collect();
-                    let fault = ending::ended(stage, status, &last_words, &item.limits);
+                    let fault = ending::ended(stage, status, &last_words, &limits);
                     return Ok(Attempt::Ended(stage, fault));
                 }
-                Said::Nothing if since.elapsed() > item.limits.time() => {
+                Said::Nothing if since.elapsed() > limits.time() => {
                     worker.end();
-                    return Ok(Attempt::Ended(stage, ending::timed_out(stage, &item.limits)));
+                    return Ok(Attempt::Ended(stage, ending::timed_out(stage, &limits)));
                 }
-                Said::Nothing if worker.resident_bytes() > item.limits.bytes => {
+                Said::Nothing if worker.resident_bytes() > limits.bytes => {
                     worker.end();
-                    return Ok(Attempt::Ended(stage, ending::out_of_memory(stage, &item.limits)));
+                    return Ok(Attempt::Ended(stage, ending::out_of_memory(stage, &limits)));
                 }
                 Said::Nothing => {}
             }
         }
     }
 
-    /// The worker that is there, where it fits the item, or a new one.
-    fn worker_for(&mut self, item: &Item) -> Result<Worker, RunError> {
-        let options = WorkerOptions {
-            threads: item.threads,
-            bytes: item.limits.bytes,
-            plugins: self.plugins.clone(),
-        };
+    /// The worker that is there, where it fits the request, or a new one.
+    fn worker_for(&mut self, request: &Request) -> Result<Worker, RunError> {
+        let (threads, limits) = request.terms();
+        let options = WorkerOptions { threads, bytes: limits.bytes, plugins: self.plugins.clone() };
         match self.worker.take() {
             Some(worker) if worker.options == options => Ok(worker),
             _ => Worker::start(options).map_err(RunError::Start),

@@ -95,6 +95,7 @@ const MEDIAL: Layers<'_> = &[
 const BENCH: Layers<'_> = &[
     &["process_tree"],
     &["plugin"],
+    &["check"],
     &["run"],
     &["exit"],
     &["args", "files", "interrupt"],

@@ -104,6 +104,12 @@ pub(super) fn prepare(
     let radius = radii(&grid, &faces, &tree, &inside);
     let before = faces.len();
     faces.retain(|face| face.corners.iter().all(|&c| radius[c as usize] >= 0.0));
+    if faces.is_empty() {
+        return Err(SimplifyError::unsupported(format!(
+            "the solid is too thin for voxels at resolution = {resolution}: no face between two of \
+             them lies inside; raise it"
+        )));
+    }
     faces.par_sort_by(|a, b| b.angle.total_cmp(&a.angle));
     let mut diagnostics = Diagnostics::default();
     diagnostics.count("faces_left_out_at_the_surface", before - faces.len());

@@ -100,7 +100,7 @@ impl DeyZhaoParams {
         let Self { theta, rho, .. } = Self::default();
         vec![
             ParamInfo::new("theta", theta, "degrees", "theta_0 of the angle condition"),
-            ParamInfo::new("rho", rho, "", "rho_0 of the ratio condition"),
+            ParamInfo::new("rho", rho, "none", "rho_0 of the ratio condition"),
             ParamInfo::new(
                 "condition",
                 "both",

@@ -35,8 +35,8 @@ fn prepare<'s>(
     order.sort_by(|&a, &b| radius(b).total_cmp(&radius(a)).then(a.cmp(&b)));
     // Timed as `simplify`, once for each level.
     Ok(Box::new(move |level: Level| {
-        let Level::Spheres(count) = level else {
-            return Err(SimplifyError::unsupported("ask for a number of spheres"));
+        let Level::Spheres(count @ 1..) = level else {
+            return Err(SimplifyError::unsupported("ask for a number of spheres, at least 1"));
         };
         let mut keep = vec![false; initial.spheres.len()];
         order.iter().take(count).for_each(|&i| keep[i] = true);

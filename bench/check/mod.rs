@@ -1,0 +1,203 @@
+//! One corpus for every method: what each must do, whatever it is and wherever it comes from.
+//!
+//! A [`Case`] is a function of a [`Subject`]: a method with its parameters. It knows neither
+//! processes nor limits; the runner gives it a worker of its own, so that a case that panics, hangs
+//! or takes all memory is one that failed. What the contract leaves open is a commented exception
+//! beside the demand.
+//!
+//! | file | demands |
+//! |---|---|
+//! | `solids` | the shapes that all cases are about |
+//! | `valid`, `counts`, `levels` | what a result is, and how far it goes |
+//! | `same` | what must change nothing: the order of questions, threads, scale, a second run |
+//! | `said` | what a method says of itself is true |
+//! | `cancel`, `given` | cancelled runs, medial meshes from elsewhere |
+
+use medial::complex::MedialMesh;
+use medial::shape::Shape;
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError,
+};
+use serde::{Deserialize, Serialize};
+
+mod cancel;
+mod counts;
+mod given;
+mod levels;
+mod said;
+mod same;
+mod solids;
+mod valid;
+
+/// One demand, by its name.
+pub struct Case {
+    /// Name, for `--case`.
+    pub name: &'static str,
+    /// What it demands, as a sentence without a subject.
+    pub demands: &'static str,
+    run: fn(&Subject<'_>) -> Answer,
+}
+
+/// A method under test.
+pub struct Subject<'a> {
+    /// The method.
+    pub method: &'a dyn MedialSimplifier,
+    /// Its parameters.
+    pub params: &'a Params,
+    /// Whether it is a program of its own.
+    pub external: bool,
+    /// Is told what the method is asked next, so that whoever has to end it knows at what it was.
+    pub doing: &'a dyn Fn(&str),
+}
+
+/// How a case ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The method does what is demanded; with what a reader may want to know.
+    Passed(Vec<String>),
+    /// It does not: why.
+    Failed(String),
+    /// The demand does not apply to it: why.
+    Skipped(String),
+}
+
+/// What a case gives: remarks, or why it is not passed.
+type Answer = Result<Vec<String>, Miss>;
+
+/// Why a case is not passed.
+enum Miss {
+    Failed(String),
+    Skipped(String),
+}
+
+/// All cases, in the order in which they are run: what is said first, what takes long last.
+pub fn cases() -> &'static [Case] {
+    const fn case(
+        name: &'static str,
+        demands: &'static str,
+        run: fn(&Subject<'_>) -> Answer,
+    ) -> Case {
+        Case { name, demands, run }
+    }
+    const CASES: &[Case] = &[
+        case("report", "has an id, a title, a citation, and parameters with units", said::report),
+        case("unknown-parameter", "refuses a parameter that it does not have", said::unknown),
+        case("defaults", "does with its documented defaults what it does without", said::defaults),
+        case("valid-sphere", "gives valid results on a sphere", |s| valid::on(s, "sphere")),
+        case("valid-box", "gives valid results on a box", |s| valid::on(s, "box")),
+        case("valid-capsule", "gives valid results on a capsule", |s| valid::on(s, "capsule")),
+        case("valid-torus", "gives valid results on a torus", |s| valid::on(s, "torus")),
+        case("valid-hollow", "gives valid results on a hollow sphere", |s| {
+            valid::on(s, "hollow-sphere")
+        }),
+        case("valid-bracket", "gives valid results on a bracket", |s| valid::on(s, "bracket")),
+        case("valid-parts", "gives valid results on two boxes apart", |s| {
+            valid::on(s, solids::PARTS)
+        }),
+        case("valid-plate", "answers or refuses a plate of a ten-thousandth", |s| {
+            valid::or_refused(s, solids::PLATE)
+        }),
+        case("valid-tetrahedron", "answers or refuses a solid of four vertices", |s| {
+            valid::or_refused(s, solids::TETRAHEDRON)
+        }),
+        case("valid-cube", "answers or refuses a solid of eight vertices", |s| {
+            valid::or_refused(s, solids::CUBE)
+        }),
+        case("counts", "meets numbers of spheres to 2 %, or warns why not", counts::met),
+        case("counts-above", "gives all it has where more is asked", counts::above),
+        case("no-spheres", "refuses to give no sphere", counts::none),
+        case("native", "refuses senseless native levels, or says that it has none", levels::native),
+        case("published", "answers its published level, or says why not", levels::published),
+        case("continuing", "gives after other levels what it gives alone", same::continuing),
+        case("repeated", "gives the same medial mesh each time, bit by bit", same::repeated),
+        case("threads", "gives the same medial mesh with 1, 2 and 5 threads", same::threads),
+        case("scale", "gives the same medial mesh in other units", same::scale),
+        case("cancelled-before", "ends soon when it is cancelled from the start", cancel::before),
+        case("cancelled-within", "ends soon when it is cancelled at work", cancel::within),
+        case("given-initial", "starts from a given medial mesh, or says why not", given::initial),
+    ];
+    CASES
+}
+
+/// The case with a name.
+pub fn find(name: &str) -> Option<&'static Case> {
+    cases().iter().find(|case| case.name == name)
+}
+
+impl Case {
+    /// Puts the method to the test. A panic of the method is for the caller to catch.
+    pub fn run(&self, subject: &Subject<'_>) -> Outcome {
+        match (self.run)(subject) {
+            Ok(remarks) => Outcome::Passed(remarks),
+            Err(Miss::Failed(why)) => Outcome::Failed(why),
+            Err(Miss::Skipped(why)) => Outcome::Skipped(why),
+        }
+    }
+}
+
+fn failed<T>(why: impl Into<String>) -> Result<T, Miss> {
+    Err(Miss::Failed(why.into()))
+}
+
+impl Subject<'_> {
+    /// The method on a shape, with nothing asked yet.
+    fn prepare<'s>(&self, shape: &'s Shape) -> Result<Box<dyn Simplification + 's>, Miss> {
+        self.prepare_as(shape, self.params, &RunContext::default())
+    }
+
+    fn prepare_as<'s>(
+        &self,
+        shape: &'s Shape,
+        params: &Params,
+        context: &RunContext,
+    ) -> Result<Box<dyn Simplification + 's>, Miss> {
+        (self.doing)(&format!("preparing the {}", shape.name()));
+        let prepared = self.method.prepare(shape, params, context);
+        prepared.map_err(|error| miss(&format!("preparing the {}", shape.name()), &error))
+    }
+
+    /// A sound result at a level.
+    fn ask(
+        &self,
+        simplification: &mut dyn Simplification,
+        shape: &Shape,
+        level: Level,
+    ) -> Result<Simplified, Miss> {
+        let place = format!("{level} of the {}", shape.name());
+        (self.doing)(&place);
+        let result = simplification.at(level).map_err(|error| miss(&place, &error))?;
+        valid::sound(&result, level).map_err(|why| Miss::Failed(format!("{place}: {why}")))?;
+        Ok(result)
+    }
+
+    /// The level that stands for a number of spheres: the published one for a method that cannot be
+    /// asked for numbers.
+    fn level(&self, simplification: &mut dyn Simplification, count: usize) -> Result<Level, Miss> {
+        let level = Level::Spheres(count);
+        (self.doing)(&format!("asking for {level}"));
+        let Err(SimplifyError::Unsupported { why }) = simplification.at(level) else {
+            return Ok(level);
+        };
+        match simplification.at(Level::Published) {
+            Err(SimplifyError::Unsupported { .. }) => Err(Miss::Skipped(format!(
+                "it answers neither numbers of spheres nor the published level ({why})"
+            ))),
+            _ => Ok(Level::Published),
+        }
+    }
+
+    /// The medial mesh that a method gives for a number of spheres when asked for nothing else.
+    fn mesh(&self, shape: &Shape, count: usize) -> Result<MedialMesh, Miss> {
+        let level = self.level(self.prepare(shape)?.as_mut(), count)?;
+        Ok(self.ask(self.prepare(shape)?.as_mut(), shape, level)?.mesh)
+    }
+}
+
+/// What an error at a place means: that something is not done by a method is an answer.
+fn miss(place: &str, error: &SimplifyError) -> Miss {
+    match error {
+        SimplifyError::Unsupported { why } => Miss::Skipped(format!("{place}: {why}")),
+        error => Miss::Failed(format!("{place}: {error}")),
+    }
+}

@@ -1,0 +1,132 @@
+//! The conformance corpus: all methods of the project pass it, and methods that are broken do not.
+
+mod common;
+
+use std::path::Path;
+use std::process::Command;
+
+use common::{code, example, run, stderr};
+use serde_json::Value;
+
+const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
+const PLUGINS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/plugins/largest.toml");
+
+/// The exit code and the object of `check`.
+fn check(program: impl AsRef<Path>, arguments: &[&str]) -> (i32, Value) {
+    let output = run(program, &[&["check", "--json"], arguments].concat());
+    let object = serde_json::from_slice(&output.stdout);
+    (code(&output), object.unwrap_or_else(|_| panic!("{}", stderr(&output))))
+}
+
+/// Cases that ended so, as `method case: reason`.
+fn ended(object: &Value, outcome: &str) -> Vec<String> {
+    let cases = object["cases"].as_array().expect("a list");
+    let cases = cases.iter().filter(|case| case["outcome"] == outcome);
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let line = |case: &Value| {
+        format!("{} {}: {}", text(&case["method"]), text(&case["case"]), text(&case["reason"]))
+    };
+    cases.map(line).collect()
+}
+
+#[track_caller]
+fn assert_passes((code, object): (i32, Value), methods: usize) {
+    assert_eq!(ended(&object, "failed"), Vec::<String>::new());
+    assert_eq!(ended(&object, "skipped"), Vec::<String>::new());
+    let cases = medial_bench::check::cases().len();
+    assert_eq!((code, object["passed"].as_u64()), (0, Some((methods * cases) as u64)));
+}
+
+#[test]
+fn all_built_in_methods_pass() {
+    assert_passes(check(MEDIAL, &[]), 10);
+}
+
+#[test]
+fn variants_pass() {
+    for variant in ["facet", "grid", "homotopy"] {
+        assert_passes(check(MEDIAL, &["angle", "--set", &format!("variant={variant}")]), 1);
+    }
+    assert_passes(check(MEDIAL, &["lambda", "--set", "variant=cell"]), 1);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_program_in_shell_passes() {
+    assert_passes(check(MEDIAL, &["largest-awk", "--plugins", PLUGINS]), 1);
+}
+
+#[test]
+#[expect(clippy::print_stderr, reason = "a test that was skipped says so")]
+fn a_program_in_python_passes() {
+    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
+    if !numpy.is_ok_and(|output| output.status.success()) {
+        eprintln!("skipped: a_program_in_python_passes: no python3 with numpy");
+        return;
+    }
+    assert_passes(check(MEDIAL, &["largest", "--plugins", PLUGINS]), 1);
+}
+
+/// Method, case that finds its fault, words of the reason, case that it passes all the same.
+const FAULTY: [(&str, &str, &str, &str); 11] = [
+    ("panics", "valid-torus", "this method panics at 20 spheres", "no-spheres"),
+    ("loops", "valid-torus", "ended after 3 s", "repeated"),
+    ("allocates", "valid-torus", "more than 1500 MB", "scale"),
+    ("grows", "valid-parts", "more than 1500 MB", "report"),
+    ("overflows", "valid-box", "stack overflowed", "report"),
+    ("aborts", "defaults", "SIGABRT", "report"),
+    ("exits", "published", "exit code 0", "report"),
+    ("invalid", "valid-sphere", "radius NaN", "published"),
+    ("empty", "counts", "no sphere", "published"),
+    ("random", "repeated", "a second run", "valid-sphere"),
+    ("random", "continuing", "not those asked alone", "valid-sphere"),
+];
+
+#[test]
+fn faulty_methods_are_found_and_the_rest_goes_on() {
+    for (method, finds, words, passes) in FAULTY {
+        // What ends by itself, or by its memory, may take its time on a busy machine.
+        let timeout = if method == "loops" { "3" } else { "60" };
+        let limits = ["--timeout", timeout, "--memory", "1500"];
+        let cases = [method, "--case", finds, "--case", passes];
+        let (code, object) = check(example("faulty"), &[&cases[..], &limits].concat());
+        assert_eq!(code, 3, "{object}");
+        let [found] = &ended(&object, "failed")[..] else { panic!("{object}") };
+        assert!(found.starts_with(&format!("{method} {finds}: ")), "{found}");
+        assert!(found.contains(words), "{found}");
+        let command = object["cases"][0]["command"].as_str().expect("a command");
+        let again =
+            format!("faulty check {method} --case {finds} --timeout {timeout} --memory 1500");
+        assert_eq!(command, again);
+    }
+}
+
+#[test]
+fn methods_that_only_behave_oddly_pass() {
+    assert_passes(check(example("faulty"), &["talks"]), 1);
+}
+
+#[test]
+fn what_does_not_exist_is_a_slip_of_the_command_line() {
+    let slips: [(&[&str], &str); 4] = [
+        (&["check", "nothing"], "there are: angle"),
+        (&["check", "qmat", "--case", "nothing"], "there are: report"),
+        (&["check", "qmat", "--set", "nothing=1"], "no such parameter"),
+        (&["check", "qmat", "--timeout", "0"], "positive"),
+    ];
+    for (arguments, words) in slips {
+        let output = run(MEDIAL, arguments);
+        assert_eq!(code(&output), 2);
+        assert!(stderr(&output).contains(words), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn lines_are_for_people() {
+    let output = run(MEDIAL, &["check", "qmat", "--case", "report", "--case", "no-spheres"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), 3, "{text}");
+    assert!(lines[0].starts_with("qmat           report") && lines[0].ends_with("s  ok"), "{text}");
+    assert_eq!(lines[2], "2 cases: 2 ok, 0 failed, 0 skipped");
+}
