@@ -184,19 +184,4 @@ mod tests {
         let folder = Folder::new("long");
         write(&folder.0.join("a".repeat(255)));
     }
-
-    #[test]
-    fn temporaries_can_be_removed_while_they_are_written() {
-        let folder = Folder::new("signal");
-        let path = folder.0.join("a");
-        let failed = write_atomically(&path, |out| {
-            out.write_all(b"half")?;
-            assert_eq!(fs::read_dir(&folder.0).unwrap().count(), 1);
-            remove_temporaries();
-            assert_eq!(fs::read_dir(&folder.0).unwrap().count(), 0);
-            Ok(())
-        });
-        assert!(failed.is_err());
-        assert_eq!(fs::read_dir(&folder.0).unwrap().count(), 0);
-    }
 }
