@@ -70,6 +70,7 @@ impl From<SimplifyError> for Fault {
             SimplifyError::Parameter(_) | SimplifyError::Level(_) => Status::Refused,
             SimplifyError::InvalidOutput(_) => Status::InvalidOutput,
             SimplifyError::Crashed(_) => Status::Panicked,
+            SimplifyError::Failed(why) if speaks_of_memory(why) => Status::OutOfMemory,
             SimplifyError::Shape(_)
             | SimplifyError::Hierarchy(_)
             | SimplifyError::Failed(_)
@@ -77,6 +78,16 @@ impl From<SimplifyError> for Fault {
         };
         Self { status, reason: error.to_string() }
     }
+}
+
+/// Whether a program that failed says that it was refused memory. The limit of the worker holds for
+/// the programs that it starts, and most of them end by themselves when they meet it.
+fn speaks_of_memory(why: &str) -> bool {
+    let why = why.to_lowercase();
+    let words =
+        ["memoryerror", "bad_alloc", "out of memory", "cannot allocate", "unable to allocate"];
+    let more = ["memory exhausted", "memory allocation of", "outofmemory"];
+    words.iter().chain(&more).any(|word| why.contains(word))
 }
 
 /// Starts a simplification on a view of a shape and asks it for every level, from fine to coarse.
