@@ -9,12 +9,13 @@ use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::text::printable;
 
 /// The columns behind the name of the method: title and width.
-const COLUMNS: [(&str, usize); 6] = [
+const COLUMNS: [(&str, usize); 7] = [
     ("Hausdorff %", 12),
     ("mean %", 9),
     ("topology", 9),
     ("seconds", 9),
     ("reached", 9),
+    ("off count", 10),
     ("failed", 7),
 ];
 
@@ -64,6 +65,7 @@ fn write_row(text: &mut String, row: &SeriesSummary, label: &str, width: usize) 
         format!("{right}/{known}"),
         number(&TOTAL_SECONDS),
         format!("{}/{}", row.reached, row.asked),
+        row.missed.to_string(),
         row.failed.to_string(),
     ];
     let _ = write!(text, "  {:<width$}", printable(label));

@@ -7,7 +7,7 @@ use crate::metric::{
 };
 use crate::page::{Page, html};
 use crate::record::Status;
-use crate::summary::{CountSummary, best, headlines};
+use crate::summary::{CountSummary, SeriesSummary, best, headlines};
 use crate::tables::Table;
 use crate::text::{counted, escape_html, grouped};
 
@@ -100,7 +100,7 @@ fn matrix(page: &Page<'_>, summaries: &[&CountSummary], metric: &Metric) -> Stri
             counted(summary.common, "mesh", "meshes")
         ));
     }
-    html.push_str("<th scope=\"col\">topology right</th><th scope=\"col\">failed</th></tr></thead>\n<tbody>\n");
+    html.push_str("<th scope=\"col\">topology right</th><th scope=\"col\">not as asked</th></tr></thead>\n<tbody>\n");
     for (series, label) in page.comparison.series.iter().enumerate() {
         html.push_str(&format!("<tr><th scope=\"row\">{}</th>", html::series(series, label)));
         let rows =
@@ -110,11 +110,20 @@ fn matrix(page: &Page<'_>, summaries: &[&CountSummary], metric: &Metric) -> Stri
         }
         let (right, known) =
             rows().fold((0, 0), |sum, row| (sum.0 + row.topology.0, sum.1 + row.topology.1));
-        let (failed, asked) =
-            rows().fold((0, 0), |sum, row| (sum.0 + row.failed, sum.1 + row.asked));
+        let sum = |of: fn(&SeriesSummary) -> usize| rows().map(of).sum::<usize>();
+        let kinds = [
+            (sum(|row| row.failed), "failed"),
+            (sum(|row| row.missed), "off count"),
+            (sum(|row| row.unsupported), "unsupported"),
+        ];
+        let kinds = kinds.iter().filter(|(number, _)| *number > 0);
+        let kinds: Vec<String> = kinds.map(|(number, kind)| format!("{number} {kind}")).collect();
+        let trouble = match kinds.is_empty() {
+            true => "none".to_owned(),
+            false => format!("{} of {}", kinds.join(", "), sum(|row| row.asked)),
+        };
         let topology = if known > 0 { format!("{right} of {known}") } else { "–".to_owned() };
-        let failed = if failed > 0 { format!("{failed} of {asked}") } else { "none".to_owned() };
-        html.push_str(&format!("<td>{topology}</td><td>{failed}</td></tr>\n"));
+        html.push_str(&format!("<td>{topology}</td><td>{trouble}</td></tr>\n"));
     }
     html.push_str("</tbody>\n</table></div></div>\n");
     html
