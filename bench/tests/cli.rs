@@ -511,10 +511,11 @@ fn meshes_of_one_name_stay_apart() {
     assert_ne!(written[0], written[1]);
 
     // A wrong word costs no earlier result, not even with --fresh.
-    let wrong: [(&[&str], i32); 7] = [
+    let wrong: [(&[&str], i32); 8] = [
         (&["--samples", "0"], 2),
         (&["--set", "qmat.k=x"], 2),
         (&["--repeat", "0"], 2),
+        (&["--repeat", "1000000000000"], 2),
         (&["--methods", "qmad"], 2),
         (&["builtin:spere"], 2),
         (&["builtin:sphere:1"], 2),

@@ -316,12 +316,17 @@ fn an_interrupted_run_says_how_to_go_on() {
     let out = dir.path().join("out");
     let words = ["compare", "builtin:box:8", "--methods", "qmat,loops", "--spheres", "20"];
     let more = ["--samples", "100", "--out", text(&out)];
+    let earlier = ["compare", "builtin:box:8", "--methods", "pmat", "--spheres", "20", "--quiet"];
+    assert_eq!(code(&run(example("faulty"), &[&earlier[..], &more].concat())), 0);
+    assert!(out.join("index.html").exists());
     let mut run = Command::new(example("faulty"));
     run.args(words).args(more).stdout(Stdio::null()).stderr(Stdio::piped());
     let child = run.spawn().expect("it starts");
     let deadline = Instant::now() + Duration::from_secs(20);
     // The first item is done, the second one loops.
-    while fs::metadata(out.join("results.jsonl")).map_or(0, |file| file.len()) == 0 {
+    let lines =
+        || fs::read_to_string(out.join("results.jsonl")).unwrap_or_default().matches('\n').count();
+    while lines() < 2 {
         assert!(Instant::now() < deadline, "nothing was recorded");
         thread::sleep(Duration::from_millis(10));
     }
@@ -331,7 +336,13 @@ fn an_interrupted_run_says_how_to_go_on() {
     let output = child.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
     assert!(stderr(&output).contains("the same command goes on"), "{}", stderr(&output));
-    assert_eq!(records(&out).len(), 1);
+    assert_eq!(records(&out).len(), 2);
+    // The page of the earlier run would contradict the records; a new one names both runs.
+    assert!(!out.join("index.html").exists());
+    let report = Command::new(example("faulty")).arg("report").arg(&out).output().expect("it runs");
+    assert_eq!(code(&report), 0, "{}", stderr(&report));
+    let page = fs::read_to_string(out.join("index.html")).expect("a page");
+    assert!(page.contains("--methods pmat") && page.contains("--methods qmat,loops"));
     let alive =
         |pid: &u32| fs::read(format!("/proc/{pid}/cmdline")).is_ok_and(|line| !line.is_empty());
     assert!(!workers.iter().any(alive), "a worker is left");
