@@ -309,6 +309,15 @@ mod tests {
     }
 
     #[test]
+    fn numbers_survive_json() {
+        let numbers = (1..10_000).map(|k| f64::from(k).sqrt() * 1e-3);
+        for number in numbers {
+            let text = serde_json::to_string(&number).unwrap();
+            assert_eq!(serde_json::from_str::<f64>(&text).unwrap(), number, "{text}");
+        }
+    }
+
+    #[test]
     fn items_survive_their_file() {
         let text = serde_json::to_string(&item()).unwrap();
         assert_eq!(serde_json::from_str::<Item>(&text).unwrap(), item());

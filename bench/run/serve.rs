@@ -22,7 +22,7 @@ use crate::process_tree;
 
 use super::answer::panic_message;
 use super::protocol::{CheckItem, Event, Request, send};
-use super::record::{Kept, NoisePart, record, repetition};
+use super::record::{Kept, NoisePart, failure_record, record, repetition};
 use super::scene::{Scene, reference_key};
 use super::verdict::{judge, mesh_hash};
 use super::{
@@ -120,9 +120,24 @@ fn run(
     let noise = noise_parts(registry, scene, item, &runs);
     for ((run, verdict), noise) in runs.iter().zip(verdicts).zip(noise) {
         let record = record(item, scene, run, verdict, provenance, axes);
-        send(&Event::Record(Box::new(Kept { record, noise })))?;
+        let kept = Kept { record, noise };
+        let kept = if survives_json(&kept) { kept } else { unreadable(item, run, provenance) };
+        send(&Event::Record(Box::new(kept)))?;
     }
     Ok(())
+}
+
+/// Whether a record reads back as it is: JSON has no infinity and no NaN, and writes `null`.
+fn survives_json(kept: &Kept) -> bool {
+    let text = serde_json::to_string(kept).unwrap_or_default();
+    serde_json::from_str::<Kept>(&text).is_ok_and(|back| back == *kept)
+}
+
+/// The record in place of one that no reader could read.
+fn unreadable(item: &Item, run: &LevelRun, provenance: &Provenance) -> Kept {
+    let reason = "a number of its record is not finite".to_owned();
+    let fault = Fault { status: Status::InvalidOutput, reason };
+    Kept { record: failure_record(item, run.level, &fault, provenance), noise: None }
 }
 
 fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Result<()> {

@@ -251,6 +251,11 @@ impl<'a> Supervisor<'a> {
                 worker.end();
                 return Err(RunError::Interrupted);
             }
+            // Also between events: whoever talks without end must not talk past the limit.
+            if since.elapsed() > limits.time() {
+                worker.end();
+                return Ok(Attempt::Ended(stage, ending::timed_out(stage, &limits)));
+            }
             match worker.listen(LOOK_AGAIN) {
                 Said::Event(event) => match *event {
                     Event::Finished => {
@@ -280,10 +285,6 @@ impl<'a> Supervisor<'a> {
                     let (status, last_words) = worker.collect();
                     let fault = ending::ended(stage, status, &last_words, &limits);
                     return Ok(Attempt::Ended(stage, fault));
-                }
-                Said::Nothing if since.elapsed() > limits.time() => {
-                    worker.end();
-                    return Ok(Attempt::Ended(stage, ending::timed_out(stage, &limits)));
                 }
                 Said::Nothing if worker.resident_bytes() > limits.bytes => {
                     worker.end();
