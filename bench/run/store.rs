@@ -7,10 +7,10 @@
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use medial::simplifier::Level;
-use medial_reports::{Journal, JournalError, Status};
+use medial_reports::{Journal, JournalError, Status, read_records};
 use serde::{Deserialize, Serialize};
 
 use super::Item;
@@ -139,24 +139,17 @@ impl Store {
         &self.dir
     }
 
-    /// Removes all results and what was made of them.
+    /// Removes all records, the results that they name and the page. Whatever else lies in the folder
+    /// is the user's and stays; the next report replaces its own tables and plots.
     ///
     /// # Errors
     /// When a file cannot be removed.
     pub fn clear(&mut self, journal: &str) -> Result<(), StoreError> {
         let failed = |path: &Path, source| StoreError::Io { path: path.to_owned(), source };
         self.withdraw_page()?;
+        remove_artifacts(&self.dir, &self.dir.join(journal));
         for name in [journal, "header.json", "study.toml", "results.csv"] {
             remove(&self.dir.join(name)).map_err(|error| failed(&self.dir.join(name), error))?;
-        }
-        for name in [AXES, "tables", "plots"] {
-            let path = self.dir.join(name);
-            match fs::remove_dir_all(&path) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(failed(&path, error));
-                }
-                _ => {}
-            }
         }
         self.known.clear();
         self.journal = Journal::open(self.dir.join(journal))?;
@@ -287,21 +280,36 @@ fn stub(line: &[u8]) -> Option<Stub> {
     stub.filter(|stub| !stub.key.is_empty())
 }
 
-/// Removes what writers left under temporary names. The lock is held: none is in use.
+/// Removes the medial meshes that records name. What cannot be removed stays: without a record it is
+/// no result.
+fn remove_artifacts(dir: &Path, journal: &Path) {
+    let Ok(journaled) = read_records(journal) else { return };
+    for artifact in journaled.records.iter().filter_map(|record| record.artifact.as_deref()) {
+        let inside = Path::new(artifact).components().all(|c| matches!(c, Component::Normal(_)));
+        if inside && artifact.ends_with(".ma") {
+            let path = dir.join(artifact);
+            let _ = fs::remove_file(&path);
+            // Succeeds for a folder that is empty now.
+            let _ = path.parent().map(fs::remove_dir);
+        }
+    }
+}
+
+/// Removes what writers of this program left under temporary names, in the folders that it writes
+/// to and no other. The lock is held: none is in use.
 fn remove_temporaries(dir: &Path) {
-    let mut folders = vec![dir.to_owned()];
-    while let Some(folder) = folders.pop() {
-        let Ok(entries) = fs::read_dir(&folder) else { continue };
-        for entry in entries.flatten() {
-            let name = entry.file_name();
-            let name = name.to_string_lossy();
-            match entry.file_type() {
-                Ok(kind) if kind.is_dir() => folders.push(entry.path()),
-                Ok(kind) if kind.is_file() && name.starts_with('.') && name.ends_with(".tmp") => {
-                    let _ = fs::remove_file(entry.path());
-                }
-                _ => {}
-            }
+    let mut folders = vec![dir.to_owned(), dir.join("tables"), dir.join("plots")];
+    for results in [AXES, "stability"] {
+        let meshes = fs::read_dir(dir.join(results)).into_iter().flatten().flatten();
+        folders.push(dir.join(results));
+        folders.extend(meshes.map(|entry| entry.path()).filter(|path| path.is_dir()));
+    }
+    let entries = folders.iter().flat_map(fs::read_dir).flatten().flatten();
+    for entry in entries {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(".medial-") && name.ends_with(".tmp") {
+            let _ = fs::remove_file(entry.path());
         }
     }
 }

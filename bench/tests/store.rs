@@ -199,14 +199,20 @@ fn torn_lines_and_temporary_files_are_removed() {
     let path = out.join("results.jsonl");
     let whole = fs::read_to_string(&path).expect("results");
     fs::write(&path, &whole[..whole.len() - 100]).expect("written");
-    let stray = out.join("axes/.x.ma.123-0.tmp");
+    let stray = out.join("axes/box-8/.medial-123-0.tmp");
     fs::write(&stray, "half").expect("written");
+    // What is not this program's stays, whatever is asked.
+    let foreign = [out.join(".x.tmp"), out.join("axes/mine.txt"), out.join("plots/mine.png")];
+    foreign.iter().for_each(|path| fs::write(path, "mine").expect("written"));
     let common = ["--samples", "200", "--out", text(&out)];
     let output = run(MEDIAL, &[&["compare"], &words[..], &common].concat());
     assert_eq!(code(&output), 0);
     assert!(stderr(&output).contains("last line was incomplete"), "{}", stderr(&output));
     assert!(!stray.exists());
     assert_eq!(records(&out).len(), 2);
+    let fresh = [&["compare"], &words[..], &common, &["--fresh", "--quiet"]].concat();
+    assert_eq!(code(&run(MEDIAL, &fresh)), 0);
+    assert!(foreign.iter().all(|path| path.exists()), "{foreign:?}");
 }
 
 #[test]
