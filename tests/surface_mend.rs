@@ -7,7 +7,8 @@ use medial::surface::{
     Components, Fault, Format, Loaded, MendOptions, Repair, SurfaceError, TriMesh, mend_bytes,
 };
 
-const FILL: MendOptions = MendOptions { fill_holes: true, components: Components::All };
+const FILL: MendOptions =
+    MendOptions { fill_holes: true, separate: false, components: Components::All };
 
 fn off(mesh: &TriMesh) -> String {
     let mut text = format!("OFF\n{} {} 0\n", mesh.vertices.len(), mesh.faces.len());
@@ -101,6 +102,34 @@ fn holes_that_meet_are_refused() {
     };
     let fault = mend(&lattice_box(4, windows), FILL).expect_err("tangled").fault;
     assert!(matches!(fault, Fault::TangledHole { .. }), "{fault}");
+    let options = MendOptions { separate: true, ..FILL };
+    let apart = mend(&lattice_box(4, windows), options).expect("closed");
+    assert!((apart.report.volume.expect("closed") - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn parts_that_touch_in_a_vertex_are_drawn_apart_on_demand() {
+    let mut both = lattice_box(1, |_| false);
+    let shift = both.vertices.len() as u32;
+    both.vertices.extend_from_within(..);
+    both.vertices[shift as usize..].iter_mut().for_each(|v| *v += Vec3::ONE);
+    both.faces.extend_from_within(..);
+    both.faces[12..].iter_mut().for_each(|face| *face = face.map(|v| v + shift));
+    let fault = mend(&both, FILL).expect_err("they touch").fault;
+    assert!(matches!(fault, Fault::NonManifoldVertex { vertices: 1, .. }), "{fault}");
+    let options = MendOptions { separate: true, ..MendOptions::default() };
+    let mended = mend(&both, options).expect("two solids");
+    assert_eq!(mended.report.expected_betti, Some([2, 0, 0]));
+    assert!((mended.report.volume.expect("closed") - 2.0).abs() < 2e-3);
+    let moved = mended.mesh.vertices.iter().filter(|v| !both.vertices.contains(v)).count();
+    assert_eq!((moved, mended.mesh.vertices.len()), (1, 16));
+    assert!(
+        mended
+            .report
+            .repairs
+            .iter()
+            .any(|repair| { matches!(repair, Repair::SeparatedVertices { vertices: 1, .. }) })
+    );
 }
 
 #[test]
@@ -110,7 +139,7 @@ fn the_largest_part_is_kept() {
     let shift = both.vertices.len() as u32;
     both.faces.splice(0..0, small.faces.iter().map(|face| face.map(|v| v + shift)));
     both.vertices.extend(small.vertices.iter().map(|&v| v * 0.5 + Vec3::splat(3.0)));
-    let options = MendOptions { fill_holes: false, components: Components::Largest };
+    let options = MendOptions { components: Components::Largest, ..MendOptions::default() };
     let mended = mend(&both, options).expect("a solid");
     assert_eq!((mended.report.components, mended.mesh.faces.len()), (1, 48));
     assert!(

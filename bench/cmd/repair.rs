@@ -22,6 +22,9 @@ pub struct Arguments {
     /// Close holes of up to 500 edges by triangles between their vertices.
     #[arg(long)]
     fill_holes: bool,
+    /// Draw parts back from vertices in which they touch, by a thousandth of their faces there.
+    #[arg(long)]
+    separate: bool,
     /// Which parts to keep.
     #[arg(long, value_enum, default_value_t = Keep::All)]
     components: Keep,
@@ -46,7 +49,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         Keep::Largest => Components::Largest,
         Keep::All => Components::All,
     };
-    let options = MendOptions { fill_holes: arguments.fill_holes, components };
+    let Arguments { fill_holes, separate, .. } = *arguments;
+    let options = MendOptions { fill_holes, separate, components };
     let mended = surface::mend(&arguments.input, options).map_err(Failure::input)?;
     surface::write(&arguments.output, &mended.mesh).map_err(Failure::input)?;
     let report = mended.report;

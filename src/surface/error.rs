@@ -232,7 +232,7 @@ pub enum Fault {
     /// Edges with more than two faces.
     #[error(
         "the surface is not manifold: {} with more than two faces, the first ({faces} faces) \
-         from {} to {}; remove inner walls and doubled parts",
+         from {} to {}; inner walls and doubled parts have to go, and which they are only its maker knows",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
     NonManifoldEdge {
@@ -246,7 +246,7 @@ pub enum Fault {
     /// Vertices whose faces form more than one fan.
     #[error(
         "the surface is not manifold: {} where parts touch in a point, the first is {first}; \
-         separate the parts",
+         separate the parts (`medial repair --separate`)",
         counted(*.vertices, "vertex")
     )]
     NonManifoldVertex {
@@ -264,7 +264,7 @@ pub enum Fault {
     /// A component whose two sides coincide.
     #[error(
         "the component of face {face} ({}) encloses no volume; \
-         remove it or give it thickness",
+         leave it out (`medial repair --components largest`) or give it thickness",
         counted(*.faces, "face")
     )]
     ZeroVolume {

@@ -1,4 +1,4 @@
-//! Repairs that are made only on demand: parts left out, holes filled.
+//! Repairs that are made only on demand: parts left out, parts that touch taken apart, holes filled.
 
 use std::path::Path;
 
@@ -7,6 +7,7 @@ use super::error::Fault;
 use super::holes;
 use super::repair::repair;
 use super::report::Repair;
+use super::separate::separate;
 use super::soup::PolygonSoup;
 use super::topology::Topology;
 use super::{Format, Loaded, SurfaceError, TriMesh, accept, examine, in_file, read};
@@ -27,12 +28,15 @@ pub struct MendOptions {
     /// Whether holes are closed by triangles between their vertices, so that no angle at them is
     /// larger than needed.
     pub fill_holes: bool,
+    /// Whether parts that touch in a vertex are drawn back from it, by a thousandth of the faces
+    /// there.
+    pub separate: bool,
     /// Which parts are kept.
     pub components: Components,
 }
 
 /// Reads a surface and repairs it beyond what [`read`](super::read) does, which accepts the result.
-/// No vertex is moved. The report lists every repair in its order.
+/// No vertex is moved but those of parts that are separated. The report lists every repair in its order.
 ///
 /// # Errors
 /// As [`read`](super::read) for what is left after the repairs, and when a hole is too long to be
@@ -84,7 +88,11 @@ fn mended(bytes: &[u8], format: Format, options: MendOptions) -> Result<Loaded, 
     if options.components == Components::Largest {
         repairs.extend(keep_largest(&mut mesh));
     }
-    let TriMesh { vertices, mut faces } = mesh;
+    let TriMesh { mut vertices, mut faces } = mesh;
+    // Before the holes: their loops pass a vertex once only if its fans are separate.
+    if options.separate {
+        repairs.extend(separate(&mut vertices, &mut faces));
+    }
     if options.fill_holes {
         repairs.extend(holes::fill(&vertices, &mut faces)?);
     }

@@ -26,6 +26,7 @@ mod read;
 mod repair;
 mod report;
 mod sample;
+mod separate;
 mod soup;
 mod topology;
 mod triangulate;

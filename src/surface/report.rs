@@ -106,6 +106,13 @@ pub enum Repair {
         /// Their faces.
         faces: usize,
     },
+    /// Parts that touched in a vertex were drawn back from it, on demand.
+    SeparatedVertices {
+        /// How many vertices were touched by several parts.
+        vertices: usize,
+        /// The longest way that one was moved, in the unit of the file.
+        largest_move: String,
+    },
     /// A hole was closed by triangles between its vertices, on demand.
     FilledHole {
         /// Edges around the hole.
@@ -135,6 +142,7 @@ impl Repair {
             | Self::DroppedDuplicateFaces { faces: n }
             | Self::TriangulatedPolygons { polygons: n, .. }
             | Self::DroppedUnreferencedVertices { vertices: n }
+            | Self::SeparatedVertices { vertices: n, .. }
             | Self::ReorientedFaces { faces: n }
             | Self::TurnedOutward { components: n }
             | Self::TurnedInward { components: n }
@@ -148,7 +156,9 @@ impl fmt::Display for Repair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let noun = match self {
             Self::FlushedCoordinates { .. } => "coordinate",
-            Self::WeldedVertices { .. } | Self::DroppedUnreferencedVertices { .. } => "vertex",
+            Self::WeldedVertices { .. }
+            | Self::SeparatedVertices { .. }
+            | Self::DroppedUnreferencedVertices { .. } => "vertex",
             Self::TriangulatedPolygons { .. } => "polygon",
             Self::TurnedOutward { .. }
             | Self::TurnedInward { .. }
@@ -181,6 +191,9 @@ impl fmt::Display for Repair {
             }
             Self::DroppedComponents { faces, .. } => {
                 write!(f, "left out {what} with {}", counted(faces, "face"))
+            }
+            Self::SeparatedVertices { ref largest_move, .. } => {
+                write!(f, "separated parts at {what}, by {largest_move} at most")
             }
             Self::FilledHole { edges, .. } => {
                 write!(f, "filled a hole of {} with {what}", counted(edges, "edge"))
