@@ -9,6 +9,7 @@ pub mod angle;
 pub mod aof;
 pub mod dey_zhao;
 pub mod hem;
+pub mod initial;
 pub mod lambda;
 mod perturb;
 pub mod pmat;
@@ -24,6 +25,7 @@ pub mod tam_heidrich;
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
     vec![
+        Box::new(initial::method()),
         Box::new(angle::method()),
         Box::new(lambda::method()),
         Box::new(dey_zhao::method()),

@@ -96,6 +96,7 @@ impl Ranked {
 impl Simplification for Ranked {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let (count, native, mut diagnostics) = match level {
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }

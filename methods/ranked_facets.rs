@@ -149,6 +149,7 @@ impl Simplification for RankedFacets<'_> {
         }
         let mut diagnostics = self.prepared.clone();
         let (kept, native) = match level {
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }

@@ -39,6 +39,7 @@ pub fn method() -> Method<NoParams> {
         )
         .summary("Removes the spheres that another sphere contains once both are scaled.")
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
+        .filter()
         .published("unsupported: it is described, not published, as a method");
     Method::new(info, prepare)
 }

@@ -78,19 +78,23 @@ pub(crate) fn level_label(level: Level) -> String {
         Level::Spheres(count) => grouped(count as u64),
         Level::Published => "published".to_owned(),
         Level::Native(value) => format!("level {value}"),
+        Level::MaxError(_) => level.to_string(),
     }
 }
 
-/// Sphere counts from many to few, then published, then native levels ascending.
+/// Sphere counts from many to few, error bounds from large to small, published, native levels
+/// ascending.
 fn compare_levels(a: Level, b: Level) -> Ordering {
     let rank = |level| match level {
         Level::Spheres(_) => 0,
-        Level::Published => 1,
-        Level::Native(_) => 2,
+        Level::MaxError(_) => 1,
+        Level::Published => 2,
+        Level::Native(_) => 3,
     };
     match (a, b) {
         (Level::Spheres(a), Level::Spheres(b)) => b.cmp(&a),
         (Level::Native(a), Level::Native(b)) => a.total_cmp(&b),
+        (Level::MaxError(a), Level::MaxError(b)) => b.total_cmp(&a),
         _ => rank(a).cmp(&rank(b)),
     }
 }

@@ -24,6 +24,8 @@ pub enum Status {
     Ok,
     /// A valid medial mesh came out, with a number of spheres more than 2 % off the one asked.
     OtherCount,
+    /// No level that was tried keeps the error bound: an answer, not a failure.
+    BoundMissed,
     /// The method does not do this: an answer, not a failure.
     Unsupported,
     /// The input was refused before the method saw it, or by a check of the method's own.
@@ -42,9 +44,10 @@ pub enum Status {
 
 impl Status {
     /// Every status, in the order of the enumeration.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Ok,
         Self::OtherCount,
+        Self::BoundMissed,
         Self::Unsupported,
         Self::Refused,
         Self::Failed,
@@ -64,9 +67,9 @@ impl Status {
         matches!(self, Self::Ok | Self::OtherCount)
     }
 
-    /// Whether something went wrong: neither a result nor the plain answer "unsupported".
+    /// Whether something went wrong: neither a result nor a plain answer that there is none.
     pub fn is_failure(self) -> bool {
-        !matches!(self, Self::Ok | Self::OtherCount | Self::Unsupported)
+        !matches!(self, Self::Ok | Self::OtherCount | Self::BoundMissed | Self::Unsupported)
     }
 
     /// The word that stands in the JSON.
@@ -74,6 +77,7 @@ impl Status {
         match self {
             Self::Ok => "ok",
             Self::OtherCount => "other_count",
+            Self::BoundMissed => "bound_missed",
             Self::Unsupported => "unsupported",
             Self::Refused => "refused",
             Self::Failed => "failed",

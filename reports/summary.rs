@@ -1,24 +1,33 @@
-//! Means over meshes, made so that no method gains by failing.
+//! Means over meshes that no other method changes.
 //!
-//! At one number of spheres, methods are averaged over the meshes that all of them have in
-//! common. A method that reached the count on less than half of the meshes would leave the others
-//! nothing to be averaged over: it is averaged over its own meshes and marked as not compared.
+//! 1. Each method has one *set* of meshes for all its means: those on which it reached every count
+//!    that counts for it, so that a curve over counts never changes meshes on its way. Counts that
+//!    it reached on few meshes do not count for it, the rarest first, until the set holds at least
+//!    half of the meshes it was asked for. A count left out so has no mean; how often it was
+//!    reached is said.
+//! 2. Methods are ranked by ratios to one reference method, mesh by mesh, over the meshes that both
+//!    reached. A mesh that a method misses costs that method its point, and nobody else.
+//!
+//! Which other methods ran decides no number here but where the reference itself is missing.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::comparison::{Comparison, Entry};
-use crate::metric::{COMPARED, HAUSDORFF, Metric};
+use crate::metric::{COMPARED, HAUSDORFF, Mean, Metric};
 use crate::record::Status;
 
 /// Error bounds, in % of the diagonal, for which the fewest spheres are told.
-pub(crate) const ERROR_BOUNDS: [f64; 3] = [2.0, 1.0, 0.5];
+pub(crate) const ERROR_BOUNDS: [f64; 4] = [2.0, 1.0, 0.5, 0.2];
+
+/// The method that others are put in relation to, where it ran with its defaults.
+const REFERENCE: &str = "qmat";
 
 /// All methods at one number of spheres.
 pub(crate) struct CountSummary {
     /// The number of spheres that was asked.
     pub(crate) count: usize,
-    /// Number of meshes that the compared methods have in common.
-    pub(crate) common: usize,
+    /// Number of meshes that any method was asked for.
+    pub(crate) meshes: usize,
     /// One row for each series that was asked for this count.
     pub(crate) rows: Vec<SeriesSummary>,
 }
@@ -26,8 +35,8 @@ pub(crate) struct CountSummary {
 /// One method at one number of spheres.
 pub(crate) struct SeriesSummary {
     pub(crate) series: usize,
-    /// Whether the means are over the common meshes; otherwise over the method's own.
-    pub(crate) compared: bool,
+    /// Meshes that the means are over: the method's own set; 0 where this count has no mean.
+    pub(crate) over: usize,
     /// Meshes that the method was asked for.
     pub(crate) asked: usize,
     /// Meshes on which it reached the count.
@@ -40,10 +49,22 @@ pub(crate) struct SeriesSummary {
     pub(crate) unsupported: usize,
     /// Means of [`COMPARED`], in that order.
     pub(crate) means: [Option<f64>; COMPARED.len()],
+    /// Hausdorff error in relation to the reference's.
+    pub(crate) ratio: Option<Ratio>,
     /// Arithmetic means of substrate, prepare and simplify seconds.
     pub(crate) stages: Option<[f64; 3]>,
-    /// Results with the Betti numbers of the solid, of those where both are known.
+    /// Results with the Betti numbers of the solid, of those where both are known; over all meshes
+    /// on which it reached the count.
     pub(crate) topology: (usize, usize),
+}
+
+/// One method in relation to the reference, over the meshes that both reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ratio {
+    /// Geometric mean of the ratios.
+    pub(crate) value: f64,
+    /// Number of meshes.
+    pub(crate) meshes: usize,
 }
 
 impl SeriesSummary {
@@ -54,12 +75,68 @@ impl SeriesSummary {
     }
 }
 
-/// Summaries for every number of spheres that was asked, from many to few.
-pub(crate) fn by_count(comparison: &Comparison<'_>) -> Vec<CountSummary> {
-    comparison.counts().map(|(level, count)| at_count(comparison, level, count)).collect()
+impl CountSummary {
+    /// Whether a row's means are over all meshes, and so read beside others of that kind.
+    pub(crate) fn is_whole(&self, row: &SeriesSummary) -> bool {
+        row.over == self.meshes && row.over > 0
+    }
 }
 
-fn at_count(comparison: &Comparison<'_>, level: usize, count: usize) -> CountSummary {
+/// The series that others are put in relation to: Q-MAT as it is by default, or else the first
+/// series that reached a count.
+pub(crate) fn reference(comparison: &Comparison<'_>) -> Option<usize> {
+    let plain = comparison.series.iter().position(|label| label == REFERENCE);
+    let first = || comparison.entries.iter().filter(|e| e.comparable()).map(|e| e.series).min();
+    plain.filter(|&series| comparison.entries.iter().any(|e| e.series == series)).or_else(first)
+}
+
+/// Summaries for every number of spheres that was asked, from many to few.
+pub(crate) fn by_count(comparison: &Comparison<'_>) -> Vec<CountSummary> {
+    let sets: Vec<OwnSet> =
+        (0..comparison.series.len()).map(|series| OwnSet::of(comparison, series)).collect();
+    let reference = reference(comparison);
+    let counts = comparison.counts();
+    counts.map(|(level, count)| at_count(comparison, &sets, reference, (level, count))).collect()
+}
+
+/// The counts that have means for a method, and the meshes that these are over.
+struct OwnSet {
+    levels: BTreeSet<usize>,
+    meshes: BTreeSet<usize>,
+}
+
+impl OwnSet {
+    fn of(comparison: &Comparison<'_>, series: usize) -> Self {
+        let mut asked = BTreeSet::new();
+        let mut reached: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+        let counts: BTreeSet<usize> = comparison.counts().map(|(level, _)| level).collect();
+        for entry in comparison.entries.iter().filter(|entry| entry.series == series) {
+            if counts.contains(&entry.level) {
+                asked.insert(entry.mesh);
+                let meshes = reached.entry(entry.level).or_default();
+                meshes.extend(entry.comparable().then_some(entry.mesh));
+            }
+        }
+        loop {
+            let common = reached.values().cloned().reduce(|a, b| &a & &b).unwrap_or_default();
+            // Levels are from many spheres to few: of two as rare, the finer one goes.
+            let rarest = reached.iter().min_by_key(|(level, meshes)| (meshes.len(), **level));
+            match rarest.map(|(&level, _)| level) {
+                Some(rarest) if 2 * common.len() < asked.len() || common.is_empty() => {
+                    reached.remove(&rarest);
+                }
+                _ => return Self { levels: reached.into_keys().collect(), meshes: common },
+            }
+        }
+    }
+}
+
+fn at_count(
+    comparison: &Comparison<'_>,
+    sets: &[OwnSet],
+    reference: Option<usize>,
+    (level, count): (usize, usize),
+) -> CountSummary {
     let of_series = |series: usize| -> Vec<&Entry<'_>> {
         let here = |entry: &&Entry<'_>| entry.level == level && entry.series == series;
         comparison.entries.iter().filter(here).collect()
@@ -70,51 +147,46 @@ fn at_count(comparison: &Comparison<'_>, level: usize, count: usize) -> CountSum
         .collect();
     let meshes: BTreeSet<usize> =
         all.iter().flat_map(|(_, entries)| entries.iter().map(|entry| entry.mesh)).collect();
-    let reached_on = |entries: &[&Entry<'_>]| -> BTreeSet<usize> {
-        entries.iter().filter(|entry| entry.comparable()).map(|entry| entry.mesh).collect()
+    let yardstick = reference.map(of_series).unwrap_or_default();
+    let row = |(series, entries): &(usize, Vec<&Entry<'_>>)| {
+        let set = &sets[*series];
+        let kept = entries.iter().copied().filter(|entry| {
+            set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
+        });
+        let mut row = summarise(*series, entries, &kept.collect::<Vec<_>>());
+        row.ratio = ratio(entries, &yardstick);
+        row
     };
-    let takes_part = |entries: &[&Entry<'_>]| {
-        let reached = reached_on(entries).len();
-        reached > 0 && 2 * reached >= meshes.len()
+    CountSummary { count, meshes: meshes.len(), rows: all.iter().map(row).collect() }
+}
+
+/// Hausdorff errors in relation to those of the reference, on the meshes where both reached a count.
+fn ratio(entries: &[&Entry<'_>], reference: &[&Entry<'_>]) -> Option<Ratio> {
+    let error = |entry: &Entry<'_>| {
+        HAUSDORFF.of(entry.record).filter(|&error| entry.comparable() && error > 0.0)
     };
-    let common = all
-        .iter()
-        .filter(|(_, entries)| takes_part(entries))
-        .map(|(_, entries)| reached_on(entries))
-        .reduce(|a, b| &a & &b)
-        .unwrap_or_default();
-    let rows = all
-        .iter()
-        .map(|(series, entries)| {
-            let compared = takes_part(entries) && !common.is_empty();
-            let kept: Vec<&Entry<'_>> = entries
-                .iter()
-                .copied()
-                .filter(|entry| entry.comparable() && (!compared || common.contains(&entry.mesh)))
-                .collect();
-            summarise(*series, compared, entries, &kept)
-        })
-        .collect();
-    CountSummary { count, common: common.len(), rows }
+    let pair = |entry: &&Entry<'_>| {
+        let other = reference.iter().find(|other| other.mesh == entry.mesh)?;
+        Some(error(entry)? / error(other)?)
+    };
+    let ratios: Vec<f64> = entries.iter().filter_map(pair).collect();
+    let value = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
+    Some(Ratio { value, meshes: ratios.len() })
 }
 
 /// The row of one series from all its entries and those that are averaged.
-fn summarise(
-    series: usize,
-    compared: bool,
-    entries: &[&Entry<'_>],
-    kept: &[&Entry<'_>],
-) -> SeriesSummary {
+fn summarise(series: usize, entries: &[&Entry<'_>], kept: &[&Entry<'_>]) -> SeriesSummary {
     let number = |of: &dyn Fn(&Entry<'_>) -> bool| entries.iter().filter(|entry| of(entry)).count();
-    let reached = number(&|entry| entry.comparable());
+    let reached: Vec<&Entry<'_>> =
+        entries.iter().copied().filter(|entry| entry.comparable()).collect();
     let failed = number(&|entry| entry.record.status.is_failure());
     let unsupported = number(&|entry| entry.record.status == Status::Unsupported);
     SeriesSummary {
         series,
-        compared,
+        over: kept.len(),
         asked: entries.len(),
-        reached,
-        missed: entries.len() - reached - failed - unsupported,
+        reached: reached.len(),
+        missed: entries.len() - reached.len() - failed - unsupported,
         failed,
         unsupported,
         means: COMPARED.map(|metric| {
@@ -123,8 +195,9 @@ fn summarise(
             // A mean over fewer meshes than the others' would not compare.
             if values.len() == kept.len() { metric.mean.of(&values) } else { None }
         }),
+        ratio: None,
         stages: mean_stages(kept),
-        topology: topology(kept),
+        topology: topology(&reached),
     }
 }
 
@@ -149,10 +222,10 @@ fn topology(entries: &[&Entry<'_>]) -> (usize, usize) {
     known.fold((0, 0), |(right, all), same| (right + usize::from(same), all + 1))
 }
 
-/// The series with the best mean among those compared, where at least two are.
+/// The best mean among those over all meshes, where there are at least two.
 pub(crate) fn best(summary: &CountSummary, metric: &Metric) -> Option<f64> {
-    let means: Vec<f64> =
-        summary.rows.iter().filter(|row| row.compared).filter_map(|row| row.mean(metric)).collect();
+    let whole = summary.rows.iter().filter(|row| summary.is_whole(row));
+    let means: Vec<f64> = whole.filter_map(|row| row.mean(metric)).collect();
     (means.len() > 1).then(|| means.into_iter().reduce(|a, b| pick(metric, a, b))).flatten()
 }
 
@@ -163,10 +236,10 @@ pub(crate) fn pick(metric: &Metric, a: f64, b: f64) -> f64 {
 
 /// The area under a series' curve of Hausdorff error against spheres, both as logarithms, over the
 /// whole range of counts, told as the error of the level line with the same area: in % of the diagonal.
-/// `None` where the series was not compared at some count, or there is only one.
+/// `None` where the series has no mean at some count, or there is only one.
 pub(crate) fn curve_level(summaries: &[CountSummary], series: usize) -> Option<f64> {
     let point = |summary: &CountSummary| {
-        let row = summary.rows.iter().find(|row| row.series == series && row.compared)?;
+        let row = summary.rows.iter().find(|row| row.series == series)?;
         Some(((summary.count as f64).ln(), row.mean(&HAUSDORFF)?.max(1e-6).ln()))
     };
     let points: Vec<(f64, f64)> = summaries.iter().map(point).collect::<Option<_>>()?;
@@ -212,38 +285,45 @@ pub(crate) fn fewest_spheres(comparison: &Comparison<'_>, series: usize, bound: 
     }
 }
 
-/// One sentence for each number of spheres: who has the lowest error, by how much, at what time.
+/// One sentence for each number of spheres: who has the lowest error in relation to the reference,
+/// on how many meshes, at what time.
 pub(crate) fn headlines(comparison: &Comparison<'_>, summaries: &[CountSummary]) -> Vec<String> {
-    summaries.iter().filter_map(|summary| headline(comparison, summary)).collect()
+    let Some(reference) = reference(comparison) else { return Vec::new() };
+    summaries.iter().filter_map(|summary| headline(comparison, reference, summary)).collect()
 }
 
-fn headline(comparison: &Comparison<'_>, summary: &CountSummary) -> Option<String> {
-    let mut ranked: Vec<(f64, &SeriesSummary)> = summary
+fn headline(
+    comparison: &Comparison<'_>,
+    reference: usize,
+    summary: &CountSummary,
+) -> Option<String> {
+    let name = |series: usize| comparison.series[series].as_str();
+    // A method that shares few meshes with the reference has not shown what it can do on the rest.
+    let mut ranked: Vec<(Ratio, &SeriesSummary)> = summary
         .rows
         .iter()
-        .filter(|row| row.compared)
-        .filter_map(|row| Some((row.mean(&HAUSDORFF)?, row)))
+        .filter_map(|row| Some((row.ratio.filter(|r| 2 * r.meshes >= summary.meshes)?, row)))
         .collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.series.cmp(&b.1.series)));
-    let &(error, row) = ranked.first()?;
-    let name = |row: &SeriesSummary| comparison.series[row.series].as_str();
+    ranked.sort_by(|a, b| a.0.value.total_cmp(&b.0.value).then(a.1.series.cmp(&b.1.series)));
+    let &(ratio, row) = ranked.first()?;
     let spheres = crate::text::counted(summary.count, "sphere", "spheres");
-    let meshes = crate::text::counted(summary.common, "mesh", "meshes");
-    let mut text = format!(
-        "{spheres}: {} has a Hausdorff error of {} % of the diagonal over {meshes}",
-        name(row),
-        HAUSDORFF.format_mean(error)
-    );
+    let told = |ratio: Ratio, row: &SeriesSummary| {
+        let times = match row.series == reference {
+            true => "the reference".to_owned(),
+            false => {
+                let value = crate::text::significant(ratio.value, 3);
+                format!("{value} times the error of {}", name(reference))
+            }
+        };
+        let meshes = crate::text::counted(ratio.meshes, "mesh", "meshes");
+        format!("{} ({times}, on {meshes})", name(row.series))
+    };
+    let mut text = format!("{spheres}: the lowest Hausdorff error has {}", told(ratio, row));
     if let Some(seconds) = row.mean(&crate::metric::TOTAL_SECONDS) {
         text.push_str(&format!(" in {} s", crate::text::significant(seconds, 3)));
     }
     match ranked.get(1) {
-        Some(&(next, other)) => text.push_str(&format!(
-            ", the lowest; then {} with {} % ({} times)",
-            name(other),
-            HAUSDORFF.format_mean(next),
-            crate::text::significant(next / error, 3)
-        )),
+        Some(&(next, other)) => text.push_str(&format!("; then {}", told(next, other))),
         None => text.push_str("; nothing to compare it with"),
     }
     text.push('.');
@@ -258,10 +338,10 @@ mod tests {
     fn curve(errors: &[(usize, Option<f64>)]) -> Vec<CountSummary> {
         let summary = |&(count, error): &(usize, Option<f64>)| CountSummary {
             count,
-            common: 1,
+            meshes: 1,
             rows: vec![SeriesSummary {
                 series: 0,
-                compared: error.is_some(),
+                over: usize::from(error.is_some()),
                 asked: 1,
                 reached: 1,
                 missed: 0,
@@ -269,6 +349,7 @@ mod tests {
                 unsupported: 0,
                 means: COMPARED
                     .map(|metric| if metric.key == HAUSDORFF.key { error } else { None }),
+                ratio: None,
                 stages: None,
                 topology: (0, 0),
             }],

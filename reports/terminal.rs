@@ -9,8 +9,9 @@ use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::text::printable;
 
 /// The columns behind the name of the method: title and width.
-const COLUMNS: [(&str, usize); 7] = [
+const COLUMNS: [(&str, usize); 8] = [
     ("Hausdorff %", 12),
+    ("over", 8),
     ("mean %", 9),
     ("topology", 9),
     ("seconds", 9),
@@ -37,11 +38,11 @@ fn write_count(
     comparison: &Comparison<'_>,
     width: usize,
 ) {
-    let meshes = if summary.common == 1 { "mesh" } else { "meshes" };
+    let meshes = if summary.meshes == 1 { "mesh" } else { "meshes" };
     let _ = writeln!(
         text,
-        "{} spheres, means over {} {meshes} that all reached",
-        summary.count, summary.common
+        "{} spheres, {} {meshes}; each method's means over its own set of them",
+        summary.count, summary.meshes
     );
     let _ = write!(text, "  {:<width$}", "method");
     for (title, width) in COLUMNS {
@@ -61,6 +62,7 @@ fn write_row(text: &mut String, row: &SeriesSummary, label: &str, width: usize) 
     let (right, known) = row.topology;
     let cells = [
         number(&HAUSDORFF),
+        format!("{}/{}", row.over, row.asked),
         number(&MEAN_ERROR),
         format!("{right}/{known}"),
         number(&TOTAL_SECONDS),
@@ -72,8 +74,5 @@ fn write_row(text: &mut String, row: &SeriesSummary, label: &str, width: usize) 
     for (cell, (_, width)) in cells.iter().zip(COLUMNS) {
         let _ = write!(text, "{cell:>width$}");
     }
-    // Means over other meshes than the rest cannot be read beside them.
-    // A row without any result is averaged over nothing, not over its own meshes.
-    let own = !row.compared && row.mean(&HAUSDORFF).is_some();
-    text.push_str(if own { "  (own meshes)\n" } else { "\n" });
+    text.push('\n');
 }

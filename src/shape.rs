@@ -34,7 +34,9 @@ use substrate::{Cache, Use};
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
 pub struct Shape {
     store: Arc<Store>,
-    used: Mutex<BTreeMap<Substrate, Use>>,
+    /// Shared by a view and those that start from another medial mesh on its behalf.
+    used: Arc<Mutex<BTreeMap<Substrate, Use>>>,
+    given: Option<Result<Arc<MedialMesh>, ShapeError>>,
 }
 
 /// How the substrates of a shape are built; the same for every method in a comparison.
@@ -52,7 +54,6 @@ struct Store {
     normalisation: Normalisation,
     report: SurfaceReport,
     options: ShapeOptions,
-    given: Option<Result<Arc<MedialMesh>, ShapeError>>,
     samples: Cache<Sampling, Arc<[Vec3]>>,
     delaunay: Cache<Sampling, Arc<Delaunay>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
@@ -87,7 +88,6 @@ impl Shape {
             normalisation,
             report,
             options,
-            given: None,
             samples: Cache::default(),
             delaunay: Cache::default(),
             cells: Cache::default(),
@@ -97,19 +97,15 @@ impl Shape {
             tree: Cache::default(),
             inside: Cache::default(),
         };
-        Ok(Self { store: Arc::new(store), used: Mutex::default() })
+        Ok(Self { store: Arc::new(store), used: Arc::default(), given: None })
     }
 
     /// The shape with an initial medial mesh from elsewhere, in input units, in place of its own.
     /// [`Shape::initial`] refuses one without a sphere, and one that is not valid once normalised.
-    ///
-    /// # Panics
-    /// If another view on the same store exists.
     pub fn with_initial(mut self, initial: &MedialMesh) -> Self {
-        let store = Arc::get_mut(&mut self.store).expect("the only view");
-        let to_normal = store.normalisation;
+        let to_normal = self.store.normalisation;
         let mesh = initial.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
-        store.given = Some(match mesh.check() {
+        self.given = Some(match mesh.check() {
             Ok(()) if mesh.spheres.is_empty() => Err(ShapeError::EmptyInitial),
             Ok(()) => Ok(Arc::new(mesh)),
             Err(error) => Err(ShapeError::Initial(error)),
@@ -119,7 +115,24 @@ impl Shape {
 
     /// A fresh view: the same substrates, nothing used yet.
     pub fn view(&self) -> Self {
-        Self { store: Arc::clone(&self.store), used: Mutex::default() }
+        Self { used: Arc::default(), ..self.sharing() }
+    }
+
+    /// The shape with an initial medial mesh in place of its own, in normalised units, on behalf of
+    /// this view: what is used through it counts as used here.
+    ///
+    /// # Errors
+    /// [`ShapeError::EmptyInitial`] for one without a sphere.
+    pub fn starting_from(&self, initial: Arc<MedialMesh>) -> Result<Self, ShapeError> {
+        if initial.spheres.is_empty() {
+            return Err(ShapeError::EmptyInitial);
+        }
+        Ok(Self { given: Some(Ok(initial)), ..self.sharing() })
+    }
+
+    fn sharing(&self) -> Self {
+        let (store, used) = (Arc::clone(&self.store), Arc::clone(&self.used));
+        Self { store, used, given: self.given.clone() }
     }
 
     /// Name of the input.
@@ -244,7 +257,7 @@ impl Shape {
     /// When the samples do not span space, or no pole lies inside the surface; when the given mesh has
     /// no sphere or is not valid.
     pub fn inner_balls(&self) -> Result<Arc<InnerBalls>, ShapeError> {
-        if let Some(given) = &self.store.given {
+        if let Some(given) = &self.given {
             return given.as_ref().map(|m| Arc::new(InnerBalls::of_mesh(m))).map_err(Clone::clone);
         }
         let delaunay = self.delaunay()?;
@@ -265,7 +278,7 @@ impl Shape {
     /// # Errors
     /// As [`Shape::voronoi`]; when the given mesh has no sphere or is not valid.
     pub fn initial(&self) -> Result<Arc<MedialMesh>, ShapeError> {
-        match &self.store.given {
+        match &self.given {
             Some(given) => given.clone(),
             None => self.voronoi(),
         }
@@ -273,7 +286,7 @@ impl Shape {
 
     /// Whether [`Shape::initial`] is a given mesh, which need not be part of a Voronoi diagram.
     pub fn has_given_initial(&self) -> bool {
-        self.store.given.is_some()
+        self.given.is_some()
     }
 
     /// The contact points of each sphere of a medial mesh of this shape: those that it carries, or

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::complex::MedialMesh;
 use crate::shape::{Cost, Shape};
 
+mod chain;
 mod error;
 mod extras;
 mod info;
@@ -18,6 +19,7 @@ mod method;
 mod params;
 mod run;
 
+pub use chain::Chain;
 pub use error::SimplifyError;
 pub use extras::Extras;
 pub use info::{Capability, MethodInfo, NativeLevel, ParamInfo};
@@ -145,6 +147,9 @@ pub enum Level {
     Spheres(usize),
     /// The method's own scalar, in the unit that [`MethodInfo::native`] names.
     Native(f64),
+    /// As few spheres as keep the symmetric Hausdorff error within this fraction of the diagonal.
+    /// For methods that do not do this of themselves, a harness searches among their other levels.
+    MaxError(f64),
 }
 
 impl fmt::Display for Level {
@@ -153,8 +158,14 @@ impl fmt::Display for Level {
             Self::Published => write!(f, "published"),
             Self::Spheres(count) => write!(f, "{count} spheres"),
             Self::Native(value) => write!(f, "level {value}"),
+            Self::MaxError(bound) => write!(f, "at most {} % error", percent(*bound)),
         }
     }
+}
+
+/// A fraction as a percentage, without the digits that the multiplication adds.
+fn percent(fraction: f64) -> f64 {
+    (fraction * 1e12).round() / 1e10
 }
 
 /// A simplified medial mesh and what is to be known of it.

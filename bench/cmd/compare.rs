@@ -35,9 +35,19 @@ pub struct Arguments {
     /// Sphere counts, separated by commas [default: 1000,500,200,100].
     #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
-    /// Levels of a method's own beside the counts; can be given several times.
+    /// Levels of a method's own beside the counts, in place of its default sweep; can be given
+    /// several times.
     #[arg(long, value_name = "ID=X,Y")]
     levels: Vec<String>,
+    /// No levels of a method's own but those given.
+    #[arg(long)]
+    no_sweep: bool,
+    /// Search the fewest spheres within each of these Hausdorff errors, fractions of the diagonal.
+    #[arg(long, value_name = "E,F", value_delimiter = ',')]
+    max_error: Vec<f64>,
+    /// Also run these methods from what each filter leaves: `qmat` adds `angle+qmat` and so on.
+    #[arg(long, value_name = "IDS", value_delimiter = ',')]
+    after_filters: Vec<String>,
     /// Also run each method at its published level.
     #[arg(long)]
     published: bool,
@@ -147,6 +157,13 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     if !arguments.spheres.is_empty() {
         study.spheres.clone_from(&arguments.spheres);
     }
+    if !arguments.max_error.is_empty() {
+        study.max_error.clone_from(&arguments.max_error);
+    }
+    if !arguments.after_filters.is_empty() {
+        study.after_filters.clone_from(&arguments.after_filters);
+    }
+    study.sweep &= !arguments.no_sweep;
     study.published |= arguments.published;
     study.repeat = arguments.repeat.unwrap_or(study.repeat);
     study.timeout = arguments.timeout.unwrap_or(study.timeout);
@@ -165,6 +182,7 @@ impl Arguments {
             return Ok(());
         }
         study.methods = study.entries(registry)?.into_iter().map(|(method, _)| method).collect();
+        study.after_filters.clear();
         for word in &self.set {
             let parts = word.split_once('=').and_then(|(name, value)| {
                 let (method, key) = name.split_once('.')?;

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use medial::complex;
+use medial::complex::{self, MedialMesh};
 use medial::complex::collapse::Hierarchy;
-use medial::metrics::JudgeOptions;
+use medial::metrics::{JudgeOptions, MetricError};
 use medial::shape::Shape;
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError,
@@ -27,20 +27,27 @@ use crate::exit::{Exit, Failure};
 use crate::files::{check_folder, check_output, medial_mesh_for};
 use crate::output::{counted, note, percent, print_json, print_line, version};
 use crate::run::record::fill_result;
-use crate::run::{Fault, Input, LevelRun, Registry, Source, StageLine, answer, search_error};
+use crate::run::{
+    Fault, Input, LevelRun, Probe, Registry, Search, Source, StageLine, answer,
+};
 
 /// What a search over sphere counts found, for the answer to `--max-error`.
 #[derive(Debug, Serialize)]
-struct Search {
+struct Searched {
     /// The bound, a fraction of the diagonal.
     bound: f64,
     /// The error of the result.
     hausdorff: f64,
-    /// Number of sphere counts that were tried.
+    /// Number of levels that were tried.
     tried: usize,
     /// Spheres of the result.
     spheres: usize,
+    /// Whether the error is the upper end of a certified interval, or else a maximum of samples.
+    certified: bool,
 }
+
+/// Width of the interval that certifies a bound, as a share of it.
+const CERTIFIED_SHARE: f64 = 0.05;
 
 /// Arguments of `simplify`.
 #[derive(Debug, Args)]
@@ -59,6 +66,9 @@ pub struct Arguments {
     /// As few spheres as keep the symmetric Hausdorff error within this fraction of the diagonal.
     #[arg(long, value_name = "E")]
     max_error: Option<f64>,
+    /// Hold that bound by a certificate, not by samples alone.
+    #[arg(long, requires = "max_error")]
+    certify: bool,
     /// Set a parameter of the method; can be given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -240,16 +250,16 @@ fn simplify(
     start: &Start<'_>,
     input: &Input,
     line: &StageLine,
-) -> Result<(LevelRun, Option<Search>), Failure> {
+) -> Result<(LevelRun, Option<Searched>), Failure> {
     let seed = arguments.substrate.seed();
     let run = RunContext::with_seed(seed).on_progress(line.steps());
     let (level, search) = match (arguments.spheres, arguments.level, arguments.max_error) {
         (Some(count), ..) => (Level::Spheres(count), None),
         (_, Some(value), _) => (Level::Native(value), None),
         (.., Some(bound)) => {
-            let search = search(arguments, start, input, (bound, line))?;
             // The seconds are those of the level found, asked alone.
-            (Level::Spheres(search.spheres), Some(search))
+            let (level, search) = search(arguments, start, input, (bound, line))?;
+            (level, Some(search))
         }
         _ => (Level::Published, None),
     };
@@ -276,7 +286,7 @@ fn search(
     start: &Start<'_>,
     input: &Input,
     (bound, line): (f64, &StageLine),
-) -> Result<Search, Failure> {
+) -> Result<(Level, Searched), Failure> {
     let seed = arguments.substrate.seed();
     let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
     let refused = |error: SimplifyError| failure_of(input, error.into());
@@ -287,12 +297,24 @@ fn search(
     let run = RunContext::with_seed(seed).on_progress(line.steps());
     let mut simplification = start.begin(&view, &run).map_err(refused)?;
     let initial = start.spheres().map_err(refused)?;
-    let found = search_error(simplification.as_mut(), &judge, initial, bound, |count| {
-        line.at(format!("searching the bound: {count} spheres"));
-    });
-    let found = found.map_err(refused)?;
-    let spheres = found.simplified.mesh.spheres.len();
-    Ok(Search { bound, hausdorff: found.hausdorff, tried: found.tried, spheres })
+    let measure = |mesh: &MedialMesh| -> Result<f64, String> {
+        let told = |error: MetricError| error.to_string();
+        let sampled = judge.distances(mesh).map_err(told)?.hausdorff;
+        match arguments.certify && sampled <= bound {
+            // An upper end within the bound needs an interval that is narrow beside it.
+            true => Ok(judge.certify(mesh, CERTIFIED_SHARE * bound).map_err(told)?.upper),
+            false => Ok(sampled),
+        }
+    };
+    let trying = |level: Level| line.at(format!("searching the bound: {level}"));
+    let info = start.method.info();
+    let mut search = Search::new(simplification.as_mut(), info, initial, &measure, &trying);
+    let found = search.within(bound).map_err(refused)?;
+    let Some(Probe { level, spheres, error }) = found.within else {
+        return Err(Failure::usage(found.refusal(bound)));
+    };
+    let (tried, certified) = (found.tried, arguments.certify);
+    Ok((level, Searched { bound, hausdorff: error, tried, spheres, certified }))
 }
 
 fn describe(arguments: &Arguments, start: &Start<'_>, run: &LevelRun) -> Simplify {
@@ -336,7 +358,7 @@ fn failure_named(name: &str, Fault { status, reason }: Fault) -> Failure {
 
 fn print_result(
     simplify: &Simplify,
-    search: Option<&Search>,
+    search: Option<&Searched>,
     arguments: &Arguments,
     global: &Global,
 ) {
@@ -356,9 +378,10 @@ fn print_result(
     }
     if let Some(search) = search {
         print_line(&format!(
-            "  Hausdorff error {}, the fewest of {} tried",
+            "  Hausdorff error {}{}, the fewest spheres of {} tried",
+            if search.certified { "at most " } else { "" },
             percent(search.hausdorff),
-            counted(search.tried as u64, "count")
+            counted(search.tried as u64, "level")
         ));
     }
     if let Some(output) = &arguments.output {

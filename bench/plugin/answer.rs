@@ -38,7 +38,7 @@ pub(super) fn answer(task: &Task<'_>, ended: Ended) -> Result<Simplified, Simpli
     let mut simplified = Simplified::new(mesh, task.level);
     simplified.native_level = match task.level {
         Level::Native(value) => report.native_level.or(Some(value)),
-        Level::Spheres(_) | Level::Published => report.native_level,
+        _ => report.native_level,
     };
     let diagnostics = &mut simplified.diagnostics;
     report.warnings.into_iter().chain(notes).for_each(|warning| diagnostics.warn(warning));

@@ -199,7 +199,8 @@ fn checked(simplified: Simplified) -> Result<Simplified, Fault> {
     Ok(simplified)
 }
 
-fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
+/// What work gives, or why it ended, panics included.
+pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(outcome) => Ok(outcome?),
         Err(payload) => {

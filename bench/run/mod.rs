@@ -9,12 +9,13 @@
 //! | files | step |
 //! |---|---|
 //! | `source`, `item`, `registry` | what is run |
-//! | `scene`, `answer`, `verdict`, `record` | the path of one item, inside a worker |
+//! | `scene`, `answer`, `search`, `bounds`, `verdict`, `record` | the path of one item, inside a worker |
 //! | `protocol`, `serve`, `worker` | processes and what they say |
 //! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
 //! | `store` | the folder of results |
 
 mod answer;
+mod bounds;
 mod ending;
 mod item;
 mod npy;
@@ -50,7 +51,7 @@ pub use record::Kept;
 pub use registry::{Entry, Registry, RegistryError};
 pub use reproduce::Reproducer;
 pub use scene::Scene;
-pub use search::{Found, search_error};
+pub use search::{Found, Probe, Search};
 pub use serve::serve;
 pub use similar::did_you_mean;
 pub use source::{Input, InputError, Source};

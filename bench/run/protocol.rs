@@ -89,6 +89,8 @@ pub enum Event {
     Preparing(String),
     /// The method is asked for a level.
     Asked(Level),
+    /// The fewest spheres within a bound are searched, on a clock of their own.
+    Searching(Level),
     /// The results are being measured.
     Measuring,
     /// The input is refused: why.

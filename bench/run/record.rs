@@ -192,6 +192,7 @@ fn save(
         Level::Published => "published".to_owned(),
         Level::Spheres(count) => count.to_string(),
         Level::Native(value) => format!("level-{value}"),
+        Level::MaxError(bound) => format!("error-{bound}"),
     };
     let mesh = file_stem(&record.mesh);
     let method = file_stem(record.simplify.variant.as_ref().unwrap_or(&record.simplify.method));

@@ -1,21 +1,25 @@
 //! The methods that there are: those of the program, and those of plug-in files.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use medial::simplifier::MedialSimplifier;
+use medial::simplifier::{Chain, MedialSimplifier};
 
 use crate::plugin::{self, PluginError};
 
 /// Methods by id, in the order of the tables.
 pub struct Registry {
     entries: Vec<Entry>,
+    /// Every pair of them, the second after the first. Made with their parts, so that the same id
+    /// means the same in a worker.
+    chains: Vec<Entry>,
     /// The plug-in files that were added, as absolute paths.
     files: Vec<PathBuf>,
 }
 
 /// A method, and what it is made of where it is not part of the program.
 pub struct Entry {
-    method: Box<dyn MedialSimplifier>,
+    method: Arc<dyn MedialSimplifier>,
     fingerprint: Option<String>,
 }
 
@@ -23,6 +27,19 @@ impl Entry {
     /// The method.
     pub fn method(&self) -> &dyn MedialSimplifier {
         self.method.as_ref()
+    }
+
+    fn chain(first: &Self, then: &Self) -> Self {
+        let method = Arc::new(Chain::new(Arc::clone(&first.method), Arc::clone(&then.method)));
+        let parts = [&first.fingerprint, &then.fingerprint];
+        let fingerprint = parts.iter().any(|part| part.is_some()).then(|| {
+            parts.map(|part| part.as_deref().unwrap_or("built in")).join(" + ")
+        });
+        Self { method, fingerprint }
+    }
+
+    fn is_fixed(&self) -> bool {
+        self.method.info().fixed
     }
 
     /// Its id.
@@ -54,13 +71,14 @@ impl Registry {
     /// # Errors
     /// [`RegistryError::Duplicate`] when two have one id.
     pub fn new(methods: Vec<Box<dyn MedialSimplifier>>) -> Result<Self, RegistryError> {
-        let mut registry = Self { entries: Vec::new(), files: Vec::new() };
+        let mut registry =
+            Self { entries: Vec::new(), chains: Vec::new(), files: Vec::new() };
         for method in methods {
             let id = &method.info().id;
             if registry.entry(id).is_some() {
                 return Err(RegistryError::Duplicate(id.clone().into_owned()));
             }
-            registry.entries.push(Entry { method, fingerprint: None });
+            registry.add(Entry { method: method.into(), fingerprint: None });
         }
         Ok(registry)
     }
@@ -77,18 +95,27 @@ impl Registry {
         let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
         for external in plugin::load(&file, &taken)? {
             let fingerprint = Some(external.fingerprint().to_owned());
-            self.entries.push(Entry { method: Box::new(external), fingerprint });
+            self.add(Entry { method: Arc::new(external), fingerprint });
         }
         self.files.push(file);
         Ok(())
     }
 
-    /// The method with an id.
-    pub fn entry(&self, id: &str) -> Option<&Entry> {
-        self.entries.iter().find(|entry| entry.id() == id)
+    /// Adds a method, and its chains with those that are there.
+    fn add(&mut self, new: Entry) {
+        for other in self.entries.iter().filter(|other| !other.is_fixed() && !new.is_fixed()) {
+            self.chains.push(Entry::chain(other, &new));
+            self.chains.push(Entry::chain(&new, other));
+        }
+        self.entries.push(new);
     }
 
-    /// All methods.
+    /// The method with an id, or the chain of two: `FIRST+THEN`.
+    pub fn entry(&self, id: &str) -> Option<&Entry> {
+        self.entries.iter().chain(&self.chains).find(|entry| entry.id() == id)
+    }
+
+    /// All methods, chains left out.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }

@@ -1,76 +1,270 @@
-//! The coarsest level within an error bound, by a search over sphere counts, for every method alike.
+//! The coarsest level within an error bound, searched for every method alike.
+//!
+//! The error does not fall strictly with the number of spheres, and the finest level need not be
+//! the best: initial medial meshes have flaws that methods mend. So nothing is refused before it
+//! was tried.
+//!
+//! 1. Counts from that of the initial medial mesh downwards, each a fixed part of the one before.
+//! 2. Where none of them is within the bound, the method's own levels: its sweep, and the published
+//!    one.
+//! 3. From the fewest spheres that are within, the count is halved in between (as logarithms) down
+//!    to the next count that is not; a method without counts is asked for its own level instead.
+//!
+//! A coarser level that happens to be within the bound can be missed; what is found is within it.
 
-use medial::metrics::Judge;
-use medial::simplifier::{Level, Simplification, Simplified, SimplifyError};
+use medial::complex::MedialMesh;
+use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
 
-/// What [`search_error`] found.
+/// Counts tried at first.
+const COUNTS: usize = 7;
+/// The smallest factor between two of them.
+const RATIO: f64 = 4.0;
+/// Fewest spheres tried at first.
+const FEWEST: f64 = 4.0;
+/// Levels tried in between, for each bound. With those at first, at most 25 where a method has a
+/// sweep of ten levels.
+const BISECTIONS: usize = 7;
+/// Relative difference of two counts at which nothing is searched in between.
+const CLOSE: f64 = 1.02;
+
+/// How a medial mesh is measured: its error as a fraction of the diagonal.
+pub type Measure<'a> = dyn Fn(&MedialMesh) -> Result<f64, String> + 'a;
+
+/// A level that was tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Probe {
+    /// The level.
+    pub level: Level,
+    /// Spheres of the result.
+    pub spheres: usize,
+    /// Its error, a fraction of the diagonal.
+    pub error: f64,
+}
+
+/// What a search for one bound came to.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// The simplified mesh.
-    pub simplified: Simplified,
-    /// Its symmetric Hausdorff distance, a fraction of the diagonal.
-    pub hausdorff: f64,
+    /// The fewest spheres within the bound; `None` where no level that was tried is.
+    pub within: Option<Probe>,
+    /// The lowest error of all that was tried; `None` where the method gave no result at all.
+    pub best: Option<Probe>,
     /// Number of levels that were tried.
     pub tried: usize,
 }
 
-/// The smallest sphere count found with a symmetric Hausdorff distance of at most `bound`.
-///
-/// Halves the count from `initial` until the bound is exceeded, then bisects between the last two
-/// counts; `trying` is told each before it is tried. The error does not fall strictly with the count, so a smaller count that happens to
-/// satisfy the bound can be missed; the returned mesh does satisfy it.
-///
-/// # Errors
-/// [`SimplifyError::Level`] when even the initial mesh exceeds the bound, and what the method says.
-pub fn search_error(
-    simplification: &mut dyn Simplification,
-    judge: &Judge,
-    initial: usize,
-    bound: f64,
-    trying: impl Fn(usize),
-) -> Result<Found, SimplifyError> {
-    let mut tried = 0;
-    let mut probe = |count: usize| -> Result<(Simplified, f64), SimplifyError> {
-        tried += 1;
-        trying(count);
-        let simplified = simplification.at(Level::Spheres(count))?;
-        let distances = judge.distances(&simplified.mesh);
-        let hausdorff = distances.map_err(|e| SimplifyError::Level(e.to_string()))?.hausdorff;
-        Ok((simplified, hausdorff))
-    };
-    let mut best = probe(initial)?;
-    if best.1 > bound {
-        return Err(SimplifyError::Level(format!(
-            "no sphere count meets the bound: the initial medial mesh of {initial} spheres already \
-             has a Hausdorff error of {:.3e} of the diagonal, more than {bound:.3e}; sample more densely",
-            best.1
-        )));
+/// A search on one simplification; bounds that are asked later know what was tried before.
+pub struct Search<'a> {
+    simplification: &'a mut dyn Simplification,
+    measure: &'a Measure<'a>,
+    trying: &'a dyn Fn(Level),
+    probes: Vec<Probe>,
+    tried: usize,
+    refusal: Option<SimplifyError>,
+    counts: Vec<usize>,
+    own: Vec<Level>,
+}
+
+impl<'a> Search<'a> {
+    /// A search among counts from `most` on and the levels that `info` names. `trying` is told each
+    /// level before it is tried.
+    pub fn new(
+        simplification: &'a mut dyn Simplification,
+        info: &MethodInfo,
+        most: usize,
+        measure: &'a Measure<'a>,
+        trying: &'a dyn Fn(Level),
+    ) -> Self {
+        let ratio = (most as f64 / FEWEST).powf(1.0 / (COUNTS - 1) as f64).max(RATIO);
+        let count = |step: usize| (most as f64 / ratio.powi(step as i32)).round() as usize;
+        let counts = (0..COUNTS).map(count).filter(|&count| count >= FEWEST as usize).collect();
+        let sweep = info.sweep.iter().copied().map(Level::Native);
+        let own = sweep.chain([Level::Published]).collect();
+        let (probes, tried, refusal) = (Vec::new(), 0, None);
+        Self { simplification, measure, trying, probes, tried, refusal, counts, own }
     }
-    let (mut within, mut beyond) = (initial, 0);
-    while within > 1 && beyond == 0 {
-        let count = within / 2;
-        let (simplified, hausdorff) = probe(count)?;
-        if hausdorff > bound {
-            beyond = count;
-        } else {
-            // The method may stop above the count; asking for less would give the same mesh.
-            let stopped = simplified.mesh.spheres.len() > count;
-            best = (simplified, hausdorff);
-            within = count;
-            if stopped {
-                break;
+
+    /// The fewest spheres found with an error of at most `bound`.
+    ///
+    /// # Errors
+    /// What the method or the measure said last, where not one level gave a result.
+    pub fn within(&mut self, bound: f64) -> Result<Found, SimplifyError> {
+        for count in std::mem::take(&mut self.counts) {
+            self.probe(Level::Spheres(count))?;
+        }
+        if self.fewest(bound).is_none() {
+            for level in std::mem::take(&mut self.own) {
+                self.probe(level)?;
             }
         }
-    }
-    while beyond > 0 && within - beyond > 1 {
-        let count = beyond.midpoint(within);
-        let (simplified, hausdorff) = probe(count)?;
-        if hausdorff > bound {
-            beyond = count;
-        } else {
-            best = (simplified, hausdorff);
-            within = count;
+        for _ in 0..BISECTIONS {
+            let Some(level) = self.fewest(bound).and_then(|best| self.between(best, bound)) else {
+                break;
+            };
+            self.probe(level)?;
+        }
+        let best = self.probes.iter().min_by(|a, b| a.error.total_cmp(&b.error)).copied();
+        match (best, self.refusal.take()) {
+            (None, Some(refusal)) => Err(refusal),
+            _ => Ok(Found { within: self.fewest(bound), best, tried: self.tried }),
         }
     }
-    let (simplified, hausdorff) = best;
-    Ok(Found { simplified, hausdorff, tried })
+
+    /// Tries a level. A level that the method has not, or finds nothing at, is passed over.
+    fn probe(&mut self, level: Level) -> Result<(), SimplifyError> {
+        (self.trying)(level);
+        self.tried += 1;
+        let mesh = match self.simplification.at(level) {
+            Ok(simplified) if simplified.mesh.spheres.is_empty() => {
+                let why = format!("{level} leaves no sphere");
+                self.refusal = Some(SimplifyError::Level(why));
+                return Ok(());
+            }
+            Ok(simplified) => simplified.mesh,
+            Err(SimplifyError::Cancelled) => return Err(SimplifyError::Cancelled),
+            Err(refusal) => {
+                self.refusal = Some(refusal);
+                return Ok(());
+            }
+        };
+        match (self.measure)(&mesh) {
+            Ok(error) => self.probes.push(Probe { level, spheres: mesh.spheres.len(), error }),
+            Err(why) => self.refusal = Some(SimplifyError::Level(why)),
+        }
+        Ok(())
+    }
+
+    fn fewest(&self, bound: f64) -> Option<Probe> {
+        let within = self.probes.iter().filter(|probe| probe.error <= bound);
+        within.min_by(|a, b| a.spheres.cmp(&b.spheres).then(a.error.total_cmp(&b.error))).copied()
+    }
+
+    /// The level to try between the fewest spheres within a bound and the next level beyond it.
+    fn between(&self, best: Probe, bound: f64) -> Option<Level> {
+        let takes_counts = self.probes.iter().any(|probe| matches!(probe.level, Level::Spheres(_)));
+        match best.level {
+            Level::Native(value) if !takes_counts => self.between_levels(value, best, bound),
+            _ => self.between_counts(best, bound),
+        }
+    }
+
+    fn between_counts(&self, best: Probe, bound: f64) -> Option<Level> {
+        let asked = self.probes.iter().filter_map(|probe| match probe.level {
+            // A method that stops above the count gives the same mesh for every smaller one.
+            Level::Spheres(asked) if probe.error > bound && probe.spheres < best.spheres => {
+                Some(asked.min(probe.spheres))
+            }
+            Level::Spheres(asked) if probe.spheres == best.spheres && asked < best.spheres => {
+                Some(best.spheres)
+            }
+            _ => None,
+        });
+        let beyond = asked.max().unwrap_or(1);
+        let middle = ((beyond * best.spheres) as f64).sqrt().round() as usize;
+        let is_new = !self.probes.iter().any(|probe| probe.level == Level::Spheres(middle));
+        let is_between = beyond < middle && middle < best.spheres;
+        let is_apart = best.spheres as f64 > CLOSE * beyond as f64;
+        (is_new && is_between && is_apart).then_some(Level::Spheres(middle))
+    }
+
+    fn between_levels(&self, value: f64, best: Probe, bound: f64) -> Option<Level> {
+        let coarser = self.probes.iter().filter(|p| p.error > bound && p.spheres < best.spheres);
+        let next = coarser.max_by_key(|probe| probe.spheres)?;
+        let Level::Native(beyond) = next.level else { return None };
+        let middle = if value > 0.0 && beyond > 0.0 {
+            (value * beyond).sqrt()
+        } else {
+            value.midpoint(beyond)
+        };
+        let is_apart = best.spheres as f64 > CLOSE * next.spheres as f64;
+        (is_apart && middle != value && middle != beyond).then_some(Level::Native(middle))
+    }
+}
+
+impl Found {
+    /// What is to be said where no level is within a bound.
+    pub fn refusal(&self, bound: f64) -> String {
+        let percent = |fraction: f64| format!("{:.3} %", 100.0 * fraction);
+        let best = self.best.map_or_else(String::new, |Probe { level, spheres, error }| {
+            let spheres = crate::output::counted(spheres as u64, "sphere");
+            format!(": the lowest error is {} at {level} ({spheres})", percent(error))
+        });
+        format!(
+            "none of {} levels that were tried has a Hausdorff error of at most {} of the diagonal{best}; \
+             allow more, or sample more densely",
+            self.tried,
+            percent(bound)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use medial::Vec3;
+    use medial::complex::{MedialMesh, Sphere};
+    use medial::simplifier::Simplified;
+
+    /// A method whose error at each number of spheres is given; meshes are told apart by their
+    /// number of spheres alone.
+    fn found(
+        most: usize,
+        bound: f64,
+        answers: impl Fn(Level) -> Option<usize> + Send,
+        error: impl Fn(usize) -> f64,
+    ) -> Found {
+        let mut method = move |level: Level| {
+            let count = answers(level).ok_or_else(|| SimplifyError::unsupported("no"))?;
+            let sphere = |i: usize| Sphere { centre: Vec3::X * i as f64, radius: 1.0 };
+            let spheres = (0..count).map(sphere).collect();
+            let mesh = MedialMesh { spheres, ..MedialMesh::default() };
+            Ok(Simplified::new(mesh, level))
+        };
+        let info = MethodInfo::new("made-up", "Made up").sweep(&[1.0, 2.0, 4.0, 8.0]);
+        let measure = |mesh: &MedialMesh| Ok(error(mesh.spheres.len()));
+        let mut search = Search::new(&mut method, &info, most, &measure, &|_| {});
+        search.within(bound).expect("some level has a result")
+    }
+
+    fn counts(level: Level) -> Option<usize> {
+        match level {
+            Level::Spheres(count) => Some(count),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn a_falling_error_is_met_to_within_two_per_cent() {
+        let found = found(30_000, 0.01, counts, |count| 1.0 / count as f64);
+        let within = found.within.expect("met");
+        assert!((100..=102).contains(&within.spheres), "{within:?}");
+        assert!(found.tried <= 25, "{}", found.tried);
+    }
+
+    #[test]
+    fn a_bad_start_is_no_reason_to_refuse() {
+        // The finest levels are the worst: flaws of the start that the method mends.
+        let error = |count: usize| if count > 1_000 { 0.12 } else { 1.0 / count as f64 };
+        let found = found(30_000, 0.01, counts, error);
+        assert!((100..=102).contains(&found.within.expect("met").spheres));
+    }
+
+    #[test]
+    fn own_levels_are_tried_where_no_count_is_within() {
+        let by_level = |level: Level| match level {
+            Level::Native(value) => Some((5_000.0 / value) as usize),
+            _ => None,
+        };
+        let found = found(30_000, 0.001, by_level, |count| 1.0 / count as f64);
+        let within = found.within.expect("met");
+        assert!((1_000..=1_030).contains(&within.spheres), "{within:?}");
+        assert!(found.tried <= 25);
+    }
+
+    #[test]
+    fn what_is_beyond_reach_is_said_with_the_best() {
+        let found = found(1_000, 0.001, counts, |count| 0.02 + 1.0 / count as f64);
+        assert_eq!(found.within, None);
+        let why = found.refusal(0.001);
+        assert!(why.contains("2.100 % at 1000 spheres") && why.contains("0.100 %"), "{why}");
+    }
 }

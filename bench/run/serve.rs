@@ -13,7 +13,8 @@ use std::thread;
 use std::time::Duration;
 
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::complex::MedialMesh;
+use medial::simplifier::{Level, MethodInfo, RunContext, Simplification, SimplifyError};
 use medial_reports::Status;
 
 use crate::check::{self, Outcome, Subject};
@@ -21,6 +22,7 @@ use crate::plugin::SCRATCH;
 use crate::process_tree;
 
 use super::answer::panic_message;
+use super::bounds::Bounds;
 use super::protocol::{CheckItem, Event, Request, send};
 use super::record::{Kept, NoisePart, failure_record, record, repetition};
 use super::scene::{Scene, reference_key};
@@ -114,7 +116,7 @@ fn run(
         Err(why) => return send(&Event::Refused(why)),
     };
     send(&Event::Preparing(scene.input.hash.clone()))?;
-    let runs = answer_item(registry, item, &scene.shape().view());
+    let runs = answer_item(registry, item, scene, scene.shape());
     send(&Event::Measuring)?;
     let verdicts = judge(scene, &runs);
     let noise = noise_parts(registry, scene, item, &runs);
@@ -147,7 +149,7 @@ fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Res
         Err(why) => return send(&Event::Refused(why)),
     };
     send(&Event::Preparing(scene.input.hash.clone()))?;
-    for LevelRun { level, outcome, times } in answer_item(registry, item, &scene.shape().view()) {
+    for LevelRun { level, outcome, times } in answer_item(registry, item, scene, scene.shape()) {
         let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
         send(&Event::Repeated(level, outcome))?;
     }
@@ -176,17 +178,49 @@ fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
     }
 }
 
-fn answer_item(registry: &Registry, item: &Item, view: &Shape) -> Vec<LevelRun> {
-    let context = RunContext::with_seed(item.seed);
+/// The answers of an item's method on a shape of its scene, in the order of its levels, of which
+/// error bounds are the last.
+fn answer_item(registry: &Registry, item: &Item, scene: &Scene, shape: &Shape) -> Vec<LevelRun> {
     let entry = find(registry, &item.method);
-    let start = || match entry {
+    let context = RunContext::with_seed(item.seed);
+    let prepare = preparing(|view| match &entry {
         Ok(entry) => entry.method().prepare(view, &item.method.params, &context),
-        Err(why) => Err(SimplifyError::Failed(why)),
+        Err(why) => Err(SimplifyError::Failed(why.clone())),
+    });
+    let bound = |level: &Level| match level {
+        Level::MaxError(bound) => Some(*bound),
+        _ => None,
     };
-    answer(view, start, &item.levels, |level| {
-        // The supervisor notices by itself when the pipe is closed.
+    let levels: Vec<Level> = item.levels.iter().copied().filter(|l| bound(l).is_none()).collect();
+    let bounds: Vec<f64> = item.levels.iter().filter_map(bound).collect();
+    // The supervisor notices by itself when the pipe is closed.
+    let view = shape.view();
+    let mut runs = answer(&view, || prepare(&view), &levels, |level| {
         let _ = send(&Event::Asked(level));
-    })
+    });
+    let measure = |mesh: &MedialMesh| {
+        let distances = scene.judge.distances(&scene.carried(mesh));
+        distances.map(|distances| distances.hausdorff).map_err(|error| error.to_string())
+    };
+    let unknown = MethodInfo::default();
+    let search = Bounds {
+        shape,
+        info: entry.as_ref().map_or(&unknown, |entry| entry.method().info()),
+        prepare: &prepare,
+        measure: &measure,
+        searching: &|level| drop(send(&Event::Searching(level))),
+    };
+    runs.extend(search.answer(&bounds));
+    runs
+}
+
+/// A closure that begins a simplification on any view: without a function that takes it, its
+/// lifetimes are not inferred.
+fn preparing<F>(begin: F) -> F
+where
+    F: for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError>,
+{
+    begin
 }
 
 /// Puts a method to one case of the conformance corpus.
@@ -241,8 +275,8 @@ fn noise_parts(
         return vec![Some(NoisePart { growth: Some(1.0), shift: None }); runs.len()];
     }
     if runs.iter().any(|run| run.outcome.is_ok() && scene.reference(&key(run.level)).is_none()) {
-        let clean = scene.clean().expect("there is noise").view();
-        let clean = results(&answer_item(registry, item, &clean));
+        let clean = scene.clean().expect("there is noise");
+        let clean = results(&answer_item(registry, item, scene, clean));
         clean.into_iter().for_each(|(key, mesh)| scene.remember(key, mesh));
     }
     let part = |run: &LevelRun| {

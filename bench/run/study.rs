@@ -56,6 +56,11 @@ pub struct Study {
     pub dataset: Option<String>,
     /// Numbers of spheres.
     pub spheres: Vec<usize>,
+    /// Error bounds, fractions of the diagonal, for each of which the fewest spheres are searched.
+    pub max_error: Vec<f64>,
+    /// Whether each method also runs at levels of its own: those given to it, or else its default
+    /// sweep.
+    pub sweep: bool,
     /// Whether each method also runs at its published level.
     pub published: bool,
     /// Seed of every random choice.
@@ -78,6 +83,8 @@ pub struct Study {
     pub memory: Option<u64>,
     /// Plug-in files.
     pub plugins: Vec<PathBuf>,
+    /// Methods that start from what each filter leaves, beside those named.
+    pub after_filters: Vec<String>,
     /// Methods with their parameters; all methods unless given.
     #[serde(rename = "method")]
     pub methods: Vec<StudyMethod>,
@@ -113,6 +120,8 @@ impl Default for Study {
             meshes: vec![],
             dataset: None,
             spheres: vec![1000, 500, 200, 100],
+            max_error: vec![],
+            sweep: true,
             published: false,
             seed: 0,
             repeat: 1,
@@ -123,6 +132,7 @@ impl Default for Study {
             timeout: TIMEOUT,
             memory: None,
             plugins: vec![],
+            after_filters: vec![],
             methods: vec![],
         }
     }
@@ -255,6 +265,11 @@ impl Study {
         if counts.chain([&self.spheres]).any(|counts| counts.contains(&0)) {
             return wrong("--spheres 0: ask for at least one sphere".into());
         }
+        if let Some(bound) = self.max_error.iter().find(|&&bound| !(bound > 0.0 && bound < 1.0)) {
+            return wrong(format!(
+                "--max-error {bound}: a fraction of the diagonal between 0 and 1 is meant"
+            ));
+        }
         Ok(())
     }
 
@@ -267,12 +282,17 @@ impl Study {
         &self,
         registry: &'r Registry,
     ) -> Result<Vec<(StudyMethod, &'r Entry)>, StudyError> {
-        if self.methods.is_empty() {
-            let all = registry.entries().iter();
-            return Ok(all.map(|entry| (StudyMethod::of(entry.id()), entry)).collect());
+        let mut methods = self.methods.clone();
+        if methods.is_empty() {
+            methods = registry.entries().iter().map(|e| StudyMethod::of(e.id())).collect();
+        }
+        for then in &self.after_filters {
+            let filters = registry.entries().iter().filter(|e| e.method().info().is_filter);
+            let chains = filters.map(|filter| format!("{}+{then}", filter.id()));
+            methods.extend(chains.map(|id| StudyMethod::of(&id)));
         }
         let mut found: Vec<(StudyMethod, &Entry)> = Vec::new();
-        for method in &self.methods {
+        for method in &methods {
             let entry = registry.entry(&method.id).ok_or_else(|| StudyError::Method {
                 id: method.id.clone(),
                 known: registry.entries().iter().map(|entry| entry.id().to_owned()).collect(),
@@ -387,8 +407,13 @@ impl Study {
         Limits { seconds: self.timeout, bytes }
     }
 
-    /// The published level, the counts and the method's own levels, each from fine to coarse.
+    /// The published level, the counts, the method's own levels and the error bounds, each from
+    /// fine to coarse.
     fn levels(&self, method: &StudyMethod, entry: &Entry) -> Vec<Level> {
+        let info = entry.method().info();
+        if info.fixed {
+            return vec![Level::Published];
+        }
         let mut levels = Vec::new();
         if method.published.unwrap_or(self.published) {
             levels.push(Level::Published);
@@ -397,13 +422,21 @@ impl Study {
         counts.sort_unstable_by(|a, b| b.cmp(a));
         counts.dedup();
         levels.extend(counts.into_iter().map(Level::Spheres));
-        let mut native = method.levels.clone();
+        let mut native = match method.levels.is_empty() && self.sweep {
+            true => info.sweep.clone(),
+            false => method.levels.clone(),
+        };
         native.sort_by(f64::total_cmp);
         native.dedup();
-        if entry.method().info().native.as_ref().is_some_and(|native| !native.larger_is_coarser) {
+        if info.native.as_ref().is_some_and(|native| !native.larger_is_coarser) {
             native.reverse();
         }
         levels.extend(native.into_iter().map(Level::Native));
+        // Last, since a search that does not end must cost nothing else.
+        let mut bounds = self.max_error.clone();
+        bounds.sort_by(f64::total_cmp);
+        bounds.dedup();
+        levels.extend(bounds.into_iter().map(Level::MaxError));
         levels
     }
 }

@@ -274,6 +274,11 @@ impl<'a> Supervisor<'a> {
                         let place = levels.position(|&asked| asked == level);
                         stage = Stage::Asked(place.unwrap_or(0));
                     }
+                    Event::Searching(level) => {
+                        let mut levels = item.iter().flat_map(|item| &item.levels);
+                        let place = levels.position(|&asked| asked == level);
+                        (stage, since) = (Stage::Asked(place.unwrap_or(0)), Instant::now());
+                    }
                     event => {
                         if matches!(event, Event::Doing(_)) {
                             stage = Stage::Checking;

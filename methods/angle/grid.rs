@@ -238,6 +238,7 @@ impl Simplification for Faces {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let mut diagnostics = self.diagnostics.clone();
         let (count, native) = match level {
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }

@@ -145,6 +145,7 @@ impl Simplification for Peeled {
         let mut diagnostics = self.diagnostics.clone();
         let by_level = |theta: f64| self.removed.partition_point(|&(_, value)| value <= theta);
         let (count, native) = match level {
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }

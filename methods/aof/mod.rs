@@ -105,6 +105,7 @@ pub fn method() -> Method<AofParams> {
              straight from the surface.",
         )
         .native(NativeLevel::larger_is_coarser("alpha", "degrees of object angle"))
+        .filter()
         .published(
             "the object angle of the parameter `angle`: the paper chooses one for each model",
         )
@@ -141,6 +142,7 @@ impl Simplification for Prepared<'_> {
         let mut diagnostics = base.diagnostics.clone();
         lattices.begin();
         let angle = match level {
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Native(angle) => angle,
             Level::Spheres(_) | Level::Published => solid.params().angle,
         };
@@ -149,7 +151,7 @@ impl Simplification for Prepared<'_> {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }
             Level::Spheres(count) => solid.with_count(base, count, lattices, &mut diagnostics)?,
-            Level::Native(_) | Level::Published => {
+            Level::Native(_) | Level::Published | Level::MaxError(_) => {
                 params::check_angle(angle).map_err(SimplifyError::Level)?;
                 solid.axis(base.resolution, &base.descent, angle)?
             }

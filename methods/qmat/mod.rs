@@ -129,6 +129,7 @@ struct Prepared {
 impl Simplification for Prepared {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let target = match level {
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("at least one sphere must stay".to_owned()));
             }

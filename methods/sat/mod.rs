@@ -76,6 +76,7 @@ pub fn method() -> Method<SatParams> {
              its balls back.",
         )
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
+        .filter()
         .published("s = 1.1, the default of the authors' tool, without its angle filter")
         .params(SatParams::describe());
     Method::new(info, prepare)
@@ -163,6 +164,7 @@ impl Simplification for Prepared {
         let mut diagnostics = Diagnostics::default();
         self.scales.begin();
         let scaled = match level {
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Published => self.at_scale(PUBLISHED)?,
             Level::Native(scale) if (1.0..=LARGEST_SCALE).contains(&scale) => {
                 self.at_scale(scale)?

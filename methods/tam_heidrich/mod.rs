@@ -129,6 +129,7 @@ pub fn method() -> Method<TamHeidrichParams> {
              outside in, loops and components kept.",
         )
         .native(NativeLevel::larger_is_coarser("t_v", "per cent of the solid's volume"))
+        .filter()
         .published("up to three rounds with t_t = 5 triangles, then two with t_v = 1 %")
         .params(TamHeidrichParams::describe())
         .extra(Capability::new(PARTS, "the parts that the axis was cut into, the largest first"));
@@ -187,6 +188,7 @@ impl Prepared {
     fn schedule(&self, level: Level) -> Result<(Vec<f64>, usize), SimplifyError> {
         let published = &self.params.t_v.0;
         match level {
+            Level::MaxError(_) => Err(SimplifyError::searched()),
             Level::Published => Ok((published.clone(), 0)),
             Level::Native(t) if (0.0..=100.0).contains(&t) => {
                 Ok((vec![t; published.len().max(1)], 0))

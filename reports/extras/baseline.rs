@@ -164,10 +164,10 @@ fn means_table(
     let mut groups: BTreeMap<usize, Vec<Row>> = BTreeMap::new();
     for summary in summaries {
         let numbers = medial_numbers(summary.count);
-        for series in summary.rows.iter().filter(|series| series.compared) {
+        for series in summary.rows.iter().filter(|series| series.over > 0) {
             let errors = [series.mean(&HAUSDORFF), series.mean(&MEAN_ERROR)];
             let name = &comparison.series[series.series];
-            let new = row(numbers, "medial method", name, summary.common, errors);
+            let new = row(numbers, "medial method", name, series.over, errors);
             groups.entry(numbers).or_default().push(new);
         }
     }

@@ -34,7 +34,7 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     if let [means, bounds] = page.summary_tables {
         html.push_str(&titled(bounds, false));
         if !page.overview_plots.is_empty() {
-            html.push_str("<h3>Means over the meshes in common</h3>\n");
+            html.push_str("<h3>Means over meshes</h3>\n");
             html.push_str(&html::plots(page.overview_plots));
         }
         if !means.rows.is_empty() {
@@ -77,11 +77,11 @@ fn matrices(page: &Page<'_>, summaries: &[&CountSummary]) -> String {
         html.push_str(&matrix(page, summaries, metric));
     }
     html.push_str(
-        "<p class=\"note\">At each number of spheres, all methods are averaged over the meshes \
-         that they have in common. In parentheses: the method reached this number on less than \
-         half of the meshes and is averaged over those, not compared. The darker, the better \
-         within the column; bold: the best. A dash: no result, see the failures and the remarks.\
-         </p>\n</div>\n",
+        "<p class=\"note\">Each method is averaged over one set of meshes of its own for all \
+         counts. In parentheses, with their number: means over fewer meshes than all, which do not \
+         read beside the others; the ratios in the table of all columns do. The darker, the \
+         better among means over all meshes; bold: the best. A dash: the count was reached on too \
+         few meshes, see the failures and the remarks.</p>\n</div>\n",
     );
     html
 }
@@ -97,7 +97,7 @@ fn matrix(page: &Page<'_>, summaries: &[&CountSummary], metric: &Metric) -> Stri
         html.push_str(&format!(
             "<th scope=\"col\" class=\"num\">{} <small>spheres, {}</small></th>",
             grouped(summary.count as u64),
-            counted(summary.common, "mesh", "meshes")
+            counted(summary.meshes, "mesh", "meshes")
         ));
     }
     html.push_str("<th scope=\"col\">topology right</th><th scope=\"col\">not as asked</th></tr></thead>\n<tbody>\n");
@@ -135,8 +135,8 @@ fn matrix_cell(summary: &CountSummary, series: usize, metric: &Metric) -> String
         return "<td class=\"num\">–</td>".to_owned();
     };
     let text = metric.format_mean(mean);
-    if !row.compared {
-        return format!("<td class=\"num\">({text})</td>");
+    if !summary.is_whole(row) {
+        return format!("<td class=\"num\">({text}; <small>{}</small>)</td>", row.over);
     }
     let shade = (100.0 * goodness(summary, metric, mean)).round();
     let text = match best(summary, metric) {
@@ -152,7 +152,7 @@ fn goodness(summary: &CountSummary, metric: &Metric, mean: f64) -> f64 {
         crate::metric::Mean::Geometric { floor } => value.max(floor).ln(),
         crate::metric::Mean::Arithmetic => value,
     };
-    let compared = summary.rows.iter().filter(|row| row.compared);
+    let compared = summary.rows.iter().filter(|row| summary.is_whole(row));
     let laid: Vec<f64> = compared.filter_map(|row| row.mean(metric)).map(lay).collect();
     let low = laid.iter().copied().fold(f64::INFINITY, f64::min);
     let high = laid.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -9,7 +9,7 @@ use std::fmt::Display;
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::{BELOW_30, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
-use crate::summary::CountSummary;
+use crate::summary::{CountSummary, SeriesSummary};
 
 use self::axis::Scale;
 use self::bars::Bars;
@@ -187,7 +187,7 @@ pub(crate) fn overview_plots(
         plots.extend(kind.draw(format!("overview-{}", kind.name), title, curves)?);
     }
     // The fewest spheres take the most work.
-    if let Some(summary) = summaries.iter().rev().find(|summary| summary.common > 0) {
+    if let Some(summary) = summaries.iter().rev().find(|summary| summary.rows.iter().any(|row| row.over > 0)) {
         plots.extend(stage_bars(comparison, summary)?);
     }
     Ok(plots)
@@ -202,18 +202,32 @@ fn mean_curve(
     let means: Vec<(usize, (f64, f64))> = summaries
         .iter()
         .filter_map(|summary| {
-            let row = summary.rows.iter().find(|row| row.series == series && row.compared)?;
+            let row = summary.rows.iter().find(|row| row.series == series)?;
             let x =
                 if kind.against_time { row.mean(&TOTAL_SECONDS)? } else { summary.count as f64 };
             Some((summary.count, (x, row.mean(kind.y)?)))
         })
         .collect();
     let tags = if kind.against_time { ends(means.iter().map(|mean| mean.0)) } else { Vec::new() };
+    // The set is the same at each count that has a mean.
+    let row_of = |summary: &'_ CountSummary| {
+        let row = summary.rows.iter().find(|row| row.series == series && row.over > 0)?;
+        Some(label_over(&comparison.series[series], summary, row))
+    };
+    let label = summaries.iter().find_map(row_of);
     Curve {
         series,
-        label: comparison.series[series].clone(),
+        label: label.unwrap_or_else(|| comparison.series[series].clone()),
         points: means.into_iter().map(|mean| mean.1).collect(),
         tags,
+    }
+}
+
+/// The label of a curve of means, with the number of meshes where these are not all.
+fn label_over(label: &str, summary: &CountSummary, row: &SeriesSummary) -> String {
+    match summary.is_whole(row) {
+        true => label.to_owned(),
+        false => format!("{label} ({} of {})", row.over, summary.meshes),
     }
 }
 
@@ -221,9 +235,9 @@ fn stage_bars(
     comparison: &Comparison<'_>,
     summary: &CountSummary,
 ) -> Result<Option<Plot>, PlotError> {
-    let rows = summary.rows.iter().filter(|row| row.compared);
-    let rows: Vec<_> =
-        rows.filter_map(|row| Some((comparison.series[row.series].clone(), row.stages?))).collect();
+    let label = |row: &SeriesSummary| label_over(&comparison.series[row.series], summary, row);
+    let rows = summary.rows.iter().filter(|row| row.over > 0);
+    let rows: Vec<_> = rows.filter_map(|row| Some((label(row), row.stages?))).collect();
     let level = level_label(medial::simplifier::Level::Spheres(summary.count));
     let title = format!("Seconds by stage, to {level} spheres");
     let svg = Bars { title: title.clone(), rows }.to_svg()?;

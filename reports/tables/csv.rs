@@ -76,6 +76,7 @@ fn identity() -> Vec<Column> {
                     Level::Published => "published",
                     Level::Spheres(_) => "spheres",
                     Level::Native(_) => "native",
+                    Level::MaxError(_) => "max_error",
                 }
                 .to_owned(),
             )
@@ -83,7 +84,7 @@ fn identity() -> Vec<Column> {
         column("asked", |r| match r.simplify.level {
             Level::Published => None,
             Level::Spheres(count) => Some(count.to_string()),
-            Level::Native(level) => Some(number(level)),
+            Level::Native(value) | Level::MaxError(value) => Some(number(value)),
         }),
         column("status", |r| Some(r.status.key().to_owned())),
         column("reason", |r| r.reason.clone()),

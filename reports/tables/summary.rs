@@ -3,7 +3,7 @@
 use crate::comparison::Comparison;
 use crate::metric::COMPARED;
 use crate::summary::{
-    CountSummary, ERROR_BOUNDS, Fewest, SeriesSummary, best, curve_level, fewest_spheres,
+    CountSummary, ERROR_BOUNDS, Fewest, SeriesSummary, best, curve_level, fewest_spheres, reference,
 };
 use crate::tables::{Cell, Column, Row, Table};
 use crate::text::{counted, grouped, significant};
@@ -19,7 +19,12 @@ pub(crate) fn summary_tables(
 
 fn means_table(comparison: &Comparison<'_>, summaries: &[CountSummary], how: &str) -> Table {
     let mut columns =
-        vec![Column::number("spheres"), Column::text("method"), Column::text("meshes")];
+        vec![Column::number("spheres"), Column::text("method"), Column::text("means over")];
+    let yardstick = reference(comparison).map(|series| comparison.series[series].as_str());
+    columns.extend([
+        Column::number(format!("Hausdorff ÷ {}", yardstick.unwrap_or("reference"))),
+        Column::text("on"),
+    ]);
     columns.extend(COMPARED.iter().map(|metric| Column::number(metric.heading())));
     columns.extend(["substrate (s)", "prepare (s)", "simplify (s)"].map(Column::number));
     columns.extend([Column::text("topology right"), Column::text("without a result")]);
@@ -34,12 +39,14 @@ fn means_table(comparison: &Comparison<'_>, summaries: &[CountSummary], how: &st
         notes: vec![
             how.to_owned(),
             "Geometric means of errors and total time, arithmetic means of angles, shares, spikes \
-             and stages. At each number of spheres all methods are averaged over the meshes that \
-             they have in common. Values in parentheses: the method reached this number on less \
-             than half of the meshes and is averaged over those, not compared."
+             and stages. Each method is averaged over one set of meshes of its own for all counts: \
+             those on which it reached every count that it reached on enough of them. Means over \
+             all meshes read beside each other; in parentheses are those over fewer. Across \
+             different sets, compare the ratio: the geometric mean of the Hausdorff errors in \
+             relation to the named method's, on the meshes where both reached the count."
                 .to_owned(),
             "Lengths in % of the bounding-box diagonal; seconds of wall clock. Arrows: which way \
-             is better. Bold: best of the methods compared."
+             is better. Bold: best of the means over all meshes."
                 .to_owned(),
         ],
         columns,
@@ -48,16 +55,19 @@ fn means_table(comparison: &Comparison<'_>, summaries: &[CountSummary], how: &st
 }
 
 fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummary) -> Vec<Cell> {
-    let framed = |text: String| if row.compared { text } else { format!("({text})") };
+    let is_whole = summary.is_whole(row);
+    let framed = |text: String| if is_whole { text } else { format!("({text})") };
     let mut cells = vec![
         Cell::new(grouped(summary.count as u64)),
         Cell::new(comparison.series[row.series].as_str()),
-        Cell::new(meshes_averaged(summary, row)),
+        Cell::new(format!("{} of {}", row.over, row.asked)),
+        Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3))),
+        Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes"))),
     ];
     cells.extend(COMPARED.iter().map(|metric| {
         let Some(mean) = row.mean(metric) else { return Cell::optional(None) };
         let text = metric.format_mean(mean);
-        let best = row.compared
+        let best = is_whole
             && best(summary, metric).is_some_and(|best| metric.format_mean(best) == text);
         Cell { text: framed(text), best }
     }));
@@ -71,12 +81,6 @@ fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummar
     cells.push(Cell::optional((known > 0).then(|| format!("{right} of {known}"))));
     cells.push(Cell::new(without_result(row)));
     cells
-}
-
-/// How many meshes a row averages, of how many it was asked for.
-pub(crate) fn meshes_averaged(summary: &CountSummary, row: &SeriesSummary) -> String {
-    let averaged = if row.compared { summary.common } else { row.reached };
-    format!("{averaged} of {}", row.asked)
 }
 
 /// What became of the meshes that are in no mean.
@@ -121,7 +125,7 @@ pub(crate) fn bounds_table(
                 .to_owned(),
             "Level of the curve: the area under the curve of mean Hausdorff error against spheres, \
              both as logarithms, told as the constant error with the same area; over the counts \
-             that were run, where the method was compared at all of them."
+             that were run, where the method has a mean at all of them."
                 .to_owned(),
         ],
         rows: rows.collect(),

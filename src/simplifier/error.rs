@@ -39,6 +39,13 @@ pub enum SimplifyError {
 }
 
 impl SimplifyError {
+    /// For a level by error bound, of methods without such levels: a harness searches for it.
+    pub fn searched() -> Self {
+        Self::unsupported(
+            "an error bound is searched for among other levels; ask for spheres or a level",
+        )
+    }
+
     /// [`SimplifyError::Unsupported`] with what the method does not do, and what it does instead.
     pub fn unsupported(why: impl Into<String>) -> Self {
         Self::Unsupported { why: why.into() }

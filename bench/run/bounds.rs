@@ -1,0 +1,75 @@
+//! Error bounds as levels: a search, then the level that it found, asked alone on the clock.
+
+use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
+use medial::shape::Shape;
+use medial_reports::Status;
+
+use super::answer::guarded;
+use super::search::{Measure, Search};
+use super::{Fault, LevelRun, Times, answer};
+
+/// Begins a simplification on a view.
+pub type Prepare<'a> =
+    dyn for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError> + 'a;
+
+/// What a search for error bounds needs.
+pub struct Bounds<'a> {
+    /// The shape.
+    pub shape: &'a Shape,
+    /// What the method says of itself.
+    pub info: &'a MethodInfo,
+    /// Begins the method.
+    pub prepare: &'a Prepare<'a>,
+    /// Measures what comes out.
+    pub measure: &'a Measure<'a>,
+    /// Is told each bound before it is searched for.
+    pub searching: &'a dyn Fn(Level),
+}
+
+impl Bounds<'_> {
+    /// A run for each bound, given from small to large. The seconds are those of the level found,
+    /// without the search.
+    pub fn answer(&self, bounds: &[f64]) -> Vec<LevelRun> {
+        if bounds.is_empty() {
+            return Vec::new();
+        }
+        let found = guarded(|| self.search(bounds))
+            .unwrap_or_else(|fault| vec![Err(fault); bounds.len()]);
+        let levels: Vec<Level> = found.iter().filter_map(|level| level.as_ref().ok()).copied().collect();
+        let view = self.shape.view();
+        let mut runs = match levels.is_empty() {
+            true => Vec::new(),
+            false => answer(&view, || (self.prepare)(&view), &levels, |_| {}),
+        }
+        .into_iter();
+        let run = |(&bound, found): (&f64, Result<Level, Fault>)| {
+            let level = Level::MaxError(bound);
+            match found {
+                Ok(_) => LevelRun { level, ..runs.next().expect("one for each level") },
+                Err(fault) => LevelRun { level, outcome: Err(fault), times: Times::default() },
+            }
+        };
+        bounds.iter().zip(found).map(run).collect()
+    }
+
+    /// The level for each bound.
+    fn search(&self, bounds: &[f64]) -> Result<Vec<Result<Level, Fault>>, SimplifyError> {
+        let view = self.shape.view();
+        let most = view.initial()?.spheres.len();
+        let mut simplification = (self.prepare)(&view)?;
+        let mut search =
+            Search::new(simplification.as_mut(), self.info, most, self.measure, &|_| {});
+        let mut found = Vec::new();
+        // The loosest first: what is tried for it is of use to the others.
+        for &bound in bounds.iter().rev() {
+            (self.searching)(Level::MaxError(bound));
+            let result = search.within(bound)?;
+            found.push(result.within.map(|probe| probe.level).ok_or_else(|| Fault {
+                status: Status::BoundMissed,
+                reason: result.refusal(bound),
+            }));
+        }
+        found.reverse();
+        Ok(found)
+    }
+}

@@ -1,0 +1,31 @@
+//! No simplification: the initial medial mesh as it is.
+//!
+//! What every method starts from, as a row like theirs, so that a table says which errors and which
+//! wrong Betti numbers are the start's own.
+
+use medial::shape::Shape;
+use medial::simplifier::{
+    Level, Method, MethodInfo, NoParams, RunContext, Simplification, Simplified, SimplifyError,
+};
+
+/// The initial medial mesh as a method.
+pub fn method() -> Method<NoParams> {
+    let info = MethodInfo::new("initial", "Initial medial mesh")
+        .citation("N. Amenta, M. Bern, 1999, Surface reconstruction by Voronoi filtering, doi:10.1007/PL00009475")
+        .summary("Simplifies nothing: the inner part of the Voronoi diagram of the samples.")
+        .published("the whole of it; there is no other level")
+        .fixed();
+    Method::new(info, prepare)
+}
+
+fn prepare<'s>(
+    shape: &'s Shape,
+    _params: NoParams,
+    _run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let initial = shape.initial()?;
+    Ok(Box::new(move |level: Level| match level {
+        Level::Published => Ok(Simplified::new(initial.as_ref().clone(), level)),
+        _ => Err(SimplifyError::unsupported("the initial medial mesh has no other level")),
+    }))
+}
