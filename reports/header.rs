@@ -56,6 +56,9 @@ pub struct MethodNote {
     pub summary: String,
     /// What the published level means.
     pub published: String,
+    /// Name and unit of the method's own level, where it has one.
+    #[serde(default)]
+    pub native: Option<String>,
 }
 
 impl From<&MethodInfo> for MethodNote {
@@ -66,11 +69,17 @@ impl From<&MethodInfo> for MethodNote {
             citation: info.citation.to_string(),
             summary: info.summary.to_string(),
             published: info.published.to_string(),
+            native: info.native.as_ref().map(|native| format!("{} ({})", native.name, native.unit)),
         }
     }
 }
 
 impl Header {
+    /// Name and unit of a method's own level, as the runner passed them in.
+    pub(crate) fn native_axis(&self, method: &str) -> Option<String> {
+        self.methods.iter().find(|note| note.id == method)?.native.clone()
+    }
+
     /// How the files were made: a sentence that stands in each of them.
     pub(crate) fn how(&self) -> String {
         let Some(run) = self.runs.last() else { return "Made by medial.".to_owned() };

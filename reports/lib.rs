@@ -16,10 +16,12 @@
 //! | `write` | [`write_report`], all of it into one folder |
 
 mod comparison;
+mod equal_error;
 mod extras;
 mod header;
 mod journal;
 mod metric;
+mod native;
 mod page;
 mod plots;
 pub mod published;

@@ -93,41 +93,49 @@ pub(crate) fn reference(comparison: &Comparison<'_>) -> Option<usize> {
 /// Summaries for every number of spheres that was asked, from many to few.
 pub(crate) fn by_count(comparison: &Comparison<'_>) -> Vec<CountSummary> {
     let sets: Vec<OwnSet> =
-        (0..comparison.series.len()).map(|series| OwnSet::of(comparison, series)).collect();
+        (0..comparison.series.len()).map(|s| OwnSet::at_counts(comparison, s)).collect();
     let reference = reference(comparison);
     let counts = comparison.counts();
     counts.map(|(level, count)| at_count(comparison, &sets, reference, (level, count))).collect()
 }
 
-/// The counts that have means for a method, and the meshes that these are over.
-struct OwnSet {
-    levels: BTreeSet<usize>,
-    meshes: BTreeSet<usize>,
+/// The levels that have means for a method, and the meshes that these are over.
+pub(crate) struct OwnSet {
+    pub(crate) levels: BTreeSet<usize>,
+    pub(crate) meshes: BTreeSet<usize>,
+    /// Meshes that it was asked for.
+    pub(crate) asked: usize,
 }
 
 impl OwnSet {
-    fn of(comparison: &Comparison<'_>, series: usize) -> Self {
+    /// From each level and mesh that was asked, and whether the result there counts.
+    pub(crate) fn of(entries: impl Iterator<Item = (usize, usize, bool)>) -> Self {
         let mut asked = BTreeSet::new();
         let mut reached: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
-        let counts: BTreeSet<usize> = comparison.counts().map(|(level, _)| level).collect();
-        for entry in comparison.entries.iter().filter(|entry| entry.series == series) {
-            if counts.contains(&entry.level) {
-                asked.insert(entry.mesh);
-                let meshes = reached.entry(entry.level).or_default();
-                meshes.extend(entry.comparable().then_some(entry.mesh));
-            }
+        for (level, mesh, counts) in entries {
+            asked.insert(mesh);
+            reached.entry(level).or_default().extend(counts.then_some(mesh));
         }
+        let asked = asked.len();
         loop {
-            let common = reached.values().cloned().reduce(|a, b| &a & &b).unwrap_or_default();
+            let meshes = reached.values().cloned().reduce(|a, b| &a & &b).unwrap_or_default();
             // Levels are from many spheres to few: of two as rare, the finer one goes.
             let rarest = reached.iter().min_by_key(|(level, meshes)| (meshes.len(), **level));
             match rarest.map(|(&level, _)| level) {
-                Some(rarest) if 2 * common.len() < asked.len() || common.is_empty() => {
+                Some(rarest) if 2 * meshes.len() < asked || meshes.is_empty() => {
                     reached.remove(&rarest);
                 }
-                _ => return Self { levels: reached.into_keys().collect(), meshes: common },
+                _ => return Self { levels: reached.into_keys().collect(), meshes, asked },
             }
         }
+    }
+
+    /// The set of a series for its counts.
+    fn at_counts(comparison: &Comparison<'_>, series: usize) -> Self {
+        let counts: BTreeSet<usize> = comparison.counts().map(|(level, _)| level).collect();
+        let own = comparison.entries.iter().filter(|entry| entry.series == series);
+        let own = own.filter(|entry| counts.contains(&entry.level));
+        Self::of(own.map(|entry| (entry.level, entry.mesh, entry.comparable())))
     }
 }
 
@@ -214,7 +222,7 @@ fn mean_stages(entries: &[&Entry<'_>]) -> Option<[f64; 3]> {
 }
 
 /// Results with the solid's Betti numbers, and results where both are known.
-fn topology(entries: &[&Entry<'_>]) -> (usize, usize) {
+pub(crate) fn topology(entries: &[&Entry<'_>]) -> (usize, usize) {
     let known = entries.iter().filter_map(|entry| {
         let evaluation = entry.record.evaluate.as_ref()?;
         Some(evaluation.betti == evaluation.expected_betti?)

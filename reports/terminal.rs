@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::comparison::Comparison;
+use crate::equal_error::{BoundSummary, by_bound};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Metric, TOTAL_SECONDS};
 use crate::record::Record;
 use crate::summary::{CountSummary, SeriesSummary, by_count};
@@ -26,10 +27,25 @@ pub fn summary_text(records: &[Record]) -> String {
     let comparison = Comparison::new(records);
     let widest = comparison.series.iter().map(|label| label.chars().count()).max().unwrap_or(0);
     let mut text = String::new();
+    for bound in by_bound(&comparison) {
+        write_bound(&mut text, &bound, &comparison, widest.max(8));
+    }
     for count in by_count(&comparison) {
         write_count(&mut text, &count, &comparison, widest.max(8));
     }
     text
+}
+
+fn write_bound(text: &mut String, bound: &BoundSummary, comparison: &Comparison<'_>, width: usize) {
+    let _ = writeln!(text, "at most {} % Hausdorff error, fewest spheres", bound.percent);
+    let _ = writeln!(text, "  {:<width$}{:>12}{:>10}", "method", "median", "kept on");
+    for row in &bound.rows {
+        let label = printable(&comparison.series[row.series]);
+        let median = row.spheres.map_or_else(|| "-".to_owned(), |spheres| spheres.to_string());
+        let kept = format!("{}/{}", row.met, row.asked);
+        let _ = writeln!(text, "  {label:<width$}{median:>12}{kept:>10}");
+    }
+    text.push('\n');
 }
 
 fn write_count(

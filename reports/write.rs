@@ -5,11 +5,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::comparison::Comparison;
+use crate::equal_error::{by_bound, equal_error_table};
 use crate::extras::extras;
 use crate::header::Header;
 use crate::journal::replace_file;
+use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, Page};
-use crate::plots::{PlotError, mesh_plots, overview_plots};
+use crate::plots::{Plot, PlotError, equal_error_plot, mean_plots, mesh_plots, native_plots};
 use crate::record::Record;
 use crate::summary::by_count;
 use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_markdown};
@@ -43,11 +45,21 @@ pub fn write_report(
     let mut files = Files { dir, written: Vec::new() };
 
     files.write("results.csv", &to_csv(&comparison).map_err(|error| ReportError::csv(&error))?)?;
-    let summary_tables = summary_tables(&comparison, &summaries, &how);
+    let (natives, bounds) = (native_curves(&comparison), by_bound(&comparison));
+    let axis = |method: &str| header.native_axis(method);
+    let mut summary_tables = summary_tables(&comparison, &summaries, &how);
+    // The most telling one first.
+    summary_tables.splice(0..0, equal_error_table(&comparison, &bounds, &how));
+    if !natives.is_empty() {
+        summary_tables.push(native_table(&comparison, &natives, &axis, &how));
+    }
     files.write_tables("summary", "Summary", &summary_tables)?;
 
-    let overview_plots = overview_plots(&comparison, &summaries)?;
-    for plot in &overview_plots {
+    let mut overview_plots: Vec<Plot> =
+        equal_error_plot(&comparison, &bounds)?.into_iter().collect();
+    overview_plots.extend(mean_plots(&comparison, &summaries, &natives)?);
+    let native_plots = native_plots(&comparison, &natives, &axis)?;
+    for plot in overview_plots.iter().chain(&native_plots) {
         files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
     }
     let extras = extras(dir, &comparison, &summaries)?;
@@ -81,6 +93,7 @@ pub fn write_report(
         comparison: &comparison,
         summaries: &summaries,
         overview_plots: &overview_plots,
+        native_plots: &native_plots,
         meshes: &meshes,
         summary_tables: &summary_tables,
         extras: &extras,

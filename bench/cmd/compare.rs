@@ -73,6 +73,9 @@ pub struct Arguments {
     /// End an item that needs more megabytes [default: three quarters of the machine's].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
+    /// Certify each Hausdorff error by an interval of this width, a fraction of the diagonal.
+    #[arg(long, value_name = "WIDTH")]
+    certify: Option<f64>,
     #[command(flatten)]
     substrate: SubstrateArguments,
     #[command(flatten)]
@@ -168,6 +171,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     study.repeat = arguments.repeat.unwrap_or(study.repeat);
     study.timeout = arguments.timeout.unwrap_or(study.timeout);
     study.memory = arguments.memory.or(study.memory);
+    study.certify = arguments.certify.or(study.certify);
     study.threads = global.threads.or(study.threads);
     study.plugins.extend(global.plugins.iter().map(absolute));
     arguments.substrate.apply(&mut study)?;

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use medial::complex::{self, MedialMesh};
 use medial::complex::collapse::Hierarchy;
-use medial::metrics::{JudgeOptions, MetricError};
+use medial::complex::{self, MedialMesh};
+use medial::metrics::{JudgeOptions, MetricError, topology_warning};
 use medial::shape::Shape;
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError,
@@ -27,9 +27,7 @@ use crate::exit::{Exit, Failure};
 use crate::files::{check_folder, check_output, medial_mesh_for};
 use crate::output::{counted, note, percent, print_json, print_line, version};
 use crate::run::record::fill_result;
-use crate::run::{
-    Fault, Input, LevelRun, Probe, Registry, Search, Source, StageLine, answer,
-};
+use crate::run::{Fault, Input, LevelRun, Probe, Registry, Search, Source, StageLine, answer};
 
 /// What a search over sphere counts found, for the answer to `--max-error`.
 #[derive(Debug, Serialize)]
@@ -123,8 +121,10 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let loaded = loaded.map(|path| hierarchy::load(path, &origin, &shape)).transpose()?;
     let start = Start { method, params, shape: &shape, loaded };
     let (run, search) = simplify(arguments, &start, &input, &line)?;
-    let simplify = describe(arguments, &start, &run);
+    let mut simplify = describe(arguments, &start, &run);
     let simplified = run.outcome.map_err(|fault| failure(&source, fault))?;
+    line.at("checking the topology");
+    simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
     line.at("writing");
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
@@ -162,6 +162,18 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         }
     }
     Ok(Exit::Done)
+}
+
+/// What is to be said where the result, or what it was made from, has not the solid's topology.
+fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
+    let expected = shape.expected_betti();
+    let Some(own) = topology_warning(complex::betti(result), expected) else { return Vec::new() };
+    let initial = shape.initial().ok();
+    let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
+    let start = start.map(|start| {
+        format!("the initial medial mesh is not right either ({start}); `--sampling auto` adds samples where it fails")
+    });
+    [Some(format!("the topology is not the solid's: {own}")), start].into_iter().flatten().collect()
 }
 
 /// The list of parts with their centres as in the input.

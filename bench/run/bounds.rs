@@ -1,7 +1,7 @@
 //! Error bounds as levels: a search, then the level that it found, asked alone on the clock.
 
-use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
 use medial::shape::Shape;
+use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
 use medial_reports::Status;
 
 use super::answer::guarded;
@@ -33,9 +33,10 @@ impl Bounds<'_> {
         if bounds.is_empty() {
             return Vec::new();
         }
-        let found = guarded(|| self.search(bounds))
-            .unwrap_or_else(|fault| vec![Err(fault); bounds.len()]);
-        let levels: Vec<Level> = found.iter().filter_map(|level| level.as_ref().ok()).copied().collect();
+        let found =
+            guarded(|| self.search(bounds)).unwrap_or_else(|fault| vec![Err(fault); bounds.len()]);
+        let levels: Vec<Level> =
+            found.iter().filter_map(|level| level.as_ref().ok()).copied().collect();
         let view = self.shape.view();
         let mut runs = match levels.is_empty() {
             true => Vec::new(),

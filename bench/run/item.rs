@@ -98,6 +98,10 @@ pub struct Measure {
     /// asked, as a fraction of the diagonal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub union_spacing: Option<f64>,
+    /// Width of the certified interval of the Hausdorff distance, a fraction of the diagonal, where
+    /// one is asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certify: Option<f64>,
 }
 
 /// A method, its parameters, and the name of this pair in tables.
@@ -199,7 +203,7 @@ impl Measure {
 impl From<JudgeOptions> for Measure {
     fn from(options: JudgeOptions) -> Self {
         let JudgeOptions { samples, volume_depth, seed } = options;
-        Self { samples, volume_depth, seed, union_spacing: None }
+        Self { samples, volume_depth, seed, union_spacing: None, certify: None }
     }
 }
 

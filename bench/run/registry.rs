@@ -32,9 +32,10 @@ impl Entry {
     fn chain(first: &Self, then: &Self) -> Self {
         let method = Arc::new(Chain::new(Arc::clone(&first.method), Arc::clone(&then.method)));
         let parts = [&first.fingerprint, &then.fingerprint];
-        let fingerprint = parts.iter().any(|part| part.is_some()).then(|| {
-            parts.map(|part| part.as_deref().unwrap_or("built in")).join(" + ")
-        });
+        let fingerprint = parts
+            .iter()
+            .any(|part| part.is_some())
+            .then(|| parts.map(|part| part.as_deref().unwrap_or("built in")).join(" + "));
         Self { method, fingerprint }
     }
 
@@ -71,8 +72,7 @@ impl Registry {
     /// # Errors
     /// [`RegistryError::Duplicate`] when two have one id.
     pub fn new(methods: Vec<Box<dyn MedialSimplifier>>) -> Result<Self, RegistryError> {
-        let mut registry =
-            Self { entries: Vec::new(), chains: Vec::new(), files: Vec::new() };
+        let mut registry = Self { entries: Vec::new(), chains: Vec::new(), files: Vec::new() };
         for method in methods {
             let id = &method.info().id;
             if registry.entry(id).is_some() {

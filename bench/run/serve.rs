@@ -12,8 +12,8 @@ use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::Duration;
 
-use medial::shape::{Shape, ShapeOptions};
 use medial::complex::MedialMesh;
+use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MethodInfo, RunContext, Simplification, SimplifyError};
 use medial_reports::Status;
 
@@ -195,9 +195,14 @@ fn answer_item(registry: &Registry, item: &Item, scene: &Scene, shape: &Shape) -
     let bounds: Vec<f64> = item.levels.iter().filter_map(bound).collect();
     // The supervisor notices by itself when the pipe is closed.
     let view = shape.view();
-    let mut runs = answer(&view, || prepare(&view), &levels, |level| {
-        let _ = send(&Event::Asked(level));
-    });
+    let mut runs = answer(
+        &view,
+        || prepare(&view),
+        &levels,
+        |level| {
+            let _ = send(&Event::Asked(level));
+        },
+    );
     let measure = |mesh: &MedialMesh| {
         let distances = scene.judge.distances(&scene.carried(mesh));
         distances.map(|distances| distances.hausdorff).map_err(|error| error.to_string())

@@ -73,6 +73,10 @@ pub struct Study {
     pub dual: Dual,
     /// Surface samples of the evaluation, beside the vertices.
     pub samples: usize,
+    /// Width of the certified interval of each Hausdorff error, a fraction of the diagonal; none
+    /// unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certify: Option<f64>,
     /// Number of threads; all processors unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<usize>,
@@ -128,6 +132,7 @@ impl Default for Study {
             sampling: Sampling::default(),
             dual: Dual::default(),
             samples: SAMPLES,
+            certify: None,
             threads: None,
             timeout: TIMEOUT,
             memory: None,
@@ -258,6 +263,9 @@ impl Study {
         if !(self.timeout > 0.0 && self.timeout.is_finite()) {
             return wrong(format!("--timeout {}: a positive number of seconds", self.timeout));
         }
+        if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
+            return wrong(format!("--certify {width}: a fraction of the diagonal from 1e-6 on"));
+        }
         if self.memory == Some(0) {
             return wrong("--memory 0: a positive number of megabytes".into());
         }
@@ -379,6 +387,7 @@ impl Study {
             volume_depth: VOLUME_DEPTH,
             seed: self.seed,
             union_spacing: None,
+            certify: self.certify,
         }
     }
 

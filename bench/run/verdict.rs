@@ -43,7 +43,11 @@ fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
     let hash = mesh_hash(mesh);
     let mesh = scene.carried(mesh);
     let begun = Instant::now();
-    let evaluation = (measure.samples > 0).then(|| scene.judge.evaluate(&mesh));
+    let evaluation = (measure.samples > 0).then(|| {
+        let certified =
+            measure.certify.map(|width| scene.judge.certify(&mesh, width)).transpose()?;
+        Ok(Evaluation { certified, ..scene.judge.evaluate(&mesh)? })
+    });
     let seconds = begun.elapsed().as_secs_f64();
     let union = |spacing| UnionTopology { betti: union_betti(&mesh, spacing).ok() };
     Verdict { evaluation, seconds, union: measure.union_spacing.map(union), hash }

@@ -25,6 +25,8 @@ pub(crate) struct Page<'a> {
     pub(crate) comparison: &'a Comparison<'a>,
     pub(crate) summaries: &'a [CountSummary],
     pub(crate) overview_plots: &'a [Plot],
+    /// One for each method with a scalar of its own.
+    pub(crate) native_plots: &'a [Plot],
     /// In the order of the meshes.
     pub(crate) meshes: &'a [MeshPart],
     pub(crate) summary_tables: &'a [Table],

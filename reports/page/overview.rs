@@ -15,6 +15,9 @@ use crate::text::{counted, escape_html, grouped};
 static SHOWN: [&Metric; 7] =
     [&HAUSDORFF, &EPSILON, &MEAN_ERROR, &MIN_ANGLE, &BELOW_30, &SPIKES, &TOTAL_SECONDS];
 
+/// A longer table is folded.
+const MANY_ROWS: usize = 48;
+
 /// Headlines, the matrix of means, the fewest spheres for an error, failures, and plots.
 pub(crate) fn section(page: &Page<'_>) -> String {
     let mut html = String::from("<section id=\"overview\">\n<h2>Overview</h2>\n");
@@ -31,15 +34,17 @@ pub(crate) fn section(page: &Page<'_>) -> String {
         html.push_str(&matrices(page, &compared));
     }
     html.push_str(&failures(page));
-    if let [means, bounds] = page.summary_tables {
-        html.push_str(&titled(bounds, false));
-        if !page.overview_plots.is_empty() {
-            html.push_str("<h3>Means over meshes</h3>\n");
-            html.push_str(&html::plots(page.overview_plots));
-        }
-        if !means.rows.is_empty() {
-            html.push_str(&titled(means, true));
-        }
+    for table in page.summary_tables.iter().filter(|table| !table.rows.is_empty()) {
+        html.push_str(&titled(table, table.rows.len() > MANY_ROWS));
+    }
+    if !page.overview_plots.is_empty() {
+        html.push_str("<h3>Plots over all meshes</h3>\n");
+        html.push_str(&html::plots(page.overview_plots));
+    }
+    if !page.native_plots.is_empty() {
+        html.push_str("<details><summary>Plots of each method on its own axis</summary>\n");
+        html.push_str(&html::plots(page.native_plots));
+        html.push_str("</details>\n");
     }
     html.push_str("</section>\n");
     html

@@ -8,7 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::plots::PlotError;
 use crate::plots::axis::{Axis, Scale};
-use crate::plots::palette::{BASELINE, GRID, INK, Marker, PAPER, style};
+use crate::plots::palette::{GRID, INK, Marker, PAPER, style};
 use crate::text::{printable, shortened};
 
 /// The backend draws at whole pixels: everything is drawn at twice its size and shown at half.
@@ -25,6 +25,8 @@ pub(crate) struct Curve {
     pub(crate) points: Vec<(f64, f64)>,
     /// Texts beside some points: index and text.
     pub(crate) tags: Vec<(usize, String)>,
+    /// Dashed, and without a row of its own in the legend where the label is empty.
+    pub(crate) dashed: bool,
 }
 
 /// A figure before it is drawn.
@@ -48,7 +50,7 @@ impl Figure {
         let x = Axis::fit(self.x.0.as_str(), self.x.1, points().map(|point| point.0));
         let y = Axis::fit(self.y.0.as_str(), self.y.1, points().map(|point| point.1));
         let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
-        let legend = self.curves.len() as i32 * LEGEND_ROW + 60 * RESOLUTION;
+        let legend = self.named().count() as i32 * LEGEND_ROW + 60 * RESOLUTION;
         let size = (WIDTH as u32, HEIGHT.max(legend) as u32);
         let mut svg = String::new();
         self.draw(&x, &y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())?;
@@ -99,6 +101,11 @@ impl Figure {
         area.present().map_err(failed)
     }
 
+    /// The curves that the legend names.
+    fn named(&self) -> impl Iterator<Item = &Curve> {
+        self.curves.iter().filter(|curve| !curve.label.is_empty())
+    }
+
     /// Wide enough for the longest label, as far as its width can be told without a font.
     fn legend_width(&self) -> i32 {
         let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
@@ -109,11 +116,10 @@ impl Figure {
         &self,
         area: &DrawingArea<B, Shift>,
     ) -> Result<(), PlotError> {
-        for (row, curve) in self.curves.iter().enumerate() {
+        for (row, curve) in self.named().enumerate() {
             let y = 18 * RESOLUTION + row as i32 * LEGEND_ROW;
             let (colour, marker) = style(curve.series);
-            let dashes: &[(i32, i32)] =
-                if curve.series == BASELINE { &[(0, 5), (19, 24)] } else { &[(0, 24)] };
+            let dashes: &[(i32, i32)] = if curve.dashed { &[(0, 5), (19, 24)] } else { &[(0, 24)] };
             for (from, to) in dashes {
                 let line = vec![(from * RESOLUTION, y), (to * RESOLUTION, y)];
                 area.draw(&PathElement::new(line, colour.stroke_width(2 * RESOLUTION as u32)))
@@ -141,7 +147,7 @@ fn draw_curve<B: DrawingBackend>(
     let (colour, marker) = style(curve.series);
     let line = colour.stroke_width(2 * RESOLUTION as u32);
     let points = curve.points.iter().copied();
-    if curve.series == BASELINE {
+    if curve.dashed {
         let dashes = DashedLineSeries::new(points, 7 * RESOLUTION, 5 * RESOLUTION, line);
         chart.draw_series(dashes).map_err(PlotError::new)?;
     } else {

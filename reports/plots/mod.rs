@@ -7,8 +7,12 @@ mod palette;
 
 use std::fmt::Display;
 
+use medial::simplifier::Level;
+
 use crate::comparison::{Comparison, Entry, level_label, reached};
+use crate::equal_error::BoundSummary;
 use crate::metric::{BELOW_30, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
+use crate::native::{NativeCurve, NativePoint};
 use crate::summary::{CountSummary, SeriesSummary};
 
 use self::axis::Scale;
@@ -129,28 +133,46 @@ pub(crate) fn mesh_plots(
 ) -> Result<Vec<Plot>, PlotError> {
     let mut plots = Vec::new();
     for kind in &KINDS {
-        let curves = (0..comparison.series.len())
-            .map(|series| mesh_curve(comparison, mesh, series, kind))
-            .filter(|curve| !curve.points.is_empty())
-            .collect();
+        let series = 0..comparison.series.len();
+        let curves = series.flat_map(|series| mesh_curves(comparison, mesh, series, kind));
         let title = format!("{}: {}", comparison.meshes[mesh], kind.title);
-        plots.extend(kind.draw(format!("mesh-{stem}-{}", kind.name), title, curves)?);
+        plots.extend(kind.draw(format!("mesh-{stem}-{}", kind.name), title, curves.collect())?);
     }
     Ok(plots)
 }
 
-/// Every measured result of one method on one mesh, from many spheres to few.
-fn mesh_curve(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &Kind) -> Curve {
-    let point = |entry: &&Entry<'_>| {
+/// Every measured result of one method on one mesh, from many spheres to few: those at counts and
+/// error bounds as a line, those at levels of its own as dashes.
+fn mesh_curves(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &Kind) -> Vec<Curve> {
+    let is_own = |entry: &Entry<'_>| {
+        matches!(entry.record.simplify.level, Level::Native(_) | Level::Published)
+    };
+    let mut curves: Vec<Curve> = [false, true]
+        .into_iter()
+        .map(|own| {
+            let entries = comparison.of_mesh(mesh).filter(|entry| entry.series == series);
+            let entries = entries.filter(|entry| entry.measured() && is_own(entry) == own);
+            Curve { dashed: own, ..mesh_curve(comparison, series, entries, kind) }
+        })
+        .filter(|curve| !curve.points.is_empty())
+        .collect();
+    // One row in the legend for both.
+    curves.iter_mut().skip(1).for_each(|curve| curve.label.clear());
+    curves
+}
+
+fn mesh_curve<'e>(
+    comparison: &Comparison<'_>,
+    series: usize,
+    entries: impl Iterator<Item = &'e Entry<'e>>,
+    kind: &Kind,
+) -> Curve {
+    let point = |entry: &Entry<'_>| {
         let spheres = reached(entry.record)?;
         let x = if kind.against_time { TOTAL_SECONDS.of(entry.record)? } else { spheres as f64 };
         Some((spheres, (x, kind.y.of(entry.record)?)))
     };
-    let mut points: Vec<(usize, (f64, f64))> = comparison
-        .of_mesh(mesh)
-        .filter(|entry| entry.series == series && entry.measured())
-        .filter_map(|entry| point(&entry))
-        .collect();
+    let mut points: Vec<(usize, (f64, f64))> = entries.filter_map(point).collect();
     points.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.0.total_cmp(&b.1.0)));
     let tags =
         if kind.against_time { ends(points.iter().map(|point| point.0)) } else { Vec::new() };
@@ -159,6 +181,7 @@ fn mesh_curve(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &Ki
         label: comparison.series[series].clone(),
         points: points.into_iter().map(|point| point.1).collect(),
         tags,
+        dashed: false,
     }
 }
 
@@ -173,24 +196,126 @@ fn ends(counts: impl ExactSizeIterator<Item = usize>) -> Vec<(usize, String)> {
 }
 
 /// Figures of the means over all meshes, and the bars of the stages.
-pub(crate) fn overview_plots(
+pub(crate) fn mean_plots(
     comparison: &Comparison<'_>,
     summaries: &[CountSummary],
+    natives: &[NativeCurve],
 ) -> Result<Vec<Plot>, PlotError> {
     let mut plots = Vec::new();
     for kind in &KINDS {
-        let curves = (0..comparison.series.len())
+        let mut curves: Vec<Curve> = (0..comparison.series.len())
             .map(|series| mean_curve(comparison, summaries, series, kind))
             .filter(|curve| !curve.points.is_empty())
             .collect();
+        curves.extend(own_levels(comparison, natives, kind, &curves));
         let title = format!("All meshes, {} means: {}", kind.y.mean.word(), kind.title);
         plots.extend(kind.draw(format!("overview-{}", kind.name), title, curves)?);
     }
     // The fewest spheres take the most work.
-    if let Some(summary) = summaries.iter().rev().find(|summary| summary.rows.iter().any(|row| row.over > 0)) {
+    if let Some(summary) =
+        summaries.iter().rev().find(|summary| summary.rows.iter().any(|row| row.over > 0))
+    {
         plots.extend(stage_bars(comparison, summary)?);
     }
     Ok(plots)
+}
+
+/// The means at levels of their own as dashes, for the figures of errors against spheres.
+fn own_levels(
+    comparison: &Comparison<'_>,
+    natives: &[NativeCurve],
+    kind: &Kind,
+    named: &[Curve],
+) -> Vec<Curve> {
+    let error: fn(&NativePoint) -> f64 = match kind.name {
+        "hausdorff" => |point| point.hausdorff,
+        "mean" => |point| point.mean,
+        _ => return Vec::new(),
+    };
+    let curve = |native: &NativeCurve| {
+        let is_named = named.iter().any(|curve| curve.series == native.series);
+        let label = &comparison.series[native.series];
+        Curve {
+            series: native.series,
+            label: if is_named { String::new() } else { format!("{label} (own levels)") },
+            points: native.points.iter().map(|point| (point.spheres, error(point))).collect(),
+            tags: vec![],
+            dashed: true,
+        }
+    };
+    natives.iter().map(curve).collect()
+}
+
+/// One figure for each method with a scalar of its own: what it does to the error, on its own axis.
+pub(crate) fn native_plots(
+    comparison: &Comparison<'_>,
+    natives: &[NativeCurve],
+    axis: &dyn Fn(&str) -> Option<String>,
+) -> Result<Vec<Plot>, PlotError> {
+    let mut plots = Vec::new();
+    let stems = crate::text::file_stems(comparison.series.iter().map(String::as_str));
+    for native in natives {
+        let at = |point: &NativePoint| match point.level {
+            Level::Native(value) => Some((value, point.hausdorff)),
+            _ => None,
+        };
+        let points: Vec<(f64, f64)> = native.points.iter().filter_map(at).collect();
+        if points.len() < 2 {
+            continue;
+        }
+        let (least, most) = (points.iter().map(|p| p.0), points.iter().map(|p| p.0));
+        let (least, most) = (least.fold(f64::INFINITY, f64::min), most.fold(0.0, f64::max));
+        let scale = if least > 0.0 && most > 20.0 * least { Scale::Log } else { Scale::Linear };
+        let label = &comparison.series[native.series];
+        let axis = axis(comparison.methods[native.series]);
+        let title = format!("{label}: Hausdorff error against its own level");
+        let tags = native.points.iter().filter(|point| at(point).is_some()).enumerate();
+        let tags = tags.map(|(k, point)| (k, crate::text::grouped(point.spheres.round() as u64)));
+        let curve = Curve {
+            series: native.series,
+            label: format!("means over {}", native.over),
+            points,
+            tags: tags.collect(),
+            dashed: true,
+        };
+        let figure = Figure {
+            title: title.clone(),
+            x: (axis.unwrap_or_else(|| "own level".to_owned()), scale),
+            y: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),
+            curves: vec![curve],
+        };
+        let stem = format!("overview-level-{}", stems[native.series]);
+        plots.extend(figure.to_svg()?.map(|svg| Plot { stem, title, svg }));
+    }
+    Ok(plots)
+}
+
+/// Fewest spheres against the error that they keep, from a search.
+pub(crate) fn equal_error_plot(
+    comparison: &Comparison<'_>,
+    bounds: &[BoundSummary],
+) -> Result<Option<Plot>, PlotError> {
+    let curve = |series: usize| {
+        let point = |bound: &BoundSummary| {
+            let row = bound.rows.iter().find(|row| row.series == series)?;
+            Some((bound.percent, row.spheres?))
+        };
+        let points = bounds.iter().filter_map(point).collect();
+        let label = comparison.series[series].clone();
+        Curve { series, label, points, tags: vec![], dashed: false }
+    };
+    let title = "Equal error: median of the fewest spheres, searched for".to_owned();
+    let figure = Figure {
+        title: title.clone(),
+        x: ("Hausdorff error kept (% of diagonal)".to_owned(), Scale::Log),
+        y: ("spheres".to_owned(), Scale::Log),
+        curves: (0..comparison.series.len())
+            .map(curve)
+            .filter(|curve| !curve.points.is_empty())
+            .collect(),
+    };
+    let stem = "overview-equal-error".to_owned();
+    Ok(figure.to_svg()?.map(|svg| Plot { stem, title, svg }))
 }
 
 fn mean_curve(
@@ -220,6 +345,7 @@ fn mean_curve(
         label: label.unwrap_or_else(|| comparison.series[series].clone()),
         points: means.into_iter().map(|mean| mean.1).collect(),
         tags,
+        dashed: false,
     }
 }
 
@@ -238,7 +364,7 @@ fn stage_bars(
     let label = |row: &SeriesSummary| label_over(&comparison.series[row.series], summary, row);
     let rows = summary.rows.iter().filter(|row| row.over > 0);
     let rows: Vec<_> = rows.filter_map(|row| Some((label(row), row.stages?))).collect();
-    let level = level_label(medial::simplifier::Level::Spheres(summary.count));
+    let level = level_label(Level::Spheres(summary.count));
     let title = format!("Seconds by stage, to {level} spheres");
     let svg = Bars { title: title.clone(), rows }.to_svg()?;
     Ok(svg.map(|svg| Plot { stem: "overview-stages".to_owned(), title, svg }))
@@ -258,18 +384,24 @@ pub(crate) fn against_numbers(
     let Some(kind) = KINDS.iter().find(|kind| kind.name == name) else { return Ok(None) };
     let numbers = |spheres: f64| 4.0 * spheres;
     let curve = |series| match mesh {
-        Some(mesh) => mesh_curve(comparison, mesh, series, kind),
-        None => mean_curve(comparison, summaries, series, kind),
+        Some(mesh) => mesh_curves(comparison, mesh, series, kind),
+        None => vec![mean_curve(comparison, summaries, series, kind)],
     };
     let mut curves: Vec<Curve> = (0..comparison.series.len())
-        .map(curve)
+        .flat_map(curve)
         .map(|mut curve| {
             curve.points.iter_mut().for_each(|point| point.0 = numbers(point.0));
             curve
         })
         .filter(|curve| !curve.points.is_empty())
         .collect();
-    curves.push(Curve { series: BASELINE, label: baseline.to_owned(), points, tags: vec![] });
+    curves.push(Curve {
+        series: BASELINE,
+        label: baseline.to_owned(),
+        points,
+        tags: vec![],
+        dashed: true,
+    });
     let (stem, of) = match mesh {
         None => ("overview".to_owned(), "All meshes, geometric means".to_owned()),
         Some(mesh) => {
@@ -296,7 +428,8 @@ pub(crate) fn against_noise(
     spikes: bool,
     curves: Vec<NoiseCurve>,
 ) -> Result<Option<Plot>, PlotError> {
-    let curve = |(series, label, points)| Curve { series, label, points, tags: vec![] };
+    let curve =
+        |(series, label, points)| Curve { series, label, points, tags: vec![], dashed: false };
     let scale = if spikes { Scale::LogOfOneMore } else { Scale::Log };
     let figure = Figure {
         title: title.clone(),

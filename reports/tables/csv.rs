@@ -108,6 +108,8 @@ fn sizes() -> Vec<Column> {
         column("nonmanifold_edges", |r| {
             Some(r.evaluate.as_ref()?.counts.nonmanifold_edges.to_string())
         }),
+        column("certified_lower", |r| Some(number(r.evaluate.as_ref()?.certified?.lower))),
+        column("certified_upper", |r| Some(number(r.evaluate.as_ref()?.certified?.upper))),
         column("stored_bytes", |r| Some(r.evaluate.as_ref()?.counts.bytes().to_string())),
         column("peak_bytes", |r| r.simplify.peak_bytes.map(|bytes| bytes.to_string())),
         column("threads", move |r| count(r.simplify.threads)),

@@ -67,8 +67,8 @@ fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummar
     cells.extend(COMPARED.iter().map(|metric| {
         let Some(mean) = row.mean(metric) else { return Cell::optional(None) };
         let text = metric.format_mean(mean);
-        let best = is_whole
-            && best(summary, metric).is_some_and(|best| metric.format_mean(best) == text);
+        let best =
+            is_whole && best(summary, metric).is_some_and(|best| metric.format_mean(best) == text);
         Cell { text: framed(text), best }
     }));
     match row.stages {

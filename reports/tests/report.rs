@@ -108,15 +108,97 @@ fn no_method_gains_by_failing() {
     set(&mut records[2], 0.0123);
     let files = report_of(&records);
     let summary = text(&files, "tables/summary.md");
-    let rows: Vec<&str> = summary
-        .lines()
-        .filter(|line| line.contains("| qmat") || line.contains("| angle"))
-        .collect();
-    assert!(rows.len() >= 2, "{summary}");
-    // Over the one mesh that both have; with the hard one, qmat's mean would be near 7.84 %.
-    assert!(rows.iter().take(2).all(|row| row.contains("1.23")), "{rows:?}");
-    assert!(!summary.contains("7.84"), "{summary}");
+    let row = |method: &str| {
+        let mut rows = summary.lines().filter(|line| line.contains(&format!("| {method} |")));
+        rows.next().unwrap_or_else(|| panic!("{method}: {summary}")).to_owned()
+    };
+    // Equal where both have a result, and that is said; its mean over fewer meshes is marked.
+    assert!(row("angle").contains("| 1.00 | 1 mesh |"), "{}", row("angle"));
+    assert!(row("angle").contains("(1.23)") && row("angle").contains("1 of 2"));
+    assert!(row("qmat").contains("7.84") && row("qmat").contains("2 of 2"));
     assert!(text(&files, "index.html").contains("index out of bounds"));
+}
+
+/// What the summary says of a method, without the marks of the best.
+fn summary_rows(records: &[Record], method: &str) -> Vec<String> {
+    let files = report_of(records);
+    let rows = text(&files, "tables/summary.md").lines();
+    let rows = rows.filter(|line| line.contains(&format!("| {method} |")));
+    rows.map(|line| line.replace('*', "")).collect()
+}
+
+#[test]
+fn a_further_method_changes_no_number_of_the_others() {
+    let before = comparison(&SHAPES[..6], &["qmat", "angle"], &COUNTS);
+    let mut after = before.clone();
+    for (index, mesh) in SHAPES[..6].iter().enumerate() {
+        for count in COUNTS {
+            // A weak one: off its count on most meshes, failed on one.
+            let mut weak = ok(mesh, "weak", count, index, 9);
+            match index {
+                0 => weak.simplify.reached = Some(count),
+                1 => weak = failed(mesh, "weak", count, Status::Panicked, "no"),
+                _ => {
+                    weak.status = Status::OtherCount;
+                    weak.simplify.reached = Some(3 * count);
+                }
+            }
+            after.push(weak);
+        }
+    }
+    for method in ["qmat", "angle"] {
+        let rows = summary_rows(&before, method);
+        assert!(rows.len() > COUNTS.len(), "{rows:?}");
+        assert_eq!(rows, summary_rows(&after, method));
+    }
+}
+
+#[test]
+fn a_curve_is_over_one_set_of_meshes() {
+    // The hard mesh is reached at the smaller count alone.
+    let mut records = vec![];
+    for (count, meshes) in [(500, &["a", "b"][..]), (100, &["a", "b", "hard"][..])] {
+        for (shape, mesh) in meshes.iter().enumerate() {
+            records.push(ok(mesh, "qmat", count, shape, 0));
+        }
+    }
+    records.push(failed("hard", "qmat", 500, Status::TimedOut, "no result within 300 s"));
+    let rows = summary_rows(&records, "qmat");
+    assert!(rows[0].contains("| 2 of 3 |") && rows[1].contains("| 2 of 3 |"), "{rows:?}");
+}
+
+#[test]
+fn bounds_and_own_levels_have_tables_of_their_own() {
+    use medial::simplifier::Level;
+
+    let mut records = Vec::new();
+    for (shape, mesh) in SHAPES[..4].iter().enumerate() {
+        for (rank, method) in ["qmat", "angle"].iter().enumerate() {
+            for (count, level) in [(900, 30.0), (300, 60.0), (90, 90.0)] {
+                let mut record = ok(mesh, method, count, shape, rank);
+                record.simplify.level = Level::Native(level);
+                records.push(record);
+            }
+            let mut within = ok(mesh, method, 200 * (1 + rank), shape, rank);
+            within.simplify.level = Level::MaxError(0.01);
+            if (shape, rank) == (3, 1) {
+                within = failed(mesh, method, 1, Status::BoundMissed, "the lowest is 1.2 %");
+                within.simplify.level = Level::MaxError(0.01);
+            }
+            records.push(within);
+        }
+    }
+    let files = report_of(&records);
+    let summary = text(&files, "tables/summary.md");
+    let rows: Vec<&str> = summary.lines().filter(|line| line.starts_with("| 1 | ")).collect();
+    assert_eq!(rows.len(), 2, "{summary}");
+    assert!(rows[0].contains("| qmat | 4 of 4 | 200 | 1.00 | 4 meshes |"), "{}", rows[0]);
+    assert!(rows[1].contains("| angle | 3 of 4 | 400 | 2.00 | 3 meshes |"), "{}", rows[1]);
+    assert!(summary.contains("| angle | 60 theta (degrees) | 4 of 4 | 300 |"), "{summary}");
+    for plot in ["plots/overview-equal-error.svg", "plots/overview-level-angle.svg"] {
+        assert!(files.contains_key(plot), "{plot}");
+    }
+    assert!(text(&files, "index.html").contains("the lowest is 1.2 %"));
 }
 
 #[test]

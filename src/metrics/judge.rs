@@ -10,7 +10,7 @@ use super::volume::{Sides, box_in, volume_error_in};
 use super::{
     AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
     SurfaceDistances, VolumeOptions, certify, counts, distances, spikes, surface_distances,
-    triangle_quality,
+    topology_warning, triangle_quality,
 };
 use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
 use crate::geometry::TriangleBvh;
@@ -112,6 +112,7 @@ impl Judge {
         );
         let ((distances, envelope), axis) = (distances?, axis.transpose()?);
         let mut warnings = self.misfits(mesh, &union, &distances);
+        warnings.extend(topology_warning(betti, self.truth.betti));
         let volume_error = match volume_error {
             // All else is defined, and the surface was taken for a solid.
             Err(MetricError::NoVolume(volume)) => {

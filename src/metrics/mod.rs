@@ -15,6 +15,7 @@ mod protrusion;
 mod quality;
 mod spikes;
 mod surface_distance;
+mod topology;
 mod union_topology;
 mod volume;
 
@@ -31,5 +32,6 @@ pub use judge::{Judge, JudgeOptions, Truth};
 pub use quality::triangle_quality;
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
 pub use surface_distance::{SurfaceDistances, surface_distances};
+pub use topology::topology_warning;
 pub use union_topology::union_betti;
 pub use volume::{VolumeOptions, enclosed_volume, volume_error};

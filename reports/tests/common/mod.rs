@@ -192,6 +192,7 @@ pub fn header(methods: &[&str]) -> Header {
         citation: "A. Author, 2015, Title, Journal, doi:10.1145/0000000".to_owned(),
         summary: "Collapses edges by a quadric error.".to_owned(),
         published: "a count of 1,000 spheres".to_owned(),
+        native: Some("theta (degrees)".to_owned()),
     };
     Header {
         title: String::new(),
