@@ -16,6 +16,7 @@ type Text = Cow<'static, str>;
 ///     .citation("Who, when, where, DOI")
 ///     .summary("Keeps the balls that shrink least.")
 ///     .native(NativeLevel::larger_is_coarser("t", "fraction of the diagonal"))
+///     .sweep(&[0.01, 0.02, 0.05])
 ///     .param(ParamInfo::new("rounds", 3, "rounds", "how often all balls shrink"));
 /// assert_eq!(info.params[0].default, "3");
 /// ```
@@ -31,6 +32,9 @@ pub struct MethodInfo {
     pub summary: Text,
     /// The method's own level, where it has a scalar one.
     pub native: Option<NativeLevel>,
+    /// Native levels of a default comparison, from fine to coarse, in the unit of
+    /// [`MethodInfo::native`]; none for a method without one.
+    pub sweep: Vec<f64>,
     /// What [`Level::Published`](super::Level::Published) means here.
     pub published: Text,
     /// Parameters, in the order of the paper.
@@ -59,6 +63,11 @@ impl MethodInfo {
     /// With [`MethodInfo::native`].
     pub fn native(self, native: NativeLevel) -> Self {
         Self { native: Some(native), ..self }
+    }
+
+    /// With [`MethodInfo::sweep`], from fine to coarse.
+    pub fn sweep(self, levels: &[f64]) -> Self {
+        Self { sweep: levels.to_vec(), ..self }
     }
 
     /// With [`MethodInfo::published`].
