@@ -43,3 +43,25 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
 pub fn find(id: &str) -> Option<Box<dyn MedialSimplifier>> {
     registry().into_iter().find(|method| method.info().id == id)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::registry;
+
+    #[test]
+    fn default_sweeps_go_from_fine_to_coarse_wherever_there_is_a_native_level() {
+        for method in registry() {
+            let info = method.info();
+            let Some(native) = &info.native else {
+                assert!(info.sweep.is_empty(), "{}: levels of no scalar", info.id);
+                continue;
+            };
+            assert!(info.sweep.len() >= 3, "{}: {:?}", info.id, info.sweep);
+            let is_coarser = |pair: &[f64]| match native.larger_is_coarser {
+                true => pair[0] < pair[1],
+                false => pair[0] > pair[1],
+            };
+            assert!(info.sweep.windows(2).all(is_coarser), "{}: {:?}", info.id, info.sweep);
+        }
+    }
+}

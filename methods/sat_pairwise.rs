@@ -40,6 +40,7 @@ pub fn method() -> Method<NoParams> {
         .summary("Removes the spheres that another sphere contains once both are scaled.")
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
         .filter()
+        .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0])
         .published("unsupported: it is described, not published, as a method");
     Method::new(info, prepare)
 }

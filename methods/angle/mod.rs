@@ -133,6 +133,7 @@ pub fn method() -> Method<AngleParams> {
         .summary("Keeps the spheres whose contact points subtend the largest angles.")
         .native(NativeLevel::larger_is_coarser("theta", "degrees of separation angle"))
         .filter()
+        .sweep(&[20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0])
         .published("unsupported: the papers choose theta for each model")
         .params(AngleParams::describe());
     Method::new(info, prepare)

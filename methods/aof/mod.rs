@@ -106,6 +106,7 @@ pub fn method() -> Method<AofParams> {
         )
         .native(NativeLevel::larger_is_coarser("alpha", "degrees of object angle"))
         .filter()
+        .sweep(&[15.0, 25.0, 35.0, 45.0, 60.0])
         .published(
             "the object angle of the parameter `angle`: the paper chooses one for each model",
         )

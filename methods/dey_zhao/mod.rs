@@ -127,6 +127,7 @@ pub fn method() -> Method<DeyZhaoParams> {
             "multiple of the paper's two thresholds",
         ))
         .filter()
+        .sweep(&[0.5, 1.0, 1.5, 2.0, 3.0])
         .published(
             "the paper's constants, strength 1; for other counts both thresholds are strengthened \
              together, which is not in the paper",

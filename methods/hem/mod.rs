@@ -158,6 +158,7 @@ pub fn method() -> Method<HemParams> {
              boundary samples to the primitives around the surviving end.",
         )
         .native(NativeLevel::larger_is_coarser("epsilon", "fraction of the diagonal"))
+        .sweep(&[0.005, 0.01, 0.02, 0.05])
         .published(
             "before the first collapse of a local error above 1e-4 of the diagonal, the default \
              of the authors' code; the error of the whole is measured, not held",

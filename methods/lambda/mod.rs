@@ -97,6 +97,7 @@ pub fn method() -> Method<LambdaParams> {
         .summary("Keeps the spheres whose contact points need the largest enclosing balls.")
         .native(NativeLevel::larger_is_coarser("lambda", "fraction of the bounding-box diagonal"))
         .filter()
+        .sweep(&[0.005, 0.01, 0.02, 0.04, 0.08])
         .published("unsupported: the paper gives no universal lambda")
         .params(LambdaParams::describe());
     Method::new(info, prepare)

@@ -80,6 +80,7 @@ pub fn method() -> Method<NoParams> {
              absorbs the smaller one: the scale axis as a hierarchy.",
         )
         .native(NativeLevel::larger_is_coarser("s", "factor by which all balls grow, at least 1"))
+        .sweep(&[1.1, 1.5, 2.0, 4.0, 8.0, 16.0])
         .published(
             "the end of the algorithm, where no edge is left, with the whole hierarchy; the paper \
              picks scales by eye for each shape",

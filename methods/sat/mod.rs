@@ -77,6 +77,7 @@ pub fn method() -> Method<SatParams> {
         )
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
         .filter()
+        .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0])
         .published("s = 1.1, the default of the authors' tool, without its angle filter")
         .params(SatParams::describe());
     Method::new(info, prepare)

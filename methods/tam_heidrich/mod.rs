@@ -130,6 +130,7 @@ pub fn method() -> Method<TamHeidrichParams> {
         )
         .native(NativeLevel::larger_is_coarser("t_v", "per cent of the solid's volume"))
         .filter()
+        .sweep(&[0.01, 0.1, 0.5, 1.0, 5.0])
         .published("up to three rounds with t_t = 5 triangles, then two with t_v = 1 %")
         .params(TamHeidrichParams::describe())
         .extra(Capability::new(PARTS, "the parts that the axis was cut into, the largest first"));
