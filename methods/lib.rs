@@ -25,7 +25,6 @@ pub mod tam_heidrich;
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
     vec![
-        Box::new(initial::method()),
         Box::new(angle::method()),
         Box::new(lambda::method()),
         Box::new(dey_zhao::method()),
@@ -39,7 +38,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
     ]
 }
 
-/// The method with an id, or `None`.
+/// The method with an id, or `None`. [`initial`] simplifies nothing and is none of them.
 pub fn find(id: &str) -> Option<Box<dyn MedialSimplifier>> {
     registry().into_iter().find(|method| method.info().id == id)
 }

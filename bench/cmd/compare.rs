@@ -39,9 +39,10 @@ pub struct Arguments {
     /// several times.
     #[arg(long, value_name = "ID=X,Y")]
     levels: Vec<String>,
-    /// No levels of a method's own but those given.
+    /// Counts alone: no levels of the methods' own but those given, no row of the initial medial
+    /// mesh.
     #[arg(long)]
-    no_sweep: bool,
+    counts_only: bool,
     /// Search the fewest spheres within each of these Hausdorff errors, fractions of the diagonal.
     #[arg(long, value_name = "E,F", value_delimiter = ',')]
     max_error: Vec<f64>,
@@ -166,7 +167,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     if !arguments.after_filters.is_empty() {
         study.after_filters.clone_from(&arguments.after_filters);
     }
-    study.sweep &= !arguments.no_sweep;
+    study.counts_only |= arguments.counts_only;
     study.published |= arguments.published;
     study.repeat = arguments.repeat.unwrap_or(study.repeat);
     study.timeout = arguments.timeout.unwrap_or(study.timeout);

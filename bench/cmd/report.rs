@@ -1,5 +1,6 @@
 //! `medial report DIR`: rebuilds tables, plots and page from the records of a folder.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -137,7 +138,9 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
     }
     // Methods of this program are described as they are now; those of plug-ins that are not named
     // this time stay as they were.
-    for entry in registry.entries() {
+    let ids = records.iter().map(|record| record.simplify.method.as_str());
+    let ids: BTreeSet<&str> = ids.collect();
+    for entry in ids.into_iter().filter_map(|id| registry.entry(id)) {
         let note = entry.method().info().into();
         match header.methods.iter_mut().find(|known| known.id == entry.id()) {
             Some(known) => *known = note,
@@ -146,6 +149,9 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
     }
     let ran = |id: &str| records.iter().any(|record| record.simplify.method == id);
     header.methods.retain(|method| ran(&method.id));
+    // In the order of the tables.
+    let place = |id: &str| registry.entries().iter().position(|entry| entry.id() == id);
+    header.methods.sort_by_key(|method| place(&method.id).map_or((1, 0), |place| (0, place)));
     header
 }
 

@@ -119,6 +119,7 @@ fn items(
         meshes: arguments.meshes.clone(),
         spheres: arguments.spheres.clone(),
         methods: methods.collect::<Result<_, _>>()?,
+        counts_only: true,
         threads: global.threads,
         ..Study::default()
     };

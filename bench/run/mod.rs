@@ -48,7 +48,7 @@ pub use progress::Progress;
 pub use protocol::CheckItem;
 pub use provenance::{Provenance, hex, hex_digest, peak_bytes, shell_line};
 pub use record::Kept;
-pub use registry::{Entry, Registry, RegistryError};
+pub use registry::{Entry, INITIAL, Registry, RegistryError};
 pub use reproduce::Reproducer;
 pub use scene::Scene;
 pub use search::{Found, Probe, Search};

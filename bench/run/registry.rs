@@ -5,14 +5,19 @@ use std::sync::Arc;
 
 use medial::simplifier::{Chain, MedialSimplifier};
 
+use medial_methods::initial;
+
 use crate::plugin::{self, PluginError};
+
+/// The row that simplifies nothing.
+pub const INITIAL: &str = "initial";
 
 /// Methods by id, in the order of the tables.
 pub struct Registry {
     entries: Vec<Entry>,
-    /// Every pair of them, the second after the first. Made with their parts, so that the same id
-    /// means the same in a worker.
-    chains: Vec<Entry>,
+    /// What can be run but is no method: the initial medial mesh as it is, and every pair of
+    /// methods, the second after the first. Made at once, so that an id means the same in a worker.
+    others: Vec<Entry>,
     /// The plug-in files that were added, as absolute paths.
     files: Vec<PathBuf>,
 }
@@ -37,10 +42,6 @@ impl Entry {
             .any(|part| part.is_some())
             .then(|| parts.map(|part| part.as_deref().unwrap_or("built in")).join(" + "));
         Self { method, fingerprint }
-    }
-
-    fn is_fixed(&self) -> bool {
-        self.method.info().fixed
     }
 
     /// Its id.
@@ -72,7 +73,9 @@ impl Registry {
     /// # Errors
     /// [`RegistryError::Duplicate`] when two have one id.
     pub fn new(methods: Vec<Box<dyn MedialSimplifier>>) -> Result<Self, RegistryError> {
-        let mut registry = Self { entries: Vec::new(), chains: Vec::new(), files: Vec::new() };
+        let initial = Entry { method: Arc::new(initial::method()), fingerprint: None };
+        let (entries, others) = (Vec::new(), vec![initial]);
+        let mut registry = Self { entries, others, files: Vec::new() };
         for method in methods {
             let id = &method.info().id;
             if registry.entry(id).is_some() {
@@ -103,19 +106,19 @@ impl Registry {
 
     /// Adds a method, and its chains with those that are there.
     fn add(&mut self, new: Entry) {
-        for other in self.entries.iter().filter(|other| !other.is_fixed() && !new.is_fixed()) {
-            self.chains.push(Entry::chain(other, &new));
-            self.chains.push(Entry::chain(&new, other));
+        for other in &self.entries {
+            self.others.push(Entry::chain(other, &new));
+            self.others.push(Entry::chain(&new, other));
         }
         self.entries.push(new);
     }
 
-    /// The method with an id, or the chain of two: `FIRST+THEN`.
+    /// The method with an id, the chain of two (`FIRST+THEN`), or [`INITIAL`].
     pub fn entry(&self, id: &str) -> Option<&Entry> {
-        self.entries.iter().chain(&self.chains).find(|entry| entry.id() == id)
+        self.entries.iter().chain(&self.others).find(|entry| entry.id() == id)
     }
 
-    /// All methods, chains left out.
+    /// All methods, without chains and the initial medial mesh.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }

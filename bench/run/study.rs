@@ -26,7 +26,7 @@ use medial::surface::Sampling;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Dual, Entry, InputError, Item, Limits, Measure, MethodSpec, Provenance, Registry,
+    Dual, Entry, INITIAL, InputError, Item, Limits, Measure, MethodSpec, Provenance, Registry,
     RegistryError, SceneSpec, Source, did_you_mean, hex_digest,
 };
 
@@ -58,9 +58,9 @@ pub struct Study {
     pub spheres: Vec<usize>,
     /// Error bounds, fractions of the diagonal, for each of which the fewest spheres are searched.
     pub max_error: Vec<f64>,
-    /// Whether each method also runs at levels of its own: those given to it, or else its default
-    /// sweep.
-    pub sweep: bool,
+    /// Counts alone: no levels of the methods' own but those given to them, and no row of the
+    /// initial medial mesh.
+    pub counts_only: bool,
     /// Whether each method also runs at its published level.
     pub published: bool,
     /// Seed of every random choice.
@@ -125,7 +125,7 @@ impl Default for Study {
             dataset: None,
             spheres: vec![1000, 500, 200, 100],
             max_error: vec![],
-            sweep: true,
+            counts_only: false,
             published: false,
             seed: 0,
             repeat: 1,
@@ -299,6 +299,9 @@ impl Study {
             let chains = filters.map(|filter| format!("{}+{then}", filter.id()));
             methods.extend(chains.map(|id| StudyMethod::of(&id)));
         }
+        if !self.counts_only {
+            methods.insert(0, StudyMethod::of(INITIAL));
+        }
         let mut found: Vec<(StudyMethod, &Entry)> = Vec::new();
         for method in &methods {
             let entry = registry.entry(&method.id).ok_or_else(|| StudyError::Method {
@@ -431,7 +434,7 @@ impl Study {
         counts.sort_unstable_by(|a, b| b.cmp(a));
         counts.dedup();
         levels.extend(counts.into_iter().map(Level::Spheres));
-        let mut native = match method.levels.is_empty() && self.sweep {
+        let mut native = match method.levels.is_empty() && !self.counts_only {
             true => info.sweep.clone(),
             false => method.levels.clone(),
         };

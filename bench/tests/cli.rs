@@ -224,6 +224,7 @@ fn compare_leaves_a_row_for_every_run() {
         "builtin:capsule",
         "--spheres",
         "100,50",
+        "--counts-only",
         "--samples",
         "1000",
         "--out",
@@ -250,6 +251,72 @@ fn compare_leaves_a_row_for_every_run() {
     assert_eq!(run(&["report", text_path(&out)]).0, 0);
 }
 
+#[test]
+fn own_levels_bounds_chains_and_the_start_are_rows() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("report");
+    let (code, object) = json(&[
+        "compare",
+        "builtin:capsule",
+        "--methods",
+        "qmat,angle",
+        "--spheres",
+        "40",
+        "--max-error",
+        "0.05,0.0001",
+        "--after-filters",
+        "qmat",
+        "--levels",
+        "angle=30,60,90",
+        "--certify",
+        "0.01",
+        "--samples",
+        "500",
+        "--out",
+        text_path(&out),
+    ]);
+    assert_eq!(code, 3, "a bound below the error of the samples is missed: {object}");
+    let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
+    let records: Vec<Value> =
+        lines.lines().map(|line| serde_json::from_str(line).expect("a record")).collect();
+    let of = |method: &str, level: Value| {
+        let found = records.iter().find(|record| {
+            record["simplify"]["method"] == method && record["simplify"]["level"] == level
+        });
+        found.unwrap_or_else(|| panic!("{method} {level}")).clone()
+    };
+    let hausdorff = |record: &Value| record["evaluate"]["hausdorff"].as_f64().expect("a number");
+    let start = of("initial", "published".into());
+    assert_eq!(start["simplify"]["spheres"], start["initial"]["spheres"]);
+    for method in ["qmat", "angle", "angle+qmat", "lambda+qmat", "aof+qmat"] {
+        let within = of(method, serde_json::json!({ "max_error": 0.05 }));
+        assert!(within["status"] == "ok" && hausdorff(&within) <= 0.05, "{within}");
+        let beyond = of(method, serde_json::json!({ "max_error": 0.0001 }));
+        let why = beyond["reason"].as_str().expect("a reason");
+        assert!(beyond["status"] == "bound_missed" && why.contains("lowest error"), "{beyond}");
+        let certified = &within["evaluate"]["certified"];
+        assert!(certified["upper"].as_f64().expect("certified") >= 0.99 * hausdorff(&within));
+    }
+    for level in [30.0, 60.0, 90.0] {
+        assert_eq!(of("angle", serde_json::json!({ "native": level }))["status"], "ok");
+    }
+    // A chain starts from what the filter left, and says so.
+    let chain = of("angle+qmat", serde_json::json!({ "spheres": 40 }));
+    assert_eq!(chain["simplify"]["spheres"], 40);
+    assert!(chain["simplify"]["warnings"].to_string().contains("to start from"), "{chain}");
+    let page = fs::read_to_string(out.join("index.html")).expect("a page");
+    for text in ["Equal error", "levels of its own", "angle+qmat", "theta"] {
+        assert!(page.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn a_wrong_topology_is_said() {
+    // One ball where the solid has a tunnel.
+    let (code, object) = json(&["simplify", "builtin:torus", "-m", "lambda", "--spheres", "1"]);
+    assert!(code == 0 && object["warnings"].to_string().contains("1 tunnel missing"), "{object}");
+}
+
 /// The summary without its numbers.
 fn heads(stdout: &str) -> String {
     let line = |line: &str| line.split_whitespace().next().unwrap_or_default().to_owned();
@@ -271,6 +338,7 @@ fn a_refused_mesh_and_an_unsupported_level_are_rows() {
         text_path(&bad),
         "builtin:sphere",
         "--published",
+        "--counts-only",
         "--spheres",
         "20",
         "--samples",
@@ -284,7 +352,7 @@ fn a_refused_mesh_and_an_unsupported_level_are_rows() {
     assert_eq!(object["status"]["refused"], 2);
     assert_eq!(object["status"]["unsupported"], 1);
     assert_eq!(object["status"]["ok"], 1);
-    let (code, _) = json(&["compare", text_path(&bad), "--out", text_path(&out)]);
+    let (code, _) = json(&["compare", text_path(&bad), "--counts-only", "--out", text_path(&out)]);
     assert_eq!(code, 5, "nothing was measured");
 }
 
@@ -497,7 +565,9 @@ fn meshes_of_one_name_stay_apart() {
         fs::write(at(&format!("{folder}/x.off")), cube_off(0.0, side)).expect("written");
     }
     let (a, b, out) = (at("a/x.off"), at("b/x.off"), at("out"));
-    let common = ["--methods", "qmat,qmat", "--spheres", "2", "--samples", "100", "--out", &out];
+    let mut common =
+        vec!["--methods", "qmat,qmat", "--spheres", "2", "--samples", "100", "--out", &out];
+    common.push("--counts-only");
     let (code, object) = json(&[&["compare", &a, &b, &a], &common[..]].concat());
     assert_eq!((code, &object["records"]), (0, &2.into()), "{object}");
     let records = fs::read_to_string(at("out/results.jsonl")).expect("results");

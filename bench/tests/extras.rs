@@ -53,6 +53,7 @@ fn a_baseline_survives_a_rebuilt_report() {
         "builtin:torus",
         "--methods",
         "angle",
+        "--counts-only",
         "--spheres",
         "100",
         "--samples",

@@ -29,7 +29,7 @@ fn faults_of_methods_are_contained_and_named() {
         "panics,loops,allocates,grows,overflows,aborts,exits,invalid,empty,talks,strays,qmat";
     let arguments = [
         &["compare", "builtin:box:8", "--methods", methods, "--spheres", "30,20,10"][..],
-        &["--samples", "100", "--timeout", "3", "--memory", "1500", "--quiet"],
+        &["--samples", "100", "--counts-only", "--timeout", "3", "--memory", "1500", "--quiet"],
         &["--out", out.to_str().expect("UTF-8")],
     ];
     let output = run(example("faulty"), &arguments.concat());
@@ -74,7 +74,7 @@ fn a_method_that_changes_its_mind_is_called_out() {
     let out = dir.path().join("out");
     let arguments = [
         &["compare", "builtin:box:8", "--methods", "random,qmat", "--spheres", "30", "--repeat"][..],
-        &["3", "--samples", "100", "--quiet", "--out", out.to_str().expect("UTF-8")],
+        &["3", "--samples", "100", "--counts-only", "--quiet", "--out", out.to_str().expect("UTF-8")],
     ];
     assert_eq!(code(&run(example("faulty"), &arguments.concat())), 0);
     for record in records(&out) {
@@ -124,7 +124,7 @@ fn faults_of_programs_are_contained_and_named() {
     let arguments = [
         &["compare", "builtin:box:8", "--methods", &methods, "--spheres", "20", "--plugins", &file]
             [..],
-        &["--samples", "100", "--timeout", "10", "--memory", "1500", "--quiet"],
+        &["--samples", "100", "--counts-only", "--timeout", "10", "--memory", "1500", "--quiet"],
         &["--out", out.to_str().expect("UTF-8")],
     ];
     let output = run(example("faulty"), &arguments.concat());

@@ -20,7 +20,8 @@ fn text(path: &Path) -> &str {
 
 /// `compare` with `--json`: the exit code and the object.
 fn compare(arguments: &[&str], out: &Path) -> (i32, Value) {
-    let common = ["--samples", "200", "--quiet", "--json", "--out", text(out)];
+    let common =
+        ["--samples", "200", "--counts-only", "--quiet", "--json", "--out", text(out)];
     let output = run(MEDIAL, &[&["compare"], arguments, &common].concat());
     let object =
         serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", stderr(&output)));
@@ -73,7 +74,7 @@ fn failures_are_run_again_when_asked_or_when_a_limit_is_wider() {
     let faulty = |more: &[&str]| {
         let arguments = [
             &["compare", "builtin:box:8", "--methods", "loops,panics", "--spheres", "20"][..],
-            &["--samples", "100", "--quiet", "--json", "--out", text(&out)],
+            &["--samples", "100", "--counts-only", "--quiet", "--json", "--out", text(&out)],
             more,
         ];
         let output = run(example("faulty"), &arguments.concat());
@@ -91,7 +92,7 @@ fn two_runs_into_one_folder_lose_nothing() {
     let out = dir.path().join("out");
     let arguments = |method: &'static str| {
         let words = ["compare", "builtin:box:8", "--methods", method, "--spheres", "40,30,20"];
-        let more = ["--samples", "100", "--quiet", "--out"];
+        let more = ["--samples", "100", "--counts-only", "--quiet", "--out"];
         words.into_iter().chain(more).map(str::to_owned).chain([text(&out).to_owned()])
     };
     let program = example("faulty");
@@ -157,7 +158,7 @@ fn a_killed_run_is_continued() {
     let begun = Instant::now();
     compare(&words, &whole);
     let length = begun.elapsed();
-    let common = ["--samples", "200", "--quiet", "--out", text(&killed)];
+    let common = ["--samples", "200", "--counts-only", "--quiet", "--out", text(&killed)];
     let arguments = [&["compare"], &words[..], &common].concat();
     let mut running = 0;
     for share in [0.2, 0.4, 0.5] {
@@ -204,7 +205,7 @@ fn torn_lines_and_temporary_files_are_removed() {
     // What is not this program's stays, whatever is asked.
     let foreign = [out.join(".x.tmp"), out.join("axes/mine.txt"), out.join("plots/mine.png")];
     foreign.iter().for_each(|path| fs::write(path, "mine").expect("written"));
-    let common = ["--samples", "200", "--out", text(&out)];
+    let common = ["--samples", "200", "--counts-only", "--out", text(&out)];
     let output = run(MEDIAL, &[&["compare"], &words[..], &common].concat());
     assert_eq!(code(&output), 0);
     assert!(stderr(&output).contains("last line was incomplete"), "{}", stderr(&output));
@@ -275,7 +276,7 @@ fn an_item_is_run_from_its_file_and_only_once_into_a_folder() {
 fn a_study_is_a_file_and_lies_beside_its_results() {
     let dir = tempfile::tempdir().expect("a folder");
     let (file, out) = (dir.path().join("study.toml"), dir.path().join("out"));
-    let study = "# Two rows of one method.\nmeshes = [\"builtin:box:8\"]\nspheres = [30]\nsamples = 200\n\n\
+    let study = "# Two rows of one method.\nmeshes = [\"builtin:box:8\"]\nspheres = [30]\nsamples = 200\ncounts_only = true\n\n\
                  [[method]]\nid = \"qmat\"\n\n\
                  [[method]]\nid = \"qmat\"\nname = \"no scale\"\nparams = { k = 0 }\nspheres = [20, 10]\n\n\
                  [[method]]\nid = \"angle\"\nlevels = [30, 60]\n";
@@ -321,7 +322,7 @@ fn an_interrupted_run_says_how_to_go_on() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
     let words = ["compare", "builtin:box:8", "--methods", "qmat,loops", "--spheres", "20"];
-    let more = ["--samples", "100", "--out", text(&out)];
+    let more = ["--samples", "100", "--counts-only", "--out", text(&out)];
     let earlier = ["compare", "builtin:box:8", "--methods", "pmat", "--spheres", "20", "--quiet"];
     assert_eq!(code(&run(example("faulty"), &[&earlier[..], &more].concat())), 0);
     assert!(out.join("index.html").exists());

@@ -23,7 +23,7 @@ fn compares(program: &Path, plugins: &[&str], methods: &[(&str, &str)]) {
     let ids = methods.iter().map(|(id, _)| *id).collect::<Vec<_>>().join(",") + ",qmat";
     let arguments = [
         &["compare", "builtin:box:8", "--methods", &ids, "--spheres", "30,20"][..],
-        &["--samples", "200", "--quiet", "--out", out.to_str().expect("UTF-8")],
+        &["--samples", "200", "--counts-only", "--quiet", "--out", out.to_str().expect("UTF-8")],
         plugins,
     ];
     let output = run(program, &arguments.concat());
