@@ -140,6 +140,9 @@ pub struct Claim {
     pub says: String,
     /// What must hold, all of it.
     pub means: Vec<Comparison>,
+    /// What is known of the reason where it does not hold here.
+    #[serde(default)]
+    pub if_not: Option<String>,
 }
 
 /// A comparison of two of our values.
@@ -314,6 +317,7 @@ mod tests {
         let mut exhibit = published().swap_remove(1);
         exhibit.claims = vec![Claim {
             says: String::new(),
+            if_not: None,
             means: vec![Comparison {
                 left: "bear/none".into(),
                 is: Relation::Less,

@@ -48,6 +48,9 @@ pub struct Verdict {
     pub holds: Option<bool>,
     /// Each comparison with its numbers.
     pub because: Vec<String>,
+    /// What is known of the reason, where it does not hold.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
 }
 
 impl Reproduction {
@@ -89,7 +92,8 @@ fn judge(claim: &Claim, rows: &[ReproducedRow]) -> Verdict {
     });
     let (each, because): (Vec<Option<bool>>, Vec<String>) = compared.unzip();
     let holds = each.into_iter().collect::<Option<Vec<bool>>>().map(|all| all.iter().all(|&h| h));
-    Verdict { says: claim.says.clone(), holds, because }
+    let reason = claim.if_not.clone().filter(|_| holds == Some(false));
+    Verdict { says: claim.says.clone(), holds, because, reason }
 }
 
 /// A count in full, anything else with three significant digits.

@@ -37,6 +37,9 @@ impl Reproduction {
                 .collect();
             let says = escape_markdown(&verdict.says);
             text.push_str(&format!("\n**{word}:** {says}\n\n{}", because.concat()));
+            if let Some(reason) = &verdict.reason {
+                text.push_str(&format!("\nWhy not: {}\n", escape_markdown(reason)));
+            }
         }
         text
     }
