@@ -7,6 +7,7 @@ use medial::simplifier::MedialSimplifier;
 
 pub mod angle;
 pub mod aof;
+mod by_knob;
 pub mod dey_zhao;
 pub mod hem;
 pub mod initial;
@@ -19,8 +20,11 @@ mod ranked_facets;
 mod reuse;
 pub mod sat;
 pub mod sat_pairwise;
+mod scale;
 mod sheets;
+mod size_search;
 pub mod tam_heidrich;
+mod ties;
 
 /// All methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {

@@ -8,43 +8,18 @@ use medial::simplifier::{
     Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work,
 };
 
+use crate::scale::{Scale, Wanted};
+use crate::ties::{break_ties, tie};
+
 /// An initial medial mesh with a value for each sphere; larger values are kept longer.
 pub(crate) struct Ranked {
     mesh: Arc<MedialMesh>,
     value: Vec<f64>,
-    /// Spheres by descending value, then ascending id.
+    /// Spheres by descending value; those that tie as [`break_ties`] has them.
     order: Vec<u32>,
     scale: Scale,
     /// Counts and warnings of the preparation, repeated with every level.
     prepared: Diagnostics,
-}
-
-/// How the values are compared with a native level.
-pub(crate) struct Scale {
-    /// Name of the level for messages.
-    pub name: &'static str,
-    /// Range of meaningful levels, in native units.
-    pub range: std::ops::RangeInclusive<f64>,
-    /// `true` keeps values at the level (`>=`), `false` only those above it (`>`).
-    pub inclusive: bool,
-    /// Why there is no published level.
-    pub no_published: &'static str,
-}
-
-impl Scale {
-    /// Refuses a level that means nothing.
-    pub(crate) fn check(&self, level: f64) -> Result<(), SimplifyError> {
-        let Self { name, range, .. } = self;
-        if range.contains(&level) {
-            return Ok(());
-        }
-        let (least, most) = (range.start(), range.end());
-        let message = match *most {
-            f64::MAX => format!("{name} = {level:?} is below {least}, or no number"),
-            _ => format!("{name} = {level:?} is outside {least} to {most}"),
-        };
-        Err(SimplifyError::Level(message))
-    }
 }
 
 impl Ranked {
@@ -59,11 +34,11 @@ impl Ranked {
         order.sort_unstable_by(|&a, &b| {
             value[b as usize].total_cmp(&value[a as usize]).then(a.cmp(&b))
         });
+        break_ties(&mut order, |s| value[s as usize], |s| mesh.spheres[s as usize]);
         Self { mesh, value, order, scale, prepared }
     }
 
-    fn by_count(&self, asked: usize) -> (usize, f64, Diagnostics) {
-        let mut diagnostics = self.prepared.clone();
+    fn by_count(&self, asked: usize, diagnostics: &mut Diagnostics) -> (Vec<bool>, f64) {
         let count = asked.min(self.order.len());
         if count < asked {
             diagnostics.warn(format!(
@@ -76,40 +51,30 @@ impl Ranked {
             None => *self.scale.range.start(),
         };
         let tied = self.order[..count].iter().rev();
-        let tied = tied.take_while(|&&s| self.value[s as usize] == threshold).count();
+        let tied = tied.take_while(|&&s| tie(self.value[s as usize], threshold)).count();
         if tied > 0 && count < self.order.len() {
-            diagnostics.count("kept_at_the_threshold_by_id", tied);
+            diagnostics.count("kept_at_the_threshold", tied);
         }
-        (count, threshold, diagnostics)
+        let mut keep = vec![false; self.order.len()];
+        for &sphere in &self.order[..count] {
+            keep[sphere as usize] = true;
+        }
+        (keep, threshold)
     }
 
-    fn by_level(&self, level: f64) -> Result<(usize, f64, Diagnostics), SimplifyError> {
-        self.scale.check(level)?;
-        let kept = |&s: &u32| {
-            let value = self.value[s as usize];
-            value > level || (self.scale.inclusive && value == level)
-        };
-        Ok((self.order.partition_point(kept), level, self.prepared.clone()))
+    fn by_level(&self, level: f64) -> (Vec<bool>, f64) {
+        let kept = |&value: &f64| value > level || (self.scale.inclusive && value == level);
+        (self.value.iter().map(kept).collect(), level)
     }
 }
 
 impl Simplification for Ranked {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
-        let (count, native, mut diagnostics) = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
-            Level::Spheres(asked) => self.by_count(asked),
-            Level::Native(value) => self.by_level(value)?,
-            Level::Published => {
-                return Err(SimplifyError::Unsupported { why: self.scale.no_published.into() });
-            }
+        let mut diagnostics = self.prepared.clone();
+        let (keep, native) = match self.scale.wanted(level, &mut diagnostics)? {
+            Wanted::Spheres(asked) => self.by_count(asked, &mut diagnostics),
+            Wanted::Native(value) => self.by_level(value),
         };
-        let mut keep = vec![false; self.order.len()];
-        for &sphere in &self.order[..count] {
-            keep[sphere as usize] = true;
-        }
         let mesh = self.mesh.induced(&keep);
         if mesh.spheres.is_empty() {
             let largest = self.order.first().map_or(0.0, |&s| self.value[s as usize]);

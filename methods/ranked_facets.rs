@@ -4,7 +4,7 @@
 use std::cell::OnceCell;
 use std::sync::Arc;
 
-use medial::complex::{DualTriangulation, MedialMesh, VoronoiFacets};
+use medial::complex::{DualTriangulation, MedialMesh, Sphere, VoronoiFacets};
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work,
@@ -12,7 +12,8 @@ use medial::simplifier::{
 
 use rayon::prelude::*;
 
-use crate::ranked::Scale;
+use crate::scale::{Scale, Wanted};
+use crate::ties::{break_ties, mean};
 
 /// The Voronoi facets of a shape and the medial mesh that their vertices belong to.
 pub(crate) struct FacetSet {
@@ -27,13 +28,25 @@ impl FacetSet {
     /// # Errors
     /// As [`Shape::voronoi`]; when a medial mesh was given, which has no Voronoi facets.
     pub(crate) fn of(shape: &Shape) -> Result<Self, SimplifyError> {
+        Self::refuse_given(shape)?;
+        let (facets, mesh) = (shape.facets()?, shape.voronoi()?);
+        Ok(Self { mesh, facets, dual: shape.options().dual })
+    }
+
+    /// Refuses a shape with a given medial mesh.
+    pub(crate) fn refuse_given(shape: &Shape) -> Result<(), SimplifyError> {
         if shape.has_given_initial() {
             let why = "it selects facets of the Voronoi diagram of the samples, and a given medial \
                        mesh has none: leave out --initial";
-            return Err(SimplifyError::Unsupported { why: why.into() });
+            return Err(SimplifyError::unsupported(why));
         }
-        let (facets, mesh) = (shape.facets()?, shape.voronoi()?);
-        Ok(Self { mesh, facets, dual: shape.options().dual })
+        Ok(())
+    }
+
+    /// The mean centre and radius of the vertices of a facet.
+    pub(crate) fn middle(&self, facet: u32) -> Sphere {
+        let vertices = self.facets.polygon(facet as usize).iter();
+        mean(vertices.map(|&v| self.mesh.spheres[v as usize]))
     }
 }
 
@@ -62,16 +75,8 @@ pub(crate) struct RankedFacets<'s> {
     /// Values and facets by descending value; only levels that ask for spheres need it.
     order: OnceCell<Vec<(f64, u32)>>,
     scale: Scale,
-    /// The level of [`Level::Published`], where there is one.
-    published: Option<f64>,
     /// Counts and warnings of the preparation, repeated with every level.
     prepared: Diagnostics,
-}
-
-/// The order of facets of equal value. Ids follow a curve: the first of them would be one end of the
-/// shape. Multiples of the golden ratio, modulo one, spread any number of facets over all of it.
-fn spread(facet: u32) -> u32 {
-    facet.wrapping_mul(0x9e37_79b9)
 }
 
 impl<'s> RankedFacets<'s> {
@@ -80,11 +85,10 @@ impl<'s> RankedFacets<'s> {
         set: FacetSet,
         value: impl FacetValue + 's,
         scale: Scale,
-        published: Option<f64>,
         prepared: Diagnostics,
     ) -> Self {
         let value = Box::new(value);
-        Self { set, value, order: OnceCell::new(), scale, published, prepared }
+        Self { set, value, order: OnceCell::new(), scale, prepared }
     }
 
     fn order(&self) -> &[(f64, u32)] {
@@ -92,9 +96,8 @@ impl<'s> RankedFacets<'s> {
             let facets = (0..self.set.facets.len()).into_par_iter().with_min_len(256);
             let mut ranked: Vec<(f64, u32)> =
                 facets.map(|facet| (self.value.value(facet), facet as u32)).collect();
-            ranked.par_sort_unstable_by(|a, b| {
-                b.0.total_cmp(&a.0).then(spread(a.1).cmp(&spread(b.1)))
-            });
+            ranked.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            break_ties(&mut ranked, |(value, _)| value, |(_, facet)| self.set.middle(facet));
             ranked
         })
     }
@@ -115,8 +118,7 @@ impl<'s> RankedFacets<'s> {
     }
 
     /// The facets that a native level keeps, ascending.
-    fn by_level(&self, level: f64) -> Result<Vec<u32>, SimplifyError> {
-        self.scale.check(level)?;
+    fn by_level(&self, level: f64) -> Vec<u32> {
         let (value, inclusive) = (&self.value, self.scale.inclusive);
         let is_above = value.is_above(level);
         let kept = |&facet: &u32| {
@@ -124,7 +126,7 @@ impl<'s> RankedFacets<'s> {
             is_above(facet) || (inclusive && value.value(facet) == level)
         };
         let facets = (0..self.set.facets.len() as u32).into_par_iter().with_min_len(256);
-        Ok(facets.filter(kept).collect())
+        facets.filter(kept).collect()
     }
 
     /// The facets that a number of spheres allows, ascending, and the value of the best of the
@@ -148,19 +150,9 @@ impl Simplification for RankedFacets<'_> {
             return Err(SimplifyError::unsupported(why));
         }
         let mut diagnostics = self.prepared.clone();
-        let (kept, native) = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
-            Level::Spheres(spheres) => self.by_count(spheres),
-            Level::Native(level) => (self.by_level(level)?, level),
-            Level::Published => match self.published {
-                Some(level) => (self.by_level(level)?, level),
-                None => {
-                    return Err(SimplifyError::Unsupported { why: self.scale.no_published.into() });
-                }
-            },
+        let (kept, native) = match self.scale.wanted(level, &mut diagnostics)? {
+            Wanted::Spheres(spheres) => self.by_count(spheres),
+            Wanted::Native(level) => (self.by_level(level), level),
         };
         let FacetSet { mesh, facets, dual } = &self.set;
         let mesh = facets.subcomplex(mesh, *dual, &kept, &[], &[]);

@@ -27,7 +27,8 @@ use medial::simplifier::{
     SimplifyError,
 };
 
-use crate::ranked::{Ranked, Scale};
+use crate::ranked::Ranked;
+use crate::scale::{Published, Scale};
 
 /// The pairwise scale filter as a method.
 pub fn method() -> Method<NoParams> {
@@ -56,8 +57,10 @@ fn prepare<'s>(
         name: "s",
         range: 0.0..=f64::MAX,
         inclusive: false,
-        no_published: "this filter is described, not published, as a method; ask for a number of \
-                       spheres or for a scale (1.1 to 2 is usual for the transform)",
+        published: Published::None(
+            "this filter is described, not published, as a method; ask for a number of spheres or for \
+             a scale (1.1 to 2 is usual for the transform)",
+        ),
     };
     Ok(Box::new(Ranked::new(mesh, value, scale, Diagnostics::default())))
 }

@@ -50,7 +50,7 @@ pub struct ShapeOptions {
 
 struct Store {
     name: String,
-    mesh: TriMesh,
+    mesh: Arc<TriMesh>,
     normalisation: Normalisation,
     report: SurfaceReport,
     options: ShapeOptions,
@@ -60,6 +60,12 @@ struct Store {
     facets: Cache<Sampling, Arc<VoronoiFacets>>,
     medial: Cache<Sampling, Arc<MedialMesh>>,
     balls: Cache<Sampling, Arc<InnerBalls>>,
+    of_surface: Arc<OfSurface>,
+}
+
+/// What does not depend on the samples.
+#[derive(Default)]
+struct OfSurface {
     tree: Cache<(), Arc<TriangleBvh>>,
     inside: Cache<(), Arc<InsideTest>>,
 }
@@ -84,7 +90,7 @@ impl Shape {
         };
         let store = Store {
             name: name.into(),
-            mesh,
+            mesh: Arc::new(mesh),
             normalisation,
             report,
             options,
@@ -94,8 +100,7 @@ impl Shape {
             facets: Cache::default(),
             medial: Cache::default(),
             balls: Cache::default(),
-            tree: Cache::default(),
-            inside: Cache::default(),
+            of_surface: Arc::default(),
         };
         Ok(Self { store: Arc::new(store), used: Arc::default(), given: None })
     }
@@ -111,6 +116,29 @@ impl Shape {
             Err(error) => Err(ShapeError::Initial(error)),
         });
         self
+    }
+
+    /// The same surface with other samples, for a method whose level is the density of samples. The
+    /// bounding-volume tree and the inside test are shared; all else is built anew, kept as long as
+    /// this shape, and part of the work of the method that asks for it: seconds and memory both. A
+    /// given medial mesh is left behind.
+    pub fn resampled(&self, sampling: Sampling) -> Self {
+        let Store { name, mesh, normalisation, report, options, of_surface, .. } = &*self.store;
+        let store = Store {
+            name: name.clone(),
+            mesh: Arc::clone(mesh),
+            normalisation: *normalisation,
+            report: report.clone(),
+            options: ShapeOptions { sampling, ..options.clone() },
+            samples: Cache::of_asker(),
+            delaunay: Cache::of_asker(),
+            cells: Cache::of_asker(),
+            facets: Cache::of_asker(),
+            medial: Cache::of_asker(),
+            balls: Cache::of_asker(),
+            of_surface: Arc::clone(of_surface),
+        };
+        Self { store: Arc::new(store), used: Arc::default(), given: None }
     }
 
     /// A fresh view: the same substrates, nothing used yet.
@@ -319,13 +347,21 @@ impl Shape {
     /// # Errors
     /// When the surface has no face.
     pub fn surface_tree(&self) -> Result<Arc<TriangleBvh>, ShapeError> {
-        let built = self.store.tree.get((), || Ok(Arc::new(TriangleBvh::new(&self.store.mesh)?)));
+        let built = self
+            .store
+            .of_surface
+            .tree
+            .get((), || Ok(Arc::new(TriangleBvh::new(&self.store.mesh)?)));
         self.take(Substrate::SurfaceTree, built)
     }
 
     /// The inside test of the surface.
     pub fn inside_test(&self) -> Arc<InsideTest> {
-        let built = self.store.inside.get((), || Ok(Arc::new(InsideTest::new(&self.store.mesh))));
+        let built = self
+            .store
+            .of_surface
+            .inside
+            .get((), || Ok(Arc::new(InsideTest::new(&self.store.mesh))));
         self.take(Substrate::InsideTest, built).expect("a test of any mesh can be built")
     }
 
@@ -347,7 +383,7 @@ impl Shape {
         };
         let unseen = self.view();
         let (tree, inside) = (unseen.surface_tree()?, unseen.inside_test());
-        Ok(Judge::new(self.store.mesh.clone(), tree, inside, truth, options))
+        Ok(Judge::new(self.mesh().clone(), tree, inside, truth, options))
     }
 
     fn take<T>(

@@ -20,8 +20,7 @@ fn text(path: &Path) -> &str {
 
 /// `compare` with `--json`: the exit code and the object.
 fn compare(arguments: &[&str], out: &Path) -> (i32, Value) {
-    let common =
-        ["--samples", "200", "--counts-only", "--quiet", "--json", "--out", text(out)];
+    let common = ["--samples", "200", "--counts-only", "--quiet", "--json", "--out", text(out)];
     let output = run(MEDIAL, &[&["compare"], arguments, &common].concat());
     let object =
         serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", stderr(&output)));

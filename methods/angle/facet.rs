@@ -18,11 +18,13 @@ use rayon::prelude::*;
 
 use super::FacetAngle;
 use crate::ranked_facets::{FacetSet, RankedFacets};
+use crate::scale::Scale;
 
 /// Ranks the Voronoi facets. `O(n)` for their vertices.
 pub(super) fn prepare(
     shape: &Shape,
     at: FacetAngle,
+    scale: Scale,
 ) -> Result<RankedFacets<'static>, SimplifyError> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
@@ -39,14 +41,21 @@ pub(super) fn prepare(
         }
     };
     let values: Vec<f64> = (0..set.facets.len()).into_par_iter().map(value).collect();
-    Ok(RankedFacets::new(set, values, super::scale(), None, Diagnostics::default()))
+    Ok(RankedFacets::new(set, values, scale, Diagnostics::default()))
 }
 
+/// A point as near to the middle of two samples, in chords, is the middle but for rounding.
+const MIDDLE: f64 = 1e-9;
+
 /// Degrees between two points that are equally far from `x`. The arc tangent keeps its digits where
-/// the arc sine loses half of them, and needs no clamp.
+/// the arc sine loses half of them, and needs no clamp. At the middle it is 180 whatever the rounding,
+/// which would otherwise decide between the many that have it.
 pub(super) fn angle_from(x: Vec3, [p, q]: [Vec3; 2]) -> f64 {
-    let half_chord = p.distance(q) / 2.0;
-    (2.0 * half_chord.atan2(x.distance(p.midpoint(q)))).to_degrees()
+    let (half_chord, off) = (p.distance(q) / 2.0, x.distance(p.midpoint(q)));
+    if off <= MIDDLE * half_chord {
+        return 180.0;
+    }
+    (2.0 * half_chord.atan2(off)).to_degrees()
 }
 
 #[cfg(test)]

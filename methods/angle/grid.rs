@@ -7,11 +7,15 @@
 //! 4. The faces, as squares of two triangles on the corners of the voxels. The radius at a corner is
 //!    its distance from the surface.
 //!
+//! A number of spheres is met by the resolution (file `resolution.rs`), or, with `size=ranking`, by as
+//! many of the faces of largest angle as have so many corners.
+//!
 //! # Deviations from the paper
 //! - The paper rasterises distance fields in graphics hardware, slice by slice; here the closest points
 //!   are exact, from a tree.
-//! - A face with a corner outside the solid is left out and counted: no medial sphere is centred
-//!   there. Only parts about as thin as a voxel have any.
+//! - No medial sphere is centred outside the solid. A face with one corner outside is the triangle of the
+//!   others, one with a side inside is that edge, any other is left out and counted. Only parts about
+//!   as thin as a voxel have any.
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
@@ -23,10 +27,15 @@ use medial::simplifier::{
 use medial::surface::{InsideTest, Side};
 use rayon::prelude::*;
 
-use crate::ranked::Scale;
+use super::AngleParams;
+use crate::scale::{Scale, Wanted};
+use crate::ties::{break_ties, mean};
 
 /// Most voxels along the longest side: a cube of so many takes about a gigabyte.
-pub(super) const MAX_RESOLUTION: u32 = 320;
+pub(super) const MAX_RESOLUTION: f64 = 320.0;
+
+/// Fewest voxels along the longest side.
+pub(super) const MIN_RESOLUTION: f64 = 2.0;
 
 /// A face of the lattice.
 #[derive(Clone, Copy, Debug)]
@@ -55,9 +64,9 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(shape: &Shape, resolution: u32) -> Self {
+    fn new(shape: &Shape, resolution: f64) -> Self {
         let (lo, hi) = shape.mesh().bounding_box().expect("a shape has vertices");
-        let side = (hi - lo).max_element() / f64::from(resolution);
+        let side = (hi - lo).max_element() / resolution;
         // A side that is a whole number of voxels but for rounding does not get one more.
         let voxels = |length: f64| (length / side * (1.0 - 1e-9)).ceil().max(1.0) as usize;
         Self { origin: lo, side, size: (hi - lo).to_array().map(voxels) }
@@ -91,7 +100,7 @@ impl Grid {
 /// Steps 1 to 3 for all angles. `O(R^3 log F)` for `F` triangles.
 pub(super) fn prepare(
     shape: &Shape,
-    resolution: u32,
+    &AngleParams { resolution, theta, .. }: &AngleParams,
     run: &RunContext,
 ) -> Result<Faces, SimplifyError> {
     let tree = shape.surface_tree()?;
@@ -103,7 +112,10 @@ pub(super) fn prepare(
     run.step(1, 2)?;
     let radius = radii(&grid, &faces, &tree, &inside);
     let before = faces.len();
-    faces.retain(|face| face.corners.iter().all(|&c| radius[c as usize] >= 0.0));
+    faces.retain(|face| {
+        let mut sides = (0..4).map(|k| [k, (k + 1) % 4].map(|k| face.corners[k] as usize));
+        sides.any(|side| side.iter().all(|&corner| radius[corner] >= 0.0))
+    });
     if faces.is_empty() {
         return Err(SimplifyError::unsupported(format!(
             "the solid is too thin for voxels at resolution = {resolution}: no face between two of \
@@ -111,9 +123,12 @@ pub(super) fn prepare(
         )));
     }
     faces.par_sort_by(|a, b| b.angle.total_cmp(&a.angle));
+    let corner = |id: u32| Sphere::new(grid.corner(id), radius[id as usize]);
+    let middle = |face: Face| mean(inner(&radius, face).iter().map(|&id| corner(id)));
+    break_ties(&mut faces, |face| face.angle, middle);
     let mut diagnostics = Diagnostics::default();
     diagnostics.count("faces_left_out_at_the_surface", before - faces.len());
-    Ok(Faces { grid, faces, radius, scale: super::scale(), diagnostics })
+    Ok(Faces { grid, faces, radius, scale: super::scale(theta), diagnostics })
 }
 
 /// Step 2: zero for voxels outside.
@@ -165,7 +180,9 @@ fn diverging(grid: &Grid, toward: &[[f32; 3]]) -> Vec<Face> {
             if a == Vec3::ZERO || b == Vec3::ZERO || b[axis] <= a[axis] {
                 return None;
             }
-            let angle = 2.0 * (a - b).length().atan2((a + b).length());
+            let sum = (a + b).length();
+            let sum = if sum > OPPOSITE { sum } else { 0.0 };
+            let angle = 2.0 * (a - b).length().atan2(sum);
             let corner = |u: usize, v: usize| {
                 let mut at = place;
                 at[axis] += 1;
@@ -174,11 +191,19 @@ fn diverging(grid: &Grid, toward: &[[f32; 3]]) -> Vec<Face> {
                 grid.corner_id(at)
             };
             let corners = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
-            Some(Face { angle: angle.to_degrees(), corners })
+            // Directions are kept in single precision: what agrees to this is one angle.
+            let angle = (angle.to_degrees() / ANGLE_STEP).round() * ANGLE_STEP;
+            Some(Face { angle, corners })
         })
     };
     (0..grid.len()).into_par_iter().flat_map_iter(of_voxel).collect()
 }
+
+/// Degrees; a power of two, so that angles are exact multiples.
+const ANGLE_STEP: f64 = 1.0 / (1 << 20) as f64;
+
+/// Unit vectors whose sum is no longer are opposite: directions are kept in single precision.
+const OPPOSITE: f64 = 1e-6;
 
 fn vector(v: [f32; 3]) -> Vec3 {
     Vec3::from(v.map(f64::from)).normalize_or_zero()
@@ -203,12 +228,17 @@ fn radii(grid: &Grid, faces: &[Face], tree: &TriangleBvh, inside: &InsideTest) -
     radius
 }
 
+/// The corners of a face that are inside, in order around it.
+fn inner(radius: &[f64], face: Face) -> Vec<u32> {
+    face.corners.into_iter().filter(|&corner| radius[corner as usize] >= 0.0).collect()
+}
+
 impl Faces {
     /// How many of the best faces have at most so many corners together, at least one.
     fn faces_for(&self, spheres: usize) -> usize {
         let mut seen = std::collections::HashSet::new();
         for (rank, face) in self.faces.iter().enumerate() {
-            seen.extend(face.corners);
+            seen.extend(inner(&self.radius, *face));
             if seen.len() > spheres {
                 return rank.max(1);
             }
@@ -218,18 +248,24 @@ impl Faces {
 
     /// Step 4.
     fn mesh(&self, count: usize) -> MedialMesh {
-        let kept = &self.faces[..count];
-        let mut ids: Vec<u32> = kept.iter().flat_map(|face| face.corners).collect();
+        let kept: Vec<Vec<u32>> =
+            self.faces[..count].iter().map(|&face| inner(&self.radius, face)).collect();
+        let mut ids = kept.concat();
         ids.sort_unstable();
         ids.dedup();
         let number = |id: u32| ids.binary_search(&id).expect("a corner of a kept face") as u32;
         let sphere = |&id: &u32| Sphere::new(self.grid.corner(id), self.radius[id as usize]);
-        let triangles = kept.iter().flat_map(|face| {
-            let [a, b, c, d] = face.corners.map(number);
-            [[a, b, c], [a, c, d]]
-        });
+        let (mut edges, mut triangles) = (Vec::new(), Vec::new());
+        for corners in &kept {
+            let corners: Vec<u32> = corners.iter().map(|&id| number(id)).collect();
+            match corners[..] {
+                [a, b] => edges.push([a, b]),
+                _ => triangles
+                    .extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]])),
+            }
+        }
         let spheres = ids.iter().map(sphere).collect();
-        MedialMesh::from_simplices(spheres, vec![], triangles.collect())
+        MedialMesh::from_simplices(spheres, edges, triangles)
             .expect("finite spheres and ids in range")
     }
 }
@@ -237,22 +273,12 @@ impl Faces {
 impl Simplification for Faces {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let mut diagnostics = self.diagnostics.clone();
-        let (count, native) = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
-            Level::Spheres(spheres) => {
+        let (count, native) = match self.scale.wanted(level, &mut diagnostics)? {
+            Wanted::Spheres(spheres) => {
                 let count = self.faces_for(spheres);
                 (count, self.faces.get(count).map_or(0.0, |face| face.angle))
             }
-            Level::Native(theta) => {
-                self.scale.check(theta)?;
-                (self.faces.partition_point(|face| face.angle > theta), theta)
-            }
-            Level::Published => {
-                return Err(SimplifyError::Unsupported { why: self.scale.no_published.into() });
-            }
+            Wanted::Native(theta) => (self.faces.partition_point(|face| face.angle > theta), theta),
         };
         let mesh = self.mesh(count);
         let reached = mesh.spheres.len();

@@ -12,7 +12,14 @@
 //!    the smallest value goes first, then its neighbours are looked at again.
 //! 4. The *effective* value of a sheet is the largest value up to its removal. At `theta` all sheets
 //!    are gone whose effective value is at most `theta`: those that would have gone had no sheet
-//!    above `theta` been touched. A number of spheres is met the same way, as far as sheets can go.
+//!    above `theta` been touched.
+//!
+//! # Numbers of spheres
+//! Half of the sheets of a dense sample have 180 degrees: below their number `theta` says nothing more,
+//! and what the test of the topology leaves of them is one strip or lump. So a number of spheres is
+//! met by the number of samples at one `theta` (`methods/size_search.rs`). The topology is then that of
+//! the Voronoi diagram of those samples. With `size=ranking` sheets of the given samples go on in
+//! the order of step 3, which keeps their topology, as far as sheets can go.
 //!
 //! # Why the topology stays
 //! A facet is a disc. A seam that is a connected part of its border and not all of it is an arc or a
@@ -38,9 +45,11 @@ use medial::simplifier::{
 use rayon::prelude::*;
 
 use super::facet::angle_from;
-use crate::ranked::Scale;
+use crate::by_knob::ByKnob;
 use crate::ranked_facets::FacetSet;
+use crate::scale::{Scale, Wanted};
 use crate::sheets::{Sheets, Without};
+use crate::ties::break_ties;
 
 /// The sheets of a shape in the order in which they can go.
 pub(super) struct Peeled {
@@ -54,9 +63,27 @@ pub(super) struct Peeled {
     diagnostics: Diagnostics,
 }
 
+/// Steps 1 to 4 for any number of samples, at the separation angle `theta`.
+pub(super) fn prepare_by_samples<'s>(
+    shape: &'s Shape,
+    theta: f64,
+    run: &RunContext,
+) -> Result<ByKnob<'s>, SimplifyError> {
+    FacetSet::refuse_given(shape)?;
+    let run_again = run.clone();
+    let at = move |shape: &Shape| -> Result<Box<dyn Simplification>, SimplifyError> {
+        Ok(Box::new(prepare(shape, super::scale(theta), &run_again)?))
+    };
+    ByKnob::of_samples(shape, theta, run, at)
+}
+
 /// Steps 1 to 3. `O(n log n)` in the number of facets, and as often over the sides of a sheet as a
 /// neighbour goes.
-pub(super) fn prepare(shape: &Shape, run: &RunContext) -> Result<Peeled, SimplifyError> {
+pub(super) fn prepare(
+    shape: &Shape,
+    scale: Scale,
+    run: &RunContext,
+) -> Result<Peeled, SimplifyError> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
     let widest = |facet: usize| {
@@ -69,11 +96,13 @@ pub(super) fn prepare(shape: &Shape, run: &RunContext) -> Result<Peeled, Simplif
     let sheets = Sheets::of(&set.mesh, &set.facets);
     let mut without = Without::none(&sheets);
     let (mut removed, mut left) = (Vec::new(), vec![without.spheres()]);
-    // Values are not negative, so that their bits are in order.
-    let entry = |sheet: usize| (value[sheet].to_bits(), sheet as u32);
-    let mut open: BTreeSet<(u64, u32)> = (0..sheets.len()).map(entry).collect();
+    let order = in_order(&set, &value);
+    let mut place = vec![0; order.len()];
+    (0..).zip(&order).for_each(|(rank, &sheet)| place[sheet as usize] = rank);
+    let mut open: BTreeSet<u32> = (0..order.len() as u32).collect();
     let mut effective = 0.0_f64;
-    while let Some((_, sheet)) = open.pop_first() {
+    while let Some(first) = open.pop_first() {
+        let sheet = order[first as usize];
         if removed.len().is_multiple_of(4096) {
             run.step(removed.len(), sheets.len())?;
         }
@@ -84,12 +113,23 @@ pub(super) fn prepare(shape: &Shape, run: &RunContext) -> Result<Peeled, Simplif
         effective = effective.max(value[sheet as usize]);
         removed.push((sheet, effective));
         left.push(without.spheres());
-        open.extend(neighbours.into_iter().map(entry));
+        open.extend(neighbours.into_iter().map(|sheet| place[sheet]));
     }
     let mut diagnostics = Diagnostics::default();
     diagnostics.count("sheets", sheets.len());
     diagnostics.count("sheets_that_can_go", removed.len());
-    Ok(Peeled { set, sheets, removed, left, scale: super::scale(), diagnostics })
+    Ok(Peeled { set, sheets, removed, left, scale, diagnostics })
+}
+
+/// Sheets by ascending value; of those that tie the smallest first, so that what is left is spread over
+/// the thick parts. Half of all sheets hold the middle of their two samples and have 180 degrees.
+fn in_order(set: &FacetSet, value: &[f64]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..value.len() as u32).collect();
+    let of = |sheet: u32| value[sheet as usize];
+    order.par_sort_unstable_by(|&a, &b| of(b).total_cmp(&of(a)).then(a.cmp(&b)));
+    break_ties(&mut order, of, |sheet| set.middle(sheet));
+    order.reverse();
+    order
 }
 
 /// The point of a convex planar polygon nearest to `m`, which need not lie in its plane.
@@ -144,23 +184,13 @@ impl Simplification for Peeled {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let mut diagnostics = self.diagnostics.clone();
         let by_level = |theta: f64| self.removed.partition_point(|&(_, value)| value <= theta);
-        let (count, native) = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
-            Level::Spheres(spheres) => {
+        let (count, native) = match self.scale.wanted(level, &mut diagnostics)? {
+            Wanted::Spheres(spheres) => {
                 let enough = self.left.partition_point(|&left| left > spheres);
                 let count = enough.min(self.removed.len());
                 (count, count.checked_sub(1).map_or(0.0, |last| self.removed[last].1))
             }
-            Level::Native(theta) => {
-                self.scale.check(theta)?;
-                (by_level(theta), theta)
-            }
-            Level::Published => {
-                return Err(SimplifyError::Unsupported { why: self.scale.no_published.into() });
-            }
+            Wanted::Native(theta) => (by_level(theta), theta),
         };
         let mesh = self.mesh(count);
         if let Level::Spheres(asked) = level

@@ -16,12 +16,23 @@
 //!   between them. The default: it meets every number of spheres.
 //! - `facet` (file `facet.rs`): the facets of the Voronoi diagram, with their sides and corners, as
 //!   Attali and Montanvert have it.
-//! - `grid` (file `grid.rs`): faces between voxels, Foskey et al.'s own algorithm.
+//! - `grid` (file `grid.rs`): faces between voxels, Foskey et al.'s own algorithm, whose resolution
+//!   decides the number of spheres.
 //! - `homotopy` (file `homotopy.rs`): sheets, removed only where that changes no topology (Sud et al.).
+//!
+//! # The published level
+//! The papers choose `theta` for each model. [`Level::Published`](medial::simplifier::Level::Published) is
+//! `theta` = 60 degrees: an object angle of 30, at which the authors' tool of the scale axis (Miklos,
+//! Giesen, Pauly 2010) filters the sheets of its own results. A warning says so.
+//!
+//! # Equal angles
+//! Angles saturate at 180 degrees. Of those that tie, spheres and sheets of larger balls are kept first,
+//! and of about equally large ones such as are spread over the shape (`methods/ties.rs`).
 
 mod facet;
 mod grid;
 mod homotopy;
+mod resolution;
 mod vertex;
 
 use medial::shape::Shape;
@@ -30,7 +41,7 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::ranked::Scale;
+use crate::scale::{Published, Scale};
 
 /// Parameters of the angle filter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,8 +51,13 @@ pub struct AngleParams {
     pub variant: Variant,
     /// Where the angle of a facet is measured; `facet` alone.
     pub at: FacetAngle,
-    /// Voxels along the longest side of the bounding box; `grid` alone.
-    pub resolution: u32,
+    /// Voxels along the longest side of the bounding box, which may have a fraction; `grid` alone.
+    pub resolution: f64,
+    /// What a number of spheres is met by; `grid` and `homotopy` alone.
+    pub size: Size,
+    /// Separation angle, in degrees, of [`Level::Published`](medial::simplifier::Level::Published), and
+    /// of a number of spheres that is met by the sampling.
+    pub theta: f64,
 }
 
 /// What is filtered.
@@ -58,6 +74,18 @@ pub enum Variant {
     Homotopy,
 }
 
+/// What a number of spheres is met by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// How finely the shape is sampled, at one angle: the resolution of the lattice for `grid`, the
+    /// number of samples for `homotopy`.
+    #[serde(alias = "resolution", alias = "density")]
+    Sampling,
+    /// The angle, at the given sampling.
+    Ranking,
+}
+
 /// Where the separation angle of a Voronoi facet is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -70,17 +98,29 @@ pub enum FacetAngle {
 
 impl Default for AngleParams {
     fn default() -> Self {
-        Self { variant: Variant::Vertex, at: FacetAngle::Barycentre, resolution: 64 }
+        Self {
+            variant: Variant::Vertex,
+            at: FacetAngle::Barycentre,
+            resolution: 64.0,
+            size: Size::Sampling,
+            theta: 60.0,
+        }
     }
 }
 
 impl AngleParams {
     fn validate(self) -> Result<Self, SimplifyError> {
-        let most = grid::MAX_RESOLUTION;
-        if !(2..=most).contains(&self.resolution) {
+        let [least, most] = [grid::MIN_RESOLUTION, grid::MAX_RESOLUTION];
+        if !(least..=most).contains(&self.resolution) {
             return Err(SimplifyError::Parameter(format!(
-                "resolution = {}: give 2 to {most} voxels along the longest side",
+                "resolution = {}: give {least} to {most} voxels along the longest side",
                 self.resolution
+            )));
+        }
+        if !(0.0..=180.0).contains(&self.theta) {
+            return Err(SimplifyError::Parameter(format!(
+                "theta = {}: a separation angle has 0 to 180 degrees",
+                self.theta
             )));
         }
         Ok(self)
@@ -105,21 +145,33 @@ impl AngleParams {
                 "resolution",
                 Self::default().resolution,
                 "voxels",
-                "grid: voxels along the longest side of the bounding box",
+                "grid: voxels along the longest side of the bounding box, a fraction allowed",
+            ),
+            ParamInfo::new(
+                "size",
+                "sampling",
+                "sampling or ranking",
+                "grid, homotopy: meet a number of spheres by the resolution or the number of samples \
+                 at the angle `theta`, or by the angle at the given ones",
+            ),
+            ParamInfo::new(
+                "theta",
+                Self::default().theta,
+                "degrees of separation angle",
+                "angle of the published level, and of a number of spheres met by the sampling",
             ),
         ]
     }
 }
 
-/// How angles are compared with `theta`.
-fn scale() -> Scale {
-    Scale {
-        name: "theta",
-        range: 0.0..=180.0,
-        inclusive: false,
-        no_published: "the papers choose theta for each model; ask for a number of spheres or for an \
-                       angle in degrees (15 to 120 is usual)",
-    }
+/// How angles are compared with `theta`; `published` is that of the parameters, in degrees.
+fn scale(published: f64) -> Scale {
+    let published = Published::Documented(
+        published,
+        "the parameter theta, which is by default the authors' sheet filter of the scale axis: an \
+         object angle of 30 degrees",
+    );
+    Scale { name: "theta", range: 0.0..=180.0, inclusive: false, published }
 }
 
 /// The angle filter as a method.
@@ -134,7 +186,10 @@ pub fn method() -> Method<AngleParams> {
         .native(NativeLevel::larger_is_coarser("theta", "degrees of separation angle"))
         .filter()
         .sweep(&[20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0])
-        .published("unsupported: the papers choose theta for each model")
+        .published(
+            "theta = 60 degrees (parameter `theta`), an object angle of 30, the sheet filter of the \
+             authors' tool of the scale axis; the papers choose theta for each model",
+        )
         .params(AngleParams::describe());
     Method::new(info, prepare)
 }
@@ -145,10 +200,15 @@ fn prepare<'s>(
     run: &RunContext,
 ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
     let params = params.validate()?;
-    Ok(match params.variant {
-        Variant::Vertex => Box::new(vertex::prepare(shape)?),
-        Variant::Facet => Box::new(facet::prepare(shape, params.at)?),
-        Variant::Grid => Box::new(grid::prepare(shape, params.resolution, run)?),
-        Variant::Homotopy => Box::new(homotopy::prepare(shape, run)?),
+    let scale = scale(params.theta);
+    Ok(match (params.variant, params.size) {
+        (Variant::Vertex, _) => Box::new(vertex::prepare(shape, scale)?),
+        (Variant::Facet, _) => Box::new(facet::prepare(shape, params.at, scale)?),
+        (Variant::Grid, Size::Sampling) => Box::new(resolution::prepare(shape, params, run)?),
+        (Variant::Grid, Size::Ranking) => Box::new(grid::prepare(shape, &params, run)?),
+        (Variant::Homotopy, Size::Sampling) => {
+            Box::new(homotopy::prepare_by_samples(shape, params.theta, run)?)
+        }
+        (Variant::Homotopy, Size::Ranking) => Box::new(homotopy::prepare(shape, scale, run)?),
     })
 }

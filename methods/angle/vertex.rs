@@ -19,9 +19,10 @@ use medial::simplifier::{Diagnostics, SimplifyError};
 use rayon::prelude::*;
 
 use crate::ranked::Ranked;
+use crate::scale::Scale;
 
 /// Ranks the spheres of the initial medial mesh. `O(n log n)`.
-pub(super) fn prepare(shape: &Shape) -> Result<Ranked, SimplifyError> {
+pub(super) fn prepare(shape: &Shape, scale: Scale) -> Result<Ranked, SimplifyError> {
     let mesh = shape.initial()?;
     let mut diagnostics = Diagnostics::default();
     let contacts = shape.contacts(&mesh, &mut diagnostics)?;
@@ -33,5 +34,5 @@ pub(super) fn prepare(shape: &Shape) -> Result<Ranked, SimplifyError> {
             contacts.with(sphere, |points| separation_angle(s.centre, points)).to_degrees()
         })
         .collect();
-    Ok(Ranked::new(mesh, value, super::scale(), diagnostics))
+    Ok(Ranked::new(mesh, value, scale, diagnostics))
 }

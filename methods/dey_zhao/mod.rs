@@ -20,19 +20,32 @@
 //! change under scaling.
 //!
 //! # The level
-//! The paper has none. Here it is the *strength* `t`, 1 for the paper's: both thresholds at once,
-//! `[t theta]` and `[t rho]`. A facet's value is the largest `t` at which it would be kept, and a
-//! number of spheres asks for the facets of largest value. From `t = 4` on no angle is
-//! enough, and only ratios count.
+//! The paper has none: what decides the size of its result is the density of the samples. So a number of
+//! spheres is met by a search over the number of samples at the paper's constants (`size=density`;
+//! `methods/size_search.rs`): the same kind of sampling as the shape's, blue noise in place of vertices. All other
+//! levels are those of the shape's own samples.
+//!
+//! For comparison there is the *strength* `t`, 1 for the paper's: both thresholds at once, `[t theta]`
+//! and `[t rho]`. A facet's value is the largest `t` at which it would be kept. With `size=ranking` a
+//! number of spheres asks for the facets of largest value. From `t = 4` on no angle is enough, and only
+//! ratios count. Facets that tie are kept by the size of their balls, then spread over the shape
+//! (`methods/ties.rs`).
 //!
 //! # Deviations from the paper
 //! - The paper restricts the result to the inside of a watertight surface that it reconstructs;
 //!   here the surface is given.
+//! - Step 5: the paper keeps the facets of the Delaunay edges that the surface encloses. Here a facet is
+//!   inside if all its vertices are, so that every sphere is centred inside. A part thinner than the
+//!   samples are apart has enclosed edges whose facets reach outside: these are lost. An edge that cuts
+//!   across a dent of the surface, with a facet inside, is kept. `inside=edge` drops the latter, as far
+//!   as the middle of the edge tells, and counts both (`enclosed_edges_without_facet`,
+//!   `facets_of_edges_not_enclosed`).
 //! - A triangle without area has no normal and is left out of its umbrellas, and counted. A sample
 //!   without umbrella keeps no facet.
 //! - A facet of the box of the samples, which the paper adds to bound cells, is not needed: an
 //!   unbounded Voronoi edge has the outward normal of its hull triangle for its far end.
 
+mod enclosed;
 #[cfg(test)]
 mod tests;
 mod umbrella;
@@ -42,6 +55,7 @@ use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::VoronoiFacets;
+use medial::geometry::VertexId;
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification,
@@ -49,8 +63,9 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::ranked::Scale;
+use crate::by_knob::ByKnob;
 use crate::ranked_facets::{FacetSet, FacetValue, RankedFacets};
+use crate::scale::{Published, Scale};
 use umbrella::{Place, Umbrellas};
 
 /// Parameters of the Voronoi subcomplex; the default is the paper's.
@@ -63,6 +78,30 @@ pub struct DeyZhaoParams {
     pub rho: f64,
     /// Which of the two conditions are tested.
     pub condition: Condition,
+    /// What a number of spheres is met by.
+    pub size: Size,
+    /// What has to be inside for a facet to be inside.
+    pub inside: Inside,
+}
+
+/// What has to be inside for a facet to be inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Inside {
+    /// All of its vertices.
+    Vertices,
+    /// All of its vertices and the middle of its Delaunay edge; how these two differ is counted.
+    Edge,
+}
+
+/// What a number of spheres is met by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// The number of samples, both thresholds as they are.
+    Density,
+    /// The strength of both thresholds, the samples as they are.
+    Ranking,
 }
 
 /// The conditions of step 3.
@@ -79,7 +118,13 @@ pub enum Condition {
 
 impl Default for DeyZhaoParams {
     fn default() -> Self {
-        Self { theta: 22.5, rho: 8.0, condition: Condition::Both }
+        Self {
+            theta: 22.5,
+            rho: 8.0,
+            condition: Condition::Both,
+            size: Size::Density,
+            inside: Inside::Vertices,
+        }
     }
 }
 
@@ -107,6 +152,20 @@ impl DeyZhaoParams {
                 "both | angle | ratio",
                 "conditions that are tested; the paper's figures show each alone",
             ),
+            ParamInfo::new(
+                "size",
+                "density",
+                "density | ranking",
+                "meet a number of spheres by the number of samples, as the paper does, or by \
+                 strengthening both thresholds on the given samples",
+            ),
+            ParamInfo::new(
+                "inside",
+                "vertices",
+                "vertices | edge",
+                "what is inside of a facet that is inside: its vertices, or the middle of its Delaunay \
+                 edge too; then the difference is counted",
+            ),
         ]
     }
 }
@@ -129,8 +188,8 @@ pub fn method() -> Method<DeyZhaoParams> {
         .filter()
         .sweep(&[0.5, 1.0, 1.5, 2.0, 3.0])
         .published(
-            "the paper's constants, strength 1; for other counts both thresholds are strengthened \
-             together, which is not in the paper",
+            "the paper's constants, strength 1; other strengths, of both thresholds together, are \
+             not in the paper",
         )
         .params(DeyZhaoParams::describe());
     Method::new(info, prepare)
@@ -139,19 +198,46 @@ pub fn method() -> Method<DeyZhaoParams> {
 fn prepare<'s>(
     shape: &'s Shape,
     params: DeyZhaoParams,
-    _run: &RunContext,
+    run: &RunContext,
 ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
     let params = params.validate()?;
+    Ok(match params.size {
+        Size::Density => {
+            FacetSet::refuse_given(shape)?;
+            let at = move |shape: &Shape| -> Result<Box<dyn Simplification>, SimplifyError> {
+                Ok(Box::new(selection(shape, params)?))
+            };
+            Box::new(ByKnob::of_samples(shape, PUBLISHED, run, at)?)
+        }
+        Size::Ranking => Box::new(selection(shape, params)?),
+    })
+}
+
+/// The strength of the paper's constants.
+const PUBLISHED: f64 = 1.0;
+
+fn scale() -> Scale {
+    Scale {
+        name: "strength",
+        range: 0.0..=f64::MAX,
+        inclusive: false,
+        published: Published::Native(PUBLISHED),
+    }
+}
+
+/// Steps 1 to 3 on the samples of a shape.
+fn selection(shape: &Shape, params: DeyZhaoParams) -> Result<RankedFacets<'static>, SimplifyError> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
     let umbrellas = Umbrellas::new(&delaunay, shape.cells()?.circumspheres());
     let mut diagnostics = Diagnostics::default();
     diagnostics.count("samples_without_umbrella", umbrellas.missing());
     diagnostics.count("umbrella_triangles_without_area", umbrellas.flat());
-    let scale =
-        Scale { name: "strength", range: 0.0..=f64::MAX, inclusive: false, no_published: "" };
-    let strength = Strength { facets: set.facets.clone(), umbrellas, params };
-    Ok(Box::new(RankedFacets::new(set, strength, scale, Some(1.0), diagnostics)))
+    let mut strength = Strength { facets: set.facets.clone(), umbrellas, params, enclosed: None };
+    if params.inside == Inside::Edge {
+        enclosed::restrict(&mut strength, shape, &mut diagnostics)?;
+    }
+    Ok(RankedFacets::new(set, strength, scale(), diagnostics))
 }
 
 /// Step 3.
@@ -159,14 +245,19 @@ struct Strength {
     facets: Arc<VoronoiFacets>,
     umbrellas: Umbrellas,
     params: DeyZhaoParams,
+    /// Of each facet, where not all of them count: whether its edge is enclosed.
+    enclosed: Option<Vec<bool>>,
 }
 
 impl FacetValue for Strength {
     /// The largest strength at which the facet dual to a Delaunay edge is kept: from either end, by
     /// either condition.
     fn value(&self, facet: usize) -> f64 {
-        let [p, q] = self.ends(facet);
-        self.from(p, q).max(self.from(q, p))
+        if !self.is_enclosed(facet) {
+            return 0.0;
+        }
+        let [p, q] = self.facets.ends(facet);
+        self.of_edge(p, q)
     }
 
     fn is_above(&self, level: f64) -> Box<dyn Fn(usize) -> bool + Sync + '_> {
@@ -176,6 +267,9 @@ impl FacetValue for Strength {
         let rims = cosine < 1e-6 || level * rho < 2.0 + 1e-6;
         let threshold = Threshold { level, cosine, ratio: level * rho, rims };
         Box::new(move |facet| {
+            if !self.is_enclosed(facet) {
+                return false;
+            }
             let [p, q] = self.ends(facet);
             let edge = self.umbrellas.position(q) - self.umbrellas.position(p);
             let length = edge.length();
@@ -199,6 +293,17 @@ struct Threshold {
 const ROUNDING: f64 = 1e-12;
 
 impl Strength {
+    /// The strength of a Delaunay edge: from either end, by either condition.
+    fn of_edge(&self, p: VertexId, q: VertexId) -> f64 {
+        let [p, q] = [p, q].map(|v| self.umbrellas.place(v));
+        self.from(p, q).max(self.from(q, p))
+    }
+
+    #[inline]
+    fn is_enclosed(&self, facet: usize) -> bool {
+        self.enclosed.as_ref().is_none_or(|enclosed| enclosed[facet])
+    }
+
     fn ends(&self, facet: usize) -> [Place; 2] {
         self.facets.ends(facet).map(|v| self.umbrellas.place(v))
     }

@@ -29,8 +29,8 @@ use medial::simplifier::{
 };
 use rayon::prelude::*;
 
-use crate::ranked::Scale;
 use crate::ranked_facets::{FacetSet, RankedFacets};
+use crate::scale::{Scale, Wanted};
 
 /// The cells of the Voronoi diagram inside a surface with their values.
 pub(super) struct Cells {
@@ -80,7 +80,7 @@ pub(super) fn prepare(shape: &Shape) -> Result<Cells, SimplifyError> {
     }
     let mut descending = vertex_value.clone();
     descending.sort_unstable_by(|a, b| b.total_cmp(a));
-    let scale = super::scale();
+    let scale = super::scale(&mesh);
     Ok(Cells {
         mesh,
         facets,
@@ -98,7 +98,8 @@ pub(super) fn prepare(shape: &Shape) -> Result<Cells, SimplifyError> {
 pub(super) fn prepare_facets(shape: &Shape) -> Result<RankedFacets<'static>, SimplifyError> {
     let set = FacetSet::of(shape)?;
     let value = facet_values(shape, &set.facets)?;
-    Ok(RankedFacets::new(set, value, super::scale(), None, Diagnostics::default()))
+    let scale = super::scale(&set.mesh);
+    Ok(RankedFacets::new(set, value, scale, Diagnostics::default()))
 }
 
 fn facet_values(shape: &Shape, facets: &VoronoiFacets) -> Result<Vec<f64>, SimplifyError> {
@@ -136,19 +137,9 @@ impl Cells {
 impl Simplification for Cells {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let mut diagnostics = Diagnostics::default();
-        let lambda = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
-            Level::Spheres(spheres) => self.level_for(spheres),
-            Level::Native(lambda) => {
-                self.scale.check(lambda)?;
-                lambda
-            }
-            Level::Published => {
-                return Err(SimplifyError::Unsupported { why: self.scale.no_published.into() });
-            }
+        let lambda = match self.scale.wanted(level, &mut diagnostics)? {
+            Wanted::Spheres(spheres) => self.level_for(spheres),
+            Wanted::Native(lambda) => lambda,
         };
         let mesh = self.kept(lambda);
         let reached = mesh.spheres.len();

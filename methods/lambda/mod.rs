@@ -14,6 +14,13 @@
 //! - `cell` (file `cell.rs`): facets, edges and vertices of the Voronoi diagram, each by its own
 //!   value, as the definition has it.
 //!
+//! # The published level
+//! The paper gives no universal `lambda`. [`Level::Published`](medial::simplifier::Level::Published) is
+//! the default of the program that Yan, Letscher and Ju published with *Voxel cores: efficient, robust,
+//! and provably good approximation of 3D medial axes*, ACM Transactions on Graphics 37(4), 2018, which
+//! prunes by the same measure: facets whose two samples are less than 4 % of the longest side of the
+//! box of the Voronoi vertices inside apart, that is, `lambda` = 2 % of this side. A warning says so.
+//!
 //! # Deviations from the paper
 //! - The text of the Q-MAT paper says "circumradius of the closest points". For a Voronoi vertex
 //!   the circumradius of its four samples is the ball's own radius, which would make this a size
@@ -22,13 +29,14 @@
 mod cell;
 mod vertex;
 
+use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
     Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::ranked::Scale;
+use crate::scale::{Published, Scale};
 
 /// Parameters of the lambda-medial axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -76,15 +84,23 @@ impl LambdaParams {
     }
 }
 
-/// How enclosing balls are compared with `lambda`.
-fn scale() -> Scale {
-    Scale {
-        name: "lambda",
-        range: 0.0..=1.0,
-        inclusive: true,
-        no_published: "the paper gives no universal lambda; ask for a number of spheres or for a \
-                       fraction of the diagonal (0.001 to 0.1 is usual)",
-    }
+/// `lambda` of [`Level::Published`](medial::simplifier::Level::Published), as a fraction of the longest
+/// side of the box of the spheres' centres.
+const PUBLISHED: f64 = 0.02;
+
+/// How enclosing balls are compared with `lambda`, on a medial mesh that has a sphere.
+fn scale(mesh: &MedialMesh) -> Scale {
+    let first = mesh.spheres[0].centre;
+    let bounds = mesh
+        .spheres
+        .iter()
+        .fold([first; 2], |[low, high], sphere| [low.min(sphere.centre), high.max(sphere.centre)]);
+    let longest = (bounds[1] - bounds[0]).max_element();
+    let published = Published::Documented(
+        PUBLISHED * longest,
+        "as in the authors' program of voxel cores: closest points 4 % of the longest side apart",
+    );
+    Scale { name: "lambda", range: 0.0..=1.0, inclusive: true, published }
 }
 
 /// The lambda-medial axis as a method.
@@ -98,7 +114,10 @@ pub fn method() -> Method<LambdaParams> {
         .native(NativeLevel::larger_is_coarser("lambda", "fraction of the bounding-box diagonal"))
         .filter()
         .sweep(&[0.005, 0.01, 0.02, 0.04, 0.08])
-        .published("unsupported: the paper gives no universal lambda")
+        .published(
+            "lambda = 2 % of the longest side of the box of the spheres' centres, the default of the \
+             authors' program of voxel cores; the paper gives no universal lambda",
+        )
         .params(LambdaParams::describe());
     Method::new(info, prepare)
 }

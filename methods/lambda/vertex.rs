@@ -25,5 +25,6 @@ pub(super) fn prepare(shape: &Shape) -> Result<Ranked, SimplifyError> {
         .into_par_iter()
         .map(|sphere| contacts.with(sphere, |points| enclosing_ball(points).1))
         .collect();
-    Ok(Ranked::new(mesh, value, super::scale(), diagnostics))
+    let scale = super::scale(&mesh);
+    Ok(Ranked::new(mesh, value, scale, diagnostics))
 }

@@ -28,7 +28,10 @@
 //!   polar balls. As far as we know the authors' tool does not undo it either. Without step 2
 //!   (`radius_factor=1`, `jitter=0`) rounding decides which polar balls meet at scale 1, and the result
 //!   is torn; a warning says so.
-//! - A number of spheres is met by a search on `s`. A scale has the count it has: the result is the
+//! - The authors choose the density of the samples, `delta`, beside `s`; with `size=density` a number of
+//!   spheres is met by the number of samples at `s` = 1.1 (`methods/size_search.rs`). Each count then
+//!   has balls of its own.
+//! - By default a number of spheres is met by a search on `s`. A scale has the count it has: the result is the
 //!   largest count at most as large as asked that the search meets, to 1 %, and is reported. Scales
 //!   are kept from request to request; the seconds of each are those of all scales that it needed.
 
@@ -47,10 +50,11 @@ use medial::simplifier::{
     Simplified, SimplifyError,
 };
 
+use crate::by_knob::ByKnob;
 use crate::perturb::perturbed;
 use crate::reuse::Reuse;
 
-pub use params::SatParams;
+pub use params::{SatParams, Size};
 
 /// Scale of [`Level::Published`]: the default of the authors' tool.
 const PUBLISHED: f64 = 1.1;
@@ -89,10 +93,19 @@ fn prepare<'s>(
     run: &RunContext,
 ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
     let params = params.validate()?;
-    let balls = shape.inner_balls()?;
-    run.step(0, balls.spheres.len())?;
-    let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
-    Ok(Box::new(Prepared { spheres, params, run: run.clone(), scales: Reuse::new() }))
+    if params.size == Size::Scale {
+        return Ok(Box::new(Prepared::new(shape, params, run)?));
+    }
+    if shape.has_given_initial() {
+        let why = "it meets a number of spheres by sampling the surface, and a given medial mesh \
+                   leaves nothing to sample: leave out --initial, or set size=scale";
+        return Err(SimplifyError::unsupported(why));
+    }
+    let run_again = run.clone();
+    let at = move |shape: &Shape| -> Result<Box<dyn Simplification>, SimplifyError> {
+        Ok(Box::new(Prepared::new(shape, params, &run_again)?))
+    };
+    Ok(Box::new(ByKnob::of_samples(shape, PUBLISHED, run, at)?))
 }
 
 /// The balls of one shape, perturbed.
@@ -115,6 +128,14 @@ struct Scaled {
 }
 
 impl Prepared {
+    /// Steps 1 and 2.
+    fn new(shape: &Shape, params: SatParams, run: &RunContext) -> Result<Self, SimplifyError> {
+        let balls = shape.inner_balls()?;
+        run.step(0, balls.spheres.len())?;
+        let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
+        Ok(Self { spheres, params, run: run.clone(), scales: Reuse::new() })
+    }
+
     /// The axis at a scale, computed once.
     fn at_scale(&mut self, scale: f64) -> Result<Arc<Scaled>, SimplifyError> {
         let Self { spheres, params, scales, .. } = self;

@@ -14,11 +14,23 @@ pub struct SatParams {
     pub jitter: f64,
     /// Facets with a smaller object angle are removed from the outside in; degrees, 0 for none.
     pub sat_angle: f64,
+    /// What a number of spheres is met by.
+    pub size: Size,
+}
+
+/// What a number of spheres is met by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// The scale, the samples as they are.
+    Scale,
+    /// The number of samples, at the published scale.
+    Density,
 }
 
 impl Default for SatParams {
     fn default() -> Self {
-        Self { radius_factor: 1.002, jitter: 1e-4, sat_angle: 0.0 }
+        Self { radius_factor: 1.002, jitter: 1e-4, sat_angle: 0.0, size: Size::Scale }
     }
 }
 
@@ -66,6 +78,12 @@ impl SatParams {
                 defaults.sat_angle,
                 "degrees of object angle, 0 for no filter",
                 "facets below it are removed from the outside in; the authors' tool has 30",
+            ),
+            ParamInfo::new(
+                "size",
+                "scale",
+                "scale or density",
+                "meet a number of spheres by the scale, or by the number of samples at scale 1.1",
             ),
         ]
     }

@@ -3,7 +3,9 @@
 use medial::Vec3;
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError, Work,
+};
 use medial::surface::{self, TriMesh};
 use medial_methods::dey_zhao;
 
@@ -104,4 +106,41 @@ fn a_larger_strength_keeps_less_and_a_given_mesh_is_no_voronoi_diagram() {
     let shape = shape_of(&mesh, "vertices").with_initial(&given);
     let refused = dey_zhao::method().prepare(&shape, &Params::none(), &RunContext::default());
     assert!(matches!(refused, Err(SimplifyError::Unsupported { .. })));
+}
+
+#[test]
+fn a_number_of_spheres_is_the_published_result_of_fewer_samples() {
+    let mesh = built_in("blob", 60);
+    for sampling in ["vertices", "uniform:4000:7"] {
+        let shape = shape_of(&mesh, sampling);
+        for count in [1000, 250] {
+            let found = at(&shape, &[], Level::Spheres(count));
+            let reached = found.mesh.spheres.len();
+            assert!(reached <= count && reached * 100 >= 98 * count, "{reached} for {count}");
+            assert_eq!(found.native_level, Some(1.0));
+            let counts = &found.diagnostics.counts;
+            let samples = counts.iter().find(|(name, _)| name == "samples").expect("a count").1;
+            let again = match sampling {
+                "vertices" => format!("blue:{samples}"),
+                _ => format!("uniform:{samples}:7"),
+            };
+            assert_eq!(found.mesh, at(&shape_of(&mesh, &again), &[], Level::Published).mesh);
+        }
+    }
+}
+
+#[test]
+fn a_level_asked_after_others_is_the_same_and_says_what_it_reused() {
+    let shape = shape_of(&built_in("capsule", 36), "vertices");
+    let run = RunContext::default();
+    let mut prepared = dey_zhao::method().prepare(&shape, &Params::none(), &run).expect("ready");
+    let levels = [Level::Spheres(400), Level::Published, Level::Spheres(100), Level::Spheres(400)];
+    for level in levels {
+        let found = prepared.at(level).expect("a level");
+        assert_eq!(found.mesh, at(&shape, &[], level).mesh, "{level}");
+    }
+    let again = prepared.at(Level::Spheres(400)).expect("a level");
+    assert!(matches!(again.work, Work::Reused(_)));
+    let many = prepared.at(Level::Spheres(1_000_000_000)).expect("as many as there are");
+    assert!(many.diagnostics.warnings.iter().any(|w| w.contains("are not tried")));
 }

@@ -230,3 +230,24 @@ fn larger_scales_leave_fewer_spheres_and_counts_are_met() {
         assert_eq!(again.mesh, result.mesh);
     }
 }
+
+#[test]
+fn a_number_by_density_is_the_published_scale_of_fewer_samples() {
+    let built_in = medial_datasets::find("blob").expect("in the catalogue");
+    let mesh = built_in.mesh(built_in.default_resolution);
+    let shape = shape_of("blob", &mesh);
+    let found = at(&shape, &[("size", "density")], Level::Spheres(500));
+    let reached = found.mesh.spheres.len();
+    assert!((490..=500).contains(&reached), "{reached}");
+    assert_eq!(found.native_level, Some(1.1));
+    let counts = &found.diagnostics.counts;
+    let samples = counts.iter().find(|(name, _)| name == "samples").expect("a count").1;
+    let sampling = format!("blue:{samples}").parse().expect("a sampling");
+    let options = ShapeOptions { sampling, ..ShapeOptions::default() };
+    let report = surface::validate(&mesh).expect("a solid");
+    let sampled = Shape::new("blob", &mesh, report, options).expect("an extent");
+    assert_eq!(found.mesh, at(&sampled, &[], Level::Published).mesh);
+    // Other levels are those of the shape's own samples.
+    let own = at(&shape, &[("size", "density")], Level::Native(1.3));
+    assert_eq!(own.mesh, at(&shape, &[], Level::Native(1.3)).mesh);
+}

@@ -23,7 +23,7 @@ pub mod union_boundary;
 pub(crate) use bvh::{
     Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order, morton_code, morton_order,
 };
-pub use bvh::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree};
+pub use bvh::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree, spread_order};
 pub(crate) use bvh::{ConeBlock, FaceBlock, Lanes, Measure, Query, ReachTree};
 pub use cone::Cone;
 pub use delaunay::Delaunay;

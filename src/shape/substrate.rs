@@ -104,6 +104,8 @@ pub(super) struct Use {
 
 /// Values that are built once for each key, with what building them cost.
 pub(super) struct Cache<K, T> {
+    /// Whether what building needs of the heap is part of the work that asked for it.
+    is_of_asker: bool,
     /// Looked up by key only, never iterated.
     slots: Mutex<HashMap<K, Arc<Slot<T>>>>,
 }
@@ -112,7 +114,14 @@ type Slot<T> = OnceLock<(Result<T, ShapeError>, Cost)>;
 
 impl<K, T> Default for Cache<K, T> {
     fn default() -> Self {
-        Self { slots: Mutex::default() }
+        Self { is_of_asker: false, slots: Mutex::default() }
+    }
+}
+
+impl<K, T> Cache<K, T> {
+    /// A cache of what is no substrate that methods share, but one method's own work.
+    pub fn of_asker() -> Self {
+        Self { is_of_asker: true, ..Self::default() }
     }
 }
 
@@ -129,7 +138,7 @@ impl<K: Eq + Hash, T: Clone> Cache<K, T> {
         let (value, cost) = slot
             .get_or_init(|| {
                 built_here = true;
-                Cost::of_substrate(build)
+                if self.is_of_asker { Cost::of(build) } else { Cost::of_substrate(build) }
             })
             .clone();
         (value, Use { cost, built_here })

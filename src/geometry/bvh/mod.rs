@@ -27,6 +27,7 @@ mod winding;
 
 pub(crate) use build::Plan;
 pub(crate) use hulls::{ConeBlock, FaceBlock};
+pub use morton::spread_order;
 pub(crate) use morton::{in_morton_order, morton_code, morton_order};
 pub(crate) use reach::{Measure, ReachTree};
 pub(crate) use search::Search;

@@ -47,6 +47,28 @@ pub(crate) fn morton_order(points: &[Vec3]) -> Vec<(u64, u32)> {
     order
 }
 
+/// An order of points of which every beginning is spread over all of them: their places along a
+/// Morton curve, stepped through by the golden ratio. Indices matter to coincident points only.
+/// `O(n log n)`.
+///
+/// ```
+/// use medial::{Vec3, geometry::spread_order};
+///
+/// let points: Vec<Vec3> = (0..100).map(|k| Vec3::new(f64::from(k), 0.0, 0.0)).collect();
+/// let mut first: Vec<u32> = spread_order(&points)[..5].to_vec();
+/// first.sort_unstable();
+/// assert!(first[0] < 20 && first[4] >= 80);
+/// ```
+pub fn spread_order(points: &[Vec3]) -> Vec<u32> {
+    // Its multiples, modulo one, leave no gap much larger than another. As a fraction of 2^32.
+    const GOLDEN: u32 = 0x9e37_79b9;
+    let along = morton_order(points);
+    let keyed = (0_u32..).zip(along).map(|(place, (_, point))| (place.wrapping_mul(GOLDEN), point));
+    let mut spread: Vec<(u32, u32)> = keyed.collect();
+    spread.sort_unstable();
+    spread.into_iter().map(|(_, point)| point).collect()
+}
+
 /// The Morton code of a point with coordinates from 0 to `2^21`.
 pub(crate) fn morton_code(p: Vec3) -> u64 {
     // The casts saturate: points that are not numbers have a code too.

@@ -1,0 +1,346 @@
+//! A number of spheres by a knob that is not the level: how densely the surface is sampled, how fine
+//! a lattice is. The level stays where it is.
+//!
+//! 1. The first value is guessed by a power law between knob and spheres.
+//! 2. By the same law, from the nearest value so far, until the count lies between two values.
+//! 3. Between them the Illinois variant of regula falsi, on logarithms.
+//! 4. Counts jump: samples of another number are other samples. Where both values have met without the
+//!    count, those around them in growing distance.
+//!
+//! The search ends at a count of at most [`TOLERANCE`] below the one asked, after [`MOST_PROBES`], or
+//! where no value is left to try. The answer is the nearest count from below that was met. Which
+//! values are tried depends on the count alone, so that the same count has the same answer whatever
+//! was asked before; what was made for earlier counts is not made again.
+
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+
+use medial::complex::MedialMesh;
+use medial::shape::{Shape, ShapeError};
+use medial::simplifier::{Diagnostics, Extras, Level, RunContext, Simplified, SimplifyError};
+
+use crate::reuse::Reuse;
+
+/// A count within this fraction below the one asked ends the search; comparisons at equal counts take
+/// such a count for the one asked.
+const TOLERANCE: f64 = 0.02;
+
+/// Values that are tried at most.
+const MOST_PROBES: usize = 12;
+
+/// Most samples that a search takes: memory and time stay bounded, whatever is asked.
+const MOST_SAMPLES: f64 = 50_000.0;
+
+/// Longest step of step 2, as a factor.
+const LONGEST_STEP: f64 = 16.0;
+
+/// Two values nearer to each other, as a fraction, have met.
+const MET: f64 = 2e-3;
+
+/// What step 4 goes outward by, as a fraction.
+const OUTWARD: f64 = 0.01;
+
+/// What a search turns.
+pub(crate) struct Knob {
+    /// Name under which the value is reported, times [`Knob::steps`].
+    pub count: &'static str,
+    /// What the value is a number of, for messages.
+    pub unit: &'static str,
+    /// Values that can be tried.
+    pub range: RangeInclusive<f64>,
+    /// Steps in a unit: values are whole numbers divided by this.
+    pub steps: f64,
+    /// The first guess: `value` gives `rate * value^exponent` spheres.
+    pub rate: f64,
+    /// See [`Knob::rate`].
+    pub exponent: f64,
+}
+
+impl Knob {
+    /// The number of boundary samples of a shape.
+    pub(crate) fn samples() -> Self {
+        let range = 8.0..=MOST_SAMPLES;
+        Self { count: "samples", unit: "samples", range, steps: 1.0, rate: 2.0, exponent: 1.0 }
+    }
+
+    fn snapped(&self, value: f64) -> f64 {
+        let value = value.clamp(*self.range.start(), *self.range.end());
+        (value * self.steps).round() / self.steps
+    }
+}
+
+/// A result at one value of the knob.
+pub(crate) struct Probe {
+    /// Empty where nothing can be made at this value.
+    pub mesh: MedialMesh,
+    /// Counts and warnings of the method, of which the search has no part.
+    pub diagnostics: Diagnostics,
+}
+
+/// The results of one shape by a knob.
+pub(crate) struct SizeSearch {
+    knob: Knob,
+    run: RunContext,
+    /// By the bits of the value.
+    probes: Reuse<u64, Probe>,
+}
+
+impl SizeSearch {
+    pub(crate) fn new(knob: Knob, run: &RunContext) -> Self {
+        Self { knob, run: run.clone(), probes: Reuse::new() }
+    }
+
+    /// The result with the nearest count from below that the search meets, at a native level that stays
+    /// the same.
+    ///
+    /// # Errors
+    /// Those of `make` that do not depend on the value; [`SimplifyError::Unsupported`] where no value tried
+    /// gives a sphere.
+    pub(crate) fn at(
+        &mut self,
+        count: usize,
+        native: f64,
+        make: impl Fn(f64) -> Result<Probe, SimplifyError>,
+    ) -> Result<Simplified, SimplifyError> {
+        self.probes.begin();
+        let mut path = Path::new(&self.knob, count);
+        let mut best: Option<(f64, Arc<Probe>)> = None;
+        while let Some(value) = path.next {
+            self.run.step(path.tried.len(), MOST_PROBES)?;
+            let probe = self.probes.get(value.to_bits(), || or_empty(make(value)))?;
+            let size = probe.mesh.spheres.len();
+            path.tell(value, size);
+            let rank = |size: usize| (size == 0, size > count, size.abs_diff(count));
+            if best.as_ref().is_none_or(|(_, b)| rank(size) < rank(b.mesh.spheres.len())) {
+                best = Some((value, probe));
+            }
+        }
+        let tried = path.tried.len();
+        let (value, probe) = best.expect("at least one value is tried");
+        let mut diagnostics = probe.diagnostics.clone();
+        diagnostics.count(self.knob.count, (value * self.knob.steps).round() as usize);
+        diagnostics.count("values_tried", tried);
+        self.explain(count, value, probe.mesh.spheres.len(), &mut diagnostics)?;
+        Ok(Simplified {
+            mesh: probe.mesh.clone(),
+            asked: Level::Spheres(count),
+            native_level: Some(native),
+            work: self.probes.work(),
+            diagnostics,
+            extras: Extras::default(),
+        })
+    }
+
+    fn explain(
+        &self,
+        asked: usize,
+        value: f64,
+        reached: usize,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<(), SimplifyError> {
+        let Knob { unit, range, .. } = &self.knob;
+        let (least, most) = (range.start(), range.end());
+        if reached == 0 {
+            return Err(SimplifyError::unsupported(format!(
+                "no number of {unit} tried for {asked} spheres gives one, of {least} to {most}"
+            )));
+        }
+        if reached == asked {
+            return Ok(());
+        }
+        let why = if reached > asked {
+            "fewer were not met".to_owned()
+        } else if value == *most {
+            format!("more than {most} are not tried")
+        } else {
+            "the nearest count from below that the search met".to_owned()
+        };
+        diagnostics.warn(format!("{reached} spheres instead of {asked}, at {value} {unit}: {why}"));
+        Ok(())
+    }
+}
+
+/// The values that a search tries for a count, one after the other.
+struct Path<'a> {
+    knob: &'a Knob,
+    count: usize,
+    tried: Vec<f64>,
+    /// How often it has gone outward since both values met.
+    outward: i32,
+    /// The largest value with at most so many spheres, the smallest with more.
+    below: Option<End>,
+    above: Option<End>,
+    last_was_above: Option<bool>,
+    /// The value to try next.
+    next: Option<f64>,
+}
+
+/// A value that was tried: logarithms of it, and of its count over the one aimed at.
+#[derive(Clone, Copy)]
+struct End {
+    value: f64,
+    excess: f64,
+}
+
+impl<'a> Path<'a> {
+    fn new(knob: &'a Knob, count: usize) -> Self {
+        let first = (count as f64 / knob.rate).powf(1.0 / knob.exponent);
+        let next = Some(knob.snapped(first));
+        Self {
+            knob,
+            count,
+            tried: Vec::new(),
+            outward: 0,
+            below: None,
+            above: None,
+            last_was_above: None,
+            next,
+        }
+    }
+
+    /// Takes the number of spheres at the value that was to try.
+    fn tell(&mut self, value: f64, size: usize) {
+        self.tried.push(value);
+        let is_above = size > self.count;
+        if !is_above && size as f64 >= (1.0 - TOLERANCE) * self.count as f64 {
+            self.next = None;
+            return;
+        }
+        // A little below the count, since one above is of no use.
+        let aim = (1.0 - TOLERANCE / 2.0) * self.count as f64;
+        let end = End { value, excess: ((size as f64).max(0.5) / aim).ln() };
+        // An end that stays twice pulls half as hard.
+        let pull = if self.last_was_above == Some(is_above) { 0.5 } else { 1.0 };
+        let halved = |end: End| End { excess: pull * end.excess, ..end };
+        if self.outward > 0 {
+            // The values that have met stay where they are.
+        } else if is_above {
+            (self.above, self.below) = (Some(end), self.below.map(halved));
+        } else {
+            (self.below, self.above) = (Some(end), self.above.map(halved));
+        }
+        self.last_was_above = Some(is_above);
+        self.next = if self.tried.len() < MOST_PROBES { self.proposed() } else { None };
+    }
+
+    fn proposed(&mut self) -> Option<f64> {
+        let Knob { steps, exponent, .. } = *self.knob;
+        let stepped = |end: End| {
+            let longest = LONGEST_STEP.ln();
+            let by = (-end.excess / exponent).clamp(-longest, longest);
+            let value = self.knob.snapped(end.value * by.exp());
+            let least = self.knob.snapped(end.value - end.excess.signum() / steps);
+            if end.excess > 0.0 { value.min(least) } else { value.max(least) }
+        };
+        match (self.below, self.above) {
+            (Some(below), Some(above)) => self.between(below, above),
+            (Some(end), None) | (None, Some(end)) => {
+                Some(stepped(end)).filter(|&value| value != end.value)
+            }
+            (None, None) => None,
+        }
+    }
+}
+
+impl Path<'_> {
+    /// Steps 3 and 4.
+    fn between(&mut self, below: End, above: End) -> Option<f64> {
+        let steps = self.knob.steps;
+        let have_met = above.value - below.value < (1.5 / steps).max(MET * below.value);
+        if self.outward == 0 && !have_met {
+            let share = (below.excess / (below.excess - above.excess)).clamp(0.1, 0.9);
+            let [low, high] = [below, above].map(|end| end.value.ln());
+            let value = self.knob.snapped((low + share * (high - low)).exp());
+            let [first, last] = [below.value + 1.0 / steps, above.value - 1.0 / steps];
+            return Some(self.knob.snapped(value.max(first).min(last)));
+        }
+        let around = (self.outward + 1..=self.outward + 2 * MOST_PROBES as i32).find_map(|turn| {
+            let far = f64::from((turn + 1) / 2);
+            let by = (far * OUTWARD * below.value).max(far / steps);
+            let value = if turn % 2 == 1 { below.value - by } else { above.value + by };
+            let value = self.knob.snapped(value);
+            (!self.tried.contains(&value)).then_some((turn, value))
+        });
+        let (turn, value) = around?;
+        self.outward = turn;
+        Some(value)
+    }
+}
+
+/// A shape with another number of samples of the same kind.
+pub(crate) fn resampled(shape: &Shape, samples: f64) -> Shape {
+    shape.resampled(shape.options().sampling.with_count(samples as usize))
+}
+
+/// A result, or an empty one where there is nothing inside at this value: the search goes on.
+fn or_empty(result: Result<Probe, SimplifyError>) -> Result<Probe, SimplifyError> {
+    match result {
+        Err(
+            SimplifyError::Unsupported { .. }
+            | SimplifyError::Shape(
+                ShapeError::EmptyMedialMesh
+                | ShapeError::BelowResolution { .. }
+                | ShapeError::Triangulation(_),
+            ),
+        ) => Ok(Probe { mesh: MedialMesh::default(), diagnostics: Diagnostics::default() }),
+        result => result,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All values tried for a count, and the last size.
+    fn search(knob: &Knob, count: usize, size: impl Fn(f64) -> usize) -> (Vec<f64>, usize) {
+        let mut path = Path::new(knob, count);
+        let (mut values, mut last) = (Vec::new(), 0);
+        while let Some(value) = path.next {
+            assert!(knob.range.contains(&value) && !values.contains(&value), "{value} {values:?}");
+            values.push(value);
+            last = size(value);
+            path.tell(value, last);
+        }
+        (values, last)
+    }
+
+    #[test]
+    fn power_laws_with_noise_are_met_from_below_in_a_few_steps() {
+        // A hash of the value, from -1 to 1.
+        let noise = |v: f64| ((v * 12.9898).sin() * 43_758.547).fract();
+        for (rate, exponent, steps) in [(0.2, 1.0, 1.0), (3.0, 0.8, 1.0), (0.4, 2.2, 1e3)] {
+            let knob = Knob { steps, exponent: f64::round(exponent), ..Knob::samples() };
+            for count in [300, 1000, 6_789] {
+                let size =
+                    |v: f64| (rate * v.powf(exponent) * (1.0 + 0.004 * noise(v))).round() as usize;
+                let (values, last) = search(&knob, count, size);
+                let near = last <= count && last as f64 >= 0.98 * count as f64;
+                assert!(near && values.len() <= 8, "{rate} {exponent}: {values:?}, {last}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_search_ends_where_nothing_is_left_to_try() {
+        let knob = Knob::samples();
+        // As many as there can be, at once; none at all; always too many; a jump.
+        assert_eq!(search(&knob, 1_000_000_000, |_| 5000).0, [MOST_SAMPLES]);
+        assert_eq!(search(&knob, 100, |_| 0).0.last(), Some(&MOST_SAMPLES));
+        assert_eq!(search(&knob, 100, |_| 5000).0.last(), Some(&8.0));
+        let (values, _) = search(&knob, 100, |v| if v < 103.0 { 50 } else { 200 });
+        assert!(values.contains(&102.0) && values.contains(&103.0), "{values:?}");
+    }
+
+    #[test]
+    fn where_two_values_met_the_search_goes_on_around_them() {
+        let knob = Knob::samples();
+        // Falls where it should rise, and has the count only beyond.
+        let size = |v: f64| match v as u32 {
+            0..=260 => 480,
+            264 => 495,
+            _ => 2000,
+        };
+        let (values, last) = search(&knob, 500, size);
+        assert_eq!(last, 495, "{values:?}");
+    }
+}
