@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use crate::comparison::Comparison;
 use crate::equal_error::{BoundSummary, by_bound};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Metric, TOTAL_SECONDS};
+use crate::native::native_curves;
 use crate::record::Record;
 use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::text::printable;
@@ -27,6 +28,7 @@ pub fn summary_text(records: &[Record]) -> String {
     let comparison = Comparison::new(records);
     let widest = comparison.series.iter().map(|label| label.chars().count()).max().unwrap_or(0);
     let mut text = String::new();
+    write_start(&mut text, &comparison);
     for bound in by_bound(&comparison) {
         write_bound(&mut text, &bound, &comparison, widest.max(8));
     }
@@ -34,6 +36,23 @@ pub fn summary_text(records: &[Record]) -> String {
         write_count(&mut text, &count, &comparison, widest.max(8));
     }
     text
+}
+
+/// What all methods start from, where it was measured: errors and topology that are not theirs.
+fn write_start(text: &mut String, comparison: &Comparison<'_>) {
+    let mut curves = native_curves(comparison).into_iter();
+    let Some(start) = curves.find(|curve| comparison.methods[curve.series] == "initial") else {
+        return;
+    };
+    if let Some(point) = start.points.first() {
+        let (right, known) = point.topology;
+        let _ = writeln!(
+            text,
+            "initial medial mesh: Hausdorff {} %, mean {} %, topology right on {right} of {known}\n",
+            HAUSDORFF.format_mean(point.hausdorff),
+            MEAN_ERROR.format_mean(point.mean)
+        );
+    }
 }
 
 fn write_bound(text: &mut String, bound: &BoundSummary, comparison: &Comparison<'_>, width: usize) {
