@@ -6,8 +6,8 @@
 //! <https://doi.org/10.1145/1778765.1778838>.
 //!
 //! 1. The shape as a union of balls: the inner polar balls of its samples.
-//! 2. Radii times 1.002, centres moved by up to `1e-4 r`, so that balls that touch in a sample
-//!    overlap in general position (the authors' tool; `methods/perturb.rs`).
+//! 2. Radii times 1.002, centres moved by up to `1e-4 r`, the *jitter*, so that balls that touch in a
+//!    sample overlap in general position (the authors' tool; `methods/perturb.rs`).
 //! 3. Every radius is multiplied by the scale `s`.
 //! 4. The medial axis of the union of the grown balls, exact ([`UnionAxis`]). A ball that the union of
 //!    others covers contributes nothing.
@@ -23,17 +23,18 @@
 //!   refinement to `delta` = 0.01 of the model's size. The union approximates the shape as well as
 //!   these samples do.
 //! - Step 5 is off by default. The authors' tool removes sheets below 30 degrees at scales above 1;
-//!   `sat_angle=30` asks for it. It removes facets one by one, so that a sheet can go in part.
-//! - Step 6 does not undo the factor of step 2: a result at scale 1 is 0.2 % larger than the union of
-//!   polar balls. As far as we know the authors' tool does not undo it either. Without step 2
-//!   (`radius_factor=1`, `jitter=0`) rounding decides which polar balls meet at scale 1, and the result
-//!   is torn; a warning says so.
+//!   `sat_angle=30` asks for it, and makes the published level that of the tool as it comes. It removes
+//!   facets one by one, so that a sheet can go in part.
+//! - Step 6 undoes neither part of step 2: a result at scale 1 is 0.2 % larger than the union of
+//!   polar balls, and its centres keep the jitter, by which results of different seeds differ. As far as
+//!   we know the authors' tool does not undo it either. Without step 2 (`radius_factor=1`, `jitter=0`)
+//!   rounding decides which polar balls meet at scale 1, and the result is torn; a warning says so.
 //! - The authors choose the density of the samples, `delta`, beside `s`; with `size=density` a number of
 //!   spheres is met by the number of samples at `s` = 1.1 (`methods/size_search.rs`). Each count then
 //!   has balls of its own.
-//! - By default a number of spheres is met by a search on `s`. A scale has the count it has: the result is the
-//!   largest count at most as large as asked that the search meets, to 1 %, and is reported. Scales
-//!   are kept from request to request; the seconds of each are those of all scales that it needed.
+//! - By default a number of spheres is met by a search on `s`. A scale has the count it has: the result
+//!   is the largest count at most as large as asked that the search meets, to 1 %, and is reported.
+//!   Scales are kept from request to request; the seconds of each are those of all scales that it needed.
 
 mod params;
 mod search;
@@ -82,7 +83,9 @@ pub fn method() -> Method<SatParams> {
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
         .filter()
         .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0])
-        .published("s = 1.1, the default of the authors' tool, without its angle filter")
+        .published(
+            "s = 1.1, the default of the authors' tool, without its angle filter (sat_angle=30)",
+        )
         .params(SatParams::describe());
     Method::new(info, prepare)
 }
