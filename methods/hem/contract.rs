@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::edge::{Edge, Ground, NONE};
 use super::edges::{Edges, ascending};
-use super::params::{HemParams, Inside};
+use super::params::{Blocking, HemParams, Inside};
 use super::samples::SampleLists;
 use super::star::Star;
 
@@ -20,6 +20,7 @@ const JOB: usize = 4096;
 /// A medial mesh under contraction.
 pub(super) struct Contraction {
     inside: Inside,
+    blocking: Blocking,
     complex: CollapseComplex,
     samples: SampleLists,
     edges: Edges,
@@ -71,6 +72,7 @@ impl Contraction {
     pub(super) fn new(mesh: &MedialMesh, samples: SampleLists, params: HemParams) -> Self {
         let mut contraction = Self {
             inside: params.inside,
+            blocking: params.blocking,
             complex: CollapseComplex::from_mesh(mesh).recording(),
             samples,
             edges: Edges::default(),
@@ -207,7 +209,7 @@ impl Contraction {
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
         edge.tested = true;
-        if !self.complex.keeps_homotopy(a, b) {
+        if self.is_blocked(ends) {
             self.tally.held_by_topology += 1;
             edge.bar(0);
             edge.bar(1);
@@ -218,6 +220,19 @@ impl Contraction {
             if self.complex.folded_face(a, b, centre).is_some() {
                 self.tally.held_by_inversion += 1;
                 edge.bar(survivor);
+            }
+        }
+    }
+
+    /// Whether the topology forbids to collapse an edge.
+    fn is_blocked(&mut self, [a, b]: [u32; 2]) -> bool {
+        match self.blocking {
+            Blocking::Homotopy => !self.complex.keeps_homotopy(a, b),
+            Blocking::Neighbours => {
+                let of_b = self.complex.neighbours(b);
+                let common = self.complex.neighbours(a).iter().filter(|v| of_b.contains(v));
+                let sides = self.complex.opposite_sides(a).iter();
+                common.count() > sides.filter(|side| side.contains(&b)).count()
             }
         }
     }
@@ -305,8 +320,7 @@ impl Contraction {
         if edges.is_empty() {
             return "no edge is left, each sphere is a component of its own".to_owned();
         }
-        let by_topology = edges.iter().filter(|&&[a, b]| !self.complex.keeps_homotopy(a, b));
-        let by_topology = by_topology.count();
+        let by_topology = edges.iter().filter(|&&ends| self.is_blocked(ends)).count();
         let by_inversion = edges.len() - by_topology;
         format!(
             "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \

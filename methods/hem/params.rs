@@ -9,6 +9,10 @@ use serde::{Deserialize, Serialize};
 pub struct HemParams {
     /// What a sample inside the union is charged with.
     pub inside: Inside,
+    /// What a bound bounds.
+    pub sides: Sides,
+    /// Which collapses are blocked.
+    pub blocking: Blocking,
 }
 
 /// What counts as the error of a sample. Outside all primitives both are its distance to the
@@ -23,14 +27,52 @@ pub enum Inside {
     Surface,
 }
 
+/// Which directions the error of a whole mesh has. The order of the collapses has one only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sides {
+    /// From the samples to the union, as published.
+    #[default]
+    One,
+    /// Also from the boundary of the union to the surface.
+    Both,
+}
+
+/// Which collapses are blocked for the sake of the topology.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Blocking {
+    /// Those that change the homotopy type.
+    #[default]
+    Homotopy,
+    /// Those of edges whose ends have a common neighbour without a face, as in the authors' code.
+    Neighbours,
+}
+
 impl HemParams {
     pub(super) fn describe() -> Vec<ParamInfo> {
-        vec![ParamInfo::new(
-            "inside",
-            "depth",
-            "depth or surface",
-            "error of a sample inside the union: its depth in the deepest primitive, or its \
-             distance to the nearest surface of a primitive, be it buried",
-        )]
+        vec![
+            ParamInfo::new(
+                "inside",
+                "depth",
+                "depth or surface",
+                "error of a sample inside the union: its depth in the deepest primitive, or its \
+                 distance to the nearest surface of a primitive, be it buried",
+            ),
+            ParamInfo::new(
+                "sides",
+                "one",
+                "one or both",
+                "what a bound bounds: the error at the samples, or also the distance from the \
+                 boundary of the union to the surface",
+            ),
+            ParamInfo::new(
+                "blocking",
+                "homotopy",
+                "homotopy or neighbours",
+                "collapses that are blocked: those that change the homotopy type, or as in the \
+                 authors' code those of edges whose ends have a common neighbour without a face",
+            ),
+        ]
     }
 }

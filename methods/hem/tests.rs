@@ -53,7 +53,11 @@ fn model((spheres, edges, faces, points, lists, coarse): Parts, inside: Inside) 
 }
 
 fn contraction(model: &Model) -> Contraction {
-    Contraction::new(&model.mesh(), model.sample_lists(), HemParams { inside: model.inside })
+    Contraction::new(
+        &model.mesh(),
+        model.sample_lists(),
+        HemParams { inside: model.inside, ..HemParams::default() },
+    )
 }
 
 /// Every edge of a complex with its own evaluation in full against the oracle.
@@ -268,8 +272,10 @@ fn readings_differ_inside() {
     let error = |model: &Model| contraction(model).known([0, 2]).unwrap().into[0].error();
     assert!((error(&depth) - 1.0).abs() < 1e-15, "in the middle of the capsule");
     assert!(error(&surface) < 1e-15, "on the sphere");
-    let all =
-        |model: &Model| bound::sample_error(&model.mesh(), &model.points, model.inside).unwrap();
+    let all = |model: &Model| {
+        let (samples, inside) = (model.points.clone(), model.inside);
+        bound::Ruler { samples, inside, surface: None }.error(&model.mesh()).unwrap()
+    };
     assert!((all(&depth) - 1.0).abs() < 1e-15 && all(&surface) < 1e-15);
 }
 
@@ -299,12 +305,20 @@ fn the_topology_is_kept_to_the_end() {
 
 #[test]
 fn a_level_within_the_bound_is_found() {
-    let within = |good: &'static [usize]| move |t: usize| Ok(good.contains(&t));
-    assert_eq!(last_within(0, within(&[])).unwrap(), 0);
-    assert_eq!(last_within(9, within(&[9])).unwrap(), 9);
-    assert_eq!(last_within(9, within(&[1, 2, 3, 4, 5])).unwrap(), 5);
-    assert_eq!(last_within(9, within(&[])).unwrap(), 0);
-    assert_eq!(last_within(9, within(&[1, 2, 8])).unwrap(), 8, "the latest");
+    let search = |all: usize, good: &'static [usize]| {
+        let error = |t: usize| Ok(if good.contains(&t) { 1.0 } else { 2.0 + t as f64 });
+        last_within(all, 1.0, error).unwrap()
+    };
+    assert_eq!(search(0, &[0]), Found::Within(0));
+    assert_eq!(search(9, &[0, 9]), Found::Within(9));
+    assert_eq!(search(9, &[0, 1, 2, 3, 4, 5]), Found::Within(5));
+    assert_eq!(search(9, &[0]), Found::Within(0));
+    assert_eq!(search(9, &[0, 1, 2, 8]), Found::Within(8), "the latest");
+    // The initial mesh is not within; a state in between is, which growing steps miss.
+    assert_eq!(search(160, &[50, 51, 52]), Found::Within(52));
+    let refused = search(160, &[]);
+    assert!(matches!(refused, Found::None { best: 0, error: 2.0, measured: 16.. }), "{refused:?}");
+    assert!(matches!(search(0, &[]), Found::None { best: 0, measured: 1, .. }));
 }
 
 #[test]

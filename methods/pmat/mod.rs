@@ -30,12 +30,18 @@
 //! - Centres closer than `1e-12` are one point: the cost is 0, whatever the radii.
 //! - Equal costs are ordered by the smaller, then by the larger id; of two equal radii the smaller
 //!   id stays.
-//! - There is no published scale: the figures show scales between 1.18 and 17.38, picked by eye
-//!   for each shape. The published level is the end of the algorithm, where no edge is left, and
-//!   it comes with the whole hierarchy, as every other level does.
+//! - There is no published scale: Table 1 has scales between 1.18 and 17.38, picked by eye for each
+//!   shape. The published level is `s = 1.18`, the least of them, and says so; the end of the
+//!   algorithm, where no edge is left, is `Level::Spheres(1)`. Every level comes with the whole
+//!   hierarchy.
 //!
 //! # Deviations from the paper
 //!
+//! - *The initial mesh.* The paper starts from a medial mesh made like that of the scale axis
+//!   transform, from inner polar balls. Here it is the initial mesh of the harness, all Voronoi
+//!   vertices inside with the Voronoi edges and facets between them, or one that is given, so that
+//!   all methods that collapse edges start alike. Vertices near the surface that are no poles are
+//!   the first to be absorbed.
 //! - Algorithm 1 queues all edges of the survivor again at each collapse. Its own edges still have
 //!   the costs that they are queued at, so here only those that it takes over are added. The
 //!   collapses are the same; a test compares the two.
@@ -61,6 +67,9 @@ pub use cost::absorption_scale;
 
 use cost::{Key, absorbed_first};
 
+/// The scale of [`Level::Published`]: the least of the paper's Table 1.
+const PUBLISHED: f64 = 1.18;
+
 /// Name of the extra that holds all levels as a [`Hierarchy`], for [`resume`].
 pub const HIERARCHY: &str = "hierarchy";
 
@@ -82,7 +91,7 @@ pub fn method() -> Method<NoParams> {
         .native(NativeLevel::larger_is_coarser("s", "factor by which all balls grow, at least 1"))
         .sweep(&[1.1, 1.5, 2.0, 4.0, 8.0, 16.0])
         .published(
-            "the end of the algorithm, where no edge is left, with the whole hierarchy; the paper \
+            "s = 1.18, the least scale of the paper's Table 1, with the whole hierarchy; the paper \
              picks scales by eye for each shape",
         )
         .extra(Capability::new(HIERARCHY, "all levels at once, to go on from without the shape"));
@@ -176,7 +185,7 @@ impl Levels {
             Level::Native(scale) => Err(SimplifyError::Level(format!(
                 "s = {scale:?} is no scale: ask for a finite number of at least 1"
             ))),
-            Level::Published => Ok(self.hierarchy.last_stage()),
+            Level::Published => Ok(self.scales.partition_point(|&cost| cost <= PUBLISHED)),
         }
     }
 
@@ -201,10 +210,10 @@ impl Levels {
                  own",
                 spheres - stage
             )),
-            Level::Published => diagnostics.warn(
-                "the paper leaves the scale to the user (1.18 to 17.38 in its figures); this is the \
-                 end of its algorithm, where no edge is left",
-            ),
+            Level::Published => diagnostics.warn(format!(
+                "the paper leaves the scale to the user (1.18 to 17.38 in its Table 1); this is \
+                 s = {PUBLISHED}"
+            )),
             _ => {}
         }
         diagnostics

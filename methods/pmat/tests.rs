@@ -68,7 +68,8 @@ fn a_chain_by_hand() {
     assert_eq!(at(Level::Native(1.0)).mesh, mesh);
     assert_eq!(at(Level::Native(2.0)).mesh.spheres, [spheres[0], spheres[1], spheres[3]]);
     assert_eq!(at(Level::Native(3.9)).mesh.edges, [[0, 1]]);
-    assert_eq!(at(Level::Published).mesh.spheres, [spheres[0]]);
+    assert_eq!(at(Level::Published).mesh, mesh);
+    assert_eq!(at(Level::Spheres(1)).mesh.spheres, [spheres[0]]);
     assert_eq!(at(Level::Spheres(2)).native_level, Some(3.2));
 }
 

@@ -89,6 +89,9 @@ impl Contraction {
     /// Steps 1 and 2: quadrics of all spheres, costs of all edges.
     pub(super) fn new(mesh: &MedialMesh, params: QmatParams) -> Self {
         let complex = CollapseComplex::from_mesh(mesh);
+        // The oracle follows it.
+        #[cfg(test)]
+        let complex = complex.recording();
         let (quadrics, skipped) = initial_quadrics(mesh, &complex, &params);
         let candidates = mesh
             .edges
@@ -98,6 +101,11 @@ impl Contraction {
             .collect();
         let queue = CollapseQueue::from_candidates(candidates);
         Self { params, complex, quadrics, queue, skipped, tally: Tally::default() }
+    }
+
+    /// The parameters that it is run with.
+    pub(super) fn params(&self) -> QmatParams {
+        self.params
     }
 
     /// Number of spheres left.
@@ -228,6 +236,12 @@ impl Contraction {
         queue.wake(complex, removed);
         tally.collapses += 1;
         kept
+    }
+
+    /// How many collapses were taken against the link condition.
+    #[cfg(test)]
+    pub(super) fn unlocked(&self) -> usize {
+        self.tally.unlocked
     }
 
     /// Largest error of a sphere left, over the slabs it stands for.

@@ -1,10 +1,13 @@
 //! The parameters of Q-MAT.
 
-use medial::simplifier::{ParamInfo, SimplifyError};
+use medial::simplifier::{Level, ParamInfo, SimplifyError};
 use serde::{Deserialize, Serialize};
 
-/// Parameters of Q-MAT; the default is the paper's. Lengths are fractions of the bounding-box
-/// diagonal.
+/// `η` of the paper: from so many spheres on it checks the link condition.
+const PUBLISHED_FROM: usize = 200;
+
+/// Parameters of Q-MAT; the default is the paper's, but for [`QmatParams::topology_from`]. Lengths
+/// are fractions of the bounding-box diagonal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct QmatParams {
@@ -26,7 +29,7 @@ impl Default for QmatParams {
             k: 1e-5,
             boundary: Boundary::Paper,
             k_boundary: 0.1,
-            topology_from: TopologyFrom::Spheres(200),
+            topology_from: TopologyFrom::Auto,
             singular_ratio: 1e-10,
         }
     }
@@ -48,6 +51,9 @@ pub enum Boundary {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "TopologyWord", into = "TopologyWord")]
 pub enum TopologyFrom {
+    /// From the first collapse on; at [`Level::Published`](medial::simplifier::Level::Published)
+    /// from 200 spheres on, as in the paper.
+    Auto,
     /// From the first collapse on.
     All,
     /// While at most so many spheres are left: `η` of the paper's Algorithm 1.
@@ -60,16 +66,25 @@ impl TopologyFrom {
     /// Whether a collapse has to keep the topology when so many spheres are left.
     pub fn applies(self, spheres: usize) -> bool {
         match self {
-            Self::All => true,
+            Self::Auto | Self::All => true,
             Self::Spheres(from) => spheres <= from,
             Self::Never => false,
+        }
+    }
+
+    /// What it means at a level: never [`TopologyFrom::Auto`].
+    fn at(self, level: Level) -> Self {
+        match (self, level) {
+            (Self::Auto, Level::Published) => Self::Spheres(PUBLISHED_FROM),
+            (Self::Auto, _) => Self::All,
+            (given, _) => given,
         }
     }
 }
 
 /// How [`TopologyFrom`] is written.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-#[serde(untagged, expecting = "topology_from is a number of spheres, `all` or `never`")]
+#[serde(untagged, expecting = "topology_from is a number of spheres, `all`, `never` or `auto`")]
 enum TopologyWord {
     Spheres(usize),
     Word(Word),
@@ -78,6 +93,7 @@ enum TopologyWord {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Word {
+    Auto,
     All,
     Never,
 }
@@ -86,6 +102,7 @@ impl From<TopologyWord> for TopologyFrom {
     fn from(word: TopologyWord) -> Self {
         match word {
             TopologyWord::Spheres(from) => Self::Spheres(from),
+            TopologyWord::Word(Word::Auto) => Self::Auto,
             TopologyWord::Word(Word::All) => Self::All,
             TopologyWord::Word(Word::Never) => Self::Never,
         }
@@ -96,6 +113,7 @@ impl From<TopologyFrom> for TopologyWord {
     fn from(from: TopologyFrom) -> Self {
         match from {
             TopologyFrom::Spheres(from) => Self::Spheres(from),
+            TopologyFrom::Auto => Self::Word(Word::Auto),
             TopologyFrom::All => Self::Word(Word::All),
             TopologyFrom::Never => Self::Word(Word::Never),
         }
@@ -103,6 +121,11 @@ impl From<TopologyFrom> for TopologyWord {
 }
 
 impl QmatParams {
+    /// The parameters at a level.
+    pub(super) fn at(self, level: Level) -> Self {
+        Self { topology_from: self.topology_from.at(level), ..self }
+    }
+
     pub(super) fn validate(self) -> Result<Self, SimplifyError> {
         let at_least_zero = [("k", self.k), ("k_boundary", self.k_boundary)];
         for (name, value) in at_least_zero {
@@ -142,9 +165,10 @@ impl QmatParams {
             ),
             ParamInfo::new(
                 "topology_from",
-                "200",
-                "spheres, or all, or never",
-                "from this count on a collapse has to satisfy the link condition (section 4.5)",
+                "auto",
+                "spheres, or all, never or auto",
+                "from this count on a collapse has to keep the topology (section 4.5): all is from \
+                 the start, 200 is the paper's, auto is 200 at the published level and all at others",
             ),
             ParamInfo::new(
                 "singular_ratio",

@@ -4,8 +4,11 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere, betti};
 use medial::simplifier::{Params, RunContext};
 use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 use super::contract::Contraction;
+use super::oracle::Oracle;
 use super::*;
 
 fn params() -> QmatParams {
@@ -238,6 +241,72 @@ proptest! {
     }
 }
 
+/// Follows the contraction to its end beside the oracle; the number of fallbacks, and of collapses.
+fn follow(mesh: &MedialMesh, params: QmatParams) -> [usize; 3] {
+    let mut oracle = Oracle::new(mesh, params);
+    let mut contraction = Contraction::new(mesh, params);
+    let (mut fallbacks, mut collapses) = (0, 0);
+    while let Some(expected) = oracle.next() {
+        let done = contraction.complex().record().len();
+        let target = contraction.sphere_count() - 1;
+        contraction.run_to(mesh, target, &RunContext::default()).unwrap();
+        let record = contraction.complex().record();
+        assert_eq!(record.len(), done + 1, "{expected:?}");
+        let taken = record[done];
+        let ends = [taken.kept.min(taken.removed), taken.kept.max(taken.removed)];
+        assert_eq!(ends, expected.ends, "step {done}: {taken:?} instead of {expected:?}");
+        let off = taken.sphere.centre.distance(expected.sphere.centre)
+            + (taken.sphere.radius - expected.sphere.radius).abs();
+        assert!(off < 1e-6, "step {done}: {taken:?} instead of {expected:?}");
+        fallbacks += usize::from(expected.is_fallback);
+        collapses += 1;
+        oracle.collapse(taken.kept, taken.removed, taken.sphere);
+        let complex = contraction.complex();
+        assert_eq!([complex.edge_count(), complex.face_count()], oracle.sizes());
+    }
+    // Nothing is left but what only Betti numbers allow.
+    let (left, unlocked) = (contraction.sphere_count(), contraction.unlocked());
+    contraction.run_to(mesh, 1, &RunContext::default()).unwrap();
+    assert!(contraction.sphere_count() == left || contraction.unlocked() > unlocked);
+    [fallbacks, collapses, oracle.postponed]
+}
+
+#[test]
+fn order_placement_and_fallback_are_those_of_the_paper_by_brute_force() {
+    let mut rng = Pcg64::seed_from_u64(81);
+    let mut totals = [0; 3];
+    for round in 0..400 {
+        let n = rng.random_range(6..14_u32);
+        let mut x = || rng.random_range(0.0..1.0);
+        let spheres =
+            spheres_at((0..n).map(|_| (Vec3::new(x(), x(), x()), 0.02 + 0.3 * x() * x())));
+        let mut distinct = || {
+            let a = rng.random_range(0..n);
+            let b = (a + rng.random_range(1..n)) % n;
+            let c = (0..n).filter(|v| ![a, b].contains(v)).nth(rng.random_range(0..n as usize - 2));
+            [a, b, c.expect("three of six")]
+        };
+        let faces: Vec<[u32; 3]> = (0..2 * n).map(|_| distinct()).collect();
+        let edges = (0..n / 3).map(|_| distinct()).map(|[a, b, _]| [a, b]).collect();
+        let initial = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
+        // Knots in which a rejected edge waits longer than a search of all edges would let it are the
+        // link condition's, not the order's.
+        let topology_from = TopologyFrom::Never;
+        let boundary = [Boundary::Paper, Boundary::None][round % 2];
+        let params = QmatParams { topology_from, boundary, ..params() };
+        totals.iter_mut().zip(follow(&initial, params)).for_each(|(all, n)| *all += n);
+    }
+    for (bumps, topology_from) in [6, 8, 11]
+        .into_iter()
+        .flat_map(|n| [TopologyFrom::All, TopologyFrom::Spheres(20)].map(|from| (n, from)))
+    {
+        let found = follow(&bumpy(bumps), QmatParams { topology_from, ..params() });
+        totals.iter_mut().zip(found).for_each(|(all, n)| *all += n);
+    }
+    let [fallbacks, collapses, postponed] = totals;
+    assert!(fallbacks > 10 && collapses > 3_000 && postponed > 50, "{totals:?}");
+}
+
 #[test]
 fn parameters_are_typed_and_checked() {
     let typed = |key: &str, value: &str| {
@@ -246,6 +315,7 @@ fn parameters_are_typed_and_checked() {
         params.typed::<QmatParams>().and_then(QmatParams::validate)
     };
     assert_eq!(Params::none().typed::<QmatParams>().unwrap(), QmatParams::default());
+    assert_eq!(typed("topology_from", "auto").unwrap(), QmatParams::default());
     assert_eq!(typed("topology_from", "all").unwrap().topology_from, TopologyFrom::All);
     assert_eq!(typed("topology_from", "never").unwrap().topology_from, TopologyFrom::Never);
     assert_eq!(typed("topology_from", "50").unwrap().topology_from, TopologyFrom::Spheres(50));

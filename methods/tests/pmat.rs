@@ -57,9 +57,20 @@ fn a_sampled_torus_keeps_its_loop_down_to_few_spheres() {
     let mut simplification = prepare(&shape);
     let at_100 = simplification.at(Level::Spheres(100)).expect("a count");
     assert_eq!(betti(&at_100.mesh)[0], 1);
-    let end = simplification.at(Level::Published).expect("the end");
+    let end = simplification.at(Level::Spheres(1)).expect("the end");
     assert_eq!((end.mesh.spheres.len(), betti(&end.mesh)), (1, [1, 0, 0]));
-    assert!(end.diagnostics.warnings[0].contains("leaves the scale to the user"));
+}
+
+#[test]
+fn the_published_level_is_the_least_published_scale_and_says_so() {
+    let shape = shape("bracket", 8);
+    let mut simplification = prepare(&shape);
+    let published = simplification.at(Level::Published).expect("a scale");
+    assert!(published.diagnostics.warnings[0].contains("leaves the scale to the user"));
+    let by_scale = simplification.at(Level::Native(1.18)).expect("a scale");
+    assert_eq!(published.mesh, by_scale.mesh);
+    let initial = shape.initial().expect("an initial medial mesh").spheres.len();
+    assert!((2..initial).contains(&published.mesh.spheres.len()));
 }
 
 #[test]

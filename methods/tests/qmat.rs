@@ -50,7 +50,7 @@ fn topology_is_kept_at_every_level() {
         let initial = shape.initial().expect("an initial medial mesh");
         let expected = medial_datasets::find(id).expect("in the catalogue").expected_betti;
         assert_eq!(betti(&initial), expected, "{id}: too coarse a sample for this test");
-        let mut simplification = prepare(&shape, &[("topology_from", "all")]);
+        let mut simplification = prepare(&shape, &[]);
         let mut count = initial.spheres.len();
         while count > 1 {
             count = if count > 60 { count * 9 / 10 } else { count - 1 };
@@ -61,6 +61,45 @@ fn topology_is_kept_at_every_level() {
             assert_eq!(reached > count, !result.diagnostics.warnings.is_empty(), "{id} at {count}");
         }
     }
+}
+
+/// The default on every built-in shape whose initial mesh has the topology of the solid.
+#[test]
+fn by_default_what_the_initial_mesh_has_is_kept_on_every_built_in_shape() {
+    let mut tested = 0;
+    for built_in in medial_datasets::catalogue() {
+        let shape = shape(built_in.id, built_in.default_resolution);
+        let initial = shape.initial().expect("an initial medial mesh");
+        if betti(&initial) != built_in.expected_betti {
+            continue;
+        }
+        tested += 1;
+        let mut simplification = prepare(&shape, &[]);
+        for count in [3000, 1000, 300, 100, 30, 8] {
+            let result = spheres(simplification.as_mut(), count);
+            assert_eq!(betti(&result.mesh), built_in.expected_betti, "{} at {count}", built_in.id);
+        }
+    }
+    assert!(tested >= 10, "{tested}");
+}
+
+/// What is published checks from 200 spheres on, and only there does that decide.
+#[test]
+fn the_published_level_checks_from_200_spheres_on() {
+    let shape = shape("frame", medial_datasets::find("frame").expect("a frame").default_resolution);
+    let at = |params: &[(&str, &str)], level: Level| {
+        prepare(&shape, params).at(level).expect("a level").mesh
+    };
+    let published = at(&[], Level::Published);
+    assert_eq!(published, at(&[("topology_from", "200")], Level::Spheres(100)));
+    assert_eq!(at(&[], Level::Spheres(100)), at(&[("topology_from", "all")], Level::Spheres(100)));
+    let told = at(&[("topology_from", "all")], Level::Published);
+    assert_eq!(told, at(&[], Level::Spheres(100)));
+    // Going from one to the other starts anew.
+    let mut both = prepare(&shape, &[]);
+    assert_eq!(spheres(both.as_mut(), 300).mesh, at(&[], Level::Spheres(300)));
+    let after = both.at(Level::Published).expect("a level");
+    assert_eq!((after.mesh, after.work), (published, Work::Anew));
 }
 
 #[test]
@@ -84,7 +123,7 @@ fn topology_is_kept_at_every_level_of_real_meshes() {
         let initial = shape.initial().expect("an initial medial mesh");
         // Not that of the solid where the samples are too coarse for it.
         let expected = betti(&initial);
-        let mut simplification = prepare(&shape, &[("topology_from", "all")]);
+        let mut simplification = prepare(&shape, &[]);
         let mut count = initial.spheres.len();
         while count > 4 {
             count /= 4;
