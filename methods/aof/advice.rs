@@ -11,17 +11,17 @@ use super::solid::Solid;
 
 /// Bytes for each voxel of the start set: values in bricks that are not full, twice while one is
 /// thinned, lists of blocks, the heap.
-const BYTES_PER_VOXEL: f64 = 64.0;
+pub(super) const BYTES_PER_VOXEL: f64 = 64.0;
 
 /// Voxels that a lattice tried for advice may visit.
-const MOST_VISITS: f64 = 2e7;
+pub(super) const MOST_VISITS: f64 = 2e7;
 
 /// A lattice of this resolution tells how deep a solid is, where the one asked has too many voxels.
 const SOUNDING: u32 = 54;
 
 /// A voxel whose sphere fits is there wherever the distance is so many sides: its centre is at most
 /// half a diagonal away.
-const SURELY: f64 = 1.9;
+pub(super) const SURELY: f64 = 1.9;
 
 impl Solid<'_> {
     /// Refuses lattices that have too many voxels along a side or do not fit into memory.
@@ -47,7 +47,7 @@ impl Solid<'_> {
     }
 
     /// The largest resolution below a given one that fits into memory, if it surely has voxels.
-    fn fitting(&self, resolution: u32) -> Option<u32> {
+    pub(super) fn fitting(&self, resolution: u32) -> Option<u32> {
         let limit = self.params().max_memory;
         // Not quite a cube root: the lattice is a whole number of coarse voxels.
         let estimate = f64::from(resolution) * (limit / self.megabytes(resolution).0).cbrt();
@@ -64,8 +64,9 @@ impl Solid<'_> {
         (surely || (tried == fits && tally.start > 0)).then_some(fits)
     }
 
-    /// Memory for the voxels of a resolution, in megabytes, and their number.
-    fn megabytes(&self, resolution: u32) -> (f64, f64) {
+    /// Memory for the voxels of a resolution, in megabytes, and their number. That of the medial mesh is
+    /// known when its voxels are (file `output_size.rs`).
+    pub(super) fn megabytes(&self, resolution: u32) -> (f64, f64) {
         let grid = self.grid(resolution);
         let voxels = self.volume / grid.side.powi(3);
         let bricks: f64 = grid.size.iter().map(|&n| f64::from(n) / 8.0).product();
@@ -74,15 +75,9 @@ impl Solid<'_> {
 
     /// About how many voxels a lattice of a resolution visits: those inside, and a layer along the
     /// surface.
-    fn visits(&self, resolution: u32) -> f64 {
+    pub(super) fn visits(&self, resolution: u32) -> f64 {
         let side = self.grid(resolution).side;
-        let mesh = self.shape.mesh();
-        let doubled = |f: usize| {
-            let [a, b, c] = mesh.triangle(f);
-            (b - a).cross(c - a).length()
-        };
-        let area: f64 = (0..mesh.faces.len()).map(doubled).sum::<f64>() / 2.0;
-        self.volume / side.powi(3) + 2.0 * area / (side * side)
+        self.volume / side.powi(3) + 2.0 * self.area / (side * side)
     }
 
     /// The error for a lattice without voxels. It names a resolution that was tried and has some,

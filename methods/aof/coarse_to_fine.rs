@@ -6,8 +6,8 @@
 //!    parent, with them its distance `D`, and from `D` its side: no test is needed where the parent
 //!    is farther from the surface than its descendants from it.
 //! 3. Above the finest level: where the sphere of radius `sigma` lies inside (`D >= sigma`), `AOF'`
-//!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, up to the
-//!    flux of the samples themselves in a constant field.
+//!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, by default up
+//!    to the flux of the samples themselves in a constant field.
 //! 4. At the finest level: `AOF'` of every voxel whose sphere lies inside. The final threshold is
 //!    applied later, as it depends on the level that is asked.
 //!
@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use medial::Vec3;
 use medial::geometry::{NearSet, NearbyTriangles};
+use medial::shape::Shape;
 use medial::simplifier::{RunContext, SimplifyError};
 use medial::surface::{InsideTest, Side};
 use rayon::prelude::*;
@@ -25,7 +26,7 @@ use rayon::prelude::*;
 use super::bricks::{Bricks, Voxel};
 use super::flux::{Probe, Sphere};
 use super::grid::Grid;
-use super::params::{AofParams, Start};
+use super::params::{AofParams, Dismiss, Start};
 
 /// Coarse voxels along a side of a block, at most.
 const BLOCK: u32 = 4;
@@ -40,6 +41,13 @@ pub struct Surface {
     pub triangles: NearbyTriangles,
     /// Which side.
     pub inside: Arc<InsideTest>,
+}
+
+impl Surface {
+    /// That of a shape.
+    pub fn of(shape: &Shape) -> Self {
+        Self { triangles: NearbyTriangles::new(shape.mesh()), inside: shape.inside_test() }
+    }
 }
 
 /// What to find out about the voxels.
@@ -111,6 +119,8 @@ struct Levels {
     sizes: Vec<u32>,
     /// Radius around the centre that holds the spheres of a voxel and of its descendants.
     reaches: Vec<f64>,
+    /// Flux from which on a voxel of the level is dismissed.
+    dismissed_from: Vec<f64>,
     d: u32,
     start: Start,
 }
@@ -127,9 +137,14 @@ impl Levels {
             reaches[level] = reaches[level].max(moved + reaches[level + 1]);
         }
         let spheres = sizes.iter().zip(counts);
-        let spheres =
+        let spheres: Vec<Sphere> =
             spheres.map(|(&size, n)| Sphere::new(params.spiral, n, radius(size))).collect();
-        Ok(Self { spheres, sizes, reaches, d: params.d, start: params.start })
+        let from = |sphere: &Sphere| match params.dismiss {
+            Dismiss::Zero => 0.0,
+            Dismiss::Bias => -sphere.bias,
+        };
+        let dismissed_from = spheres.iter().map(from).collect();
+        Ok(Self { spheres, sizes, reaches, dismissed_from, d: params.d, start: params.start })
     }
 
     fn tally(&self) -> Tally {
@@ -279,7 +294,7 @@ impl<'a> Walk<'a> {
             self.emit(base, distance, flux);
             return;
         }
-        if evaluate && flux >= -self.levels.spheres[level].bias {
+        if evaluate && flux >= self.levels.dismissed_from[level] {
             self.tally.dismissed[level] += u64::from(size).pow(3);
             known.dismissed = true;
             if self.wanted == Wanted::Kept {

@@ -1,11 +1,14 @@
 //! The axis with a number of voxels: a lattice as coarse as the count allows, then deletion.
 //!
-//! 1. The axis of the base has too many voxels. Of these, those on sheets grow in number with the
-//!    square of the resolution, those on curves with the resolution itself. This gives the resolution
-//!    that should have the count; every lattice that is tried corrects the estimate.
-//! 2. The search ends with a lattice that has the topology of the base and a few more voxels than
-//!    asked. Where the topology is lost, the next one lies half way to the coarsest lattice that has it.
-//! 3. The rest is deleted, simple voxels of the largest flux first.
+//! 1. The axis of the base has too many voxels, or too few. Of these, those on sheets grow in number
+//!    with the square of the resolution, those on curves with the resolution itself. This gives the
+//!    resolution that should have the count; every lattice that is tried corrects the estimate.
+//! 2. Too few: finer lattices are tried, each at most twice as fine as the one before, until one has
+//!    the count, memory or effort ends, or finer lattices bring no more voxels.
+//! 3. Too many: the search ends with a lattice that has the topology of the base, loses no more of the
+//!    surface, and has a few more voxels than asked. Where either is lost, the next one lies half way
+//!    to the coarsest lattice that has both.
+//! 4. The rest is deleted, simple voxels of the largest flux first.
 //!
 //! Which lattices are tried depends on the count alone, so that the same count has the same answer
 //! whatever was asked before. Lattices that are there already are not made again.
@@ -14,18 +17,23 @@ use std::sync::Arc;
 
 use medial::simplifier::{Diagnostics, SimplifyError};
 
+use super::advice::MOST_VISITS;
+use super::base::Base;
 use super::bricks::Bricks;
+use super::losses::LOST;
 use super::output::sorted;
 use super::params::Variant;
-use super::solid::{Axis, Base, Solid, betti_of};
+use super::solid::{Axis, Solid, betti_of};
 use super::thinning::{Order, thin};
 use crate::reuse::Reuse;
 
-/// Lattices tried by resolution; `None` where the topology of the base is lost.
+/// Lattices tried by resolution; `None` where the topology or a part of the base is lost.
 pub type Lattices = Reuse<u32, Option<Axis>>;
 
 /// A lattice with at most this share of voxels above the count is not made coarser.
 const ENOUGH: f64 = 1.15;
+/// A lattice may lose so much more of the surface than the base does or may.
+const WORSE: f64 = 1.2;
 /// What the estimate aims at, in counts.
 const AIM: f64 = 1.06;
 /// Lattices that are tried for a count.
@@ -47,63 +55,140 @@ impl Solid<'_> {
         diagnostics: &mut Diagnostics,
     ) -> Result<Axis, SimplifyError> {
         let angle = self.params().angle;
-        let mut best = lattices
+        let first = lattices
             .get(base.resolution, || self.axis(base.resolution, &base.descent, angle).map(Some))?;
-        let size = |lattice: &Arc<Option<Axis>>| lattice.as_ref().as_ref().map_or(0, Axis::len);
-        if size(&best) <= count {
-            if size(&best) < count {
-                diagnostics.warn(format!(
-                    "{} spheres instead of {count}: the axis has no more voxels at resolution {}",
-                    size(&best),
-                    base.resolution
-                ));
-            }
-            return Ok(taken(&best));
+        let mut search = Search {
+            growth: Growth::of(&taken(&first), base.resolution),
+            best: first,
+            high: base.resolution,
+            low: 1,
+            tried: 0,
+        };
+        if size(&search.best) < count {
+            self.climb(base, count, lattices, &mut search)?;
         }
-        let mut growth = Growth::of(&taken(&best), base.resolution);
-        let (mut low, mut high) = (1, base.resolution);
-        let (mut tried, mut is_lost) = (0, false);
-        while tried < MOST_TRIES && size(&best) as f64 > ENOUGH * count as f64 {
+        if size(&search.best) > count {
+            self.descend_to(base, count, lattices, &mut search)?;
+        }
+        let mut axis = taken(&search.best);
+        if axis.len() < count {
+            diagnostics.warn(format!(
+                "{} spheres instead of {count}: the axis has no more voxels at resolution {}, the \
+                 finest that was tried",
+                axis.len(),
+                search.high
+            ));
+        }
+        if axis.len() > count {
+            self.take_down(&mut axis, count, diagnostics)?;
+            self.say_what_the_count_loses(&axis, search.high, diagnostics)?;
+        }
+        self.say_what_is_lost(base, search.high, diagnostics)?;
+        diagnostics.count("lattice", search.high as usize);
+        diagnostics.count("lattices_tried", search.tried);
+        Ok(axis)
+    }
+
+    /// Step 2.
+    fn climb(
+        &self,
+        base: &Base,
+        count: usize,
+        lattices: &mut Lattices,
+        search: &mut Search,
+    ) -> Result<(), SimplifyError> {
+        let mut at = search.high;
+        while search.tried < MOST_TRIES && size(&search.best) < count {
+            let ideal = search.growth.resolution_of(AIM * count as f64);
+            let next = ideal.clamp(at + 1 + at / 16, 2 * at + 1);
+            if self.check_resolution(next).is_err() || self.visits(next) > MOST_VISITS {
+                break;
+            }
+            search.tried += 1;
+            let lattice = lattices.get(next, || self.faithful_axis(next, base))?;
+            let (before, found) = (size(&search.best), size(&lattice));
+            if found > before {
+                search.growth.correct(next, found);
+                (search.low, search.high) = (search.high, next);
+                search.best = lattice;
+            } else if found > 0 && 2 * next >= 3 * at {
+                // The axis is a curve's end, or a point: it has no more voxels on any lattice.
+                break;
+            }
+            at = next;
+        }
+        Ok(())
+    }
+
+    /// Step 3.
+    fn descend_to(
+        &self,
+        base: &Base,
+        count: usize,
+        lattices: &mut Lattices,
+        search: &mut Search,
+    ) -> Result<(), SimplifyError> {
+        let mut is_lost = false;
+        while search.tried < MOST_TRIES && size(&search.best) as f64 > ENOUGH * count as f64 {
+            let Search { low, high, .. } = *search;
             // Below a lattice that lost the topology not much is gained by going close to it.
             if high - low <= 1 + high / if is_lost { 8 } else { 16 } {
                 break;
             }
-            tried += 1;
-            let ideal = growth.resolution_of(AIM * count as f64);
+            search.tried += 1;
+            let ideal = search.growth.resolution_of(AIM * count as f64);
             let next = if low < ideal && ideal < high { ideal } else { low.midpoint(high) };
-            let lattice = lattices.get(next, || self.axis_with_topology(next, base.topology))?;
+            let lattice = lattices.get(next, || self.faithful_axis(next, base))?;
             is_lost |= lattice.is_none();
-            match size(&lattice) {
-                0 => low = next,
-                found => {
-                    growth.correct(next, found);
-                    if found >= count {
-                        (best, high) = (lattice, next);
-                    } else {
-                        low = next;
-                    }
-                }
+            let found = size(&lattice);
+            if found > 0 {
+                search.growth.correct(next, found);
+            }
+            if found >= count {
+                (search.best, search.high) = (lattice, next);
+            } else {
+                search.low = next;
             }
         }
-        let mut axis = taken(&best);
-        if axis.len() > count {
-            self.take_down(&mut axis, count, diagnostics)?;
-        }
-        diagnostics.count("lattice", high as usize);
-        diagnostics.count("lattices_tried", tried);
-        Ok(axis)
+        Ok(())
     }
 
-    fn axis_with_topology(
-        &self,
-        resolution: u32,
-        topology: Option<[u64; 3]>,
-    ) -> Result<Option<Axis>, SimplifyError> {
-        let base = self.descend(resolution, self.wanted())?;
-        if topology.is_some_and(|topology| betti_of(&base.voxels) != topology) {
+    fn faithful_axis(&self, resolution: u32, base: &Base) -> Result<Option<Axis>, SimplifyError> {
+        let start = self.descend(resolution, self.wanted())?;
+        let (topology, base_loss) = (base.topology, base.loss.map_or(0.0, |loss| loss.distance));
+        // A finer lattice may have what the base misses.
+        let is_other = |b, t| b != t && Some(b) != self.shape.expected_betti();
+        if topology.is_some_and(|t| is_other(betti_of(&start.voxels), t)) {
             return Ok(None);
         }
-        self.axis(resolution, &base, self.params().angle).map(Some)
+        let most = base_loss.max(LOST * self.grid(self.params().resolution).side);
+        if self.loss(resolution, &start.voxels, WORSE * most)?.is_some() {
+            return Ok(None);
+        }
+        self.axis(resolution, &start, self.params().angle).map(Some)
+    }
+
+    /// What is missing of the spheres of an axis that was taken down to a count.
+    fn say_what_the_count_loses(
+        &self,
+        axis: &Axis,
+        resolution: u32,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<(), SimplifyError> {
+        let allowed = LOST * axis.grid.side;
+        if let Some(loss) = self.loss_of(resolution, &axis.voxels, allowed)? {
+            let place = self.shape.normalisation().backward(loss.place);
+            diagnostics.warn(format!(
+                "the surface at ({:.6}, {:.6}, {:.6}) is {:.1} % of the diagonal away from every sphere: \
+                 {} of them do not reach all of the solid",
+                place.x,
+                place.y,
+                place.z,
+                100.0 * loss.distance,
+                axis.len()
+            ));
+        }
+        Ok(())
     }
 
     fn take_down(
@@ -132,6 +217,22 @@ impl Solid<'_> {
         diagnostics.count("deleted_to_the_count", before - axis.voxels.len());
         Ok(())
     }
+}
+
+/// Lattices on both sides of a count.
+struct Search {
+    growth: Growth,
+    /// The coarsest with the count, or the finest that was tried.
+    best: Arc<Option<Axis>>,
+    /// Its resolution.
+    high: u32,
+    /// A coarser resolution that has too few voxels, or not the topology.
+    low: u32,
+    tried: usize,
+}
+
+fn size(lattice: &Option<Axis>) -> usize {
+    lattice.as_ref().map_or(0, Axis::len)
 }
 
 fn taken(lattice: &Option<Axis>) -> Axis {

@@ -1,6 +1,6 @@
 //! The parameters of the average outward flux.
 
-use medial::simplifier::{ParamInfo, SimplifyError};
+use medial::simplifier::SimplifyError;
 use serde::{Deserialize, Serialize};
 
 use super::spiral::Spiral;
@@ -10,7 +10,8 @@ pub(super) const MAX_RESOLUTION: u32 = 60_000;
 /// Most voxels along the longest side of a coarse voxel.
 const MAX_SPLIT: u32 = 1024;
 
-/// Parameters; the default is the paper's where the paper has one.
+/// Parameters at one level; see [`AofSettings`](super::AofSettings) for what is set.
+/// The default is that of every level but the published one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AofParams {
@@ -35,9 +36,11 @@ pub struct AofParams {
     pub spiral: Spiral,
     /// Which voxels there are to begin with.
     pub start: Start,
+    /// From which flux on a coarse voxel is dismissed.
+    pub dismiss: Dismiss,
     /// Whether centres are moved from the voxel's onto the axis.
     pub refine: bool,
-    /// Limit of the memory for voxels, in megabytes.
+    /// Limit of the memory for voxels and the medial mesh, in megabytes.
     pub max_memory: f64,
 }
 
@@ -64,6 +67,16 @@ pub enum Start {
     Coarse,
 }
 
+/// From which flux on a coarse voxel is dismissed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Dismiss {
+    /// `AOF' >= 0`, as in the paper.
+    Zero,
+    /// Where `AOF'` is not below minus the flux that the samples have in a constant field.
+    Bias,
+}
+
 impl Default for AofParams {
     fn default() -> Self {
         Self {
@@ -76,8 +89,9 @@ impl Default for AofParams {
             variant: Variant::Thinning,
             spiral: Spiral::EqualArea,
             start: Start::Fine,
+            dismiss: Dismiss::Bias,
             refine: true,
-            max_memory: 1000.0,
+            max_memory: 2000.0,
         }
     }
 }
@@ -159,79 +173,12 @@ impl AofParams {
         };
         (-mu * angle.to_radians().sin()) as f32
     }
-
-    pub(super) fn describe() -> Vec<ParamInfo> {
-        let defaults = Self::default();
-        vec![
-            ParamInfo::new(
-                "resolution",
-                defaults.resolution,
-                "voxels",
-                "voxels along the longest side of the bounding box, at the finest level",
-            ),
-            ParamInfo::new("d", defaults.d, "number", "each voxel is split into d x d x d"),
-            ParamInfo::new(
-                "levels",
-                defaults.levels,
-                "number",
-                "levels of resolution, from coarse to fine",
-            ),
-            ParamInfo::new(
-                "samples",
-                defaults.samples,
-                "numbers",
-                "samples on each sphere, from the coarsest level to the finest",
-            ),
-            ParamInfo::new(
-                "angle",
-                defaults.angle,
-                "degrees",
-                "object angle of the sheets that are kept, when no level names one",
-            ),
-            ParamInfo::new(
-                "mu",
-                defaults.mu,
-                "pure number",
-                "factor of the threshold -mu sin(angle); 0 is 0.125 for plain and homotopy, where a \
-                 sheet anywhere in a voxel keeps it, and 0.375 for the end points of thinning",
-            ),
-            ParamInfo::new(
-                "variant",
-                "thinning",
-                "plain, homotopy or thinning",
-                "keep by threshold; delete simple voxels alone, outermost first; or thin by flux",
-            ),
-            ParamInfo::new(
-                "spiral",
-                "equal-area",
-                "equal-area or classic",
-                "how the samples lie on the sphere",
-            ),
-            ParamInfo::new(
-                "start",
-                "fine",
-                "fine or coarse",
-                "begin with the voxels whose spheres fit inside at the finest level, or at the \
-                 coarsest as in the paper",
-            ),
-            ParamInfo::new(
-                "refine",
-                defaults.refine,
-                "true or false",
-                "move centres onto the axis, between opposite closest points",
-            ),
-            ParamInfo::new(
-                "max_memory",
-                defaults.max_memory,
-                "megabytes",
-                "limit of the memory for voxels",
-            ),
-        ]
-    }
 }
 
 /// One number of samples for all levels may be given as a number.
-fn number_or_text<'de, D: serde::Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+pub(super) fn number_or_text<'de, D: serde::Deserializer<'de>>(
+    from: D,
+) -> Result<String, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged, expecting = "expected 8 to 10000 for each level, such as 70/60/50")]
     enum Given {

@@ -7,6 +7,7 @@ use medial::metrics::enclosed_volume;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
+use super::crust::AxisPoles;
 use super::duplicates::{DistinctBalls, tetrahedron};
 use super::fins::without_fins;
 use super::merge;
@@ -26,6 +27,8 @@ pub(super) struct Axis {
     pub(super) at_face: Vec<f64>,
     /// The number of voids.
     pub(super) b2: u64,
+    /// The poles that are on it; none where its spheres are no polar balls of samples.
+    pub(super) poles: Option<AxisPoles>,
 }
 
 impl Axis {
@@ -43,7 +46,7 @@ impl Axis {
         }
         let at_sphere = vec![0.0; mesh.spheres.len()];
         let at_face = vec![0.0; mesh.faces.len()];
-        Self { mesh, incidence, on_curve, at_sphere, at_face, b2: 0 }
+        Self { mesh, incidence, on_curve, at_sphere, at_face, b2: 0, poles: None }
     }
 
     /// The axis of a shape that the parameters ask for.
@@ -135,8 +138,12 @@ fn of_union(
     let (mesh, into) = merge::merged(&finless, params.merge, run)?;
     let mut axis = Axis::of_mesh(mesh);
     // The first vertices of the axis are centres of balls.
-    for (&ball, &v) in union.balls().iter().zip(&first_into) {
-        axis.at_sphere[into[v as usize] as usize] += poles.volumes[ball as usize];
+    let on_axis = || union.balls().iter().zip(&first_into).map(|(&b, &v)| (b, into[v as usize]));
+    for (ball, sphere) in on_axis() {
+        axis.at_sphere[sphere as usize] += poles.volumes[ball as usize];
+    }
+    if !shape.has_given_initial() {
+        axis.poles = Some(AxisPoles::of(shape.samples().len(), &poles, on_axis()));
     }
     diagnostics.count("fins", is_fin.iter().filter(|&&fin| fin).count());
     diagnostics.count("fins_left", fins_left);

@@ -77,6 +77,11 @@ impl DistinctBalls {
         Self { balls: balls.to_vec(), samples, volumes }
     }
 
+    /// The samples that a ball passes through.
+    pub(super) fn samples_of(&self, ball: u32) -> &[u32] {
+        &self.samples[ball as usize]
+    }
+
     /// For each corner of the union of the balls, moved and grown to `moved`, its sample.
     pub(super) fn samples_of_corners(
         &self,

@@ -105,7 +105,7 @@ impl Default for TamHeidrichParams {
             axis: AxisChoice::Auto,
             remove: List::default(),
             radius_factor: 1.002,
-            jitter: 1e-4,
+            jitter: 1e-7,
             merge: 1e-3,
         }
     }

@@ -225,6 +225,18 @@ impl Parts {
         self.has_contact(part) && self.euler[part] == 0
     }
 
+    /// How many spheres go with a part of those that remain.
+    pub(super) fn own_spheres(&self, part: usize, remaining: &Remaining<'_>) -> usize {
+        let axis = remaining.axis;
+        let corners = self.faces(part).iter().flat_map(|&f| axis.mesh.faces[f as usize]);
+        // A curve counts as one more part, so that its spheres are never a part's own.
+        let mut own: Vec<u32> =
+            corners.filter(|&v| self.at_sphere[v as usize].count == 1).collect();
+        own.sort_unstable();
+        own.dedup();
+        own.len()
+    }
+
     /// Removes a part that is there with its own simplices (step 4).
     pub(super) fn remove(&mut self, part: usize, remaining: &mut Remaining<'_>) {
         let axis = remaining.axis;

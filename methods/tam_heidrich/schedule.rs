@@ -29,8 +29,10 @@ pub(super) struct Pruning<'a> {
     pub(super) diagnostics: Diagnostics,
     run: &'a RunContext,
     params: &'a TamHeidrichParams,
-    /// Rounds end as soon as so many spheres are left.
+    /// Rounds end as near to so many spheres as whole parts allow.
     enough: usize,
+    /// The number of spheres on the other side of `enough`, once the rounds ended there.
+    pub(super) other_side: Option<usize>,
     rounds: usize,
     /// The `t_v` of the last round, if it was one by volume.
     pub(super) t_v: Option<f64>,
@@ -46,20 +48,33 @@ impl<'a> Pruning<'a> {
     ) -> Self {
         let remaining = Remaining::all(axis);
         let parts = Parts::of(&remaining);
-        let (rounds, t_v) = (0, None);
-        let mut pruning = Self { remaining, parts, diagnostics, run, params, enough, rounds, t_v };
+        let (rounds, t_v, other_side) = (0, None, None);
+        let mut pruning =
+            Self { remaining, parts, diagnostics, run, params, enough, other_side, rounds, t_v };
         pruning.report("start", &[]);
         pruning
     }
 
-    /// Whether so many spheres are left as were asked for, or fewer.
+    /// Whether the number of spheres is as near to that asked for as whole parts allow.
     pub(super) fn is_enough(&self) -> bool {
-        self.remaining.spheres <= self.enough
+        self.other_side.is_some() || self.remaining.spheres <= self.enough
     }
 
-    /// Whether no round took place.
-    pub(super) fn is_untouched(&self) -> bool {
-        self.rounds == 0
+    /// Removes a part, unless more spheres are nearer to the number that was asked for than are left
+    /// without it. Whether it was removed.
+    fn remove(&mut self, part: usize) -> bool {
+        let before = self.remaining.spheres;
+        let after = before - self.parts.own_spheres(part, &self.remaining);
+        let is_last = after < self.enough;
+        if is_last && before - self.enough < self.enough - after {
+            self.other_side = Some(after);
+            return false;
+        }
+        self.parts.remove(part, &mut self.remaining);
+        if is_last {
+            self.other_side = Some(before);
+        }
+        true
     }
 
     /// The published schedule: rounds by triangle count until they bring little, then one round for
@@ -127,8 +142,7 @@ impl<'a> Pruning<'a> {
                 false => self.parts.has_contact(part),
             };
             if may_go {
-                self.parts.remove(part, &mut self.remaining);
-                removed += 1;
+                removed += usize::from(self.remove(part));
             } else {
                 refused += 1;
                 leaves += usize::from(graph.as_ref().is_some_and(|g| g.is_leaf[part]));

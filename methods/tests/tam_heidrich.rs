@@ -10,7 +10,7 @@ use medial::complex::{MedialMesh, betti};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
-use medial_methods::tam_heidrich::{self, PartInfo, parts_of_faces};
+use medial_methods::tam_heidrich::{self, OuterPoles, PartInfo, RemainingPoles, parts_of_faces};
 
 fn shape_of(name: &str, mesh: &TriMesh) -> Shape {
     let report = surface::validate(mesh).expect("a solid");
@@ -177,7 +177,7 @@ fn loops_survive_every_checked_round() {
 }
 
 #[test]
-fn counts_are_met_from_above_and_results_are_nested() {
+fn counts_are_met_from_either_side_and_results_are_nested() {
     let shape = built_in("blob");
     let whole = at(&shape, &NO_ROUNDS, Level::Published).mesh;
     let mut finer = whole.clone();
@@ -196,10 +196,78 @@ fn counts_are_met_from_above_and_results_are_nested() {
         assert!(level >= t_v);
         (finer, t_v) = (result.mesh, level);
     }
+    // Each level on the way is the answer to what is nearer to it than to the next.
+    let at_each = |spheres: usize| at(&shape, &[], Level::Spheres(spheres)).mesh.spheres.len();
+    let mut level = whole.spheres.len();
+    for _ in 0..12 {
+        let next = at_each(level - 1);
+        if next >= level {
+            // The next level is farther: it is met from half way on.
+            let asked = (1..level).rev().find(|&n| n % 40 == 0 && at_each(n) < level);
+            let Some(asked) = asked else { break };
+            let next = at_each(asked);
+            assert!(asked.abs_diff(next) <= level - asked, "{asked}: {next} instead of {level}");
+            level = next;
+        } else {
+            level = next;
+        }
+    }
+    assert!(level < whole.spheres.len());
     // One sheet for each body is what no rule allows to go.
     let result = at(&shape, &[("topology", "all")], Level::Spheres(1));
     assert!(parts(&result).iter().all(|p| !p.removable));
     assert_eq!(betti(&result.mesh), betti(&whole));
+}
+
+/// Moving the balls decides ties; it does not decide what is left.
+#[test]
+fn another_seed_leaves_nearly_as_many_spheres() {
+    for id in ["blob", "bracket", "torus"] {
+        let shape = built_in(id);
+        let left = [0, 1, 2, 3].map(|seed| {
+            let mut run = RunContext::default();
+            run.seed = seed;
+            let prepared = tam_heidrich::method().prepare(&shape, &Params::none(), &run);
+            let result = prepared.expect("an axis").at(Level::Published).expect("an answer");
+            let start = ["b0", "b1", "b2"].map(|b| count(&result, &format!("start_{b}")));
+            assert_eq!(Some(start), shape.expected_betti(), "{id}: moving makes no loops");
+            result.mesh.spheres.len()
+        });
+        let (least, most) = (left.iter().min(), left.iter().max());
+        let [least, most] = [least, most].map(|n| *n.expect("four") as f64);
+        assert!(most <= 1.03 * least, "{id}: {left:?}");
+    }
+}
+
+/// The surface of the remaining poles, in units of the box of 3 by 2 by 1.
+#[test]
+fn the_power_crust_takes_the_poles_that_are_left() {
+    let shape = built_in("box");
+    let diagonal = shape.normalisation().diagonal;
+    let volume = |poles: &RemainingPoles, outer| {
+        let crust = poles.power_crust(&shape, outer).expect("a crust");
+        let report = surface::validate(&crust.triangles()).expect("a closed surface");
+        report.volume.expect("closed") * diagonal.powi(3)
+    };
+    let poles = |result: &Simplified| result.extras.get::<RemainingPoles>().expect("poles").clone();
+    let outer = |poles: &RemainingPoles, which| poles.outer(&shape, which).expect("outer poles");
+    let whole = poles(&at(&shape, &NO_ROUNDS, Level::Published));
+    assert!(whole.inner.len() > 50, "{}", whole.inner.len());
+    let samples = shape.samples();
+    for ball in whole.inner.iter().chain(&outer(&whole, OuterPoles::All)) {
+        let nearest = samples.iter().map(|&s| s.distance(ball.centre)).fold(f64::MAX, f64::min);
+        assert!((nearest - ball.radius).abs() < 1e-9, "polar balls, neither moved nor grown");
+    }
+    let full = volume(&whole, OuterPoles::All);
+    assert!((full - 6.0).abs() < 0.4, "{full}");
+    // Without the sheets to its edges the box is rounded, less so without their outer poles.
+    let pruned = poles(&at(&shape, &[("t_v", "100")], Level::Published));
+    assert!(pruned.inner.len() < whole.inner.len());
+    assert!(pruned.inner.iter().all(|ball| whole.inner.contains(ball)));
+    let numbers = [OuterPoles::All, OuterPoles::OfRemaining].map(|o| outer(&pruned, o).len());
+    assert!(numbers[1] < numbers[0], "{numbers:?}");
+    let [all, remaining] = [OuterPoles::All, OuterPoles::OfRemaining].map(|o| volume(&pruned, o));
+    assert!(all < remaining, "{all} {remaining} {full}");
 }
 
 #[test]
