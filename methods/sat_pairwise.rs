@@ -23,7 +23,7 @@ mod containment;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Method, MethodInfo, NativeLevel, NoParams, RunContext, Simplification,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, NoParams, RunContext, Simplification,
     SimplifyError,
 };
 
@@ -40,7 +40,7 @@ pub fn method() -> Method<NoParams> {
         )
         .summary("Removes the spheres that another sphere contains once both are scaled.")
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
-        .filter()
+        .filter(Level::Native(1.1))
         .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0])
         .published("unsupported: it is described, not published, as a method");
     Method::new(info, prepare)

@@ -50,7 +50,7 @@ fn hierarchy(criterion: &mut Criterion) {
     let pmat = medial_methods::find("pmat").expect("registered");
     let run = RunContext::default();
     let mut levels = pmat.prepare(&shape, &Params::none(), &run).expect("prepared");
-    let end = levels.at(Level::Published).expect("the end");
+    let end = levels.at(Level::Spheres(1)).expect("the end");
     let hierarchy = end.extras.get_shared::<Hierarchy>().expect("PMAT has a hierarchy");
     let last = hierarchy.last_stage();
     let mut group = criterion.benchmark_group("hierarchy");

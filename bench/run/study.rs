@@ -295,7 +295,7 @@ impl Study {
             methods = registry.entries().iter().map(|e| StudyMethod::of(e.id())).collect();
         }
         for then in &self.after_filters {
-            let filters = registry.entries().iter().filter(|e| e.method().info().is_filter);
+            let filters = registry.entries().iter().filter(|e| e.method().info().filter.is_some());
             let chains = filters.map(|filter| format!("{}+{then}", filter.id()));
             methods.extend(chains.map(|id| StudyMethod::of(&id)));
         }

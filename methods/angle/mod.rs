@@ -37,7 +37,7 @@ mod vertex;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
+    Level, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
@@ -184,7 +184,7 @@ pub fn method() -> Method<AngleParams> {
         )
         .summary("Keeps the spheres whose contact points subtend the largest angles.")
         .native(NativeLevel::larger_is_coarser("theta", "degrees of separation angle"))
-        .filter()
+        .filter(Level::Published)
         .sweep(&[20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0])
         .published(
             "theta = 60 degrees (parameter `theta`), an object angle of 30, the sheet filter of the \

@@ -58,7 +58,7 @@ use medial::complex::VoronoiFacets;
 use medial::geometry::VertexId;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification,
     SimplifyError,
 };
 use serde::{Deserialize, Serialize};
@@ -185,7 +185,7 @@ pub fn method() -> Method<DeyZhaoParams> {
             "strength",
             "multiple of the paper's two thresholds",
         ))
-        .filter()
+        .filter(Level::Published)
         .sweep(&[0.5, 1.0, 1.5, 2.0, 3.0])
         .published(
             "the paper's constants, strength 1; other strengths, of both thresholds together, are \

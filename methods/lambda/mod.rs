@@ -32,7 +32,7 @@ mod vertex;
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
+    Level, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
@@ -112,7 +112,7 @@ pub fn method() -> Method<LambdaParams> {
         )
         .summary("Keeps the spheres whose contact points need the largest enclosing balls.")
         .native(NativeLevel::larger_is_coarser("lambda", "fraction of the bounding-box diagonal"))
-        .filter()
+        .filter(Level::Published)
         .sweep(&[0.005, 0.01, 0.02, 0.04, 0.08])
         .published(
             "lambda = 2 % of the longest side of the box of the spheres' centres, the default of the \

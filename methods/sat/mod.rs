@@ -81,7 +81,7 @@ pub fn method() -> Method<SatParams> {
              its balls back.",
         )
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
-        .filter()
+        .filter(Level::Published)
         .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0])
         .published(
             "s = 1.1, the default of the authors' tool, without its angle filter (sat_angle=30)",

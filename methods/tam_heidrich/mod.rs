@@ -145,7 +145,7 @@ pub fn method() -> Method<TamHeidrichParams> {
              outside in, loops and components kept.",
         )
         .native(NativeLevel::larger_is_coarser("t_v", "per cent of the solid's volume"))
-        .filter()
+        .filter(Level::Published)
         .sweep(&[0.01, 0.1, 0.5, 1.0, 5.0])
         .published("up to three rounds with t_t = 5 triangles, then two with t_v = 1 %")
         .params(TamHeidrichParams::describe())

@@ -11,6 +11,8 @@ use super::{
 
 /// Parameter that sets the first method's own level.
 const LEVEL: &str = "level";
+/// Its word for the published level.
+const PUBLISHED: &str = "published";
 /// What stands before the parameters of the first method.
 const FIRST: &str = "first.";
 
@@ -25,13 +27,17 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// `first` at its published level, or at the one that the parameter `level` sets, then `then`.
-    /// The id is `FIRST+THEN`; parameters are those of `then`, and those of `first` with `first.`
+    /// `first` at the level that the parameter `level` sets, or else at that of
+    /// [`MethodInfo::filter`], or the published one; then `then`. The id is `FIRST+THEN`; parameters are those of `then`, and those of `first` with `first.`
     /// before their names.
     pub fn new(first: Arc<dyn MedialSimplifier>, then: Arc<dyn MedialSimplifier>) -> Self {
         let (a, b) = (first.info(), then.info());
         let unit = a.native.as_ref().map_or("none".into(), |native| native.unit.clone());
-        let level = ParamInfo::new(LEVEL, "published", unit, format!("level of {} first", a.id));
+        let default = match a.filter {
+            Some(Level::Native(value)) => value.to_string(),
+            _ => PUBLISHED.to_owned(),
+        };
+        let level = ParamInfo::new(LEVEL, default, unit, format!("level of {} first", a.id));
         let of_first = |param: &ParamInfo| ParamInfo {
             name: format!("{FIRST}{}", param.name).into(),
             ..param.clone()
@@ -53,20 +59,23 @@ impl Chain {
 
     /// The level of the first method, its parameters, and those of the second.
     fn split(&self, params: &Params) -> Result<(Level, Params, Params), SimplifyError> {
-        let (mut level, mut of_first, mut of_then) =
-            (Level::Published, Params::none(), Params::none());
+        let first = self.first.info();
+        let mut level = first.filter.unwrap_or(Level::Published);
+        let (mut of_first, mut of_then) = (Params::none(), Params::none());
         for (key, value) in &params.0 {
             if let Some(key) = key.strip_prefix(FIRST) {
                 of_first.0.insert(key.to_owned(), value.clone());
-            } else if key == LEVEL && value.as_str() != Some("published") {
-                let number = value.as_f64().ok_or_else(|| {
-                    let id = &self.first.info().id;
-                    SimplifyError::Parameter(format!(
-                        "{LEVEL} = {value}: a level of {id}, or `published`"
-                    ))
-                })?;
-                level = Level::Native(number);
-            } else if key != LEVEL {
+            } else if key == LEVEL {
+                level = match (value.as_f64(), value.as_str()) {
+                    (Some(number), _) => Level::Native(number),
+                    (_, Some(PUBLISHED)) => Level::Published,
+                    _ => {
+                        let id = &first.id;
+                        let why = format!("{LEVEL} = {value}: a level of {id}, or `{PUBLISHED}`");
+                        return Err(SimplifyError::Parameter(why));
+                    }
+                };
+            } else {
                 of_then.0.insert(key.clone(), value.clone());
             }
         }

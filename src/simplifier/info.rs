@@ -4,6 +4,8 @@ use std::borrow::Cow;
 
 use serde::Serialize;
 
+use super::Level;
+
 /// Text of a method's description: a literal in code, owned where it was read from a file.
 type Text = Cow<'static, str>;
 
@@ -35,9 +37,9 @@ pub struct MethodInfo {
     /// Native levels of a default comparison, from fine to coarse, in the unit of
     /// [`MethodInfo::native`]; none for a method without one.
     pub sweep: Vec<f64>,
-    /// Whether it keeps a part of the medial axis as it is, so that a collapse may go on from its
-    /// result.
-    pub is_filter: bool,
+    /// Of a method that keeps a part of the medial axis as it is: the level from which a collapse
+    /// may go on, unless another is named.
+    pub filter: Option<Level>,
     /// Whether there is one result for each shape, at [`Level::Published`](super::Level::Published)
     /// alone.
     pub fixed: bool,
@@ -76,9 +78,9 @@ impl MethodInfo {
         Self { sweep: levels.to_vec(), ..self }
     }
 
-    /// With [`MethodInfo::is_filter`].
-    pub fn filter(self) -> Self {
-        Self { is_filter: true, ..self }
+    /// With [`MethodInfo::filter`].
+    pub fn filter(self, level: Level) -> Self {
+        Self { filter: Some(level), ..self }
     }
 
     /// With [`MethodInfo::fixed`]: no levels.
