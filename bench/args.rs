@@ -31,7 +31,7 @@ pub struct Global {
 /// How the substrates of a shape are built.
 #[derive(Clone, Debug, Args)]
 pub struct SubstrateArguments {
-    /// Boundary samples: `vertices`, `uniform:COUNT` or `blue:COUNT` [default: vertices].
+    /// Boundary samples: `vertices`, `auto`, `uniform:COUNT` or `blue:COUNT` [default: vertices].
     #[arg(long, value_name = "SAMPLING")]
     pub sampling: Option<String>,
     /// Triangulation of the dual Voronoi polygons [default: fan].

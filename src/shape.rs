@@ -6,7 +6,7 @@
 //! from the mesh. [`Shape::view`] opens a fresh view on the same store.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use crate::Vec3;
 use crate::complex::{
@@ -21,12 +21,14 @@ mod contacts;
 mod error;
 mod inner_balls;
 mod power_crust;
+mod refined;
 mod substrate;
 
 pub use contacts::ContactSets;
 pub use error::ShapeError;
 pub use inner_balls::InnerBalls;
 pub use power_crust::PolarBalls;
+pub use refined::{BOUND, ENOUGH, MOST_TIMES, ROUNDS, Refined, Refinement};
 pub use substrate::{Cost, Substrate};
 
 use substrate::{Cache, Use};
@@ -55,6 +57,8 @@ struct Store {
     report: SurfaceReport,
     options: ShapeOptions,
     samples: Cache<Sampling, Arc<[Vec3]>>,
+    /// What [`Sampling::Auto`] could not mend.
+    unmended: OnceLock<String>,
     delaunay: Cache<Sampling, Arc<Delaunay>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
     facets: Cache<Sampling, Arc<VoronoiFacets>>,
@@ -95,6 +99,7 @@ impl Shape {
             report,
             options,
             samples: Cache::default(),
+            unmended: OnceLock::new(),
             delaunay: Cache::default(),
             cells: Cache::default(),
             facets: Cache::default(),
@@ -212,11 +217,37 @@ impl Shape {
         self.samples_by(&self.store.options.sampling)
     }
 
-    /// Boundary samples by another sampling.
+    /// Boundary samples by another sampling. [`Sampling::Auto`] costs several medial meshes, which
+    /// count as the cost of the samples.
     pub fn samples_by(&self, sampling: &Sampling) -> Arc<[Vec3]> {
-        let built =
-            self.store.samples.get(*sampling, || Ok(sample(&self.store.mesh, sampling).into()));
+        let refined = match sampling {
+            Sampling::Auto => self.surface_tree().ok().zip(Some(self.inside_test())),
+            _ => None,
+        };
+        let built = self.store.samples.get(*sampling, || {
+            let refined = refined.and_then(|(tree, inside)| self.refined(&tree, &inside));
+            Ok(refined.unwrap_or_else(|| sample(&self.store.mesh, sampling).into()))
+        });
         self.take(Substrate::Samples, built).expect("sampling cannot fail")
+    }
+
+    /// The samples of [`Sampling::Auto`]; none where the vertices do not span space, which
+    /// triangulating them reports.
+    fn refined(&self, tree: &TriangleBvh, inside: &InsideTest) -> Option<Arc<[Vec3]>> {
+        let expected = self.expected_betti();
+        let (mesh, dual) = (&self.store.mesh, self.store.options.dual);
+        let refined = Refinement { mesh, tree, inside, expected, dual }.run().ok()?;
+        if let Some(warning) = refined.warning() {
+            // The first: another view that builds the same samples says the same.
+            let _ = self.store.unmended.set(warning);
+        }
+        Some(refined.samples.into())
+    }
+
+    /// What is wrong with the medial mesh of the samples all the same, where [`Sampling::Auto`] reached
+    /// one of its limits; once they are built.
+    pub fn sampling_warning(&self) -> Option<&str> {
+        self.store.unmended.get().map(String::as_str)
     }
 
     /// The Delaunay triangulation of the boundary samples.

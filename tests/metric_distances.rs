@@ -210,6 +210,23 @@ fn the_envelope_is_sampled_by_area() {
     assert!((flat / points.len() as f64 - 1.0 / area).abs() < 0.01);
 }
 
+/// Of thousands of balls that bury each other few points are on the boundary; enough of them are found
+/// for a maximum.
+#[test]
+fn a_union_of_buried_balls_is_sampled_until_enough_are_found() {
+    let coordinate = |k: u32, step: f64| (f64::from(k) * step).fract();
+    let centre =
+        |k| Vec3::new(coordinate(k, 0.819_17), coordinate(k, 0.671_04), coordinate(k, 0.549_7));
+    let balls: Vec<_> = (0..1500).map(|k| (centre(k), 0.3)).collect();
+    let mesh = complex(&balls, &[], &[]);
+    let union = MedialUnion::new(&mesh).unwrap();
+    let options = EnvelopeOptions { samples: 400, burial: 1e-9, seed: 1 };
+    let points = sample_envelope(&mesh, &union, &options).unwrap();
+    // Ten candidates for each sample asked give some tens.
+    assert!((80..=400).contains(&points.len()), "{}", points.len());
+    assert!(points.iter().all(|&p| union.signed(p).abs() < 1e-9));
+}
+
 #[test]
 fn unions_without_area_are_measured_at_their_centres() {
     let (surface, _) = cuboid(3.0, 2.0, 1.0);

@@ -6,7 +6,9 @@
 //!
 //! 1. Patches and their areas: `4 pi r^2`; `pi (1 - s^2) l (r_1 + r_2)`; two triangles for a slab.
 //! 2. A pilot run with an eighth of the samples tells which share survives.
-//! 3. The run proper is denser by that share, so that about the asked number survives.
+//! 3. The run proper is denser by that share, so that about the asked number survives; where less
+//!    than a tenth of the area does, by at most ten times, and more only as long as less than a
+//!    quarter of the asked number survives.
 //!
 //! Spheres are sampled along an equal-area spiral, cones and triangles by low-discrepancy
 //! sequences, each patch turned or shifted at random, so that a patch with a single sample has it
@@ -41,7 +43,12 @@ const LEAST_PILOT: f64 = 1000.0;
 
 /// The run proper makes at most this many candidates for each sample asked: beyond, nearly all of
 /// the patches' area is buried, and fewer samples than asked are returned.
-const MOST_CANDIDATES: f64 = 10.0;
+const USUAL_CANDIDATES: f64 = 10.0;
+
+/// More candidates are made only for as many samples as a maximum can rest on: this share of those asked.
+/// Tens of thousands of balls bury all but a thousandth of each other.
+const LEAST_SHARE: f64 = 0.25;
+const MOST_CANDIDATES: f64 = 200.0;
 
 /// The golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -84,7 +91,21 @@ pub(super) fn sample_envelope_along(
     let sampled = |candidates| sample_patches(&patches, axes, candidates / total, union, options);
     let pilot = (asked / PILOT).max(LEAST_PILOT);
     let share = sampled(pilot).len() as f64 / pilot;
-    Ok(sampled(asked * (1.0 / share).clamp(1.0, MOST_CANDIDATES)))
+    let mut points = sampled(asked * candidates_for(share));
+    let survivors = points.len() as f64 / (asked * candidates_for(share));
+    if (points.len() as f64) < LEAST_SHARE * asked
+        && candidates_for(survivors) > candidates_for(share)
+    {
+        // The pilot run had too few survivors to tell their share.
+        points = sampled(asked * candidates_for(survivors));
+    }
+    Ok(points)
+}
+
+/// Candidates for each sample asked where a share of them survives.
+fn candidates_for(share: f64) -> f64 {
+    let usual = (1.0 / share).clamp(1.0, USUAL_CANDIDATES);
+    (LEAST_SHARE / share).clamp(usual, MOST_CANDIDATES)
 }
 
 /// A piece of the boundary of one primitive.

@@ -48,14 +48,17 @@ pub struct Evaluation {
 }
 
 /// Distances between the surface S and the boundary of the union U of the medial primitives.
+///
+/// Maxima are over samples and the points that are reached from the largest of them by local ascent:
+/// distances at actual points, and so lower bounds of the true maxima.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Distances {
-    /// Largest distance from a surface sample to the nearest primitive's surface, buried or not:
+    /// Largest distance from a point of S to the nearest primitive's surface, buried or not:
     /// the reading of the Q-MAT paper.
     pub epsilon: f64,
-    /// Largest absolute signed distance from a surface sample to the union.
+    /// Largest absolute signed distance from a point of S to the union.
     pub epsilon_union: f64,
-    /// Largest distance from a sample of the union's boundary to the surface.
+    /// Largest distance from a point of the union's boundary to the surface.
     pub reverse: f64,
     /// `max(epsilon_union, reverse)`.
     pub hausdorff: f64,
@@ -73,7 +76,8 @@ pub struct Distances {
     pub spheres_only: f64,
     /// Number of surface samples, the mesh vertices included.
     pub samples: usize,
-    /// Number of samples on the boundary of the union.
+    /// Number of samples on the boundary of the union: those that no primitive buries. A small number
+    /// says that nearly all of the primitives' area is buried, and that `reverse` rests on these few.
     pub reverse_samples: usize,
 }
 

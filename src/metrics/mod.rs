@@ -2,6 +2,7 @@
 //!
 //! [`Judge`] runs them all; each can be had alone.
 
+mod ascent;
 mod axis_distance;
 mod certificate;
 mod counts;

@@ -137,6 +137,11 @@ impl Pose {
         mesh.renumbered(&order)
     }
 
+    /// Where a point is on the curve.
+    pub fn place_of(&self, p: Vec3) -> Place {
+        self.place(p, 0.0)
+    }
+
     /// Where a point is on the curve; points in one cell by finer coordinates, and by a radius.
     fn place(&self, p: Vec3, radius: f64) -> Place {
         // From 0.17 to 0.83, off all simple fractions.
@@ -157,7 +162,7 @@ const FINE: f64 = (1_u64 << 38) as f64;
 
 /// A place on the curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Place {
+pub(super) struct Place {
     code: u64,
     fine: [i64; 4],
 }

@@ -1,7 +1,7 @@
 //! How far the union of the medial primitives leaves the solid.
 //!
-//! Of the samples of the union's boundary at which the reverse distance is measured, the first one
-//! outside the solid, from the farthest from the surface on, gives the protrusion.
+//! Of the points of the union's boundary at which the reverse distance is measured (samples, and those
+//! reached uphill from them), the first one outside the solid, from the farthest from the surface on, gives the protrusion.
 
 use super::hausdorff::Envelope;
 use crate::complex::MedialMesh;

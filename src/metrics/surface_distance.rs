@@ -6,13 +6,17 @@
 //! 3. T is sampled uniformly by area, its vertices added, and measured against S. The boundary of a
 //!    union has no vertices to add; where a decimated surface is farthest is often one of its own.
 //!
-//! Distances between surfaces are exact, so nothing here is a bound but the sampled maxima, which
-//! fall short of the true ones.
+//! 4. Maxima are sought uphill from the largest samples, as there.
+//!
+//! Distances between surfaces are exact, so nothing here is a bound but the maxima, which may fall
+//! short of the true ones.
 
 use serde::{Deserialize, Serialize};
 
-use super::hausdorff::{DistanceOptions, MetricError, SurfaceSamples};
+use super::ascent::Start;
+use super::hausdorff::{DistanceOptions, MetricError, SEEDS, SurfaceSamples, highest, spacing};
 use super::pose::Pose;
+use crate::Vec3;
 use crate::complex::MedialMesh;
 use crate::geometry::TriangleBvh;
 use crate::surface::TriMesh;
@@ -20,9 +24,9 @@ use crate::surface::TriMesh;
 /// Distances between a reference surface S and another surface T, in the unit of both.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceDistances {
-    /// Largest distance from a sample of S to T.
+    /// Largest distance from S to T, at a sample or uphill from one.
     pub forward: f64,
-    /// Largest distance from a sample of T to S.
+    /// Largest distance from T to S, likewise.
     pub reverse: f64,
     /// The larger of the two.
     pub hausdorff: f64,
@@ -71,20 +75,33 @@ pub fn surface_distances(
     other: &TriMesh,
     options: &DistanceOptions,
 ) -> Result<SurfaceDistances, MetricError> {
-    let samples = |of: &TriMesh, count: usize| {
-        let pose = Pose::new(of, &MedialMesh::default());
-        SurfaceSamples::new(of, &pose, count, options.seed)
-    };
-    let on_surface = samples(surface, options.surface_samples)?;
-    let on_other = samples(other, options.envelope_samples)?;
+    let pose = |of: &TriMesh| Pose::new(of, &MedialMesh::default());
+    let poses = [pose(surface), pose(other)];
+    let on_surface =
+        SurfaceSamples::new(surface, &poses[0], options.surface_samples, options.seed)?;
+    let on_other = SurfaceSamples::new(other, &poses[1], options.envelope_samples, options.seed)?;
     let other_tree = TriangleBvh::new(other).map_err(MetricError::Tree)?;
     let there = other_tree.distance_batch(&on_surface.points);
     let back = tree.distance_batch(&on_other.points);
-    let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+    let forward = Start {
+        pose: &poses[0],
+        points: &on_surface.points,
+        values: &there,
+        spacing: spacing(surface, options.surface_samples),
+        seeds: SEEDS,
+    };
+    let reverse = Start {
+        pose: &poses[1],
+        points: &on_other.points,
+        values: &back,
+        spacing: spacing(other, options.envelope_samples),
+        seeds: SEEDS,
+    };
+    let forward = highest(tree, &forward, |p, near| distance_from(&other_tree, p, near));
+    let reverse = highest(&other_tree, &reverse, |p, near| distance_from(tree, p, near));
     let mean = |values: &[f64], power: i32| {
         values.iter().map(|v| v.powi(power)).sum::<f64>() / values.len().max(1) as f64
     };
-    let (forward, reverse) = (largest(&there), largest(&back));
     let uniform = &there[..on_surface.uniform];
     Ok(SurfaceDistances {
         forward,
@@ -96,4 +113,11 @@ pub fn surface_distances(
         samples: there.len(),
         reverse_samples: back.len(),
     })
+}
+
+/// The distance of a point from a mesh, searched from the face that was found last.
+fn distance_from(tree: &TriangleBvh, p: Vec3, near: &mut usize) -> f64 {
+    let closest = tree.closest_from(p, Some(*near as u32));
+    *near = closest.face as usize;
+    closest.distance
 }

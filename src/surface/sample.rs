@@ -15,14 +15,17 @@ use crate::sum::Sum;
 
 /// How a surface is sampled.
 ///
-/// As text: `vertices`, `uniform:20000`, `blue:20000`, the latter two with an optional seed as in
-/// `blue:20000:7`.
+/// As text: `vertices`, `auto`, `uniform:20000`, `blue:20000`, the latter two with an optional seed as
+/// in `blue:20000:7`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Sampling {
     /// The vertices of the mesh, unaltered.
     #[default]
     MeshVertices,
+    /// The vertices of the mesh, and points that are added until the medial mesh is right: by
+    /// [`Shape`](crate::shape::Shape), which knows it. To [`sample`] alone these are the vertices.
+    Auto,
     /// Independent points, uniformly distributed by area.
     AreaUniform {
         /// Number of points.
@@ -43,8 +46,8 @@ pub enum Sampling {
 /// A text that names no sampling.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{0:?} is no sampling; use vertices, uniform:COUNT or blue:COUNT, with an optional :SEED, \
-     and a count from 1 to 10000000, of blue noise to 1000000"
+    "{0:?} is no sampling; use vertices, auto, uniform:COUNT or blue:COUNT, with an optional \
+     :SEED, and a count from 1 to 10000000, of blue noise to 1000000"
 )]
 pub struct ParseSamplingError(String);
 
@@ -62,6 +65,9 @@ impl FromStr for Sampling {
         let kind = parts.next();
         if text == "vertices" {
             return Ok(Self::MeshVertices);
+        }
+        if text == "auto" {
+            return Ok(Self::Auto);
         }
         let count = parts.next().and_then(|c| c.parse().ok()).ok_or_else(error)?;
         let seed = parts.next().map_or(Ok(0), str::parse).map_err(|_| error())?;
@@ -88,7 +94,7 @@ impl Sampling {
     /// The same sampling with another seed.
     pub fn with_seed(self, seed: u64) -> Self {
         match self {
-            Self::MeshVertices => self,
+            Self::MeshVertices | Self::Auto => self,
             Self::AreaUniform { count, .. } => Self::AreaUniform { count, seed },
             Self::BlueNoise { count, .. } => Self::BlueNoise { count, seed },
         }
@@ -113,6 +119,7 @@ impl fmt::Display for Sampling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (kind, count, seed) = match *self {
             Self::MeshVertices => return f.write_str("vertices"),
+            Self::Auto => return f.write_str("auto"),
             Self::AreaUniform { count, seed } => ("uniform", count, seed),
             Self::BlueNoise { count, seed } => ("blue", count, seed),
         };
@@ -125,7 +132,7 @@ impl fmt::Display for Sampling {
 const CANDIDATES: usize = 5;
 
 /// Samples a surface. Exactly as many points as asked, in the unit of the mesh; none if the mesh
-/// has no area.
+/// has no area. [`Sampling::Auto`] gives the vertices.
 ///
 /// # Panics
 /// If a face names a vertex that does not exist.
@@ -143,7 +150,7 @@ const CANDIDATES: usize = 5;
 /// ```
 pub fn sample(mesh: &TriMesh, sampling: &Sampling) -> Vec<Vec3> {
     match *sampling {
-        Sampling::MeshVertices => mesh.vertices.clone(),
+        Sampling::MeshVertices | Sampling::Auto => mesh.vertices.clone(),
         Sampling::AreaUniform { count, seed } => {
             let mut areas = Areas::new(mesh);
             areas.points(count, seed).into_iter().map(|(point, _)| point).collect()

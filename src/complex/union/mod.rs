@@ -186,15 +186,40 @@ impl MedialUnion {
 
     /// `sigma(p)`, beginning with the primitive that the last call with the same `near` found:
     /// faster for points that follow each other, with the same answer.
-    pub(super) fn signed_from(&self, p: Vec3, near: &mut usize) -> f64 {
+    pub(crate) fn signed_from(&self, p: Vec3, near: &mut usize) -> f64 {
         let (nearest, place) = self.parts.nearest::<Signed>(p, *near);
         *near = place;
         nearest.signed
     }
 
+    /// A point of the union's boundary near to `p`, begun as in [`signed_from`](Self::signed_from):
+    /// the closest one where `p` is outside; from inside, the way leads out of the deepest primitive,
+    /// again and again. `None` where it ends more than `burial` inside some primitive.
+    pub(crate) fn boundary_near(&self, p: Vec3, burial: f64, near: &mut usize) -> Option<Vec3> {
+        let mut point = p;
+        for _ in 0..MOST_EXITS {
+            let (nearest, place) = self.parts.nearest::<Signed>(point, *near);
+            *near = place;
+            let (signed, centre) = self.parts.shape(place).nearest_centre(point)?;
+            if (-burial..=burial).contains(&signed) {
+                return Some(point);
+            }
+            debug_assert!((signed - nearest.signed).abs() <= 1e-9 * (1.0 + signed.abs()));
+            point -= signed * (point - centre).try_normalize()?;
+        }
+        (self.signed_from(point, near) >= -burial).then_some(point)
+    }
+
     /// `mu(p)`: the least distance to the surface of a primitive, buried or not.
     pub fn unsigned_nearest(&self, p: Vec3) -> f64 {
         self.nearest_surface(p).signed.abs()
+    }
+
+    /// `mu(p)`, begun as in [`signed_from`](Self::signed_from).
+    pub(crate) fn unsigned_from(&self, p: Vec3, near: &mut usize) -> f64 {
+        let (nearest, place) = self.parts.nearest::<Unsigned>(p, *near);
+        *near = place;
+        nearest.signed.abs()
     }
 
     /// The primitive of least signed distance.
@@ -313,6 +338,9 @@ impl MedialUnion {
         self.parts.search(&mut Nearer { parts: &self.parts, p, limit, each });
     }
 }
+
+/// Primitives that are left one after the other on the way out of a union.
+const MOST_EXITS: usize = 12;
 
 /// How many primitives are remembered that buried a point.
 const RECENT: usize = 4;

@@ -194,11 +194,11 @@ fn the_interval_agrees_with_samples_on_random_meshes() {
         let edges = [[0, 5], [5, 6], [1, 7]];
         let mesh = medial(&spheres, &edges, &[[0, 1, 2], [1, 2, 3], [2, 3, 4]]);
         let interval = certified(&surface, &mesh, 1e-3);
-        let options =
-            DistanceOptions { surface_samples: 40_000, envelope_samples: 40_000, seed: 1 };
+        let options = DistanceOptions { surface_samples: 5_000, envelope_samples: 5_000, seed: 1 };
         let sampled = distances(&surface, &bvh, &mesh, &options).unwrap().hausdorff;
         assert!(sampled <= interval.upper, "{sampled} is above {interval:?}");
-        assert!(sampled >= interval.lower - 0.02, "{sampled} is far below {interval:?}");
+        // The largest samples alone fall short by a tenth.
+        assert!(sampled >= 0.99 * interval.lower, "{sampled} is far below {interval:?}");
     }
 }
 

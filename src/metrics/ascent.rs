@@ -1,0 +1,273 @@
+//! Local ascent from the largest samples of a distance, so that a maximum does not depend on how
+//! near a sample happened to fall to it.
+//!
+//! A sampled maximum falls short by what the nearest sample misses: nothing where the maximum is at
+//! a vertex, which is sampled, and much where it is at the tip of a ball or in a notch between
+//! two cones. Methods would be flattered differently. Therefore, from the samples:
+//!
+//! 1. *Seeds*: the largest samples, the largest first, each at least a step from those before it.
+//! 2. *Rounds*: around each seed the points at one step in twelve directions (those of an
+//!    icosahedron, turned from round to round) are carried onto the surface, and measured. The seed
+//!    moves to the best one where that is better, by more than rounding.
+//! 3. After some rounds the step is halved, and the worse half of the seeds is given up, but for the
+//!    last few. Seeds that even the distance of all further steps could not bring to the best one
+//!    are given up at once, because distances are 1-Lipschitz.
+//!
+//! The result is the distance at an actual point of the surface: still a lower bound of the true
+//! maximum. Directions follow the pose and ties are decided in it, so that the result moves along
+//! with the shape as the samples do ([`super::pose`]). Each round ends before the next begins, and seeds
+//! do not see each other within it: the result is the same for any number of threads.
+
+use rayon::prelude::*;
+
+use super::pose::Pose;
+use crate::Vec3;
+use crate::complex::MedialUnion;
+use crate::geometry::TriangleBvh;
+
+/// So many seeds are followed to the end.
+const LAST_SEEDS: usize = 6;
+
+/// Rounds at one step.
+const ROUNDS: usize = 3;
+
+/// Times that the step is halved: to a thousandth of the distance between samples.
+const HALVINGS: usize = 10;
+
+/// Seeds are taken from so many times more samples: the largest are often all in one place.
+const CROWD: usize = 40;
+
+/// Smaller gains than this fraction of the diameter are rounding.
+const GAIN: f64 = 1e-10;
+
+/// A point of a surface, with its distance from the other one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Peak {
+    pub point: Vec3,
+    pub value: f64,
+}
+
+/// Where the searches of the last query ended; the next one begins there.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Near {
+    place: usize,
+    face: Option<u32>,
+}
+
+/// A surface, and a distance at each of its points.
+pub(super) trait Hill: Sync {
+    /// A point of the surface near to `p` with its distance, where one is found.
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak>;
+}
+
+/// The points of a triangle mesh.
+pub(super) struct OnMesh<'a, F> {
+    pub mesh: &'a TriangleBvh,
+    /// Distance of a point from the other surface.
+    pub value: F,
+}
+
+impl<F: Fn(Vec3, &mut usize) -> f64 + Sync> Hill for OnMesh<'_, F> {
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak> {
+        let closest = self.mesh.closest_from(p, near.face);
+        near.face = Some(closest.face);
+        Some(Peak { point: closest.point, value: (self.value)(closest.point, &mut near.place) })
+    }
+}
+
+/// The boundary of a union, with distances from a mesh.
+pub(super) struct OnUnion<'a> {
+    pub union: &'a MedialUnion,
+    pub surface: &'a TriangleBvh,
+    /// Points deeper than this in the union are not on its boundary.
+    pub burial: f64,
+}
+
+impl Hill for OnUnion<'_> {
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak> {
+        let point = self.union.boundary_near(p, self.burial, &mut near.place)?;
+        let closest = self.surface.closest_from(point, near.face);
+        near.face = Some(closest.face);
+        Some(Peak { point, value: closest.distance })
+    }
+}
+
+/// Samples of a surface, from which an ascent starts.
+#[derive(Clone, Copy)]
+pub(super) struct Start<'a> {
+    pub pose: &'a Pose,
+    pub points: &'a [Vec3],
+    /// The distance at each point.
+    pub values: &'a [f64],
+    /// Typical distance between samples.
+    pub spacing: f64,
+    /// Seeds are at most so many.
+    pub seeds: usize,
+}
+
+/// The points that are reached uphill from the largest of some samples, one for each seed.
+pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Peak> {
+    let mut climbers: Vec<(Peak, Near)> =
+        start.pick().into_iter().map(|seed| (seed, Near::default())).collect();
+    let gain = GAIN * start.pose.diameter();
+    let mut given_up = Vec::new();
+    let mut step = start.spacing;
+    for halving in 0..=HALVINGS {
+        for round in 0..ROUNDS {
+            let arms = directions(start.pose, halving * ROUNDS + round).map(|d| d * step);
+            climbers.par_iter_mut().for_each(|climber| climb(hill, &arms, gain, climber));
+        }
+        climbers.sort_by(|(a, _), (b, _)| b.value.total_cmp(&a.value));
+        step *= 0.5;
+        let keep = climbers.len().div_ceil(2).max(LAST_SEEDS);
+        let best = climbers.first().map_or(0.0, |(peak, _)| peak.value);
+        // All steps still to come add up to two of the next ones for each round.
+        let hopeless = best - 2.0 * ROUNDS as f64 * step;
+        let kept = climbers.partition_point(|(peak, _)| peak.value >= hopeless).min(keep);
+        given_up.extend(climbers.drain(kept..).map(|(peak, _)| peak));
+    }
+    climbers.into_iter().map(|(peak, _)| peak).chain(given_up).collect()
+}
+
+/// Moves a climber to the best of the points around it, where that is better.
+fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Peak, Near)) {
+    let here = peak.point;
+    for &arm in arms {
+        if let Some(found) = hill.near(here + arm, near)
+            && found.value > peak.value + gain
+        {
+            *peak = found;
+        }
+    }
+}
+
+impl Start<'_> {
+    /// The largest samples that are apart from each other. Those that are equal up to rounding are
+    /// taken along the pose's curve, so that neither their numbering nor their orientation decides.
+    fn pick(&self) -> Vec<Peak> {
+        let grain = GAIN * self.pose.diameter();
+        let rank =
+            |k: usize| ((-self.values[k] / grain).round(), self.pose.place_of(self.points[k]));
+        let mut ranked: Vec<_> =
+            self.largest().into_iter().map(|k| (rank(k), self.peak(k))).collect();
+        ranked.sort_by(|((a, at), _), ((b, other), _)| a.total_cmp(b).then_with(|| at.cmp(other)));
+        let mut seeds: Vec<Peak> = Vec::with_capacity(self.seeds);
+        for (_, peak) in ranked {
+            let apart = self.spacing * self.spacing;
+            if seeds.iter().all(|seed| seed.point.distance_squared(peak.point) >= apart) {
+                seeds.push(peak);
+            }
+            if seeds.len() == self.seeds {
+                break;
+            }
+        }
+        seeds
+    }
+
+    /// The samples that seeds are taken from: whole classes of equal values, so that their order in
+    /// the list does not decide. What is no number has been reported as the maximum already.
+    fn largest(&self) -> Vec<usize> {
+        let values = self.values;
+        let mut order: Vec<usize> = (0..values.len()).filter(|&k| values[k].is_finite()).collect();
+        let crowd = CROWD * self.seeds;
+        if crowd < order.len() {
+            order.select_nth_unstable_by(crowd, |&a, &b| values[b].total_cmp(&values[a]));
+            let least = values[order[crowd]];
+            order.retain(|&k| values[k] >= least);
+        }
+        order
+    }
+
+    fn peak(&self, k: usize) -> Peak {
+        Peak { point: self.points[k], value: self.values[k] }
+    }
+}
+
+/// The corners of an icosahedron, turned differently in each round.
+fn directions(pose: &Pose, round: usize) -> [Vec3; 12] {
+    const GOLDEN: f64 = 1.618_033_988_749_895;
+    // An angle that is no simple fraction of a turn, about an axis of no symmetry.
+    let axis = Vec3::new(0.267_261, 0.534_522, 0.801_784).normalize();
+    let turn = glam::DQuat::from_axis_angle(axis, 2.399_963_2 * (round as f64 + 0.3));
+    let [x, y, z] = pose.axes();
+    std::array::from_fn(|k| {
+        let sign = |bit: usize| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
+        let (short, long) = (sign(0), sign(1) * GOLDEN);
+        let corner = match k / 4 {
+            0 => Vec3::new(0.0, short, long),
+            1 => Vec3::new(short, long, 0.0),
+            _ => Vec3::new(long, 0.0, short),
+        };
+        let d = turn * corner.normalize();
+        d.x * x + d.y * y + d.z * z
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::complex::{MedialMesh, Sphere};
+    use crate::surface::TriMesh;
+
+    fn square() -> TriMesh {
+        let corner = |x, y| Vec3::new(x, y, 0.0);
+        let vertices = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
+        TriMesh { vertices, faces: vec![[0, 1, 2], [0, 2, 3]] }
+    }
+
+    /// A start from points that all miss the maximum.
+    fn best(hill: &impl Hill, surface: &TriMesh, points: &[Vec3], spacing: f64) -> Peak {
+        let pose = Pose::new(surface, &MedialMesh::default());
+        let mut near = Near::default();
+        let values: Vec<f64> =
+            points.iter().map(|&p| hill.near(p, &mut near).unwrap().value).collect();
+        let start = Start { pose: &pose, points, values: &values, spacing, seeds: 8 };
+        let peaks = ascend(hill, &start);
+        assert!(
+            peaks.iter().all(|p| p.value <= hill.near(p.point, &mut near).unwrap().value + 1e-12)
+        );
+        peaks.into_iter().max_by(|a, b| a.value.total_cmp(&b.value)).unwrap()
+    }
+
+    #[test]
+    fn the_ridge_between_three_balls_is_climbed() {
+        let surface = square();
+        let mesh = TriangleBvh::new(&surface).unwrap();
+        // The circumcentre of three points of the square is where the nearest is farthest.
+        let centres = [[0.2, 0.2], [0.8, 0.3], [0.3, 0.9]].map(|[x, y]| Vec3::new(x, y, 0.0));
+        let balls = centres.map(|c| Sphere::new(c, 0.05));
+        let union = MedialUnion::of_spheres(&balls).unwrap();
+        let value = |p: Vec3, near: &mut usize| union.signed_from(p, near).abs();
+        let hill = OnMesh { mesh: &mesh, value };
+        let [a, b, c] = centres;
+        let area = (b - a).cross(c - a).length() / 2.0;
+        let radius = a.distance(b) * b.distance(c) * c.distance(a) / (4.0 * area);
+        let found = best(&hill, &surface, &[Vec3::new(0.35, 0.45, 0.0)], 0.1);
+        assert!((found.value - (radius - 0.05)).abs() < 1e-3 * radius, "{found:?}, {radius}");
+    }
+
+    #[test]
+    fn the_notch_between_two_balls_is_found() {
+        let surface = square();
+        let tree = TriangleBvh::new(&surface).unwrap();
+        // Their spheres meet in a circle, the lowest point of which is nearest to the square.
+        let ball = |x: f64| Sphere::new(Vec3::new(0.5 + x, 0.5, -1.0), 0.5);
+        let union = MedialUnion::of_spheres(&[ball(-0.3), ball(0.3)]).unwrap();
+        let hill = OnUnion { union: &union, surface: &tree, burial: 1e-12 };
+        // Beside the pole that is farthest from the square.
+        let found = best(&hill, &surface, &[Vec3::new(0.15, 0.55, -1.49)], 0.1);
+        assert!((found.value - 1.5).abs() < 1e-6, "{found:?}");
+        assert!(union.signed(found.point).abs() < 1e-12);
+    }
+
+    #[test]
+    fn samples_that_are_no_numbers_are_no_seeds() {
+        let surface = square();
+        let pose = Pose::new(&surface, &MedialMesh::default());
+        let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let values = [f64::NAN, 1.0, f64::INFINITY];
+        let start = Start { pose: &pose, points: &points, values: &values, spacing: 0.1, seeds: 3 };
+        let seeds = start.pick();
+        assert_eq!((seeds.len(), seeds[0].point), (1, Vec3::X));
+    }
+}

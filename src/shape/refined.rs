@@ -1,0 +1,385 @@
+//! Samples that are added to the vertices of a surface until the Voronoi medial mesh is right.
+//!
+//! The vertices of a surface often are too few where two sheets of it are close: the Voronoi medial mesh
+//! then leaves the solid, bridges a gap, or has a hole. Where that is so, samples are added one round
+//! after the other, as in surface Delaunay refinement (Boissonnat, Oudot: *Provably good sampling and
+//! meshing of surfaces*, Graphical Models 67, 2005, doi:10.1016/j.gmod.2005.01.004): the ball around a
+//! Voronoi vertex holds no sample, so a point of the surface in it is a new sample that removes it.
+//!
+//! 1. The Voronoi medial mesh of the samples is built, with its Betti numbers.
+//! 2. *Error*. Balls, and the interpolated balls in the middle of edges and triangles, that reach beyond
+//!    the surface by more than [`BOUND`]; points of the surface that no primitive covers to within
+//!    [`BOUND`].
+//! 3. *Topology*, where the Betti numbers are not the solid's: tetrahedra whose barycentre is on
+//!    another side of the surface than the centre of their ball, and simplices of the mesh whose
+//!    barycentre is outside.
+//! 4. Each of these places names a point of the surface: the one that is closest to the centre, or the
+//!    uncovered one. These become samples, the worst place first, none nearer to an earlier one of the
+//!    round than half of what its ball is pierced by. Where there is a sample already (between two balls
+//!    that are right a cone may still bulge), one of twelve points of the surface around is taken, the
+//!    farthest from all samples.
+//! 5. Where no place is found, or several rounds brought nothing, the longest side of each face is
+//!    halved as well.
+//!
+//! It ends when nothing is wrong, or at a limit of rounds or samples; then with the samples of the round
+//! that was best, and a warning.
+//!
+//! # Deviations from the paper
+//! No angle or size is asked of the triangles, and nothing is proved: the surface is not smooth. The balls of
+//! all Voronoi vertices are looked at, not those of Voronoi edges that cross the surface.
+
+use std::sync::Arc;
+
+use rstar::RTree;
+
+use crate::Vec3;
+use crate::complex::{
+    CellSpheres, DualTriangulation, MedialMesh, MedialUnion, VoronoiFacets, betti,
+    voronoi_medial_mesh,
+};
+use crate::geometry::{Delaunay, TriangleBvh, TriangulationError};
+use crate::surface::{InsideTest, Sampling, Side, TriMesh, sample};
+
+/// The error that is allowed, as a fraction of the bounding box's diagonal.
+pub const BOUND: f64 = 0.01;
+
+/// Rounds at most.
+pub const ROUNDS: usize = 16;
+
+/// At most so many times the vertices become samples, or [`ENOUGH`] where that is more.
+pub const MOST_TIMES: usize = 8;
+
+/// So many samples are allowed to every surface.
+pub const ENOUGH: usize = 20_000;
+
+/// A ball is removed for the topology's sake where the surface pierces it by more than this fraction of
+/// its radius: shallower ones are slivers on the surface, which new samples would but replace.
+const PIERCED: f64 = 0.15;
+
+/// Where the topology is still wrong after so many rounds, balls count that are pierced by a third of this.
+const PATIENCE: usize = 8;
+
+/// After so many rounds that brought nothing the longest side of each face is halved.
+const STALLED: usize = 4;
+
+/// Samples nearer to a new one than this fraction of what a ball is pierced by are in its place.
+const CLEAR: f64 = 0.2;
+
+/// Points of the surface at which it is tested whether it is covered, beside one in each face.
+const TESTED: usize = 10_000;
+
+/// The surface whose medial mesh is asked, normalised, with its substrates.
+#[derive(Clone, Copy)]
+pub struct Refinement<'a> {
+    /// The surface.
+    pub mesh: &'a TriMesh,
+    /// Its faces in a tree.
+    pub tree: &'a TriangleBvh,
+    /// Its inside test.
+    pub inside: &'a InsideTest,
+    /// Betti numbers of the solid, where they are known.
+    pub expected: Option<[u64; 3]>,
+    /// How dual Voronoi polygons are triangulated.
+    pub dual: DualTriangulation,
+}
+
+/// Samples and what is wrong with their medial mesh.
+#[derive(Clone, Debug)]
+pub struct Refined {
+    /// The vertices of the surface, and the points that were added.
+    pub samples: Vec<Vec3>,
+    /// Betti numbers of the Voronoi medial mesh.
+    pub betti: [u64; 3],
+    /// Betti numbers of the solid, where they are known.
+    pub expected: Option<[u64; 3]>,
+    /// Largest error that was seen, as a fraction of the diagonal.
+    pub error: f64,
+    /// Rounds in which samples were added before.
+    pub rounds: usize,
+    /// Whether the Betti numbers are the solid's, and the error is within [`BOUND`].
+    pub is_right: bool,
+}
+
+/// A place where a sample is missing.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// A point of the surface.
+    point: Vec3,
+    /// No sample is nearer to the point than this, or than a part of it.
+    clear: f64,
+}
+
+impl Refined {
+    /// What is still wrong, for the reader of a result.
+    pub fn warning(&self) -> Option<String> {
+        let Self { samples, betti, expected, error, .. } = self;
+        let topology = expected.filter(|expected| expected != betti).map(|expected| {
+            format!(
+                "the initial medial mesh has the Betti numbers {betti:?}, the solid {expected:?}"
+            )
+        });
+        let gap = (*error > BOUND).then(|| {
+            format!("the initial medial mesh is off by {:.2} % of the diagonal", 100.0 * error)
+        });
+        let wrong: Vec<String> = topology.into_iter().chain(gap).collect();
+        let count = samples.len();
+        (!wrong.is_empty())
+            .then(|| format!("--sampling auto ended with {count} samples: {}", wrong.join("; ")))
+    }
+}
+
+impl Refinement<'_> {
+    /// Adds samples until the Voronoi medial mesh is right, or a limit is reached. The same samples for
+    /// any number of threads.
+    ///
+    /// # Errors
+    /// When the vertices do not span space.
+    pub fn run(&self) -> Result<Refined, TriangulationError> {
+        let most = ENOUGH.max(MOST_TIMES * self.mesh.vertices.len());
+        let tested = self.tested();
+        let mut samples = self.mesh.vertices.clone();
+        let mut best: Option<Refined> = None;
+        let mut stalled = 0;
+        for round in 0..=ROUNDS {
+            let diagram = Diagram::new(self, &samples)?;
+            let (found, places) = self.judge(&diagram, &tested, round);
+            let is_right = found.is_right;
+            if best.as_ref().is_none_or(|best| self.is_better(&found, best)) {
+                best = Some(found);
+                stalled = 0;
+            }
+            stalled += 1;
+            let full = samples.len() >= most;
+            if is_right || full || round == ROUNDS {
+                break;
+            }
+            let mut added = self.spread(places, &samples);
+            if added.is_empty() || stalled % STALLED == 0 {
+                added.extend(self.halved(&samples));
+            }
+            added.truncate(most - samples.len());
+            if added.is_empty() {
+                break;
+            }
+            samples.extend(added);
+        }
+        Ok(best.expect("one round at least"))
+    }
+
+    /// Right before wrong, right topology before wrong topology, small errors before large ones.
+    fn is_better(&self, new: &Refined, old: &Refined) -> bool {
+        let rank = |r: &Refined| (self.wrong(r.betti), r.error);
+        let ((wrong, error), (old_wrong, old_error)) = (rank(new), rank(old));
+        wrong < old_wrong || (wrong == old_wrong && error < old_error)
+    }
+
+    /// How far Betti numbers are from the solid's.
+    fn wrong(&self, betti: [u64; 3]) -> u64 {
+        let expected = self.expected.unwrap_or(betti);
+        expected.iter().zip(betti).map(|(a, b)| a.abs_diff(b)).sum()
+    }
+
+    /// What is wrong with a diagram, and where, the worst first.
+    fn judge(&self, diagram: &Diagram, tested: &[Vec3], rounds: usize) -> (Refined, Vec<Place>) {
+        let betti = betti(&diagram.medial);
+        let wrong = self.wrong(betti) > 0;
+        let pierced = wrong.then_some(if rounds < PATIENCE { PIERCED } else { PIERCED / 3.0 });
+        let (mut places, reach) = self.outgrown(&diagram.medial, pierced);
+        let (uncovered, gap) = self.uncovered(&diagram.medial, tested);
+        places.extend(uncovered);
+        if let Some(pierced) = pierced {
+            places.extend(self.inconsistent(diagram, pierced));
+        }
+        places.sort_by(|a, b| b.clear.total_cmp(&a.clear));
+        let error = reach.max(gap);
+        let found = Refined {
+            samples: diagram.samples.to_vec(),
+            betti,
+            expected: self.expected,
+            error,
+            rounds,
+            is_right: !wrong && error <= BOUND,
+        };
+        (found, places)
+    }
+
+    /// Step 2, the balls that reach too far beyond the surface, with the largest reach; and of step 3, the
+    /// simplices whose barycentre is outside.
+    fn outgrown(&self, medial: &MedialMesh, pierced: Option<f64>) -> (Vec<Place>, f64) {
+        let balls = barycentres(medial);
+        let centres: Vec<Vec3> = balls.iter().map(|&(c, _)| c).collect();
+        let closest = self.tree.closest_batch(&centres);
+        let sides = self.inside.sides(&centres);
+        let mut largest = 0.0_f64;
+        let mut places = Vec::new();
+        for ((&(_, radius), closest), side) in balls.iter().zip(&closest).zip(sides) {
+            let is_out = side == Side::Outside;
+            let depth = if is_out { -closest.distance } else { closest.distance };
+            let reach = radius - depth;
+            largest = largest.max(reach);
+            let leaves = |share: f64| is_out && closest.distance > share * radius;
+            if reach > BOUND || pierced.is_some_and(leaves) {
+                places.push(Place { point: closest.point, clear: reach.min(radius) });
+            }
+        }
+        (places, largest)
+    }
+
+    /// Step 2, the points of the surface that are not covered, with the largest distance of one.
+    fn uncovered(&self, medial: &MedialMesh, tested: &[Vec3]) -> (Vec<Place>, f64) {
+        let Ok(union) = MedialUnion::new(medial) else {
+            let places = tested.iter().map(|&point| Place { point, clear: BOUND }).collect();
+            return (places, f64::INFINITY);
+        };
+        let gaps = union.signed_batch(tested);
+        let largest = gaps.iter().copied().fold(0.0, f64::max);
+        let far = tested.iter().zip(&gaps).filter(|&(_, &gap)| gap > BOUND);
+        (far.map(|(&point, &clear)| Place { point, clear }).collect(), largest)
+    }
+
+    /// Step 3, tetrahedra that are on another side than the centre of their ball.
+    fn inconsistent(&self, diagram: &Diagram, pierced: f64) -> Vec<Place> {
+        let triangulation = diagram.delaunay.triangulation();
+        let cells: Vec<_> = triangulation
+            .finite_cells()
+            .zip(diagram.cells.circumspheres())
+            .filter_map(|(cell, sphere)| Some((cell, (*sphere)?)))
+            .collect();
+        let middle = |cell| {
+            let corners = triangulation.vertices(cell).map(|v| diagram.delaunay.point(v));
+            corners.into_iter().sum::<Vec3>() / 4.0
+        };
+        let middles: Vec<Vec3> = cells.iter().map(|&(cell, _)| middle(cell)).collect();
+        let sides = self.inside.sides(&middles);
+        let odd: Vec<_> = cells
+            .into_iter()
+            .zip(sides)
+            .filter(|&((cell, _), side)| (side == Side::Inside) != diagram.cells.is_inside(cell))
+            .map(|((_, sphere), _)| sphere)
+            .collect();
+        let centres: Vec<Vec3> = odd.iter().map(|sphere| sphere.centre).collect();
+        let closest = self.tree.closest_batch(&centres);
+        odd.iter()
+            .zip(closest)
+            .filter(|(sphere, closest)| sphere.radius - closest.distance > pierced * sphere.radius)
+            .map(|(sphere, closest)| Place {
+                point: closest.point,
+                clear: sphere.radius - closest.distance,
+            })
+            .collect()
+    }
+
+    /// Step 4: of some places, the worst first, new samples that are clear of each other.
+    fn spread(&self, places: Vec<Place>, samples: &[Vec3]) -> Vec<Vec3> {
+        let array = |p: &Vec3| p.to_array();
+        let old = RTree::bulk_load(samples.iter().map(array).collect());
+        let mut new: RTree<[f64; 3]> = RTree::new();
+        let distance = |tree: &RTree<[f64; 3]>, p: Vec3| {
+            let nearest = tree.nearest_neighbor(p.to_array());
+            nearest.map_or(f64::INFINITY, |&q| p.distance(Vec3::from_array(q)))
+        };
+        let mut kept = Vec::new();
+        for Place { mut point, clear } in places {
+            if distance(&new, point) < 0.5 * clear {
+                continue;
+            }
+            if distance(&old, point) < CLEAR * clear {
+                let around = directions().map(|d| self.tree.closest(point + clear * d).point);
+                let farther =
+                    |a: &Vec3, b: &Vec3| distance(&old, *a).total_cmp(&distance(&old, *b));
+                point = around.max_by(farther).unwrap_or(point);
+            }
+            if distance(&old, point).min(distance(&new, point)) > CLEAR * clear {
+                new.insert(point.to_array());
+                kept.push(point);
+            }
+        }
+        kept
+    }
+
+    /// Points of the surface at which it is tested whether it is covered.
+    fn tested(&self) -> Vec<Vec3> {
+        let sampling = Sampling::AreaUniform { count: TESTED, seed: 0 };
+        let mut points = sample(self.mesh, &sampling);
+        points.extend((0..self.mesh.faces.len()).map(|face| {
+            let [a, b, c] = self.mesh.triangle(face);
+            (a + b + c) / 3.0
+        }));
+        points
+    }
+
+    /// Step 5: in each face the middle of its longest side, each once; where that is a sample already, the
+    /// middle of the face.
+    fn halved(&self, samples: &[Vec3]) -> Vec<Vec3> {
+        let middles = (0..self.mesh.faces.len()).map(|face| {
+            let [a, b, c] = self.mesh.triangle(face);
+            let sides = [(a, b), (b, c), (c, a)];
+            let longest = |x: &&(Vec3, Vec3), y: &&(Vec3, Vec3)| {
+                x.0.distance_squared(x.1).total_cmp(&y.0.distance_squared(y.1))
+            };
+            let (p, q) = sides.iter().max_by(longest).copied().unwrap_or((a, b));
+            (p.midpoint(q), (a + b + c) / 3.0)
+        });
+        let mut taken: std::collections::BTreeSet<[u64; 3]> = samples.iter().map(bits).collect();
+        let mut added = Vec::new();
+        for (middle, centre) in middles {
+            let point = if taken.contains(&bits(&middle)) { centre } else { middle };
+            if taken.insert(bits(&point)) {
+                added.push(point);
+            }
+        }
+        added
+    }
+}
+
+fn bits(p: &Vec3) -> [u64; 3] {
+    p.to_array().map(f64::to_bits)
+}
+
+/// The Voronoi diagram of some samples and its medial mesh.
+struct Diagram {
+    samples: Arc<[Vec3]>,
+    delaunay: Delaunay,
+    cells: CellSpheres,
+    medial: MedialMesh,
+}
+
+impl Diagram {
+    fn new(of: &Refinement<'_>, samples: &[Vec3]) -> Result<Self, TriangulationError> {
+        let samples: Arc<[Vec3]> = samples.into();
+        let delaunay = Delaunay::new(&samples)?;
+        let cells = CellSpheres::classify(&delaunay, of.inside, of.tree);
+        let facets = VoronoiFacets::new(&delaunay, &cells);
+        let medial = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, of.dual);
+        Ok(Self { samples, delaunay, cells, medial })
+    }
+}
+
+/// The balls of a medial mesh, and the interpolated ones in the middle of its edges and triangles.
+fn barycentres(medial: &MedialMesh) -> Vec<(Vec3, f64)> {
+    let ball = |v: u32| medial.spheres[v as usize];
+    let mean = |corners: &[u32]| {
+        let share = 1.0 / corners.len() as f64;
+        let sum = corners.iter().map(|&v| (ball(v).centre, ball(v).radius));
+        let (centre, radius) = sum.fold((Vec3::ZERO, 0.0), |(c, r), (d, s)| (c + d, r + s));
+        (centre * share, radius * share)
+    };
+    let spheres = medial.spheres.iter().map(|s| (s.centre, s.radius));
+    let edges = medial.edges.iter().map(|e| mean(e));
+    spheres.chain(edges).chain(medial.faces.iter().map(|f| mean(f))).collect()
+}
+
+/// Twelve directions, those of the corners of an icosahedron.
+fn directions() -> impl Iterator<Item = Vec3> {
+    const GOLDEN: f64 = 1.618_033_988_749_895;
+    (0..12).map(|k| {
+        let sign = |bit: usize| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
+        let (short, long) = (sign(0), sign(1) * GOLDEN);
+        let corner = match k / 4 {
+            0 => Vec3::new(0.0, short, long),
+            1 => Vec3::new(short, long, 0.0),
+            _ => Vec3::new(long, 0.0, short),
+        };
+        corner.normalize()
+    })
+}
