@@ -142,6 +142,7 @@ impl Shape {
             medial: Cache::of_asker(),
             balls: Cache::of_asker(),
             of_surface: Arc::clone(of_surface),
+            unmended: OnceLock::new(),
         };
         Self { store: Arc::new(store), used: Arc::default(), given: None }
     }

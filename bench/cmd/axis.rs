@@ -69,10 +69,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let [seconds, cpu_seconds] = [by_stage(|c| c.seconds), by_stage(|c| c.cpu_seconds)];
     let expected = shape.expected_betti();
     let mut warnings = shape.report().warnings.clone();
+    warnings.extend(shape.sampling_warning().map(str::to_owned));
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
         warnings.push(format!(
             "the medial mesh has Betti numbers {betti:?}, the solid {expected:?}: the samples are too \
-             coarse somewhere, or parts touch; try --sampling blue:{}",
+             coarse somewhere, or parts touch; try --sampling auto, or blue:{}",
             (4 * shape.samples().len()).min(1_000_000)
         ));
     }

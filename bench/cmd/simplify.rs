@@ -124,6 +124,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let mut simplify = describe(arguments, &start, &run);
     let simplified = run.outcome.map_err(|fault| failure(&source, fault))?;
     line.at("checking the topology");
+    simplify.warnings.extend(shape.sampling_warning().map(str::to_owned));
     simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
     line.at("writing");
     if let Some(output) = &arguments.output {

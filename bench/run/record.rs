@@ -113,6 +113,7 @@ pub fn record(
         record.reason = None;
     }
     fill_result(&mut record.simplify, result);
+    record.simplify.warnings.extend(scene.shape().sampling_warning().map(str::to_owned));
     if let Some(ProgramPeak(bytes)) = result.extras.get() {
         // The program ran beside the heap of this process, which held what it was given.
         record.simplify.peak_bytes = Some(run.times.peak_bytes + bytes);

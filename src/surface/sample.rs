@@ -81,11 +81,11 @@ impl FromStr for Sampling {
 }
 
 impl Sampling {
-    /// So many points of the same kind and seed; blue noise where the kind is the vertices, of
-    /// which there are as many as there are. `count` is at least 1.
+    /// So many points of the same kind and seed; blue noise where the kind has a number of its
+    /// own, as the vertices have. `count` is at least 1.
     pub fn with_count(self, count: usize) -> Self {
         match self {
-            Self::MeshVertices => Self::BlueNoise { count, seed: 0 },
+            Self::MeshVertices | Self::Auto => Self::BlueNoise { count, seed: 0 },
             Self::AreaUniform { seed, .. } => Self::AreaUniform { count, seed },
             Self::BlueNoise { seed, .. } => Self::BlueNoise { count, seed },
         }
