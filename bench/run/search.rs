@@ -185,8 +185,11 @@ impl Found {
     pub fn refusal(&self, bound: f64) -> String {
         let percent = |fraction: f64| format!("{:.3} %", 100.0 * fraction);
         let best = self.best.map_or_else(String::new, |Probe { level, spheres, error }| {
-            let spheres = crate::output::counted(spheres as u64, "sphere");
-            format!(": the lowest error is {} at {level} ({spheres})", percent(error))
+            let count = match level {
+                Level::Spheres(asked) if asked == spheres => String::new(),
+                _ => format!(", which has {spheres} spheres"),
+            };
+            format!(": the lowest error is {} at {level}{count}", percent(error))
         });
         format!(
             "none of {} levels that were tried has a Hausdorff error of at most {} of the diagonal{best}; \
@@ -265,6 +268,6 @@ mod tests {
         let found = found(1_000, 0.001, counts, |count| 0.02 + 1.0 / count as f64);
         assert_eq!(found.within, None);
         let why = found.refusal(0.001);
-        assert!(why.contains("2.100 % at 1000 spheres") && why.contains("0.100 %"), "{why}");
+        assert!(why.contains("2.100 % at 1000 spheres;") && why.contains("0.100 %"), "{why}");
     }
 }

@@ -137,7 +137,7 @@ fn axis_simplify_evaluate_convert() {
     }
     assert_eq!(object["betti"], object["expected_betti"]);
 
-    for method in ["qmat", "pmat", "hem", "dey-zhao", "angle", "lambda"] {
+    for method in ["qmat", "pmat", "hem", "sat-pairwise", "angle", "lambda"] {
         let (code, object) =
             json(&["simplify", mesh, "--method", method, "--spheres", "60", "-o", simple]);
         assert_eq!(code, 0, "{object}");
@@ -192,7 +192,7 @@ fn axis_simplify_evaluate_convert() {
 #[test]
 fn threads_change_no_byte() {
     let dir = tempfile::tempdir().expect("a folder");
-    for method in ["qmat", "pmat", "hem", "dey-zhao", "angle", "lambda"] {
+    for method in ["qmat", "pmat", "hem", "sat-pairwise", "angle", "lambda"] {
         let written = ["1", "2"].map(|threads| {
             let path = dir.path().join(format!("{method}-{threads}.ma"));
             let (code, ..) = run(&[
@@ -346,7 +346,7 @@ fn a_refused_mesh_and_an_unsupported_level_are_rows() {
         "--out",
         text_path(&out),
         "--methods",
-        "angle",
+        "sat-pairwise",
     ]);
     assert_eq!(code, 3);
     assert_eq!(object["status"]["refused"], 2);

@@ -206,7 +206,7 @@ struct Prepared {
 impl Simplification for Prepared {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
+            Level::MaxError(_) => Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
             }

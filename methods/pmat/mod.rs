@@ -171,7 +171,7 @@ impl Levels {
     /// The number of collapses that a level asks for.
     fn stage_of(&self, level: Level) -> Result<usize, SimplifyError> {
         match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
+            Level::MaxError(_) => Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
             }
