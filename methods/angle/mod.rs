@@ -21,7 +21,7 @@
 //! - `homotopy` (file `homotopy.rs`): sheets, removed only where that changes no topology (Sud et al.).
 //!
 //! # The published level
-//! The papers choose `theta` for each model. [`Level::Published`](medial::simplifier::Level::Published) is
+//! The papers choose `theta` for each model. [`Level::Published`] is
 //! `theta` = 60 degrees: an object angle of 30, at which the authors' tool of the scale axis (Miklos,
 //! Giesen, Pauly 2010) filters the sheets of its own results. A warning says so.
 //!
@@ -55,7 +55,7 @@ pub struct AngleParams {
     pub resolution: f64,
     /// What a number of spheres is met by; `grid` and `homotopy` alone.
     pub size: Size,
-    /// Separation angle, in degrees, of [`Level::Published`](medial::simplifier::Level::Published), and
+    /// Separation angle, in degrees, of [`Level::Published`], and
     /// of a number of spheres that is met by the sampling.
     pub theta: f64,
 }

@@ -15,7 +15,7 @@
 //!   value, as the definition has it.
 //!
 //! # The published level
-//! The paper gives no universal `lambda`. [`Level::Published`](medial::simplifier::Level::Published) is
+//! The paper gives no universal `lambda`. [`Level::Published`] is
 //! the default of the program that Yan, Letscher and Ju published with *Voxel cores: efficient, robust,
 //! and provably good approximation of 3D medial axes*, ACM Transactions on Graphics 37(4), 2018, which
 //! prunes by the same measure: facets whose two samples are less than 4 % of the longest side of the
@@ -84,7 +84,7 @@ impl LambdaParams {
     }
 }
 
-/// `lambda` of [`Level::Published`](medial::simplifier::Level::Published), as a fraction of the longest
+/// `lambda` of [`Level::Published`], as a fraction of the longest
 /// side of the box of the spheres' centres.
 const PUBLISHED: f64 = 0.02;
 

@@ -51,7 +51,7 @@ pub enum Boundary {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "TopologyWord", into = "TopologyWord")]
 pub enum TopologyFrom {
-    /// From the first collapse on; at [`Level::Published`](medial::simplifier::Level::Published)
+    /// From the first collapse on; at [`Level::Published`]
     /// from 200 spheres on, as in the paper.
     Auto,
     /// From the first collapse on.
