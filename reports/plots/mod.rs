@@ -269,11 +269,13 @@ pub(crate) fn native_plots(
         let label = &comparison.series[native.series];
         let axis = axis(comparison.methods[native.series]);
         let title = format!("{label}: Hausdorff error against its own level");
-        let tags = native.points.iter().filter(|point| at(point).is_some()).enumerate();
-        let tags = tags.map(|(k, point)| (k, crate::text::grouped(point.spheres.round() as u64)));
+        let spheres = native.points.iter().filter(|point| at(point).is_some());
+        let spheres: Vec<f64> = spheres.map(|point| point.spheres).collect();
+        let tags = apart(&points, scale).into_iter();
+        let tags = tags.map(|k| (k, crate::text::grouped(spheres[k].round() as u64)));
         let curve = Curve {
             series: native.series,
-            label: format!("means over {}", native.over),
+            label: format!("spheres, over {}", crate::text::counted(native.over, "mesh", "meshes")),
             points,
             tags: tags.collect(),
             dashed: true,
@@ -288,6 +290,21 @@ pub(crate) fn native_plots(
         plots.extend(figure.to_svg()?.map(|svg| Plot { stem, title, svg }));
     }
     Ok(plots)
+}
+
+/// The points whose tags would not cover each other: from the first on, each an eighth of the axis
+/// away from the one before.
+fn apart(points: &[(f64, f64)], scale: Scale) -> Vec<usize> {
+    let place = |k: usize| if matches!(scale, Scale::Log) { points[k].0.ln() } else { points[k].0 };
+    let places = || (0..points.len()).map(place);
+    let range = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
+    let mut kept: Vec<usize> = Vec::new();
+    for k in 0..points.len() {
+        if kept.last().is_none_or(|&last| (place(k) - place(last)).abs() >= range / 8.0) {
+            kept.push(k);
+        }
+    }
+    kept
 }
 
 /// Fewest spheres against the error that they keep, from a search.
