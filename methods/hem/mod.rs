@@ -157,7 +157,7 @@ pub fn method() -> Method<HemParams> {
              boundary samples to the primitives around the surviving end: one-sided, at the samples.",
         )
         .native(NativeLevel::larger_is_coarser("epsilon", "fraction of the diagonal"))
-        .sweep(&[0.005, 0.01, 0.02, 0.05])
+        .sweep(&[0.01, 0.02, 0.04, 0.08])
         .published(
             "before the first collapse of a local error above 1e-4 of the diagonal, the default \
              of the authors' code; the error of the whole is measured, not held",

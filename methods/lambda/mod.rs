@@ -113,7 +113,7 @@ pub fn method() -> Method<LambdaParams> {
         .summary("Keeps the spheres whose contact points need the largest enclosing balls.")
         .native(NativeLevel::larger_is_coarser("lambda", "fraction of the bounding-box diagonal"))
         .filter(Level::Published)
-        .sweep(&[0.005, 0.01, 0.02, 0.04, 0.08])
+        .sweep(&[0.0025, 0.005, 0.01, 0.02])
         .published(
             "lambda = 2 % of the longest side of the box of the spheres' centres, the default of the \
              authors' program of voxel cores; the paper gives no universal lambda",
