@@ -326,9 +326,9 @@ fn headline(
         let meshes = crate::text::counted(ratio.meshes, "mesh", "meshes");
         format!("{} ({times}, on {meshes})", name(row.series))
     };
-    let mut text = format!("{spheres}: the lowest Hausdorff error has {}", told(ratio, row));
+    let mut text = format!("{spheres}: lowest Hausdorff error by {}", told(ratio, row));
     if let Some(seconds) = row.mean(&crate::metric::TOTAL_SECONDS) {
-        text.push_str(&format!(" in {} s", crate::text::significant(seconds, 3)));
+        text.push_str(&format!(", {} s", crate::text::significant(seconds, 3)));
     }
     match ranked.get(1) {
         Some(&(next, other)) => text.push_str(&format!("; then {}", told(next, other))),

@@ -96,6 +96,7 @@ pub fn write_report(
         native_plots: &native_plots,
         meshes: &meshes,
         summary_tables: &summary_tables,
+        has_equal_error: !bounds.is_empty(),
         extras: &extras,
     };
     files.write("index.html", page.to_html().as_bytes())?;

@@ -30,6 +30,8 @@ pub(crate) struct Page<'a> {
     /// In the order of the meshes.
     pub(crate) meshes: &'a [MeshPart],
     pub(crate) summary_tables: &'a [Table],
+    /// Whether the first of them is that of equal errors.
+    pub(crate) has_equal_error: bool,
     pub(crate) extras: &'a [Extra],
 }
 

@@ -30,11 +30,17 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     if !lines.is_empty() {
         html.push_str(&format!("<ul class=\"headlines\">{}</ul>\n", lines.concat()));
     }
+    let is_shown = |table: &&Table| !table.rows.is_empty();
+    // The most telling table, where it was asked for, comes before the means.
+    let (first, rest) = page.summary_tables.split_at(usize::from(page.has_equal_error));
+    for table in first.iter().filter(is_shown) {
+        html.push_str(&titled(table, table.rows.len() > MANY_ROWS));
+    }
     if !compared.is_empty() {
         html.push_str(&matrices(page, &compared));
     }
     html.push_str(&failures(page));
-    for table in page.summary_tables.iter().filter(|table| !table.rows.is_empty()) {
+    for table in rest.iter().filter(is_shown) {
         html.push_str(&titled(table, table.rows.len() > MANY_ROWS));
     }
     if !page.overview_plots.is_empty() {
@@ -106,7 +112,10 @@ fn matrix(page: &Page<'_>, summaries: &[&CountSummary], metric: &Metric) -> Stri
         ));
     }
     html.push_str("<th scope=\"col\">topology right</th><th scope=\"col\">not as asked</th></tr></thead>\n<tbody>\n");
-    for (series, label) in page.comparison.series.iter().enumerate() {
+    let at_counts =
+        |series: usize| summaries.iter().any(|s| s.rows.iter().any(|row| row.series == series));
+    let series = page.comparison.series.iter().enumerate();
+    for (series, label) in series.filter(|&(series, _)| at_counts(series)) {
         html.push_str(&format!("<tr><th scope=\"row\">{}</th>", html::series(series, label)));
         let rows =
             || summaries.iter().filter_map(|s| s.rows.iter().find(|row| row.series == series));
@@ -177,6 +186,9 @@ fn failures(page: &Page<'_>) -> String {
             let reason = match record.status {
                 // Each such reason has its own number.
                 Status::OtherCount => "another number of spheres than asked: not compared",
+                Status::BoundMissed => {
+                    "no level that was tried keeps the error; the results name the lowest"
+                }
                 _ => record.reason.as_deref().unwrap_or("no reason was given"),
             };
             let level = crate::comparison::level_label(record.simplify.level);
@@ -191,9 +203,10 @@ fn failures(page: &Page<'_>) -> String {
     }
     let runs = groups.values().map(Vec::len).sum();
     let mut html = format!(
-        "<details class=\"failures\" open><summary>{} without the result that was asked, of {}</summary>\n\
+        "<details class=\"failures\"{}><summary>{} without the result that was asked, of {}</summary>\n\
          <div class=\"scroll\"><table>\n<thead><tr><th>method</th><th>status</th><th>reason</th>\
          <th class=\"num\">runs</th><th>meshes (spheres asked)</th></tr></thead>\n<tbody>\n",
+        if groups.len() > MANY_ROWS / 4 { "" } else { " open" },
         counted(runs, "run", "runs"),
         page.comparison.entries.len()
     );
