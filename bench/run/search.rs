@@ -193,7 +193,7 @@ impl Found {
         });
         format!(
             "none of {} levels that were tried has a Hausdorff error of at most {} of the diagonal{best}; \
-             allow more, or sample more densely",
+             allow more, or sample more densely (`--sampling auto`)",
             self.tried,
             percent(bound)
         )

@@ -7,7 +7,8 @@
 //! MEDIAL_FUZZ_SEED=7 MEDIAL_FUZZ_SECONDS=600 cargo test -p medial-bench --test fuzz_inputs -- --ignored
 //! ```
 //!
-//! `MEDIAL_FUZZ_KIND=ply` keeps to one kind of file, by its extension. Inputs that failed are left in the system's temporary folder, under the names that are printed.
+//! `MEDIAL_FUZZ_KIND=ply` keeps to one kind of file, by its extension. Inputs that failed are left in
+//! the system's temporary folder, under the names that are printed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
