@@ -123,6 +123,16 @@ pub fn record(
         record.union = union;
         match evaluation {
             Some(Ok(evaluation)) => {
+                // The level that a search found was asked once more: what it gives now is what counts.
+                if let Level::MaxError(bound) = run.level
+                    && evaluation.distances.hausdorff > bound
+                {
+                    let error = evaluation.distances.hausdorff;
+                    record.status = Status::BoundMissed;
+                    record.simplify.status = Status::BoundMissed;
+                    record.reason =
+                        Some(format!("the level found gives {error:.3e} when it is asked alone"));
+                }
                 record.evaluate = Some(evaluation);
                 record.evaluate_seconds = Some(seconds);
             }

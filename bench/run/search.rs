@@ -76,7 +76,8 @@ impl<'a> Search<'a> {
     ) -> Self {
         let ratio = (most as f64 / FEWEST).powf(1.0 / (COUNTS - 1) as f64).max(RATIO);
         let count = |step: usize| (most as f64 / ratio.powi(step as i32)).round() as usize;
-        let counts = (0..COUNTS).map(count).filter(|&count| count >= FEWEST as usize).collect();
+        let counts =
+            (0..COUNTS).map(count).filter(|&count| count >= most.min(FEWEST as usize)).collect();
         let sweep = info.sweep.iter().copied().map(Level::Native);
         let own = sweep.chain([Level::Published]).collect();
         let (probes, tried, refusal) = (Vec::new(), 0, None);

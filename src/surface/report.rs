@@ -59,7 +59,7 @@ pub struct SurfaceReport {
 }
 
 /// One kind of change made to what the file holds.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "repair", rename_all = "snake_case")]
 pub enum Repair {
     /// Coordinates below 2^-150 of the largest were set to zero.
@@ -111,7 +111,7 @@ pub enum Repair {
         /// How many vertices were touched by several parts.
         vertices: usize,
         /// The longest way that one was moved, in the unit of the file.
-        largest_move: String,
+        largest_move: f64,
     },
     /// A hole was closed by triangles between its vertices, on demand.
     FilledHole {
@@ -192,8 +192,8 @@ impl fmt::Display for Repair {
             Self::DroppedComponents { faces, .. } => {
                 write!(f, "left out {what} with {}", counted(faces, "face"))
             }
-            Self::SeparatedVertices { ref largest_move, .. } => {
-                write!(f, "separated parts at {what}, by {largest_move} at most")
+            Self::SeparatedVertices { largest_move, .. } => {
+                write!(f, "separated parts at {what}, by {largest_move:.3e} at most")
             }
             Self::FilledHole { edges, .. } => {
                 write!(f, "filled a hole of {} with {what}", counted(edges, "edge"))

@@ -29,7 +29,7 @@ pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Opti
         }
         touching += 1;
         let tip = vertices[vertex];
-        let drawn_back = |fan: &Fan| tip + (rim_mean(vertices, faces, fan) - tip) * STEP;
+        let drawn_back = |fan: &Fan| tip * (1.0 - STEP) + rim_mean(vertices, faces, fan) * STEP;
         let targets: Vec<Vec3> = fans.values().map(drawn_back).collect();
         let height = |k: &usize| tip.distance_squared(targets[*k]);
         let flattest = (0..fans.len()).min_by(|a, b| height(a).total_cmp(&height(b)));
@@ -40,7 +40,6 @@ pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Opti
             fan.iter().for_each(|&corner| faces.as_flattened_mut()[corner] = own);
         }
     }
-    let largest_move = format!("{largest_move:.3e}");
     (touching > 0).then_some(Repair::SeparatedVertices { vertices: touching, largest_move })
 }
 
@@ -73,9 +72,12 @@ fn fans(vertices: usize, faces: &[[u32; 3]]) -> Vec<BTreeMap<u32, Fan>> {
 
 /// Mean of the vertices across from the fan's own.
 fn rim_mean(vertices: &[Vec3], faces: &[[u32; 3]], fan: &Fan) -> Vec3 {
+    // Each is divided first: the sum of coordinates near the end of the range would overflow.
+    let share = 0.5 / fan.len() as f64;
     let others = |&corner: &usize| {
-        let face = faces[corner / 3].map(|v| vertices[v as usize]);
-        face[(corner + 1) % 3] + face[(corner + 2) % 3]
+        let [first, face] = [corner % 3, corner / 3];
+        let at = |k: usize| vertices[faces[face][(first + k) % 3] as usize] * share;
+        at(1) + at(2)
     };
-    fan.iter().map(others).sum::<Vec3>() / (2 * fan.len()) as f64
+    fan.iter().map(others).sum()
 }
