@@ -1,53 +1,12 @@
 //! Which levels the variants of the angle filter and of the lambda-medial axis answer, and by what they meet a
 //! number of spheres.
 
-use medial::complex::MedialMesh;
+mod common;
+
+use common::{ANGLE, LAMBDA, at, built_in, levels, shape_of};
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::{self, TriMesh};
-
-const ANGLE: [&[(&str, &str)]; 4] = [
-    &[("variant", "facet")],
-    &[("variant", "facet"), ("at", "minimum")],
-    &[("variant", "grid")],
-    &[("variant", "homotopy")],
-];
-const LAMBDA: [&[(&str, &str)]; 2] =
-    [&[("variant", "cell")], &[("variant", "cell"), ("leftovers", "false")]];
-
-fn shape_of(mesh: &TriMesh) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    Shape::new("shape", mesh, report, ShapeOptions::default()).expect("an extent")
-}
-
-fn built_in(id: &str) -> TriMesh {
-    let shape = medial_datasets::find(id).expect("in the catalogue");
-    shape.mesh(shape.default_resolution)
-}
-
-fn params(set: &[(&str, &str)]) -> Params {
-    let mut params = Params::none();
-    set.iter().for_each(|(key, value)| params.set(key, value));
-    params
-}
-
-fn levels(
-    shape: &Shape,
-    method: &str,
-    set: &[(&str, &str)],
-    levels: &[Level],
-) -> Vec<Result<Simplified, SimplifyError>> {
-    let method = medial_methods::find(method).expect("registered");
-    let run = RunContext::default();
-    let mut prepared = method.prepare(shape, &params(set), &run).expect("prepared");
-    levels.iter().map(|&level| prepared.at(level)).collect()
-}
-
-fn at(shape: &Shape, method: &str, set: &[(&str, &str)], level: Level) -> MedialMesh {
-    let mesh = levels(shape, method, set, &[level]).remove(0).expect("a level").mesh;
-    mesh.check().expect("a valid complex");
-    mesh
-}
+use medial::simplifier::{Level, Simplified, SimplifyError};
+use medial::surface;
 
 #[test]
 fn counts_are_met_from_below_or_it_is_said() {

@@ -1,58 +1,19 @@
 //! The variants of the angle filter and of the lambda-medial axis: thresholds on boxes and plates,
 //! incidence, topology, scale.
 
+mod common;
+
+use common::{ANGLE, LAMBDA, at, built_in, levels, params, shape_of};
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::geometry::enclosing_ball;
-use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::{self, TriMesh};
+use medial::shape::Shape;
+use medial::simplifier::{Level, RunContext, Simplified, SimplifyError};
+use medial::surface::TriMesh;
 
-const ANGLE: [&[(&str, &str)]; 4] = [
-    &[("variant", "facet")],
-    &[("variant", "facet"), ("at", "minimum")],
-    &[("variant", "grid")],
-    &[("variant", "homotopy")],
-];
 /// Numbers of spheres by ranking instead of sampling.
 const BY_RANKING: [[(&str, &str); 2]; 2] =
     [[("variant", "grid"), ("size", "ranking")], [("variant", "homotopy"), ("size", "ranking")]];
-const LAMBDA: [&[(&str, &str)]; 2] =
-    [&[("variant", "cell")], &[("variant", "cell"), ("leftovers", "false")]];
-
-fn shape_of(mesh: &TriMesh) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    Shape::new("shape", mesh, report, ShapeOptions::default()).expect("an extent")
-}
-
-fn built_in(id: &str) -> TriMesh {
-    let shape = medial_datasets::find(id).expect("in the catalogue");
-    shape.mesh(shape.default_resolution)
-}
-
-fn params(set: &[(&str, &str)]) -> Params {
-    let mut params = Params::none();
-    set.iter().for_each(|(key, value)| params.set(key, value));
-    params
-}
-
-fn levels(
-    shape: &Shape,
-    method: &str,
-    set: &[(&str, &str)],
-    levels: &[Level],
-) -> Vec<Result<Simplified, SimplifyError>> {
-    let method = medial_methods::find(method).expect("registered");
-    let run = RunContext::default();
-    let mut prepared = method.prepare(shape, &params(set), &run).expect("prepared");
-    levels.iter().map(|&level| prepared.at(level)).collect()
-}
-
-fn at(shape: &Shape, method: &str, set: &[(&str, &str)], level: Level) -> MedialMesh {
-    let mesh = levels(shape, method, set, &[level]).remove(0).expect("a level").mesh;
-    mesh.check().expect("a valid complex");
-    mesh
-}
 
 /// A solid box around the origin, in the shape's units: its half sides, descending, and how far a point
 /// is from the central rectangle.
