@@ -156,10 +156,11 @@ impl Family {
     }
 }
 
-/// Kills what a listing finds, again and again until it finds nothing, since what is killed may have
-/// started another just before. Gives the number of those that still ran.
+/// Kills what a listing finds, again and again until it finds nothing new, since what is killed may
+/// have started another just before. Gives the number of those that still ran.
 fn end_all(list: impl Fn() -> Vec<Stat>) -> usize {
     let mut ended = BTreeSet::new();
+    let mut remains = BTreeSet::new();
     let start = Instant::now();
     loop {
         let (over, running): (Vec<Stat>, Vec<Stat>) = list().into_iter().partition(|s| s.is_zombie);
@@ -169,9 +170,14 @@ fn end_all(list: impl Fn() -> Vec<Stat>) -> usize {
         }
         // Somebody else's remains are not ours to collect, and need not be waited for.
         over.iter().filter(|stat| stat.parent == std::process::id()).for_each(|s| collect(s.pid));
-        if running.is_empty() || start.elapsed() > LONGEST_END {
+        // A process that ended while the listing was made has handed its children to another parent,
+        // perhaps to one whose children were already listed: its remains ask for one more look.
+        let remains_now: BTreeSet<_> = over.iter().map(|stat| (stat.pid, stat.born)).collect();
+        let is_quiet = running.is_empty() && remains_now.is_subset(&remains);
+        if is_quiet || start.elapsed() > LONGEST_END {
             return ended.len();
         }
+        remains = remains_now;
         thread::sleep(Duration::from_millis(1));
     }
 }
