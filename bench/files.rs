@@ -42,15 +42,24 @@ pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<LoadedMa, Failure> 
 /// When the extension is none of a medial mesh, or the folder does not exist.
 pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
     let Some(path) = output else { return Ok(()) };
-    let known = ["ma", "ply", "obj"];
-    let extension = extension(path);
-    if !known.contains(&extension.as_str()) {
-        return Err(Failure::input(format!(
-            "{}: the extension {extension:?} is not one of .ma, .ply, .obj",
-            path.display()
-        )));
-    }
+    check_extension(path, &["ma", "ply", "obj"])?;
     check_folder(path)
+}
+
+/// Extensions of surfaces that are written.
+pub const SURFACES: [&str; 3] = ["ply", "off", "obj"];
+
+/// Refuses a file of a kind that is not written.
+///
+/// # Errors
+/// When the extension is none of those known.
+pub fn check_extension(path: &Path, known: &[&str]) -> Result<(), Failure> {
+    let extension = extension(path);
+    if known.contains(&extension.as_str()) {
+        return Ok(());
+    }
+    let (path, known) = (path.display(), known.join(", ."));
+    Err(Failure::input(format!("{path}: the extension {extension:?} is not one of .{known}")))
 }
 
 /// Refuses a file in a folder that does not exist.

@@ -92,7 +92,11 @@ fn printable_lines(text: &str) -> String {
 
 /// A number with its noun, such as `1 sphere` or `3 faces`.
 pub fn counted(number: u64, noun: &str) -> String {
-    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+    match (number, noun) {
+        (1, _) => format!("1 {noun}"),
+        (_, "vertex") => format!("{number} vertices"),
+        _ => format!("{number} {noun}s"),
+    }
 }
 
 /// A fraction of the diagonal as a percentage with three decimals.

@@ -16,7 +16,7 @@ use medial_methods::aof::LatticeVoxels;
 use serde_json::json;
 
 use crate::exit::Failure;
-use crate::files::{check_folder, extension};
+use crate::files::{check_extension, check_folder, extension};
 use crate::run::write_npy_header;
 
 const EXTENSIONS: [&str; 3] = ["ply", "npy", "csv"];
@@ -27,13 +27,7 @@ const COLUMNS: [&str; 8] = ["x", "y", "z", "distance", "flux", "i", "j", "k"];
 /// # Errors
 /// When its extension is unknown, or its folder not there.
 pub fn check(path: &Path) -> Result<(), Failure> {
-    let extension = extension(path);
-    if !EXTENSIONS.contains(&extension.as_str()) {
-        return Err(Failure::input(format!(
-            "{}: the extension {extension:?} is not one of .ply, .npy, .csv",
-            path.display()
-        )));
-    }
+    check_extension(path, &EXTENSIONS)?;
     check_folder(path)
 }
 

@@ -83,6 +83,48 @@ fn a_torus_comes_back_by_either_method() {
     assert!(code == 0 && stdout.contains("genus 1"), "{stdout}");
 }
 
+/// A thin ring, whose hole a coarse surface closes, and a ball that asks for no fine one.
+#[test]
+fn the_tolerance_is_as_coarse_as_the_topology_allows() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let made = |name: &str, medial_mesh: String| {
+        fs::write(at(name), medial_mesh).expect("written");
+        let (code, object) = json(&["reconstruct", &at(name), "-o", &at("x.ply")]);
+        assert_eq!(code, 0, "{object}");
+        assert_eq!(object["betti"], object["union_betti"], "{object}");
+        object["tolerance"].as_f64().expect("a number")
+    };
+    assert_eq!(made("ball.ma", "1 0 0\nv 0 0 0 1\n".into()), 0.04);
+    let corner = |k: u32| (std::f64::consts::TAU * f64::from(k) / 32.0).sin_cos();
+    let v = (0..32).map(|k| format!("v {} {} 0 0.97\n", corner(k).0, corner(k).1));
+    let e = (0..32).map(|k| format!("e {k} {}\n", (k + 1) % 32));
+    let ring = format!("32 32 0\n{}{}", v.collect::<String>(), e.collect::<String>());
+    assert!(made("ring.ma", ring) < 0.04);
+}
+
+#[test]
+fn poles_that_pruning_leaves_make_a_surface() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let volume = |outer: &str| {
+        let path = at("crust.ply");
+        let words = ["simplify", "builtin:box", "-m", "tam-heidrich", "--set", "t_v=100"];
+        let more = ["--power-crust", &path, "--outer-poles", outer];
+        let (code, stdout, stderr) = run(&[&words[..], &more].concat());
+        assert!(code == 0 && stdout.contains("the power crust"), "{stdout}{stderr}");
+        let (_, info) = json(&["info", &path]);
+        assert_eq!(info["closed"], true, "{info}");
+        info["volume"].as_f64().expect("a volume")
+    };
+    let [all, remaining] = ["all", "remaining"].map(volume);
+    // The box of 3 by 2 by 1 loses its edges with their sheets, less so without their outer poles.
+    assert!(4.0 < all && all < remaining && remaining < 6.5, "{all} {remaining}");
+    let (code, _, stderr) =
+        run(&["simplify", "builtin:box", "-m", "qmat", "--power-crust", "x.ply"]);
+    assert!(code == 2 && stderr.contains("qmat has no poles"), "{stderr}");
+}
+
 #[test]
 fn threads_change_no_byte() {
     let dir = tempfile::tempdir().expect("a folder");

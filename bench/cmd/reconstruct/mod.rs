@@ -1,21 +1,23 @@
 //! `medial reconstruct X.ma -o x.ply`: a surface from a medial mesh.
 
+mod crust;
+mod union;
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use medial::complex::{self, ContourError, MedialMesh, MedialUnion, union_surface};
-use medial::geometry::PowerCrust;
-use medial::metrics::union_betti;
-use medial::shape::Shape;
-use medial::surface::{self, Normalisation, SurfaceReport, TriMesh};
+use medial::complex::{self, MedialMesh};
+use medial::shape::{Cost, Shape};
+use medial::surface::{self, SurfaceReport, TriMesh};
 use serde_json::{Map, Value, json};
 
 use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
 use crate::exit::{Exit, Failure};
-use crate::files::{check_folder, extension, medial_mesh_for};
+use crate::files::{SURFACES, check_extension, check_folder, medial_mesh_for};
 use crate::output::{counted, percent, print_json, print_line};
 use crate::run::{Input, Source, StageLine, peak_bytes};
-use medial::shape::Cost;
+
+pub use crust::COINCIDENT;
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
@@ -34,9 +36,10 @@ pub struct Arguments {
     #[arg(long, value_name = "MESH")]
     mesh: Option<MeshArgument>,
     /// How far the surface may be from the boundary of the union, as a fraction of the diagonal of
-    /// the mesh, or of the box around the spheres without one.
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.01)]
-    tolerance: f64,
+    /// the mesh, or of the box around the spheres without one [default: the coarsest of 0.04, 0.02 and
+    /// 0.01 that shows the union's topology, with all faces within 0.005].
+    #[arg(long, value_name = "FRACTION")]
+    tolerance: Option<f64>,
     #[command(flatten)]
     substrate: SubstrateArguments,
 }
@@ -50,13 +53,6 @@ enum Method {
     PowerCrust,
 }
 
-/// Corners of the power crust that are nearer than this along it are one, as a fraction of the
-/// diagonal.
-const COINCIDENT: f64 = 1e-6;
-
-/// Balls that stand for the union where its topology is asked are so far apart, in tolerances.
-const BALL_SPACING: f64 = 0.5;
-
 /// A result farther from the mesh than this, in its diagonals, is taken to be of another surface.
 const ASTRAY: f64 = 0.5;
 
@@ -64,6 +60,10 @@ const ASTRAY: f64 = 0.5;
 struct Made {
     mesh: TriMesh,
     diagonal: f64,
+    /// As a fraction of the diagonal.
+    tolerance: f64,
+    /// Betti numbers of the union, where they are known.
+    union: Option<[u64; 3]>,
     /// Keys of this method alone.
     more: Map<String, Value>,
     warnings: Vec<String>,
@@ -100,8 +100,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     stages.add("read", lap);
     line.at("making the surface");
     let made = match arguments.method {
-        Method::Union => of_union(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
-        Method::PowerCrust => of_poles(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
+        Method::Union => union::surface_of(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
+        Method::PowerCrust => {
+            crust::surface_of(arguments, shape.as_ref(), axis.as_ref(), &mut stages)
+        }
     }?;
     warnings.extend(made.warnings);
     let (written, lap) = Cost::of(|| surface::write(&arguments.output, &made.mesh));
@@ -115,12 +117,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     // Untimed: the verdict.
     line.at("checking the surface");
     let report = examine(arguments, &made.mesh, &mut warnings)?;
-    let union = match (arguments.method, &axis) {
-        (Method::Union, Some(axis)) => {
-            topology_of_union(axis, arguments.tolerance * made.diagonal, &report, &mut warnings)
-        }
-        _ => None,
-    };
+    warnings.extend(made.union.and_then(|union| other_topology(union, &report)));
     let deviation = shape.as_ref().map(|shape| deviation(shape, &made.mesh)).transpose()?;
     if let (Some([max, _]), Some(axis)) = (deviation, &arguments.axis)
         && max > ASTRAY
@@ -132,10 +129,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         ));
     }
     drop(line);
-    let tolerance = match arguments.method {
-        Method::Union => arguments.tolerance,
-        Method::PowerCrust => COINCIDENT,
-    };
     let method = match arguments.method {
         Method::Union => "union",
         Method::PowerCrust => "power-crust",
@@ -145,8 +138,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             "method": method, "vertices": report.vertices, "faces": report.faces,
             "closed": report.closed, "manifold": report.manifold, "genus": report.genus,
             "components": report.components, "intersecting_pairs": report.intersecting_pairs,
-            "tolerance": tolerance, "diagonal": made.diagonal,
-            "betti": report.expected_betti, "union_betti": union,
+            "tolerance": made.tolerance, "diagonal": made.diagonal,
+            "betti": report.expected_betti, "union_betti": made.union,
             "deviation": deviation.map(|[max, mean]| json!({ "max": max, "mean": mean })),
             "seconds": stages.seconds, "cpu_seconds": stages.cpu_seconds, "peak_bytes": peak,
             "output": arguments.output,
@@ -161,7 +154,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     print_line(&format!(
         "{}: {}, {} in {seconds:.2} s",
         arguments.output.display(),
-        counted(report.vertices as u64, "vertex").replace("vertexs", "vertices"),
+        counted(report.vertices as u64, "vertex"),
         counted(report.faces as u64, "face")
     ));
     print_line(&format!(
@@ -182,16 +175,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 /// What can be refused before anything is read.
 fn check_arguments(arguments: &Arguments) -> Result<(), Failure> {
     let output = &arguments.output;
-    let extension = extension(output);
-    if !["ply", "off", "obj"].contains(&extension.as_str()) {
-        return Err(Failure::input(format!(
-            "{}: the extension {extension:?} is not one of .ply, .off, .obj",
-            output.display()
-        )));
-    }
+    check_extension(output, &SURFACES)?;
     check_folder(output)?;
-    let tolerance = arguments.tolerance;
-    if !(tolerance > 0.0 && tolerance <= 1.0) {
+    if let Some(tolerance) = arguments.tolerance
+        && !(tolerance > 0.0 && tolerance <= 1.0)
+    {
         let message = format!("--tolerance {tolerance}: ask for more than 0 and at most 1");
         return Err(Failure::usage(message));
     }
@@ -235,110 +223,10 @@ fn read(arguments: &Arguments) -> Result<Read, Failure> {
     Ok((shape, axis, warnings))
 }
 
-/// The boundary of the union of spheres, cones and slabs.
-fn of_union(
-    arguments: &Arguments,
-    shape: Option<&Shape>,
-    axis: Option<&MedialMesh>,
-    stages: &mut Stages,
-) -> Result<Made, Failure> {
-    let (Some(axis), Some(path)) = (axis, &arguments.axis) else { unreachable!("checked before") };
-    let of_file = |message: String| Failure::input(format!("{}: {message}", path.display()));
-    let union = MedialUnion::new(axis).map_err(|error| of_file(error.to_string()))?;
-    let (lo, hi) = union.bounding_box();
-    let corners = TriMesh { vertices: vec![lo, hi], faces: vec![] };
-    let diagonal = shape.map(|s| s.normalisation().diagonal);
-    let of_balls = || Normalisation::of(&corners).map(|n| n.diagonal);
-    let diagonal = diagonal
-        .or_else(of_balls)
-        .ok_or_else(|| of_file("its spheres have no extent, or one that is not finite".into()))?;
-    let (made, lap) = Cost::of(|| union_surface(axis, arguments.tolerance * diagonal));
-    stages.add("reconstruct", lap);
-    let made = made.map_err(|error| {
-        of_file(match error {
-            ContourError::TooFine { most, feasible, .. } => format!(
-                "--tolerance {} needs more than {most} tetrahedra, or finer ones than there are; \
-                 --tolerance {:.1e} is feasible",
-                arguments.tolerance,
-                feasible / diagonal
-            ),
-            ContourError::TooThin { feasible, .. } => format!(
-                "no sphere is thick enough to show; --tolerance {:.1e} would show the largest",
-                feasible / diagonal
-            ),
-            other => other.to_string(),
-        })
-    })?;
-    let mut warnings = Vec::new();
-    if made.lost > 0 {
-        warnings.push(format!(
-            "{} with a radius below {:.1e} of the diagonal: where the union is as thin, parts of it may be \
-             missing; a finer --tolerance shows more",
-            counted(made.lost as u64, "sphere"),
-            made.smallest / diagonal
-        ));
-    }
-    let centroids: Vec<_> = (0..made.mesh.faces.len())
-        .map(|f| made.mesh.triangle(f).into_iter().sum::<medial::Vec3>() / 3.0)
-        .collect();
-    let off = union.signed_batch(&centroids).into_iter().map(f64::abs).fold(0.0, f64::max);
-    let more = Map::from_iter([
-        ("tetrahedra".to_owned(), Value::from(made.tetrahedra)),
-        ("lost".to_owned(), Value::from(made.lost)),
-        ("faces_to_union".to_owned(), Value::from(off / diagonal)),
-    ]);
-    Ok(Made { mesh: made.mesh, diagonal, more, warnings })
-}
-
-/// The power crust of the spheres of the medial mesh, or of all inner poles, and of the outer poles.
-fn of_poles(
-    arguments: &Arguments,
-    shape: Option<&Shape>,
-    axis: Option<&MedialMesh>,
-    stages: &mut Stages,
-) -> Result<Made, Failure> {
-    let (Some(shape), Some(mesh)) = (shape, &arguments.mesh) else {
-        unreachable!("checked before")
-    };
-    let of_mesh = |message: String| Failure::input(format!("{}: {message}", mesh.display()));
-    let (balls, lap) = Cost::of(|| shape.polar_balls());
-    stages.add("poles", lap);
-    let balls = balls.map_err(|error| of_mesh(error.to_string()))?;
-    let to_normal = shape.normalisation();
-    let inner = match axis {
-        Some(axis) => axis.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)).spheres,
-        None => balls.inner,
-    };
-    let (counts, named) =
-        ([inner.len(), balls.outer.len()], arguments.axis.as_ref().unwrap_or(mesh));
-    let of_named = |message: String| Failure::input(format!("{}: {message}", named.display()));
-    let (crust, lap) = Cost::of(|| {
-        let crust = PowerCrust::new(&inner, &balls.outer)?;
-        Ok((crust.facet_count(), crust.surface(COINCIDENT)))
-    });
-    stages.add("reconstruct", lap);
-    let (facets, mut crust) =
-        crust.map_err(|error: medial::geometry::TriangulationError| of_named(error.to_string()))?;
-    if crust.mesh.faces.is_empty() {
-        return Err(of_named(
-            "no inner ball has a power cell: is the medial mesh of this surface, and in its units?"
-                .into(),
-        ));
-    }
-    for vertex in &mut crust.mesh.vertices {
-        *vertex = to_normal.backward(*vertex);
-    }
-    let more = Map::from_iter([
-        ("inner".to_owned(), Value::from(counts[0])),
-        ("outer".to_owned(), Value::from(counts[1])),
-        ("rejected".to_owned(), Value::from(balls.rejected)),
-        ("facets".to_owned(), Value::from(facets)),
-        ("merged".to_owned(), Value::from(crust.contracted)),
-        ("samples".to_owned(), Value::from(shape.samples().len())),
-        ("sampling".to_owned(), Value::from(shape.options().sampling.to_string())),
-        ("seed".to_owned(), Value::from(arguments.substrate.seed)),
-    ]);
-    Ok(Made { mesh: crust.mesh, diagonal: to_normal.diagonal, more, warnings: vec![] })
+fn face_centres(mesh: &TriMesh) -> Vec<medial::Vec3> {
+    (0..mesh.faces.len())
+        .map(|f| mesh.triangle(f).into_iter().sum::<medial::Vec3>() / 3.0)
+        .collect()
 }
 
 /// What `medial info` says of the file that was written; of what is no file, the mesh itself.
@@ -358,32 +246,27 @@ fn examine(
     Ok(inspection.report)
 }
 
-/// The Betti numbers of the union of balls along the primitives, and a warning where those of the
-/// surface differ; none where there are too many balls.
-fn topology_of_union(
-    axis: &MedialMesh,
-    tolerance: f64,
-    report: &SurfaceReport,
-    warnings: &mut Vec<String>,
-) -> Option<[u64; 3]> {
-    let union = union_betti(axis, BALL_SPACING * tolerance).ok()?;
-    let found = report.expected_betti?.map(|b| b as u64);
-    if found != union {
-        warnings.push(format!(
+/// The Betti numbers of the solid that a closed surface bounds.
+fn betti_of(report: &SurfaceReport) -> Option<[u64; 3]> {
+    Some(report.expected_betti?.map(|b| b as u64))
+}
+
+/// What is to be said where a surface has not the Betti numbers of the union.
+fn other_topology(union: [u64; 3], report: &SurfaceReport) -> Option<String> {
+    let found = betti_of(report)?;
+    (found != union).then(|| {
+        format!(
             "the surface has Betti numbers {found:?}, the union of the primitives {union:?}: crevices, \
              holes or necks are narrower than --tolerance shows; ask for a finer one"
-        ));
-    }
-    Some(union)
+        )
+    })
 }
 
 /// The largest and the mean distance of a surface's vertices and face centres from the mesh of a
 /// shape, as fractions of its diagonal.
 fn deviation(shape: &Shape, mesh: &TriMesh) -> Result<[f64; 2], Failure> {
-    let centroids =
-        (0..mesh.faces.len()).map(|f| mesh.triangle(f).into_iter().sum::<medial::Vec3>() / 3.0);
     let to_normal = shape.normalisation();
-    let points = mesh.vertices.iter().copied().chain(centroids);
+    let points = mesh.vertices.iter().copied().chain(face_centres(mesh));
     let points: Vec<_> = points.map(|p| to_normal.forward(p)).collect();
     let distances = shape.surface_tree().map_err(Failure::input)?.distance_batch(&points);
     let max = distances.iter().copied().fold(0.0, f64::max);

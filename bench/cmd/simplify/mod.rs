@@ -1,51 +1,34 @@
 //! `medial simplify MESH --method ID -o x.ma`: one method, one mesh.
 
+mod bound;
+mod outputs;
+
 use std::path::PathBuf;
 
 use clap::Args;
-use medial::complex::collapse::Hierarchy;
 use medial::complex::{self, MedialMesh};
-use medial::metrics::{JudgeOptions, MetricError, topology_warning};
+use medial::metrics::topology_warning;
 use medial::shape::Shape;
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError,
 };
-use medial_methods::aof::{self, LatticeVoxels};
 use medial_methods::pmat;
 use medial_methods::tam_heidrich::PartInfo;
 use medial_reports::{Simplify, Status};
-use serde::Serialize;
 
 use super::hierarchy::{self, Loaded, Origin};
 use super::methods::method;
 use super::voxels;
 use crate::args::{
-    Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options, params,
-    shape_options,
+    Global, MeasureArguments, MeshArgument, SubstrateArguments, params, shape_options,
 };
 use crate::exit::{Exit, Failure};
-use crate::files::{check_folder, check_output, medial_mesh_for};
+use crate::files::medial_mesh_for;
 use crate::output::{counted, note, percent, print_json, print_line, version};
 use crate::run::record::fill_result;
-use crate::run::{Fault, Input, LevelRun, Probe, Registry, Search, Source, StageLine, answer};
-
-/// What a search over sphere counts found, for the answer to `--max-error`.
-#[derive(Debug, Serialize)]
-struct Searched {
-    /// The bound, a fraction of the diagonal.
-    bound: f64,
-    /// The error of the result.
-    hausdorff: f64,
-    /// Number of levels that were tried.
-    tried: usize,
-    /// Spheres of the result.
-    spheres: usize,
-    /// Whether the error is the upper end of a certified interval, or else a maximum of samples.
-    certified: bool,
-}
-
-/// Width of the interval that certifies a bound, as a share of it.
-const CERTIFIED_SHARE: f64 = 0.05;
+use crate::run::{Fault, Input, LevelRun, Registry, Source, StageLine, answer};
+use bound::Searched;
+use outputs::Outputs;
 
 /// Arguments of `simplify`.
 #[derive(Debug, Args)]
@@ -73,19 +56,12 @@ pub struct Arguments {
     /// Start from this medial mesh instead of the Voronoi one.
     #[arg(long, value_name = "Y.ma")]
     initial: Option<PathBuf>,
-    /// The result (.ma, .ply, .obj), in the units of the surface.
-    #[arg(short, long)]
-    output: Option<PathBuf>,
-    /// Write all levels into a file, for `--hierarchy`; for methods that have them.
-    #[arg(long, value_name = "FILE")]
-    save_hierarchy: Option<PathBuf>,
-    /// Take the level from such a file, made from the same mesh by the same method, instead of
-    /// computing it.
+    /// Take the level from a file of `--save-hierarchy`, made from the same mesh by the same method,
+    /// instead of computing it.
     #[arg(long, value_name = "FILE")]
     hierarchy: Option<PathBuf>,
-    /// Write the voxels with their distance and flux (.ply, .npy, .csv), for methods on a lattice.
-    #[arg(long, value_name = "FILE")]
-    voxels: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: Outputs,
     #[command(flatten)]
     substrate: SubstrateArguments,
     #[command(flatten)]
@@ -100,10 +76,9 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let method = method(registry, &arguments.method)?;
     let options = shape_options(&arguments.substrate)?;
-    check_output(arguments.output.as_deref())?;
-    check_bound(arguments)?;
+    bound::check(arguments)?;
     check_hierarchy(arguments, method)?;
-    check_voxels(arguments, method)?;
+    arguments.outputs.check(method)?;
     let line = StageLine::new(global.quiet || global.json);
     line.at("reading");
     let input = Input::load(&source)?;
@@ -127,35 +102,24 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     simplify.warnings.extend(shape.sampling_warning().map(str::to_owned));
     simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
     line.at("writing");
-    if let Some(output) = &arguments.output {
-        let back = shape.normalisation();
-        let mesh = simplified.mesh.transformed(back.diagonal, |p| back.backward(p));
-        complex::write(output, &mesh).map_err(Failure::input)?;
-    }
-    let extras = &simplified.extras;
-    if let (Some(path), Some(all)) = (&arguments.save_hierarchy, extras.get::<Hierarchy>()) {
-        hierarchy::save(path, all, &origin)?;
-    }
-    let voxels = extras.get::<LatticeVoxels>();
-    if let (Some(path), Some(voxels)) = (&arguments.voxels, voxels) {
-        voxels::write(path, voxels, &shape)?;
-    }
+    arguments.outputs.write(&simplified, &shape, &origin)?;
     drop(line);
     if global.json {
         let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
+        let extras = &simplified.extras;
         if let Some(search) = &search {
             object["max_error"] = serde_json::to_value(search).map_err(Failure::input)?;
         }
         if let Some(parts) = extras.get::<Vec<PartInfo>>() {
             object["parts"] = in_input_units(parts, &shape).map_err(Failure::input)?;
         }
-        if let Some(voxels) = voxels {
+        if let Some(voxels) = extras.get() {
             object["voxels"] = voxels::describe(voxels, &shape);
         }
         print_json(&object, &warnings);
     } else {
         print_result(&simplify, search.as_ref(), arguments, global);
-        if let Some(parts) = extras.get::<Vec<PartInfo>>() {
+        if let Some(parts) = simplified.extras.get::<Vec<PartInfo>>() {
             print_line(&format!("  {}, listed by --json", counted(parts.len() as u64, "part")));
         }
         for warning in simplify.warnings.iter().chain(&warnings) {
@@ -187,22 +151,13 @@ fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde
     serde_json::to_value(parts.iter().map(carried).collect::<Vec<_>>())
 }
 
-fn check_bound(arguments: &Arguments) -> Result<(), Failure> {
-    match arguments.max_error {
-        Some(bound) if !(bound.is_finite() && bound > 0.0) => {
-            let message = format!("--max-error {bound}: a positive fraction of the diagonal");
-            Err(Failure::usage(message))
-        }
-        // The whole solid is within one diagonal of anything inside it.
-        Some(bound) if bound >= 1.0 => Err(Failure::usage(format!(
-            "--max-error {bound}: a fraction of the diagonal is meant, and this is {} % of it; \
-             write {} for {bound} %",
-            100.0 * bound,
-            bound / 100.0
-        ))),
-        Some(_) => judge_options(&arguments.measure, JudgeOptions::default(), 0).map(|_| ()),
-        None => Ok(()),
+fn check_hierarchy(arguments: &Arguments, method: &dyn MedialSimplifier) -> Result<(), Failure> {
+    let info = method.info();
+    if arguments.hierarchy.is_some() && !info.has_extra(pmat::HIERARCHY) {
+        let message = format!("--hierarchy: {} has no hierarchy of levels", info.id);
+        return Err(Failure::usage(message));
     }
+    Ok(())
 }
 
 /// What a method starts from.
@@ -236,27 +191,6 @@ impl<'a> Start<'a> {
     }
 }
 
-fn check_hierarchy(arguments: &Arguments, method: &dyn MedialSimplifier) -> Result<(), Failure> {
-    let asked =
-        [("--hierarchy", &arguments.hierarchy), ("--save-hierarchy", &arguments.save_hierarchy)];
-    if let Some((option, _)) = asked.iter().find(|(_, path)| path.is_some())
-        && !method.info().has_extra(pmat::HIERARCHY)
-    {
-        let id = &method.info().id;
-        return Err(Failure::usage(format!("{option}: {id} has no hierarchy of levels")));
-    }
-    arguments.save_hierarchy.as_deref().map_or(Ok(()), check_folder)
-}
-
-fn check_voxels(arguments: &Arguments, method: &dyn MedialSimplifier) -> Result<(), Failure> {
-    let Some(path) = &arguments.voxels else { return Ok(()) };
-    if !method.info().has_extra(aof::VOXELS) {
-        let id = &method.info().id;
-        return Err(Failure::usage(format!("--voxels: {id} has no voxels")));
-    }
-    voxels::check(path)
-}
-
 /// Runs the method at the level that is asked, or at the one that a search finds.
 fn simplify(
     arguments: &Arguments,
@@ -271,7 +205,7 @@ fn simplify(
         (_, Some(value), _) => (Level::Native(value), None),
         (.., Some(bound)) => {
             // The seconds are those of the level found, asked alone.
-            let (level, search) = search(arguments, start, input, (bound, line))?;
+            let (level, search) = bound::search(arguments, start, input, (bound, line))?;
             (level, Some(search))
         }
         _ => (Level::Published, None),
@@ -291,43 +225,6 @@ fn simplify(
         run.times.prepare += loaded.read;
     }
     Ok((run, search))
-}
-
-/// Searches the fewest spheres within an error bound.
-fn search(
-    arguments: &Arguments,
-    start: &Start<'_>,
-    input: &Input,
-    (bound, line): (f64, &StageLine),
-) -> Result<(Level, Searched), Failure> {
-    let seed = arguments.substrate.seed();
-    let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
-    let refused = |error: SimplifyError| failure_of(input, error.into());
-    let judge = start.shape.judge(input.axis.as_ref(), options);
-    let judge = judge.map_err(|error| refused(error.into()))?;
-    let view = start.shape.view();
-    line.at(format!("preparing {}", arguments.method));
-    let run = RunContext::with_seed(seed).on_progress(line.steps());
-    let mut simplification = start.begin(&view, &run).map_err(refused)?;
-    let initial = start.spheres().map_err(refused)?;
-    let measure = |mesh: &MedialMesh| -> Result<f64, String> {
-        let told = |error: MetricError| error.to_string();
-        let sampled = judge.distances(mesh).map_err(told)?.hausdorff;
-        match arguments.certify && sampled <= bound {
-            // An upper end within the bound needs an interval that is narrow beside it.
-            true => Ok(judge.certify(mesh, CERTIFIED_SHARE * bound).map_err(told)?.upper),
-            false => Ok(sampled),
-        }
-    };
-    let trying = |level: Level| line.at(format!("searching the bound: {level}"));
-    let info = start.method.info();
-    let mut search = Search::new(simplification.as_mut(), info, initial, &measure, &trying);
-    let found = search.within(bound).map_err(refused)?;
-    let Some(Probe { level, spheres, error }) = found.within else {
-        return Err(Failure::usage(found.refusal(bound)));
-    };
-    let (tried, certified) = (found.tried, arguments.certify);
-    Ok((level, Searched { bound, hausdorff: error, tried, spheres, certified }))
 }
 
 fn describe(arguments: &Arguments, start: &Start<'_>, run: &LevelRun) -> Simplify {
@@ -397,17 +294,9 @@ fn print_result(
             counted(search.tried as u64, "level")
         ));
     }
-    if let Some(output) = &arguments.output {
-        print_line(&format!("  written: {}", output.display()));
-    }
-    if let Some(path) = &arguments.save_hierarchy {
-        print_line(&format!("  written: {} with all levels", path.display()));
-    }
-    if let Some(path) = &arguments.voxels {
-        print_line(&format!("  written: {}, a point for each voxel", path.display()));
-    }
-    let outputs = [&arguments.output, &arguments.save_hierarchy, &arguments.voxels];
-    if outputs.iter().all(|output| output.is_none()) {
+    let written = arguments.outputs.written();
+    written.iter().for_each(|line| print_line(&format!("  {line}")));
+    if written.is_empty() {
         note(global, "medial: the result was not written; -o FILE.ma keeps it");
     }
 }

@@ -1,0 +1,139 @@
+//! The files that `simplify` writes: what can be refused before the work, and the writing.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use medial::complex::{self, collapse::Hierarchy};
+use medial::shape::Shape;
+use medial::simplifier::{MedialSimplifier, Simplified};
+use medial::surface;
+use medial_methods::aof::{self, LatticeVoxels};
+use medial_methods::pmat;
+use medial_methods::tam_heidrich::{self, OuterPoles, RemainingPoles};
+
+use crate::cmd::hierarchy::{self, Origin};
+use crate::cmd::reconstruct::COINCIDENT;
+use crate::cmd::voxels;
+use crate::exit::Failure;
+use crate::files::{SURFACES, check_extension, check_folder, check_output};
+
+/// Files to write.
+#[derive(Debug, Args)]
+pub struct Outputs {
+    /// The result (.ma, .ply, .obj), in the units of the surface.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Write all levels into a file, for `--hierarchy`; for methods that have them.
+    #[arg(long, value_name = "FILE")]
+    save_hierarchy: Option<PathBuf>,
+    /// Write the voxels with their distance and flux (.ply, .npy, .csv), for methods on a lattice.
+    #[arg(long, value_name = "FILE")]
+    voxels: Option<PathBuf>,
+    /// Write the power crust of the poles that are left (.ply, .off, .obj), for methods that prune
+    /// by parts.
+    #[arg(long, value_name = "FILE")]
+    power_crust: Option<PathBuf>,
+    /// Outer poles that this power crust takes.
+    #[arg(long, value_enum, default_value_t = Outer::All, requires = "power_crust")]
+    outer_poles: Outer,
+}
+
+/// Outer poles of a power crust.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Outer {
+    /// Those of all samples.
+    All,
+    /// Not those of removed features: sharper where the shape has corners.
+    Remaining,
+}
+
+impl Outputs {
+    /// Refuses what the method has not or what could not be written, before anything is computed.
+    ///
+    /// # Errors
+    /// When an extension is unknown, a folder not there, or the method has no such thing.
+    pub fn check(&self, method: &dyn MedialSimplifier) -> Result<(), Failure> {
+        let info = method.info();
+        let needs = |option: &str, extra: &str, what: &str| match info.has_extra(extra) {
+            true => Ok(()),
+            false => Err(Failure::usage(format!("{option}: {} has no {what}", info.id))),
+        };
+        check_output(self.output.as_deref())?;
+        if let Some(path) = &self.save_hierarchy {
+            needs("--save-hierarchy", pmat::HIERARCHY, "hierarchy of levels")?;
+            check_folder(path)?;
+        }
+        if let Some(path) = &self.voxels {
+            needs("--voxels", aof::VOXELS, "voxels")?;
+            voxels::check(path)?;
+        }
+        if let Some(path) = &self.power_crust {
+            needs("--power-crust", tam_heidrich::POLES, "poles")?;
+            check_extension(path, &SURFACES)?;
+            check_folder(path)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what was asked for; `origin` says what a hierarchy is of.
+    ///
+    /// # Errors
+    /// When a file cannot be written, or the poles have no power crust.
+    pub fn write(
+        &self,
+        result: &Simplified,
+        shape: &Shape,
+        origin: &Origin,
+    ) -> Result<(), Failure> {
+        if let Some(path) = &self.output {
+            let back = shape.normalisation();
+            let mesh = result.mesh.transformed(back.diagonal, |p| back.backward(p));
+            complex::write(path, &mesh).map_err(Failure::input)?;
+        }
+        if let (Some(path), Some(all)) = (&self.save_hierarchy, result.extras.get::<Hierarchy>()) {
+            hierarchy::save(path, all, origin)?;
+        }
+        if let (Some(path), Some(voxels)) = (&self.voxels, result.extras.get::<LatticeVoxels>()) {
+            voxels::write(path, voxels, shape)?;
+        }
+        if let (Some(path), Some(poles)) = (&self.power_crust, result.extras.get()) {
+            self.write_crust(path, poles, shape)?;
+        }
+        Ok(())
+    }
+
+    fn write_crust(
+        &self,
+        path: &Path,
+        poles: &RemainingPoles,
+        shape: &Shape,
+    ) -> Result<(), Failure> {
+        let outer = match self.outer_poles {
+            Outer::All => OuterPoles::All,
+            Outer::Remaining => OuterPoles::OfRemaining,
+        };
+        let of_file = |why: String| Failure::input(format!("{}: {why}", path.display()));
+        let crust = poles.power_crust(shape, outer).map_err(|error| of_file(error.to_string()))?;
+        let mut crust = crust.surface(COINCIDENT).mesh;
+        if crust.faces.is_empty() {
+            return Err(of_file("no pole is left: nothing to make a surface of".into()));
+        }
+        let back = shape.normalisation();
+        crust.vertices.iter_mut().for_each(|vertex| *vertex = back.backward(*vertex));
+        surface::write(path, &crust).map_err(Failure::input)
+    }
+
+    /// What was written, a line each.
+    pub fn written(&self) -> Vec<String> {
+        let files = [
+            (&self.output, ""),
+            (&self.save_hierarchy, " with all levels"),
+            (&self.voxels, ", a point for each voxel"),
+            (&self.power_crust, ", the power crust of the poles that are left"),
+        ];
+        let written = files.into_iter().filter_map(|(path, what)| {
+            path.as_ref().map(|path| format!("written: {}{what}", path.display()))
+        });
+        written.collect()
+    }
+}
