@@ -8,12 +8,21 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 
-use crate::catalogue::KnownAxis;
 use crate::geodesic::unit_sphere;
 use crate::shapes::{
     BOX_HALF, CAVITY, COIL, CORE_HALF, ELLIPSOID, PAIR_BALL, PAIR_CAPSULE, PLATE_HALF, ROD_APEX,
     ROD_HALF, ROD_RADIUS, ROUNDING, TORUS, coil_centre, coil_length,
 };
+
+/// The medial axis of a built-in shape, known without sampling, in the shape's own coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownAxis {
+    /// The axis with its radii.
+    pub mesh: MedialMesh,
+    /// How far `mesh` may be from the true axis, in centres and in radii, both ways; in the
+    /// shape's own unit. Zero where it is exact up to rounding: no curved sheet or curve.
+    pub tolerance: f64,
+}
 
 /// Rings of a triangulated disc, and vertices that each has more than the one inside it.
 const DISC_RINGS: u32 = 32;

@@ -1,10 +1,10 @@
 //! The list of built-in shapes.
 
-use medial::complex::MedialMesh;
 use medial::surface::TriMesh;
 use serde::Serialize;
 
-use crate::{axes, shapes};
+use crate::axes::{self, KnownAxis};
+use crate::shapes;
 
 /// Finest resolution that is generated: some four million vertices.
 pub const MAX_RESOLUTION: u32 = 2000;
@@ -30,16 +30,6 @@ pub struct BuiltIn {
     pub(crate) known_axis: Option<fn() -> KnownAxis>,
     /// Bounding-box diagonal of the continuous shape, in its own unit.
     pub diagonal: f64,
-}
-
-/// The medial axis of a built-in shape, known without sampling, in the shape's own coordinates.
-#[derive(Clone, Debug, PartialEq)]
-pub struct KnownAxis {
-    /// The axis with its radii.
-    pub mesh: MedialMesh,
-    /// How far `mesh` may be from the true axis, in centres and in radii, both ways; in the
-    /// shape's own unit. Zero where it is exact up to rounding: no curved sheet or curve.
-    pub tolerance: f64,
 }
 
 impl BuiltIn {

@@ -24,7 +24,8 @@ mod revolved;
 mod shapes;
 mod torus;
 
-pub use catalogue::{BuiltIn, KnownAxis, MAX_RESOLUTION, catalogue, find};
+pub use axes::KnownAxis;
+pub use catalogue::{BuiltIn, MAX_RESOLUTION, catalogue, find};
 pub use noise::add_noise;
 
 #[cfg(test)]

@@ -12,7 +12,7 @@
 
 use medial::Vec3;
 use medial::complex::Sphere;
-use medial::geometry::spread_order;
+use medial::geometry::trees::spread_order;
 
 /// Size classes in a doubling of the radius.
 const CLASSES: f64 = 2.0;

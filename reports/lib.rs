@@ -17,6 +17,7 @@
 
 mod comparison;
 mod equal_error;
+mod error;
 mod extras;
 mod header;
 mod journal;
@@ -32,6 +33,7 @@ mod terminal;
 mod text;
 mod write;
 
+pub use error::ReportError;
 pub use extras::{
     AxisShift, BASELINES, Baseline, NoiseRecord, ORACLES, STABILITY, read_lines, write_lines,
 };
@@ -43,4 +45,4 @@ pub use record::{
 };
 pub use terminal::summary_text;
 pub use text::{file_stem, printable};
-pub use write::{ReportError, read_header, write_report};
+pub use write::{read_header, write_report};

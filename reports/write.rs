@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 
 use crate::comparison::Comparison;
 use crate::equal_error::{by_bound, equal_error_table};
+use crate::error::ReportError;
 use crate::extras::extras;
 use crate::header::Header;
 use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, Page};
-use crate::plots::{Plot, PlotError, equal_error_plot, mean_plots, mesh_plots, native_plots};
+use crate::plots::{Plot, equal_error_plot, mean_plots, mesh_plots, native_plots};
 use crate::record::Record;
 use crate::summary::by_count;
 use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_markdown};
@@ -175,42 +176,5 @@ impl Files<'_> {
             }
         }
         Ok(())
-    }
-}
-
-/// Why a report could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The file system refused.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// A file could not be made from the records.
-    #[error("{what} could not be made: {message}")]
-    Content {
-        /// The file.
-        what: &'static str,
-        /// What went wrong.
-        message: String,
-    },
-}
-
-impl ReportError {
-    fn csv(error: &csv::Error) -> Self {
-        Self::Content { what: "results.csv", message: error.to_string() }
-    }
-
-    fn header(error: &serde_json::Error) -> Self {
-        Self::Content { what: "header.json", message: error.to_string() }
-    }
-}
-
-impl From<PlotError> for ReportError {
-    fn from(error: PlotError) -> Self {
-        Self::Content { what: "a plot", message: error.to_string() }
     }
 }

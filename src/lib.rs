@@ -16,9 +16,7 @@
 
 mod atomic;
 pub mod complex;
-mod disjoint;
-pub mod geometry;
-mod hash;
+mod diagnostics;
 pub mod heap;
 pub mod metrics;
 pub mod shape;
@@ -28,5 +26,6 @@ pub mod surface;
 
 pub use atomic::{remove_temporaries, write_atomically};
 
-/// A point or a vector in space, double precision.
-pub type Vec3 = glam::DVec3;
+pub use geometry::Vec3;
+/// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a crate of its own.
+pub use medial_geometry as geometry;

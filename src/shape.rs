@@ -12,13 +12,15 @@ use crate::Vec3;
 use crate::complex::{
     CellSpheres, DualTriangulation, MedialMesh, VoronoiFacets, voronoi_medial_mesh,
 };
-use crate::geometry::{Delaunay, TriangleBvh};
+use crate::diagnostics::Diagnostics;
+use crate::geometry::Delaunay;
 use crate::metrics::{Judge, JudgeOptions, Truth};
-use crate::simplifier::Diagnostics;
+use crate::surface::TriangleBvh;
 use crate::surface::{InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, sample};
 
 mod contacts;
 mod error;
+mod growing;
 mod inner_balls;
 mod power_crust;
 mod refined;

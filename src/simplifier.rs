@@ -19,6 +19,7 @@ mod method;
 mod params;
 mod run;
 
+pub use crate::diagnostics::Diagnostics;
 pub use chain::Chain;
 pub use error::SimplifyError;
 pub use extras::Extras;
@@ -204,25 +205,4 @@ pub enum Work {
     /// Parts of it had been done for earlier calls: what these cost then adds to the seconds of
     /// this call.
     Reused(Cost),
-}
-
-/// Counts and remarks beside a result.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Diagnostics {
-    /// Named counts, such as `rejected_by_link_condition`, in the order of the algorithm.
-    pub counts: Vec<(String, u64)>,
-    /// Sentences for the user, such as why the asked count was not reached.
-    pub warnings: Vec<String>,
-}
-
-impl Diagnostics {
-    /// Adds a named count.
-    pub fn count(&mut self, name: &str, value: usize) {
-        self.counts.push((name.to_owned(), value as u64));
-    }
-
-    /// Adds a warning.
-    pub fn warn(&mut self, warning: impl Into<String>) {
-        self.warnings.push(warning.into());
-    }
 }

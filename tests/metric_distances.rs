@@ -4,12 +4,13 @@ use std::f64::consts::{PI, TAU};
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, UnionError};
-use medial::geometry::{Sphere, TriangleBvh};
+use medial::geometry::Sphere;
 use medial::metrics::{
     AxisOptions, DistanceOptions, Distances, EnvelopeOptions, MetricError, VolumeOptions,
     axis_distance, distances, enclosed_volume, sample_envelope, volume_error,
 };
 use medial::surface::TriMesh;
+use medial::surface::TriangleBvh;
 
 fn measure(surface: &TriMesh, mesh: &MedialMesh) -> Distances {
     let options =

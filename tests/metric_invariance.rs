@@ -9,11 +9,11 @@ mod shapes;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere, betti, euler};
-use medial::geometry::TriangleBvh;
 use medial::metrics::{
     AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, Judge, JudgeOptions, Truth,
     axis_distance, certify, counts, distances, spikes, triangle_quality,
 };
+use medial::surface::TriangleBvh;
 use medial::surface::{InsideTest, TriMesh};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};

@@ -2,8 +2,8 @@
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
-use medial::geometry::TriangleBvh;
 use medial::metrics::{Judge, JudgeOptions, Truth};
+use medial::surface::TriangleBvh;
 use medial::surface::{InsideTest, TriMesh};
 
 /// A box of diagonal 1 around the origin, and its exact axis.

@@ -2,8 +2,9 @@
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, Primitive, UnionError};
-use medial::geometry::{BvhError, Cone, Feature, Slab, Sphere, TriangleBvh};
+use medial::geometry::{Cone, Slab, Sphere};
 use medial::surface::TriMesh;
+use medial::surface::{BvhError, Feature, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -45,7 +46,7 @@ fn soup(count: usize, rng: &mut Pcg64) -> TriMesh {
     mesh
 }
 
-fn assert_describes(mesh: &TriMesh, p: Vec3, closest: &medial::geometry::Closest) {
+fn assert_describes(mesh: &TriMesh, p: Vec3, closest: &medial::surface::Closest) {
     let corners = mesh.triangle(closest.face as usize);
     assert!((closest.point.distance(p) - closest.distance).abs() < 1e-14);
     let off = match closest.feature {

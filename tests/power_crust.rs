@@ -19,7 +19,7 @@ fn crust(mesh: &TriMesh, samples: usize, exact: impl Fn(Vec3) -> f64) -> (TriMes
     let shape = Shape::new("sampled", mesh, report, options).unwrap();
     let balls = shape.polar_balls().unwrap();
     let crust = PowerCrust::new(&balls.inner, &balls.outer).unwrap();
-    let mut made = crust.surface(COINCIDENT).mesh;
+    let mut made = surface::crust_surface(&crust, COINCIDENT).mesh;
     for v in &mut made.vertices {
         *v = shape.normalisation().backward(*v);
     }
@@ -90,7 +90,7 @@ fn the_bisector_of_two_balls_is_found() {
             assert!((powers[0] - powers[1]).abs() < 1e-12);
         }
     }
-    let volume = surface::validate(&crust.triangles()).unwrap().volume.unwrap();
+    let volume = surface::validate(&(&crust).into()).unwrap().volume.unwrap();
     let at = |k: usize| (9.0 + 1.0 - outer[k].radius.powi(2)) / 6.0;
     let expected = (at(0) + at(1)) * (at(2) + at(3)) * (at(4) + at(5));
     assert!((volume - expected).abs() < 1e-12, "{volume} {expected}");
@@ -104,7 +104,7 @@ fn balls_that_cannot_be_are_refused_and_none_is_no_surface() {
     assert_eq!(PowerCrust::new(&[], &[]).unwrap().facet_count(), 0);
     // A single ball is bounded by the box around it.
     let alone = PowerCrust::new(&[Sphere::new(Vec3::ONE, 0.0)], &[]).unwrap();
-    assert_eq!(surface::validate(&alone.triangles()).unwrap().genus, Some(0));
+    assert_eq!(surface::validate(&(&alone).into()).unwrap().genus, Some(0));
 }
 
 #[test]
@@ -152,7 +152,7 @@ proptest! {
         };
         let of = |side: bool| balls.iter().filter(|b| b.4 == side).map(ball).collect::<Vec<_>>();
         let crust = PowerCrust::new(&of(true), &of(false)).unwrap();
-        assert_closed_manifold(&crust.triangles())?;
-        assert_closed_manifold(&crust.surface(1e-6).mesh)?;
+        assert_closed_manifold(&(&crust).into())?;
+        assert_closed_manifold(&surface::crust_surface(&crust, 1e-6).mesh)?;
     }
 }

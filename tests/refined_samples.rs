@@ -5,9 +5,9 @@ mod shapes;
 
 use medial::Vec3;
 use medial::complex::{DualTriangulation, betti};
-use medial::geometry::TriangleBvh;
 use medial::metrics::JudgeOptions;
 use medial::shape::{BOUND, Refined, Refinement, Shape, ShapeOptions, Substrate};
+use medial::surface::TriangleBvh;
 use medial::surface::{InsideTest, Sampling, TriMesh, validate};
 
 /// Two plates with a gap between them that is narrower than they are thick, joined at one side, in as few

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use medial::Vec3;
-use medial::geometry::{BvhError, SignedDistance, TriangleBvh, WindingTree};
+use medial::surface::{BvhError, SignedDistance, TriangleBvh, WindingTree};
 use medial::surface::{GeneralisedWinding, InsideTest, Side, TriMesh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

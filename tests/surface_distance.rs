@@ -1,9 +1,9 @@
 //! Distances between surfaces against closed forms and brute force.
 
 use medial::Vec3;
-use medial::geometry::TriangleBvh;
 use medial::metrics::{DistanceOptions, SurfaceDistances, surface_distances};
 use medial::surface::TriMesh;
+use medial::surface::TriangleBvh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

@@ -7,8 +7,8 @@ use medial::complex::{
     ContourError, MedialMesh, MedialUnion, Sphere, union_surface, union_surface_while,
     union_surface_within,
 };
-use medial::geometry::TriangleBvh;
 use medial::metrics::{EnvelopeOptions, sample_envelope, union_betti};
+use medial::surface::TriangleBvh;
 use medial::surface::{self, SurfaceReport};
 use proptest::prelude::*;
 

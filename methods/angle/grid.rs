@@ -19,11 +19,11 @@
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
-use medial::geometry::TriangleBvh;
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Extras, Level, RunContext, Simplification, Simplified, SimplifyError, Work,
 };
+use medial::surface::TriangleBvh;
 use medial::surface::{InsideTest, Side};
 use rayon::prelude::*;
 

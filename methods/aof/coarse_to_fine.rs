@@ -16,8 +16,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::nearby::{NearSet, NearbyTriangles};
 use medial::Vec3;
-use medial::geometry::{NearSet, NearbyTriangles};
 use medial::shape::Shape;
 use medial::simplifier::{RunContext, SimplifyError};
 use medial::surface::{InsideTest, Side};

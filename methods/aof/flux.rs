@@ -15,8 +15,8 @@
 //! The sum is divided by the number of all samples. Where the surface that is near is one plane,
 //! the gradient is the same everywhere, and need not be sampled.
 
+use super::nearby::{NearBatch, NearSet, NearbyTriangles};
 use medial::Vec3;
-use medial::geometry::{NearBatch, NearSet, NearbyTriangles};
 
 use super::spiral::Spiral;
 

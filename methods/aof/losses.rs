@@ -12,8 +12,8 @@
 
 use medial::Vec3;
 use medial::complex::{MedialUnion, Sphere as Ball};
-use medial::geometry::TriangleBvh;
 use medial::simplifier::SimplifyError;
+use medial::surface::TriangleBvh;
 
 use super::advice::SURELY;
 use super::bricks::{Bricks, Voxel};

@@ -71,6 +71,7 @@ mod flux;
 mod grid;
 mod lattice;
 mod losses;
+mod nearby;
 mod output;
 mod output_size;
 mod params;
@@ -86,12 +87,12 @@ mod voids;
 
 use std::sync::Arc;
 
-use medial::geometry::TriangleBvh;
 use medial::shape::Shape;
 use medial::simplifier::{
     Capability, Extras, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification,
     Simplified, SimplifyError,
 };
+use medial::surface::TriangleBvh;
 
 use count::Lattices;
 
@@ -102,6 +103,7 @@ pub use flux::{Probe, Sphere};
 pub use grid::Grid;
 pub use lattice::{LatticeVoxel, LatticeVoxels};
 pub use losses::Loss;
+pub use nearby::{NearBatch, NearPoint, NearSet, NearbyTriangles};
 pub use params::{AofParams, Dismiss, Start, Variant};
 pub use refine::{Refined, refine};
 pub use settings::{AofSettings, Auto};

@@ -17,10 +17,11 @@
 //! All of this happens in the sphere of the voxel, and needs the triangles near it alone. These
 //! are collected for all voxels, then for halves of them, and so on.
 
+use super::nearby::{NearBatch, NearSet, NearbyTriangles};
 use medial::Vec3;
 use medial::complex::Sphere as Ball;
-use medial::geometry::{NearBatch, NearSet, NearbyTriangles, TriangleBvh};
 use medial::simplifier::{RunContext, SimplifyError};
+use medial::surface::TriangleBvh;
 use rayon::prelude::*;
 
 use super::flux::Sphere;

@@ -2,9 +2,9 @@
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere as Ball, cubical_betti};
-use medial::geometry::TriangleBvh;
 use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::surface::TriangleBvh;
 
 use rayon::prelude::*;
 

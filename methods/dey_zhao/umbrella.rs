@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use medial::Vec3;
-use medial::geometry::{CellId, Delaunay, Sphere, VertexId, unbounded_directions};
+use medial::geometry::{CellId, Delaunay, Sphere, VertexId};
 use rayon::prelude::*;
 use wide::u32x4;
 
@@ -196,7 +196,7 @@ fn with_poles(
             }
         }
     }
-    for (v, direction) in unbounded_directions(delaunay) {
+    for (v, direction) in delaunay.unbounded_directions() {
         with_poles[of_sample[v.index()] as usize].pole_vector = direction;
     }
     with_poles

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, UnionError};
-use medial::geometry::TriangleBvh;
 use medial::metrics::{EnvelopeOptions, MetricError, sample_envelope};
 use medial::simplifier::SimplifyError;
+use medial::surface::TriangleBvh;
 
 use super::params::Inside;
 

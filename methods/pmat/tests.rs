@@ -2,7 +2,8 @@
 
 use medial::Vec3;
 use medial::complex::collapse::{Candidate, CollapseComplex, CollapseQueue, Step};
-use medial::complex::{DisjointSets, MedialMesh, Sphere, betti, stability_ratio};
+use medial::complex::{MedialMesh, Sphere, betti, stability_ratio};
+use medial::geometry::DisjointSets;
 use proptest::prelude::*;
 
 use super::*;

@@ -1,8 +1,9 @@
 //! The initial error function of every sphere: slabs, cones of lone edges, boundary planes.
 
+use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH, stability_ratio};
-use medial::geometry::{Cone, ConeFrame, SlabPlanes, boundary_edge_normal};
+use medial::geometry::{Cone, ConeFrame, SlabPlanes};
 
 use super::params::{Boundary, QmatParams};
 use super::quadric::Quadric;
@@ -107,6 +108,16 @@ fn add_rim(
     }
 }
 
+/// Outward unit normal of the plane that closes a slab at its boundary edge `ends`: tangent to
+/// both balls, orthogonal to the slab's plane, facing away from `opposite`.
+///
+/// `None` when one ball holds the other or the three centres are collinear.
+fn boundary_edge_normal(ends: [Sphere; 2], opposite: Sphere) -> Option<Vec3> {
+    let frame = Cone::new(ends[0], ends[1]).frame()?;
+    let away = frame.across(ends[0].centre - opposite.centre)?;
+    Some(frame.normal(away))
+}
+
 /// The tangent planes of a slab; none where the face is so thin that its plane is rounding noise.
 fn slab_planes(spheres: [Sphere; 3]) -> Option<SlabPlanes> {
     let [a, b, c] = spheres.map(|m| m.centre);
@@ -135,5 +146,38 @@ fn k_boundary(a: Sphere, b: Sphere, params: &QmatParams) -> Option<(f64, f64)> {
         Boundary::Paper => Some((weight, 1.0)),
         Boundary::Legacy => Some((0.1 * weight, a.centre.distance(b.centre))),
         Boundary::None => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use medial::geometry::Slab;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+
+    #[test]
+    fn boundary_planes_close_slabs() {
+        let mut rng = Pcg64::seed_from_u64(7);
+        for _ in 0..2000 {
+            let [a, b, c] = [(); 3].map(|()| {
+                let centre = Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
+                Sphere::new(centre, rng.random::<f64>() * 0.5)
+            });
+            let Some(n) = boundary_edge_normal([a, b], c) else {
+                assert!(Cone::new(a, b).larger().is_some());
+                continue;
+            };
+            let (span, aside) = (b.centre - a.centre, c.centre - a.centre);
+            let turn = span.cross(aside).normalize();
+            assert!((n.length() - 1.0).abs() < 1e-13);
+            assert!((n.dot(span) + b.radius - a.radius).abs() < 1e-12);
+            assert!(n.dot(turn).abs() < 1e-9);
+            assert!(n.dot(aside - span * (aside.dot(span) / span.length_squared())) <= 0.0);
+        }
+        let line = [0.0, 1.0, 2.0].map(|x| Sphere::new(Vec3::X * x, 0.5));
+        assert_eq!(boundary_edge_normal([line[0], line[1]], line[2]), None);
+        assert_eq!(Slab::new(line).planes(), None);
     }
 }

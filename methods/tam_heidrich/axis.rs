@@ -2,10 +2,10 @@
 
 use medial::Vec3;
 use medial::complex::{Contacts, Incidence, MedialMesh, UnionAxis, betti};
-use medial::geometry::TriangleBvh;
 use medial::metrics::enclosed_volume;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::surface::TriangleBvh;
 
 use super::crust::AxisPoles;
 use super::duplicates::{DistinctBalls, tetrahedron};

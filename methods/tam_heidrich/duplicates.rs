@@ -12,7 +12,8 @@
 
 use medial::Vec3;
 use medial::complex::{CellSpheres, Sphere, UnionAxis};
-use medial::geometry::{CellId, Delaunay, shared_sample};
+use medial::geometry::predicates::{Sign, orient3d};
+use medial::geometry::{CellId, Delaunay, UnionVertex};
 use medial::shape::{Shape, ShapeError};
 
 /// Polar balls, each once.
@@ -100,6 +101,29 @@ impl DistinctBalls {
         };
         union.corners().iter().map(at).collect()
     }
+}
+
+/// The sample in which the three polar balls of a vertex meet on its side of their centres' plane:
+/// a key for `UnionBoundary::merge`. `None` if they have no sample in common there.
+///
+/// `centre` gives the centre of a ball, `samples` the samples that it passes through, and `position` that of
+/// a sample. Balls that were grown no longer pass through their samples.
+fn shared_sample<S: AsRef<[u32]>>(
+    vertex: &UnionVertex,
+    centre: impl Fn(u32) -> Vec3,
+    samples: impl Fn(u32) -> S,
+    position: impl Fn(u32) -> Vec3,
+) -> Option<u32> {
+    let lists = vertex.balls.map(&samples);
+    let [a, b, c] = lists.each_ref().map(AsRef::as_ref);
+    let [p, q, r] = vertex.balls.map(centre);
+    let distance = |s: &u32| position(*s).distance_squared(vertex.position);
+    a.iter()
+        .copied()
+        .filter(|s| b.contains(s) && c.contains(s))
+        // Three spheres meet in a point and its mirror image, so the side tells which.
+        .filter(|&s| orient3d(p, q, r, position(s)) != Sign::Negative)
+        .min_by(|s, t| distance(s).total_cmp(&distance(t)).then(s.cmp(t)))
 }
 
 /// For each finite cell whether it is an inner pole: no Voronoi vertex inside is farther from one of its

@@ -11,7 +11,7 @@
 
 use medial::complex::{Incidence, MedialMesh};
 
-use super::parts::kept_part;
+use super::kept::kept_part;
 
 /// The mesh without the triangles that `is_fin` names, as far as they can go; for each sphere of
 /// `mesh` the one that it went into; and how many of these triangles are left.

@@ -13,7 +13,7 @@
 
 use std::collections::VecDeque;
 
-use medial::complex::DisjointSets;
+use medial::geometry::DisjointSets;
 
 use super::parts::{Parts, Remaining};
 

@@ -83,6 +83,7 @@ mod crust;
 mod duplicates;
 mod fins;
 mod graph;
+mod kept;
 mod merge;
 mod params;
 mod parts;

@@ -21,9 +21,11 @@
 //!    of parts at each edge and vertex make the test of step 3 a comparison, and a removal linear in
 //!    the size of the part.
 
-use medial::complex::{DisjointSets, MedialMesh};
+use medial::complex::MedialMesh;
+use medial::geometry::DisjointSets;
 
 use super::axis::Axis;
+use super::kept::kept_part;
 
 /// What is left of an axis.
 #[derive(Clone)]
@@ -87,25 +89,6 @@ impl<'a> Remaining<'a> {
     pub(super) fn mesh(&self) -> MedialMesh {
         kept_part(&self.axis.mesh, &self.sphere_kept, &self.edge_kept, &self.face_kept)
     }
-}
-
-/// What is kept of a mesh, in its order. The sides of kept faces and the ends of kept edges are kept.
-pub(super) fn kept_part(
-    whole: &MedialMesh,
-    sphere_kept: &[bool],
-    edge_kept: &[bool],
-    face_kept: &[bool],
-) -> MedialMesh {
-    let mut mesh = whole.induced(sphere_kept);
-    let mut number = vec![u32::MAX; whole.spheres.len()];
-    let kept = (0..number.len()).filter(|&v| sphere_kept[v]);
-    kept.zip(0..).for_each(|(old, new)| number[old] = new);
-    let number = |v: u32| number[v as usize];
-    let edges = whole.edges.iter().zip(edge_kept).filter(|e| *e.1);
-    mesh.edges = edges.map(|(edge, _)| edge.map(number)).collect();
-    let faces = whole.faces.iter().zip(face_kept).filter(|f| *f.1);
-    mesh.faces = faces.map(|(face, _)| face.map(number)).collect();
-    mesh
 }
 
 /// The parts of what remained when it was decomposed, by their smallest triangle.

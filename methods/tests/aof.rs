@@ -2,14 +2,15 @@
 
 use medial::Vec3;
 use medial::complex::{betti, cubical_betti};
-use medial::geometry::{NearSet, NearbyTriangles, TriangleBvh};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
+use medial::surface::TriangleBvh;
 use medial::surface::{self, TriMesh};
 use medial_methods::aof::{
     self, AofParams, Axis, Descent, Grid, LatticeVoxels, Probe, Solid, Sphere, Spiral, Surface,
     Variant, Voxel, Wanted, refine,
 };
+use medial_methods::aof::{NearSet, NearbyTriangles};
 
 fn shape_of(mesh: &TriMesh) -> Shape {
     let report = surface::validate(mesh).expect("a solid");

@@ -246,7 +246,7 @@ fn the_power_crust_takes_the_poles_that_are_left() {
     let diagonal = shape.normalisation().diagonal;
     let volume = |poles: &RemainingPoles, outer| {
         let crust = poles.power_crust(&shape, outer).expect("a crust");
-        let report = surface::validate(&crust.triangles()).expect("a closed surface");
+        let report = surface::validate(&(&crust).into()).expect("a closed surface");
         report.volume.expect("closed") * diagonal.powi(3)
     };
     let poles = |result: &Simplified| result.extras.get::<RemainingPoles>().expect("poles").clone();

@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{BASELINES, Extra, read_lines};
 use crate::comparison::{Comparison, Entry, reached};
+use crate::error::ReportError;
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Mean, Metric};
 use crate::plots::{Plot, against_numbers};
 use crate::summary::CountSummary;
 use crate::tables::{Cell, Column, Row, Table};
 use crate::text::{grouped, significant};
-use crate::write::ReportError;
 
 /// A decimated surface, measured against the mesh that it was made of: one line of
 /// `baselines.jsonl`.

@@ -16,10 +16,10 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::comparison::Comparison;
+use crate::error::ReportError;
 use crate::plots::Plot;
 use crate::summary::CountSummary;
 use crate::tables::Table;
-use crate::write::ReportError;
 
 pub use baseline::Baseline;
 pub use stability::{AxisShift, NoiseRecord};

@@ -7,8 +7,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{Extra, ORACLES};
+use crate::error::ReportError;
 use crate::tables::{Cell, Column, Row, Table};
-use crate::write::ReportError;
 
 #[derive(Deserialize)]
 struct Oracles {

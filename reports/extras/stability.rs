@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{Extra, STABILITY, read_lines};
 use crate::comparison::Comparison;
+use crate::error::ReportError;
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Mean, Metric, SPIKE_RATIO, SPIKES};
 use crate::plots::{NoiseCurve, against_noise};
 use crate::record::Record;
 use crate::tables::{Cell, Column, Row, Table};
 use crate::text::{counted, grouped, significant};
-use crate::write::ReportError;
 
 /// One method at one level on one noisy surface: one line of `stability.jsonl`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

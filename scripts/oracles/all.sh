@@ -8,7 +8,7 @@
 #   scripts/oracles/all.sh [-m MESHES] [DIR]
 #
 # MESHES: a folder with meshes beside the built-in shapes [default: $MEDIAL_MESHES, if set]. Programs that are
-# there already can be named: MEDIAL, DISTANCE_ORACLE (examples/distance_oracle.rs), ORACLE_PYTHON.
+# there already can be named: MEDIAL, DISTANCE_ORACLE (src/bin/distance_oracle.rs), ORACLE_PYTHON.
 set -eu
 cd "$(dirname "$0")/../.."
 
@@ -46,8 +46,8 @@ has_cgal=yes
 [ -e /usr/include/CGAL/Polygon_mesh_processing/distance.h ] || has_cgal=
 
 # 1. Closest points, distances and inside tests on the same 100,000 queries.
-ours=${DISTANCE_ORACLE:-$target/release/examples/distance_oracle}
-if [ -z "${DISTANCE_ORACLE:-}" ]; then cargo build --quiet --release --example distance_oracle; fi
+ours=${DISTANCE_ORACLE:-$target/release/distance_oracle}
+if [ -z "${DISTANCE_ORACLE:-}" ]; then cargo build --quiet --release -p medial-oracles --bin distance_oracle; fi
 names=torus
 if [ -n "$meshes" ]; then names="torus $meshes/bear.off $meshes/abc_bracket.obj"; fi
 for name in $names; do

@@ -40,8 +40,8 @@ if [ ! "$work/delaunay_cgal" -nt scripts/oracles/delaunay_cgal.cpp ]; then
     g++ -std=c++17 -O3 -DNDEBUG -DCGAL_LINKED_WITH_TBB scripts/oracles/delaunay_cgal.cpp \
         -o "$work/delaunay_cgal" -ltbb -ltbbmalloc -lgmp -lmpfr -pthread
 fi
-cargo build --quiet --release --example delaunay_oracle
-ours=${CARGO_TARGET_DIR:-target}/release/examples/delaunay_oracle
+cargo build --quiet --release -p medial-oracles --bin delaunay_oracle
+ours=${CARGO_TARGET_DIR:-target}/release/delaunay_oracle
 
 status=0
 printf '%-18s %9s %10s %10s %7s %9s %9s\n' points cells 'medial s' 'CGAL s' ratio 'medial MB' 'CGAL MB'

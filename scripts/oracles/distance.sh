@@ -31,8 +31,8 @@ if [ ! "$work/distance_cgal" -nt scripts/oracles/distance_cgal.cpp ]; then
     g++ -std=c++17 -O3 -DNDEBUG scripts/oracles/distance_cgal.cpp -o "$work/distance_cgal" \
         -lgmp -lmpfr
 fi
-cargo build --quiet --release --example distance_oracle
-ours=${CARGO_TARGET_DIR:-target}/release/examples/distance_oracle
+cargo build --quiet --release -p medial-oracles --bin distance_oracle
+ours=${CARGO_TARGET_DIR:-target}/release/distance_oracle
 theirs=$work/distance_cgal
 
 # Best seconds of a file of runs: first those for the queries, then those before.

@@ -3,7 +3,7 @@
 //
 //   distance_cgal FILE MODE ANSWERS
 //
-// FILE and ANSWERS as in examples/distance_oracle.rs. Modes:
+// FILE and ANSWERS as in src/bin/distance_oracle.rs. Modes:
 //   closest         AABB_tree of triangles, exact predicates; its internal k-d tree gives the start
 //   closest-simple  the same with Simple_cartesian<double>
 //   closest-hinted  the same as closest-simple, queries along a Hilbert curve, each starting from the

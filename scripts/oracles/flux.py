@@ -2,7 +2,7 @@
 
     flux.py FILE ANSWERS THREADS ROUNDS [GUARD]
 
-FILE, FILE.voxels and ANSWERS as in methods/examples/flux_oracle.rs. All samples are asked in one
+FILE, FILE.voxels and ANSWERS as in src/bin/flux_oracle.rs. All samples are asked in one
 batched call of RaycastingScene (single precision), the opposites of fan samples in a second one. Fans
 are told from the primitive's barycentric coordinates. A voxel with a sample that single precision
 cannot decide (GUARD, a fraction of the diagonal; a closest point elsewhere at an equal distance, or one

@@ -49,10 +49,9 @@ if [ ! "$work/distance_cgal" -nt scripts/oracles/distance_cgal.cpp ]; then
     g++ -std=c++17 -O3 -DNDEBUG scripts/oracles/distance_cgal.cpp -o "$work/distance_cgal" \
         -lgmp -lmpfr
 fi
-cargo build --quiet --release --example distance_oracle
-cargo build --quiet --release -p medial-methods --example flux_oracle
-compare=$target/release/examples/distance_oracle
-ours=$target/release/examples/flux_oracle
+cargo build --quiet --release -p medial-oracles
+compare=$target/release/distance_oracle
+ours=$target/release/flux_oracle
 
 status=0
 for name in "$@"; do

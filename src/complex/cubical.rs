@@ -9,7 +9,7 @@
 //! Components are found over runs of voxels along `x` (J. Hoshen, R. Kopelman, "Percolation and
 //! cluster distribution", Physical Review B 14, 1976, doi:10.1103/PhysRevB.14.3438, on runs).
 
-use crate::disjoint::DisjointSets;
+use crate::geometry::DisjointSets;
 
 /// Betti numbers `[b0, b1, b2]` of the union of closed unit cubes at the given places, in any
 /// order, repetitions allowed.

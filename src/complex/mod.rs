@@ -29,5 +29,4 @@ pub use union_axis::{AxisFacet, AxisTally, UnionAxis};
 pub use voronoi::{CellSpheres, DualTriangulation, voronoi_medial_mesh};
 pub use voronoi_facets::VoronoiFacets;
 
-pub use crate::disjoint::DisjointSets;
 pub use crate::geometry::Sphere;

@@ -23,7 +23,7 @@
 use super::MedialMesh;
 use super::incidence::Incidence;
 use super::reduction::rank;
-use crate::disjoint::DisjointSets;
+use crate::geometry::DisjointSets;
 
 /// Betti numbers `[b0, b1, b2]` over `Z_2` of a medial mesh in canonical form: components,
 /// independent loops, voids.

@@ -20,7 +20,9 @@ use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
 use crate::Vec3;
 use crate::complex::{Contacts, MedialMesh, Sphere, VoronoiFacets};
-use crate::geometry::{CellId, Delaunay, TriangleBvh, morton_order};
+use crate::geometry::trees::morton_order;
+use crate::geometry::{CellId, Delaunay};
+use crate::surface::TriangleBvh;
 use crate::surface::{InsideTest, Side};
 
 /// Circumcentres closer to the surface than this count as outside, in units of the diagonal.

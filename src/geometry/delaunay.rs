@@ -23,7 +23,7 @@ use crate::Vec3;
 /// Dereferences to its [`Triangulation`], whose vertex ids are indices of the input points.
 ///
 /// ```
-/// use medial::{Vec3, geometry::delaunay::Delaunay};
+/// use medial_geometry::{Vec3, delaunay::Delaunay};
 ///
 /// let corners: Vec<Vec3> = (0..8u32)
 ///     .map(|i| Vec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)))
@@ -35,7 +35,7 @@ use crate::Vec3;
 ///     assert_eq!(centre, Vec3::splat(0.5));
 ///     assert!((radius - 0.75f64.sqrt()).abs() < 1e-15);
 /// }
-/// # Ok::<(), medial::geometry::triangulation::TriangulationError>(())
+/// # Ok::<(), medial_geometry::triangulation::TriangulationError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Delaunay {
@@ -85,6 +85,30 @@ impl Delaunay {
     /// The combinatorial triangulation alone.
     pub fn into_triangulation(self) -> Triangulation {
         self.triangulation
+    }
+
+    /// The hull's vertices, ascending, with the average direction of their cells' unbounded edges, of
+    /// unit length: where their first poles are.
+    pub fn unbounded_directions(&self) -> Vec<(VertexId, Vec3)> {
+        let mut normals: Vec<(VertexId, Vec3)> = Vec::with_capacity(3 * self.infinite_cell_count());
+        for cell in self.infinite_cells() {
+            let [a, b, c, _] = self.vertices(cell);
+            let [p, q, r] = [a, b, c].map(|v| self.point(v));
+            // Scaled first, so that the product of short edges does not underflow.
+            let (u, v) = (q - p, r - p);
+            let reach = u.abs().max_element().max(v.abs().max_element());
+            let normal = (u / reach).cross(v / reach).normalize_or_zero();
+            normals.extend([a, b, c].map(|v| (v, normal)));
+        }
+        // Stable, so that the sums are taken in the order of the cells.
+        normals.sort_by_key(|n| n.0);
+        normals
+            .chunk_by(|a, b| a.0 == b.0)
+            .map(|of_vertex| {
+                let sum: Vec3 = of_vertex.iter().map(|n| n.1).sum();
+                (of_vertex[0].0, sum.normalize_or(of_vertex[0].1))
+            })
+            .collect()
     }
 
     /// The position of a finite vertex.

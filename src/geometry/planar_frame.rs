@@ -17,10 +17,14 @@ const FLAT: f64 = 1e-15;
 
 /// A triangle in its own orthonormal frame. Segments and points are triangles of no height.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct PlanarFrame {
+pub struct PlanarFrame {
+    /// The corner `a`.
     pub origin: Vec3,
+    /// Unit vector along the base.
     pub x: Vec3,
+    /// Unit vector in the plane, towards the third corner.
     pub y: Vec3,
+    /// Unit normal.
     pub normal: Vec3,
     /// Length `L` of the base.
     pub length: f64,
@@ -32,10 +36,12 @@ pub(crate) struct PlanarFrame {
 
 /// The part of a triangle that holds its nearest point, in the corners' rotated order `a, b, c`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Part {
+pub enum Part {
+    /// The inside.
     Face,
     /// The side from this corner to the next.
     Side(usize),
+    /// This corner.
     Corner(usize),
 }
 
@@ -218,7 +224,7 @@ impl PlanarFrame {
 }
 
 /// The largest power of two that is not above a positive number; 1 for zero or infinity.
-pub(crate) fn power_of_two_below(value: f64) -> f64 {
+pub fn power_of_two_below(value: f64) -> f64 {
     if value.is_normal() { f64::from_bits(value.to_bits() & (0x7ff << 52)) } else { 1.0 }
 }
 
@@ -226,7 +232,7 @@ pub(crate) fn power_of_two_below(value: f64) -> f64 {
 ///
 /// The normal of a needle is a small difference of large products; a plain cross product would
 /// turn it by as much as the triangle is thin.
-pub(crate) fn accurate_cross(u: Vec3, v: Vec3) -> Vec3 {
+pub fn accurate_cross(u: Vec3, v: Vec3) -> Vec3 {
     Vec3::new(
         difference_of_products(u.y, v.z, u.z, v.y),
         difference_of_products(u.z, v.x, u.x, v.z),

@@ -57,7 +57,7 @@ pub struct PolarBall {
 /// The poles of all samples, and the polar balls.
 ///
 /// ```
-/// use medial::{Vec3, geometry::{Delaunay, Pole, Poles}};
+/// use medial_geometry::{Vec3, Delaunay, Pole, Poles};
 ///
 /// // The corners of a cube and the middle of its faces.
 /// let mut samples: Vec<Vec3> = (0..8u32)
@@ -70,7 +70,7 @@ pub struct PolarBall {
 /// assert_eq!(poles.of_sample(8).first, Some(Pole::Infinite(Vec3::X)));
 /// let inner = poles.inner_balls(|_| true);
 /// assert!(inner.iter().all(|ball| ball.sphere.radius < 1.0));
-/// # Ok::<(), medial::geometry::TriangulationError>(())
+/// # Ok::<(), medial_geometry::TriangulationError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Poles {
@@ -142,34 +142,10 @@ fn first_poles(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Vec<Option<Po
             }
         }
     }
-    for (v, direction) in unbounded_directions(delaunay) {
+    for (v, direction) in delaunay.unbounded_directions() {
         first[v.index()] = Some(Pole::Infinite(direction));
     }
     first
-}
-
-/// The hull's vertices, ascending, with the average direction of their cells' unbounded edges, of
-/// unit length: where their first poles are.
-pub fn unbounded_directions(delaunay: &Delaunay) -> Vec<(VertexId, Vec3)> {
-    let mut normals: Vec<(VertexId, Vec3)> = Vec::with_capacity(3 * delaunay.infinite_cell_count());
-    for cell in delaunay.infinite_cells() {
-        let [a, b, c, _] = delaunay.vertices(cell);
-        let [p, q, r] = [a, b, c].map(|v| delaunay.point(v));
-        // Scaled first, so that the product of short edges does not underflow.
-        let (u, v) = (q - p, r - p);
-        let reach = u.abs().max_element().max(v.abs().max_element());
-        let normal = (u / reach).cross(v / reach).normalize_or_zero();
-        normals.extend([a, b, c].map(|v| (v, normal)));
-    }
-    // Stable, so that the sums are taken in the order of the cells.
-    normals.sort_by_key(|n| n.0);
-    normals
-        .chunk_by(|a, b| a.0 == b.0)
-        .map(|of_vertex| {
-            let sum: Vec3 = of_vertex.iter().map(|n| n.1).sum();
-            (of_vertex[0].0, sum.normalize_or(of_vertex[0].1))
-        })
-        .collect()
 }
 
 /// Step 2.

@@ -34,12 +34,11 @@ use rayon::prelude::*;
 use super::triangulation::{CellId, VertexId};
 use super::{Regular, Sphere, TriangulationError};
 use crate::Vec3;
-use crate::surface::{Contraction, Folds, TriMesh, contract_short_edges_while};
 
 /// The facets of the power diagram that separate inner from outer balls.
 ///
 /// ```
-/// use medial::{Vec3, geometry::{PowerCrust, Sphere}, surface};
+/// use medial_geometry::{PowerCrust, Sphere, Vec3};
 ///
 /// // A ball, and six as large around it: the crust is the cube between them.
 /// let inner = [Sphere::new(Vec3::ZERO, 1.0)];
@@ -48,9 +47,15 @@ use crate::surface::{Contraction, Folds, TriMesh, contract_short_edges_while};
 ///     axes.into_iter().flat_map(|a| [a, -a]).map(|a| Sphere::new(2.0 * a, 1.0)).collect();
 /// let crust = PowerCrust::new(&inner, &outer)?;
 /// assert_eq!(crust.facet_count(), 6);
-/// let report = surface::validate(&crust.triangles())?;
-/// assert_eq!(report.genus, Some(0));
-/// assert!((report.volume.unwrap() - 8.0).abs() < 1e-12);
+/// let volume: f64 = crust
+///     .triangles()
+///     .iter()
+///     .map(|face| {
+///         let [a, b, c] = face.map(|corner| crust.corners()[corner as usize]);
+///         a.cross(b).dot(c) / 6.0
+///     })
+///     .sum();
+/// assert!((volume - 8.0).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -152,32 +157,13 @@ impl PowerCrust {
     }
 
     /// Step 3: the crust as triangles, on the same corners.
-    pub fn triangles(&self) -> TriMesh {
+    pub fn triangles(&self) -> Vec<[u32; 3]> {
         let mut faces = Vec::with_capacity(self.rings.len() - 2 * self.facet_count());
         for facet in 0..self.facet_count() {
             let ring = self.facet(facet);
             faces.extend(ring[1..].windows(2).map(|pair| [ring[0], pair[0], pair[1]]));
         }
-        TriMesh { vertices: self.corners.clone(), faces }
-    }
-
-    /// The crust as triangles, with corners at one position merged along the edges between them.
-    /// Corners nearer than `coincident`, in the unit of the balls, are at one position; above the level of
-    /// rounding, which flat groups of balls amplify to some 1e-8 of the diagonal, any value well below
-    /// the distance of samples will do.
-    pub fn surface(&self, coincident: f64) -> Contraction {
-        self.surface_while(coincident, || true).expect("nobody stops it")
-    }
-
-    /// [`PowerCrust::surface`] for as long as `go_on` says so, which is asked every few thousand edges;
-    /// `None` if it was stopped.
-    pub fn surface_while(
-        &self,
-        coincident: f64,
-        go_on: impl FnMut() -> bool,
-    ) -> Option<Contraction> {
-        let limits = vec![coincident; self.corners.len()];
-        contract_short_edges_while(&self.triangles(), &limits, Folds::Ignored, go_on)
+        faces
     }
 }
 

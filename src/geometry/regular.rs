@@ -19,7 +19,7 @@ use crate::Vec3;
 /// whose power cell is empty is *hidden*: it is no vertex.
 ///
 /// ```
-/// use medial::{Vec3, geometry::regular::Regular};
+/// use medial_geometry::{Vec3, regular::Regular};
 ///
 /// let mut points = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
 /// points.push(Vec3::splat(0.25));
@@ -28,7 +28,7 @@ use crate::Vec3;
 /// let hidden = Regular::new(&points, &[0.0, 0.0, 0.0, 0.0, -1.0])?;
 /// assert_eq!(hidden.finite_cell_count(), 1);
 /// assert_eq!(hidden.hidden()[0].index(), 4);
-/// # Ok::<(), medial::geometry::triangulation::TriangulationError>(())
+/// # Ok::<(), medial_geometry::triangulation::TriangulationError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Regular {

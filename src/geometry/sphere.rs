@@ -1,11 +1,10 @@
 //! The sphere, its signed distance, and the answer type shared by sphere, cone and slab.
 
-use serde::{Deserialize, Serialize};
-
 use crate::Vec3;
 
 /// A medial sphere `m = (c, r)`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sphere {
     /// Centre `c`.
     pub centre: Vec3,

@@ -75,13 +75,3 @@ impl ConeFrame {
         [self.v, self.w, -self.v, -self.w].map(|across| self.normal(across))
     }
 }
-
-/// Outward unit normal of the plane that closes a slab at its boundary edge `ends`: tangent to
-/// both balls, orthogonal to the slab's plane, facing away from `opposite`.
-///
-/// `None` when one ball holds the other or the three centres are collinear.
-pub fn boundary_edge_normal(ends: [Sphere; 2], opposite: Sphere) -> Option<Vec3> {
-    let frame = super::Cone::new(ends[0], ends[1]).frame()?;
-    let away = frame.across(ends[0].centre - opposite.centre)?;
-    Some(frame.normal(away))
-}

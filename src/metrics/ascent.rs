@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use super::pose::Pose;
 use crate::Vec3;
 use crate::complex::MedialUnion;
-use crate::geometry::TriangleBvh;
+use crate::surface::TriangleBvh;
 
 /// So many seeds are followed to the end.
 const LAST_SEEDS: usize = 6;

@@ -20,8 +20,8 @@ use super::lifted_axis::{LiftedAxis, lifted};
 use super::{AxisDistances, AxisSpan, MetricError, SheetCoverage};
 use crate::Vec3;
 use crate::complex::{MedialMesh, UnionError};
-use crate::disjoint::DisjointSets;
-use crate::geometry::TriangleBvh;
+use crate::geometry::DisjointSets;
+use crate::surface::TriangleBvh;
 
 /// Distance, in the unit of the axes, within which a point of a sheet is covered.
 pub const COVERED: f64 = 0.01;

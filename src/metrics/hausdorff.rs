@@ -34,9 +34,9 @@ use super::pose::Pose;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
 use crate::geometry::TriangulationError;
-use crate::geometry::{BvhError, TriangleBvh};
 use crate::sum::Sum;
 use crate::surface::TriMesh;
+use crate::surface::{BvhError, TriangleBvh};
 
 /// How densely to sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

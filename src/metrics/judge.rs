@@ -13,7 +13,7 @@ use super::{
     topology_warning, triangle_quality,
 };
 use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
-use crate::geometry::TriangleBvh;
+use crate::surface::TriangleBvh;
 use crate::surface::{InsideTest, Side, TriMesh};
 
 /// Mean error from which radii that do not fit the surface are named. Below, the result is right

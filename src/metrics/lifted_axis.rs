@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::Vec3;
 use crate::complex::Sphere;
-use crate::geometry::{Bounds, Node, Plan, Search, Tree};
+use crate::geometry::trees::{Bounds, Node, Plan, Search, Tree};
 
 /// Squared sine of the angle of two sides below which a triangle is measured by its sides alone.
 const THIN: f64 = 1e-24;

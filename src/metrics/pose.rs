@@ -27,7 +27,7 @@ use rayon::prelude::*;
 
 use crate::Vec3;
 use crate::complex::MedialMesh;
-use crate::geometry::morton_code;
+use crate::geometry::trees::morton_code;
 use crate::sum::Sum;
 use crate::surface::TriMesh;
 

@@ -39,8 +39,8 @@ mod tests {
     use super::*;
     use crate::Vec3;
     use crate::complex::{MedialUnion, Sphere};
-    use crate::geometry::TriangleBvh;
     use crate::surface::TriMesh;
+    use crate::surface::TriangleBvh;
 
     #[test]
     fn balls_that_leave_a_box() {

@@ -26,9 +26,8 @@
 use super::counts::degrees;
 use super::quality::{corners, extreme_angles};
 use super::{RatioSpikes, Spikes};
-use crate::complex::{
-    Contacts, DisjointSets, Incidence, MedialMesh, Sphere, ZERO_LENGTH, stability_ratio,
-};
+use crate::complex::{Contacts, Incidence, MedialMesh, Sphere, ZERO_LENGTH, stability_ratio};
+use crate::geometry::DisjointSets;
 use crate::geometry::separation_angle;
 
 /// The thresholds `tau` on the stability ratio.

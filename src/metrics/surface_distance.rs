@@ -18,8 +18,8 @@ use super::hausdorff::{DistanceOptions, MetricError, SEEDS, SurfaceSamples, high
 use super::pose::Pose;
 use crate::Vec3;
 use crate::complex::MedialMesh;
-use crate::geometry::TriangleBvh;
 use crate::surface::TriMesh;
+use crate::surface::TriangleBvh;
 
 /// Distances between a reference surface S and another surface T, in the unit of both.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,7 +49,7 @@ pub struct SurfaceDistances {
 ///
 /// ```
 /// use medial::Vec3;
-/// use medial::geometry::TriangleBvh;
+/// use medial::surface::TriangleBvh;
 /// use medial::metrics::{DistanceOptions, surface_distances};
 /// use medial::surface::TriMesh;
 ///

@@ -17,10 +17,11 @@ use super::MetricError;
 use super::pose::Pose;
 use crate::Vec3;
 use crate::complex::MedialUnion;
-use crate::geometry::{Sphere, TriangleBvh};
-use crate::hash::splitmix;
+use crate::geometry::Sphere;
+use crate::geometry::hash::splitmix;
 use crate::sum::Sum;
 use crate::surface::TriMesh;
+use crate::surface::TriangleBvh;
 
 /// How finely to divide space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use rstar::primitives::GeomWithData;
-use rstar::{PointDistance, RTree};
 
 use crate::Vec3;
 use crate::complex::{Contacts, MedialMesh};
+use crate::geometry::trees::PointTree;
 
 /// How far beyond the nearest one a sample still counts as touched.
 const REACH: f64 = 1.0 + 1e-3;
@@ -39,19 +38,14 @@ impl ContactSets {
     ///
     /// Cost `O((n + m) log m + output)`.
     pub(super) fn search(mesh: &MedialMesh, samples: &Arc<[Vec3]>) -> Self {
-        let points = samples.iter().enumerate();
-        let tree = RTree::bulk_load(
-            points.map(|(id, p)| GeomWithData::new(p.to_array(), id as u32)).collect(),
-        );
+        let tree = PointTree::new(samples);
         let found: Vec<Vec<u32>> = mesh
             .spheres
             .par_iter()
             .map(|s| {
-                let centre = s.centre.to_array();
-                let nearest = tree.nearest_neighbor(centre).map(|point| point.distance_2(&centre));
-                let reach = s.radius.min(nearest.map_or(0.0, f64::sqrt)) * REACH;
-                let near = tree.locate_within_distance(centre, reach * reach);
-                let mut ids: Vec<u32> = near.map(|point| point.data).collect();
+                let nearest = tree.nearest(s.centre).map_or(0.0, |(_, squared)| squared.sqrt());
+                let reach = s.radius.min(nearest) * REACH;
+                let mut ids = tree.within(s.centre, reach * reach);
                 ids.sort_unstable();
                 ids
             })

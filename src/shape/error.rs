@@ -1,7 +1,8 @@
 //! Why a substrate could not be built.
 
 use crate::complex::{CellSpheres, ComplexError};
-use crate::geometry::{BvhError, TriangulationError};
+use crate::geometry::TriangulationError;
+use crate::surface::BvhError;
 
 /// Why a substrate could not be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -30,14 +30,15 @@
 
 use std::sync::Arc;
 
-use rstar::RTree;
-
+use super::growing::Growing;
 use crate::Vec3;
 use crate::complex::{
     CellSpheres, DualTriangulation, MedialMesh, MedialUnion, VoronoiFacets, betti,
     voronoi_medial_mesh,
 };
-use crate::geometry::{Delaunay, TriangleBvh, TriangulationError};
+use crate::geometry::trees::PointTree;
+use crate::geometry::{Delaunay, TriangulationError};
+use crate::surface::TriangleBvh;
 use crate::surface::{InsideTest, Sampling, Side, TriMesh, sample};
 
 /// The error that is allowed, as a fraction of the bounding box's diagonal.
@@ -271,30 +272,23 @@ impl Refinement<'_> {
 
     /// Step 4: of some places, the worst first, new samples that are clear of each other.
     fn spread(&self, places: Vec<Place>, samples: &[Vec3]) -> Vec<Vec3> {
-        let array = |p: &Vec3| p.to_array();
-        let old = RTree::bulk_load(samples.iter().map(array).collect());
-        let mut new: RTree<[f64; 3]> = RTree::new();
-        let distance = |tree: &RTree<[f64; 3]>, p: Vec3| {
-            let nearest = tree.nearest_neighbor(p.to_array());
-            nearest.map_or(f64::INFINITY, |&q| p.distance(Vec3::from_array(q)))
-        };
-        let mut kept = Vec::new();
+        let old = PointTree::new(samples);
+        let distance = |p: Vec3| old.nearest(p).map_or(f64::INFINITY, |(_, d)| d.sqrt());
+        let mut new = Growing::default();
         for Place { mut point, clear } in places {
-            if distance(&new, point) < 0.5 * clear {
+            if new.distance(point) < 0.5 * clear {
                 continue;
             }
-            if distance(&old, point) < CLEAR * clear {
+            if distance(point) < CLEAR * clear {
                 let around = directions().map(|d| self.tree.closest(point + clear * d).point);
-                let farther =
-                    |a: &Vec3, b: &Vec3| distance(&old, *a).total_cmp(&distance(&old, *b));
+                let farther = |a: &Vec3, b: &Vec3| distance(*a).total_cmp(&distance(*b));
                 point = around.max_by(farther).unwrap_or(point);
             }
-            if distance(&old, point).min(distance(&new, point)) > CLEAR * clear {
-                new.insert(point.to_array());
-                kept.push(point);
+            if distance(point).min(new.distance(point)) > CLEAR * clear {
+                new.push(point);
             }
         }
-        kept
+        new.points
     }
 
     /// Points of the surface at which it is tested whether it is covered.

@@ -4,10 +4,10 @@ use super::error::{Fault, VertexName, counted};
 use super::intersect::{Intersections, intersections};
 use super::mesh::{Normalisation, TriMesh};
 use super::orient::{self, Shell};
-use super::predicates::Unit;
 use super::repair::Repaired;
 use super::report::SurfaceReport;
 use super::topology::Topology;
+use super::unit::Unit;
 use crate::Vec3;
 use crate::sum::Sum;
 

@@ -21,11 +21,11 @@
 
 use std::ops::ControlFlow;
 
-use super::boxes::bounds;
 use super::mesh::TriMesh;
-use super::predicates::{Point2, Sign, Unit, orient2d, orient3d, project, projection_axis};
+use super::unit::Unit;
 use crate::Vec3;
-use crate::geometry::{Bounds, Plan, Tree, WideTree, in_morton_order};
+use crate::geometry::predicates::{Point2, Sign, orient2d, orient3d, project, projection_axis};
+use crate::geometry::trees::{Bounds, Plan, Tree, WideTree, in_morton_order};
 
 /// Triangles of a leaf.
 const LEAF: usize = 4;
@@ -155,7 +155,7 @@ impl InsideTest {
         self.tree.above(p, |places| {
             places.into_iter().try_for_each(|place| {
                 let triangle = self.triangles[place as usize];
-                let (lo, hi) = bounds(triangle);
+                let Bounds { lo, hi } = Bounds::of_points(triangle);
                 if !in_column(lo, hi) {
                     return ControlFlow::Continue(());
                 }
@@ -174,11 +174,12 @@ fn crossing(triangle: [Vec3; 3], low: f64, p: Vec3) -> Option<Crossing> {
     let looks_up = crossed_by_column(triangle, p);
     if p.z >= low {
         let [a, b, c] = triangle;
+        // Positive on the side that the face looks at.
         let height = orient3d(a, b, c, p);
         if height.is_zero() && contains(triangle, p) {
             return Some(Crossing::On);
         }
-        return (looks_up * height.value() > 0).then_some(Crossing::Above(looks_up));
+        return (looks_up * height.value() < 0).then_some(Crossing::Above(looks_up));
     }
     (looks_up != 0).then_some(Crossing::Above(looks_up))
 }
@@ -223,7 +224,7 @@ fn contains(triangle: [Vec3; 3], p: Vec3) -> bool {
         }),
         // A segment or a point: within its box, so on it if on its line, seen along every axis.
         None => {
-            let (lo, hi) = bounds(triangle);
+            let Bounds { lo, hi } = Bounds::of_points(triangle);
             (0..3).all(|axis| {
                 orient2d(
                     project(lo_end(triangle), axis),

@@ -17,9 +17,9 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use super::boxes::{BoxTree, bounds};
-use super::predicates::{Point2, Sign, orient2d, orient3d, project, projection_axis};
 use crate::Vec3;
+use crate::geometry::predicates::{Point2, Sign, orient2d, orient3d, project, projection_axis};
+use crate::geometry::trees::{Bounds, Node, Plan, Tree};
 
 /// The intersecting pairs of a mesh.
 #[derive(Debug, Default)]
@@ -45,7 +45,7 @@ const MOST_OF_ONE: usize = 10_000;
 /// Finds all intersections. `O(F log F + pairs)`, but gives up, and says so, after a number of
 /// tests that no surface of practical use needs.
 ///
-/// `points` are scaled as [`super::predicates::Unit`] does.
+/// `points` are scaled as [`super::unit::Unit`] does.
 pub(super) fn intersections(
     points: &[Vec3],
     faces: &[[u32; 3]],
@@ -57,7 +57,7 @@ pub(super) fn intersections(
         .map(|face| projection_axis(corners(face)).is_none())
         .collect();
     let solid = (0..faces.len() as u32).filter(|&face| !flat[face as usize]);
-    let tree = BoxTree::new(solid.map(|face| (face, corners(face))));
+    let tree = BoxTree::new(solid.collect(), corners);
     let mut found = Intersections {
         complete: true,
         degenerate_faces: flat.iter().filter(|&&f| f).count(),
@@ -86,6 +86,24 @@ pub(super) fn intersections(
     found
 }
 
+/// Faces with the boxes around them, in leaf order, so that a query reads memory in one direction.
+struct BoxTree {
+    tree: Tree,
+    ids: Vec<u32>,
+    triangles: Vec<[Vec3; 3]>,
+}
+
+impl BoxTree {
+    fn new(faces: Vec<u32>, corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
+        let boxes = faces.iter().map(|&face| (Bounds::of_points(corners(face)), 0.0));
+        let plan = Plan { max_leaf: 4, group: 1, padding: 0.0 };
+        let tree = Tree::build(&boxes.collect::<Vec<_>>(), plan);
+        let ids: Vec<u32> = tree.order().iter().map(|&item| faces[item as usize]).collect();
+        let triangles = ids.iter().map(|&face| corners(face)).collect();
+        Self { tree, ids, triangles }
+    }
+}
+
 /// What one face contributes: pairs with faces of larger index.
 struct Partial {
     pairs: usize,
@@ -97,19 +115,17 @@ struct Partial {
 
 fn meets(tree: &BoxTree, item: usize, faces: &[[u32; 3]], component: &[u32]) -> Partial {
     let (face, triangle) = (tree.ids[item], tree.triangles[item]);
-    let (lo, hi) = bounds(triangle);
-    let overlaps = |l: Vec3, h: Vec3| l.cmple(hi).all() && h.cmpge(lo).all();
+    let own = Bounds::of_points(triangle);
     let mut part = Partial { pairs: 0, tests: 0, first: None, complete: true, components: vec![] };
-    tree.visit(overlaps, |other_item| {
+    let mut look_at = |other_item: usize| {
         let (other, other_triangle) = (tree.ids[other_item], tree.triangles[other_item]);
-        let (l, h) = bounds(other_triangle);
         part.tests += 1;
         if part.tests > MOST_OF_ONE {
             part.complete = false;
             return ControlFlow::Break(());
         }
         if other <= face
-            || !overlaps(l, h)
+            || !own.overlaps(&Bounds::of_points(other_triangle))
             || !faces_meet(faces[face as usize], triangle, faces[other as usize], other_triangle)
         {
             return ControlFlow::Continue(());
@@ -122,7 +138,9 @@ fn meets(tree: &BoxTree, item: usize, faces: &[[u32; 3]], component: &[u32]) -> 
             part.components.push(pair);
         }
         ControlFlow::Continue(())
-    });
+    };
+    let overlaps = |_: usize, node: &Node| node.bounds.overlaps(&own);
+    tree.tree.descend(overlaps, |places| places.into_iter().try_for_each(&mut look_at));
     part
 }
 

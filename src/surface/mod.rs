@@ -9,7 +9,6 @@
 //! a reason to refuse (intersecting faces, faces without area), is in its [`SurfaceReport`].
 //! Every sign that a decision depends on is computed exactly.
 
-mod boxes;
 mod check;
 mod contract;
 mod eliminate;
@@ -21,15 +20,18 @@ mod mend;
 mod mesh;
 mod nesting;
 mod orient;
-mod predicates;
+mod power_crust;
 mod read;
 mod repair;
 mod report;
 mod sample;
 mod separate;
+mod signed_distance;
 mod soup;
 mod topology;
+mod triangles;
 mod triangulate;
+mod unit;
 mod winding;
 mod write;
 
@@ -42,9 +44,12 @@ pub use error::{Fault, Place, SurfaceError, VertexName};
 pub use inside::{InsideTest, Side};
 pub use mend::{Components, MendOptions, mend, mend_bytes};
 pub use mesh::{Normalisation, TriMesh};
+pub use power_crust::{crust_surface, crust_surface_while};
 pub use read::Format;
 pub use report::{Repair, SurfaceReport};
 pub use sample::{ParseSamplingError, Sampling, sample};
+pub use signed_distance::SignedDistance;
+pub use triangles::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree};
 pub use winding::GeneralisedWinding;
 pub use write::write;
 

@@ -10,7 +10,7 @@
 use std::ops::ControlFlow;
 
 use super::inside::{Crossing, InsideTest};
-use super::predicates::Unit;
+use super::unit::Unit;
 use crate::Vec3;
 
 /// A closed surface in components.

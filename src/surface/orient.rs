@@ -8,9 +8,9 @@
 
 use super::intersect::Intersections;
 use super::nesting::{self, Parts, TooManyNested};
-use super::predicates::Unit;
 use super::report::Repair;
 use super::topology::Topology;
+use super::unit::Unit;
 use crate::Vec3;
 use crate::sum::Sum;
 

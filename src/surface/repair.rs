@@ -17,11 +17,11 @@
 use std::collections::HashMap;
 
 use super::error::Fault;
-use super::predicates::Unit;
 use super::report::Repair;
 use super::soup::PolygonSoup;
 use super::topology::Topology;
 use super::triangulate::Triangulator;
+use super::unit::Unit;
 use crate::Vec3;
 
 /// A triangle mesh with what was done to get it. Its faces may still be of any kind but for

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::eliminate::eliminate;
 use super::mesh::TriMesh;
-use super::predicates::Unit;
+use super::unit::Unit;
 use crate::Vec3;
 use crate::sum::Sum;
 

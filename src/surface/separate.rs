@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use super::report::Repair;
 use crate::Vec3;
-use crate::disjoint::DisjointSets;
+use crate::geometry::DisjointSets;
 
 /// Share of the way to the mean of its rim by which a tip is drawn back.
 const STEP: f64 = 1e-3;

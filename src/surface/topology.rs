@@ -4,7 +4,7 @@
 //! the same vertices are neighbours if no third one is; they agree on the orientation if they run
 //! in opposite directions.
 
-use crate::disjoint::DisjointSets;
+use crate::geometry::DisjointSets;
 
 /// Adjacency, defects and components of a triangle mesh, whatever its defects.
 #[derive(Debug)]

@@ -13,8 +13,8 @@
 //! All turns are decided by exact predicates. A hole joined to the outline by a doubled edge
 //! (the same vertices twice) is cut correctly.
 
-use super::predicates::{Point2, Sign, orient2d, project};
 use crate::Vec3;
+use crate::geometry::predicates::{Point2, Sign, orient2d, project};
 
 /// What cutting polygons has cost and met.
 #[derive(Debug)]

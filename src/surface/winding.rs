@@ -24,16 +24,16 @@ use std::ops::ControlFlow;
 
 use super::inside::{Crossing, InsideTest, perturbed_turn};
 use super::mesh::TriMesh;
-use super::predicates::Unit;
+use super::unit::Unit;
 use crate::Vec3;
-use crate::geometry::in_morton_order;
+use crate::geometry::trees::in_morton_order;
 
 /// Generalised winding numbers of a mesh: 1 inside and 0 outside a closed outward-oriented surface,
 /// fractions near holes; points above 1/2 count as inside.
 ///
 /// The time of a query is that of [`InsideTest`] and a few tens of nanoseconds for each boundary
 /// edge; soups of many separate triangles are better served by
-/// [`WindingTree`](crate::geometry::WindingTree), which approximates.
+/// [`WindingTree`](crate::surface::WindingTree), which approximates.
 ///
 /// ```
 /// use medial::Vec3;

@@ -3,6 +3,7 @@
 use medial::complex::MedialMesh;
 use medial::geometry::PowerCrust;
 use medial::shape::{Cost, Shape};
+use medial::surface;
 use serde_json::{Map, Value};
 
 use super::{Arguments, Made, Stages};
@@ -36,7 +37,7 @@ pub fn surface_of(
     let of_named = |message: String| Failure::input(format!("{}: {message}", named.display()));
     let (crust, lap) = Cost::of(|| {
         let crust = PowerCrust::new(&inner, &balls.outer)?;
-        Ok((crust.facet_count(), crust.surface(COINCIDENT)))
+        Ok((crust.facet_count(), surface::crust_surface(&crust, COINCIDENT)))
     });
     stages.add("reconstruct", lap);
     let (facets, mut crust) =

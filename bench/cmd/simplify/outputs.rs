@@ -114,7 +114,7 @@ impl Outputs {
         };
         let of_file = |why: String| Failure::input(format!("{}: {why}", path.display()));
         let crust = poles.power_crust(shape, outer).map_err(|error| of_file(error.to_string()))?;
-        let mut crust = crust.surface(COINCIDENT).mesh;
+        let mut crust = surface::crust_surface(&crust, COINCIDENT).mesh;
         if crust.faces.is_empty() {
             return Err(of_file("no pole is left: nothing to make a surface of".into()));
         }

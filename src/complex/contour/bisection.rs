@@ -16,7 +16,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use rayon::prelude::*;
 
 use crate::Vec3;
-use crate::hash::splitmix;
+use crate::geometry::hash::splitmix;
 
 /// The side of the cube is cut into so many steps of the integer grid that vertices are on.
 pub(super) const STEPS: u32 = 1 << 20;

@@ -22,7 +22,8 @@ mod tests;
 
 use super::{ComplexError, MedialMesh};
 use crate::Vec3;
-use crate::geometry::{Bounds, Cone, SlabFace, Sphere, in_morton_order};
+use crate::geometry::trees::{Bounds, in_morton_order};
+use crate::geometry::{Cone, SlabFace, Sphere};
 
 use coincident::Distinct;
 use parts::{Part, Parts, Shape};

@@ -5,13 +5,10 @@
 //! could matter by more than their errors is measured in double precision. A query too far away
 //! for single precision searches the tree of two children a node.
 
-use super::{NearestPrimitive, Primitive};
+use super::Primitive;
 use crate::Vec3;
-use crate::geometry::{
-    Bounds, Cone, ConeBlock, FaceBlock, Lanes, Plan, Query, ReachTree, SlabFace, Sphere, Tree,
-};
-
-use super::search::{Exactly, Nearest, Reading, UnionSearch};
+use crate::geometry::trees::{Bounds, ConeBlock, FaceBlock, Plan, ReachTree, Tree};
+use crate::geometry::{Cone, SlabFace, Sphere};
 
 /// More than the rounding errors of a bound and of a signed distance together, relative to the
 /// distances and lengths that they are computed from: the distance itself, the radius, and how far
@@ -23,7 +20,7 @@ pub(super) const ROUNDING: f64 = 32.0 * f64::EPSILON;
 const LEAF: usize = 12;
 
 /// Primitives measured together.
-const LANES: usize = 4;
+pub(super) const LANES: usize = 4;
 
 #[derive(Clone, Debug)]
 pub(super) enum Shape {
@@ -81,13 +78,13 @@ impl Part {
 /// The primitives of a union.
 #[derive(Clone, Debug)]
 pub(super) struct Parts {
-    tree: Tree,
-    quick: ReachTree,
+    pub tree: Tree,
+    pub quick: ReachTree,
     /// For each leaf of the quick tree its first block of each kind, and one more: those of the
     /// leaf after the last.
-    leaves: Vec<Leaf>,
-    cones: Vec<ConeBlock>,
-    faces: Vec<FaceBlock>,
+    pub leaves: Vec<Leaf>,
+    pub cones: Vec<ConeBlock>,
+    pub faces: Vec<FaceBlock>,
     /// In leaf order, in each leaf those without faces first.
     shapes: Vec<Shape>,
     /// In the order of the shapes.
@@ -98,13 +95,13 @@ pub(super) struct Parts {
 
 /// Where a leaf begins.
 #[derive(Clone, Copy, Debug)]
-struct Leaf {
+pub(super) struct Leaf {
     /// A node of the tree, to be searched in double precision, instead of blocks.
-    cluster: Option<u32>,
+    pub cluster: Option<u32>,
     /// Place of its first shape, and of its first face.
-    first: [u32; 2],
-    cone: u32,
-    face: u32,
+    pub first: [u32; 2],
+    pub cone: u32,
+    pub face: u32,
 }
 
 impl Parts {
@@ -189,70 +186,5 @@ impl Parts {
     #[inline]
     pub fn slack(&self) -> f64 {
         self.slack
-    }
-
-    /// The nearest primitive by a reading of the distance, and its place. Begins with the one at
-    /// `start`.
-    pub fn nearest<R: Reading>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
-        let mut search = Nearest::<R>::from(self, p, start);
-        self.search(&mut search);
-        search.answer()
-    }
-
-    /// Shows to a search all primitives within its limit, and some others.
-    #[inline]
-    pub fn search(&self, search: &mut impl UnionSearch) {
-        match self.quick.wide().query(search.point()) {
-            Some(query) => self.search_quickly(&query, search),
-            None => self.tree.search(&mut Exactly(search)),
-        }
-    }
-
-    #[inline]
-    fn search_quickly<S: UnionSearch>(&self, query: &Query, search: &mut S) {
-        let limit = query.signed_limit(search.limit());
-        self.quick.search(query, S::MEASURE, limit, |leaf, mut limit| {
-            let [here, next] = [self.leaves[leaf], self.leaves[leaf + 1]];
-            if let Some(node) = here.cluster {
-                self.tree.search_below(node as usize, &mut Exactly(search));
-                return query.signed_limit(search.limit());
-            }
-            let mut look = |first: u32, block: u32, signed: Lanes| {
-                let place = (first as usize) + LANES * block as usize;
-                limit = self.look(query, search, place, S::MEASURE.of(signed), limit);
-            };
-            for (block, cones) in (0..).zip(&self.cones[here.cone as usize..next.cone as usize]) {
-                look(here.first[0], block, cones.signed(query));
-            }
-            for (block, faces) in (0..).zip(&self.faces[here.face as usize..next.face as usize]) {
-                look(here.first[1], block, faces.signed(query));
-            }
-            limit
-        });
-    }
-
-    /// Shows the primitives from a place on to a search that are within a limit, and returns the
-    /// new one.
-    #[inline]
-    fn look<S: UnionSearch>(
-        &self,
-        query: &Query,
-        search: &mut S,
-        place: usize,
-        values: Lanes,
-        mut limit: f32,
-    ) -> f32 {
-        // What is no number may be within.
-        let mut near = !values.simd_gt(Lanes::splat(limit)).to_bitmask() & 0xf;
-        let values = values.to_array();
-        while near != 0 {
-            let lane = near.trailing_zeros() as usize;
-            near &= near - 1;
-            if values[lane] <= limit || values[lane].is_nan() {
-                search.look(place + lane);
-                limit = query.signed_limit(search.limit());
-            }
-        }
-        limit
     }
 }

@@ -4,9 +4,9 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::NearestPrimitive;
-use super::parts::{Parts, ROUNDING};
+use super::parts::{LANES, Parts, ROUNDING};
 use crate::Vec3;
-use crate::geometry::{Measure, Node, Search};
+use crate::geometry::trees::{Lanes, Measure, Node, Query, Search};
 
 /// A search among the primitives around a point.
 pub(super) trait UnionSearch {
@@ -21,6 +21,73 @@ pub(super) trait UnionSearch {
 
     /// Looks at the primitive at a place.
     fn look(&mut self, place: usize);
+}
+
+impl Parts {
+    /// The nearest primitive by a reading of the distance, and its place. Begins with the one at
+    /// `start`.
+    pub fn nearest<R: Reading>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
+        let mut search = Nearest::<R>::from(self, p, start);
+        self.search(&mut search);
+        search.answer()
+    }
+
+    /// Shows to a search all primitives within its limit, and some others.
+    #[inline]
+    pub fn search(&self, search: &mut impl UnionSearch) {
+        match self.quick.wide().query(search.point()) {
+            Some(query) => self.search_quickly(&query, search),
+            None => self.tree.search(&mut Exactly(search)),
+        }
+    }
+
+    #[inline]
+    fn search_quickly<S: UnionSearch>(&self, query: &Query, search: &mut S) {
+        let limit = query.signed_limit(search.limit());
+        self.quick.search(query, S::MEASURE, limit, |leaf, mut limit| {
+            let [here, next] = [self.leaves[leaf], self.leaves[leaf + 1]];
+            if let Some(node) = here.cluster {
+                self.tree.search_below(node as usize, &mut Exactly(search));
+                return query.signed_limit(search.limit());
+            }
+            let mut look = |first: u32, block: u32, signed: Lanes| {
+                let place = (first as usize) + LANES * block as usize;
+                limit = self.look(query, search, place, S::MEASURE.of(signed), limit);
+            };
+            for (block, cones) in (0..).zip(&self.cones[here.cone as usize..next.cone as usize]) {
+                look(here.first[0], block, cones.signed(query));
+            }
+            for (block, faces) in (0..).zip(&self.faces[here.face as usize..next.face as usize]) {
+                look(here.first[1], block, faces.signed(query));
+            }
+            limit
+        });
+    }
+
+    /// Shows the primitives from a place on to a search that are within a limit, and returns the
+    /// new one.
+    #[inline]
+    fn look<S: UnionSearch>(
+        &self,
+        query: &Query,
+        search: &mut S,
+        place: usize,
+        values: Lanes,
+        mut limit: f32,
+    ) -> f32 {
+        // What is no number may be within.
+        let mut near = !values.simd_gt(Lanes::splat(limit)).to_bitmask() & 0xf;
+        let values = values.to_array();
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize;
+            near &= near - 1;
+            if values[lane] <= limit || values[lane].is_nan() {
+                search.look(place + lane);
+                limit = query.signed_limit(search.limit());
+            }
+        }
+        limit
+    }
 }
 
 /// The same search in the tree of two children a node, in double precision.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::corners::Corners;
 use super::sectors::Sectors;
 use super::{AxisTally, NONE};
-use crate::disjoint::DisjointSets;
+use crate::geometry::DisjointSets;
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{CellId, Delaunay, VertexId};
 

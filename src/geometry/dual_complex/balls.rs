@@ -1,8 +1,8 @@
 //! Regular triangulations of balls whose centres need not span space.
 
 use crate::Vec3;
-use crate::geometry::predicates::MAX_COORDINATE;
-use crate::geometry::{Regular, Sphere, TriangulationError};
+use crate::predicates::MAX_COORDINATE;
+use crate::{Regular, Sphere, TriangulationError};
 
 /// Triangulates balls with their squared radii as weights, with four anchors after them if that
 /// is needed to span space.

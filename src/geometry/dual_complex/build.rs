@@ -5,12 +5,12 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::{Class, DualComplex, PAIRS};
-use crate::geometry::Regular;
-use crate::geometry::predicates::{
+use crate::Regular;
+use crate::predicates::{
     Sign, Site, edge_clearance, edge_size, tetrahedron_size, triangle_clearance, triangle_size,
     vertex_clearance,
 };
-use crate::geometry::triangulation::{CellId, Facet, VertexId};
+use crate::triangulation::{CellId, Facet, VertexId};
 
 /// The smallest number of cells that a thread takes.
 const GRAIN: usize = 1 << 10;

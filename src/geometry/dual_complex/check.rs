@@ -1,7 +1,7 @@
 //! Verification: closure under faces, and classes against cofaces.
 
 use super::{CellEdge, Class, DualComplex, PAIRS};
-use crate::geometry::triangulation::{CellId, Facet, VertexId};
+use crate::triangulation::{CellId, Facet, VertexId};
 
 /// The first violation that [`DualComplex::check`] met.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

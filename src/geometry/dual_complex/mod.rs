@@ -80,7 +80,7 @@ pub type CellEdge = (CellId, usize, usize);
 /// each cell and one for each ball.
 ///
 /// ```
-/// use medial::{Vec3, geometry::{DualComplex, Sphere}};
+/// use medial_geometry::{Vec3, DualComplex, Sphere};
 ///
 /// // A ring of six balls, each of which meets the next two.
 /// let ring: Vec<Sphere> = (0..6)
@@ -90,7 +90,7 @@ pub type CellEdge = (CellId, usize, usize);
 /// let complex = DualComplex::of_balls(&ring)?;
 /// assert_eq!(complex.counts(), [6, 6, 0, 0]);
 /// assert_eq!(complex.betti(), [1, 1, 0]);
-/// # Ok::<(), medial::geometry::TriangulationError>(())
+/// # Ok::<(), medial_geometry::TriangulationError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct DualComplex<'r> {

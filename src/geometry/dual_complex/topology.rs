@@ -7,7 +7,7 @@
 
 use super::{DualComplex, VertexId};
 use crate::disjoint::DisjointSets;
-use crate::geometry::triangulation::Facet;
+use crate::triangulation::Facet;
 
 /// The simplices of a dual complex as lists of balls: ascending in each simplex, the lists
 /// themselves in lexicographic order.

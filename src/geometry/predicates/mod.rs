@@ -18,6 +18,7 @@ mod filter;
 mod lanes;
 mod narrow;
 mod perturb;
+mod planar;
 mod power_exact;
 mod power_size;
 mod wide;
@@ -29,6 +30,7 @@ pub(crate) use filter::{
     Filter, Metric, Site, UNDERFLOW, Unweighted, Weighted, approximate_orientation,
 };
 pub(crate) use perturb::{in_conflict, in_conflict_given, lexicographic};
+pub use planar::{Point2, orient2d, project, projection_axis};
 pub(crate) use power_size::{
     edge_clearance, edge_size, tetrahedron_size, triangle_clearance, triangle_size,
     vertex_clearance,
@@ -51,8 +53,9 @@ pub enum Sign {
 }
 
 impl Sign {
+    /// The sign of a value; not a number counts as zero.
     #[inline]
-    fn of(x: f64) -> Self {
+    pub fn of(x: f64) -> Self {
         if x > 0.0 {
             Self::Positive
         } else if x < 0.0 {
@@ -60,6 +63,21 @@ impl Sign {
         } else {
             Self::Zero
         }
+    }
+
+    /// Whether it is zero.
+    pub fn is_zero(self) -> bool {
+        self == Self::Zero
+    }
+
+    /// -1, 0 or 1.
+    pub fn value(self) -> i32 {
+        self as i32
+    }
+
+    /// Whether the two are strictly on opposite sides.
+    pub fn opposes(self, other: Self) -> bool {
+        self.value() * other.value() < 0
     }
 }
 

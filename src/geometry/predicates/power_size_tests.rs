@@ -163,7 +163,7 @@ proptest! {
             prop_assert_eq!(edge_clearance([a, b], e), edge_clearance([b, a], e));
         }
         let [p, q, r] = [a, b, c].map(|s| crate::Vec3::from_array(s.p));
-        if !crate::geometry::predicates::collinear(p, q, r) {
+        if !crate::predicates::collinear(p, q, r) {
             prop_assert_eq!(triangle_clearance([a, b, c], e), triangle_clearance([b, c, a], e));
         }
     }

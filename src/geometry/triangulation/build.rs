@@ -27,9 +27,7 @@ use super::cells::{Cell, FRONTIER, Face, INFINITE, OPPOSITE};
 use super::error::TriangulationError;
 use super::stellate::{ABSENT, TABLE};
 use super::zone::{Candidate, FOREIGN, UNKNOWN, Wall};
-use crate::geometry::predicates::{
-    Filter, Metric, Sign, Site, approximate_orientation, sites_collinear,
-};
+use crate::predicates::{Filter, Metric, Sign, Site, approximate_orientation, sites_collinear};
 
 /// A walk in rounded arithmetic may turn in a circle; after this many steps it goes on exactly.
 const MAX_ROUNDED_STEPS: usize = 256;

@@ -2,7 +2,7 @@
 
 use super::cells::OPPOSITE;
 use super::{CellId, Facet, Triangulation, VertexId};
-use crate::geometry::predicates::{Filter, Metric, Sign, Site, in_conflict};
+use crate::predicates::{Filter, Metric, Sign, Site, in_conflict};
 
 /// The first violation that a check met.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -131,7 +131,7 @@ impl Triangulation {
 
     /// Checks every cell's orientation, and every facet's regularity against the vertex across it,
     /// exactly and with the perturbation.
-    pub(in crate::geometry) fn check_regularity<M: Metric>(
+    pub(crate) fn check_regularity<M: Metric>(
         &self,
         sites: &[Site],
         filter: Filter,
@@ -160,7 +160,7 @@ impl Triangulation {
     }
 
     /// Whether a site that is not a vertex of it is in conflict with a cell.
-    pub(in crate::geometry) fn conflicts<M: Metric>(
+    pub(crate) fn conflicts<M: Metric>(
         &self,
         sites: &[Site],
         filter: Filter,
@@ -184,7 +184,7 @@ impl Triangulation {
     /// position is strictly outside the convex hull.
     ///
     /// A walk for a position that is not a site climbs its power, too, and ends.
-    pub(in crate::geometry) fn walk(&self, sites: &[Site], start: CellId, p: &[f64; 3]) -> CellId {
+    pub(crate) fn walk(&self, sites: &[Site], start: CellId, p: &[f64; 3]) -> CellId {
         let mut cell = if self.is_infinite(start) { self.neighbours(start)[3] } else { start };
         loop {
             if self.is_infinite(cell) {

@@ -26,7 +26,7 @@ use super::cells::{Cell, FRONTIER, Face, MAX_CELLS, UNUSED};
 use super::error::TriangulationError;
 use super::zone::UNKNOWN;
 use crate::Vec3;
-use crate::geometry::predicates::{Metric, Site};
+use crate::predicates::{Metric, Site};
 
 /// About so many sites are tried on all cuts.
 const TRIED_SITES: usize = 512;

@@ -1,7 +1,7 @@
 //! What can be wrong with points that are to be triangulated.
 
 use crate::Vec3;
-use crate::geometry::predicates::MAX_COORDINATE;
+use crate::predicates::MAX_COORDINATE;
 
 /// Why points have no triangulation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -17,8 +17,8 @@ use std::cmp::Ordering;
 
 use rayon::prelude::*;
 
-use crate::geometry::predicates::{Site, lexicographic};
 use crate::hash::splitmix;
+use crate::predicates::{Site, lexicographic};
 
 /// Bits of a Hilbert index for each axis.
 const BITS: u32 = 16;

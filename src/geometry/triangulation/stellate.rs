@@ -4,7 +4,7 @@ use super::build::Builder;
 use super::cells::{Cell, Face, INFINITE, MAX_CELLS, UNUSED};
 use super::error::TriangulationError;
 use super::zone::UNKNOWN;
-use crate::geometry::predicates::Metric;
+use crate::predicates::Metric;
 
 /// Local number of a vertex that is not on the boundary of the conflict zone.
 pub(super) const ABSENT: u8 = u8::MAX;

@@ -7,7 +7,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::*;
 use crate::Vec3;
-use crate::geometry::predicates::{Unweighted, Weighted};
+use crate::predicates::{Unweighted, Weighted};
 
 /// Cells as sorted quadruples of input points.
 fn cell_set(t: &Triangulation) -> Vec<[VertexId; 4]> {

@@ -3,7 +3,7 @@
 use super::build::Builder;
 use super::cells::{Cell, FRONTIER, Face, INFINITE, OPPOSITE};
 use super::stellate::ABSENT;
-use crate::geometry::predicates::{Filter, Metric, Sign, Site, UNDERFLOW, in_conflict_given};
+use crate::predicates::{Filter, Metric, Sign, Site, UNDERFLOW, in_conflict_given};
 
 /// What is known of a cell while a conflict zone grows: nothing, tested or about to be, and in
 /// conflict. The last two are bits, the second never without the first.

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use crate::geometry::dual_complex::{CellEdge, Class, DualComplex};
-use crate::geometry::predicates::{Sign, orient3d, tetrahedron_size, triangle_clearance};
-use crate::geometry::triangulation::{CellId, Facet, VertexId};
+use crate::dual_complex::{CellEdge, Class, DualComplex};
+use crate::predicates::{Sign, orient3d, tetrahedron_size, triangle_clearance};
+use crate::triangulation::{CellId, Facet, VertexId};
 
 /// Pairs of vertices at the ends of arcs of length zero.
 ///

@@ -3,7 +3,6 @@
 use super::{UnionBoundary, UnionVertex};
 use crate::Vec3;
 use crate::disjoint::DisjointSets;
-use crate::geometry::predicates::{Sign, orient3d};
 
 /// Vertices of the boundary of a union of balls, each once.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,30 +93,4 @@ impl UnionBoundary {
             balls: pairs.into_iter().map(|pair| pair.1).collect(),
         }
     }
-}
-
-/// The sample in which the three polar balls of a vertex meet on its side of their centres' plane:
-/// a key for [`UnionBoundary::merge`]. `None` if they have no sample in common there.
-///
-/// `centre` gives the centre of a ball, `samples` the samples that it passes through, and `position` that of
-/// a sample. Balls that were grown no longer pass through their samples.
-///
-/// R. Tam, W. Heidrich: *Shape simplification based on the medial axis transform*, IEEE Visualization
-/// 2003, <https://doi.org/10.1109/VISUAL.2003.1250410>.
-pub fn shared_sample<S: AsRef<[u32]>>(
-    vertex: &UnionVertex,
-    centre: impl Fn(u32) -> Vec3,
-    samples: impl Fn(u32) -> S,
-    position: impl Fn(u32) -> Vec3,
-) -> Option<u32> {
-    let lists = vertex.balls.map(&samples);
-    let [a, b, c] = lists.each_ref().map(AsRef::as_ref);
-    let [p, q, r] = vertex.balls.map(centre);
-    let distance = |s: &u32| position(*s).distance_squared(vertex.position);
-    a.iter()
-        .copied()
-        .filter(|s| b.contains(s) && c.contains(s))
-        // Three spheres meet in a point and its mirror image, so the side tells which.
-        .filter(|&s| orient3d(p, q, r, position(s)) != Sign::Negative)
-        .min_by(|s, t| distance(s).total_cmp(&distance(t)).then(s.cmp(t)))
 }

@@ -23,7 +23,7 @@
 mod coincidence;
 mod merge;
 
-pub use merge::{MergedVertices, shared_sample};
+pub use merge::MergedVertices;
 
 use rayon::prelude::*;
 
@@ -47,7 +47,7 @@ pub struct UnionVertex {
 /// have them.
 ///
 /// ```
-/// use medial::{Vec3, geometry::{DualComplex, Sphere, UnionBoundary}};
+/// use medial_geometry::{Vec3, DualComplex, Sphere, UnionBoundary};
 ///
 /// let corners = [Vec3::ZERO, Vec3::new(6.0, 0.0, 0.0), Vec3::new(6.0, 8.0, 0.0), Vec3::new(0.0, 8.0, 0.0)];
 /// let balls = corners.map(|c| Sphere::new(c, 13.0));
@@ -59,7 +59,7 @@ pub struct UnionVertex {
 /// assert_eq!(merged.points().len(), 2);
 /// assert_eq!(merged.balls(0), [0, 1, 2, 3]);
 /// assert!(merged.points().iter().all(|p| p.distance(Vec3::new(3.0, 4.0, 12.0 * p.z.signum())) < 1e-14));
-/// # Ok::<(), medial::geometry::TriangulationError>(())
+/// # Ok::<(), medial_geometry::TriangulationError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct UnionBoundary {

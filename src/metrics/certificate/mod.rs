@@ -44,8 +44,9 @@ use serde::{Deserialize, Serialize};
 use super::MetricError;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, Primitive};
-use crate::geometry::{Cone, Slab, Sphere, TriangleBvh};
+use crate::geometry::{Cone, Slab, Sphere};
 use crate::surface::TriMesh;
+use crate::surface::TriangleBvh;
 
 use surface_side::SurfaceSide;
 use union_side::UnionSide;

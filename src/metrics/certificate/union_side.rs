@@ -6,8 +6,9 @@ use super::{Bound, Hulls, Side, WitnessSide, farthest, quartered};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion};
 use crate::geometry::planar_frame::PlanarFrame;
-use crate::geometry::{Cone, ConeFrame, Slab, Sphere, TriangleBvh};
+use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 use crate::surface::TriMesh;
+use crate::surface::TriangleBvh;
 
 /// A point of a primitive's surface that no primitive holds deeper than this is on the boundary
 /// of the union, up to rounding.

@@ -1,0 +1,559 @@
+//! Closest points for many queries close to each other: the few triangles that can matter are
+//! collected once, and handed down from a region to the regions inside it.
+//!
+//! 1. For a ball of radius `reach` around `c`, every closest point lies within `D(c) + 2 reach` of
+//!    `c`, with `D` the distance to the surface. The triangles that come so near are the
+//!    [`NearSet`] of the ball. The set of a ball inside it is a part of its set.
+//! 2. A triangle is convex: with `u` the unit vector from `c` to its closest point and `d` the
+//!    distance, it lies beyond the plane `(y - c) . u = d`. A query `p` is therefore at least
+//!    `d - (p - c) . u` away from it. Most triangles of a set need no more than this.
+//! 3. With `u0` and `D` those of the nearest triangle, and `w = p - c`, the closest point to `c` is at
+//!    most `D - u0 . w + e` away from `p`, `e = D - sqrt(D^2 - reach^2)`. By step 2 a triangle
+//!    matters only if `d <= D + |u - u0| reach + e`. That is far less than `D + 2 reach` on the side
+//!    where the nearest triangle is.
+//! 4. Queries are measured two at a time in double precision.
+//!
+//! Only the closest point inside the surface is of interest here, so features are told apart by
+//! what they do to the distance: a *fan* feature is an edge or vertex that is the closest point of
+//! a whole wedge of space, a concave one. Edges between coplanar faces, convex edges, and vertices
+//! without a concave edge are closest points of the planes beside them alone.
+
+use wide::f64x2;
+
+use medial::Vec3;
+use medial::geometry::planar_frame::{Part, PlanarFrame};
+use medial::surface::TriMesh;
+
+/// Sine of the dihedral deviation below which two faces are coplanar.
+const COPLANAR: f64 = 1e-7;
+
+/// How far the normals of triangles in one plane may be apart.
+const SAME_NORMAL: f64 = 1e-12;
+
+/// Triangles in their own frames, with the kinds of their sides and corners.
+#[derive(Clone, Debug)]
+pub struct NearbyTriangles {
+    frames: Vec<PlanarFrame>,
+    /// Bit `k`: side `k` is concave; bit `3 + k`: corner `k` ends a concave side. In the order of
+    /// the frame's corners.
+    fans: Vec<u8>,
+}
+
+/// The triangles that can hold the closest point of a query in a ball.
+#[derive(Clone, Debug, Default)]
+pub struct NearSet {
+    centre: Vec3,
+    /// Ascending triangles.
+    entries: Vec<Entry>,
+    /// Place of the nearest.
+    nearest: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    triangle: u32,
+    distance: f64,
+    /// Unit vector from the centre to the closest point, or zero.
+    toward: Vec3,
+}
+
+/// Where the closest point of a query lies, seen from inside the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NearPoint {
+    /// Distance from the query.
+    pub distance: f64,
+    /// Unit vector from the closest point to the query: the gradient of the distance; zero on the
+    /// surface.
+    pub gradient: Vec3,
+    /// Whether the closest point lies on a concave edge or vertex.
+    pub on_fan: bool,
+    /// The triangle.
+    pub triangle: u32,
+}
+
+/// Queries relative to the centre of a [`NearSet`], answered together; reused without allocation.
+#[derive(Clone, Debug, Default)]
+pub struct NearBatch {
+    points: Vec<[f64x2; 3]>,
+    answers: Vec<Answer>,
+    len: usize,
+}
+
+/// The best of two queries so far.
+#[derive(Clone, Copy, Debug)]
+struct Answer {
+    squared: f64x2,
+    /// Triangle, as a number.
+    triangle: f64x2,
+    /// Its gradient times the query, where the foot is inside the triangle.
+    along: f64x2,
+    /// All bits set where the foot is inside the triangle.
+    interior: f64x2,
+}
+
+/// No triangle yet, or none that is nearer than the given bound.
+const NONE: f64 = -1.0;
+
+impl NearbyTriangles {
+    /// The triangles of a closed, outward-oriented surface. `O(F log F)`.
+    ///
+    /// # Panics
+    /// If a face names a vertex that does not exist.
+    pub fn new(mesh: &TriMesh) -> Self {
+        let (frames, firsts): (Vec<_>, Vec<_>) =
+            (0..mesh.faces.len()).map(|f| PlanarFrame::new(mesh.triangle(f))).unzip();
+        let concave = concave_sides(mesh, &frames);
+        let mut concave_vertex = vec![false; mesh.vertices.len()];
+        for (face, sides) in mesh.faces.iter().zip(&concave) {
+            for k in (0..3).filter(|&k| sides[k]) {
+                concave_vertex[face[k] as usize] = true;
+                concave_vertex[face[(k + 1) % 3] as usize] = true;
+            }
+        }
+        let fans = (0..mesh.faces.len()).map(|f| {
+            (0..3).fold(0_u8, |bits, k| {
+                let corner = (firsts[f] + k) % 3;
+                let vertex = mesh.faces[f][corner] as usize;
+                bits | u8::from(concave[f][corner]) << k
+                    | u8::from(concave_vertex[vertex]) << (3 + k)
+            })
+        });
+        Self { fans: fans.collect(), frames }
+    }
+
+    /// Number of triangles.
+    pub fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
+    /// All triangles, as the set of a ball that is as large as need be. `O(F)`.
+    pub fn all(&self, centre: Vec3) -> NearSet {
+        let entries = (0..self.len()).map(|t| self.measure(t as u32, centre)).collect();
+        let mut set = NearSet { centre, entries, nearest: 0 };
+        set.find_nearest();
+        set
+    }
+
+    /// Makes `set` the set of the ball around `centre`, which must lie in the ball of `within`.
+    pub fn narrow(&self, within: &NearSet, centre: Vec3, reach: f64, set: &mut NearSet) {
+        set.centre = centre;
+        set.entries.clear();
+        set.nearest = 0;
+        let Some(first) = within.entries.get(within.nearest) else {
+            return;
+        };
+        let moved = centre - within.centre;
+        let bound = |entry: &Entry| entry.distance - entry.toward.dot(moved);
+        let mut best = self.measure(first.triangle, centre);
+        for entry in &within.entries {
+            if bound(entry) < best.distance {
+                let measured = self.measure(entry.triangle, centre);
+                if measured.distance < best.distance {
+                    best = measured;
+                }
+            }
+        }
+        // The same as for the entries of the new set, with what the old one knows of a triangle.
+        let relevant = Relevant::new(&best, reach);
+        let mut nearest = f64::INFINITY;
+        for entry in &within.entries {
+            if !relevant.may_be_nearest(bound(entry), entry.toward) {
+                continue;
+            }
+            let entry = self.measure(entry.triangle, centre);
+            if relevant.may_be_nearest(entry.distance, entry.toward) {
+                if entry.distance < nearest {
+                    (nearest, set.nearest) = (entry.distance, set.entries.len());
+                }
+                set.entries.push(entry);
+            }
+        }
+    }
+
+    #[inline]
+    fn measure(&self, triangle: u32, p: Vec3) -> Entry {
+        let (distance, away) = self.frames[triangle as usize].distance_and_direction(p);
+        Entry { triangle, distance, toward: -away }
+    }
+
+    /// Closest point of a triangle, and whether it lies on a fan feature.
+    fn foot(&self, triangle: u32, p: Vec3) -> (Vec3, bool) {
+        let frame = &self.frames[triangle as usize];
+        let fans = self.fans[triangle as usize];
+        let (part, t) = frame.nearest_part(p);
+        let corner = |k: usize| match k % 3 {
+            0 => frame.origin,
+            1 => frame.point(frame.length, 0.0),
+            _ => frame.point(frame.apex[0], frame.apex[1]),
+        };
+        match part {
+            Part::Face => {
+                let [x, y, _] = frame.local(p);
+                (frame.point(x, y), false)
+            }
+            Part::Side(k) => (corner(k).lerp(corner(k + 1), t), fans >> k & 1 == 1),
+            Part::Corner(k) => (corner(k), fans >> (3 + k) & 1 == 1),
+        }
+    }
+
+    /// The gradient of the distance in the whole ball, where all triangles of the set lie in one
+    /// plane. A closest point at their border would be one of a triangle beyond it too, which the
+    /// set would hold.
+    pub fn constant_gradient(&self, set: &NearSet) -> Option<Vec3> {
+        let frame = |entry: &Entry| &self.frames[entry.triangle as usize];
+        let own = frame(set.entries.get(set.nearest)?);
+        let height = own.local(set.centre)[2];
+        let in_plane = |other: &PlanarFrame| {
+            let apart = (other.origin - own.origin).dot(own.normal);
+            !other.is_flat()
+                && other.normal.distance_squared(own.normal) < SAME_NORMAL * SAME_NORMAL
+                && apart.abs() < SAME_NORMAL * height.abs()
+        };
+        let all = set.entries.iter().all(|entry| in_plane(frame(entry)));
+        all.then(|| own.normal * height.signum())
+    }
+
+    /// Answers a batch. Queries that have a bound keep it where no triangle of the set is nearer.
+    pub fn closest(&self, set: &NearSet, batch: &mut NearBatch) {
+        let Some(first) = set.entries.get(set.nearest) else {
+            return;
+        };
+        let frame = Spread::new(&self.frames[first.triangle as usize], set.centre);
+        for (point, answer) in batch.points.iter().zip(&mut batch.answers) {
+            frame.measure(point, f64::from(first.triangle), answer);
+        }
+        for (place, entry) in set.entries.iter().enumerate() {
+            if place != set.nearest {
+                self.closest_on(entry, set.centre, batch);
+            }
+        }
+    }
+
+    fn closest_on(&self, entry: &Entry, centre: Vec3, batch: &mut NearBatch) {
+        let frame = Spread::new(&self.frames[entry.triangle as usize], centre);
+        let toward = entry.toward.to_array().map(f64x2::splat);
+        let distance = f64x2::splat(entry.distance * (1.0 - 1e-12));
+        for (point, answer) in batch.points.iter().zip(&mut batch.answers) {
+            let bound = distance - dot(&toward, point);
+            let near = (bound.simd_le(f64x2::ZERO)) | (bound * bound).simd_le(answer.squared);
+            if near.any() {
+                frame.measure(point, f64::from(entry.triangle), answer);
+            }
+        }
+    }
+
+    /// What was found for query `k` of a batch, or `None` where its bound stood.
+    #[inline]
+    pub fn answer(&self, set: &NearSet, batch: &NearBatch, k: usize) -> Option<NearPoint> {
+        let (answer, lane) = (&batch.answers[k / 2], k % 2);
+        let triangle = answer.triangle.to_array()[lane];
+        if triangle < 0.0 {
+            return None;
+        }
+        let triangle = triangle as u32;
+        let distance = answer.squared.to_array()[lane].sqrt();
+        let p = set.centre + batch.point(k);
+        if answer.is_interior(lane) {
+            let frame = &self.frames[triangle as usize];
+            let height = frame.local(p)[2];
+            let gradient =
+                if distance == 0.0 { Vec3::ZERO } else { frame.normal * height.signum() };
+            return Some(NearPoint { distance, gradient, on_fan: false, triangle });
+        }
+        let (foot, on_fan) = self.foot(triangle, p);
+        let gradient = (p - foot).try_normalize().unwrap_or(Vec3::ZERO);
+        Some(NearPoint { distance, gradient, on_fan, triangle })
+    }
+
+    /// The sum of `gradient . query` over the queries, relative to the centre, whose closest points
+    /// are inside triangles. The other queries that have an answer go to `beside`.
+    #[inline]
+    pub fn sum_along(
+        &self,
+        set: &NearSet,
+        batch: &NearBatch,
+        mut beside: impl FnMut(usize, NearPoint),
+    ) -> f64 {
+        let (mut sum, mut single) = (f64x2::ZERO, 0.0);
+        for (pair, answer) in batch.answers.iter().enumerate() {
+            if answer.interior.all() && 2 * pair + 1 < batch.len {
+                sum += answer.along;
+                continue;
+            }
+            for k in 2 * pair..(2 * pair + 2).min(batch.len) {
+                if answer.is_interior(k % 2) {
+                    single += answer.along.to_array()[k % 2];
+                } else if let Some(near) = self.answer(set, batch, k) {
+                    beside(k, near);
+                }
+            }
+        }
+        let [even, odd] = sum.to_array();
+        even + odd + single
+    }
+
+    /// The closest point of the surface to a point of the ball, relative to its centre, if it is
+    /// nearer than `bound`, and its distance.
+    pub fn closest_within(&self, set: &NearSet, point: Vec3, bound: f64) -> Option<(Vec3, f64)> {
+        let p = set.centre + point;
+        let (mut best, mut found) = (bound, None);
+        for entry in &set.entries {
+            if entry.distance * (1.0 - 1e-12) - entry.toward.dot(point) < best {
+                let (distance, away) =
+                    self.frames[entry.triangle as usize].distance_and_direction(p);
+                if distance < best {
+                    best = distance;
+                    found = Some((p - away * distance, distance));
+                }
+            }
+        }
+        found
+    }
+
+    /// The closest point of query `k` of a batch.
+    pub fn closest_point(&self, set: &NearSet, batch: &NearBatch, k: usize) -> Option<Vec3> {
+        let near = self.answer(set, batch, k)?;
+        Some(self.foot(near.triangle, set.centre + batch.point(k)).0)
+    }
+}
+
+/// Step 3.
+struct Relevant {
+    /// `u0`.
+    toward: Vec3,
+    /// `D + e`, and `D + 2 reach`, with more than rounding can take.
+    limits: [f64; 2],
+    reach: f64,
+}
+
+impl Relevant {
+    fn new(nearest: &Entry, reach: f64) -> Self {
+        let d = nearest.distance;
+        let bent = if d > reach { d - (d * d - reach * reach).sqrt() } else { 2.0 * reach };
+        let slack = 1e-12 * (d + reach);
+        let limits = [d + bent + slack, d + 2.0 * reach + slack];
+        Self { toward: nearest.toward, limits, reach }
+    }
+
+    /// Whether a triangle beyond a plane with the normal `toward`, at `distance` from the centre,
+    /// may be nearest to a point of the ball.
+    #[inline]
+    fn may_be_nearest(&self, distance: f64, toward: Vec3) -> bool {
+        let beyond = distance - self.limits[0];
+        let turned = self.reach * self.reach * toward.distance_squared(self.toward);
+        beyond <= 0.0 || (distance <= self.limits[1] && beyond * beyond <= turned)
+    }
+}
+
+impl NearSet {
+    /// Distance of the centre to the surface.
+    pub fn distance(&self) -> f64 {
+        self.entries.get(self.nearest).map_or(f64::INFINITY, |entry| entry.distance)
+    }
+
+    /// The centre of the ball.
+    pub fn centre(&self) -> Vec3 {
+        self.centre
+    }
+
+    /// Number of triangles.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    fn find_nearest(&mut self) {
+        self.nearest = 0;
+        for (place, entry) in self.entries.iter().enumerate() {
+            if entry.distance < self.entries[self.nearest].distance {
+                self.nearest = place;
+            }
+        }
+    }
+}
+
+impl NearBatch {
+    /// Forgets all queries.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        self.answers.clear();
+        self.len = 0;
+    }
+
+    /// Adds a query, relative to the centre of the set that it will be asked of. Triangles at
+    /// `bound` or farther will not be looked for; infinity for no bound.
+    pub fn push(&mut self, point: Vec3, bound: f64) {
+        let lane = self.len % 2;
+        if lane == 0 {
+            self.points.push(point.to_array().map(f64x2::splat));
+            self.answers.push(Answer::bounded(f64x2::splat(bound * bound)));
+        } else {
+            let last = self.len / 2;
+            for (axis, value) in point.to_array().into_iter().enumerate() {
+                let [even, _] = self.points[last][axis].to_array();
+                self.points[last][axis] = f64x2::new([even, value]);
+            }
+            let [even, _] = self.answers[last].squared.to_array();
+            self.answers[last] = Answer::bounded(f64x2::new([even, bound * bound]));
+        }
+        self.len += 1;
+    }
+
+    /// The same queries once more, without bounds.
+    pub fn reset(&mut self) {
+        self.answers.fill(Answer::bounded(f64x2::splat(f64::INFINITY)));
+    }
+
+    /// Number of queries.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no query.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Whether a triangle was found for query `k` that is nearer than its bound.
+    #[inline]
+    pub fn is_nearer(&self, k: usize) -> bool {
+        self.answers[k / 2].triangle.to_array()[k % 2] >= 0.0
+    }
+
+    /// Query `k`, relative to the centre.
+    pub fn point(&self, k: usize) -> Vec3 {
+        let [x, y, z] = self.points[k / 2].map(|axis| axis.to_array()[k % 2]);
+        Vec3::new(x, y, z)
+    }
+}
+
+impl Answer {
+    fn bounded(squared: f64x2) -> Self {
+        let none = f64x2::splat(NONE);
+        Self { squared, triangle: none, along: f64x2::ZERO, interior: f64x2::ZERO }
+    }
+
+    #[inline]
+    fn is_interior(&self, lane: usize) -> bool {
+        self.interior.to_bitmask() >> lane & 1 == 1
+    }
+}
+
+fn dot(a: &[f64x2; 3], b: &[f64x2; 3]) -> f64x2 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A frame in both lanes, its origin relative to the centre of a set.
+struct Spread {
+    /// Coordinates of the origin along the frame's own axes.
+    origin: [f64x2; 3],
+    axes: [[f64x2; 3]; 3],
+    length: f64x2,
+    apex: [f64x2; 2],
+    reciprocal: [f64x2; 2],
+    flat: bool,
+}
+
+impl Spread {
+    #[inline]
+    fn new(frame: &PlanarFrame, centre: Vec3) -> Self {
+        let axes = [frame.x, frame.y, frame.normal];
+        let offset = frame.origin - centre;
+        let [cx, cy] = frame.apex;
+        Self {
+            origin: axes.map(|axis| f64x2::splat(offset.dot(axis))),
+            axes: axes.map(|axis| axis.to_array().map(f64x2::splat)),
+            length: f64x2::splat(frame.length),
+            apex: [f64x2::splat(cx), f64x2::splat(cy)],
+            reciprocal: frame.reciprocal().map(f64x2::splat),
+            flat: frame.is_flat(),
+        }
+    }
+
+    /// [`PlanarFrame::distance_squared`] in both lanes: the least of the distances to the sides
+    /// unless the foot is inside.
+    #[inline]
+    fn measure(&self, point: &[f64x2; 3], triangle: f64, answer: &mut Answer) {
+        let [x, y, height] = [0, 1, 2].map(|axis| dot(&self.axes[axis], point) - self.origin[axis]);
+        let [cx, cy] = self.apex;
+        let zero = f64x2::ZERO;
+        let over = height * height;
+        let beyond = self.length - x;
+        let across = cx - self.length;
+        let inside = if self.flat {
+            zero
+        } else {
+            let left = cy * x - cx * y;
+            let right = cy * beyond + across * y;
+            y.simd_ge(zero) & left.simd_ge(zero) & right.simd_ge(zero)
+        };
+        let squared = if inside.all() {
+            over
+        } else {
+            let past = x - x.fast_max(zero).fast_min(self.length);
+            let base = past * past + y * y;
+            let along = |start: f64x2, run: f64x2, reciprocal: f64x2| {
+                let t = (start * run + y * cy) * reciprocal;
+                let t = t.fast_max(zero).fast_min(f64x2::ONE);
+                let (dx, dy) = (start - t * run, y - t * cy);
+                dx * dx + dy * dy
+            };
+            let sides = along(x, cx, self.reciprocal[0])
+                .fast_min(along(-beyond, across, self.reciprocal[1]))
+                .fast_min(base);
+            over + inside.bitselect(zero, sides)
+        };
+        let nearer = squared.simd_lt(answer.squared);
+        if nearer.any() {
+            answer.squared = nearer.bitselect(squared, answer.squared);
+            answer.triangle = nearer.bitselect(f64x2::splat(triangle), answer.triangle);
+            // On the surface there is no gradient.
+            let along = (height + self.origin[2]).flip_signs(height) & height.simd_ne(zero);
+            answer.along = nearer.bitselect(along, answer.along);
+            answer.interior = nearer.bitselect(inside, answer.interior);
+        }
+    }
+}
+
+/// For each face and side `k`, from corner `k` on, whether the surface is concave there.
+fn concave_sides(mesh: &TriMesh, frames: &[PlanarFrame]) -> Vec<[bool; 3]> {
+    let mut sides: Vec<([u32; 2], u32, u8)> = Vec::with_capacity(3 * mesh.faces.len());
+    for (face, corners) in (0..).zip(&mesh.faces) {
+        for k in 0..3_u8 {
+            let (a, b) = (corners[usize::from(k)], corners[(usize::from(k) + 1) % 3]);
+            sides.push(([a.min(b), a.max(b)], face, k));
+        }
+    }
+    sides.sort_unstable();
+    let mut concave = vec![[false; 3]; mesh.faces.len()];
+    for edge in sides.chunk_by(|a, b| a.0 == b.0) {
+        let is_concave = match *edge {
+            [(_, f, k), (_, g, _)] => {
+                let corners = mesh.faces[f as usize];
+                let at = |k: u8| mesh.vertices[corners[usize::from(k) % 3] as usize];
+                let along = (at(k + 1) - at(k)).normalize_or_zero();
+                let [n, m] = [f, g].map(|face| frames[face as usize].normal);
+                let sine = n.cross(m).dot(along);
+                sine < -COPLANAR || (sine <= COPLANAR && n.dot(m) < 0.0)
+            }
+            _ => true,
+        };
+        for &(_, face, k) in edge {
+            concave[face as usize][usize::from(k)] = is_concave;
+        }
+    }
+    concave
+}
+
+#[cfg(test)]
+#[path = "nearby_tests.rs"]
+mod tests;

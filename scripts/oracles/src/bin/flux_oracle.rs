@@ -1,0 +1,180 @@
+//! One side of the comparison of closest points and fluxes with CGAL and Open3D, driven by
+//! `scripts/oracles/flux.sh`.
+//!
+//! ```text
+//! flux_oracle make NAME RESOLUTION COUNT FILE
+//!     every so many voxels of the start set of a built-in shape or mesh file, COUNT of them, with the
+//!     samples of their spheres: FILE as in distance_oracle.rs, and
+//!     FILE.voxels: number of voxels and samples, sigma, centres (f64)
+//! flux_oracle run FILE ANSWERS
+//!     closest points of the samples (x, y, z, distance) into ANSWERS, fluxes into ANSWERS.flux
+//! flux_oracle time NAME RESOLUTION
+//!     seconds of the whole flux at one level, voxels, samples
+//! flux_oracle points NAME SIGMA X Y Z ...
+//!     for each point, in input units: D, closest point, flux through a sphere of radius SIGMA
+//! ```
+#![allow(clippy::print_stdout)]
+
+use std::error::Error;
+use std::time::Instant;
+
+use medial::Vec3;
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::RunContext;
+use medial::surface::{self, TriMesh};
+use medial_methods::aof::{AofParams, Probe, Solid, Sphere, Spiral, Surface, Variant, Wanted};
+use medial_methods::aof::{NearBatch, NearSet, NearbyTriangles};
+
+/// Samples of the finest level.
+const SAMPLES: usize = 50;
+
+type Outcome = Result<(), Box<dyn Error>>;
+
+fn main() -> Outcome {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    match args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["make", name, resolution, count, file] => {
+            make(name, resolution.parse()?, count.parse()?, file)
+        }
+        ["run", file, answers] => run(file, answers),
+        ["time", name, resolution] => time(name, resolution.parse()?),
+        ["points", name, sigma, ref rest @ ..] => {
+            let numbers: Result<Vec<f64>, _> = rest.iter().map(|word| word.parse()).collect();
+            points(name, sigma.parse()?, &numbers?)
+        }
+        _ => {
+            Err("usage: flux_oracle make | run | time | points; see the head of its source".into())
+        }
+    }
+}
+
+fn mesh(name: &str) -> Result<TriMesh, Box<dyn Error>> {
+    Ok(match medial_datasets::find(name) {
+        Some(shape) => shape.mesh(shape.default_resolution),
+        None => surface::read(name)?.mesh,
+    })
+}
+
+fn shape(name: &str) -> Result<Shape, Box<dyn Error>> {
+    let mesh = mesh(name)?;
+    let report = surface::validate(&mesh)?;
+    Ok(Shape::new(name, &mesh, report, ShapeOptions::default())?)
+}
+
+fn solid(shape: &Shape) -> Solid<'_> {
+    let surface =
+        Surface { triangles: NearbyTriangles::new(shape.mesh()), inside: shape.inside_test() };
+    let params = AofParams {
+        levels: 1,
+        samples: SAMPLES.to_string(),
+        variant: Variant::Plain,
+        ..AofParams::default()
+    };
+    Solid::new(shape, surface, params, RunContext::default())
+}
+
+fn make(name: &str, resolution: u32, count: usize, file: &str) -> Outcome {
+    let shape = shape(name)?;
+    let solid = solid(&shape);
+    let grid = solid.grid(resolution);
+    let start = solid.descend(resolution, Wanted::Places)?.voxels;
+    let step = (start.len() / count).max(1);
+    let centres: Vec<Vec3> = start.iter().step_by(step).map(|v| grid.centre(v.place)).collect();
+    let sphere = Sphere::new(Spiral::EqualArea, SAMPLES, grid.side);
+    let samples: Vec<Vec3> = centres
+        .iter()
+        .flat_map(|&c| sphere.directions.iter().map(move |&n| c + n * sphere.radius))
+        .collect();
+    let mesh = shape.mesh();
+    let mut task = Vec::new();
+    for number in [mesh.vertices.len(), mesh.faces.len(), samples.len()] {
+        task.extend((number as u64).to_le_bytes());
+    }
+    task.extend(bytes(mesh.vertices.iter().flat_map(|v| v.to_array())));
+    task.extend(mesh.faces.iter().flatten().flat_map(|v| v.to_le_bytes()));
+    for _ in 0..3 {
+        task.extend(bytes(samples.iter().flat_map(|p| p.to_array())));
+    }
+    std::fs::write(file, task)?;
+    let head = [centres.len() as f64, SAMPLES as f64, grid.side];
+    let voxels = head.into_iter().chain(centres.iter().flat_map(|c| c.to_array()));
+    std::fs::write(format!("{file}.voxels"), bytes(voxels))?;
+    Ok(())
+}
+
+fn bytes(numbers: impl Iterator<Item = f64>) -> Vec<u8> {
+    numbers.flat_map(f64::to_le_bytes).collect()
+}
+
+fn numbers(bytes: &[u8]) -> Vec<f64> {
+    let number = |c: &[u8]| f64::from_le_bytes(c.try_into().unwrap_or_default());
+    bytes.chunks_exact(8).map(number).collect()
+}
+
+fn run(file: &str, answers: &str) -> Outcome {
+    let task = std::fs::read(file)?;
+    let count = |k: usize| {
+        u64::from_le_bytes(task[8 * k..8 * k + 8].try_into().unwrap_or_default()) as usize
+    };
+    let (vertices, faces) = (count(0), count(1));
+    let vector = |c: &[f64]| Vec3::new(c[0], c[1], c[2]);
+    let points = numbers(&task[24..24 + 24 * vertices]);
+    let ids = &task[24 + 24 * vertices..24 + 24 * vertices + 12 * faces];
+    let id = |c: &[u8]| u32::from_le_bytes([c[0], c[1], c[2], c[3]]);
+    let mesh = TriMesh {
+        vertices: points.chunks_exact(3).map(vector).collect(),
+        faces: ids.chunks_exact(12).map(|c| [id(c), id(&c[4..]), id(&c[8..])]).collect(),
+    };
+    let voxels = numbers(&std::fs::read(format!("{file}.voxels"))?);
+    let sphere = Sphere::new(Spiral::EqualArea, voxels[1] as usize, voxels[2]);
+    let triangles = NearbyTriangles::new(&mesh);
+    let mut probe = Probe::new(&sphere);
+    let (mut set, mut batch) = (NearSet::default(), NearBatch::default());
+    let (mut closest, mut fluxes) = (Vec::new(), Vec::new());
+    let whole = triangles.all(Vec3::ZERO);
+    for centre in voxels[3..].chunks_exact(3).map(vector) {
+        triangles.narrow(&whole, centre, sphere.radius, &mut set);
+        fluxes.push(probe.flux(&triangles, &set));
+        batch.clear();
+        for &n in &sphere.directions {
+            // As the samples were written, so that both sides ask for the same points.
+            batch.push((centre + n * sphere.radius) - centre, f64::INFINITY);
+        }
+        triangles.closest(&set, &mut batch);
+        for k in 0..batch.len() {
+            let point = triangles.closest_point(&set, &batch, k).ok_or("no triangle")?;
+            let near = triangles.answer(&set, &batch, k).ok_or("no triangle")?;
+            closest.extend([point.x, point.y, point.z, near.distance]);
+        }
+    }
+    std::fs::write(answers, bytes(closest.into_iter()))?;
+    std::fs::write(format!("{answers}.flux"), bytes(fluxes.into_iter()))?;
+    Ok(())
+}
+
+fn time(name: &str, resolution: u32) -> Outcome {
+    let shape = shape(name)?;
+    let solid = solid(&shape);
+    let (clock, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+    let tally = solid.descend(resolution, Wanted::Kept)?.tally;
+    let (wall, cpu) = (clock.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+    println!("{wall:.4} {cpu:.4} {} {SAMPLES}", tally.evaluated.iter().sum::<u64>());
+    Ok(())
+}
+
+fn points(name: &str, sigma: f64, numbers: &[f64]) -> Outcome {
+    let triangles = NearbyTriangles::new(&mesh(name)?);
+    let sphere = Sphere::new(Spiral::EqualArea, SAMPLES, sigma);
+    let mut probe = Probe::new(&sphere);
+    let mut set = NearSet::default();
+    for c in numbers.chunks_exact(3) {
+        let centre = Vec3::new(c[0], c[1], c[2]);
+        triangles.narrow(&triangles.all(centre), centre, sigma, &mut set);
+        let mut own = NearBatch::default();
+        own.push(Vec3::ZERO, f64::INFINITY);
+        triangles.closest(&set, &mut own);
+        let point = triangles.closest_point(&set, &own, 0).ok_or("no triangle")?;
+        println!("{} {point} {}", set.distance(), probe.flux(&triangles, &set));
+    }
+    Ok(())
+}

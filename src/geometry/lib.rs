@@ -1,0 +1,74 @@
+//! Exact triangulations of points and balls, and exact distances to what balls span.
+//!
+//! | module or type | holds |
+//! |---|---|
+//! | [`Delaunay`], [`Regular`] | triangulations of any points, degenerate ones too, with or without weights |
+//! | [`DualComplex`], [`UnionBoundary`] | the alpha complex of balls, and the vertices of their union's boundary |
+//! | [`Poles`], [`PowerCrust`] | polar balls of a sample, and the surface between inner and outer balls |
+//! | [`Sphere`], [`Cone`], [`Slab`] | signed distances to a ball and to the hulls of two and of three |
+//! | [`trees`] | box trees: best first, overlapping, four boxes at a time in single precision |
+//! | [`predicates`] | signs that no rounding can turn |
+//!
+//! Coordinates are `f64`, in any one unit; every sign that a decision depends on is computed exactly, and
+//! ties are broken by symbolic perturbation, so that four points on a circle or all points of a lattice are
+//! no special case. The same input gives the same output with any number of threads.
+//!
+//! ```
+//! use medial_geometry::{Delaunay, Vec3};
+//!
+//! // The corners of a cube: one sphere through all eight.
+//! let corners: Vec<Vec3> = (0..8)
+//!     .map(|k| Vec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64))
+//!     .collect();
+//! let delaunay = Delaunay::new(&corners)?;
+//! let volume: f64 = delaunay
+//!     .finite_cells()
+//!     .map(|cell| {
+//!         let [a, b, c, d] = delaunay.vertices(cell).map(|v| delaunay.point(v));
+//!         (b - a).cross(c - a).dot(d - a).abs() / 6.0
+//!     })
+//!     .sum();
+//! assert!((volume - 1.0).abs() < 1e-15);
+//! # Ok::<(), medial_geometry::TriangulationError>(())
+//! ```
+
+mod cone;
+pub mod delaunay;
+mod disjoint;
+pub mod dual_complex;
+mod enclosing;
+pub mod hash;
+pub mod planar_frame;
+pub mod poles;
+pub mod power_crust;
+pub mod predicates;
+pub mod regular;
+mod separation;
+mod slab;
+mod sphere;
+mod tangent_planes;
+pub mod trees;
+pub mod triangulation;
+pub mod union_boundary;
+
+pub use cone::Cone;
+pub use delaunay::Delaunay;
+pub use disjoint::DisjointSets;
+pub use dual_complex::DualComplex;
+pub use enclosing::enclosing_ball;
+pub use poles::{PolarBall, Pole, Poles, SamplePoles};
+pub use power_crust::PowerCrust;
+pub use regular::Regular;
+pub use separation::separation_angle;
+pub use slab::{Slab, SlabFace};
+pub use sphere::{HullFoot, Sphere};
+pub use tangent_planes::{ConeFrame, SlabPlanes};
+pub use triangulation::{CellId, TriangulationError, VertexId};
+pub use union_boundary::{MergedVertices, UnionBoundary, UnionVertex};
+
+/// A point or a vector in space, double precision.
+pub type Vec3 = glam::DVec3;
+
+#[cfg(doctest)]
+#[doc = include_str!("README.md")]
+struct Readme;

@@ -1,0 +1,373 @@
+//! Signed distances to sphere, cone and slab against brute force, over all degenerate classes.
+
+use medial_geometry::Vec3;
+use medial_geometry::{Cone, Slab, SlabFace, Sphere};
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+type Spheres = Vec<Sphere>;
+
+fn vector(rng: &mut Pcg64) -> Vec3 {
+    Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0
+}
+
+fn unit(rng: &mut Pcg64) -> Vec3 {
+    loop {
+        if let Some(v) = vector(rng).try_normalize() {
+            return v;
+        }
+    }
+}
+
+/// Minimum of a convex function on [0, 1], ends included.
+fn golden(f: impl Fn(f64) -> f64, steps: usize) -> f64 {
+    let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
+    let (mut lo, mut hi) = (0.0, 1.0);
+    let (mut a, mut b) = (hi - ratio * (hi - lo), lo + ratio * (hi - lo));
+    let (mut fa, mut fb) = (f(a), f(b));
+    let mut best = f(0.0).min(f(1.0)).min(fa).min(fb);
+    for _ in 0..steps {
+        if fa < fb {
+            (hi, b, fb) = (b, a, fa);
+            a = hi - ratio * (hi - lo);
+            fa = f(a);
+        } else {
+            (lo, a, fa) = (a, b, fb);
+            b = lo + ratio * (hi - lo);
+            fb = f(b);
+        }
+        best = best.min(fa).min(fb);
+    }
+    best
+}
+
+/// The objective `|p - c(a)| - r(a)`, minimised by nested golden sections: both levels are convex.
+fn brute_force(spheres: &[Sphere], p: Vec3) -> f64 {
+    let edge = |a: Sphere, b: Sphere| golden(|t| a.lerp(b, t).signed_distance(p), 90);
+    match *spheres {
+        [a] => a.signed_distance(p),
+        [a, b] => edge(a, b),
+        [a, b, c] => golden(|t| edge(a.lerp(c, t), b.lerp(c, t)), 90),
+        _ => unreachable!("one to three spheres"),
+    }
+}
+
+fn signed(spheres: &[Sphere], p: Vec3) -> f64 {
+    match *spheres {
+        [a] => a.signed_distance(p),
+        [a, b] => Cone::new(a, b).signed_distance(p),
+        [a, b, c] => Slab::new([a, b, c]).signed_distance(p),
+        _ => unreachable!("one to three spheres"),
+    }
+}
+
+/// Largest coordinate or radius: the unit of the tolerances.
+fn scale(spheres: &[Sphere], p: Vec3) -> f64 {
+    spheres
+        .iter()
+        .map(|m| m.centre.abs().max_element().max(m.radius))
+        .fold(p.abs().max_element(), f64::max)
+}
+
+fn sphere(rng: &mut Pcg64) -> Sphere {
+    Sphere::new(vector(rng), rng.random())
+}
+
+/// A generic pair, narrow enough to have a lateral surface.
+fn tapered(rng: &mut Pcg64) -> [Sphere; 2] {
+    let a = sphere(rng);
+    let c = vector(rng);
+    let growth = (rng.random::<f64>() * 1.8 - 0.9) * a.centre.distance(c);
+    [a, Sphere::new(c, (a.radius + growth).max(0.0))]
+}
+
+fn pair(class: &str, rng: &mut Pcg64) -> Spheres {
+    let [a, b] = tapered(rng);
+    let direction = unit(rng);
+    match class {
+        "generic" => vec![sphere(rng), sphere(rng)],
+        "tapered" => vec![a, b],
+        "contained" => {
+            let inner = a.radius * 0.4;
+            vec![a, Sphere::new(a.centre + direction * a.radius * 0.5, inner)]
+        }
+        "tangent" => {
+            let inner = a.radius * 0.5;
+            // Down to tangency that only rounding decides.
+            let near = 10.0_f64.powf(-12.0 - 5.0 * rng.random::<f64>());
+            let off = 1.0 + (rng.random::<f64>() * 2.0 - 1.0) * near;
+            vec![a, Sphere::new(a.centre + direction * (a.radius - inner) * off, inner)]
+        }
+        "zero radii" => vec![Sphere::new(a.centre, 0.0), Sphere::new(b.centre, 0.0)],
+        "one zero" => vec![a, Sphere::new(a.centre + direction * 2.0, 0.0)],
+        "equal radii" => vec![a, Sphere::new(b.centre, a.radius)],
+        "tiny edge" => {
+            let length = 1e-13 * (1.0 + rng.random::<f64>());
+            let grown = a.radius + length * (rng.random::<f64>() * 1.8 - 0.9);
+            vec![a, Sphere::new(a.centre + direction * length, grown.max(0.0))]
+        }
+        "concentric" => vec![a, Sphere::new(a.centre, b.radius)],
+        "equal" => vec![a, a],
+        other => unreachable!("{other}"),
+    }
+}
+
+const PAIRS: [&str; 10] = [
+    "generic",
+    "tapered",
+    "contained",
+    "tangent",
+    "zero radii",
+    "one zero",
+    "equal radii",
+    "tiny edge",
+    "concentric",
+    "equal",
+];
+
+fn triple(class: &str, rng: &mut Pcg64) -> Spheres {
+    let [a, b] = tapered(rng);
+    let c = sphere(rng);
+    let span = b.centre - a.centre;
+    match class {
+        "third in cone" => {
+            let m = a.lerp(b, rng.random());
+            let inner = m.radius * 0.5;
+            vec![a, b, Sphere::new(m.centre + unit(rng) * m.radius * 0.4, inner)]
+        }
+        "steep" => {
+            // The radius grows faster across the edge than the centres move apart.
+            let m = a.lerp(b, 0.5);
+            let away = span.any_orthonormal_vector() * 0.3;
+            vec![a, b, Sphere::new(m.centre + away, m.radius + 0.5)]
+        }
+        "nearly steep" => {
+            let m = a.lerp(b, 0.5);
+            let level = Sphere::new(b.centre, a.radius);
+            let rise = 1.0 - 1e-9 * rng.random::<f64>();
+            let away = span.any_orthonormal_vector() * 0.3;
+            vec![a, level, Sphere::new(m.centre + away, a.radius + 0.3 * rise)]
+        }
+        "collinear, linear radii" => vec![a, b, a.lerp(b, rng.random())],
+        "collinear" => vec![a, b, Sphere::new(a.centre.lerp(b.centre, rng.random()), c.radius)],
+        "nearly collinear" => {
+            let t = rng.random::<f64>() * 1.5 - 0.25;
+            let thin = 10.0_f64.powf(-2.0 - 12.0 * rng.random::<f64>());
+            let away = span.any_orthonormal_vector() * thin;
+            let bump = thin * (rng.random::<f64>() - 0.5);
+            let m = a.lerp(b, t);
+            vec![a, b, Sphere::new(m.centre + away, (m.radius + bump).max(0.0))]
+        }
+        "needle" => {
+            let short = unit(rng) * 10.0_f64.powf(-2.0 - 12.0 * rng.random::<f64>());
+            let grown = a.radius + short.length() * (rng.random::<f64>() - 0.5);
+            vec![a, b, Sphere::new(a.centre + short, grown.max(0.0))]
+        }
+        "all one" => vec![a, a, a],
+        "zero radii" => [a, b, c].map(|m| Sphere::new(m.centre, 0.0)).to_vec(),
+        "equal radii" => [a, b, c].map(|m| Sphere::new(m.centre, a.radius)).to_vec(),
+        "flat taper" => vec![a, b, Sphere::new(c.centre, 0.5 * (a.radius + b.radius))],
+        pair_class => {
+            let mut spheres = pair(pair_class, rng);
+            spheres.insert(rng.random_range(0..3), c);
+            spheres
+        }
+    }
+}
+
+const TRIPLES: [&str; 11] = [
+    "third in cone",
+    "steep",
+    "nearly steep",
+    "collinear, linear radii",
+    "collinear",
+    "nearly collinear",
+    "needle",
+    "all one",
+    "zero radii",
+    "equal radii",
+    "flat taper",
+];
+
+/// Queries all around, on the axes, in the plane, at centres, at the apex of a cone, far away.
+fn queries(spheres: &[Sphere], rng: &mut Pcg64) -> Vec<Vec3> {
+    let [a, b] = [spheres[0], spheres[1]];
+    let last = spheres[spheres.len() - 1];
+    let t = rng.random::<f64>() * 3.0 - 1.0;
+    let mut points = vec![
+        vector(rng) * 2.0,
+        a.centre + vector(rng) * 0.3,
+        vector(rng) * 1000.0,
+        a.centre,
+        last.centre,
+        a.centre.lerp(b.centre, t),
+        a.centre.lerp(b.centre, t).lerp(last.centre, rng.random::<f64>() * 2.0 - 0.5),
+        a.centre + unit(rng) * a.radius,
+    ];
+    let growth = b.radius - a.radius;
+    if growth.abs() > 1e-3 {
+        points.push(a.centre.lerp(b.centre, -a.radius / growth));
+    }
+    points
+}
+
+fn assert_matches(class: &str, spheres: &[Sphere], rng: &mut Pcg64) -> f64 {
+    let mut worst = 0.0_f64;
+    for p in queries(spheres, rng) {
+        let (exact, oracle) = (signed(spheres, p), brute_force(spheres, p));
+        let off = (exact - oracle).abs() / scale(spheres, p);
+        assert!(off <= 1e-12, "{class}: {exact} for {oracle}, off by {off:e}: {spheres:?} at {p}");
+        worst = worst.max(off);
+    }
+    worst
+}
+
+#[test]
+fn cones_match_brute_force() {
+    let mut rng = Pcg64::seed_from_u64(1);
+    for class in PAIRS {
+        for _ in 0..400 {
+            let spheres = pair(class, &mut rng);
+            assert_matches(class, &spheres, &mut rng);
+        }
+    }
+}
+
+#[test]
+fn slabs_match_brute_force() {
+    let mut rng = Pcg64::seed_from_u64(2);
+    for class in TRIPLES.into_iter().chain(PAIRS) {
+        for _ in 0..40 {
+            let spheres = triple(class, &mut rng);
+            assert_matches(class, &spheres, &mut rng);
+        }
+    }
+}
+
+fn any_class() -> impl Strategy<Value = (Spheres, Vec3, u64)> {
+    let classes: Vec<(usize, &str)> =
+        TRIPLES.map(|c| (3, c)).into_iter().chain(PAIRS.map(|c| (2, c))).collect();
+    (proptest::sample::select(classes), any::<u64>()).prop_map(|((count, class), seed)| {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let spheres = if count == 3 { triple(class, &mut rng) } else { pair(class, &mut rng) };
+        let p = vector(&mut rng) * 2.0;
+        (spheres, p, seed)
+    })
+}
+
+/// The nearest point as found by the public `foot`: signed distance, sphere, point, weights.
+fn foot(spheres: &[Sphere], p: Vec3) -> (f64, Sphere, Vec3, Vec<f64>) {
+    match *spheres {
+        [a, b] => {
+            let f = Cone::new(a, b).foot(p);
+            (f.signed_distance, f.sphere, f.point, f.weights.to_vec())
+        }
+        [a, b, c] => {
+            let f = Slab::new([a, b, c]).foot(p);
+            (f.signed_distance, f.sphere, f.point, f.weights.to_vec())
+        }
+        _ => unreachable!("two or three spheres"),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// The direction from the nearest centre supports the hull: no ball reaches beyond the nearest
+    /// point in it.
+    #[test]
+    fn nearest_centres_attain_the_distance((spheres, p, _) in any_class()) {
+        let (distance, centre) = match *spheres {
+            [a, b] => {
+                let cone = Cone::new(a, b);
+                prop_assert_eq!(cone.nearest_centre(p).0, cone.signed_distance(p));
+                cone.nearest_centre(p)
+            }
+            [a, b, c] => {
+                let cones = [[a, b], [b, c], [c, a]].map(|[m, n]| Cone::new(m, n).nearest_centre(p));
+                let least = |x: (f64, Vec3), y: (f64, Vec3)| if y.0 < x.0 { y } else { x };
+                let sides = cones.into_iter().reduce(least).expect("three");
+                let face = SlabFace::new([a, b, c]);
+                let inner = face.and_then(|face| face.nearest_centre(p));
+                prop_assert_eq!(inner.map(|i| i.0), face.and_then(|f| f.signed_distance(p)));
+                inner.unwrap_or(sides)
+            }
+            _ => unreachable!("two or three spheres"),
+        };
+        prop_assert!((distance - signed(&spheres, p)).abs() <= 1e-12);
+        if let Some(u) = (p - centre).try_normalize() {
+            let reach = |m: &Sphere| (m.centre - p).dot(u) + m.radius;
+            let reach = spheres.iter().map(reach).fold(f64::NEG_INFINITY, f64::max);
+            // At internal tangency the centre carries half the digits.
+            prop_assert!(reach <= 1e-6 - distance, "{} {}", reach, distance);
+        }
+    }
+
+    #[test]
+    fn distances_are_lipschitz((spheres, p, seed) in any_class()) {
+        let q = p + vector(&mut Pcg64::seed_from_u64(seed ^ 1)) * 0.5;
+        let change = (signed(&spheres, p) - signed(&spheres, q)).abs();
+        prop_assert!(change <= p.distance(q) + 1e-14 * scale(&spheres, p).max(1.0));
+    }
+
+    #[test]
+    fn distances_do_not_depend_on_the_order((spheres, p, _) in any_class()) {
+        let expected = signed(&spheres, p);
+        let mut turned = spheres.clone();
+        for _ in 0..spheres.len() {
+            turned.rotate_left(1);
+            for order in [turned.clone(), turned.iter().rev().copied().collect()] {
+                prop_assert!((signed(&order, p) - expected).abs() <= 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn distances_move_with_the_spheres((spheres, p, seed) in any_class()) {
+        let mut rng = Pcg64::seed_from_u64(seed ^ 2);
+        let turn = glam::DQuat::from_axis_angle(unit(&mut rng), rng.random::<f64>() * 6.0);
+        let shift = vector(&mut rng);
+        let moved: Spheres =
+            spheres.iter().map(|m| Sphere::new(turn * m.centre + shift, m.radius)).collect();
+        let after = signed(&moved, turn * p + shift);
+        // Moving rounds the centres, which is all that thin configurations feel.
+        prop_assert!((after - signed(&spheres, p)).abs() <= 1e-11);
+    }
+
+    #[test]
+    fn growing_all_radii_shrinks_the_distance((spheres, p, seed) in any_class()) {
+        let t = Pcg64::seed_from_u64(seed ^ 3).random::<f64>();
+        let grown: Spheres =
+            spheres.iter().map(|m| Sphere::new(m.centre, m.radius + t)).collect();
+        prop_assert!((signed(&grown, p) + t - signed(&spheres, p)).abs() <= 1e-12);
+    }
+
+    #[test]
+    fn feet_are_nearest_and_on_the_boundary((spheres, p, _) in any_class()) {
+        let (distance, m, point, weights) = foot(&spheres, p);
+        prop_assert!((distance - signed(&spheres, p)).abs() <= 1e-12);
+        prop_assert!((point.distance(p) - distance.abs()).abs() <= 1e-12);
+        prop_assert!(signed(&spheres, point).abs() <= 1e-6, "{}", signed(&spheres, point));
+        prop_assert!(weights.iter().all(|&w| w >= 0.0));
+        prop_assert!((weights.iter().sum::<f64>() - 1.0).abs() <= 1e-12);
+        let thin = spheres.len() == 3
+            && (spheres[1].centre - spheres[0].centre)
+                .cross(spheres[2].centre - spheres[0].centre).length() < 1e-3;
+        if !thin {
+            let centre: Vec3 = spheres.iter().zip(&weights).map(|(m, w)| m.centre * *w).sum();
+            let radius: f64 = spheres.iter().zip(&weights).map(|(m, w)| m.radius * w).sum();
+            prop_assert!(centre.distance(m.centre) <= 1e-9);
+            prop_assert!((radius - m.radius).abs() <= 1e-9);
+        }
+    }
+
+    #[test]
+    fn feet_from_centres_are_on_the_boundary((spheres, _, seed) in any_class()) {
+        for p in queries(&spheres, &mut Pcg64::seed_from_u64(seed)) {
+            let (distance, _, point, _) = foot(&spheres, p);
+            let off = signed(&spheres, point).abs();
+            prop_assert!(off <= 1e-6 * scale(&spheres, p), "off {off:e} of {distance} at {p}");
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! The tree with four children a node, whose boxes are tested together in single precision.
+//!
+//! 1. The binary tree is collapsed: of a node's children the largest inner one is replaced by its
+//!    own two until there are four (I. Wald, C. Benthin, S. Boulos, *Getting rid of packets*, 2008,
+//!    doi:10.1109/RT.2008.4634620).
+//! 2. Boxes are moved to the centre of the mesh, scaled by a power of two to half a side of at most
+//!    1, and rounded outward to single precision. Queries are moved, scaled and rounded alike.
+//! 3. A distance so computed is off by no more than [`BLUR`] for each unit of the query's distance
+//!    from the centre and one more. Limits are larger by that: nothing is given up that double
+//!    precision would look at, so that answers do not depend on any of this.
+
+use std::ops::{ControlFlow, Range};
+
+use wide::f32x4;
+
+use super::super::planar_frame::power_of_two_below;
+use super::build::MAX_DEPTH;
+use super::{Bounds, Tree};
+use crate::Vec3;
+
+/// Bound of the error of distances in single precision, to boxes and to triangles. The longest
+/// computation, a triangle's, makes less than 25 roundings of 2^-24 each.
+const BLUR: f64 = 6e-6;
+/// Errors of signed distances to hulls of balls and to boxes with radii, over those of distances:
+/// they add the rounding of a radius, which is no larger than the frame, and of three dot products.
+const HULL: f64 = 2.0;
+/// Queries farther away than this, in half sides, would prune too little.
+const FARTHEST: f64 = 64.0;
+const LEAF: u32 = 1 << 31;
+
+/// Four values, one for each child.
+pub type Lanes = f32x4;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    lo: [Lanes; 3],
+    hi: [Lanes; 3],
+    /// A node, or with [`LEAF`] a leaf. Lanes without a child have an empty box.
+    children: [u32; 4],
+}
+
+/// A tree with four children a node.
+#[derive(Clone, Debug)]
+pub struct WideTree {
+    nodes: Vec<Node>,
+    /// Places of each leaf's items.
+    leaves: Vec<Range<u32>>,
+    /// For each leaf the node of the binary tree that it was.
+    sources: Vec<u32>,
+    root: u32,
+    frame: Frame,
+}
+
+/// The similarity to single precision.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    centre: Vec3,
+    /// A power of two.
+    pub scale: f64,
+}
+
+impl Frame {
+    fn new(Bounds { lo, hi }: Bounds) -> Self {
+        let half = (hi - lo).max_element() * 0.5;
+        Self { centre: lo + (hi - lo) * 0.5, scale: power_of_two_below(1.0 / half) }
+    }
+
+    /// A point in the frame.
+    pub fn forward(&self, p: Vec3) -> Vec3 {
+        (p - self.centre) * self.scale
+    }
+}
+
+/// A query in single precision.
+#[derive(Clone, Copy, Debug)]
+pub struct Query {
+    /// The point in the frame, each coordinate in all lanes.
+    pub p: [Lanes; 3],
+    scale: f64,
+    /// Largest error of distances.
+    blur: f64,
+}
+
+impl Query {
+    /// The value up to which computed signed distances to hulls of balls may mean `signed` or less.
+    #[inline]
+    pub fn signed_limit(&self, signed: f64) -> f32 {
+        ((signed * self.scale + HULL * self.blur) as f32).next_up()
+    }
+
+    /// Largest error of coordinates in a plane.
+    #[inline]
+    pub fn blur(&self) -> f32 {
+        self.blur as f32
+    }
+
+    /// The square up to which computed distances may mean `distance` or less.
+    #[inline]
+    pub fn limit(&self, distance: f64) -> f32 {
+        let limit = (distance * self.scale + self.blur) * (1.0 + 1e-6);
+        (limit * limit) as f32
+    }
+}
+
+impl WideTree {
+    /// Collapses a tree.
+    pub fn new(tree: &Tree) -> Self {
+        Self::within(tree, tree.bounds(), 0.0, |_| ())
+    }
+
+    /// Collapses a tree in the frame of a box around its own. Boxes no larger than `least` half
+    /// sides of the frame are leaves, whatever they hold. `each` is told the children of every node,
+    /// up to four, in the order of the nodes.
+    pub(super) fn within(
+        tree: &Tree,
+        frame: Bounds,
+        least: f64,
+        mut each: impl FnMut(&[&super::Node]),
+    ) -> Self {
+        let frame = Frame::new(frame);
+        let least = least / frame.scale;
+        let (nodes, leaves, sources) = (Vec::new(), Vec::new(), Vec::new());
+        let mut wide = Self { nodes, leaves, sources, root: 0, frame };
+        if !tree.nodes.is_empty() {
+            wide.root = wide.collapse(tree, 0, least, &mut each);
+        }
+        wide
+    }
+
+    /// The places of each leaf's items, in leaf order.
+    pub fn leaves(&self) -> &[Range<u32>] {
+        &self.leaves
+    }
+
+    /// The node of the binary tree that a leaf was.
+    pub(super) fn source(&self, leaf: usize) -> usize {
+        self.sources[leaf] as usize
+    }
+
+    pub(super) fn node(&self, place: usize) -> &Node {
+        &self.nodes[place]
+    }
+
+    /// The similarity to single precision.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    fn collapse(
+        &mut self,
+        tree: &Tree,
+        index: usize,
+        least: f64,
+        each: &mut impl FnMut(&[&super::Node]),
+    ) -> u32 {
+        let node = &tree.nodes[index];
+        if node.count > 0 || (node.bounds.hi - node.bounds.lo).max_element() < least {
+            self.leaves.push(tree.places(index));
+            self.sources.push(index as u32);
+            return LEAF | (self.leaves.len() - 1) as u32;
+        }
+        let children = descendants(tree, index);
+        each(&children.iter().map(|&child| &tree.nodes[child]).collect::<Vec<_>>());
+        let place = self.nodes.len();
+        let empty = Lanes::splat(f32::INFINITY);
+        self.nodes.push(Node { lo: [empty; 3], hi: [-empty; 3], children: [0; 4] });
+        let (mut lo, mut hi) = ([[f32::INFINITY; 4]; 3], [[f32::NEG_INFINITY; 4]; 3]);
+        for (lane, &child) in children.iter().enumerate() {
+            let Bounds { lo: l, hi: h } = tree.nodes[child].bounds;
+            let (l, h) = (self.frame.forward(l), self.frame.forward(h));
+            for axis in 0..3 {
+                lo[axis][lane] = (l[axis] as f32).next_down();
+                hi[axis][lane] = (h[axis] as f32).next_up();
+            }
+            self.nodes[place].children[lane] = self.collapse(tree, child, least, each);
+        }
+        self.nodes[place].lo = lo.map(Lanes::from);
+        self.nodes[place].hi = hi.map(Lanes::from);
+        place as u32
+    }
+
+    /// The query for a point, `None` when it is too far away, or not a number.
+    #[inline]
+    pub fn query(&self, p: Vec3) -> Option<Query> {
+        let q = self.frame.forward(p);
+        let far = q.length();
+        (far <= FARTHEST).then(|| Query {
+            p: q.to_array().map(|x| Lanes::splat(x as f32)),
+            scale: self.frame.scale,
+            blur: BLUR * (1.0 + far),
+        })
+    }
+
+    /// Shows the leaves within a limit, roughly from near to far. `visit` gets the leaf and the
+    /// limit, and returns the new one. Limits are squared distances.
+    #[inline]
+    pub fn nearest(&self, query: &Query, limit: f32, visit: impl FnMut(usize, f32) -> f32) {
+        self.search(limit, |place| self.nodes[place].distance_squared(query), visit);
+    }
+
+    /// As [`WideTree::nearest`], in whatever measure `bounds` of the children of a node, given by
+    /// its place, and the limits are in. A bound that is not a number is beyond every limit.
+    #[inline]
+    pub(super) fn search(
+        &self,
+        mut limit: f32,
+        bounds: impl Fn(usize) -> Lanes,
+        mut visit: impl FnMut(usize, f32) -> f32,
+    ) {
+        let mut stack = [(0.0_f32, 0_u32); 3 * MAX_DEPTH + 4];
+        let mut height = 0;
+        let mut current = self.root;
+        loop {
+            if current & LEAF == 0 {
+                let bounds = bounds(current as usize);
+                let children = &self.nodes[current as usize].children;
+                let mut hits = bounds.simd_le(Lanes::splat(limit)).to_bitmask();
+                let bounds = bounds.to_array();
+                let bottom = height;
+                while hits != 0 {
+                    let lane = hits.trailing_zeros() as usize;
+                    hits &= hits - 1;
+                    // Sorted in: the nearest on top.
+                    let entry = (bounds[lane], children[lane]);
+                    let mut at = height;
+                    while at > bottom && stack[at - 1].0 < entry.0 {
+                        stack[at] = stack[at - 1];
+                        at -= 1;
+                    }
+                    stack[at] = entry;
+                    height += 1;
+                }
+            } else {
+                limit = visit((current & !LEAF) as usize, limit);
+            }
+            loop {
+                if height == 0 {
+                    return;
+                }
+                height -= 1;
+                let (bound, next) = stack[height];
+                if bound <= limit {
+                    current = next;
+                    break;
+                }
+            }
+        }
+    }
+}
+
+impl WideTree {
+    /// Shows the leaves whose boxes, rounded outward, reach above `p` or to it along `z`, and have
+    /// `x` and `y` of `p`.
+    #[inline]
+    pub fn above(&self, p: Vec3, mut visit: impl FnMut(Range<u32>) -> ControlFlow<()>) {
+        // Moving, scaling and rounding keep the order of coordinates, ties included.
+        let p = self.frame.forward(p).to_array().map(|x| Lanes::splat(x as f32));
+        let mut stack = [self.root; 3 * MAX_DEPTH + 4];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let current = stack[height];
+            if current & LEAF != 0 {
+                if visit(self.leaves[(current & !LEAF) as usize].clone()).is_break() {
+                    return;
+                }
+                continue;
+            }
+            let node = &self.nodes[current as usize];
+            let mut hits = node.above(&p).to_bitmask();
+            // The left ones on top: a search that ends at the point itself ends sooner from below.
+            while hits != 0 {
+                let lane = hits.ilog2();
+                stack[height] = node.children[lane as usize];
+                height += 1;
+                hits ^= 1 << lane;
+            }
+        }
+    }
+}
+
+impl Node {
+    #[inline]
+    fn above(&self, p: &[Lanes; 3]) -> Lanes {
+        self.lo[0].simd_le(p[0])
+            & p[0].simd_le(self.hi[0])
+            & self.lo[1].simd_le(p[1])
+            & p[1].simd_le(self.hi[1])
+            & p[2].simd_le(self.hi[2])
+    }
+
+    /// Squared distances from the query to the farthest corners.
+    #[inline]
+    pub(super) fn farthest_squared(&self, query: &Query) -> Lanes {
+        let across = |k: usize| (query.p[k] - self.lo[k]).fast_max(self.hi[k] - query.p[k]);
+        let [x, y, z] = [across(0), across(1), across(2)];
+        x * x + y * y + z * z
+    }
+
+    #[inline]
+    pub(super) fn distance_squared(&self, query: &Query) -> Lanes {
+        let beyond = |k: usize| {
+            let outside = (self.lo[k] - query.p[k]).fast_max(query.p[k] - self.hi[k]);
+            outside.fast_max(Lanes::ZERO)
+        };
+        let [x, y, z] = [beyond(0), beyond(1), beyond(2)];
+        x * x + y * y + z * z
+    }
+}
+
+/// Up to four descendants of an inner node, from left to right.
+fn descendants(tree: &Tree, index: usize) -> Vec<usize> {
+    let pair = |index: usize| {
+        let first = tree.nodes[index].first as usize;
+        [first, first + 1]
+    };
+    let mut children = pair(index).to_vec();
+    while children.len() < 4 {
+        let area = |&child: &usize| tree.nodes[child].bounds.half_area(0.0);
+        let inner = |child: &usize| tree.nodes[*child].count == 0;
+        let largest = (0..children.len())
+            .filter(|&k| inner(&children[k]))
+            .max_by(|&a, &b| area(&children[a]).total_cmp(&area(&children[b])));
+        let Some(largest) = largest else {
+            break;
+        };
+        children.splice(largest..=largest, pair(children[largest]));
+    }
+    children
+}

@@ -1,0 +1,365 @@
+//! Closest point on a triangle mesh.
+
+use std::ops::Range;
+
+use super::block::Block;
+use crate::Vec3;
+use crate::geometry::planar_frame::{Part, PlanarFrame};
+use crate::geometry::trees::{Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order};
+use crate::surface::TriMesh;
+
+/// Coordinates beyond this would overflow when squared.
+const LARGEST: f64 = 1e150;
+
+/// A bounding-volume tree over triangles. Triangles of no area are segments or points, and valid.
+///
+/// Lengths are in the unit of the triangles.
+///
+/// ```
+/// use medial::Vec3;
+/// use medial::surface::{Feature, TriangleBvh};
+/// use medial::surface::TriMesh;
+///
+/// let vertices = vec![Vec3::ZERO, 2.0 * Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
+/// let bvh = TriangleBvh::new(&TriMesh { vertices, faces: vec![[0, 1, 2]] })?;
+/// let closest = bvh.closest(Vec3::new(0.5, -3.0, 4.0));
+/// assert_eq!(closest.distance, 5.0);
+/// assert_eq!(closest.point, Vec3::new(0.5, 0.0, 0.0));
+/// assert_eq!(closest.feature, Feature::Edge(0));
+/// # Ok::<(), medial::surface::BvhError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct TriangleBvh {
+    tree: Tree,
+    /// The same tree, for the closest triangle.
+    wide: WideTree,
+    /// For each leaf of the wide tree.
+    blocks: Vec<Block>,
+    /// In leaf order.
+    frames: Vec<PlanarFrame>,
+    /// In leaf order.
+    corners: Vec<[Vec3; 3]>,
+    /// In leaf order, which corner the frame starts at.
+    firsts: Vec<u8>,
+    /// For each face its place in leaf order.
+    places: Vec<u32>,
+    /// More than rounding can contribute to a distance between a query and these triangles, as
+    /// long as the query is not farther away than the mesh is large.
+    slack: f64,
+}
+
+/// The closest point of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closest {
+    /// The point.
+    pub point: Vec3,
+    /// Its distance from the query.
+    pub distance: f64,
+    /// Index of a face that holds it: of several equally near ones the smallest.
+    pub face: u32,
+    /// The part of that face that holds it.
+    pub feature: Feature,
+}
+
+/// A part of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feature {
+    /// The inside.
+    Face,
+    /// The side from corner `k` to corner `k + 1` modulo 3, without its ends.
+    Edge(u8),
+    /// Corner `k`.
+    Vertex(u8),
+}
+
+/// Why no tree can be built over a mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BvhError {
+    /// There is nothing to be near to.
+    #[error("the mesh has no faces")]
+    Empty,
+    /// A corner is not a number or too large to be squared.
+    #[error("face {face} has the corner {corner}, which is not finite or exceeds 1e150")]
+    Corner {
+        /// Index of the face.
+        face: usize,
+        /// The corner.
+        corner: Vec3,
+    },
+}
+
+/// That there are triangles, whose corners can be squared.
+pub(super) fn check_corners(triangles: &[[Vec3; 3]]) -> Result<(), BvhError> {
+    if triangles.is_empty() {
+        return Err(BvhError::Empty);
+    }
+    for (face, corners) in triangles.iter().enumerate() {
+        let fits = |corner: &&Vec3| corner.abs().max_element() <= LARGEST && !corner.is_nan();
+        if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
+            return Err(BvhError::Corner { face, corner });
+        }
+    }
+    Ok(())
+}
+
+impl TriangleBvh {
+    /// A tree over the faces of a mesh. Cost `O(n log n)`.
+    ///
+    /// # Errors
+    /// When the mesh has no faces, or a corner of one is not finite.
+    ///
+    /// # Panics
+    /// If a face names a vertex that does not exist.
+    pub fn new(mesh: &TriMesh) -> Result<Self, BvhError> {
+        Self::from_triangles(&(0..mesh.faces.len()).map(|f| mesh.triangle(f)).collect::<Vec<_>>())
+    }
+
+    /// A tree over triangles given by their corners. A segment repeats a corner, a point is three
+    /// times the same.
+    ///
+    /// # Errors
+    /// When there are none, or a corner is not finite.
+    pub fn from_triangles(triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
+        check_corners(triangles)?;
+        let boxes: Vec<_> = triangles.iter().map(|&t| (Bounds::of_points(t), 0.0)).collect();
+        let tree = Tree::build(&boxes, Plan { max_leaf: 4, group: 4, padding: 0.0 });
+        let corners: Vec<_> = tree.order().iter().map(|&f| triangles[f as usize]).collect();
+        let mut places = vec![0; triangles.len()];
+        for (place, &face) in (0..).zip(tree.order()) {
+            places[face as usize] = place;
+        }
+        let Bounds { lo, hi } = tree.bounds();
+        let slack = 64.0 * f64::EPSILON * lo.abs().max(hi.abs()).max_element();
+        let framed = corners.iter().map(|&t| PlanarFrame::new(t));
+        let (frames, firsts): (Vec<_>, Vec<_>) = framed.map(|(t, k)| (t, k as u8)).unzip();
+        let wide = WideTree::new(&tree);
+        let block =
+            |l: &Range<u32>| Block::new(&frames[l.start as usize..l.end as usize], wide.frame());
+        let blocks = wide.leaves().iter().map(block).collect();
+        Ok(Self { tree, wide, blocks, frames, corners, firsts, places, slack })
+    }
+
+    /// Number of triangles.
+    pub fn face_count(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// The closest point to `p`. A query that is not finite gets a distance that is not.
+    pub fn closest(&self, p: Vec3) -> Closest {
+        self.closest_from(p, None)
+    }
+
+    /// The closest point to `p`, found sooner when `start` is a face near to it. The answer is the
+    /// same for every start.
+    ///
+    /// # Panics
+    /// If `start` is not a face.
+    pub fn closest_from(&self, p: Vec3, start: Option<u32>) -> Closest {
+        let place = start.map_or(0, |face| self.places[face as usize]);
+        self.closest_at(p, place).1
+    }
+
+    /// The closest points to many queries, in their order, in parallel. Cost per query is about
+    /// half that of single queries, as each starts from its neighbour's answer.
+    pub fn closest_batch(&self, points: &[Vec3]) -> Vec<Closest> {
+        in_morton_order(points, |last: &mut u32, p| {
+            let (place, closest) = self.closest_at(p, *last);
+            *last = place;
+            closest
+        })
+    }
+
+    /// The distances of many queries, in their order, in parallel.
+    pub fn distance_batch(&self, points: &[Vec3]) -> Vec<f64> {
+        self.distance_batch_with(points, |_, distance| distance)
+    }
+
+    /// What `finish` makes of many queries and their distances.
+    pub(crate) fn distance_batch_with(
+        &self,
+        points: &[Vec3],
+        finish: impl Fn(Vec3, f64) -> f64 + Sync,
+    ) -> Vec<f64> {
+        in_morton_order(points, |last: &mut u32, p| {
+            let search = self.nearest(Nearest::starting(self, p, *last as usize));
+            *last = search.place as u32;
+            finish(p, search.squared.sqrt())
+        })
+    }
+
+    /// The closest point to `p` that is not farther away than `bound`, if there is one.
+    pub fn closest_within(&self, p: Vec3, bound: f64) -> Option<Closest> {
+        if bound.is_nan() || bound < 0.0 {
+            return None;
+        }
+        let found = self.nearest(Nearest::within(self, p, bound));
+        (found.place != NONE).then(|| self.describe(p, found.place, found.squared))
+    }
+
+    /// Whether some point of the mesh is not farther away from `p` than `distance`.
+    pub fn any_within(&self, p: Vec3, distance: f64) -> bool {
+        if distance.is_nan() || distance < 0.0 {
+            return false;
+        }
+        let limit = padded(distance, self.slack).powi(2);
+        let mut search = Any { bvh: self, p, squared: inclusive_square(distance), limit };
+        self.tree.search(&mut search);
+        search.limit < 0.0
+    }
+
+    fn closest_at(&self, p: Vec3, start: u32) -> (u32, Closest) {
+        let found = self.nearest(Nearest::starting(self, p, start as usize));
+        (found.place as u32, self.describe(p, found.place, found.squared))
+    }
+
+    fn nearest<'a>(&'a self, mut search: Nearest<'a>) -> Nearest<'a> {
+        let Some(query) = self.wide.query(search.p) else {
+            self.tree.search(&mut search);
+            return search;
+        };
+        let limit = query.limit(search.reach());
+        self.wide.nearest(&query, limit, |leaf, limit| {
+            let places = self.wide.leaves()[leaf].clone();
+            let mut near = self.blocks[leaf].within(&query, limit) & ((1 << places.len()) - 1);
+            let before = search.squared;
+            while near != 0 {
+                search.measure(places.start as usize + near.trailing_zeros() as usize);
+                near &= near - 1;
+            }
+            if search.squared < before { query.limit(search.reach()) } else { limit }
+        });
+        search
+    }
+
+    fn describe(&self, p: Vec3, place: usize, squared: f64) -> Closest {
+        let frame = &self.frames[place];
+        let corners = &self.corners[place];
+        let first = usize::from(self.firsts[place]);
+        let corner = |k: usize| (first + k) % 3;
+        let (part, t) = frame.nearest_part(p);
+        let (feature, point) = match part {
+            Part::Face => {
+                let [x, y, _] = frame.local(p);
+                (Feature::Face, frame.point(x, y))
+            }
+            Part::Side(k) => {
+                let (a, b) = (corners[corner(k)], corners[corner(k + 1)]);
+                (Feature::Edge(corner(k) as u8), a.lerp(b, t))
+            }
+            Part::Corner(k) => (Feature::Vertex(corner(k) as u8), corners[corner(k)]),
+        };
+        Closest { point, distance: squared.sqrt(), face: self.tree.order()[place], feature }
+    }
+}
+
+/// No place.
+const NONE: usize = usize::MAX;
+
+/// A distance increased by more than rounding can have taken from it.
+#[inline]
+fn padded(distance: f64, slack: f64) -> f64 {
+    distance * (1.0 + 1e-14) + slack
+}
+
+/// The square of a bound, such that a distance found earlier is within itself.
+fn inclusive_square(bound: f64) -> f64 {
+    bound * bound * (1.0 + 4.0 * f64::EPSILON)
+}
+
+/// Search for the closest triangle.
+struct Nearest<'a> {
+    bvh: &'a TriangleBvh,
+    p: Vec3,
+    squared: f64,
+    place: usize,
+    limit: f64,
+}
+
+impl<'a> Nearest<'a> {
+    fn starting(bvh: &'a TriangleBvh, p: Vec3, place: usize) -> Self {
+        let squared = bvh.frames[place].distance_squared(p);
+        let mut search = Self { bvh, p, squared, place, limit: 0.0 };
+        search.tighten();
+        search
+    }
+
+    fn within(bvh: &'a TriangleBvh, p: Vec3, bound: f64) -> Self {
+        let mut search = Self { bvh, p, squared: inclusive_square(bound), place: NONE, limit: 0.0 };
+        search.tighten();
+        search
+    }
+
+    fn tighten(&mut self) {
+        let reach = self.reach();
+        self.limit = reach * reach;
+    }
+
+    /// Nothing farther away can be as near as the best.
+    #[inline]
+    fn reach(&self) -> f64 {
+        padded(self.squared.sqrt(), self.bvh.slack)
+    }
+
+    #[inline]
+    fn measure(&mut self, place: usize) {
+        let squared = self.bvh.frames[place].distance_squared(self.p);
+        if squared > self.squared {
+            return;
+        }
+        let order = self.bvh.tree.order();
+        let first = self.place == NONE || order[place] < order[self.place];
+        if squared < self.squared || first {
+            self.place = place;
+            self.squared = squared;
+        }
+    }
+}
+
+impl Search for Nearest<'_> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        node.bounds.distance_squared(self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        let before = self.squared;
+        places.for_each(|place| self.measure(place));
+        if self.squared < before {
+            self.tighten();
+        }
+    }
+}
+
+/// Search for any triangle within a distance.
+struct Any<'a> {
+    bvh: &'a TriangleBvh,
+    p: Vec3,
+    squared: f64,
+    /// Negative once one is found.
+    limit: f64,
+}
+
+impl Search for Any<'_> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        node.bounds.distance_squared(self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, mut places: Range<usize>) {
+        if places.any(|k| self.bvh.frames[k].distance_squared(self.p) <= self.squared) {
+            self.limit = -1.0;
+        }
+    }
+}
