@@ -9,7 +9,7 @@ use medial::simplifier::Params;
 use medial::surface::Sampling;
 
 use crate::exit::Failure;
-use crate::run::{Dual, Study};
+use crate::run::{Dual, Study, Verbosity};
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]
@@ -26,6 +26,18 @@ pub struct Global {
     /// Methods that are programs of their own, declared in a TOML file; can be given several times.
     #[arg(long, global = true, value_name = "FILE")]
     pub plugins: Vec<PathBuf>,
+}
+
+impl Global {
+    /// Whether the progress of a list of items is shown.
+    pub fn progress(&self) -> Verbosity {
+        if self.quiet { Verbosity::Quiet } else { Verbosity::Progress }
+    }
+
+    /// Whether the stages of a single piece of work are shown: not beside JSON, which is for programs.
+    pub fn stages(&self) -> Verbosity {
+        if self.json { Verbosity::Quiet } else { self.progress() }
+    }
 }
 
 /// How the substrates of a shape are built.

@@ -61,7 +61,12 @@ pub fn find(id: &str) -> Option<BuiltIn> {
 
 /// All built-in shapes, from simple to intricate.
 pub fn catalogue() -> Vec<BuiltIn> {
-    vec![
+    [convex(), tubular(), intricate()].concat()
+}
+
+/// Convex solids.
+fn convex() -> [BuiltIn; 5] {
+    [
         BuiltIn {
             id: "sphere",
             title: "Sphere",
@@ -117,6 +122,12 @@ pub fn catalogue() -> Vec<BuiltIn> {
             known_axis: Some(axes::plate),
             diagonal: shapes::diagonal_of(shapes::PLATE_HALF),
         },
+    ]
+}
+
+/// Several parts or tubes: the axis has curves, or sheets that meet.
+fn tubular() -> [BuiltIn; 5] {
+    [
         BuiltIn {
             id: "bracket",
             title: "L-bracket",
@@ -172,6 +183,12 @@ pub fn catalogue() -> Vec<BuiltIn> {
             known_axis: Some(axes::torus),
             diagonal: shapes::torus_diagonal(),
         },
+    ]
+}
+
+/// Cavities, several loops, surfaces without corners.
+fn intricate() -> [BuiltIn; 5] {
+    [
         BuiltIn {
             id: "coil",
             title: "Coiled pipe",

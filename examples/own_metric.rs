@@ -19,7 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let union = MedialUnion::new(&medial)?;
     // Positive outside the union: what the medial mesh has lost there.
     let outside = union.signed_batch(&points);
-    let (worst, lost) = (0..).zip(&outside).max_by(|a: &(usize, _), b| a.1.total_cmp(b.1)).ok_or("no sample")?;
+    let (worst, lost) =
+        (0..).zip(&outside).max_by(|a: &(usize, _), b| a.1.total_cmp(b.1)).ok_or("no sample")?;
 
     // The largest ball of the medial mesh that comes near the place.
     let near = |sphere: &&complex::Sphere| sphere.signed_distance(points[worst]) < 2.0 * lost.abs();

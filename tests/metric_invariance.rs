@@ -172,8 +172,17 @@ fn nothing_changes_when_both_are_moved_and_scaled() {
     }
 }
 
+/// Whether a medial mesh looks the same in all frames in which its surface does. Where it does not, the
+/// samples of a turned surface are another set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Symmetry {
+    Shared,
+    Broken,
+}
+use Symmetry::{Broken, Shared};
+
 /// Surfaces with symmetries, each with medial meshes that share them all, some, or none.
-fn symmetric() -> Vec<(&'static str, TriMesh, MedialMesh)> {
+fn symmetric() -> Vec<(&'static str, Symmetry, TriMesh, MedialMesh)> {
     let half = Vec3::splat(0.5);
     let from_corners = |lift: f64| {
         let corner =
@@ -198,16 +207,21 @@ fn symmetric() -> Vec<(&'static str, TriMesh, MedialMesh)> {
     let cube = || shapes::moved(shapes::cube(), |p| p - half);
     let slab = || shapes::moved(cube(), |p| Vec3::new(2.0, 2.0, 0.5) * p);
     vec![
-        ("cube", cube(), from_corners(0.0)),
-        ("cube, off its centre", cube(), from_corners(0.05)),
-        ("plate", slab(), from_corners(0.0)),
-        ("plate, off its centre", slab(), from_corners(1e-3)),
-        ("sphere", shapes::sphere(3), ball(Vec3::ZERO, 0.9)),
-        ("sphere, off its centre", shapes::sphere(3), ball(Vec3::new(0.02, 0.01, 0.05), 0.9)),
-        ("sphere, corners", shapes::sphere(3), from_corners(0.0)),
-        ("torus", shapes::torus(24, 12), ring(12, 0.0)),
-        ("torus, five spheres", shapes::torus(24, 12), ring(5, 0.0)),
-        ("torus, one smaller", shapes::torus(24, 12), ring(12, 0.01)),
+        ("cube", Shared, cube(), from_corners(0.0)),
+        ("cube, off its centre", Broken, cube(), from_corners(0.05)),
+        ("plate", Shared, slab(), from_corners(0.0)),
+        ("plate, off its centre", Broken, slab(), from_corners(1e-3)),
+        ("sphere", Shared, shapes::sphere(3), ball(Vec3::ZERO, 0.9)),
+        (
+            "sphere, off its centre",
+            Broken,
+            shapes::sphere(3),
+            ball(Vec3::new(0.02, 0.01, 0.05), 0.9),
+        ),
+        ("sphere, corners", Shared, shapes::sphere(3), from_corners(0.0)),
+        ("torus", Shared, shapes::torus(24, 12), ring(12, 0.0)),
+        ("torus, five spheres", Broken, shapes::torus(24, 12), ring(5, 0.0)),
+        ("torus, one smaller", Broken, shapes::torus(24, 12), ring(12, 0.01)),
     ]
 }
 
@@ -221,7 +235,7 @@ fn judged(surface: &TriMesh, mesh: &MedialMesh) -> Evaluation {
 
 #[test]
 fn symmetries_of_the_shape_do_not_matter() {
-    for (name, surface, mesh) in symmetric() {
+    for (name, symmetry, surface, mesh) in symmetric() {
         let before = judged(&surface, &mesh);
         let mut rng = Pcg64::seed_from_u64(7);
         for motion in motions().into_iter().filter(|motion| motion.scale == 1.0) {
@@ -245,9 +259,15 @@ fn symmetries_of_the_shape_do_not_matter() {
                 ]
             };
             for ((what, a), (_, b)) in values(&before).into_iter().zip(values(&after)) {
-                assert!((a - b).abs() <= 1e-9, "{name}, {what}: {a} {b}");
+                let within = match (symmetry, what) {
+                    (Shared, _) => 1e-9,
+                    (Broken, "epsilon" | "epsilon_union" | "spheres_only" | "reverse") => 1e-4 * a,
+                    (Broken, _) => 0.02 * a,
+                };
+                assert!((a - b).abs() <= within, "{name}, {what}: {a} {b}");
             }
-            assert_eq!(before.distances.reverse_samples, after.distances.reverse_samples, "{name}");
+            let samples = [&before, &after].map(|e| e.distances.reverse_samples);
+            assert!(symmetry == Broken || samples[0] == samples[1], "{name}: {samples:?}");
         }
     }
 }

@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let options = shape_options(&arguments.substrate)?;
     check_output(arguments.output.as_deref())?;
-    let line = StageLine::new(global.quiet || global.json);
+    let line = StageLine::new(global.stages());
     line.at("reading");
     let (input, read) = Cost::of(|| Input::load(&source));
     let input = input?;

@@ -109,7 +109,7 @@ pub fn run(
     store.remarks.iter().for_each(|remark| note(global, remark));
     let (left, mut tally) = match arguments.fresh {
         true => (items.clone(), Tally::default()),
-        false => missing(&items, &store, arguments.retry_failed),
+        false => missing(&items, &store, arguments.retry_failed.into()),
     };
     check_params(&left, &mut supervisor)?;
     // No result is touched before this line.
@@ -119,7 +119,7 @@ pub fn run(
     if !left.is_empty() {
         report::write_study(&arguments.out, &study, arguments.study.as_deref())?;
     }
-    let mut progress = Progress::new(global.quiet, left.len());
+    let mut progress = Progress::new(global.progress(), left.len());
     let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Kept]| {
         tally.run += kept.len();
         let records: Vec<&Record> = kept.iter().map(|kept| &kept.record).collect();
@@ -132,7 +132,7 @@ pub fn run(
         ended => ended?,
     }
     let Rebuilt { records, files, .. } =
-        report::refresh(&arguments.out, registry, &provenance, tally.run > 0)?;
+        report::refresh(&arguments.out, registry, &provenance, tally.run)?;
     finish(&of_items(records, &items), tally, &arguments.out, &files, global)
 }
 

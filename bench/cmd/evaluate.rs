@@ -37,7 +37,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let options = judge_options(&arguments.measure, JudgeOptions::default(), arguments.seed)?;
-    let line = StageLine::new(global.quiet || global.json);
+    let line = StageLine::new(global.stages());
     line.at("reading");
     let input = Input::load(&source)?;
     let shape =

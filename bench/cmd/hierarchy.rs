@@ -30,8 +30,14 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// What a method would start from now; `given` when the initial mesh is from a file.
-    pub fn new(method: &str, params: &Params, input: &Input, shape: &Shape, given: bool) -> Self {
+    /// What a method would start from now; `initial` is the file of the initial mesh, if it has one.
+    pub fn new(
+        method: &str,
+        params: &Params,
+        input: &Input,
+        shape: &Shape,
+        initial: Option<&Path>,
+    ) -> Self {
         let options = shape.options();
         let dual = match options.dual {
             DualTriangulation::Fan => "fan",
@@ -43,7 +49,7 @@ impl Origin {
             surface: input.surface_hash(),
             sampling: options.sampling.to_string(),
             dual: dual.to_owned(),
-            initial: given,
+            initial: initial.is_some(),
             version: version().to_owned(),
         }
     }

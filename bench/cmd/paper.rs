@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     }
     let provenance = Provenance::here();
     let rows = chosen.iter().map(|exhibit| exhibit.rows.len()).sum();
-    let mut progress = Progress::new(global.quiet, rows);
+    let mut progress = Progress::new(global.progress(), rows);
     let here = Here::of(&provenance);
     let limits = Study { timeout: arguments.timeout, ..Study::default() }.limits(&here);
     let supervisor = Supervisor::new(registry.files(), &provenance, None, interrupt::listen());

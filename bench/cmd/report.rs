@@ -76,7 +76,7 @@ pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
     Ok(Rebuilt { records, files, warnings })
 }
 
-/// After a run of `compare`: notes the run where it has added records, and rebuilds the report where
+/// After a run of `compare`: notes the run where it has `added` records, and rebuilds the report where
 /// that is needed. Without anything new the page stays as it is.
 ///
 /// # Errors
@@ -85,10 +85,10 @@ pub fn refresh(
     dir: &Path,
     registry: &Registry,
     provenance: &Provenance,
-    added: bool,
+    added: usize,
 ) -> Result<Rebuilt, Failure> {
     let (records, warnings) = records(dir)?;
-    if !added && dir.join("index.html").exists() {
+    if added == 0 && dir.join("index.html").exists() {
         return Ok(Rebuilt { records, files: vec![], warnings });
     }
     let mut header = header(dir, &records, registry, &warnings);

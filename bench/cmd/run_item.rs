@@ -14,8 +14,8 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_raw};
 use crate::run::{
-    AXES, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
-    Supervisor, missing, run_items,
+    AXES, Failures, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError,
+    Store, Supervisor, missing, run_items,
 };
 
 /// Arguments of `run-item`.
@@ -52,10 +52,10 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         None => None,
     };
     let left = match &store {
-        Some(store) => missing(std::slice::from_ref(&item), store, false).0,
+        Some(store) => missing(std::slice::from_ref(&item), store, Failures::Kept).0,
         None => vec![item.clone()],
     };
-    let mut progress = Progress::new(global.quiet, left.len());
+    let mut progress = Progress::new(global.progress(), left.len());
     let mut records: Vec<Record> = Vec::new();
     let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Kept]| {
         records.extend(kept.iter().map(|kept| kept.record.clone()));

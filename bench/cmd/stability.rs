@@ -76,8 +76,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let items = items(arguments, global, registry, &Here::of(&provenance))?;
     let mut store = Store::open(&arguments.out, STABILITY, &provenance.command)?;
     store.remarks.iter().for_each(|remark| note(global, remark));
-    let (left, _) = missing(&items, &store, arguments.retry_failed);
-    let mut progress = Progress::new(global.quiet, left.len());
+    let (left, _) = missing(&items, &store, arguments.retry_failed.into());
+    let mut progress = Progress::new(global.progress(), left.len());
     let axes = Some(arguments.out.join(FOLDER));
     let interrupted = interrupt::listen();
     let mut supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);

@@ -3,7 +3,7 @@
 use medial_reports::{Record, Status};
 
 use super::record::{Kept, median};
-use super::store::{Store, StoreError};
+use super::store::{Failures, Store, StoreError};
 use super::supervise::{RunError, Supervisor, merge};
 use super::{Item, Progress};
 
@@ -31,11 +31,11 @@ pub enum PlanError {
 pub type Keep<'a> = dyn FnMut(&Item, &[Kept]) -> Result<(), StoreError> + 'a;
 
 /// The items with the levels that are missing in a store, and what was found there.
-pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>, Tally) {
+pub fn missing(items: &[Item], store: &Store, failures: Failures) -> (Vec<Item>, Tally) {
     let mut tally = Tally::default();
     let mut left = Vec::new();
     for item in items {
-        let levels = store.missing(item, retry_failed);
+        let levels = store.missing(item, failures);
         tally.found += item.levels.len() - levels.len();
         if !levels.is_empty() {
             left.push(Item { levels, ..item.clone() });

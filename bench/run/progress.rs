@@ -12,6 +12,15 @@ pub struct Progress {
     total: usize,
 }
 
+/// Whether anybody wants to see how far the work is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verbosity {
+    /// Nothing on standard error but failures.
+    Quiet,
+    /// What is being done.
+    Progress,
+}
+
 enum Style {
     Bar(ProgressBar),
     Lines,
@@ -20,8 +29,8 @@ enum Style {
 
 impl Progress {
     /// Progress through `total` items.
-    pub fn new(quiet: bool, total: usize) -> Self {
-        let style = if quiet {
+    pub fn new(verbosity: Verbosity, total: usize) -> Self {
+        let style = if verbosity == Verbosity::Quiet {
             Style::Quiet
         } else if io::stderr().is_terminal() {
             Style::Bar(bar(total))

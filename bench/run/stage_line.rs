@@ -10,6 +10,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use medial::simplifier::Progress;
 use medial_reports::printable;
 
+use super::Verbosity;
+
 /// Stages that are over sooner are not worth a line.
 const PATIENCE: Duration = Duration::from_secs(1);
 
@@ -34,10 +36,10 @@ struct Stage {
 
 impl StageLine {
     /// No line where nobody would see it, or nobody wants to.
-    pub fn new(quiet: bool) -> Self {
+    pub fn new(verbosity: Verbosity) -> Self {
         let stage = Stage { what: String::new(), since: Instant::now(), steps: None };
         let stage = Arc::new(Mutex::new(stage));
-        let seen = !quiet && io::stderr().is_terminal();
+        let seen = verbosity == Verbosity::Progress && io::stderr().is_terminal();
         let drawer = seen.then(|| {
             let (sender, ended) = mpsc::channel();
             let stage = Arc::clone(&stage);
@@ -112,7 +114,7 @@ mod tests {
 
     #[test]
     fn only_stages_that_last_are_shown() {
-        let line = StageLine::new(true);
+        let line = StageLine::new(Verbosity::Quiet);
         line.at("measuring \u{1b}[2J");
         let shown = |seconds: u64| {
             let stage = locked(&line.stage);

@@ -157,11 +157,11 @@ impl Store {
     }
 
     /// The levels of an item that have to be run: those without a record, and those that a limit
-    /// ended that is wider now, or that failed, where failures are to be repeated.
-    pub fn missing(&self, item: &Item, retry_failed: bool) -> Vec<Level> {
+    /// ended that is wider now, or that failed, where failures are to be retried.
+    pub fn missing(&self, item: &Item, failures: Failures) -> Vec<Level> {
         let missing = |key: &String| match self.known.get(key) {
             None => true,
-            Some(known) => known.is_incomplete(item, retry_failed),
+            Some(known) => known.is_incomplete(item, failures),
         };
         let keys = item.keys();
         let levels = item.levels.iter().zip(&keys);
@@ -188,12 +188,28 @@ impl Store {
     }
 }
 
+/// What is done about levels that failed before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failures {
+    /// Their records stand.
+    Kept,
+    /// They are run again.
+    Retried,
+}
+
+impl From<bool> for Failures {
+    /// From the option `--retry-failed`.
+    fn from(retry: bool) -> Self {
+        if retry { Self::Retried } else { Self::Kept }
+    }
+}
+
 impl Known {
-    fn is_incomplete(&self, item: &Item, retry_failed: bool) -> bool {
+    fn is_incomplete(&self, item: &Item, failures: Failures) -> bool {
         match self.status {
             Status::TimedOut if item.limits.seconds > self.seconds_limit => true,
             Status::OutOfMemory if item.limits.bytes > self.bytes_limit => true,
-            status if status.is_failure() => retry_failed,
+            status if status.is_failure() => failures == Failures::Retried,
             status => status.has_result() && self.repetitions < item.repeat,
         }
     }

@@ -206,7 +206,7 @@ fn directions(pose: &Pose, round: usize) -> [Vec3; 12] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::complex::{MedialMesh, Sphere};
+    use crate::complex::Sphere;
     use crate::surface::TriMesh;
 
     fn square() -> TriMesh {
@@ -217,7 +217,7 @@ mod tests {
 
     /// A start from points that all miss the maximum.
     fn best(hill: &impl Hill, surface: &TriMesh, points: &[Vec3], spacing: f64) -> Peak {
-        let pose = Pose::new(surface, &MedialMesh::default());
+        let pose = Pose::new(surface);
         let mut near = Near::default();
         let values: Vec<f64> =
             points.iter().map(|&p| hill.near(p, &mut near).unwrap().value).collect();
@@ -263,7 +263,7 @@ mod tests {
     #[test]
     fn samples_that_are_no_numbers_are_no_seeds() {
         let surface = square();
-        let pose = Pose::new(&surface, &MedialMesh::default());
+        let pose = Pose::new(&surface);
         let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let values = [f64::NAN, 1.0, f64::INFINITY];
         let start = Start { pose: &pose, points: &points, values: &values, spacing: 0.1, seeds: 3 };

@@ -15,8 +15,8 @@
 
 use glam::DVec4;
 
-use super::hausdorff::{Placed, place_on_triangles};
 use super::lifted_axis::{LiftedAxis, lifted};
+use super::samples::{Placed, place_on_triangles};
 use super::{AxisDistances, AxisSpan, MetricError, SheetCoverage};
 use crate::Vec3;
 use crate::complex::{MedialMesh, UnionError};

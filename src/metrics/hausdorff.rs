@@ -1,7 +1,7 @@
 //! Distances between a surface and the union of medial primitives, both ways.
 //!
 //! 1. The surface S is sampled uniformly by area; its vertices are added, because the largest
-//!    error is usually at one.
+//!    error is usually at one. The same samples for every medial mesh ([`super::samples`]).
 //! 2. Each sample is measured against the union U: `|sigma|` and `mu` of
 //!    [`MedialUnion`], and `|sigma|` of the spheres alone.
 //! 3. The boundary of U is sampled uniformly by area ([`super::envelope`]) and measured against S.
@@ -22,19 +22,13 @@
 //!   strips along the tangent curves of neighbouring primitives count more than once in
 //!   `reverse_mean`.
 
-use std::ops::{Add, Mul, Sub};
-
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
-
 use super::Distances;
 use super::ascent::{OnMesh, OnUnion, Peak, Start, ascend};
 use super::envelope::{EnvelopeOptions, sample_envelope_along};
-use super::pose::Pose;
+use super::samples::{SEEDS, SurfaceSamples};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
 use crate::geometry::TriangulationError;
-use crate::sum::Sum;
 use crate::surface::TriMesh;
 use crate::surface::{BvhError, TriangleBvh};
 
@@ -121,10 +115,10 @@ pub fn distances(
     options: &DistanceOptions,
 ) -> Result<Distances, MetricError> {
     mesh.check().map_err(UnionError::from)?;
-    let pose = Pose::new(surface, mesh);
-    let mesh = &pose.in_order(mesh);
+    let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
+    let mesh = &samples.pose.in_order(mesh);
     let union = MedialUnion::new(mesh)?;
-    let (distances, _) = distances_with_envelope(surface, bvh, mesh, &union, &pose, options)?;
+    let (distances, _) = distances_with_envelope(bvh, mesh, &union, &samples, options)?;
     Ok(distances)
 }
 
@@ -135,28 +129,21 @@ pub(super) struct Envelope {
 }
 
 /// As [`distances`], with the samples of the reverse distance; `union` is that of `mesh`, whose spheres
-/// are in the order of `pose`.
+/// are in the order of the samples' pose.
 pub(super) fn distances_with_envelope(
-    surface: &TriMesh,
     bvh: &TriangleBvh,
     mesh: &MedialMesh,
     union: &MedialUnion,
-    pose: &Pose,
+    samples: &SurfaceSamples,
     options: &DistanceOptions,
 ) -> Result<(Distances, Envelope), MetricError> {
-    let samples = SurfaceSamples::new(surface, pose, options.surface_samples, options.seed)?;
+    let pose = &samples.pose;
     let readings = union.readings_batch(&samples.points);
     let sigma: Vec<f64> = readings.iter().map(|r| r.sigma.abs()).collect();
     let mu: Vec<f64> = readings.iter().map(|r| r.mu).collect();
     let balls = MedialUnion::of_spheres(&mesh.spheres)?;
     let spheres = absolute(balls.signed_batch(&samples.points));
-    let start = Start {
-        pose,
-        points: &samples.points,
-        values: &sigma,
-        spacing: spacing(surface, options.surface_samples),
-        seeds: SEEDS,
-    };
+    let start = samples.start(&sigma);
     let signed = |p, near: &mut usize| union.signed_from(p, near).abs();
     let epsilon_union = highest(bvh, &start, signed);
     let unsigned = |p, near: &mut usize| union.unsigned_from(p, near);
@@ -217,28 +204,9 @@ pub(super) fn highest(
     largest(&[largest(start.values), largest(&peaks)])
 }
 
-/// Largest samples from which an ascent starts.
-pub(super) const SEEDS: usize = 72;
-
-/// Typical distance between so many samples of a surface.
-pub(super) fn spacing(surface: &TriMesh, samples: usize) -> f64 {
-    (area(surface) / samples as f64).sqrt()
-}
-
 /// Depth, as a fraction of the surface's diameter, from which a point that was reached uphill is not on
 /// the union's boundary.
 const EXPOSED: f64 = 1e-12;
-
-/// The area of a surface.
-fn area(surface: &TriMesh) -> f64 {
-    let twice = |face: usize| {
-        let [a, b, c] = surface.triangle(face);
-        (b - a).cross(c - a).length()
-    };
-    let mut sum = Sum::default();
-    (0..surface.faces.len()).for_each(|face| sum.add(0.5 * twice(face)));
-    sum.value()
-}
 
 /// Depth, as a fraction of the surface's diameter, from which a point of one primitive's surface
 /// counts as buried in another primitive and not as a point of the union's boundary.
@@ -255,110 +223,6 @@ fn absolute(mut values: Vec<f64>) -> Vec<f64> {
 fn largest(values: &[f64]) -> f64 {
     let larger = |a: f64, b: f64| if a.is_nan() || b <= a { a } else { b };
     values.iter().copied().fold(0.0, larger)
-}
-
-/// Samples of a surface: the area-uniform ones first, then the vertices of its faces.
-pub(super) struct SurfaceSamples {
-    pub points: Vec<Vec3>,
-    /// How many of them are area-uniform.
-    pub uniform: usize,
-}
-
-impl SurfaceSamples {
-    pub fn new(
-        surface: &TriMesh,
-        pose: &Pose,
-        count: usize,
-        seed: u64,
-    ) -> Result<Self, MetricError> {
-        if count == 0 {
-            return Err(MetricError::NoSamples("surface_samples"));
-        }
-        let triangles = pose.triangles(surface);
-        let mut points = sample_triangles(&triangles, count, seed).ok_or(MetricError::NoArea)?;
-        let mut used = vec![false; surface.vertices.len()];
-        for &v in surface.faces.iter().flatten() {
-            used[v as usize] = true;
-        }
-        points.extend(surface.vertices.iter().zip(used).filter(|&(_, u)| u).map(|(&v, _)| v));
-        Ok(Self { points, uniform: count })
-    }
-}
-
-/// Sets the random numbers apart from those of [`crate::surface::sample`] with the same seed: a medial
-/// mesh made from samples has no error at just these.
-const STREAM: u64 = 0x6d65_6173_7572_6521;
-
-/// `count` points, uniform by area and stratified along the list of triangles; `None` when there
-/// is no area or it is not finite.
-///
-/// Stratified, unlike the independent points of [`crate::surface::Sampling::AreaUniform`]: their
-/// means scatter less, and small parts are not left out by chance.
-pub(super) fn sample_triangles(
-    triangles: &[[Vec3; 3]],
-    count: usize,
-    seed: u64,
-) -> Option<Vec<Vec3>> {
-    let placed = place_on_triangles(triangles, count, seed)?;
-    Some(placed.iter().map(|placed| placed.on(triangles)).collect())
-}
-
-/// A point of a triangle.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Placed {
-    pub triangle: usize,
-    /// Weights of the second and third corner.
-    weights: [f64; 2],
-}
-
-impl Placed {
-    /// The point, on the triangle in whatever space.
-    pub fn on<V>(&self, triangles: &[[V; 3]]) -> V
-    where
-        V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f64, Output = V>,
-    {
-        let [a, b, c] = triangles[self.triangle];
-        a + (b - a) * self.weights[0] + (c - a) * self.weights[1]
-    }
-}
-
-/// As [`sample_triangles`], as places on the triangles.
-pub(super) fn place_on_triangles(
-    triangles: &[[Vec3; 3]],
-    count: usize,
-    seed: u64,
-) -> Option<Vec<Placed>> {
-    let area = |&[a, b, c]: &[Vec3; 3]| (b - a).cross(c - a).length() * 0.5;
-    let total: f64 = triangles.iter().map(area).sum();
-    if !(total > 0.0 && total.is_finite()) {
-        return None;
-    }
-    let mut rng = Pcg64::seed_from_u64(seed ^ STREAM);
-    let mut placed = Vec::with_capacity(count);
-    let (mut below, mut last) = (0.0, None);
-    let mut target = rng.random::<f64>() / count as f64 * total;
-    for (index, triangle) in triangles.iter().enumerate() {
-        let size = area(triangle);
-        below += size;
-        while placed.len() < count && target < below {
-            placed.push(uniform_in(index, &mut rng));
-            target = (placed.len() as f64 + rng.random::<f64>()) / count as f64 * total;
-        }
-        if size > 0.0 {
-            last = Some(index);
-        }
-    }
-    // The running sum may end a rounding below the total.
-    while let (true, Some(index)) = (placed.len() < count, last) {
-        placed.push(uniform_in(index, &mut rng));
-    }
-    Some(placed)
-}
-
-fn uniform_in(triangle: usize, rng: &mut Pcg64) -> Placed {
-    let root = rng.random::<f64>().sqrt();
-    let v = rng.random::<f64>();
-    Placed { triangle, weights: [root * (1.0 - v), root * v] }
 }
 
 /// Mean, root mean square and percentiles of some values.
@@ -391,21 +255,6 @@ impl Summary {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Sampling, sample};
-
-    #[test]
-    fn nothing_is_measured_where_it_was_sampled() {
-        let surface = TriMesh {
-            vertices: vec![Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y],
-            faces: vec![[0, 1, 2], [0, 2, 3]],
-        };
-        let sampled = sample(&surface, &Sampling::AreaUniform { count: 500, seed: 3 });
-        let pose = Pose::new(&surface, &MedialMesh::default());
-        let measured = SurfaceSamples::new(&surface, &pose, 500, 3).unwrap();
-        assert_eq!((measured.uniform, measured.points.len()), (500, 504));
-        let apart = |p: &&Vec3| sampled.iter().all(|q| p.distance(*q) > 1e-9);
-        assert_eq!(measured.points[..500].iter().filter(apart).count(), 500);
-    }
 
     #[test]
     fn a_distance_that_is_no_number_is_not_lost_in_the_largest() {

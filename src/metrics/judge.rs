@@ -6,11 +6,12 @@ use super::axis_distance::{PreparedAxis, prepared_axis_distance};
 use super::hausdorff::distances_with_envelope;
 use super::pose::Pose;
 use super::protrusion::{centres_outside, protrusion};
+use super::samples::SurfaceSamples;
 use super::volume::{Sides, box_in, volume_error_in};
 use super::{
     AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
-    SurfaceDistances, VolumeOptions, certify, counts, distances, spikes, surface_distances,
-    topology_warning, triangle_quality,
+    SurfaceDistances, VolumeOptions, certify, counts, spikes, surface_distances, topology_warning,
+    triangle_quality,
 };
 use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
 use crate::surface::TriangleBvh;
@@ -58,6 +59,8 @@ pub struct Judge {
     tree: Arc<TriangleBvh>,
     inside: Arc<InsideTest>,
     truth: Truth,
+    /// Those of the surface, laid out once for all medial meshes.
+    samples: Result<SurfaceSamples, MetricError>,
     /// The true axis, prepared at once and not on demand: waiting for another thread to do so, a
     /// worker would wait for itself.
     true_axis: Option<Result<PreparedAxis, MetricError>>,
@@ -75,7 +78,8 @@ impl Judge {
         options: JudgeOptions,
     ) -> Self {
         let true_axis = truth.axis.as_ref().map(PreparedAxis::new);
-        Self { surface, tree, inside, truth, true_axis, options }
+        let samples = SurfaceSamples::new(&surface, options.samples, options.seed);
+        Self { surface, tree, inside, truth, samples, true_axis, options }
     }
 
     /// How results are measured.
@@ -96,18 +100,17 @@ impl Judge {
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
         mesh.check().map_err(UnionError::from)?;
         // Random numbers and sums follow the order of the spheres.
-        let pose = Pose::new(&self.surface, mesh);
+        let samples = self.samples()?;
+        let pose = &samples.pose;
         let mesh = &pose.in_order(mesh);
         let union = MedialUnion::new(mesh)?;
         let axis = || self.true_axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
         let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
         // Side by side, because parts of each run on one thread.
-        let distances = || {
-            let (surface, options) = (&self.surface, self.distance_options());
-            distances_with_envelope(surface, &self.tree, mesh, &union, &pose, &options)
-        };
+        let distances =
+            || distances_with_envelope(&self.tree, mesh, &union, samples, &self.distance_options());
         let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
-            || rayon::join(distances, || self.volume_error(mesh, &union, &pose)),
+            || rayon::join(distances, || self.volume_error(mesh, &union, pose)),
             || rayon::join(axis, complex),
         );
         let ((distances, envelope), axis) = (distances?, axis.transpose()?);
@@ -148,7 +151,15 @@ impl Judge {
     /// # Errors
     /// As [`Judge::evaluate`].
     pub fn distances(&self, mesh: &MedialMesh) -> Result<Distances, MetricError> {
-        distances(&self.surface, &self.tree, mesh, &self.distance_options())
+        mesh.check().map_err(UnionError::from)?;
+        let samples = self.samples()?;
+        let mesh = &samples.pose.in_order(mesh);
+        let (union, options) = (MedialUnion::new(mesh)?, self.distance_options());
+        Ok(distances_with_envelope(&self.tree, mesh, &union, samples, &options)?.0)
+    }
+
+    fn samples(&self) -> Result<&SurfaceSamples, MetricError> {
+        self.samples.as_ref().map_err(Clone::clone)
     }
 
     fn distance_options(&self) -> DistanceOptions {
@@ -175,7 +186,7 @@ impl Judge {
     /// As [`Judge::evaluate`], and when the tolerance is out of range or too fine.
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
         mesh.check().map_err(UnionError::from)?;
-        let mesh = Pose::new(&self.surface, mesh).in_order(mesh);
+        let mesh = self.samples()?.pose.in_order(mesh);
         certify(&self.surface, &self.tree, &mesh, tolerance)
     }
 

@@ -14,6 +14,7 @@ mod lifted_axis;
 mod pose;
 mod protrusion;
 mod quality;
+mod samples;
 mod spikes;
 mod surface_distance;
 mod topology;

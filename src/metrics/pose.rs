@@ -1,4 +1,4 @@
-//! A frame that moves along with a surface and its medial mesh.
+//! A frame that moves along with a surface.
 //!
 //! Samples are laid out along axes and in the order of a list. Were these the coordinate axes and
 //! the order of the file, then a rotation or another numbering of the same input would give other
@@ -12,10 +12,10 @@
 //!    vertex (up to a tenth), so that the vertices of a round shape are not all equally far. The
 //!    third is the cross product: reflections are told apart.
 //! 3. A shape with symmetries has several such pairs, equal up to rounding. The least of a sum
-//!    of one function, neither odd nor even, over everything in the frame decides: the surface's triangles, and the spheres,
-//!    edges and faces of the medial mesh, which need not share the surface's symmetries. Where all
-//!    is equal even then, the frames are images of each other under a symmetry of the whole, and any
-//!    of them gives the same numbers; the first by coordinates is taken.
+//!    of one function, neither odd nor even, over all triangles in the frame decides. Where all is equal
+//!    even then, the frames are images of each other under a symmetry of the surface, and the first by
+//!    coordinates is taken. A medial mesh that shares the symmetry gets the same numbers in any of
+//!    them; one that does not is measured by another set of samples once both are turned.
 //!
 //! What is ordered is ordered along a Morton curve in this frame, through cells set off from all round
 //! numbers, so that the rounding of a rotation moves nothing into another cell.
@@ -37,14 +37,14 @@ const EQUAL: f64 = 1e-9;
 /// Sums over everything that agree to this belong to symmetric frames.
 const SYMMETRIC: f64 = 1e-10;
 
-/// Candidates times what they are compared by: a fraction of a second. A polyhedral group has 120
+/// Candidates times the triangles that they are compared by. A polyhedral group has 120
 /// elements, the rim of a solid of revolution some hundreds of vertices. Of more candidates the first by
 /// coordinates are compared, so that samples may depend on the orientation where a million triangles have
 /// more than a hundred symmetries.
-const WORK: usize = 1 << 27;
+const MOST_COMPARISONS: usize = 1 << 27;
 
 /// Second axes that are compared for a first one, the first by coordinates: bounds the memory.
-const MOST: usize = 1024;
+const MOST_SECOND_AXES: usize = 1024;
 
 /// Axes and origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,12 +57,12 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    /// The pose of a surface with its medial mesh; along the coordinate axes when the surface has no
-    /// extent. Linear but for shapes with symmetries, where it is linear for each of them.
+    /// The pose of a surface; along the coordinate axes when it has no extent. Linear but for shapes with
+    /// symmetries, where it is linear for each of them.
     ///
     /// # Panics
     /// If a face names a vertex that does not exist.
-    pub fn new(surface: &TriMesh, mesh: &MedialMesh) -> Self {
+    pub fn new(surface: &TriMesh) -> Self {
         let corners = Corners::new(surface);
         let origin = mean(&corners.points);
         let size = corners.points.iter().map(|p| p.distance(origin)).fold(0.0, f64::max);
@@ -70,8 +70,8 @@ impl Pose {
         if !(size > 0.0 && size.is_finite()) {
             return Self { size: 1.0, ..world };
         }
-        let shape = Shape { corners: &corners, origin, surface, mesh };
-        shape.pose(size).unwrap_or(world)
+        let axes = corners.axes(origin, || centroids(surface, origin, size));
+        Self { axes: axes.unwrap_or(Vec3::AXES), ..world }
     }
 
     /// The frame of the coordinates.
@@ -231,100 +231,71 @@ fn mean(points: &[Vec3]) -> Vec3 {
     Vec3::from_array(sum.map(|s| s as f64 / points.len() as f64 * unit))
 }
 
-/// What has a pose.
-struct Shape<'a> {
-    corners: &'a Corners,
-    origin: Vec3,
-    surface: &'a TriMesh,
-    mesh: &'a MedialMesh,
+/// The centroids of a surface's triangles from the origin, in units of the size.
+fn centroids(surface: &TriMesh, origin: Vec3, size: f64) -> Vec<Vec3> {
+    let centroid = |f: usize| {
+        let [a, b, c] = surface.triangle(f);
+        ((a + b + c) / 3.0 - origin) / size
+    };
+    (0..surface.faces.len()).map(centroid).collect()
 }
 
-impl Shape<'_> {
-    fn pose(&self, size: f64) -> Option<Pose> {
-        let medial = LazyCell::new(|| self.medial_marks(size));
-        let surface = LazyCell::new(|| self.surface_marks(size));
-        let marks = |turn: usize| if turn == 0 { medial.as_slice() } else { surface.as_slice() };
-        let direction = |p: Vec3| (p - self.origin).try_normalize();
-        let first = self.corners.farthest(|v| v.distance(self.origin));
+impl Corners {
+    /// Steps 2 and 3; `marks` are what breaks symmetries, made only where there may be some.
+    fn axes(&self, origin: Vec3, marks: impl Fn() -> Vec<Vec3>) -> Option<[Vec3; 3]> {
+        let marks = LazyCell::new(marks);
+        let first = self.farthest(|v| v.distance(origin));
+        let first = first.into_iter().filter_map(|p| (p - origin).try_normalize()).collect();
         // By what is the same all around the axis.
-        let first = first.into_iter().filter_map(direction).collect();
-        let first = least(first, marks, |axis: &Vec3, d, tag| {
-            let along = axis.dot(d);
-            1.732 * along + 2.236 * (d.length_squared() - along * along) + tag
-        });
+        let first = least(
+            first,
+            || &*marks,
+            |axis: &Vec3, d| {
+                let along = axis.dot(d);
+                1.732 * along + 2.236 * (d.length_squared() - along * along)
+            },
+        );
         let frames = |&x: &Vec3| {
-            let across = move |v: Vec3| (v - self.origin).reject_from_normalized(x);
-            let second = self.corners.farthest(|v| across(v).length());
+            let across = move |v: Vec3| (v - origin).reject_from_normalized(x);
+            let second = self.farthest(|v| across(v).length());
             let frame = move |v: Vec3| across(v).try_normalize().map(|y| [x, y, x.cross(y)]);
-            second.into_iter().take(MOST).filter_map(frame).collect::<Vec<_>>()
+            second.into_iter().take(MOST_SECOND_AXES).filter_map(frame).collect::<Vec<_>>()
         };
-        let most = (WORK / self.corners.points.len()).max(1);
+        let most = (MOST_COMPARISONS / self.points.len()).max(1);
         let frames = first[..first.len().min(most)].par_iter().flat_map_iter(frames).collect();
-        let frames = least(frames, marks, |[x, y, z]: &[Vec3; 3], d, tag| {
-            (1.732 * *x + 2.236 * *y - 1.26 * *z).dot(d) + d.length_squared() + tag
-        });
-        let axes = *frames.first()?;
-        Some(Pose { origin: self.origin, axes, size })
-    }
-
-    fn place(&self, p: Vec3, size: f64) -> Vec3 {
-        (p - self.origin) / size
-    }
-
-    fn medial_marks(&self, size: f64) -> Vec<Mark> {
-        let sphere = |v: u32| self.mesh.spheres[v as usize];
-        let place = |p: Vec3| self.place(p, size);
-        let spheres = self.mesh.spheres.iter().map(|s| (place(s.centre), 1.0 + s.radius / size));
-        let edges = self.mesh.edges.iter().map(|e| {
-            let [a, b] = e.map(|v| sphere(v).centre);
-            (place(a.midpoint(b)), 0.3)
-        });
-        let faces = self.mesh.faces.iter().map(|f| {
-            let [a, b, c] = f.map(|v| sphere(v).centre);
-            (place((a + b + c) / 3.0), 0.7)
-        });
-        spheres.chain(edges).chain(faces).collect()
-    }
-
-    fn surface_marks(&self, size: f64) -> Vec<Mark> {
-        let centroid = |f: usize| {
-            let [a, b, c] = self.surface.triangle(f);
-            (self.place((a + b + c) / 3.0, size), 0.0)
-        };
-        (0..self.surface.faces.len()).map(centroid).collect()
+        let frames = least(
+            frames,
+            || &*marks,
+            |[x, y, z]: &[Vec3; 3], d| {
+                (1.732 * *x + 2.236 * *y - 1.26 * *z).dot(d) + d.length_squared()
+            },
+        );
+        frames.first().copied()
     }
 }
-
-/// What may break a symmetry: a point from the origin, in units of the size, with a number that tells
-/// what it is.
-type Mark = (Vec3, f64);
 
 /// Of several candidates those with the least sum over all marks, up to rounding; the sum is that of a
-/// function that is neither odd nor even of `argument`. First over the medial mesh, which is smaller and
-/// rarely symmetric, then over the surface.
+/// function that is neither odd nor even of `argument`.
 fn least<'m, T: Copy + Send + Sync>(
     mut candidates: Vec<T>,
-    marks: impl Fn(usize) -> &'m [Mark],
-    argument: impl Fn(&T, Vec3, f64) -> f64 + Send + Sync,
+    marks: impl Fn() -> &'m Vec<Vec3>,
+    argument: impl Fn(&T, Vec3) -> f64 + Send + Sync,
 ) -> Vec<T> {
-    for turn in 0..2 {
-        if candidates.len() < 2 {
-            break;
-        }
-        let marks = marks(turn);
-        candidates.truncate((WORK / marks.len().max(1)).max(1));
-        let value = |candidate: &T| {
-            let mut sum = Sum::default();
-            for &(d, tag) in marks {
-                let t = argument(candidate, d, tag);
-                sum.add(t / (2.0 + t * t));
-            }
-            sum.value()
-        };
-        let values: Vec<f64> = candidates.par_iter().map(value).collect();
-        let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
-        let is_least = |&(_, value): &(T, f64)| value <= smallest + SYMMETRIC;
-        candidates = candidates.into_iter().zip(values).filter(is_least).map(|(c, _)| c).collect();
+    if candidates.len() < 2 {
+        return candidates;
     }
-    candidates
+    let marks = marks();
+    candidates.truncate((MOST_COMPARISONS / marks.len().max(1)).max(1));
+    let value = |candidate: &T| {
+        let mut sum = Sum::default();
+        for &d in marks {
+            let t = argument(candidate, d);
+            sum.add(t / (2.0 + t * t));
+        }
+        sum.value()
+    };
+    let values: Vec<f64> = candidates.par_iter().map(value).collect();
+    let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let is_least = |&(_, value): &(T, f64)| value <= smallest + SYMMETRIC;
+    candidates.into_iter().zip(values).filter(is_least).map(|(c, _)| c).collect()
 }

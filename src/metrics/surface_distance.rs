@@ -13,11 +13,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ascent::Start;
-use super::hausdorff::{DistanceOptions, MetricError, SEEDS, SurfaceSamples, highest, spacing};
-use super::pose::Pose;
+use super::hausdorff::{DistanceOptions, MetricError, highest};
+use super::samples::SurfaceSamples;
 use crate::Vec3;
-use crate::complex::MedialMesh;
 use crate::surface::TriMesh;
 use crate::surface::TriangleBvh;
 
@@ -75,30 +73,15 @@ pub fn surface_distances(
     other: &TriMesh,
     options: &DistanceOptions,
 ) -> Result<SurfaceDistances, MetricError> {
-    let pose = |of: &TriMesh| Pose::new(of, &MedialMesh::default());
-    let poses = [pose(surface), pose(other)];
-    let on_surface =
-        SurfaceSamples::new(surface, &poses[0], options.surface_samples, options.seed)?;
-    let on_other = SurfaceSamples::new(other, &poses[1], options.envelope_samples, options.seed)?;
+    let on_surface = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
+    let on_other = SurfaceSamples::new(other, options.envelope_samples, options.seed)?;
     let other_tree = TriangleBvh::new(other).map_err(MetricError::Tree)?;
     let there = other_tree.distance_batch(&on_surface.points);
     let back = tree.distance_batch(&on_other.points);
-    let forward = Start {
-        pose: &poses[0],
-        points: &on_surface.points,
-        values: &there,
-        spacing: spacing(surface, options.surface_samples),
-        seeds: SEEDS,
-    };
-    let reverse = Start {
-        pose: &poses[1],
-        points: &on_other.points,
-        values: &back,
-        spacing: spacing(other, options.envelope_samples),
-        seeds: SEEDS,
-    };
-    let forward = highest(tree, &forward, |p, near| distance_from(&other_tree, p, near));
-    let reverse = highest(&other_tree, &reverse, |p, near| distance_from(tree, p, near));
+    let from_surface = |p, near: &mut usize| distance_from(&other_tree, p, near);
+    let forward = highest(tree, &on_surface.start(&there), from_surface);
+    let from_other = |p, near: &mut usize| distance_from(tree, p, near);
+    let reverse = highest(&other_tree, &on_other.start(&back), from_other);
     let mean = |values: &[f64], power: i32| {
         values.iter().map(|v| v.powi(power)).sum::<f64>() / values.len().max(1) as f64
     };

@@ -6,7 +6,7 @@ use medial::shape::{Cost, Shape};
 use medial::surface;
 use serde_json::{Map, Value};
 
-use super::{Arguments, Made, Stages};
+use super::{Arguments, Made, Said, Stages};
 use crate::exit::Failure;
 
 /// Corners of the power crust that are nearer than this along it are one, as a fraction of the
@@ -61,12 +61,6 @@ pub fn surface_of(
         ("sampling".to_owned(), Value::from(shape.options().sampling.to_string())),
         ("seed".to_owned(), Value::from(arguments.substrate.seed)),
     ]);
-    Ok(Made {
-        mesh: crust.mesh,
-        diagonal: to_normal.diagonal,
-        tolerance: COINCIDENT,
-        union: None,
-        more,
-        warnings: vec![],
-    })
+    let said = Said { diagonal: to_normal.diagonal, tolerance: COINCIDENT, union: None, more };
+    Ok(Made { mesh: crust.mesh, said, warnings: vec![] })
 }

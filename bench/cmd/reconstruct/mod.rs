@@ -56,9 +56,15 @@ enum Method {
 /// A result farther from the mesh than this, in its diagonals, is taken to be of another surface.
 const ASTRAY: f64 = 0.5;
 
-/// A surface that was made, in input units, and what is to be said of it.
+/// A surface that was made, in input units.
 struct Made {
     mesh: TriMesh,
+    said: Said,
+    warnings: Vec<String>,
+}
+
+/// What is to be said of it.
+struct Said {
     diagonal: f64,
     /// As a fraction of the diagonal.
     tolerance: f64,
@@ -66,7 +72,6 @@ struct Made {
     union: Option<[u64; 3]>,
     /// Keys of this method alone.
     more: Map<String, Value>,
-    warnings: Vec<String>,
 }
 
 /// Seconds by stage.
@@ -93,7 +98,7 @@ impl Stages {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_arguments(arguments)?;
     let mut stages = Stages::default();
-    let line = StageLine::new(global.quiet || global.json);
+    let line = StageLine::new(global.stages());
     line.at("reading");
     let (read, lap) = Cost::of(|| read(arguments));
     let (shape, axis, mut warnings) = read?;
@@ -109,15 +114,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (written, lap) = Cost::of(|| surface::write(&arguments.output, &made.mesh));
     written.map_err(Failure::input)?;
     stages.add("write", lap);
-    let (seconds, cpu_seconds) = (stages.total.seconds, stages.total.cpu_seconds);
-    stages.seconds.insert("total".into(), seconds.into());
-    stages.cpu_seconds.insert("total".into(), cpu_seconds.into());
     let peak = peak_bytes();
 
     // Untimed: the verdict.
     line.at("checking the surface");
     let report = examine(arguments, &made.mesh, &mut warnings)?;
-    warnings.extend(made.union.and_then(|union| other_topology(union, &report)));
+    warnings.extend(made.said.union.and_then(|union| other_topology(union, &report)));
     let deviation = shape.as_ref().map(|shape| deviation(shape, &made.mesh)).transpose()?;
     if let (Some([max, _]), Some(axis)) = (deviation, &arguments.axis)
         && max > ASTRAY
@@ -129,47 +131,79 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         ));
     }
     drop(line);
-    let method = match arguments.method {
-        Method::Union => "union",
-        Method::PowerCrust => "power-crust",
-    };
+    stages.seconds.insert("total".into(), stages.total.seconds.into());
+    stages.cpu_seconds.insert("total".into(), stages.total.cpu_seconds.into());
+    let verdict = Verdict { report, deviation, stages, peak, made: made.said };
     if global.json {
-        let object = json!({
-            "method": method, "vertices": report.vertices, "faces": report.faces,
-            "closed": report.closed, "manifold": report.manifold, "genus": report.genus,
-            "components": report.components, "intersecting_pairs": report.intersecting_pairs,
-            "tolerance": made.tolerance, "diagonal": made.diagonal,
-            "betti": report.expected_betti, "union_betti": made.union,
-            "deviation": deviation.map(|[max, mean]| json!({ "max": max, "mean": mean })),
-            "seconds": stages.seconds, "cpu_seconds": stages.cpu_seconds, "peak_bytes": peak,
-            "output": arguments.output,
-        });
-        let Value::Object(mut object) = object else { unreachable!("made above") };
-        object.extend(made.more);
-        print_json(&object, &warnings);
-        return Ok(Exit::Done);
-    }
-    let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
-    let yes = |flag: bool| if flag { "" } else { "not " };
-    print_line(&format!(
-        "{}: {}, {} in {seconds:.2} s",
-        arguments.output.display(),
-        counted(report.vertices as u64, "vertex"),
-        counted(report.faces as u64, "face")
-    ));
-    print_line(&format!(
-        "  {}closed, {}manifold, {}, genus {genus}",
-        yes(report.closed),
-        yes(report.manifold),
-        counted(report.components as u64, "component")
-    ));
-    if let Some([max, mean]) = deviation {
-        print_line(&format!("  from the mesh: at most {}, mean {}", percent(max), percent(mean)));
-    }
-    for warning in warnings {
-        print_line(&format!("  warning: {warning}"));
+        print_json(&verdict.object(arguments), &warnings);
+    } else {
+        verdict.print(arguments);
+        warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
     }
     Ok(Exit::Done)
+}
+
+/// What is told of a surface that was made.
+struct Verdict {
+    report: SurfaceReport,
+    deviation: Option<[f64; 2]>,
+    stages: Stages,
+    peak: Option<u64>,
+    made: Said,
+}
+
+impl Verdict {
+    fn object(self, arguments: &Arguments) -> Map<String, Value> {
+        let Self { report, deviation, stages, peak, made } = self;
+        let method = match arguments.method {
+            Method::Union => "union",
+            Method::PowerCrust => "power-crust",
+        };
+        let deviation = deviation.map(|[max, mean]| json!({ "max": max, "mean": mean }));
+        let known = [
+            ("method", json!(method)),
+            ("vertices", json!(report.vertices)),
+            ("faces", json!(report.faces)),
+            ("closed", json!(report.closed)),
+            ("manifold", json!(report.manifold)),
+            ("genus", json!(report.genus)),
+            ("components", json!(report.components)),
+            ("intersecting_pairs", json!(report.intersecting_pairs)),
+            ("tolerance", json!(made.tolerance)),
+            ("diagonal", json!(made.diagonal)),
+            ("betti", json!(report.expected_betti)),
+            ("union_betti", json!(made.union)),
+            ("deviation", json!(deviation)),
+            ("seconds", stages.seconds.into()),
+            ("cpu_seconds", stages.cpu_seconds.into()),
+            ("peak_bytes", json!(peak)),
+            ("output", json!(arguments.output)),
+        ];
+        known.into_iter().map(|(key, value)| (key.to_owned(), value)).chain(made.more).collect()
+    }
+
+    fn print(&self, arguments: &Arguments) {
+        let Self { report, deviation, stages, .. } = self;
+        let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
+        let yes = |flag: bool| if flag { "" } else { "not " };
+        print_line(&format!(
+            "{}: {}, {} in {:.2} s",
+            arguments.output.display(),
+            counted(report.vertices as u64, "vertex"),
+            counted(report.faces as u64, "face"),
+            stages.total.seconds
+        ));
+        print_line(&format!(
+            "  {}closed, {}manifold, {}, genus {genus}",
+            yes(report.closed),
+            yes(report.manifold),
+            counted(report.components as u64, "component")
+        ));
+        if let Some([max, mean]) = deviation {
+            let (max, mean) = (percent(*max), percent(*mean));
+            print_line(&format!("  from the mesh: at most {max}, mean {mean}"));
+        }
+    }
 }
 
 /// What can be refused before anything is read.

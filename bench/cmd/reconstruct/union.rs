@@ -9,7 +9,7 @@ use medial::shape::{Cost, Shape};
 use medial::surface::{self, Normalisation, TriMesh};
 use serde_json::{Map, Value};
 
-use super::{Arguments, Made, Stages, betti_of, face_centres};
+use super::{Arguments, Made, Said, Stages, betti_of, face_centres};
 use crate::exit::Failure;
 use crate::output::counted;
 
@@ -57,7 +57,8 @@ pub fn surface_of(
         ("lost".to_owned(), Value::from(made.lost)),
         ("faces_to_union".to_owned(), Value::from(off)),
     ]);
-    Ok(Made { mesh: made.mesh, diagonal, tolerance, union: betti, more, warnings })
+    let said = Said { diagonal, tolerance, union: betti, more };
+    Ok(Made { mesh: made.mesh, said, warnings })
 }
 
 /// A surface of a union at the tolerance that was taken.

@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     bound::check(arguments)?;
     check_hierarchy(arguments, method)?;
     arguments.outputs.check(method)?;
-    let line = StageLine::new(global.quiet || global.json);
+    let line = StageLine::new(global.stages());
     line.at("reading");
     let input = Input::load(&source)?;
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
@@ -90,8 +90,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         shape = shape.with_initial(&initial);
     }
     let params = params(&arguments.set)?;
-    let given = arguments.initial.is_some();
-    let origin = Origin::new(&arguments.method, &params, &input, &shape, given);
+    let origin =
+        Origin::new(&arguments.method, &params, &input, &shape, arguments.initial.as_deref());
     let loaded = arguments.hierarchy.as_deref();
     let loaded = loaded.map(|path| hierarchy::load(path, &origin, &shape)).transpose()?;
     let start = Start { method, params, shape: &shape, loaded };

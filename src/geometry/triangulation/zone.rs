@@ -37,7 +37,8 @@ impl<M: Metric> Builder<'_, M> {
     pub(super) fn conflicts(&self, cell: u32, vertex: u32) -> bool {
         let site = &self.sites[vertex as usize];
         let (det, bound) = determinant::<M>(&self.cells, self.sites, cell, site);
-        conflicts_given::<M>(self.filter, &self.cells, self.sites, cell, site, det, bound)
+        let candidate = Candidate { cell, det, bound };
+        conflicts_given::<M>(self.filter, &self.cells, self.sites, site, candidate)
     }
 
     /// Marks and lists the cells in conflict with the site.
@@ -114,12 +115,13 @@ impl<M: Metric> Builder<'_, M> {
         }
         let mut size = zone.len();
         zone.resize(size + count, 0);
-        for &Candidate { cell, det, bound } in front.iter() {
+        for &candidate in front.iter() {
+            let Candidate { cell, det, bound } = candidate;
             let decided = det.abs() > bound + UNDERFLOW && !cells[cell as usize].is_infinite();
             let conflict = if decided {
                 det > 0.0
             } else {
-                conflicts_given::<M>(*filter, cells, sites, cell, site, det, bound)
+                conflicts_given::<M>(*filter, cells, sites, site, candidate)
             };
             zone[size] = cell;
             size += usize::from(conflict);
@@ -175,10 +177,8 @@ fn conflicts_given<M: Metric>(
     filter: Filter,
     cells: &[Cell],
     sites: &[Site],
-    cell: u32,
     site: &Site,
-    det: f64,
-    bound: f64,
+    Candidate { cell, det, bound }: Candidate,
 ) -> bool {
     let v = cells[cell as usize].v;
     if v[3] == INFINITE {
