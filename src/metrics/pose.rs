@@ -37,7 +37,7 @@ const EQUAL: f64 = 1e-9;
 /// Sums over everything that agree to this belong to symmetric frames.
 const SYMMETRIC: f64 = 1e-10;
 
-/// Candidates times what they are compared by: a fraction of a second. A polyhedral group has 120
+/// Candidates times what they are compared by: bounds the work. A polyhedral group has 120
 /// elements, the rim of a solid of revolution some hundreds of vertices. Of more candidates the first by
 /// coordinates are compared, so that samples may depend on the orientation where a million triangles have
 /// more than a hundred symmetries.
