@@ -93,6 +93,37 @@ fn a_method_that_changes_its_mind_is_called_out() {
     }
 }
 
+#[test]
+fn a_bound_that_the_level_found_misses_when_it_is_asked_alone_is_missed() {
+    const BOUND: f64 = 0.3;
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let bound = BOUND.to_string();
+    let arguments = [
+        &["compare", "builtin:box:8", "--methods", "warms-up,qmat", "--max-error", &bound][..],
+        &["--spheres", "30", "--samples", "500", "--counts-only", "--quiet"],
+        &["--out", out.to_str().expect("UTF-8")],
+    ];
+    let output = run(example("faulty"), &arguments.concat());
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    let within = |method: &str| {
+        let is_wanted = |record: &Value| {
+            record["simplify"]["method"] == method
+                && record["simplify"]["level"]["max_error"] == BOUND
+        };
+        records(&out).into_iter().find(is_wanted).unwrap_or_else(|| panic!("{method} has a record"))
+    };
+    let error = |record: &Value| record["evaluate"]["hausdorff"].as_f64().expect("measured");
+    let kept = within("qmat");
+    assert!(kept["status"] == "ok" && error(&kept) <= BOUND, "{kept}");
+    // The search has found a level, the result that is kept is another.
+    let missed = within("warms-up");
+    assert!(error(&missed) > BOUND, "{missed}");
+    assert_eq!([&missed["status"], &missed["simplify"]["status"]], ["bound_missed"; 2]);
+    let reason = missed["reason"].as_str().expect("a reason");
+    assert!(reason.contains("asked alone"), "{reason}");
+}
+
 /// A plug-in file with programs that go wrong, each a line for `sh`.
 fn plugins(dir: &Path, programs: &[(&str, &str)]) -> String {
     let mut text = String::new();

@@ -15,7 +15,8 @@
 //!    above `theta` been touched.
 //!
 //! # Numbers of spheres
-//! Half of the sheets of a dense sample have 180 degrees: below their number `theta` says nothing more,
+//! Sheets that hold the middle of their two samples have 180 degrees: 415 of the 24,564 of the bear stay up
+//! to 179.99999, all but 6 of the 3,181 of the built-in plate. Below their number `theta` says nothing more,
 //! and what the test of the topology leaves of them is one strip or lump. So a number of spheres is
 //! met by the number of samples at one `theta` (`methods/size_search.rs`). The topology is then that of
 //! the Voronoi diagram of those samples. With `size=ranking` sheets of the given samples go on in
@@ -122,7 +123,7 @@ pub(super) fn prepare(
 }
 
 /// Sheets by ascending value; of those that tie the smallest first, so that what is left is spread over
-/// the thick parts. Half of all sheets hold the middle of their two samples and have 180 degrees.
+/// the thick parts. All that hold the middle of their two samples have 180 degrees.
 fn in_order(set: &FacetSet, value: &[f64]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..value.len() as u32).collect();
     let of = |sheet: u32| value[sheet as usize];

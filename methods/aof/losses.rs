@@ -26,7 +26,7 @@ pub(super) const LOST: f64 = 3.0;
 const MOST_POINTS: usize = 60_000;
 /// Points around the lost one at which balls are shrunk, at most.
 const MOST_BALLS: usize = 400;
-/// Steps of a shrinking ball; most end after five.
+/// Steps of a shrinking ball, at most.
 const STEPS: usize = 40;
 
 /// A part of the surface that is far from every voxel's sphere.

@@ -35,22 +35,22 @@
 //!   thinned by flux (section 3.3 of Siddiqi et al. 2002) with `mu = 3/8` for its end points. The
 //!   paper has 369 voxels in its figures, and keeps by threshold (`variant=plain`, `mu = 1/8`) or
 //!   deletes by distance (`variant=homotopy`). Kept by threshold a sheet is two voxels thick and torn,
-//!   and a lattice of 369 has a hundred times the voxels that the other methods have spheres.
+//!   and a lattice of 369 has far more voxels than the other methods have spheres.
 //!   [`Level::Published`] has the paper's: `resolution=369`, `variant=plain`, a flux of -0.2,
 //!   `spiral=classic`, `start=coarse`, `dismiss=zero`, `refine=false`, unless set otherwise.
 //!   Where 369 does not fit into `max_memory`, or no coarse voxel into the solid, it says what is done.
 //! - Either spiral has a mean direction that is not zero, so that a constant field has a flux of up
 //!   to that length. Coarse voxels are dismissed if `AOF'` is not below minus this length
 //!   (`dismiss=bias`); with the paper's 0 (`dismiss=zero`) half the directions of a plane are never
-//!   dismissed. Neither reproduces its Table 2: of the box 45.9 % go at the first level there, here
-//!   31 % with zero and 64 % with bias.
+//!   dismissed. Neither reproduces its Table 2: of the box 45.9 % go at the first level there, of
+//!   the built-in box 31 % with zero and 64 % with bias.
 //! - A lattice on which the start set has other Betti numbers than the solid, or leaves part of the
 //!   surface far from every voxel, is made finer up to three times, and the best is taken (file
 //!   `base.rs`). What is lost in the end is named (file `losses.rs`).
 //! - Line 3 of Algorithm 1, read literally, begins with the smallest spheres; what is meant is
 //!   `sigma` at the coarsest level and `sigma / d^j` after `j` divisions.
-//! - The equal-area spiral is the default: its error on a plane through the centre is about half
-//!   that of the classic one. `spiral=classic` is the paper's.
+//! - The equal-area spiral is the default: its largest error on a plane through the centre is about
+//!   0.6 of that of the classic one (held by a test in `spiral.rs`). `spiral=classic` is the paper's.
 //! - A coarse voxel whose sphere does not fit inside is split, not lost, so that the start set is
 //!   that of the finest level (`start=fine`). The paper's own (`start=coarse`) loses whatever is thinner
 //!   than twice the coarsest voxel.
@@ -129,7 +129,7 @@ pub fn method() -> Method<AofSettings> {
              straight from the surface.",
         )
         .native(NativeLevel::larger_is_coarser("alpha", "degrees of object angle"))
-        // The published lattice takes most of a minute: the one of the other levels will do.
+        // The published lattice takes far longer: the one of the other levels will do.
         .filter(Level::Native(30.0))
         .sweep(&[15.0, 25.0, 35.0, 45.0, 60.0])
         .published(

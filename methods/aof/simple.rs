@@ -31,7 +31,7 @@ pub struct SimpleTable {
 }
 
 impl SimpleTable {
-    /// The table, built on first use in some tenths of a second.
+    /// The table, built on first use.
     pub fn get() -> &'static Self {
         static TABLE: OnceLock<SimpleTable> = OnceLock::new();
         TABLE.get_or_init(|| {

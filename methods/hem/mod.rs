@@ -48,8 +48,8 @@
 //! of the collapses stays one-sided, so that the two-sided bound costs spheres.
 //!
 //! In the reading `depth` the initial mesh is often beyond a small bound: the cones and slabs of a
-//! Voronoi medial mesh stick out of the surface between the spheres, by 0.4 % of the diagonal on the
-//! bear and the dolphin. The code's default of `1e-4` presumes the reading `surface`, in which the
+//! Voronoi medial mesh stick out of the surface between the spheres, by 0.63 % of the diagonal on the
+//! bear and 0.51 % on the dolphin. The code's default of `1e-4` presumes the reading `surface`, in which the
 //! initial mesh has no error at all. [`Level::Published`] is the code's rule: it stops before the
 //! first collapse of a local error above `1e-4`, holds nothing, and says what error the result has.
 //!
@@ -64,8 +64,7 @@
 //!
 //! - Errors below `1e-12` are rounding and count as zero. Of equal costs the shorter edge comes
 //!   first, then the smaller ids. Ordered by ids alone, or by the size of the stars, clusters of
-//!   coincident spheres (a sampled sphere) ended in knots of up to 73 spheres in which no collapse
-//!   keeps the homotopy type.
+//!   coincident spheres (a sampled sphere) end in knots in which no collapse keeps the homotopy type.
 //! - A sphere without samples adds none to the error; two without cost nothing.
 //! - A mesh that comes without contact points gets the samples nearest to its spheres.
 //!
@@ -73,13 +72,11 @@
 //!
 //! - The default reading is `depth`. `surface` hardly notices that a primitive swallows a sample: the
 //!   surfaces of others, buried beside it, are near. Largest `|sigma|` at 100 spheres, over the
-//!   vertices and 50,000 more points: bear 0.78 % of the diagonal with `depth`, 5.2 % with
-//!   `surface`; dolphin 0.45 % and 2.4 %. Largest `mu`: 0.78 % and 0.71 %, 0.45 % and 0.55 %.
+//!   vertices and 50,000 more points: bear 0.65 % of the diagonal with `depth`, 4.5 % with
+//!   `surface`; dolphin 0.41 % and 1.3 %. Largest `mu`: 0.65 % and 1.1 %, 0.41 % and 0.40 %.
 //! - The authors' code asks that an edge has as many faces as its ends have common neighbours. Here a
-//!   collapse keeps the homotopy type ([`CollapseComplex::keeps_homotopy`]). With the link condition
-//!   in full instead, the bear stopped at 95 spheres and the dolphin at 104, at errors of 12 %
-//!   and 8 %: nearly all of the edges left closed a hole and the void in it at once, which changes
-//!   nothing.
+//!   collapse keeps the homotopy type ([`CollapseComplex::keeps_homotopy`]). The link condition in
+//!   full holds back more: edges that close a hole and the void in it at once, which changes nothing.
 //! - Step 4 leaves out the edges of neighbours of `j` alone: nothing in their stars changed, because
 //!   the survivor does not move.
 //!
@@ -92,8 +89,8 @@
 //!
 //! The reason is the condition that blocks collapses. With that of the authors' code
 //! (`blocking=neighbours`) it is as their paper says: the bear has 1.8 % at 100 spheres, where Q-MAT
-//! has 1.1 % and the homotopy test 0.6 %, and stops at 77; the dolphin stops at 152, at 14 %. Edges
-//! around pockets of spheres close a hole and the void in it at once, and are held back for good.
+//! as published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77; the
+//! dolphin stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it at once, and are held back for good.
 //!
 //! [`CollapseComplex::keeps_homotopy`]: medial::complex::collapse::CollapseComplex::keeps_homotopy
 

@@ -43,7 +43,7 @@ pub(super) enum Decision {
     /// It folds a face over at the optimum and costs more elsewhere: queue it at that cost.
     Postpone(Candidate),
     /// Collapsing it would change the topology, as long as these vertices stay as they are.
-    Hold([u32; 2]),
+    Hold(Vec<u32>),
     /// Each placement folds one of these faces over, as long as they stay as they are.
     Fold(Folded),
 }
@@ -157,9 +157,9 @@ impl Contraction {
                     self.tally.postponed += 1;
                     self.queue.push(dearer);
                 }
-                Decision::Hold(obstacle) => {
+                Decision::Hold(obstacles) => {
                     self.tally.held_by_topology += 1;
-                    self.queue.park(cheapest, &obstacle);
+                    self.queue.park(cheapest, &obstacles);
                 }
                 Decision::Fold(faces) => {
                     self.tally.held_by_inversion += 1;
@@ -178,11 +178,8 @@ impl Contraction {
     /// Steps 3 and 4: where the merged sphere goes, or what holds the edge back.
     fn decide(&mut self, candidate: Candidate) -> Decision {
         let [a, b] = candidate.ends();
-        if self.keeps_topology()
-            && let Some(obstacle) = self.complex.link_obstacle(a, b)
-            && !self.complex.keeps_homotopy(a, b)
-        {
-            return Decision::Hold(obstacle);
+        if self.keeps_topology() && !self.complex.keeps_homotopy(a, b) {
+            return Decision::Hold(self.complex.homotopy_obstacles(a, b));
         }
         self.place(candidate)
     }

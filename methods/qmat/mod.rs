@@ -43,25 +43,20 @@
 //!   checks from 200 on unless told otherwise.
 //! - Section 4.6 collapses an edge whose optimum folds a face over at the best other placement at
 //!   once. That costs more than the edge was queued at. Here the edge goes back into the queue at
-//!   that cost, and is collapsed when nothing cheaper is left. Over twelve meshes this lowered the
-//!   Hausdorff distance at 100 spheres by 12 % and the mean error by 3 % (geometric means); single
-//!   meshes go either way.
+//!   that cost, and is collapsed when nothing cheaper is left.
 //! - An edge that the link condition or folding faces reject comes back when what held it back is
 //!   part of a collapse; the paper says of the latter only that it "will not be collapsed".
 //! - The link condition is that of Dey et al. in full, for holes and for voids, after elementary
 //!   expansions ([`keeps_homotopy`](medial::complex::collapse::CollapseComplex::keeps_homotopy)): a
 //!   collapse that closes a hole and a void at once passes. As it stands in their paper it blocks
-//!   pockets of spheres for good: with `topology_from=all`, dolphin at 100 spheres had a Hausdorff
-//!   distance of 13.6 % of the diagonal, with the expansions 1.5 %, with the same Betti numbers.
+//!   pockets of spheres for good.
 //! - Even so it is sufficient, not necessary: when it holds back all that is left, at 500 spheres or
 //!   fewer, an edge whose collapse brings the Betti numbers no farther from those of the initial
 //!   mesh is taken (`unlock.rs`); by section 4.5 the simplification stops. With `topology_from=200` unchecked
 //!   collapses make voids, which would otherwise be kept.
 //! - A minimiser farther from the midpoint of its edge than the two balls extend, `d + max r`, is
 //!   not used, as if `A` were singular. `A` can pass for invertible where slabs are nearly parallel,
-//!   and then a single sphere lands far outside the shape: Max Planck with `boundary=legacy` at 500
-//!   spheres, a Hausdorff distance of 202 % of the diagonal instead of 1.5 %. With the default
-//!   parameters it changed nothing on the twelve meshes that were compared.
+//!   and then a single sphere lands far outside the shape.
 
 mod accumulate;
 mod contract;

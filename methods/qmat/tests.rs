@@ -275,7 +275,7 @@ fn follow(mesh: &MedialMesh, params: QmatParams) -> [usize; 3] {
 fn order_placement_and_fallback_are_those_of_the_paper_by_brute_force() {
     let mut rng = Pcg64::seed_from_u64(81);
     let mut totals = [0; 3];
-    for round in 0..400 {
+    for round in 0..800 {
         let n = rng.random_range(6..14_u32);
         let mut x = || rng.random_range(0.0..1.0);
         let spheres =
@@ -289,9 +289,7 @@ fn order_placement_and_fallback_are_those_of_the_paper_by_brute_force() {
         let faces: Vec<[u32; 3]> = (0..2 * n).map(|_| distinct()).collect();
         let edges = (0..n / 3).map(|_| distinct()).map(|[a, b, _]| [a, b]).collect();
         let initial = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
-        // Knots in which a rejected edge waits longer than a search of all edges would let it are the
-        // link condition's, not the order's.
-        let topology_from = TopologyFrom::Never;
+        let topology_from = [TopologyFrom::Never, TopologyFrom::All][round / 2 % 2];
         let boundary = [Boundary::Paper, Boundary::None][round % 2];
         let params = QmatParams { topology_from, boundary, ..params() };
         totals.iter_mut().zip(follow(&initial, params)).for_each(|(all, n)| *all += n);

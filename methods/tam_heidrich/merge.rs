@@ -10,7 +10,6 @@
 //! 3. From 1 on until none can be.
 //!
 //! A sliver whose short side is contracted leaves an edge, which stays as a curve where nothing else has it.
-//! On the built-in double torus these are two.
 
 use medial::complex::MedialMesh;
 use medial::complex::collapse::CollapseComplex;

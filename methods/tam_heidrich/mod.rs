@@ -29,21 +29,21 @@
 //!
 //! # What does not reproduce
 //! - On an exact axis of a box there are twelve parts of level 1 and one of level 2, as in figure 5, and
-//!   so there are on a box that is sampled on a grid: 162 parts at first, these 13 after one round by
-//!   triangle count. On a box of 3,000 random samples there are not: neighbouring polar balls often share no
-//!   sample, so that their union has dimples, and its exact axis has 12,600 parts. The
-//!   rounds by triangle count leave 66, but where one of the small parts ended at a seam, that has an edge of
+//!   so there are on a box that is sampled on a grid (the built-in one): 161 parts at first, these 13
+//!   after one round by triangle count. On the same box with 3,000 samples of blue noise there are not:
+//!   neighbouring polar balls often share no sample, so that their union has dimples, and its exact axis
+//!   has 12,800 parts. The rounds by triangle count leave 68, but where one of the small parts ended at a seam, that has an edge of
 //!   two triangles, and sheets grow together over it, by the rule of section 4.1.
-//! - Rounds without a test of topology are not harmless: on the double torus they cut both loops, on a bear
-//!   of 35,000 samples they leave eleven components. `topology=all` tests there too.
+//! - Rounds without a test of topology are not harmless: on the built-in double torus they cut both
+//!   loops, on the bear with 35,000 samples of blue noise they leave 18 components. `topology=all` tests there too.
 //! - Pruning ends where all that is left is one sheet for each body, or sheets that hold loops, often
 //!   far above the number of spheres asked. The paper says the same of the bunny's feet.
 //!
 //! - *The seed.* Moved balls make no loops: the axis of a solid has the same Betti numbers for every seed.
 //!   They do decide which small parts there are, hence which sheets grow together when these go, and which
 //!   single sheet is left in the end. Moved by `1e-4 r`, a twentieth of what they grow, the balls of the
-//!   screwdriver ended at 126 to 4,594 spheres, by the seed; moved by `1e-7 r` at 4,428 to 4,707. So this is
-//!   the default; a tenth of it tears the axis of a sampled frame, whose balls are in special position.
+//!   screwdriver end at 126 to 4,594 spheres, by the seed (0 to 9); moved by `1e-7 r` at 4,427 to 4,707. So
+//!   this is the default; a tenth of it tears the axis of a sampled frame, whose balls are in special position.
 //!   Other samples of the same surface still end elsewhere: that is the rule of section 4.1.
 //!
 //! # Deviations from the paper
@@ -63,7 +63,7 @@
 //!   them; here those that stem from one sample are a little apart, and what the merging would not have
 //!   made is removed afterwards, as far as that keeps the topology: the facets between two of them
 //!   (`fins.rs`), and the vertices nearer than `merge` radii. Merged before, they contradict the dual complex
-//!   of the balls: on the box 86 facets stayed open, on a bear 2,000.
+//!   of the balls, and facets stay open.
 //! - The axis of the union is exact, not the subset of the Voronoi diagram of the corners that
 //!   intersects the power shape.
 //! - Inner and outer poles are told apart by the surface.

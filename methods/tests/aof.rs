@@ -1,50 +1,23 @@
-//! Average outward flux: closed forms, known axes, topology, bad input.
+//! Average outward flux: closed forms, known axes, topology.
 
 use medial::Vec3;
 use medial::complex::{betti, cubical_betti};
-use medial::shape::{Shape, ShapeOptions};
+use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::TriangleBvh;
-use medial::surface::{self, TriMesh};
+use medial::surface::{self, TriangleBvh};
 use medial_methods::aof::{
-    self, AofParams, Axis, Descent, Grid, LatticeVoxels, Probe, Solid, Sphere, Spiral, Surface,
-    Variant, Voxel, Wanted, refine,
+    self, AofParams, Axis, Descent, Grid, LatticeVoxels, Probe, Sphere, Spiral, Variant, Voxel,
+    Wanted, refine,
 };
 use medial_methods::aof::{NearSet, NearbyTriangles};
 
-fn shape_of(mesh: &TriMesh) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    Shape::new("shape", mesh, report, ShapeOptions::default()).expect("an extent")
-}
+mod aof_solids;
 
-fn built_in(id: &str) -> Shape {
-    let shape = medial_datasets::find(id).expect("in the catalogue");
-    shape_of(&shape.mesh(shape.default_resolution))
-}
-
-fn solid<'s>(shape: &'s Shape, params: &AofParams) -> Solid<'s> {
-    Solid::new(shape, Surface::of(shape), params.clone(), RunContext::default())
-}
+use aof_solids::{HALF, built_in, bytes_of, cuboid, shape_of, simplified, solid};
 
 fn params(variant: Variant) -> AofParams {
     AofParams { variant, ..AofParams::default() }
 }
-
-/// A box with half sides `half`, as twelve triangles.
-fn cuboid(half: Vec3) -> TriMesh {
-    let corner = |i: u32| {
-        let side = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        half * Vec3::new(side(0), side(1), side(2))
-    };
-    let quads =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    TriMesh {
-        vertices: (0..8).map(corner).collect(),
-        faces: quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-    }
-}
-
-const HALF: Vec3 = Vec3::new(1.5, 1.0, 0.5);
 
 /// Flux through a sphere of radius `sigma` in the box.
 fn flux_in_box(spiral: Spiral, samples: usize, sigma: f64, centre: Vec3) -> f64 {
@@ -242,16 +215,6 @@ fn homotopy_on_shared_meshes_keeps_their_loops() {
     }
 }
 
-fn simplified(
-    shape: &Shape,
-    set: &[(&str, &str)],
-    level: Level,
-) -> Result<Simplified, SimplifyError> {
-    let mut params = Params::none();
-    set.iter().for_each(|(key, value)| params.set(key, value));
-    aof::method().prepare(shape, &params, &RunContext::default())?.at(level)
-}
-
 #[test]
 fn refined_spheres_are_internal_and_touch_twice() {
     let shape = built_in("bracket");
@@ -353,18 +316,6 @@ fn a_gradient_that_is_the_same_everywhere_needs_no_samples() {
     }
 }
 
-/// Bytes of a result: everything that is written.
-fn bytes_of(result: &Simplified) -> Vec<u64> {
-    let ball = |s: &medial::complex::Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
-    let simplices = result.mesh.edges.iter().flatten().chain(result.mesh.faces.iter().flatten());
-    let voxels = result.extras.get::<LatticeVoxels>().into_iter().flat_map(|voxels| &voxels.voxels);
-    let balls = result.mesh.spheres.iter().flat_map(ball).map(f64::to_bits);
-    balls
-        .chain(simplices.map(|&v| u64::from(v)))
-        .chain(voxels.flat_map(|v| [v.distance.to_bits(), v.flux.to_bits()]))
-        .collect()
-}
-
 #[test]
 fn one_and_two_threads_give_the_same_bytes() {
     let shape = built_in("bracket");
@@ -412,143 +363,5 @@ fn larger_angles_leave_fewer_voxels() {
             .map(|angle| prepared.at(Level::Native(angle)).expect("an angle").mesh.spheres.len());
         assert!(counts.windows(2).all(|pair| pair[0] >= pair[1]), "{variant}: {counts:?}");
         assert!(counts[0] > counts[3], "{variant}: {counts:?}");
-    }
-}
-
-#[test]
-fn bad_input_is_refused_and_says_what_would_work() {
-    let shape = built_in("box");
-    let message = |set: &[(&str, &str)], level| match simplified(&shape, set, level) {
-        Err(SimplifyError::Parameter(message) | SimplifyError::Level(message)) => message,
-        other => panic!("{set:?}: {other:?}"),
-    };
-    let any = Level::Spheres(10);
-    assert!(message(&[("resolution", "5000")], any).contains("fits, or raise max_memory"));
-    assert!(message(&[("resolution", "0")], any).contains("resolution"));
-    assert!(message(&[("angle", "0")], any).contains("above 0"));
-    assert!(message(&[("angle", "-10")], any).contains("above 0"));
-    assert!(message(&[], Level::Native(0.0)).contains("above 0"));
-    assert!(message(&[("samples", "70/x")], any).contains("70/60/50"));
-    assert!(message(&[("samples", "5")], any).contains("70/60/50"));
-    assert!(message(&[("samples", "-50")], any).contains("70/60/50"));
-    assert!(simplified(&shape, &[("samples", "50")], any).is_ok());
-    assert!(message(&[("d", "1")], any).contains("2 or more"));
-    assert!(message(&[("levels", "40")], any).contains("fewer levels"));
-    // What the messages name works.
-    let named = |advice: &str| -> String {
-        let words = advice.rsplit("resolution = ").next().expect("a resolution");
-        words.chars().take_while(char::is_ascii_digit).collect()
-    };
-    for id in ["box", "plate", "torus"] {
-        let shape = built_in(id);
-        let plain = |resolution: &str| {
-            let set = [("resolution", resolution), ("variant", "plain")];
-            simplified(&shape, &set, Level::Native(20.0)).map(|_| ())
-        };
-        let advice = plain("1").expect_err("too coarse").to_string();
-        assert!(advice.contains("thinner than a voxel everywhere"), "{advice}");
-        assert!(plain(&named(&advice)).is_ok(), "{advice}");
-        let small = |resolution: &str| {
-            let set = [("resolution", resolution), ("max_memory", "8")];
-            simplified(&shape, &set, Level::Native(20.0)).map(|_| ())
-        };
-        let advice = small("300").expect_err("too fine").to_string();
-        let fits = named(&advice);
-        // The voxels fit; the medial mesh of them may ask for a coarser lattice still.
-        let mut coarser = fits.clone();
-        for _ in 0..4 {
-            let Err(error) = small(&coarser) else { break };
-            assert!(error.to_string().contains("the medial mesh of"), "{error}");
-            let message = error.to_string().replace(" fits, or raise max_memory", "");
-            coarser = named(&message);
-        }
-        assert!(small(&coarser).is_ok(), "{advice} {coarser}");
-        let next = (fits.parse::<u32>().expect("a number") + 3).to_string();
-        assert!(small(&next).is_err(), "{advice}");
-    }
-    assert!(message(&[("max_memory", "1e-9")], any).contains("give max_memory = "));
-}
-
-/// Every stage asks: a run that is cancelled at any of its questions ends there.
-#[test]
-fn cancelling_ends_the_run_at_every_stage() {
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-    let shape = built_in("torus");
-    // Asks so many times, then cancels.
-    let cancelled_after = |questions: usize| {
-        let run = RunContext::default();
-        let (flag, asked) = (run.cancel_flag(), Arc::new(AtomicUsize::new(0)));
-        let counted = Arc::clone(&asked);
-        let run = run.on_progress(move |progress| {
-            assert!(progress.done <= progress.total, "{progress:?}");
-            flag.store(counted.fetch_add(1, Relaxed) >= questions, Relaxed);
-        });
-        let method = aof::method();
-        let answer = method
-            .prepare(&shape, &Params::none(), &run)
-            .and_then(|mut prepared| prepared.at(Level::Native(30.0)));
-        (answer, asked.load(Relaxed))
-    };
-    let (answer, questions) = cancelled_after(usize::MAX);
-    assert!(answer.is_ok() && questions > 5, "{questions}");
-    for k in (0..questions).step_by(1 + questions / 12).chain([questions - 1]) {
-        let (answer, asked) = cancelled_after(k);
-        assert!(matches!(answer.err(), Some(SimplifyError::Cancelled)), "{k} of {questions}");
-        // Those that other threads were about to ask.
-        assert!(asked <= k + 1 + rayon::current_num_threads(), "{asked} after {k}");
-    }
-}
-
-#[test]
-fn advice_for_thin_and_scattered_solids_is_cheap_and_holds() {
-    let refusal = |mesh: &TriMesh, set: &[(&str, &str)]| {
-        let set = [&[("variant", "plain")], set].concat();
-        match simplified(&shape_of(mesh), &set, Level::Native(20.0)) {
-            Err(SimplifyError::Parameter(message)) => message,
-            other => panic!("{other:?}"),
-        }
-    };
-    let start = std::time::Instant::now();
-    let flat = |height: f64| cuboid(Vec3::new(1.0, 1.0, height));
-    let mut apart = cuboid(HALF);
-    let far = cuboid(HALF);
-    apart.faces.extend(far.faces.iter().map(|face| face.map(|v| v + 8)));
-    apart.vertices.extend(far.vertices.iter().map(|&v| v + Vec3::X * 1e12));
-    for mesh in [flat(1e-6), apart.clone()] {
-        let message = refusal(&mesh, &[]);
-        assert!(message.contains("too thin for a lattice"), "{message}");
-    }
-    // Found by trying, up to a bounded effort.
-    let message = refusal(&flat(1e-2), &[]);
-    let named = message.rsplit("resolution = ").next().and_then(|rest| rest.split(' ').next());
-    let named = named.expect("a resolution");
-    let set = [("variant", "plain"), ("resolution", named)];
-    assert!(simplified(&shape_of(&flat(1e-2)), &set, Level::Native(20.0)).is_ok(), "{message}");
-    let message = refusal(&flat(1e-4), &[]);
-    assert!(message.contains("take too long to be tried"), "{message}");
-    // A lattice that fits into memory but has no voxel is not advised.
-    let message = refusal(&flat(1e-3), &[("resolution", "4000"), ("max_memory", "1")]);
-    assert!(message.contains("give max_memory"), "{message}");
-    apart.vertices[8..].iter_mut().for_each(|v| *v += Vec3::splat(1e12));
-    let message = refusal(&apart, &[]);
-    assert!(message.contains("max_memory ends"), "{message}");
-    // Minutes and gigabytes without the bounds.
-    assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
-}
-
-#[test]
-fn samples_are_one_number_or_one_for_each_level() {
-    let shape = built_in("box");
-    let answer = |samples: &str, levels: &str| {
-        let set = [("samples", samples), ("levels", levels)];
-        simplified(&shape, &set, Level::Spheres(10)).map(|_| ())
-    };
-    for (samples, levels) in [("60/50", "3"), ("80/70/60/50", "3"), ("70/60", "1")] {
-        let message = answer(samples, levels).expect_err("of another length").to_string();
-        assert!(message.contains("one for each"), "{message}");
-    }
-    for (samples, levels) in [("60/50", "2"), ("50", "2"), ("70/60/50", "2")] {
-        assert!(answer(samples, levels).is_ok(), "{samples} for {levels} levels");
     }
 }

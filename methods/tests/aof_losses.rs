@@ -2,46 +2,13 @@
 
 use medial::Vec3;
 use medial::complex::betti;
-use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::{self, TriMesh};
-use medial_methods::aof::{self, AofParams, LatticeVoxels, Solid, Surface, Wanted};
+use medial::simplifier::{Level, Params, Simplified, SimplifyError};
+use medial::surface::TriMesh;
+use medial_methods::aof::{AofParams, LatticeVoxels, Wanted};
 
-fn shape_of(mesh: &TriMesh) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    Shape::new("shape", mesh, report, ShapeOptions::default()).expect("an extent")
-}
+mod aof_solids;
 
-fn built_in(id: &str) -> Shape {
-    let shape = medial_datasets::find(id).expect("in the catalogue");
-    shape_of(&shape.mesh(shape.default_resolution))
-}
-
-fn solid<'s>(shape: &'s Shape, params: &AofParams) -> Solid<'s> {
-    Solid::new(shape, Surface::of(shape), params.clone(), RunContext::default())
-}
-
-fn simplified(
-    shape: &Shape,
-    set: &[(&str, &str)],
-    level: Level,
-) -> Result<Simplified, SimplifyError> {
-    let mut params = Params::none();
-    set.iter().for_each(|(key, value)| params.set(key, value));
-    aof::method().prepare(shape, &params, &RunContext::default())?.at(level)
-}
-
-/// Bytes of a result: everything that is written.
-fn bytes_of(result: &Simplified) -> Vec<u64> {
-    let ball = |s: &medial::complex::Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
-    let simplices = result.mesh.edges.iter().flatten().chain(result.mesh.faces.iter().flatten());
-    let voxels = result.extras.get::<LatticeVoxels>().into_iter().flat_map(|voxels| &voxels.voxels);
-    let balls = result.mesh.spheres.iter().flat_map(ball).map(f64::to_bits);
-    balls
-        .chain(simplices.map(|&v| u64::from(v)))
-        .chain(voxels.flat_map(|v| [v.distance.to_bits(), v.flux.to_bits()]))
-        .collect()
-}
+use aof_solids::{built_in, bytes_of, shape_of, simplified, solid};
 
 /// A ball with a thin rod, closed: a limb that no Betti number tells of.
 fn lollipop(rod: f64) -> TriMesh {

@@ -46,7 +46,7 @@ const LEAST_PILOT: f64 = 1000.0;
 const USUAL_CANDIDATES: f64 = 10.0;
 
 /// More candidates are made only for as many samples as a maximum can rest on: this share of those asked.
-/// Tens of thousands of balls bury all but a thousandth of each other.
+/// Where there are many balls they bury nearly all of each other.
 const LEAST_SHARE: f64 = 0.25;
 const MOST_CANDIDATES: f64 = 200.0;
 

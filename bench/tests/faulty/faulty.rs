@@ -128,6 +128,16 @@ fn random<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
     }))
 }
 
+/// Gives one ball at the first level that it is asked for, whichever that is: a level that a search found
+/// among others is not the same when it is asked alone.
+fn warms_up<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+    let mut was_asked = false;
+    Ok(Box::new(move |level| {
+        let is_first = !std::mem::replace(&mut was_asked, true);
+        largest(shape, if is_first { Level::Spheres(1) } else { level })
+    }))
+}
+
 /// Works as it should, but takes its time.
 fn slow<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
     Ok(Box::new(move |level| {
@@ -154,6 +164,7 @@ fn main() -> ExitCode {
         method("talks", talks),
         method("strays", strays),
         method("random", random),
+        method("warms-up", warms_up),
         method("slow", slow),
     ]);
     medial_bench::main_with(methods)

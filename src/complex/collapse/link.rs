@@ -15,24 +15,21 @@ impl CollapseComplex {
     /// Source: Dey, Edelsbrunner, Guha, Nekhayev 1999, *Topology preserving edge contraction*,
     /// Publ. Inst. Math. 66. Cost: the two links.
     pub fn link_condition(&mut self, a: u32, b: u32) -> bool {
-        self.link_obstacle(a, b).is_none()
+        self.find_shared(a, b);
+        if !self.shared.is_empty() {
+            return false;
+        }
+        self.unmark_roots(a, b);
+        !self.neighbours(b).iter().any(|&c| self.marks.contains(c))
     }
 
-    /// What violates the link condition of `{a, b}`: `[c, c]` for a vertex that fails T1, `[c, d]`
-    /// for an edge that fails T2. While neither was part of a collapse, nor `a` and `b`, the
-    /// condition stays violated. Cost: the two links.
-    pub fn link_obstacle(&mut self, a: u32, b: u32) -> Option<[u32; 2]> {
-        self.find_shared(a, b);
-        if let Some(&side) = self.shared.first() {
-            return Some(side);
-        }
-        // Unmark the third vertices of the faces at the edge: a common neighbour left is a hole.
+    /// Unmarks the third vertices of the faces at the edge: marked neighbours that are left form no
+    /// face with it.
+    fn unmark_roots(&mut self, a: u32, b: u32) {
         let sides = self.side_pool.get(self.sides[b as usize]);
         for &[p, q] in sides.iter().filter(|side| side.contains(&a)) {
             self.marks.remove(if p == a { q } else { p });
         }
-        let hole = self.neighbours(b).iter().find(|&&c| self.marks.contains(c));
-        hole.map(|&c| [c, c])
     }
 
     /// Whether the link condition holds after elementary expansions: a weaker condition on the edge
@@ -52,11 +49,8 @@ impl CollapseComplex {
     /// Cost: the two links, and the square of what they share.
     pub fn keeps_homotopy(&mut self, a: u32, b: u32) -> bool {
         self.find_shared(a, b);
+        self.unmark_roots(a, b);
         let Self { marks, shared, .. } = self;
-        let sides = self.side_pool.get(self.sides[b as usize]);
-        for &[p, q] in sides.iter().filter(|side| side.contains(&a)) {
-            marks.remove(if p == a { q } else { p });
-        }
         let around = self.neighbour_pool.get(self.neighbours[b as usize]);
         let mut unreached = around.iter().filter(|&&c| marks.contains(c)).count();
         // As many edges as vertices that are no roots: trees if all are reached, cycles if not.
@@ -75,5 +69,64 @@ impl CollapseComplex {
             }
         }
         unreached == 0
+    }
+
+    /// Where [`CollapseComplex::keeps_homotopy`] is false for `{a, b}`, it stays so while no collapse
+    /// takes one of these vertices, nor `a` or `b`; empty where it is true.
+    ///
+    /// They come from one component that is no tree with one root. What is there of a component
+    /// stays while its vertices do: faces with `a`, `b` and two of them change with one of the four
+    /// alone. So its own vertices are enough where it has a cycle or two roots. A tree without a root
+    /// can still grow one, by a new edge `{c, e}` from one of its vertices: `e` is then merged from a
+    /// vertex `x` of a face `{a, c, x}` and a vertex `y` of a face `{b, c, y}`. All such `x`, or all
+    /// such `y`, are obstacles too.
+    ///
+    /// Cost: as for the condition, and the links of the component.
+    pub fn homotopy_obstacles(&mut self, a: u32, b: u32) -> Vec<u32> {
+        self.find_shared(a, b);
+        let around = self.neighbours(b).iter();
+        let mut common: Vec<u32> = around.copied().filter(|&c| self.marks.contains(c)).collect();
+        while let Some(first) = common.pop() {
+            let (mut component, edges) = self.shared_component(first);
+            common.retain(|c| !component.contains(c));
+            let roots = component.iter().filter(|&&c| self.has_face(a, b, c)).count();
+            let is_tree = edges + 1 == component.len();
+            if is_tree && roots == 1 {
+                continue;
+            }
+            if is_tree && roots == 0 {
+                for index in 0..component.len() {
+                    let [by_a, by_b] = [a, b].map(|end| self.across(component[index], end));
+                    component.extend(if by_a.len() <= by_b.len() { by_a } else { by_b });
+                }
+                component.sort_unstable();
+                component.dedup();
+            }
+            return component;
+        }
+        Vec::new()
+    }
+
+    /// The vertices that shared sides join to one of them, and the number of these sides.
+    fn shared_component(&self, first: u32) -> (Vec<u32>, usize) {
+        let mut component = vec![first];
+        let (mut next, mut ends) = (0, 0);
+        while let Some(&c) = component.get(next) {
+            next += 1;
+            for &[p, q] in self.shared.iter().filter(|side| side.contains(&c)) {
+                let other = if p == c { q } else { p };
+                ends += 1;
+                if !component.contains(&other) {
+                    component.push(other);
+                }
+            }
+        }
+        (component, ends / 2)
+    }
+
+    /// The third vertices of the faces at the edge `{v, w}`.
+    fn across(&self, v: u32, w: u32) -> Vec<u32> {
+        let sides = self.opposite_sides(v).iter().filter(|side| side.contains(&w));
+        sides.map(|&[p, q]| if p == w { q } else { p }).collect()
     }
 }

@@ -5,8 +5,9 @@
 //!
 //! 1. [`CollapseComplex::from_mesh`]; a [`Candidate`] for each edge into the queue.
 //! 2. [`CollapseQueue::pop`] the cheapest candidate that is still current.
-//! 3. Where wanted, [`CollapseComplex::link_obstacle`] and [`CollapseComplex::folded_face`]; a
-//!    candidate that fails is parked with [`CollapseQueue::park`] at what holds it back.
+//! 3. Where wanted, [`CollapseComplex::keeps_homotopy`] and [`CollapseComplex::folded_face`]; a
+//!    candidate that fails is parked with [`CollapseQueue::park`] at what holds it back, such as
+//!    [`CollapseComplex::homotopy_obstacles`].
 //! 4. [`CollapseComplex::collapse`]; new candidates for the edges of the merged sphere;
 //!    [`CollapseQueue::wake`] for both ends.
 //! 5. [`CollapseComplex::to_mesh`].

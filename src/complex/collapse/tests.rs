@@ -1,5 +1,7 @@
 //! Closed-form cases, and random complexes against [`replay`] and Betti numbers.
 
+use std::collections::BTreeMap;
+
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -111,8 +113,11 @@ fn link_condition_sees_holes_and_voids() {
     assert!(filled.link_condition(0, 1));
     let mut void = CollapseComplex::from_mesh(&hollow_tetrahedron());
     assert!(!void.link_condition(0, 1), "T2: the void of a tetrahedron");
-    assert_eq!(hole.link_obstacle(0, 1), Some([2, 2]));
-    assert_eq!(void.link_obstacle(0, 1), Some([2, 3]));
+    assert_eq!(hole.homotopy_obstacles(0, 1), [2]);
+    let mut obstacles = void.homotopy_obstacles(0, 1);
+    obstacles.sort_unstable();
+    assert_eq!(obstacles, [2, 3]);
+    assert!(filled.homotopy_obstacles(0, 1).is_empty());
     let mut path = CollapseComplex::from_mesh(&mesh(3, &[[0, 1], [1, 2]], &[]));
     assert!(path.link_condition(0, 1));
 }
@@ -129,6 +134,20 @@ fn a_cup_of_three_faces_may_be_flattened() {
     assert!(!void.keeps_homotopy(0, 1));
     let mut hole = CollapseComplex::from_mesh(&mesh(3, &[[0, 1], [1, 2], [0, 2]], &[]));
     assert!(!hole.keeps_homotopy(0, 1));
+}
+
+/// An edge that closes a hole may be collapsed once a vertex beside it is filled in, without any
+/// change at the hole's own vertices.
+#[test]
+fn an_obstacle_can_lie_beside_the_hole() {
+    // The hole 0 1 2 with faces outwards at its sides: merging 3 and 4 makes a cup of three faces.
+    let faces = [[0, 1, 3], [0, 2, 3], [1, 2, 4]];
+    let mut complex = CollapseComplex::from_mesh(&mesh(5, &[[3, 4]], &faces));
+    assert!(!complex.keeps_homotopy(0, 1));
+    let obstacles = complex.homotopy_obstacles(0, 1);
+    assert!(obstacles.contains(&3) || obstacles.contains(&4), "{obstacles:?}");
+    complex.collapse(3, 4, point(0.0, 0.0, 0.0));
+    assert!(complex.keeps_homotopy(0, 1));
 }
 
 /// The weaker condition has cases of its own on random complexes, or the property test below would
@@ -257,6 +276,7 @@ proptest! {
             let keeps = complex.keeps_homotopy(a, b);
             prop_assert_eq!(keeps, complex.keeps_homotopy(b, a));
             prop_assert!(keeps || !safe);
+            prop_assert_eq!(keeps, complex.homotopy_obstacles(a, b).is_empty());
             let before = betti(meshes.last().unwrap());
             complex.collapse(a, b, complex.sphere(a).lerp(complex.sphere(b), 0.5));
             complex.check().unwrap();
@@ -269,6 +289,28 @@ proptest! {
         }
         for (level, mesh) in meshes.iter().enumerate() {
             prop_assert_eq!(&replay(&initial, &complex.record()[..level]), mesh);
+        }
+    }
+
+    /// No edge may be collapsed again before one of its obstacles was part of a collapse.
+    #[test]
+    fn obstacles_hold_until_one_of_them_changes(seed in any::<u64>()) {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let mut complex = CollapseComplex::from_mesh(&random_mesh(seed));
+        let mut held: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+        while complex.edge_count() > 0 {
+            let edges: Vec<_> = complex.edges().collect();
+            for &[a, b] in &edges {
+                let blocked = !complex.keeps_homotopy(a, b);
+                prop_assert!(blocked || !held.contains_key(&[a, b]), "{a} {b}: {held:?}");
+                if blocked && !held.contains_key(&[a, b]) {
+                    held.insert([a, b], complex.homotopy_obstacles(a, b));
+                }
+            }
+            let [a, b] = edges[random.random_range(0..edges.len())];
+            complex.collapse(a, b, complex.sphere(a));
+            let changed = |v: &u32| *v == a || *v == b;
+            held.retain(|ends, obstacles| !ends.iter().chain(&*obstacles).any(changed));
         }
     }
 
