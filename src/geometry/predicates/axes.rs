@@ -9,7 +9,8 @@
 //! 3. The lift of a point is the sum of its squared differences, each shifted by twice the exponent
 //!    of its axis.
 
-use super::exact::{Differences, det3, differences, highest_bit, lifted_det, lowest_bit, widen};
+use super::differences::{Differences, differences, highest_bit, lowest_bit, widen};
+use super::exact::{det3, lifted_det};
 use super::wide::Wide;
 use super::{Sign, narrow};
 

@@ -18,7 +18,7 @@
 //! with an absolute error below `2^-1074` each, which [`UNDERFLOW`] covers when `M <= 1` and the slack
 //! of the constants when `M > 1`.
 
-use super::exact::Grid;
+use super::differences::Grid;
 use super::lanes::{Pair, Real};
 use super::{Sign, exact};
 

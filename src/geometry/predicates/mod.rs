@@ -13,6 +13,7 @@
 
 mod axes;
 mod circumsphere;
+mod differences;
 mod exact;
 mod filter;
 mod lanes;
@@ -24,8 +25,8 @@ mod power_size;
 mod wide;
 
 pub use circumsphere::{circumsphere, orthosphere};
+pub(crate) use differences::{highest_bit, lowest_bit};
 pub(crate) use exact::collinear as sites_collinear;
-pub(crate) use exact::{highest_bit, lowest_bit};
 pub(crate) use filter::{
     Filter, Metric, Site, UNDERFLOW, Unweighted, Weighted, approximate_orientation,
 };

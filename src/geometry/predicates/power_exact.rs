@@ -4,7 +4,8 @@
 //! the first two the weights have at most 122 and 250 bits in units of the squared quantum, so that
 //! a lift has at most 125 and 254 and no sum below reaches its sign bit.
 
-use super::exact::{Differences, differences, highest_bit, lowest_bit, minor, to_wide, widen};
+use super::differences::{Differences, differences, highest_bit, lowest_bit, to_wide, widen};
+use super::exact::minor;
 use super::wide::Wide;
 use super::{Sign, Site};
 
