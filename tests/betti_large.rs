@@ -2,8 +2,6 @@
 //! `cargo test --release --test betti_large -- --ignored --nocapture`.
 #![allow(clippy::print_stdout)]
 
-use std::path::PathBuf;
-
 use cpu_time::ThreadTime;
 use medial::complex::{betti, euler};
 use medial::shape::{Shape, ShapeOptions};
@@ -12,12 +10,7 @@ use medial::surface::{self, Sampling};
 #[test]
 #[ignore = "half a minute; prints seconds"]
 fn a_medial_mesh_with_a_million_faces() {
-    let folder = std::env::var_os("MEDIAL_MESHES").map_or("../shared/meshes".into(), PathBuf::from);
-    let file = folder.join("bear.off");
-    if !file.exists() {
-        println!("skipped: {} is missing", file.display());
-        return;
-    }
+    let Some(file) = medial_test_support::mesh("bear.off") else { return };
     let loaded = surface::read(&file).unwrap();
     let sampling: Sampling = "blue:200000".parse().unwrap();
     let options = ShapeOptions { sampling, ..ShapeOptions::default() };

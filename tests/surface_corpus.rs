@@ -1,23 +1,10 @@
 //! Every mesh and every bad file of the shared collection, where it is present.
 
-#![allow(clippy::print_stderr)] // A skipped test says so.
-
 use std::collections::HashMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use medial::surface::{self, Fault, Repair};
-
-/// The collection of meshes, or `None` with a notice.
-fn collection() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
-    let folder = std::env::var_os("MEDIAL_MESHES").map_or(beside, PathBuf::from);
-    if folder.join("MANIFEST.csv").exists() {
-        return Some(folder);
-    }
-    eprintln!("skipped: no meshes in {}; set MEDIAL_MESHES", folder.display());
-    None
-}
 
 /// The rows of a table with quoted fields, by column name.
 fn table(path: &Path) -> Vec<HashMap<String, String>> {
@@ -40,7 +27,7 @@ fn table(path: &Path) -> Vec<HashMap<String, String>> {
 
 #[test]
 fn good_meshes_are_what_the_manifest_says() {
-    let Some(folder) = collection() else { return };
+    let Some(folder) = medial_test_support::meshes() else { return };
     let rows = table(&folder.join("MANIFEST.csv"));
     assert!(rows.len() >= 12);
     for row in rows {
@@ -73,7 +60,7 @@ fn good_meshes_are_what_the_manifest_says() {
 
 #[test]
 fn bad_files_get_what_the_manifest_expects() {
-    let Some(folder) = collection() else { return };
+    let Some(folder) = medial_test_support::meshes() else { return };
     let folder = folder.join("bad");
     for row in table(&folder.join("MANIFEST.csv")) {
         let (file, expected) = (&row["file"], row["expected"].as_str());
@@ -100,7 +87,7 @@ fn bad_files_get_what_the_manifest_expects() {
 
 #[test]
 fn particular_faults_and_repairs_of_bad_files() {
-    let Some(folder) = collection() else { return };
+    let Some(folder) = medial_test_support::meshes() else { return };
     let folder = folder.join("bad");
     let fault = |file: &str| surface::read(folder.join(file)).unwrap_err().fault;
     let report = |file: &str| surface::read(folder.join(file)).unwrap().report;
@@ -130,7 +117,7 @@ fn particular_faults_and_repairs_of_bad_files() {
 /// Positions and faces of OBJ files agree with those of an independent reader.
 #[test]
 fn obj_files_agree_with_tobj() {
-    let Some(folder) = collection() else { return };
+    let Some(folder) = medial_test_support::meshes() else { return };
     for file in ["maxplanck.obj", "scorpion.obj", "abc_bracket.obj"] {
         let path = folder.join(file);
         let ours = surface::read(&path).unwrap().mesh;

@@ -3,7 +3,6 @@
 mod common;
 
 use std::path::Path;
-use std::process::Command;
 
 use common::{code, example, run, stderr};
 use serde_json::Value;
@@ -57,11 +56,8 @@ fn a_program_in_shell_passes() {
 }
 
 #[test]
-#[expect(clippy::print_stderr, reason = "a test that was skipped says so")]
 fn a_program_in_python_passes() {
-    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
-    if !numpy.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: a_program_in_python_passes: no python3 with numpy");
+    if !medial_test_support::has_numpy() {
         return;
     }
     assert_passes(check(MEDIAL, &["largest", "--plugins", PLUGINS]), 1);

@@ -1,7 +1,7 @@
 //! The command as its users meet it: what it prints, what it writes, how it ends.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -512,23 +512,9 @@ fn printed_results() {
     insta::assert_snapshot!("axis", without_timings(&stdout));
 }
 
-#[allow(clippy::print_stderr, reason = "a skipped check must say so")]
-/// Where the meshes that cannot be redistributed are, if they are.
-fn shared_meshes() -> Option<PathBuf> {
-    let folder = std::env::var_os("MEDIAL_MESHES").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
-        PathBuf::from,
-    );
-    if folder.join("bear.off").exists() {
-        return Some(folder);
-    }
-    eprintln!("skipped: no meshes in {}", folder.display());
-    None
-}
-
 #[test]
 fn published_counts_and_errors_on_real_meshes() {
-    let Some(folder) = shared_meshes() else { return };
+    let Some(folder) = medial_test_support::meshes() else { return };
     for (file, spheres) in [("bear.off", 34_703_i64), ("dolphin.off", 54_241)] {
         let mesh = folder.join(file);
         let (_, object) = json(&["axis", text_path(&mesh)]);

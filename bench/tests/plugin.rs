@@ -16,15 +16,11 @@ use medial::simplifier::{
 };
 use medial::surface;
 use medial_bench::plugin::{self, External, OwnSeconds, ProgramPeak, SCRATCH};
+use medial_test_support::skip;
 use tempfile::TempDir;
 
 mod plugins;
 use plugins::{VALID, entry, written};
-
-#[expect(clippy::print_stderr, reason = "a test that was skipped says so")]
-fn say(line: &str) {
-    eprintln!("{line}");
-}
 
 fn shape() -> Shape {
     let mesh = medial_datasets::find("capsule").expect("in the catalogue").mesh(12);
@@ -105,9 +101,7 @@ fn the_example_in_shell_keeps_the_largest_balls() {
 
 #[test]
 fn the_example_in_python_keeps_the_largest_balls_and_says_its_seconds() {
-    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
-    if !numpy.is_ok_and(|output| output.status.success()) {
-        say("skipped: no python3 with numpy");
+    if !medial_test_support::has_numpy() {
         return;
     }
     let method = example("largest");
@@ -233,7 +227,7 @@ fn is_running(pid_file: &Path) -> bool {
 #[test]
 fn what_a_program_leaves_behind_is_ended_and_told() {
     if !Path::new("/proc/self/stat").exists() {
-        say("skipped: no /proc");
+        skip("no /proc");
         return;
     }
     let has_setsid = Command::new("setsid").arg("true").output().is_ok();
@@ -246,7 +240,7 @@ fn what_a_program_leaves_behind_is_ended_and_told() {
             "env -i PATH=\"$PATH\" setsid sh -c 'echo $$ > pid; exec sleep 1000' & sleep 0.3",
         );
     } else {
-        say("skipped in part: no setsid");
+        skip("in part: no setsid");
     }
     for way in ways {
         let (folder, method) = script(&format!("{VALID}{way}\n"));
@@ -284,7 +278,7 @@ fn a_cancelled_program_ends_with_all_that_it_started() {
 #[test]
 fn the_memory_of_a_program_and_its_children_is_seen() {
     if !Path::new("/proc/self/stat").exists() {
-        say("skipped: no /proc");
+        skip("no /proc");
         return;
     }
     // A child of the shell that holds about 50 MB for a while.

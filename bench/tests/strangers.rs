@@ -58,11 +58,8 @@ fn a_program() {
 }
 
 #[test]
-#[allow(clippy::print_stdout)] // What was skipped is said.
 fn a_python_script() {
-    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
-    if !numpy.is_ok_and(|output| output.status.success()) {
-        println!("skipped: there is no python3 with numpy");
+    if !medial_test_support::has_numpy() {
         return;
     }
     let file = root().join("examples/plugins/largest.toml");

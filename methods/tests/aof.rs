@@ -185,17 +185,11 @@ fn homotopic_variants_keep_the_topology_of_the_start_set() {
     }
 }
 
-#[allow(clippy::print_stderr)]
 /// Shared meshes: three holes, and four. The start set has them too, or a warning says where not.
 #[test]
 fn homotopy_on_shared_meshes_keeps_their_loops() {
-    let folder = std::env::var("MEDIAL_MESHES").unwrap_or_else(|_| "../shared/meshes".into());
     for (name, expected) in [("threeholes.off", [1, 3, 0]), ("fertility.off", [1, 4, 0])] {
-        let path = std::path::Path::new(&folder).join(name);
-        if !path.exists() {
-            eprintln!("skipped: {} is not there", path.display());
-            continue;
-        }
+        let Some(path) = medial_test_support::mesh(name) else { continue };
         let shape = shape_of(&surface::read(&path).expect("a surface").mesh);
         for variant in [Variant::Homotopy, Variant::Thinning] {
             for resolution in [20, 48] {

@@ -1,8 +1,5 @@
 //! Q-MAT on the medial meshes of sampled solids.
 
-#![allow(clippy::print_stderr)] // A skipped test says so.
-
-use std::path::{Path, PathBuf};
 
 use medial::complex::betti;
 use medial::shape::{Shape, ShapeOptions};
@@ -104,19 +101,7 @@ fn the_published_level_checks_from_200_spheres_on() {
 
 #[test]
 fn topology_is_kept_at_every_level_of_real_meshes() {
-    let folder = std::env::var_os("MEDIAL_MESHES").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes"),
-        PathBuf::from,
-    );
-    let Ok(entries) = std::fs::read_dir(&folder) else {
-        eprintln!("skipped: no meshes in {}", folder.display());
-        return;
-    };
-    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut surfaces: Vec<PathBuf> =
-        paths.filter(|path| path.extension().is_some_and(|e| e == "off" || e == "obj")).collect();
-    surfaces.sort();
-    for path in surfaces {
+    for path in medial_test_support::surfaces() {
         let loaded = surface::read(&path).expect("a solid");
         let shape = Shape::new("mesh", &loaded.mesh, loaded.report, ShapeOptions::default());
         let shape = shape.expect("an extent");

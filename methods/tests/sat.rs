@@ -1,9 +1,6 @@
 //! SAT on sampled solids: what scale 1 leaves, the scale at which a gap closes, real meshes.
 
-#![allow(clippy::print_stderr)] // A skipped test says so.
-
 use std::f64::consts::{PI, TAU};
-use std::path::PathBuf;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
@@ -29,19 +26,6 @@ fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
     }
     let mut sat = sat::method().prepare(shape, &all, &RunContext::default()).expect("prepared");
     sat.at(level).expect("a scale axis")
-}
-
-/// Shared meshes, or none where they are missing.
-fn shared_meshes() -> Vec<PathBuf> {
-    let folder = std::env::var("MEDIAL_MESHES").unwrap_or_else(|_| "../shared/meshes".into());
-    let Ok(files) = std::fs::read_dir(&folder) else {
-        eprintln!("skipped: no meshes in {folder}");
-        return Vec::new();
-    };
-    let mut files: Vec<PathBuf> = files.flatten().map(|f| f.path()).collect();
-    files.retain(|f| f.extension().is_some_and(|e| e == "off" || e == "obj"));
-    files.sort_unstable();
-    files
 }
 
 fn of_spheres(spheres: &[Sphere]) -> MedialUnion {
@@ -200,7 +184,7 @@ fn all_built_in_shapes_have_valid_axes() {
 
 #[test]
 fn shared_meshes_have_valid_axes_for_any_number_of_threads() {
-    for path in shared_meshes() {
+    for path in medial_test_support::surfaces() {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         let surface::Loaded { mesh, report } = surface::read(&path).expect("a solid");
         let results = [1, 2].map(|threads| {

@@ -1,9 +1,6 @@
 //! Part pruning: the sheets of a box, loops of solids with tunnels, parts by hand, real meshes.
 
-#![allow(clippy::print_stderr)] // A skipped test says so.
-
 use std::collections::BTreeSet;
-use std::path::PathBuf;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
@@ -348,7 +345,7 @@ fn built_in_shapes_give_the_same_for_any_number_of_threads() {
 
 #[test]
 fn shared_meshes_give_valid_axes_for_any_number_of_threads() {
-    for path in shared_meshes() {
+    for path in medial_test_support::surfaces() {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         let mesh = surface::read(&path).expect("a solid").mesh;
         let result = for_threads(&name, &mesh, Level::Published);
@@ -356,17 +353,4 @@ fn shared_meshes_give_valid_axes_for_any_number_of_threads() {
         assert!(rounds.windows(2).all(|w| !w[1].0 || w[1].1 == w[0].1), "{name}: {rounds:?}");
         assert_eq!(rounds[rounds.len() - 1].1, betti(&result.mesh), "{name}");
     }
-}
-
-/// Shared meshes, or none where they are missing.
-fn shared_meshes() -> Vec<PathBuf> {
-    let folder = std::env::var("MEDIAL_MESHES").unwrap_or_else(|_| "../shared/meshes".into());
-    let Ok(files) = std::fs::read_dir(&folder) else {
-        eprintln!("skipped: no meshes in {folder}");
-        return Vec::new();
-    };
-    let mut files: Vec<PathBuf> = files.flatten().map(|f| f.path()).collect();
-    files.retain(|f| f.extension().is_some_and(|e| e == "off" || e == "obj"));
-    files.sort_unstable();
-    files
 }

@@ -1,0 +1,84 @@
+//! What tests may lack on a machine, and how they say so.
+//!
+//! Meshes that cannot be redistributed are in `$MEDIAL_MESHES`, by default in `shared/meshes` beside the
+//! repository. Where they are missing, a test is skipped: it says so on standard error, and in the file
+//! `$MEDIAL_SKIPPED`, if that is set, which `.ci/run` prints at its end. With `MEDIAL_REQUIRE_MESHES=1`
+//! a missing mesh is a failure.
+
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The folder of shared meshes, `None` with a notice where it is missing.
+///
+/// # Panics
+/// If it is missing and required.
+pub fn meshes() -> Option<PathBuf> {
+    let folder = folder();
+    if folder.join("MANIFEST.csv").exists() {
+        return Some(folder);
+    }
+    missing(&folder);
+    None
+}
+
+/// A shared mesh, `None` with a notice where it is missing.
+///
+/// # Panics
+/// If it is missing and required.
+pub fn mesh(name: &str) -> Option<PathBuf> {
+    let path = folder().join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    missing(&path);
+    None
+}
+
+/// All shared surfaces, by name; none, with a notice, where they are missing.
+///
+/// # Panics
+/// If they are missing and required.
+pub fn surfaces() -> Vec<PathBuf> {
+    let Some(folder) = meshes() else { return Vec::new() };
+    let entries = std::fs::read_dir(folder).expect("a folder").flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|e| e == "off" || e == "obj"));
+    files.sort_unstable();
+    files
+}
+
+/// Whether there is a Python with NumPy; a notice where there is none.
+pub fn has_numpy() -> bool {
+    let answer = Command::new("python3").args(["-c", "import numpy"]).output();
+    let has_numpy = answer.is_ok_and(|output| output.status.success());
+    if !has_numpy {
+        skip("no python3 with numpy");
+    }
+    has_numpy
+}
+
+/// Says that the test that runs, or a part of it, is skipped, and why.
+#[allow(clippy::print_stderr, reason = "that is how it is said")]
+pub fn skip(why: &str) {
+    // The harness names the thread of each test after it.
+    let test = std::thread::current().name().unwrap_or("a test").to_owned();
+    eprintln!("skipped: {test}: {why}");
+    if let Some(path) = std::env::var_os("MEDIAL_SKIPPED") {
+        let file = OpenOptions::new().create(true).append(true).open(path);
+        let written = file.and_then(|mut file| writeln!(file, "{test}: {why}"));
+        written.expect("the list of what was skipped can be written");
+    }
+}
+
+fn folder() -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/meshes");
+    std::env::var_os("MEDIAL_MESHES").map_or_else(beside, PathBuf::from)
+}
+
+fn missing(path: &Path) {
+    let is_required = std::env::var_os("MEDIAL_REQUIRE_MESHES").is_some_and(|value| value == "1");
+    assert!(!is_required, "{} is missing, and MEDIAL_REQUIRE_MESHES=1", path.display());
+    skip(&format!("{} is missing (MEDIAL_MESHES)", path.display()));
+}
