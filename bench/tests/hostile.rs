@@ -3,24 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
-
-fn medial(arguments: &[&str]) -> Command {
-    let mut command = Command::cargo_bin("medial").expect("the binary is built");
-    command.args(arguments);
-    command
-}
-
-/// Runs the command and returns its exit code and both outputs.
-fn run(arguments: &[&str]) -> (i32, String, String) {
-    let output = medial(arguments).output().expect("the command starts");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
-}
-
-fn text_path(path: &Path) -> &str {
-    path.to_str().expect("a UTF-8 path")
-}
+mod command;
+use command::{run, text_path};
 
 #[test]
 fn deleted_elements_change_no_byte_of_an_evaluation() {

@@ -3,25 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use serde_json::Value;
 
-fn run(arguments: &[&str]) -> (i32, String, String) {
-    let mut command = Command::cargo_bin("medial").expect("the binary is built");
-    let output = command.args(arguments).output().expect("the command starts");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
-}
-
-fn json(arguments: &[&str]) -> (i32, Value) {
-    let (code, stdout, stderr) = run(&[arguments, &["--json"]].concat());
-    assert_eq!(stdout.lines().count(), 1, "one line of JSON: {stdout}\n{stderr}");
-    (code, serde_json::from_str(&stdout).expect("JSON"))
-}
-
-fn text_path(path: &Path) -> &str {
-    path.to_str().expect("a UTF-8 path")
-}
+mod command;
+use command::{json, run, text_path};
 
 /// Checks what both methods promise, and that `medial info` agrees.
 fn check(object: &Value, output: &str, genus: u64) {

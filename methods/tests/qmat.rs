@@ -1,6 +1,5 @@
 //! Q-MAT on the medial meshes of sampled solids.
 
-
 use medial::complex::betti;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{
