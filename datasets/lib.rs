@@ -33,3 +33,7 @@ pub use noise::add_noise;
 mod spikes_tests;
 #[cfg(test)]
 mod tests;
+
+#[cfg(doctest)]
+#[doc = include_str!("README.md")]
+struct Readme;

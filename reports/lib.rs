@@ -46,3 +46,7 @@ pub use record::{
 pub use terminal::summary_text;
 pub use text::{file_stem, printable};
 pub use write::{read_header, write_report};
+
+#[cfg(doctest)]
+#[doc = include_str!("README.md")]
+struct Readme;
