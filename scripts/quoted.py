@@ -42,7 +42,7 @@ class Figure:
     phrase: str
     """As it stands in the file, without the marks of comments and with single spaces."""
     quoted: str
-    """The number in it. `<1` is a bound; `~50` is rounded to as many digits as are not zero."""
+    """The number in it. `<1` and `>0` are bounds; `~50` is rounded to as many digits as are not zero."""
     commands: list[str]
     """{NAME} is the shared mesh of that name, {tmp} a folder."""
     read: Callable[[list], float]
@@ -170,6 +170,10 @@ def tam_heidrich():
         commands = [f"simplify {{screwdriver.off}} {run} --spheres 1 --set jitter={jitter} --seed {seed}" for seed in range(10)]
         yield Figure(file, seeds, least, commands, lambda answers: min(a["spheres"] for a in answers))
         yield Figure(file, seeds, most, commands, lambda answers: max(a["spheres"] for a in answers))
+    torn = "a tenth of it tears the axis of a sampled frame"
+    commands = [f"simplify builtin:frame {run} --set jitter=1e-8"]
+    yield Figure(file, torn, ">0", commands, at("diagnostics/facets_left_open"))
+    yield Figure(file, torn, "0", [f"simplify builtin:frame {run}"], at("diagnostics/facets_left_open"))
 
 
 def filters():
@@ -283,6 +287,36 @@ def readme_row(method):
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
+def table_of(summary, first_heading):
+    """The rows of a table in `tables/summary.md`, as dictionaries by heading."""
+    lines = summary.splitlines()
+    start = next(n for n, line in enumerate(lines) if line.startswith(f"| {first_heading} |"))
+    cells = lambda line: [re.sub(r"[*()]", "", cell).strip() for cell in line.strip("|").split("|")]
+    rows = [cells(line) for line in lines[start + 2:start + 2 + lines[start + 2:].index("")]]
+    return [dict(zip(cells(lines[start]), row)) for row in rows]
+
+
+def compare_report(folder):
+    """The README's table of results against a report: how many rows differ."""
+    summary = Path(folder, "tables/summary.md").read_text() + "\n\n"
+    equal = {row["method"]: row for row in table_of(summary, "error (%)")}
+    at_500 = {row["method"]: row for row in table_of(summary, "spheres") if row["spheres"] == "500"}
+    wrong = 0
+    for method in equal:
+        found, within = at_500[method], equal[method]
+        over, _, whole = found["means over"].partition(" of ")
+        error = f"{found['Hausdorff % ↓']} %" if over == whole else f"({found['Hausdorff % ↓']} % on {over})"
+        ratio = lambda row, key: "1" if method == "qmat" else f"{row[key]} ({row['on'].split()[0]})"
+        cells = [error, ratio(found, "Hausdorff ÷ qmat"), found["topology right"]]
+        if found["means over"] in ("–", "none", "") or found["Hausdorff % ↓"] == "–":
+            cells = ["count not reached", "", ""]
+        cells += [within["spheres ↓"], ratio(within, "÷ qmat"), within["kept on"]]
+        stands = readme_row(method)[1:]
+        wrong += cells != stands
+        print(f"| `{method}` | {' | '.join(cells)} |", "yes" if cells == stands else f"NO: {stands}")
+    return wrong
+
+
 def standing(file):
     """The text of a file without the marks of comments and line ends."""
     text = re.sub(r"(?m)^\s*//[/!]?", " ", (ROOT / file).read_text())
@@ -292,6 +326,8 @@ def standing(file):
 def agrees(quoted, value):
     if quoted.startswith("<"):
         return value < float(quoted[1:])
+    if quoted.startswith(">"):
+        return value > float(quoted[1:])
     digits = quoted.lstrip("~").replace(",", "")
     unit = 10.0 ** -len(digits.partition(".")[2])
     if quoted.startswith("~"):
@@ -304,7 +340,10 @@ def main():
     arguments.add_argument("--medial", default=str(ROOT / "target/debug/medial"))
     arguments.add_argument("--only", default="", metavar="TEXT")
     arguments.add_argument("--commands", action="store_true")
+    arguments.add_argument("--report", metavar="DIR")
     given = arguments.parse_args()
+    if given.report:
+        sys.exit(1 if compare_report(given.report) else 0)
     groups = [hem, qmat, tam_heidrich, filters, dual, metrics, readme]
     figures = [figure for group in groups for figure in group()]
     figures = [f for f in figures if any(given.only in text for text in [f.file, f.phrase, *f.commands])]

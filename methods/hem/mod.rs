@@ -49,8 +49,8 @@
 //!
 //! In the reading `depth` the initial mesh is often beyond a small bound: the cones and slabs of a
 //! Voronoi medial mesh stick out of the surface between the spheres, by 0.63 % of the diagonal on the
-//! bear and 0.51 % on the dolphin. The code's default of `1e-4` presumes the reading `surface`, in which the
-//! initial mesh has no error at all. [`Level::Published`] is the code's rule: it stops before the
+//! bear and 0.51 % on the dolphin. The code's default of `1e-4` presumes the reading `surface`, in which
+//! the initial mesh has no error at all. [`Level::Published`] is the code's rule: it stops before the
 //! first collapse of a local error above `1e-4`, holds nothing, and says what error the result has.
 //!
 //! # Laziness
@@ -88,9 +88,10 @@
 //! 100 and at 50 spheres.
 //!
 //! The reason is the condition that blocks collapses. With that of the authors' code
-//! (`blocking=neighbours`) it is as their paper says: the bear has 1.8 % at 100 spheres, where Q-MAT
-//! as published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77; the
-//! dolphin stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it at once, and are held back for good.
+//! (`blocking=neighbours`) it is as their paper says: the bear has 1.8 % at 100 spheres, where Q-MAT as
+//! published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77; the dolphin
+//! stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it at once, and
+//! are held back for good.
 //!
 //! [`CollapseComplex::keeps_homotopy`]: medial::complex::collapse::CollapseComplex::keeps_homotopy
 

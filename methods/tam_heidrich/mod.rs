@@ -32,10 +32,12 @@
 //!   so there are on a box that is sampled on a grid (the built-in one): 161 parts at first, these 13
 //!   after one round by triangle count. On the same box with 3,000 samples of blue noise there are not:
 //!   neighbouring polar balls often share no sample, so that their union has dimples, and its exact axis
-//!   has 12,800 parts. The rounds by triangle count leave 68, but where one of the small parts ended at a seam, that has an edge of
-//!   two triangles, and sheets grow together over it, by the rule of section 4.1.
+//!   has 12,800 parts. The rounds by triangle count leave 68, but where one of the small parts ended at
+//!   a seam, that has an edge of two triangles, and sheets grow together over it, by the rule of section
+//!   4.1.
 //! - Rounds without a test of topology are not harmless: on the built-in double torus they cut both
-//!   loops, on the bear with 35,000 samples of blue noise they leave 18 components. `topology=all` tests there too.
+//!   loops, on the bear with 35,000 samples of blue noise they leave 18 components. `topology=all` tests
+//!   there too.
 //! - Pruning ends where all that is left is one sheet for each body, or sheets that hold loops, often
 //!   far above the number of spheres asked. The paper says the same of the bunny's feet.
 //!

@@ -92,8 +92,8 @@ fn sheets_of_the_box_have_the_flux_of_the_paper() {
 }
 
 /// The paper prints -0.3315 for a sheet between two voxels. Midway the closed form gives -0.375; its
-/// classic spiral with 50 to 70 samples gives between -0.34 and -0.40, depending on the
-/// orientation, and the printed value is that of an offset of 0.58 sigma.
+/// classic spiral scatters around that with the orientation, and the printed value is that of an
+/// offset of 0.58 sigma.
 #[test]
 fn a_sheet_midway_between_voxels_has_three_quarters_of_the_flux() {
     let (grid, diagonal, voxels) = box_flux(90);
