@@ -31,7 +31,11 @@ fn crust(built_in: &BuiltIn, count: usize) -> Crust {
     let options = ShapeOptions { sampling, ..ShapeOptions::default() };
     let shape = Shape::new(built_in.id, &mesh, report, options).expect("an extent");
     let balls = shape.polar_balls().expect("samples span space");
-    let made = PowerCrust::new(&balls.inner, &balls.outer).expect("balls").surface(COINCIDENT).mesh;
+    let made = surface::crust_surface(
+        &PowerCrust::new(&balls.inner, &balls.outer).expect("balls"),
+        COINCIDENT,
+    )
+    .mesh;
     let tree = shape.surface_tree().expect("faces");
     let options =
         DistanceOptions { surface_samples: 20_000, envelope_samples: 20_000, ..Default::default() };

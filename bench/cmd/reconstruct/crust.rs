@@ -6,7 +6,7 @@ use medial::shape::{Cost, Shape};
 use medial::surface;
 use serde_json::{Map, Value};
 
-use super::{Arguments, Made, Said, Stages};
+use super::{Arguments, Made, Said, Stages, no_mesh};
 use crate::exit::Failure;
 
 /// Corners of the power crust that are nearer than this along it are one, as a fraction of the
@@ -21,7 +21,7 @@ pub fn surface_of(
     stages: &mut Stages,
 ) -> Result<Made, Failure> {
     let (Some(shape), Some(mesh)) = (shape, &arguments.mesh) else {
-        unreachable!("checked before")
+        return Err(no_mesh());
     };
     let of_mesh = |message: String| Failure::input(format!("{}: {message}", mesh.display()));
     let (balls, lap) = Cost::of(|| shape.polar_balls());

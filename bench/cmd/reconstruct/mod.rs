@@ -218,15 +218,21 @@ fn check_arguments(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage(message));
     }
     match (arguments.method, &arguments.axis, &arguments.mesh) {
-        (Method::Union, None, _) => Err(Failure::usage(
-            "the union is that of a medial mesh: name one, or ask for --method power-crust",
-        )),
-        (Method::PowerCrust, _, None) => Err(Failure::usage(
-            "the power crust takes its outer poles from a surface: name it by --mesh MESH, or ask \
-             for --method union",
-        )),
+        (Method::Union, None, _) => Err(no_axis()),
+        (Method::PowerCrust, _, None) => Err(no_mesh()),
         _ => Ok(()),
     }
+}
+
+fn no_axis() -> Failure {
+    Failure::usage("the union is that of a medial mesh: name one, or ask for --method power-crust")
+}
+
+fn no_mesh() -> Failure {
+    Failure::usage(
+        "the power crust takes its outer poles from a surface: name it by --mesh MESH, or ask \
+         for --method union",
+    )
 }
 
 /// The shape and the medial mesh, in its own units, where they are named, and what was repaired.

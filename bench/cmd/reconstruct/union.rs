@@ -9,15 +9,18 @@ use medial::shape::{Cost, Shape};
 use medial::surface::{self, Normalisation, TriMesh};
 use serde_json::{Map, Value};
 
-use super::{Arguments, Made, Said, Stages, betti_of, face_centres};
+use super::{Arguments, Made, Said, Stages, betti_of, face_centres, no_axis};
 use crate::exit::Failure;
 use crate::output::counted;
 
 /// Balls that stand for the union where its topology is asked are so far apart, in tolerances.
 const BALL_SPACING: f64 = 0.5;
 
-/// Tolerances that are tried where none is asked for; the last is taken in any case.
-const TOLERANCES: [f64; 3] = [0.04, 0.02, 0.01];
+/// Tolerances that are tried first where none is asked for.
+const COARSE: [f64; 2] = [0.04, 0.02];
+
+/// The tolerance where these show too little.
+const FINE: f64 = 0.01;
 
 /// Faces of a surface that was made without asking for a tolerance are this near to the union.
 const FACES_WITHIN: f64 = 0.005;
@@ -29,7 +32,7 @@ pub fn surface_of(
     axis: Option<&MedialMesh>,
     stages: &mut Stages,
 ) -> Result<Made, Failure> {
-    let (Some(axis), Some(path)) = (axis, &arguments.axis) else { unreachable!("checked before") };
+    let (Some(axis), Some(path)) = (axis, &arguments.axis) else { return Err(no_axis()) };
     let of_file = |message: String| Failure::input(format!("{}: {message}", path.display()));
     let union = MedialUnion::new(axis).map_err(|error| of_file(error.to_string()))?;
     let (lo, hi) = union.bounding_box();
@@ -77,23 +80,28 @@ fn fitting_surface(
     diagonal: f64,
     asked: Option<f64>,
 ) -> Result<Fitting, ContourError> {
-    let tolerances = asked.map_or(TOLERANCES.to_vec(), |tolerance| vec![tolerance]);
-    let finest = *tolerances.last().expect("at least one");
+    let finest = asked.unwrap_or(FINE);
     // There may be too many balls to tell.
     let betti = union_betti(axis, BALL_SPACING * finest * diagonal).ok();
-    for tolerance in tolerances {
-        let made = match union_surface(axis, tolerance * diagonal) {
-            Err(ContourError::TooThin { .. }) if tolerance > finest => continue,
-            made => made?,
-        };
+    let at = |tolerance: f64| -> Result<Fitting, ContourError> {
+        let made = union_surface(axis, tolerance * diagonal)?;
         let off = union.signed_batch(&face_centres(&made.mesh)).into_iter().map(f64::abs);
         let off = off.fold(0.0, f64::max) / diagonal;
-        let found = surface::validate(&made.mesh).ok().and_then(|report| betti_of(&report));
-        if tolerance == finest || (off <= FACES_WITHIN && found.is_some() && found == betti) {
-            return Ok(Fitting { made, tolerance, off, betti });
+        Ok(Fitting { made, tolerance, off, betti })
+    };
+    let shows_all = |fitting: &Fitting| {
+        let found = surface::validate(&fitting.made.mesh).ok().and_then(|report| betti_of(&report));
+        fitting.off <= FACES_WITHIN && found.is_some() && found == betti
+    };
+    let coarse = if asked.is_none() { &COARSE[..] } else { &[] };
+    for &tolerance in coarse {
+        match at(tolerance) {
+            Ok(fitting) if shows_all(&fitting) => return Ok(fitting),
+            Ok(_) | Err(ContourError::TooThin { .. }) => {}
+            Err(other) => return Err(other),
         }
     }
-    unreachable!("the finest is taken in any case")
+    at(finest)
 }
 
 fn contour_error(error: ContourError, diagonal: f64) -> String {

@@ -23,6 +23,7 @@
 //! facet's plane, if its finite neighbour is, since the sphere through three coplanar points meets
 //! the plane in their circle, perturbed alike.
 
+use super::Division;
 use super::cells::{Cell, FRONTIER, Face, INFINITE, OPPOSITE};
 use super::error::TriangulationError;
 use super::stellate::{ABSENT, TABLE};
@@ -68,23 +69,23 @@ pub(super) struct Builder<'s, M> {
 impl<'s, M: Metric> Builder<'s, M> {
     /// Triangulates distinct sites; `sites[0]` is a dummy, and 1 to 4 are affinely independent.
     ///
-    /// `rounds` are the ends of the rounds of insertion; those of at least `divided_round` sites are
-    /// divided.
+    /// `rounds` are the ends of the rounds of insertion; `division` says which of them
+    /// are divided.
     pub(super) fn build(
         sites: &'s [Site],
         rounds: &[u32],
-        divided_round: u32,
+        division: Division,
         filter: Filter,
     ) -> Result<Self, TriangulationError> {
-        let alone = rounds.iter().take_while(|&&end| end < divided_round).last();
+        let alone = rounds.iter().take_while(|&&end| end < division.smallest).last();
         let mut builder = Self::new(sites, filter, alone.map_or(sites.len(), |&n| n as usize));
         builder.start();
         let mut start = 5;
         for &end in rounds {
-            if end.saturating_sub(start) < divided_round {
+            if end.saturating_sub(start) < division.smallest {
                 builder.insert_all(start..end)?;
             } else {
-                builder.insert_divided(start..end)?;
+                builder.insert_divided(start..end, division.most_deferred)?;
             }
             start = end.max(start);
         }

@@ -51,10 +51,6 @@ const DIRECTIONS: [Vec3; 13] = [
     Vec3::new(-1.0, 1.0, 1.0),
 ];
 
-/// If more than this fraction of the sites would be deferred, the round is not divided; in unit
-/// tests it always is.
-const MOST_DEFERRED: (u32, u32) = if cfg!(test) { (1, 1) } else { (1, 2) };
-
 /// For one of so many sites a cell near it is noted before the division.
 const HINT_STRIDE: usize = 256;
 
@@ -112,9 +108,14 @@ struct Part<'s, M> {
 }
 
 impl<'s, M: Metric> Builder<'s, M> {
-    /// Inserts sites in two parts, or one after the other where no plane separates them well.
-    pub(super) fn insert_divided(&mut self, range: Range<u32>) -> Result<(), TriangulationError> {
-        let Some(cut) = self.choose_cut(&range) else {
+    /// Inserts sites in two parts, or one after the other where every plane would defer more than the
+    /// share `most_deferred` of them.
+    pub(super) fn insert_divided(
+        &mut self,
+        range: Range<u32>,
+        most_deferred: (u32, u32),
+    ) -> Result<(), TriangulationError> {
+        let Some(cut) = self.choose_cut(&range, most_deferred) else {
             self.reserve(range.len());
             return self.insert_all(range);
         };
@@ -134,7 +135,7 @@ impl<'s, M: Metric> Builder<'s, M> {
     }
 
     /// The cut for which the fewest sites would be deferred, if these are not too many.
-    fn choose_cut(&mut self, range: &Range<u32>) -> Option<Cut> {
+    fn choose_cut(&mut self, range: &Range<u32>, (part, whole): (u32, u32)) -> Option<Cut> {
         let cuts = self.halving_cuts(range);
         let stride = range.len().div_ceil(TRIED_SITES);
         let (mut deferred, mut tried) = ([0; CUTS], 0);
@@ -146,7 +147,7 @@ impl<'s, M: Metric> Builder<'s, M> {
             tried += 1;
         }
         let best = (0..CUTS).min_by_key(|&i| deferred[i])?;
-        (MOST_DEFERRED.1 * deferred[best] <= MOST_DEFERRED.0 * tried).then_some(cuts[best])
+        (whole * deferred[best] <= part * tried).then_some(cuts[best])
     }
 
     /// The cuts to choose from: each direction halves the sites.

@@ -75,8 +75,17 @@ pub struct Triangulation {
     incident: Vec<CellId>,
 }
 
+/// When a round of insertion is divided between two threads.
+#[derive(Clone, Copy, Debug)]
+struct Division {
+    /// Fewest sites of a round.
+    smallest: u32,
+    /// Largest share of the sites that may be deferred, as a fraction.
+    most_deferred: (u32, u32),
+}
+
 /// Rounds of at least this many sites are inserted in two parts.
-const DIVIDED_ROUND: u32 = 1 << 14;
+const DIVISION: Division = Division { smallest: 1 << 14, most_deferred: (1, 2) };
 
 /// A triangulation of sites, with what did not become a vertex.
 pub(super) struct Triangulated {
@@ -88,13 +97,13 @@ pub(super) struct Triangulated {
 
 /// Triangulates finite sites of admissible size, in any number and position.
 pub(super) fn triangulate<M: Metric>(sites: &[Site]) -> Result<Triangulated, TriangulationError> {
-    triangulate_dividing::<M>(sites, DIVIDED_ROUND)
+    triangulate_dividing::<M>(sites, DIVISION)
 }
 
-/// The same with rounds of insertion divided from this size on.
+/// The same with rounds of insertion divided otherwise.
 fn triangulate_dividing<M: Metric>(
     sites: &[Site],
-    divided_round: u32,
+    division: Division,
 ) -> Result<Triangulated, TriangulationError> {
     if sites.len() >= cells::MAX_CELLS {
         return Err(TriangulationError::TooLarge { points: sites.len(), limit: cells::MAX_CELLS });
@@ -110,7 +119,7 @@ fn triangulate_dividing<M: Metric>(
     let mut ordered =
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
     build::bring_independent_to_front(&mut ordered, &mut ids)?;
-    let cells = Builder::<M>::build(&ordered, &rounds, divided_round, filter)?.cells;
+    let cells = Builder::<M>::build(&ordered, &rounds, division, filter)?.cells;
     let triangulation = freeze::freeze(cells, &ids, &along_curve);
     Ok(Triangulated { triangulation, repeated, filter })
 }

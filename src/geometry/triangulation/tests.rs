@@ -21,6 +21,11 @@ fn cell_set(t: &Triangulation) -> Vec<[VertexId; 4]> {
     cells
 }
 
+/// Rounds of so many sites are divided, however many of them have to be deferred.
+fn always_from(smallest: u32) -> Division {
+    Division { smallest, most_deferred: (1, 1) }
+}
+
 /// Divided on one thread, which grows one part behind the other, and on two, side by side.
 fn divided<M: Metric>(
     sites: &[Site],
@@ -28,11 +33,13 @@ fn divided<M: Metric>(
 ) -> [Result<Triangulated, TriangulationError>; 2] {
     static POOLS: LazyLock<[ThreadPool; 2]> =
         LazyLock::new(|| [1, 2].map(|n| ThreadPoolBuilder::new().num_threads(n).build().unwrap()));
-    POOLS.each_ref().map(|pool| pool.install(|| triangulate_dividing::<M>(sites, smallest)))
+    POOLS
+        .each_ref()
+        .map(|pool| pool.install(|| triangulate_dividing::<M>(sites, always_from(smallest))))
 }
 
 fn agrees<M: Metric>(sites: &[Site]) -> Result<(), TestCaseError> {
-    let undivided = triangulate_dividing::<M>(sites, u32::MAX);
+    let undivided = triangulate_dividing::<M>(sites, always_from(u32::MAX));
     for smallest in [1, 16, 64] {
         let [one, two] = divided::<M>(sites, smallest);
         prop_assert_eq!(one.is_ok(), two.is_ok());
