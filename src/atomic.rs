@@ -1,4 +1,7 @@
 //! Files that are either complete or not there.
+//!
+//! By hand because `tempfile`, whose files can be renamed too, follows no links, keeps no permissions of the
+//! file that is replaced, and has no list to remove from when a signal comes.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};

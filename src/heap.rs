@@ -1,5 +1,8 @@
 //! How much memory a piece of work takes: live bytes of the heap, and their highest number.
 //!
+//! By hand because counting allocators such as `stats_alloc` share one counter between all threads and have no
+//! highest number for a piece of work inside another.
+//!
 //! Resident sizes depend on what ran before, since an allocator keeps freed pages; live bytes do
 //! not. A program that wants them measured installs [`Heap`]; without it all numbers are 0.
 //!

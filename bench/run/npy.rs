@@ -5,6 +5,10 @@
 //! of the header (two bytes in version 1, four in 2 and 3), the header (a Python dictionary with the
 //! keys `descr`, `fortran_order` and `shape`), the numbers.
 //!
+//! An own reader because `npyz` 0.9 allocates what a header claims, multiplies its shape without a check, and
+//! brings twenty crates, some with C sources, for a dictionary of three keys; `ndarray-npy` stands on the same
+//! parser.
+//!
 //! Read are two-dimensional arrays of little-endian f8 and f4, in C or Fortran order. Memory grows
 //! with what the file holds, never with what its header claims.
 

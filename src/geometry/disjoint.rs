@@ -1,4 +1,7 @@
 //! Disjoint sets of consecutive ids.
+//!
+//! By hand because the representative is the smallest member, whatever the order of the joins; that of
+//! `petgraph` depends on ranks.
 
 /// A partition of `0..n`, joined pair by pair. The representative of a set is its smallest member.
 #[derive(Clone, Debug)]

@@ -5,6 +5,8 @@
 //! - In a text file every element has a line of its own, as the format says; a line with too few
 //!   or too many values is an error.
 //! - Bytes or lines after the last element give a warning.
+//! - An own reader because `ply-rs` keeps a map of properties for each element, and does not say which line or
+//!   element is at fault.
 //! - Triangle strips (`element tristrips`) are refused.
 
 mod header;
