@@ -5,7 +5,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`surface`] | triangle meshes: reading, repairing, checking, sampling, the inside test |
-//! | [`geometry`] | exact predicates, Delaunay triangulation, bounding-volume trees, distances to sphere, cone and slab |
+//! | [`geometry`] | the crate `medial-geometry`: exact predicates, triangulations, box trees, distances to sphere, cone and slab |
 //! | [`complex`] | the medial mesh, its formats, its topology, the edge-collapse engine |
 //! | [`metrics`] | Hausdorff distances, triangle quality, spikes, topology against the solid's own |
 //! | [`shape`] | one normalised input with its substrates, each built once, on demand, and timed |
@@ -13,6 +13,26 @@
 //!
 //! Lengths are in units of the input's bounding-box diagonal wherever a [`shape::Shape`] is
 //! involved, and in the unit of the arguments everywhere else.
+//!
+//! ```
+//! use medial::complex::betti;
+//! use medial::metrics::JudgeOptions;
+//! use medial::shape::{Shape, ShapeOptions};
+//! use medial::surface::{self, Format};
+//!
+//! let tetrahedron = b"OFF 4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+//! let loaded = surface::read_bytes(tetrahedron, Format::Off)?;
+//! let options = ShapeOptions { sampling: "uniform:500".parse()?, ..ShapeOptions::default() };
+//! let shape = Shape::new("tetrahedron", &loaded.mesh, loaded.report, options)?;
+//!
+//! // The Voronoi medial mesh, and how far its spheres, cones and slabs are from the surface.
+//! let initial = shape.initial()?;
+//! let judge = shape.judge(None, JudgeOptions { samples: 2_000, ..JudgeOptions::default() })?;
+//! let distances = judge.distances(&initial)?;
+//! assert_eq!(betti(&initial)[0], 1);
+//! assert!(distances.hausdorff < 0.15, "{} of the diagonal", distances.hausdorff);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod atomic;
 pub mod complex;

@@ -33,6 +33,24 @@ pub use substrate::{Cost, Substrate};
 use substrate::{Cache, Use};
 
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
+///
+/// ```
+/// use medial::shape::{Shape, ShapeOptions, Substrate};
+/// use medial::surface::{self, Format};
+///
+/// let tetrahedron = b"OFF 4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+/// let loaded = surface::read_bytes(tetrahedron, Format::Off)?;
+/// let options = ShapeOptions { sampling: "uniform:300".parse()?, ..ShapeOptions::default() };
+/// let shape = Shape::new("tetrahedron", &loaded.mesh, loaded.report, options)?;
+/// assert_eq!(shape.samples().len(), 300);
+/// // Built now, and once: a second view finds it there, and is told what it cost.
+/// let (first, second) = (shape.view(), shape.view());
+/// first.delaunay()?;
+/// second.delaunay()?;
+/// assert!(second.used().iter().any(|(substrate, _)| *substrate == Substrate::Delaunay));
+/// assert!(second.spent().seconds < first.spent().seconds);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Shape {
     store: Arc<Store>,
     /// Shared by a view and those that start from another medial mesh on its behalf.
