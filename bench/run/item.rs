@@ -48,6 +48,9 @@ pub struct SceneSpec {
     pub source: Source,
     /// SHA-256 of the input's file; `None` for a built-in shape, which the program's hash decides.
     pub hash: Option<String>,
+    /// Factor on all coordinates, which makes the input one in another unit of length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scaled: Option<f64>,
     /// Displacements of the vertices that make another input of it, which results are measured
     /// against.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -152,9 +155,10 @@ impl Item {
             Source::File(_) => None,
             built_in @ Source::BuiltIn { .. } => Some(built_in),
         };
-        let SceneSpec { mesh, hash, displaced, noise, sampling, dual, measure, .. } = &self.scene;
+        let SceneSpec { mesh, hash, scaled, displaced, noise, sampling, dual, measure, .. } =
+            &self.scene;
         let MethodSpec { id, name, fingerprint, .. } = &self.method;
-        let scene = (mesh, source, hash, displaced, noise, sampling, dual, measure);
+        let scene = (mesh, source, hash, scaled, displaced, noise, sampling, dual, measure);
         let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.binary);
         let common = serde_json::to_string(&rest).expect("plain data");
         let key = |level: &Level| {
@@ -244,6 +248,7 @@ mod tests {
                 mesh: "bear".into(),
                 source: Source::File(PathBuf::from("bear.off")),
                 hash: Some("12ab".into()),
+                scaled: None,
                 displaced: None,
                 noise: None,
                 sampling: Sampling::default(),
@@ -282,9 +287,10 @@ mod tests {
         for change in same {
             assert_eq!(key(change), plain);
         }
-        let other: [fn(&mut Item); 10] = [
+        let other: [fn(&mut Item); 11] = [
             |i| i.scene.mesh = "bear-2".into(),
             |i| i.scene.hash = Some("12ac".into()),
+            |i| i.scene.scaled = Some(1000.0),
             |i| i.scene.noise = Some(Noise { eta: 0.01, seed: 1 }),
             |i| i.scene.dual = Dual::Delaunay,
             |i| i.scene.measure.samples += 1,

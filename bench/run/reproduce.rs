@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use medial::metrics::JudgeOptions;
-use medial_reports::Record;
-use medial_reports::published::{Exhibit, ReproducedRow, Row, RowInput, Run};
-use serde_json::json;
+use medial_reports::published::{Against, Exhibit, ReproducedRow, Row, RowInput, Run};
+use serde_json::{Value, json};
 
 use super::{
-    Dual, Here, Item, Limits, Measure, MethodSpec, Noise, Registry, RunError, SceneSpec, Source,
-    Supervisor,
+    Dual, Here, Item, Kept, Limits, Measure, MethodSpec, Noise, Registry, RunError, SceneSpec,
+    Source, Supervisor,
 };
 
 /// Distance between the balls that stand for the primitives where the topology of a union is asked,
@@ -44,8 +43,11 @@ impl<'a> Reproducer<'a> {
     /// # Errors
     /// When the user interrupts, or no worker can be started.
     pub fn row(&mut self, exhibit: &Exhibit, row: &Row) -> Result<ReproducedRow, RunError> {
-        let RowInput { mesh, sampling, noise } = &row.input;
+        let RowInput { mesh, sampling, scale, noise } = &row.input;
         let mut input = mesh.clone();
+        if *scale != 1.0 {
+            input += &format!(", times {scale}");
+        }
         if sampling != "vertices" {
             input += &format!(", {sampling}");
         }
@@ -80,13 +82,20 @@ impl<'a> Reproducer<'a> {
         // Without a column of errors nothing is measured.
         let samples = if exhibit.needs_evaluation() { self.samples } else { 0 };
         let union_spacing = exhibit.needs_union().then_some(BALL_SPACING);
-        let measure = JudgeOptions { samples, ..JudgeOptions::default() };
+        let all = JudgeOptions::default();
+        let volume_depth = if exhibit.needs_volume() { all.volume_depth } else { 0 };
+        let measure = JudgeOptions { samples, volume_depth, ..all };
+        let noise = |against| {
+            let wanted = wanted.noise.filter(|noise| noise.against == against);
+            wanted.map(|noise| Noise { eta: noise.eta, seed: noise.seed })
+        };
         Ok(SceneSpec {
             mesh: source.name(),
             source,
             hash: None,
-            displaced: wanted.noise.map(|noise| Noise { eta: noise.eta, seed: noise.seed }),
-            noise: None,
+            scaled: Some(wanted.scale).filter(|&factor| factor != 1.0),
+            displaced: noise(Against::Noisy),
+            noise: noise(Against::Clean),
             sampling: wanted.sampling.parse().map_err(|error| format!("sampling: {error}"))?,
             dual: Dual::default(),
             measure: Measure { union_spacing, ..measure.into() },
@@ -100,7 +109,7 @@ impl<'a> Reproducer<'a> {
         row: &Row,
         scene: &SceneSpec,
     ) -> Result<(), RunError> {
-        let mut records: BTreeMap<&str, Option<Record>> = BTreeMap::new();
+        let mut records: BTreeMap<&str, Option<Kept>> = BTreeMap::new();
         for column in &exhibit.columns {
             let name = column.run.as_str();
             if !records.contains_key(name) {
@@ -113,13 +122,13 @@ impl<'a> Reproducer<'a> {
                 }
                 records.insert(name, record);
             }
-            let Some(record) = &records[name] else { continue };
-            if let Some(value) = column.read(&json!(record)) {
+            let Some(kept) = &records[name] else { continue };
+            if let Some(value) = column.read(&places(kept)) {
                 reproduced.ours.insert(column.key.clone(), value);
             }
         }
         for (name, record) in records {
-            let Some(record) = record else { continue };
+            let Some(Kept { record, .. }) = record else { continue };
             let why = record.reason.iter().map(|reason| format!("{name}: {reason}"));
             let warnings = record.simplify.warnings.iter().map(|w| format!("{name}: {w}"));
             reproduced.remarks.extend(why.chain(warnings));
@@ -127,7 +136,7 @@ impl<'a> Reproducer<'a> {
         Ok(())
     }
 
-    fn one_run(&mut self, run: &Run, scene: &SceneSpec) -> Result<Option<Record>, RunError> {
+    fn one_run(&mut self, run: &Run, scene: &SceneSpec) -> Result<Option<Kept>, RunError> {
         let Some(entry) = self.registry.entry(&run.method) else { return Ok(None) };
         let item = Item {
             scene: scene.clone(),
@@ -144,6 +153,13 @@ impl<'a> Reproducer<'a> {
             limits: self.limits,
             binary: self.here.binary.clone(),
         };
-        Ok(self.supervisor.run(&item)?.pop().map(|kept| kept.record))
+        Ok(self.supervisor.run(&item)?.pop())
     }
+}
+
+/// The places that columns are read from: the record's own, and what is told of noise beside it.
+fn places(kept: &Kept) -> Value {
+    let mut places = json!(kept.record);
+    places["noise"] = json!(kept.noise);
+    places
 }

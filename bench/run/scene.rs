@@ -53,6 +53,9 @@ impl Scene {
             ));
         }
         let mut input = Input { name: spec.mesh.clone(), ..input };
+        if let Some(factor) = spec.scaled {
+            input = scaled(input, factor)?;
+        }
         if let Some(noise) = spec.displaced {
             (input.mesh, input.report) = displaced(&input.mesh, noise)?;
             input.axis = None;
@@ -153,6 +156,15 @@ impl Scene {
     }
 }
 
+/// An input in another unit of length, or why that bounds no solid.
+fn scaled(input: Input, factor: f64) -> Result<Input, String> {
+    let Input { name, hash, mut mesh, axis, .. } = input;
+    mesh.vertices.iter_mut().for_each(|v| *v = *v * factor);
+    let report = surface::validate(&mesh).map_err(|error| format!("times {factor}: {error}"))?;
+    let axis = axis.map(|axis| axis.transformed(factor, |p| p * factor));
+    Ok(Input { name, hash, mesh, report, axis })
+}
+
 /// A surface with its vertices displaced, or why that bounds no solid.
 fn displaced(mesh: &TriMesh, noise: Noise) -> Result<(TriMesh, SurfaceReport), String> {
     let Noise { eta, seed } = noise;
@@ -171,4 +183,40 @@ impl SceneSpec {
 /// Under which name a result without noise is kept.
 pub fn reference_key(method: &MethodSpec, seed: u64, level: medial::simplifier::Level) -> String {
     serde_json::to_string(&(method, seed, level)).expect("plain data")
+}
+
+#[cfg(test)]
+mod tests {
+    use medial::metrics::JudgeOptions;
+    use medial::surface::Sampling;
+
+    use super::*;
+    use crate::run::{Dual, Source};
+
+    #[test]
+    fn another_unit_of_length_changes_the_diagonal_alone() {
+        let spec = |scaled| SceneSpec {
+            mesh: "torus".into(),
+            source: Source::BuiltIn { id: "torus".into(), resolution: Some(16) },
+            hash: None,
+            scaled,
+            displaced: None,
+            noise: None,
+            sampling: Sampling::default(),
+            dual: Dual::Fan,
+            measure: JudgeOptions { samples: 200, volume_depth: 0, seed: 0 }.into(),
+        };
+        let [plain, large] =
+            [None, Some(1024.0)].map(|scaled| Scene::load(&spec(scaled)).expect("a solid"));
+        let diagonal = |scene: &Scene| scene.shape().normalisation().diagonal;
+        assert_eq!(diagonal(&large), 1024.0 * diagonal(&plain));
+        let initial = |scene: &Scene| scene.shape().view().initial().expect("an axis");
+        // A power of two leaves all digits as they are.
+        assert_eq!(initial(&large), initial(&plain));
+        let axis = |scene: &Scene| {
+            let measured = scene.judge.evaluate(&initial(scene)).expect("measured");
+            measured.axis.expect("the axis of a torus is known").in_space
+        };
+        assert_eq!(axis(&large), axis(&plain));
+    }
 }

@@ -371,6 +371,7 @@ impl Study {
                 mesh,
                 source: source.clone(),
                 hash,
+                scaled: None,
                 displaced: None,
                 noise: None,
                 sampling: self.sampling,
