@@ -1,0 +1,237 @@
+//! From a study to its items.
+
+use std::path::Path;
+
+use medial::simplifier::Level;
+
+use super::{Study, StudyError, StudyMethod, VOLUME_DEPTH};
+use crate::run::{
+    Entry, INITIAL, InputError, Item, Limits, Measure, MethodSpec, Provenance, Registry, SceneSpec,
+    Source, hex_digest,
+};
+
+/// What is the same for all items of this process.
+#[derive(Clone, Debug)]
+pub struct Here {
+    /// SHA-256 of the program.
+    pub binary: String,
+    /// Threads where a study says nothing.
+    pub threads: usize,
+    /// Memory of the machine, in bytes; 0 where it is not known.
+    pub memory: u64,
+}
+
+impl Here {
+    /// What this process is.
+    pub fn of(provenance: &Provenance) -> Self {
+        Self {
+            binary: provenance.binary_hash.clone(),
+            threads: rayon::current_num_threads(),
+            memory: provenance.machine.memory,
+        }
+    }
+}
+
+impl Study {
+    /// The methods of the study: those named, or all there are.
+    ///
+    /// # Errors
+    /// [`StudyError::Method`] for an id that no method has; [`StudyError::Value`] for two rows of
+    /// one name.
+    pub fn entries<'r>(
+        &self,
+        registry: &'r Registry,
+    ) -> Result<Vec<(StudyMethod, &'r Entry)>, StudyError> {
+        let mut methods = self.methods.clone();
+        if methods.is_empty() {
+            methods = registry.entries().iter().map(|e| StudyMethod::of(e.id())).collect();
+        }
+        for then in &self.after_filters {
+            let filters = registry.entries().iter().filter(|e| e.method().info().filter.is_some());
+            let chains = filters.map(|filter| format!("{}+{then}", filter.id()));
+            methods.extend(chains.map(|id| StudyMethod::of(&id)));
+        }
+        if !self.counts_only {
+            methods.insert(0, StudyMethod::of(INITIAL));
+        }
+        let mut found: Vec<(StudyMethod, &Entry)> = Vec::new();
+        for method in &methods {
+            let entry = registry.entry(&method.id).ok_or_else(|| StudyError::Method {
+                id: method.id.clone(),
+                known: registry.entries().iter().map(|entry| entry.id().to_owned()).collect(),
+            })?;
+            // The same row twice would be one row with twice the weight.
+            if found.iter().any(|(other, _)| other == method) {
+                continue;
+            }
+            if let Some(name) = &method.name
+                && found.iter().any(|(other, _)| other.name.as_ref() == Some(name))
+            {
+                return Err(StudyError::Value(format!("two methods are named `{name}`")));
+            }
+            found.push((method.clone(), entry));
+        }
+        Ok(found)
+    }
+
+    /// The inputs of the study: those named and those of the set; all built-in shapes where there
+    /// are none.
+    ///
+    /// # Errors
+    /// When one does not exist, or is no input.
+    pub fn sources(&self) -> Result<Vec<Source>, StudyError> {
+        let mut sources = Vec::new();
+        for mesh in &self.meshes {
+            sources.push(Source::parse(&self.resolved(mesh))?);
+        }
+        match self.dataset.as_deref() {
+            None if sources.is_empty() => sources = Source::built_ins(),
+            None => {}
+            Some("builtin") => sources.extend(Source::built_ins()),
+            Some(other) => {
+                let message = format!("--dataset {other}: the one set is `builtin`");
+                return Err(StudyError::Value(message));
+            }
+        }
+        let mut distinct: Vec<Source> = Vec::with_capacity(sources.len());
+        for source in sources {
+            source.check()?;
+            // The same mesh twice would be one row with twice the weight.
+            if !distinct.contains(&source) {
+                distinct.push(source);
+            }
+        }
+        Ok(distinct)
+    }
+
+    /// All items, mesh by mesh.
+    ///
+    /// # Errors
+    /// As [`Study::check`], [`Study::entries`] and [`Study::sources`].
+    pub fn items(&self, registry: &Registry, here: &Here) -> Result<Vec<Item>, StudyError> {
+        self.check()?;
+        let methods = self.entries(registry)?;
+        let sources = self.sources()?;
+        let names = unique_names(&sources);
+        let mut items = Vec::new();
+        for (source, mesh) in sources.iter().zip(names) {
+            let hash = match source {
+                Source::File(path) => Some(hash_of(path)?),
+                Source::BuiltIn { .. } => None,
+            };
+            let scene = SceneSpec {
+                mesh,
+                source: source.clone(),
+                hash,
+                scaled: None,
+                displaced: None,
+                noise: None,
+                sampling: self.sampling,
+                dual: self.dual,
+                measure: self.measure(),
+            };
+            for (method, entry) in &methods {
+                items.push(self.item(scene.clone(), method, entry, here));
+            }
+        }
+        Ok(items)
+    }
+
+    fn measure(&self) -> Measure {
+        Measure {
+            samples: self.samples,
+            volume_depth: VOLUME_DEPTH,
+            seed: self.seed,
+            union_spacing: None,
+            certify: self.certify,
+        }
+    }
+
+    fn item(&self, scene: SceneSpec, method: &StudyMethod, entry: &Entry, here: &Here) -> Item {
+        Item {
+            scene,
+            method: MethodSpec {
+                id: method.id.clone(),
+                name: method.name.clone(),
+                params: method.params.clone(),
+                fingerprint: entry.fingerprint().map(str::to_owned),
+            },
+            levels: self.levels(method, entry),
+            seed: self.seed,
+            repeat: self.repeat,
+            threads: self.threads.unwrap_or(here.threads),
+            limits: self.limits(here),
+            binary: here.binary.clone(),
+        }
+    }
+
+    /// The limits of each item.
+    pub fn limits(&self, here: &Here) -> Limits {
+        let machine = if here.memory == 0 { u64::MAX } else { here.memory / 4 * 3 };
+        let bytes = self.memory.map_or(machine, |megabytes| megabytes.saturating_mul(1_000_000));
+        Limits { seconds: self.timeout, bytes }
+    }
+
+    /// The published level, the counts, the method's own levels and the error bounds, each from
+    /// fine to coarse.
+    fn levels(&self, method: &StudyMethod, entry: &Entry) -> Vec<Level> {
+        let info = entry.method().info();
+        if info.fixed {
+            return vec![Level::Published];
+        }
+        let mut levels = Vec::new();
+        if method.published.unwrap_or(self.published) {
+            levels.push(Level::Published);
+        }
+        let mut counts = method.spheres.as_ref().unwrap_or(&self.spheres).clone();
+        counts.sort_unstable_by(|a, b| b.cmp(a));
+        counts.dedup();
+        levels.extend(counts.into_iter().map(Level::Spheres));
+        let mut native = match method.levels.is_empty() && !self.counts_only {
+            true => info.sweep.clone(),
+            false => method.levels.clone(),
+        };
+        native.sort_by(f64::total_cmp);
+        native.dedup();
+        if info.native.as_ref().is_some_and(|native| !native.larger_is_coarser) {
+            native.reverse();
+        }
+        levels.extend(native.into_iter().map(Level::Native));
+        // Last, since a search that does not end must cost nothing else.
+        let mut bounds = self.max_error.clone();
+        bounds.sort_by(f64::total_cmp);
+        bounds.dedup();
+        levels.extend(bounds.into_iter().map(Level::MaxError));
+        levels
+    }
+}
+
+fn hash_of(path: &Path) -> Result<String, StudyError> {
+    let read = std::fs::read(path);
+    let bytes = read.map_err(|error| InputError::Read { path: path.to_owned(), error })?;
+    Ok(hex_digest(&bytes))
+}
+
+/// A name for each source, unlike every other even as the stem of a file: the file's stem, where
+/// that is not enough its name with the extension, then with its folder, then a number.
+fn unique_names(sources: &[Source]) -> Vec<String> {
+    let key = |name: &String| medial_reports::file_stem(name).to_ascii_lowercase();
+    let mut names: Vec<String> = sources.iter().map(Source::name).collect();
+    for depth in 1..=2 {
+        let keys: Vec<String> = names.iter().map(key).collect();
+        for (name, source) in names.iter_mut().zip(sources) {
+            if keys.iter().filter(|&other| *other == key(name)).count() > 1 {
+                *name = source.long_name(depth);
+            }
+        }
+    }
+    for index in 0..names.len() {
+        let base = names[index].clone();
+        let mut number = 2;
+        while names[..index].iter().any(|other| key(other) == key(&names[index])) {
+            names[index] = format!("{base}-{number}");
+            number += 1;
+        }
+    }
+    names
+}
