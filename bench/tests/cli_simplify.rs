@@ -16,21 +16,7 @@ fn axis_simplify_evaluate_convert() {
 
     let (code, object) = json(&["axis", mesh, "-o", axis]);
     assert_eq!(code, 0);
-    for key in [
-        "spheres",
-        "edges",
-        "faces",
-        "isolated",
-        "euler",
-        "betti",
-        "expected_betti",
-        "samples",
-        "sampling",
-        "seed",
-        "seconds",
-        "cpu_seconds",
-        "peak_bytes",
-    ] {
+    for key in "spheres edges faces isolated euler betti expected_betti samples sampling seed seconds cpu_seconds peak_bytes".split(' ') {
         assert!(object.get(key).is_some(), "{key} is missing in {object}");
     }
     for stage in ["read", "delaunay", "inside", "extract", "total"] {
@@ -47,28 +33,7 @@ fn axis_simplify_evaluate_convert() {
         assert_eq!(object["level"]["spheres"], 60);
         let (code, object) = json(&["evaluate", mesh, simple, "--samples", "2000"]);
         assert_eq!(code, 0);
-        for key in [
-            "epsilon",
-            "epsilon_union",
-            "reverse",
-            "hausdorff",
-            "mean",
-            "rms",
-            "p95",
-            "p99",
-            "reverse_mean",
-            "spheres_only",
-            "volume_error",
-            "quality",
-            "spikes",
-            "betti",
-            "euler",
-            "expected_betti",
-            "counts",
-            "diagonal",
-            "samples",
-            "seed",
-        ] {
+        for key in "epsilon epsilon_union reverse hausdorff mean rms p95 p99 reverse_mean spheres_only volume_error quality spikes betti euler expected_betti counts diagonal samples seed".split(' ') {
             assert!(object.get(key).is_some(), "{key} is missing in {object}");
         }
         let number = |key: &str| object[key].as_f64().expect("a number");
