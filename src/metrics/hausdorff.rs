@@ -114,11 +114,9 @@ pub fn distances(
     mesh: &MedialMesh,
     options: &DistanceOptions,
 ) -> Result<Distances, MetricError> {
-    mesh.check().map_err(UnionError::from)?;
     let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
-    let mesh = &samples.pose.in_order(mesh);
-    let union = MedialUnion::new(mesh)?;
-    let (distances, _) = distances_with_envelope(bvh, mesh, &union, &samples, options)?;
+    let (mesh, union) = samples.ordered(mesh)?;
+    let (distances, _) = distances_with_envelope(bvh, &mesh, &union, &samples, options)?;
     Ok(distances)
 }
 

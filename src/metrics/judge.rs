@@ -13,7 +13,7 @@ use super::{
     SurfaceDistances, VolumeOptions, certify, counts, spikes, surface_distances, topology_warning,
     triangle_quality,
 };
-use crate::complex::{MedialMesh, MedialUnion, UnionError, betti, euler};
+use crate::complex::{MedialMesh, MedialUnion, betti, euler};
 use crate::surface::TriangleBvh;
 use crate::surface::{InsideTest, Side, TriMesh};
 
@@ -98,23 +98,20 @@ impl Judge {
     /// # Errors
     /// When the mesh has no sphere or is not valid.
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
-        mesh.check().map_err(UnionError::from)?;
         // Random numbers and sums follow the order of the spheres.
         let samples = self.samples()?;
-        let pose = &samples.pose;
-        let mesh = &pose.in_order(mesh);
-        let union = MedialUnion::new(mesh)?;
+        let (mesh, union) = &samples.ordered(mesh)?;
         let axis = || self.true_axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
         let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
         // Side by side, because parts of each run on one thread.
         let distances =
-            || distances_with_envelope(&self.tree, mesh, &union, samples, &self.distance_options());
+            || distances_with_envelope(&self.tree, mesh, union, samples, &self.distance_options());
         let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
-            || rayon::join(distances, || self.volume_error(mesh, &union, pose)),
+            || rayon::join(distances, || self.volume_error(mesh, union, &samples.pose)),
             || rayon::join(axis, complex),
         );
         let ((distances, envelope), axis) = (distances?, axis.transpose()?);
-        let mut warnings = self.misfits(mesh, &union, &distances);
+        let mut warnings = self.misfits(mesh, union, &distances);
         warnings.extend(topology_warning(betti, self.truth.betti));
         let volume_error = match volume_error {
             // All else is defined, and the surface was taken for a solid.
@@ -151,11 +148,10 @@ impl Judge {
     /// # Errors
     /// As [`Judge::evaluate`].
     pub fn distances(&self, mesh: &MedialMesh) -> Result<Distances, MetricError> {
-        mesh.check().map_err(UnionError::from)?;
         let samples = self.samples()?;
-        let mesh = &samples.pose.in_order(mesh);
-        let (union, options) = (MedialUnion::new(mesh)?, self.distance_options());
-        Ok(distances_with_envelope(&self.tree, mesh, &union, samples, &options)?.0)
+        let (mesh, union) = samples.ordered(mesh)?;
+        let options = self.distance_options();
+        Ok(distances_with_envelope(&self.tree, &mesh, &union, samples, &options)?.0)
     }
 
     fn samples(&self) -> Result<&SurfaceSamples, MetricError> {
@@ -185,8 +181,7 @@ impl Judge {
     /// # Errors
     /// As [`Judge::evaluate`], and when the tolerance is out of range or too fine.
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
-        mesh.check().map_err(UnionError::from)?;
-        let mesh = self.samples()?.pose.in_order(mesh);
+        let (mesh, _) = self.samples()?.ordered(mesh)?;
         certify(&self.surface, &self.tree, &mesh, tolerance)
     }
 

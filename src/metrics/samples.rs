@@ -13,6 +13,7 @@ use super::MetricError;
 use super::ascent::Start;
 use super::pose::Pose;
 use crate::Vec3;
+use crate::complex::{MedialMesh, MedialUnion, UnionError};
 use crate::sum::Sum;
 use crate::surface::TriMesh;
 
@@ -46,6 +47,15 @@ impl SurfaceSamples {
         points.extend(surface.vertices.iter().zip(used).filter(|&(_, u)| u).map(|(&v, _)| v));
         let spacing = (area(surface) / count as f64).sqrt();
         Ok(Self { pose, points, uniform: count, spacing })
+    }
+
+    /// A medial mesh with its spheres in the order of the pose, and the union of its primitives.
+    pub fn ordered(&self, mesh: &MedialMesh) -> Result<(MedialMesh, MedialUnion), MetricError> {
+        mesh.check().map_err(UnionError::from)?;
+        let ordered = self.pose.in_order(mesh);
+        // A refusal names a sphere by its number in the mesh as it was given.
+        let union = MedialUnion::new(&ordered).or_else(|_| MedialUnion::new(mesh))?;
+        Ok((ordered, union))
     }
 
     /// An ascent from the largest of the values at the samples.
