@@ -1,13 +1,13 @@
 //! Edge collapse on a non-manifold simplicial complex of dimension at most two.
 //!
-//! [`CollapseComplex`] is the complex while it shrinks, [`CollapseQueue`] the order in which its
-//! edges are taken. The driver, the costs and the placement belong to the method:
+//! [`CollapseComplex`] is the shrinking complex, [`CollapseQueue`] decides which edge is next. The
+//! main loop, the costs and the placement belong to the method:
 //!
 //! 1. [`CollapseComplex::from_mesh`]; a [`Candidate`] for each edge into the queue.
 //! 2. [`CollapseQueue::pop`] the cheapest candidate that is still current.
-//! 3. Where wanted, [`CollapseComplex::keeps_homotopy`] and [`CollapseComplex::folded_face`]; a
-//!    candidate that fails is parked with [`CollapseQueue::park`] at what holds it back, such as
-//!    [`CollapseComplex::homotopy_obstacles`].
+//! 3. Optional tests: [`CollapseComplex::keeps_homotopy`] and [`CollapseComplex::folded_face`]. A
+//!    candidate that fails is set aside with [`CollapseQueue::park`] at the vertices that hold it
+//!    back, such as [`CollapseComplex::homotopy_obstacles`].
 //! 4. [`CollapseComplex::collapse`]; new candidates for the edges of the merged sphere;
 //!    [`CollapseQueue::wake`] for both ends.
 //! 5. [`CollapseComplex::to_mesh`].
