@@ -68,7 +68,7 @@ impl Contraction {
             while next < members.len() {
                 let v = members[next];
                 next += 1;
-                // Lists of neighbours are in no particular but a deterministic order.
+                // Lists of neighbours are in an unspecified but deterministic order.
                 for &w in complex.neighbours(v) {
                     if are_coincident(complex.sphere(v), complex.sphere(w)) && seen.insert(w) {
                         members.push(w);
