@@ -185,7 +185,7 @@ pub(super) fn orthocentre(p: [(&[f64; 3], f64); 4]) -> Option<[f64; 3]> {
         Differences::Any(d) => d,
     };
     let offset = [1, 2, 3].map(|i| to_wide::<40>(weights[0], unit).sub(to_wide(weights[i], unit)));
-    // Always the widest tier: this is reached for nearly flat cells only.
+    // Always the widest tier: this runs only where double precision is not trusted.
     orthocentre_wide::<20, 40, 60, 80>(&d, &offset, quantum)
 }
 
