@@ -91,10 +91,10 @@
 //! 100 and at 50 spheres.
 //!
 //! The reason is the condition that blocks collapses. With the condition of the authors' code
-//! (`blocking=neighbours`) the result agrees with the paper: the bear has 1.8 % at 100 spheres, where Q-MAT as
-//! published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77; the dolphin
-//! stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it at once, so
-//! that condition rejects them for good.
+//! (`blocking=neighbours`) the result agrees with the paper: the bear has 1.8 % at 100 spheres, where
+//! Q-MAT as published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77;
+//! the dolphin stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it
+//! at once, so that condition rejects them for good.
 //!
 //! [`CollapseComplex::keeps_homotopy`]: medial::complex::collapse::CollapseComplex::keeps_homotopy
 
