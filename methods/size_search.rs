@@ -7,7 +7,7 @@
 //! 4. Counts jump: samples of another number are other samples. Where both values have met without the
 //!    count, those around them in growing distance.
 //!
-//! The search ends at a count of at most [`TOLERANCE`] below the one asked, after [`MOST_PROBES`], or
+//! The search ends at a count of at most [`TOLERANCE`] below the one asked, after [`MAX_PROBES`], or
 //! where no value is left to try. The answer is the nearest count from below that was met. Which
 //! values are tried depends on the count alone, so that the same count has the same answer whatever
 //! was asked before; what was made for earlier counts is not made again.
@@ -26,13 +26,13 @@ use crate::reuse::Reuse;
 const TOLERANCE: f64 = 0.02;
 
 /// Values that are tried at most.
-const MOST_PROBES: usize = 12;
+const MAX_PROBES: usize = 12;
 
 /// Most samples that a search takes: memory and time stay bounded, whatever is asked.
-const MOST_SAMPLES: f64 = 50_000.0;
+const MAX_SAMPLES: f64 = 50_000.0;
 
 /// Longest step of step 2, as a factor.
-const LONGEST_STEP: f64 = 16.0;
+const MAX_STEP: f64 = 16.0;
 
 /// Two values nearer to each other, as a fraction, have met.
 const MET: f64 = 2e-3;
@@ -59,7 +59,7 @@ pub(crate) struct Knob {
 impl Knob {
     /// The number of boundary samples of a shape.
     pub(crate) fn samples() -> Self {
-        let range = 8.0..=MOST_SAMPLES;
+        let range = 8.0..=MAX_SAMPLES;
         Self { count: "samples", unit: "samples", range, steps: 1.0, rate: 2.0, exponent: 1.0 }
     }
 
@@ -106,7 +106,7 @@ impl SizeSearch {
         let mut path = Path::new(&self.knob, count);
         let mut best: Option<(f64, Arc<Probe>)> = None;
         while let Some(value) = path.next {
-            self.run.step(path.tried.len(), MOST_PROBES)?;
+            self.run.step(path.tried.len(), MAX_PROBES)?;
             let probe = self.probes.get(value.to_bits(), || or_empty(make(value)))?;
             let size = probe.mesh.spheres.len();
             path.tell(value, size);
@@ -220,13 +220,13 @@ impl<'a> Path<'a> {
             (self.below, self.above) = (Some(end), self.above.map(halved));
         }
         self.last_was_above = Some(is_above);
-        self.next = if self.tried.len() < MOST_PROBES { self.proposed() } else { None };
+        self.next = if self.tried.len() < MAX_PROBES { self.proposed() } else { None };
     }
 
     fn proposed(&mut self) -> Option<f64> {
         let Knob { steps, exponent, .. } = *self.knob;
         let stepped = |end: End| {
-            let longest = LONGEST_STEP.ln();
+            let longest = MAX_STEP.ln();
             let by = (-end.excess / exponent).clamp(-longest, longest);
             let value = self.knob.snapped(end.value * by.exp());
             let least = self.knob.snapped(end.value - end.excess.signum() / steps);
@@ -254,7 +254,7 @@ impl Path<'_> {
             let [first, last] = [below.value + 1.0 / steps, above.value - 1.0 / steps];
             return Some(self.knob.snapped(value.max(first).min(last)));
         }
-        let around = (self.outward + 1..=self.outward + 2 * MOST_PROBES as i32).find_map(|turn| {
+        let around = (self.outward + 1..=self.outward + 2 * MAX_PROBES as i32).find_map(|turn| {
             let far = f64::from((turn + 1) / 2);
             let by = (far * OUTWARD * below.value).max(far / steps);
             let value = if turn % 2 == 1 { below.value - by } else { above.value + by };
@@ -324,8 +324,8 @@ mod tests {
     fn a_search_ends_where_nothing_is_left_to_try() {
         let knob = Knob::samples();
         // As many as there can be, at once; none at all; always too many; a jump.
-        assert_eq!(search(&knob, 1_000_000_000, |_| 5000).0, [MOST_SAMPLES]);
-        assert_eq!(search(&knob, 100, |_| 0).0.last(), Some(&MOST_SAMPLES));
+        assert_eq!(search(&knob, 1_000_000_000, |_| 5000).0, [MAX_SAMPLES]);
+        assert_eq!(search(&knob, 100, |_| 0).0.last(), Some(&MAX_SAMPLES));
         assert_eq!(search(&knob, 100, |_| 5000).0.last(), Some(&8.0));
         let (values, _) = search(&knob, 100, |v| if v < 103.0 { 50 } else { 200 });
         assert!(values.contains(&102.0) && values.contains(&103.0), "{values:?}");

@@ -135,8 +135,8 @@ def hem():
 
 def qmat():
     file = "methods/qmat/mod.rs"
-    phrase = ("With `topology_from=200` 1,000 spheres have wrong Betti numbers on seven of the twelve shared meshes, "
-              "checked from the start on none whose initial mesh has the right ones.")
+    phrase = ("With `topology_from=200` the results of 1,000 spheres have wrong Betti numbers on seven of the twelve shared "
+              "meshes; with checks from the start, on none whose initial mesh has the right ones.")
     command = [f"compare {ALL_MESHES} --methods qmat,qmat:topology_from=200 --spheres 1000 --counts-only --samples 100"]
 
     def wrong(params, given):

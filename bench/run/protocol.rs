@@ -19,7 +19,7 @@ use super::{Fault, Item, Kept, Limits, MethodSpec, Provenance};
 const MARK: u8 = 0x1e;
 
 /// A longer line is no message.
-const LONGEST_LINE: usize = 64 << 20;
+const MAX_LINE_BYTES: usize = 64 << 20;
 
 /// What a worker is asked to do.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -149,7 +149,7 @@ pub fn receive(mut from: impl Read, mut each: impl FnMut(Event)) {
         } else if line.first() == Some(&MARK) || line.is_empty() {
             line.extend_from_slice(rest);
         }
-        if line.len() > LONGEST_LINE {
+        if line.len() > MAX_LINE_BYTES {
             line.truncate(1);
             line[0] = b' ';
         }

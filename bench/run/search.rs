@@ -20,12 +20,12 @@ const COUNTS: usize = 7;
 /// The smallest factor between two of them.
 const RATIO: f64 = 4.0;
 /// Fewest spheres tried at first.
-const FEWEST: f64 = 4.0;
+const MIN_SPHERES: f64 = 4.0;
 /// Levels tried in between, for each bound. With those at first, at most 25 where a method has a
 /// sweep of ten levels.
 const BISECTIONS: usize = 7;
 /// Relative difference of two counts at which nothing is searched in between.
-const CLOSE: f64 = 1.02;
+const CLOSE_COUNTS: f64 = 1.02;
 
 /// How a medial mesh is measured: its error as a fraction of the diagonal.
 pub type Measure<'a> = dyn Fn(&MedialMesh) -> Result<f64, String> + 'a;
@@ -74,10 +74,12 @@ impl<'a> Search<'a> {
         measure: &'a Measure<'a>,
         trying: &'a dyn Fn(Level),
     ) -> Self {
-        let ratio = (most as f64 / FEWEST).powf(1.0 / (COUNTS - 1) as f64).max(RATIO);
+        let ratio = (most as f64 / MIN_SPHERES).powf(1.0 / (COUNTS - 1) as f64).max(RATIO);
         let count = |step: usize| (most as f64 / ratio.powi(step as i32)).round() as usize;
-        let counts =
-            (0..COUNTS).map(count).filter(|&count| count >= most.min(FEWEST as usize)).collect();
+        let counts = (0..COUNTS)
+            .map(count)
+            .filter(|&count| count >= most.min(MIN_SPHERES as usize))
+            .collect();
         let sweep = info.sweep.iter().copied().map(Level::Native);
         let own = sweep.chain([Level::Published]).collect();
         let (probes, tried, refusal) = (Vec::new(), 0, None);
@@ -163,7 +165,7 @@ impl<'a> Search<'a> {
         let middle = ((beyond * best.spheres) as f64).sqrt().round() as usize;
         let is_new = !self.probes.iter().any(|probe| probe.level == Level::Spheres(middle));
         let is_between = beyond < middle && middle < best.spheres;
-        let is_apart = best.spheres as f64 > CLOSE * beyond as f64;
+        let is_apart = best.spheres as f64 > CLOSE_COUNTS * beyond as f64;
         (is_new && is_between && is_apart).then_some(Level::Spheres(middle))
     }
 
@@ -176,7 +178,7 @@ impl<'a> Search<'a> {
         } else {
             value.midpoint(beyond)
         };
-        let is_apart = best.spheres as f64 > CLOSE * next.spheres as f64;
+        let is_apart = best.spheres as f64 > CLOSE_COUNTS * next.spheres as f64;
         (is_apart && middle != value && middle != beyond).then_some(Level::Native(middle))
     }
 }

@@ -1,14 +1,14 @@
 //! What a user may have meant by a word that names nothing.
 
 /// Words less alike than this are different words: Jaro-Winkler similarity, 1 for equal ones.
-const LEAST_SIMILARITY: f64 = 0.8;
+const MIN_SIMILARITY: f64 = 0.8;
 
 /// `; did you mean ...?` for the known word that is most like the given one, or nothing.
 pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let word = word.to_lowercase();
     let alike = known.into_iter().map(|known| (strsim::jaro_winkler(&word, known), known));
     match alike.max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((similarity, known)) if similarity >= LEAST_SIMILARITY => {
+        Some((similarity, known)) if similarity >= MIN_SIMILARITY => {
             format!("; did you mean `{known}`?")
         }
         _ => String::new(),

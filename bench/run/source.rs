@@ -199,14 +199,14 @@ fn built_in(
         return Err(InputError::OutOfRange { resolution, least, most });
     }
     let vertices = estimated_vertices(&shape, resolution);
-    if vertices > MOST_VERTICES {
+    if vertices > MAX_VERTICES {
         return Err(InputError::TooManyVertices { resolution, vertices });
     }
     Ok((shape, resolution))
 }
 
 /// Built-in shapes of more vertices take hours in most verbs and are taken for a slip.
-const MOST_VERTICES: f64 = 2e6;
+const MAX_VERTICES: f64 = 2e6;
 
 /// A surface has vertices by the square of its resolution.
 fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
@@ -249,7 +249,7 @@ pub enum InputError {
     /// A built-in shape would be too large at this resolution.
     #[error(
         "resolution {resolution} would make about {vertices:.1e} vertices, above the most of \
-         {MOST_VERTICES:.0e}: ask for a coarser one"
+         {MAX_VERTICES:.0e}: ask for a coarser one"
     )]
     TooManyVertices {
         /// What was asked.

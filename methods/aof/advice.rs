@@ -14,7 +14,7 @@ use super::solid::Solid;
 pub(super) const BYTES_PER_VOXEL: f64 = 64.0;
 
 /// Voxels that a lattice tried for advice may visit.
-pub(super) const MOST_VISITS: f64 = 2e7;
+pub(super) const MAX_VISITS: f64 = 2e7;
 
 /// A lattice of this resolution tells how deep a solid is, where the one asked has too many voxels.
 const SOUNDING: u32 = 54;
@@ -55,7 +55,7 @@ impl Solid<'_> {
         while fits > 0 && self.megabytes(fits).0 > limit {
             fits -= 1;
         }
-        let tried = if self.visits(fits.max(1)) > MOST_VISITS { SOUNDING } else { fits };
+        let tried = if self.visits(fits.max(1)) > MAX_VISITS { SOUNDING } else { fits };
         if fits == 0 || tried > fits {
             return None;
         }
@@ -118,7 +118,7 @@ impl Solid<'_> {
             if self.megabytes(next).0 > self.params().max_memory {
                 return Ok(format!("{none}, beyond which max_memory ends; raise it"));
             }
-            if self.visits(next) > MOST_VISITS {
+            if self.visits(next) > MAX_VISITS {
                 return Ok(format!("{none}, and finer lattices take too long to be tried here"));
             }
             let start = self.descend(next, Wanted::Places)?.tally;

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use medial::simplifier::{Diagnostics, SimplifyError};
 
-use super::advice::MOST_VISITS;
+use super::advice::MAX_VISITS;
 use super::base::Base;
 use super::bricks::Bricks;
 use super::losses::LOST;
@@ -37,7 +37,7 @@ const WORSE: f64 = 1.2;
 /// What the estimate aims at, in counts.
 const AIM: f64 = 1.06;
 /// Lattices that are tried for a count.
-const MOST_TRIES: usize = 8;
+const MAX_TRIES: usize = 8;
 /// Neighbours from which on a voxel of a thinned axis is taken to be on a sheet.
 const ON_A_SHEET: u32 = 4;
 
@@ -98,10 +98,10 @@ impl Solid<'_> {
         search: &mut Search,
     ) -> Result<(), SimplifyError> {
         let mut at = search.high;
-        while search.tried < MOST_TRIES && size(&search.best) < count {
+        while search.tried < MAX_TRIES && size(&search.best) < count {
             let ideal = search.growth.resolution_of(AIM * count as f64);
             let next = ideal.clamp(at + 1 + at / 16, 2 * at + 1);
-            if self.check_resolution(next).is_err() || self.visits(next) > MOST_VISITS {
+            if self.check_resolution(next).is_err() || self.visits(next) > MAX_VISITS {
                 break;
             }
             search.tried += 1;
@@ -129,7 +129,7 @@ impl Solid<'_> {
         search: &mut Search,
     ) -> Result<(), SimplifyError> {
         let mut is_lost = false;
-        while search.tried < MOST_TRIES && size(&search.best) as f64 > ENOUGH * count as f64 {
+        while search.tried < MAX_TRIES && size(&search.best) as f64 > ENOUGH * count as f64 {
             let Search { low, high, .. } = *search;
             // Below a lattice that lost the topology not much is gained by going close to it.
             if high - low <= 1 + high / if is_lost { 8 } else { 16 } {

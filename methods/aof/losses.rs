@@ -23,9 +23,9 @@ use super::thinning::FACES;
 /// Distance from all spheres, in voxels, from which on a point of the surface is lost.
 pub(super) const LOST: f64 = 3.0;
 /// Points of the surface that are measured, at most.
-const MOST_POINTS: usize = 60_000;
+const MAX_POINTS: usize = 60_000;
 /// Points around the lost one at which balls are shrunk, at most.
-const MOST_BALLS: usize = 400;
+const MAX_BALLS: usize = 400;
 /// Steps of a shrinking ball, at most.
 const STEPS: usize = 40;
 
@@ -87,7 +87,7 @@ impl Solid<'_> {
         let (place, distance) = (places[farthest], distances[farthest]);
         let around = points.iter().filter(|p| p.0.distance(place) <= allowed.max(0.2 * distance));
         let around: Vec<&Point> = around.collect();
-        let some = around.iter().step_by(around.len().div_ceil(MOST_BALLS).max(1));
+        let some = around.iter().step_by(around.len().div_ceil(MAX_BALLS).max(1));
         let thickest = some.map(|&&point| shrunk(&tree, point)).fold(f64::MIN_POSITIVE, f64::max);
         let longest = grid.side * f64::from(resolution);
         let needed = (SURELY * longest / thickest).ceil().min(f64::from(u32::MAX)) as u32;
@@ -112,7 +112,7 @@ impl Solid<'_> {
                 }
             }
         }
-        let step = points.len().div_ceil(MOST_POINTS).max(1);
+        let step = points.len().div_ceil(MAX_POINTS).max(1);
         points.into_iter().step_by(step).collect()
     }
 

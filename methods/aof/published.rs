@@ -15,7 +15,7 @@ use super::settings::AofSettings;
 use super::solid::Solid;
 
 /// How often the resolution is lowered for the medial mesh.
-const LOWERED: usize = 4;
+const MAX_LOWERINGS: usize = 4;
 /// What a lower resolution aims at, as a share of the limit.
 const AIM: f64 = 0.95;
 
@@ -43,7 +43,7 @@ pub(super) fn stage<'s>(
         solid = of(&params);
     }
     let mut base = solid.base()?;
-    for _ in 0..LOWERED {
+    for _ in 0..MAX_LOWERINGS {
         let share = solid.share_of_memory(&base)?;
         if !is_free || share <= 1.0 {
             break;

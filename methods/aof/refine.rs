@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use super::flux::Sphere;
 
 /// Samples that are followed onto the axis.
-const FOLLOWED: usize = 4;
+const FOLLOWED_SAMPLES: usize = 4;
 /// Width of the last interval, in radii of the voxel's sphere.
 const TOLERANCE: f64 = 1e-9;
 /// Relative to the distance, how much nearer the surface must be for it to be another point.
@@ -165,7 +165,7 @@ impl Refiner<'_> {
                 let ball = Ball::new(centre, self.tree.closest(centre).distance);
                 Some(Refined { ball, contacts: [p, q] })
             })
-            .take(FOLLOWED);
+            .take(FOLLOWED_SAMPLES);
         let subtended = |r: &Refined| r.contacts[0].distance(r.contacts[1]) / r.ball.radius;
         let better = |best, next| if subtended(&next) > subtended(&best) { next } else { best };
         found.reduce(better).unwrap_or_else(|| {

@@ -1,4 +1,4 @@
-//! The error of a medial mesh, and the last collapse within a bound.
+//! The error of a medial mesh, and the search for the last collapse within a bound.
 
 use std::sync::Arc;
 
@@ -10,26 +10,26 @@ use medial::surface::TriangleBvh;
 
 use super::params::Inside;
 
-/// Samples on the boundary of the union, about.
-const ENVELOPE: usize = 20_000;
-/// A point deeper in some primitive, in diagonals, is not on the boundary of the union.
-const BURIAL: f64 = 1e-7;
-/// States that are measured, spread over all, before a bound is refused.
-const SPREAD: usize = 16;
+/// Approximate number of samples on the boundary of the union.
+const ENVELOPE_SAMPLES: usize = 20_000;
+/// A point deeper than this in some primitive, in diagonals, is not on the boundary of the union.
+const MAX_BURIAL: f64 = 1e-7;
+/// Number of evenly spread states that are measured before a bound is refused.
+const SPREAD_STATES: usize = 16;
 
-/// What measures a medial mesh. Lengths are fractions of the diagonal.
+/// Measures medial meshes. Lengths are fractions of the diagonal.
 pub(super) struct Ruler {
-    /// The samples that spheres answer for.
+    /// The samples that some sphere is responsible for.
     pub samples: Vec<Vec3>,
-    /// The reading at samples inside the union.
+    /// The error of a sample inside the union.
     pub inside: Inside,
-    /// The surface, where the other direction counts too.
+    /// The surface, if the other direction counts too.
     pub surface: Option<Arc<TriangleBvh>>,
 }
 
 impl Ruler {
-    /// The largest error: of a sample against the whole union, and with two sides of a point of the
-    /// union's boundary against the surface.
+    /// The largest error of a sample against the whole union; with two sides also that of a point on
+    /// the union's boundary against the surface.
     ///
     /// # Errors
     /// When the mesh has no union.
@@ -39,7 +39,7 @@ impl Ruler {
         let Some(surface) = &self.surface else {
             return Ok(at_samples);
         };
-        let options = EnvelopeOptions { samples: ENVELOPE, burial: BURIAL, seed: 0 };
+        let options = EnvelopeOptions { samples: ENVELOPE_SAMPLES, burial: MAX_BURIAL, seed: 0 };
         let boundary = sample_envelope(mesh, &union, &options).map_err(no_boundary)?;
         let nearest = surface.closest_batch(&boundary);
         Ok(nearest.iter().map(|n| n.distance).fold(at_samples, f64::max))
@@ -65,7 +65,7 @@ fn sample_error(
     if inside == Inside::Depth {
         return Ok(largest(union.signed_batch(samples)));
     }
-    // Of a sphere that lies in a cone the union has no surface of its own.
+    // The union leaves out spheres inside cones, but their surfaces count in this reading.
     let spheres = MedialUnion::of_spheres(&mesh.spheres).map_err(no_union)?;
     let mut distances = union.unsigned_nearest_batch(samples);
     for (distance, sphere) in distances.iter_mut().zip(spheres.unsigned_nearest_batch(samples)) {
@@ -74,12 +74,12 @@ fn sample_error(
     Ok(largest(distances))
 }
 
-/// What a search for a bound came to.
+/// The result of a search for a bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Found {
-    /// So many collapses are within the bound, one more is not or is not there.
+    /// After this many collapses the mesh is within the bound; one more exceeds it or does not exist.
     Within(usize),
-    /// None of the states that were measured is.
+    /// No measured state is within the bound.
     None {
         /// Collapses of the state of least error.
         best: usize,
@@ -90,12 +90,13 @@ pub(super) enum Found {
     },
 }
 
-/// The last number of collapses, up to `all`, that is within a bound, as far as it is looked for.
+/// A large number of collapses, up to `all`, after which the mesh is within a bound, such that one
+/// more exceeds it.
 ///
-/// The error grows and shrinks again, and the initial mesh need not have the least one. So states are
-/// measured backwards from the last in growing steps; where even the first is beyond the bound, more
-/// that are spread over all; and from the first that is within, bisection finds one that the next
-/// collapse takes beyond.
+/// The error is not monotone, and the initial mesh need not have the least one. So states are
+/// measured backwards from the last in growing steps. If even the initial mesh exceeds the bound,
+/// states spread over all collapses are measured. From the first state within the bound, bisection
+/// finds one whose next collapse exceeds it.
 ///
 /// # Errors
 /// Those of the measurement.
@@ -121,13 +122,14 @@ pub(super) fn last_within(
         step *= 2;
         is_found = is_within(within)?;
     }
-    for k in (1..SPREAD).rev() {
+    for k in (1..SPREAD_STATES).rev() {
         if is_found {
             break;
         }
-        (within, beyond) = (all * k / SPREAD, all * (k + 1) / SPREAD);
+        (within, beyond) = (all * k / SPREAD_STATES, all * (k + 1) / SPREAD_STATES);
         is_found = within < beyond && is_within(within)?;
     }
+    // Invariant: `within` was measured and holds the bound; `beyond` exceeds it or is `all + 1`.
     while is_found && beyond - within > 1 {
         let middle = within + (beyond - within) / 2;
         if is_within(middle)? {

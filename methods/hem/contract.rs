@@ -1,4 +1,4 @@
-//! The contraction: the edge of smallest Hausdorff error first, the survivor stays where it is.
+//! The contraction: collapses the edge of smallest Hausdorff error; the survivor does not move.
 
 use medial::complex::MedialMesh;
 use medial::complex::collapse::{Candidate, Collapse, CollapseComplex, CollapseQueue};
@@ -14,7 +14,7 @@ use super::star::Star;
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 256;
 
-/// Edges of a parallel job: each job has scratch of the size of the complex.
+/// Edges per parallel job. Large, because each job allocates scratch of the size of the complex.
 const JOB: usize = 4096;
 
 /// A medial mesh under contraction.
@@ -40,7 +40,7 @@ pub(super) enum Stop {
     Error(f64),
 }
 
-/// The collapse that is next.
+/// The next collapse.
 struct Taken {
     error: f64,
     ends: [u32; 2],
@@ -55,15 +55,15 @@ struct Tally {
     held_by_inversion: usize,
 }
 
-/// The vertices whose star a collapse changes, as they were before.
+/// What a collapse removes, as it was before.
 struct Change {
     kept: u32,
     removed: u32,
-    /// Neighbours of the removed vertex but the kept one.
+    /// Neighbours of the removed vertex, ascending, without the kept one.
     around: Vec<u32>,
-    /// Sides opposite the removed vertex.
+    /// Sides opposite the removed vertex, without those of faces with both ends.
     sides: Vec<[u32; 2]>,
-    /// The witnesses of the edges that vanish, in the order of `around`.
+    /// The witnesses of the removed vertex's edges, in the order of `around`.
     witnesses: Vec<[u32; 2]>,
 }
 
@@ -101,6 +101,7 @@ impl Contraction {
                 (evaluated.collect(), star.distances)
             })
             .collect();
+        // Jobs come back in order, so candidates line up with edges whatever the threads did.
         let edges = jobs.iter().flat_map(|(edges, _)| edges);
         let candidates = all
             .iter()
@@ -137,7 +138,7 @@ impl Contraction {
         self.complex.record()
     }
 
-    /// What is known of an edge.
+    /// The stored errors of an edge.
     #[cfg(test)]
     pub(super) fn known(&self, ends: [u32; 2]) -> Option<Edge> {
         self.edges.get(&ends).copied()
@@ -175,10 +176,11 @@ impl Contraction {
             let (error, ends) = (candidate.cost(), candidate.ends());
             let edge = self.edges[&ends];
             if edge.queued.total_cmp(&error).is_ne() {
-                // It was queued again since, earlier or later.
+                // An old entry: the edge was queued again at another cost.
                 continue;
             }
             if error > bound {
+                // Costs are lower bounds, so no other edge is within; a later call may continue here.
                 self.queue.push(candidate);
                 return None;
             }
@@ -195,6 +197,7 @@ impl Contraction {
             self.bar(ends, &mut edge);
         }
         if edge.is_open() {
+            // Beyond the next candidate the exact error does not matter yet.
             let cutoff = self.queue.peek(&self.complex).map_or(f64::INFINITY, |next| next.cost());
             let Self { complex, samples, inside, star, .. } = self;
             edge.evaluate(&Ground { complex, samples, inside: *inside }, ends, cutoff, star);
@@ -205,7 +208,7 @@ impl Contraction {
         self.edges.insert(ends, edge);
     }
 
-    /// The condition on the links for the edge, the inversion test for each direction.
+    /// Tests the topology for the edge and the inversion for each direction; bars what fails.
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
         edge.tested = true;
@@ -224,7 +227,7 @@ impl Contraction {
         }
     }
 
-    /// Whether the topology forbids to collapse an edge.
+    /// Whether the topology forbids the collapse of an edge.
     fn is_blocked(&mut self, [a, b]: [u32; 2]) -> bool {
         match self.blocking {
             Blocking::Homotopy => !self.complex.keeps_homotopy(a, b),
@@ -244,6 +247,7 @@ impl Contraction {
         self.complex.collapse(kept, removed, self.complex.sphere(kept));
         self.samples.assign(removed, kept);
         let all = self.complex.neighbours(kept).len();
+        // By index, because renewing an edge borrows the rest of `self`; the complex stays as it is.
         for index in 0..all {
             let other = self.complex.neighbours(kept)[index];
             self.renew_at_survivor(&change, other);
@@ -259,7 +263,7 @@ impl Contraction {
         }
     }
 
-    /// What a collapse changes; the edges of the removed vertex are forgotten.
+    /// Collects what a collapse changes, and forgets the edges of the removed vertex.
     fn take_apart(&mut self, kept: u32, removed: u32) -> Change {
         let mut around = self.complex.neighbours(removed).to_vec();
         around.retain(|&v| v != kept);
@@ -275,14 +279,14 @@ impl Contraction {
         Change { kept, removed, around, sides, witnesses }
     }
 
-    /// An edge of the survivor: its star gained that of the removed vertex. The queue has dropped
-    /// it, because the collapse moved the stamp of the survivor.
+    /// Renews an edge of the survivor, whose star gained that of the removed vertex. Its candidate is
+    /// outdated, because the collapse changed the stamp of the survivor.
     fn renew_at_survivor(&mut self, change: &Change, other: u32) {
         let Self { complex, samples, edges, queue, star, inside, .. } = self;
         let ground = Ground { complex, samples, inside: *inside };
         let ends = ascending(change.kept, other);
         let edge = edges.entry(ends).or_insert_with(|| {
-            // It was an edge of the removed vertex, and had witnesses then.
+            // It was an edge of the removed vertex: the witnesses it had are good first guesses.
             let place = change.around.binary_search(&other).expect("a neighbour of one of both");
             let mut edge = Edge::unknown(NONE);
             edge.sound(&ground, ends, change.witnesses[place], star);
@@ -296,14 +300,15 @@ impl Contraction {
         enqueue(queue, complex, ends, edge);
     }
 
-    /// Another edge of a neighbour of the removed vertex: simplices of its star have the survivor
-    /// now where they had the removed vertex.
+    /// Renews another edge of a neighbour of the removed vertex: in the simplices of its star the
+    /// survivor has replaced the removed vertex.
     fn renew_beside(&mut self, change: &Change, [v, other]: [u32; 2]) {
         let Self { complex, samples, edges, queue, star, inside, .. } = self;
         let ground = Ground { complex, samples, inside: *inside };
         let ends = ascending(v, other);
         let edge = edges.get_mut(&ends).expect("every edge is stored");
         let is_end = |x: u32| x == v || x == other;
+        // A side with one end is a new slab of that end's star; one with both is the edge itself.
         let opposite = change.sides.iter().filter_map(|&[x, y]| match (is_end(x), is_end(y)) {
             (true, false) => Some([change.kept, y]),
             (false, true) => Some([change.kept, x]),
@@ -341,14 +346,15 @@ impl Contraction {
     }
 }
 
-/// An edge at a cost. Of equal costs, in the main zeros, the shorter edge comes first: it is as good
-/// as the other, and clusters of coincident spheres grow in no order rather than around one hub.
+/// An edge at a cost. Of equal costs, mostly zeros, the shorter edge comes first. Ordered by ids,
+/// clusters of coincident spheres would grow around one hub and end in knots.
 fn candidate(complex: &CollapseComplex, ends: [u32; 2], cost: f64) -> Candidate {
     let [a, b] = ends.map(|v| complex.sphere(v).centre);
     Candidate::new(complex, ends, cost, a.distance(b))
 }
 
-/// Queues an edge where it comes earlier than it is queued.
+/// Queues an edge if its cost is below the one that it is queued at. A larger cost waits until the
+/// edge is popped: the queued one is still a lower bound.
 fn enqueue(queue: &mut CollapseQueue, complex: &CollapseComplex, ends: [u32; 2], edge: &mut Edge) {
     let cost = edge.cost();
     if !edge.is_barred() && cost < edge.queued {

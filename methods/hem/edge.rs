@@ -1,19 +1,19 @@
-//! What is known of the two directed contraction errors of an edge.
+//! Lower bounds of the two directed contraction errors of an edge.
 //!
 //! The error `e(i -> j)` is the largest distance of the samples `B_i` and `B_j` to the hypothetical
-//! star of `j`. Known of it is the distance of one sample, the *witness*, hence a lower bound; when
-//! the edge is the cheapest one left, all samples are asked ([`Edge::evaluate`]).
+//! star of `j`. The edge stores the distance of one sample, the *witness*: a lower bound. Only when
+//! the edge is the cheapest one left are all samples measured ([`Edge::evaluate`]).
 //!
-//! # Why the bound can be kept without looking at the star again
+//! # Why the bound can be updated without the whole star
 //!
-//! A collapse elsewhere takes primitives from the star and adds some. Let `s` be the witness's least
-//! signed distance.
-//! - `s >= 0`: afterwards it is at least the least of `s` and the distances to the added ones. If
-//!   that is negative, the witness lies inside an added primitive, at least so deep.
-//! - `s < 0`, and the primitive that holds the witness is still there: it is at least so deep.
-//!   Otherwise nothing is known, and the bound is 0.
-//! - With [`Inside::Surface`] the least distance to a surface is at least the least of the old one
-//!   and of those to the added primitives, whatever was taken away.
+//! A nearby collapse removes primitives from the star and adds others. Let `s` be the least signed
+//! distance of the witness.
+//! - `s >= 0`: the new value is at least the smallest of `s` and the distances to added primitives.
+//!   If that is negative, the witness lies inside an added primitive, at least that deep.
+//! - `s < 0`: if the primitive that holds the witness is still there, the witness is at least as deep
+//!   as before. Otherwise nothing is known, and the bound is 0.
+//! - With [`Inside::Surface`], the new least distance to a surface is at least the smallest of the old
+//!   one and the distances to the added primitives, whatever was removed.
 //!
 //! An added primitive whose balls have no excess in the direction from the old nearest primitive
 //! to the witness cannot be nearer ([`super::star`]), so most are not even built.
@@ -30,20 +30,20 @@ use super::star::{Nearest, ROUNDING, Star, excess_of};
 /// Absent index.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Errors below this are rounding, in units of the diagonal, and count as zero, so that the length
-/// of the edges and not rounding decides between them.
+/// Errors below this, in units of the diagonal, are rounding and count as zero. Otherwise rounding,
+/// and not the length, would order edges that cost nothing.
 pub(super) const NOISE: f64 = ZERO_LENGTH;
 
 /// One direction of an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Directed {
-    /// The sample that the bound is from.
+    /// The sample that gives the bound.
     pub witness: u32,
-    /// Its signed distance, or what is left of it as a bound; 0 when nothing is known.
+    /// Its signed distance, or a bound of smaller absolute value; 0 if nothing is known.
     signed: f64,
-    /// Unit vector from its nearest primitive.
+    /// Unit vector from the nearest primitive to it.
     towards: Vec3,
-    /// Vertices of its nearest primitive beside the survivor.
+    /// The vertices of its nearest primitive, without the survivor.
     nearest: [u32; 2],
     state: State,
 }
@@ -70,7 +70,7 @@ pub(super) struct Edge {
 }
 
 impl Directed {
-    /// Nothing known but a sample to begin with.
+    /// A direction without a bound, and a sample to measure first.
     pub(super) fn unknown(witness: u32) -> Self {
         Self { witness, signed: 0.0, towards: Vec3::X, nearest: [NONE; 2], state: State::AtLeast }
     }
@@ -83,7 +83,7 @@ impl Directed {
         }
     }
 
-    /// What is known of the error, barred or not.
+    /// The bound of the error, barred or not.
     #[cfg(test)]
     pub(super) fn bound(&self) -> f64 {
         self.signed.abs()
@@ -95,7 +95,7 @@ impl Directed {
         *self = Self { witness, signed: nearest.signed, towards, nearest: vertices, state };
     }
 
-    /// Takes over a sample of larger distance as the witness of a star that was gathered.
+    /// Makes a sample the witness if its distance to the gathered star is larger.
     fn raise(&mut self, star: &mut Star, witness: u32, p: Vec3, inside: Inside) {
         let nearest = star.nearest(p, 0.0, inside);
         if nearest.signed.abs() > self.signed.abs() {
@@ -104,7 +104,7 @@ impl Directed {
     }
 }
 
-/// What every evaluation reads.
+/// The data that every evaluation reads.
 #[derive(Clone, Copy)]
 pub(super) struct Ground<'a> {
     pub complex: &'a CollapseComplex,
@@ -113,7 +113,7 @@ pub(super) struct Ground<'a> {
 }
 
 impl Edge {
-    /// An edge of which nothing is known.
+    /// An edge without bounds.
     pub(super) fn unknown(witness: u32) -> Self {
         Self { into: [Directed::unknown(witness); 2], queued: f64::INFINITY, tested: false }
     }
@@ -124,8 +124,8 @@ impl Edge {
         if error < NOISE { 0.0 } else { error }
     }
 
-    /// Which end survives (0 or 1) at the smaller error, when that is known exactly and the direction
-    /// passed the tests. The smaller id survives in a tie.
+    /// The end (0 or 1) that survives at the smaller error, if that error is exact and both directions
+    /// were tested. In a tie the smaller id survives.
     pub(super) fn decided(&self) -> Option<usize> {
         let [a, b] = self.into.map(|d| d.error());
         let better = usize::from(b < a);
@@ -137,7 +137,7 @@ impl Edge {
         self.into.iter().all(|d| d.state == State::Barred)
     }
 
-    /// Whether the error of some direction is not known.
+    /// Whether the error of some direction is only bounded.
     pub(super) fn is_open(&self) -> bool {
         self.into.iter().any(|d| d.state == State::AtLeast)
     }
@@ -147,9 +147,10 @@ impl Edge {
         self.into[survivor].state = State::Barred;
     }
 
-    /// After a collapse beside it: primitives with `gone` left the star, and others came: a cone for
-    /// each of `added`, by its link vertex, or with two a slab and its rim. What was exact is a bound
-    /// now, and what was barred is to be tested again. Returns the number of distances computed.
+    /// Updates the bounds after a nearby collapse. Primitives with the vertex `gone` left the star,
+    /// and `added` came: one link vertex stands for a cone, two for a slab and its rim. Exact errors
+    /// become bounds, barred directions are to be tested again. Returns the number of distances
+    /// computed.
     pub(super) fn renew(
         &mut self,
         ground: &Ground<'_>,
@@ -166,8 +167,8 @@ impl Edge {
         distances
     }
 
-    /// Errors of the directions that are not barred: all samples, as long as the error does not
-    /// exceed `cutoff` (then it is a bound above it) or that of the other direction.
+    /// Evaluates the directions that are only bounded: measures all samples, but stops once the error
+    /// exceeds `cutoff` or the error of the other direction, and stores it as a bound.
     pub(super) fn evaluate(
         &mut self,
         ground: &Ground<'_>,
@@ -176,8 +177,9 @@ impl Edge {
         star: &mut Star,
     ) {
         star.gather(ground.complex, ends);
+        // The more promising direction first: its error may cut the other short.
         let first = usize::from(self.into[1].error() < self.into[0].error());
-        // Up to the noise all errors have the same cost.
+        // Up to the noise all errors have the same cost, so there is no need to stop.
         let mut limit = cutoff.max(NOISE);
         for survivor in [first, 1 - first] {
             if self.into[survivor].state != State::AtLeast {
@@ -191,7 +193,7 @@ impl Edge {
         }
     }
 
-    /// The better of two witnesses in each direction, of the star that the edge has now.
+    /// Sets the bound of each direction from the better of two witnesses and the present star.
     pub(super) fn sound(
         &mut self,
         ground: &Ground<'_>,
@@ -218,11 +220,13 @@ impl Directed {
         limit: f64,
         star: &mut Star,
     ) {
+        // The old witness first: if the edge is too dear after all, it usually shows it at once.
         let first = Some(self.witness).filter(|&w| w != NONE);
         *self = Self { state: State::Exact, ..Self::unknown(NONE) };
         let [removed, kept] = [removed, kept].map(|v| ground.samples.of(v).iter().copied());
         for id in first.into_iter().chain(removed).chain(kept) {
             let p = ground.samples.point(id);
+            // Only a larger distance changes the error, so the search may stop at a smaller one.
             let floor = self.error().max(NOISE);
             let nearest = star.nearest(p, floor, ground.inside);
             if nearest.signed.abs() > floor {
@@ -257,6 +261,7 @@ impl Directed {
         let hub = ground.complex.sphere(hub);
         let hub_excess = excess_of(&hub, p, self.towards);
         for [x, y] in added {
+            // A primitive can be nearer only if one of its balls has an excess beyond this.
             let limit = ROUNDING - self.signed;
             let [m, n] = [x, y].map(|v| ground.complex.sphere(if v == NONE { x } else { v }));
             let rim = excess_of(&m, p, self.towards).max(excess_of(&n, p, self.towards));
@@ -276,6 +281,7 @@ impl Directed {
                     self.lower(Cone::new(m, n).signed_distance(p), [x, y], ground.inside);
                 }
             }
+            // Inside an added primitive: further ones could only hold the witness deeper.
             if self.signed <= 0.0 {
                 break;
             }

@@ -35,6 +35,6 @@ impl Hasher for EndsHasher {
     }
 
     fn write_usize(&mut self, _length: usize) {
-        // Of an array: always the same.
+        // The length of the array, which is always two.
     }
 }

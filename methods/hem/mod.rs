@@ -9,7 +9,8 @@
 //! 2. The directed contraction error `e(i -> j)` is the largest error of a sample of `B_i` and `B_j`
 //!    against the star that `j` would have after the collapse: a cone to each neighbour of either
 //!    end, a slab for each face of either end that does not hold both. A direction that would change
-//!    the homotopy type or fold a face over is discarded; an edge costs the smaller of the others.
+//!    the homotopy type or fold a face over is discarded. The cost of an edge is the smaller error of
+//!    the directions left.
 //! 3. The cheapest edge `i -> j` is collapsed. The survivor `m_j` stays as it is and takes over the
 //!    samples of `i`.
 //! 4. The edges whose stars changed are evaluated again: those at `j` and at the neighbours of `i`.
@@ -22,63 +23,65 @@
 //!
 //! # What the error is, and what it bounds
 //!
-//! The error of a sample is `|sigma|` (`inside=depth`, the default): outside the star its exact
-//! distance, inside its depth in the primitive that holds it deepest. `inside=surface` is `mu`, as in
-//! the authors' code and as Q-MAT reports errors: with the sphere `m_j` and the sides of the slabs
-//! among the primitives. Signed distances are exact, for contained spheres and slabs without tangent
-//! planes too.
+//! With `inside=depth`, the default, the error of a sample is `|sigma|`: outside the star its exact
+//! distance, inside its depth in the primitive that holds it deepest. With `inside=surface` it is
+//! `mu`, as in the authors' code and in the errors that Q-MAT reports; the sphere `m_j` and the sides
+//! of the slabs then count as primitives. Signed distances are exact, even for contained spheres and
+//! slabs without tangent planes.
 //!
-//! Both local errors bound `mu` over the whole mesh from above, for the samples and the star that
+//! Both local errors are upper bounds of `mu` over the whole mesh, for the samples and the star that
 //! they were evaluated for: `mu <= min |s| over the star <= |sigma of the star|`. They do not bound
 //! the error of the result. A far primitive can hold a sample deeper than its own star does; and a
-//! collapse next to `j` changes primitives of the star of `j`, but is charged with the samples of its
-//! own ends only. So a bound ([`Level::Native`]) is held by measuring it (file `bound.rs`):
+//! collapse next to `j` changes primitives of the star of `j`, but its error covers the samples of
+//! its own ends only. So a bound ([`Level::Native`]) is enforced by measurement (file `bound.rs`):
 //!
-//! - edges are collapsed until the cheapest one costs more than the bound;
-//! - the error of every sample is measured against the whole union, in the reading of the parameter;
-//! - while it exceeds the bound, collapses are taken back, in growing steps and then by bisection. The
-//!   count `taken_back_for_the_bound` says how many. The error is not monotone: where the initial
-//!   mesh is beyond the bound, coarser ones can be within, and are measured before it is refused,
-//!   with the best that was found.
+//! - Edges are collapsed until the cheapest one costs more than the bound.
+//! - The error of every sample is measured against the whole union, with the same `inside`.
+//! - While it exceeds the bound, collapses are undone, in growing steps and then by bisection. The
+//!   count `taken_back_for_the_bound` says how many. The error is not monotone: if the initial mesh
+//!   exceeds the bound, coarser meshes may not. So some of them are measured before the bound is
+//!   refused; the message then names the best.
 //!
 //! *The bound is one-sided, at the samples.* It says how far each sample is from the union, not how far
-//! the union's boundary is from the surface: where primitives no longer fill the solid, its boundary
-//! runs deep inside, between samples that are all near some primitive. `sides=both` bounds the
-//! distance from the boundary of the union to the surface too, at some 20,000 samples of it. The order
-//! of the collapses stays one-sided, so that the two-sided bound costs spheres.
+//! the union's boundary is from the surface: where primitives no longer fill the solid, the boundary
+//! runs deep inside the solid although every sample is near some primitive. `sides=both` also bounds
+//! the distance from the boundary of the union to the surface, at some 20,000 samples. The order of
+//! the collapses stays one-sided, so a two-sided bound needs more spheres.
 //!
-//! In the reading `depth` the initial mesh is often beyond a small bound: the cones and slabs of a
+//! With `inside=depth` the initial mesh often exceeds a small bound: the cones and slabs of a
 //! Voronoi medial mesh stick out of the surface between the spheres, by 0.63 % of the diagonal on the
-//! bear and 0.51 % on the dolphin. The code's default of `1e-4` presumes the reading `surface`, in which
+//! bear and 0.51 % on the dolphin. The code's default of `1e-4` presumes `inside=surface`, for which
 //! the initial mesh has no error at all. [`Level::Published`] is the code's rule: it stops before the
-//! first collapse of a local error above `1e-4`, holds nothing, and says what error the result has.
+//! first collapse whose local error exceeds `1e-4`. It guarantees no bound, and reports the error of
+//! the result.
 //!
 //! # Laziness
 //!
-//! An edge is queued at a lower bound of its cost, the error of one sample in each direction, and
-//! evaluated when it comes first, up to the sample that shows it not to be (`edge.rs`). The order is
-//! that of evaluating every edge in full after each collapse, up to rounding; the tests hold it
-//! against that.
+//! An edge is queued at a lower bound of its cost, the error of one sample in each direction. When it
+//! comes first it is evaluated, until a sample shows that another edge is cheaper (`edge.rs`). The
+//! order is that of evaluating every edge in full after each collapse, up to rounding; a test compares
+//! the two.
 //!
 //! # Where the papers are silent
 //!
 //! - Errors below `1e-12` are rounding and count as zero. Of equal costs the shorter edge comes
 //!   first, then the smaller ids. Ordered by ids alone, or by the size of the stars, clusters of
 //!   coincident spheres (a sampled sphere) end in knots in which no collapse keeps the homotopy type.
-//! - A sphere without samples adds none to the error; two without cost nothing.
-//! - A mesh that comes without contact points gets the samples nearest to its spheres.
+//! - A sphere without samples contributes no error; an edge between two such spheres costs nothing.
+//! - A mesh without contact points gets, for each sphere, the samples nearest to it.
 //!
 //! # Deviations from the papers
 //!
-//! - The default reading is `depth`. `surface` hardly notices that a primitive swallows a sample: the
-//!   surfaces of others, buried beside it, are near. Largest `|sigma|` at 100 spheres, over the
+//! - The default is `inside=depth`. `surface` hardly notices that a primitive swallows a sample, since
+//!   buried surfaces of other primitives are near it. Largest `|sigma|` at 100 spheres, over the
 //!   vertices and 50,000 more points: bear 0.65 % of the diagonal with `depth`, 4.5 % with
 //!   `surface`; dolphin 0.41 % and 1.3 %. Largest `mu`: 0.65 % and 1.1 %, 0.41 % and 0.40 %.
-//! - The authors' code asks that an edge has as many faces as its ends have common neighbours. Here a
-//!   collapse keeps the homotopy type ([`CollapseComplex::keeps_homotopy`]). The link condition in
-//!   full holds back more: edges that close a hole and the void in it at once, which changes nothing.
-//! - Step 4 leaves out the edges of neighbours of `j` alone: nothing in their stars changed, because
-//!   the survivor does not move.
+//! - The authors' code requires that an edge has as many faces as its ends have common neighbours.
+//!   Here a collapse must keep the homotopy type ([`CollapseComplex::keeps_homotopy`]). The full link
+//!   condition would reject more: edges that close a hole and the void in it at once, which does not
+//!   change the homotopy type.
+//! - Step 4 skips edges at neighbours of `j` that are not neighbours of `i`: their stars do not
+//!   change, because the survivor does not move.
 //!
 //! # Published claims
 //!
@@ -87,11 +90,11 @@
 //! first half of the claim holds on all three models, the second on none: HEM stays below Q-MAT at
 //! 100 and at 50 spheres.
 //!
-//! The reason is the condition that blocks collapses. With that of the authors' code
-//! (`blocking=neighbours`) it is as their paper says: the bear has 1.8 % at 100 spheres, where Q-MAT as
-//! published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77; the dolphin
-//! stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it at once, and
-//! are held back for good.
+//! The reason is the condition that blocks collapses. With the condition of the authors' code
+//! (`blocking=neighbours`) the result agrees with the paper: the bear has 1.8 % at 100 spheres, where
+//! Q-MAT as published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77;
+//! the dolphin stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it
+//! at once, so that condition rejects them for good.
 //!
 //! [`CollapseComplex::keeps_homotopy`]: medial::complex::collapse::CollapseComplex::keeps_homotopy
 
@@ -123,7 +126,7 @@ use bound::{Found, Ruler, last_within};
 use contract::{Contraction, Stop};
 use samples::SampleLists;
 
-/// Queue value at which [`Level::Published`] stops: the default of the authors' code.
+/// Cost at which [`Level::Published`] stops: the default of the authors' code.
 const PUBLISHED: f64 = 1e-4;
 
 /// The HEM simplifier.

@@ -43,13 +43,13 @@ impl Model {
         }
     }
 
-    /// The samples as the method takes them.
+    /// The samples in the form that the method uses.
     pub(super) fn sample_lists(&self) -> SampleLists {
         let lists = self.lists.iter().map(|list| list.iter().copied().collect()).collect();
         SampleLists::new(Arc::from(self.points.as_slice()), lists)
     }
 
-    /// The complex; vertices that are gone are isolated in it.
+    /// The complex; removed vertices stay as isolated ones.
     pub(super) fn mesh(&self) -> MedialMesh {
         MedialMesh {
             spheres: self.spheres.clone(),
@@ -103,7 +103,7 @@ impl Model {
         ids.map(error).fold(0.0, f64::max)
     }
 
-    /// The edge that is to be collapsed next, of all edges evaluated in full.
+    /// The edge to be collapsed next, found by evaluating every edge in full.
     pub(super) fn cheapest(&self) -> Option<Choice> {
         let mut complex = CollapseComplex::from_mesh(&self.mesh());
         let choices = self.edges.iter().filter_map(|&ends| self.choice(&mut complex, ends));

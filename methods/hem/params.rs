@@ -7,16 +7,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HemParams {
-    /// What a sample inside the union is charged with.
+    /// The error of a sample inside the union.
     pub inside: Inside,
-    /// What a bound bounds.
+    /// The directions that a bound covers.
     pub sides: Sides,
     /// Which collapses are blocked.
     pub blocking: Blocking,
 }
 
-/// What counts as the error of a sample. Outside all primitives both are its distance to the
-/// nearest one.
+/// The error of a sample inside the union. Outside, it is always the distance to the nearest
+/// primitive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Inside {
@@ -27,7 +27,8 @@ pub enum Inside {
     Surface,
 }
 
-/// Which directions the error of a whole mesh has. The order of the collapses has one only.
+/// The directions in which the error of a whole mesh is measured. The order of the collapses always
+/// uses one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sides {
@@ -45,7 +46,8 @@ pub enum Blocking {
     /// Those that change the homotopy type.
     #[default]
     Homotopy,
-    /// Those of edges whose ends have a common neighbour without a face, as in the authors' code.
+    /// Those of edges whose ends have a common neighbour that forms no face with them, as in the
+    /// authors' code.
     Neighbours,
 }
 

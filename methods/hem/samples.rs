@@ -1,4 +1,4 @@
-//! Which boundary samples each sphere answers for.
+//! The boundary samples that each sphere is responsible for.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use medial::shape::ContactSets;
 
 /// The boundary samples and for each sphere the ids of its own, each once, ascending.
 ///
-/// A sample that several spheres touch is in several lists. No list of a sphere that is left ever
-/// loses a sample, and the lists together never grow.
+/// A sample that several spheres touch is in several lists. The list of a sphere never loses a sample
+/// while the sphere exists, and the total length never grows.
 #[derive(Clone, Debug)]
 pub(super) struct SampleLists {
     points: Arc<[Vec3]>,
@@ -41,7 +41,7 @@ impl SampleLists {
         &self.of_sphere[v as usize]
     }
 
-    /// Where a sample is.
+    /// The position of a sample.
     #[inline]
     pub(super) fn point(&self, id: u32) -> Vec3 {
         self.points[id as usize]

@@ -1,18 +1,17 @@
-//! The star of the survivor of a collapse that has not been done, and the distance of a sample to it.
+//! The star that the survivor of a planned collapse would have, and the distance of a sample to it.
 //!
 //! The survivor, the *hub*, has a cone to every neighbour of either end and a slab for every face
 //! of either end that does not hold both. The link vertices and the sides opposite the hub are the
 //! same whichever end survives. A slab is evaluated as the part between its tangent triangles and
 //! its three cones; two of them lead to the hub, the third is the *rim* over the opposite side.
 //!
-//! # Which primitives are left out
+//! # Which primitives are skipped
 //!
-//! The signed distance of a point to the convex hull of balls is a largest value over directions,
-//! `max_{|u|=1} p.u - max_v (c_v.u + r_v)`, so for any unit vector `u` and any threshold `T` a
-//! primitive is no nearer than `T` when every one of its balls has the *excess*
-//! `(c_v - p).u + r_v <= -T`. With `u` from the nearest primitive so far to the point one pass over
-//! the link vertices leaves out nearly all cones and slabs, exactly; the others are built when
-//! first asked for.
+//! The signed distance of a point to the convex hull of balls is a maximum over directions,
+//! `max_{|u|=1} p.u - max_v (c_v.u + r_v)`. So for any unit vector `u` and any threshold `T`, a
+//! primitive is no nearer than `T` if each of its balls has an *excess* `(c_v - p).u + r_v <= -T`.
+//! With `u` from the nearest primitive so far to the point, one pass over the link vertices excludes
+//! nearly all cones and slabs without error; the others are built when first needed.
 
 use medial::Vec3;
 use medial::complex::Sphere;
@@ -24,15 +23,15 @@ use super::params::Inside;
 /// Absent index.
 const NONE: u32 = u32::MAX;
 
-/// More than rounding contributes to an excess, coordinates being at most 1.
+/// Bound on the rounding error of an excess, for coordinates of at most 1.
 pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Cones that are sought by the largest excess before all that are left are tried in order.
+/// Cones tried in the order of largest excess; the others follow in the order of the link.
 const ROUNDS: usize = 4;
 
 /// Scratch for one hypothetical star after another.
 pub(super) struct Star {
-    /// For each vertex of the complex: the number of the star that it was met in, and where.
+    /// For each vertex of the complex: the number of the last star with it, and its place in `link`.
     met: Vec<(u32, u32)>,
     star: u32,
     /// Ids of the link vertices.
@@ -67,7 +66,7 @@ pub(super) struct Nearest {
 }
 
 impl Star {
-    /// Scratch for a complex of so many vertices.
+    /// Scratch for a complex with this many vertices.
     pub(super) fn new(vertices: usize) -> Self {
         Self {
             met: vec![(0, 0); vertices],
@@ -87,7 +86,7 @@ impl Star {
         }
     }
 
-    /// The link that either end of the edge `{a, b}` has after its collapse.
+    /// Collects the link that either end of the edge `{a, b}` would have after its collapse.
     pub(super) fn gather(&mut self, complex: &CollapseComplex, [a, b]: [u32; 2]) {
         self.star += 1;
         self.link.clear();
@@ -112,17 +111,18 @@ impl Star {
         self.rims.renew(self.sides.len());
     }
 
-    /// Which end survives.
+    /// Sets the surviving end.
     pub(super) fn set_hub(&mut self, hub: Sphere) {
         let reach = |m: &Sphere| m.centre.distance(hub.centre) + m.radius;
         self.reach = self.spheres.iter().map(reach).fold(hub.radius, f64::max);
         self.hub = hub;
+        // The rims do not touch the hub and stay.
         self.cones.renew(self.link.len());
         self.faces.renew(self.sides.len());
     }
 
-    /// The nearest primitive to a sample. Where its distance is at most `floor` it may be any
-    /// primitive for which that holds: the caller is interested in larger ones only.
+    /// The nearest primitive to a sample. If its distance is at most `floor`, any primitive within
+    /// `floor` may be returned: the caller needs larger distances only.
     pub(super) fn nearest(&mut self, p: Vec3, floor: f64, inside: Inside) -> Nearest {
         match inside {
             Inside::Depth => self.deepest(p, floor),
@@ -143,6 +143,7 @@ impl Star {
         }
         self.query += 1;
         let mut hub = self.measure_excess(p, best.towards(p));
+        // The largest excess is usually the nearest cone, which makes the limit sharp early.
         for _ in 0..ROUNDS {
             let Some(k) = self.largest_excess(limit(best.signed, floor)) else { break };
             self.tested[k] = self.query;
@@ -160,6 +161,7 @@ impl Star {
             let limit = limit(best.signed, floor);
             let [k, l] = self.sides[f];
             let out = self.excess[k as usize].max(self.excess[l as usize]) > limit;
+            // The hub's own excess matters for the face, which has it as a corner, not for the rim.
             if (out || hub > limit)
                 && let Some(found) = self.face(f).and_then(|face| face.nearest_centre(p))
             {
@@ -172,7 +174,7 @@ impl Star {
         best
     }
 
-    /// The primitive whose surface is nearest; the first one within `floor` will do.
+    /// The primitive whose surface is nearest; any one within `floor` will do.
     fn nearest_surface(&mut self, p: Vec3, floor: f64) -> Nearest {
         let mut best = self.at_hub(p);
         let towards = best.towards(p);
@@ -208,9 +210,9 @@ impl Star {
         best
     }
 
-    /// Whether no ball has an excess beyond `limit` in the direction from the hub to a point at a
-    /// signed distance from it, by the reach alone: so in a cluster of coincident spheres, where
-    /// all samples and all link vertices meet.
+    /// Whether the reach alone excludes an excess beyond `limit` in the direction from the hub to a
+    /// point at this signed distance. It often does in clusters of coincident spheres, whose links
+    /// and samples are large.
     fn is_within_hub(&self, signed: f64, limit: f64) -> bool {
         self.reach - (self.hub.radius + signed) <= limit
     }
@@ -229,7 +231,7 @@ impl Star {
         excess_of(&self.hub, p, towards)
     }
 
-    /// The link vertex of largest excess beyond `limit`, of those whose cone is not yet evaluated.
+    /// Of the link vertices with a cone not yet evaluated, the one of largest excess beyond `limit`.
     fn largest_excess(&self, limit: f64) -> Option<usize> {
         let (mut largest, mut place) = (limit, None);
         for (k, (&excess, &tested)) in self.excess.iter().zip(&self.tested).enumerate() {
@@ -265,15 +267,15 @@ pub(super) fn excess_of(m: &Sphere, p: Vec3, towards: Vec3) -> f64 {
     (m.centre - p).dot(towards) + m.radius
 }
 
-/// The excess up to which a ball is of no interest: while the best distance is within `floor` only
-/// primitives that hold the point deeper than that are.
+/// The excess up to which a ball can be ignored. While the best distance is within `floor`, only a
+/// primitive that holds the point deeper than `floor` matters.
 #[inline]
 fn limit(best: f64, floor: f64) -> f64 {
     ROUNDING - if best.abs() <= floor { -floor } else { best }
 }
 
 impl Nearest {
-    /// Unit vector from the centre to the point: any, when they are the same.
+    /// Unit vector from the centre to the point; any one if they coincide.
     pub(super) fn towards(&self, p: Vec3) -> Vec3 {
         (p - self.centre).try_normalize().unwrap_or(Vec3::X)
     }
@@ -293,7 +295,7 @@ impl Nearest {
     }
 }
 
-/// Values that are made when first asked for, and forgotten all at once.
+/// Values that are built when first needed, and forgotten all at once in constant time.
 struct Built<T> {
     items: Vec<(u32, Option<T>)>,
     round: u32,
@@ -306,7 +308,7 @@ impl<T> Default for Built<T> {
 }
 
 impl<T> Built<T> {
-    /// Forgets everything and makes room for so many items.
+    /// Forgets everything and makes room for `items`.
     fn renew(&mut self, items: usize) {
         self.round += 1;
         if self.items.len() < items {

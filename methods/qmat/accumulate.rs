@@ -8,7 +8,7 @@ use medial::geometry::{Cone, ConeFrame, SlabPlanes};
 use super::params::{Boundary, QmatParams};
 use super::quadric::Quadric;
 
-/// What had no tangent planes and was left out.
+/// Counts of the primitives without tangent planes, which contribute nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Skipped {
     pub(super) slabs: usize,
@@ -29,6 +29,7 @@ pub(super) fn initial_quadrics(
             Some(planes) => {
                 let mut slab = Quadric::default();
                 for normal in planes.normals() {
+                    // A plane touches all three spheres, so any of them fixes its offset.
                     slab.add_plane(normal, spheres[0], 1.0);
                 }
                 for v in face {
@@ -40,6 +41,7 @@ pub(super) fn initial_quadrics(
     }
     for &[a, b] in &mesh.edges {
         let mut faces = complex.opposite_sides(a).iter().filter(|side| side.contains(&b));
+        // No face: a cone, with a tip at each free end. One face: a boundary. More: neither.
         match (faces.next(), faces.next()) {
             (None, _) => {
                 skipped.cones += usize::from(!add_cone(&mut quadrics, mesh, [a, b]));
@@ -59,7 +61,7 @@ pub(super) fn initial_quadrics(
     (quadrics, skipped)
 }
 
-/// The four planes of a lone edge's cone, for both ends.
+/// Adds the four planes of a lone edge's cone to the quadrics of both ends; false without a cone.
 fn add_cone(quadrics: &mut [Quadric], mesh: &MedialMesh, ends: [u32; 2]) -> bool {
     let [a, b] = ends.map(|v| mesh.spheres[v as usize]);
     let Some(frame) = cone_frame(a, b) else {
@@ -75,7 +77,7 @@ fn add_cone(quadrics: &mut [Quadric], mesh: &MedialMesh, ends: [u32; 2]) -> bool
     true
 }
 
-/// The plane across the free end of a lone edge, for that end.
+/// Adds the plane across the free end of a lone edge to the quadric of that end.
 fn add_tip(quadrics: &mut [Quadric], mesh: &MedialMesh, end: u32, other: u32, params: &QmatParams) {
     let [tip, base] = [end, other].map(|v| mesh.spheres[v as usize]);
     // Without an axis the stability ratio is 0, and so is the weight.
@@ -86,7 +88,7 @@ fn add_tip(quadrics: &mut [Quadric], mesh: &MedialMesh, end: u32, other: u32, pa
     }
 }
 
-/// The plane along a boundary edge, for both its ends.
+/// Adds the plane along a boundary edge to the quadrics of both ends.
 fn add_rim(
     quadrics: &mut [Quadric],
     mesh: &MedialMesh,
@@ -118,7 +120,7 @@ fn boundary_edge_normal(ends: [Sphere; 2], opposite: Sphere) -> Option<Vec3> {
     Some(frame.normal(away))
 }
 
-/// The tangent planes of a slab; none where the face is so thin that its plane is rounding noise.
+/// The tangent planes of a slab; `None` if the face is so thin that its plane is rounding noise.
 fn slab_planes(spheres: [Sphere; 3]) -> Option<SlabPlanes> {
     let [a, b, c] = spheres.map(|m| m.centre);
     let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
@@ -130,7 +132,7 @@ fn slab_planes(spheres: [Sphere; 3]) -> Option<SlabPlanes> {
     SlabPlanes::new(spheres)
 }
 
-/// The frame of a cone; none where one ball holds the other or the axis is rounding noise.
+/// The frame of a cone; `None` if one ball holds the other or the axis is rounding noise.
 fn cone_frame(a: Sphere, b: Sphere) -> Option<ConeFrame> {
     if a.centre.distance(b.centre) < ZERO_LENGTH {
         return None;

@@ -1,4 +1,5 @@
-//! Algorithm 1 of the paper: the cheapest edge first, the merged sphere where its error is least.
+//! Algorithm 1 of the paper: collapses the cheapest edge, places the merged sphere where its error is
+//! least.
 
 use medial::complex::collapse::{Candidate, CollapseComplex, CollapseQueue};
 use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH, stability_ratio};
@@ -13,7 +14,7 @@ use super::unlock::Cluster;
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 4096;
 
-/// Stars from this size on are evaluated in parallel.
+/// Stars of at least this many edges are evaluated in parallel.
 const LARGE_STAR: usize = 2048;
 
 /// A medial mesh under contraction.
@@ -26,7 +27,7 @@ pub(super) struct Contraction {
     tally: Tally,
 }
 
-/// What happened to the candidates that were popped.
+/// Counts of what happened to popped candidates.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     collapses: usize,
@@ -36,19 +37,19 @@ struct Tally {
     held_by_inversion: usize,
 }
 
-/// What is done with a popped candidate.
+/// The fate of a popped candidate.
 pub(super) enum Decision {
     /// Collapse it to this sphere.
     Collapse(Sphere),
     /// It folds a face over at the optimum and costs more elsewhere: queue it at that cost.
     Postpone(Candidate),
-    /// Collapsing it would change the topology, as long as these vertices stay as they are.
+    /// Its collapse would change the topology, until one of these vertices changes.
     Hold(Vec<u32>),
-    /// Each placement folds one of these faces over, as long as they stay as they are.
+    /// Each placement folds one of these faces over, until they change.
     Fold(Folded),
 }
 
-/// Faces that hold back the placements of an edge; often one holds back all four.
+/// Faces that rule out placements of an edge; often one rules out all four placements.
 #[derive(Default)]
 pub(super) struct Folded {
     faces: [[u32; 3]; 4],
@@ -56,8 +57,9 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    /// Whether a placement folds a face over: one that is known, or else one that is added.
+    /// Whether a placement folds a face over: a face found before, or a new one, which is added.
     fn holds(&mut self, complex: &CollapseComplex, [a, b]: [u32; 2], sphere: Sphere) -> bool {
+        // Known faces first: one test instead of both stars, and fewer obstacles to wake at.
         let known = &self.faces[..self.count];
         if known.iter().any(|&face| complex.folds(face, sphere.centre)) {
             return true;
@@ -89,7 +91,7 @@ impl Contraction {
     /// Steps 1 and 2: quadrics of all spheres, costs of all edges.
     pub(super) fn new(mesh: &MedialMesh, params: QmatParams) -> Self {
         let complex = CollapseComplex::from_mesh(mesh);
-        // The oracle follows it.
+        // The oracle of the tests replays the collapses.
         #[cfg(test)]
         let complex = complex.recording();
         let (quadrics, skipped) = initial_quadrics(mesh, &complex, &params);
@@ -149,6 +151,7 @@ impl Contraction {
                 others.iter().fold(first, |kept, &v| self.merge([kept, v], sphere));
                 continue;
             };
+            // A candidate that is not collapsed goes back or is parked, so none is tried in vain.
             match self.decide(cheapest) {
                 Decision::Collapse(sphere) => {
                     self.merge(cheapest.ends(), sphere);
@@ -203,6 +206,7 @@ impl Contraction {
                 continue;
             }
             let dearer = priced(&self.complex, &self.params, [a, b], error);
+            // When it comes back at this cost, it is no dearer than itself and is collapsed.
             if candidate.is_before(&dearer) {
                 return Decision::Postpone(dearer);
             }
@@ -216,12 +220,13 @@ impl Contraction {
     fn merge(&mut self, [a, b]: [u32; 2], sphere: Sphere) -> u32 {
         let Self { params, complex, quadrics, queue, tally, .. } = self;
         let degree = |v| complex.neighbours(v).len();
-        // The smaller star is renamed, so that a large one is not rewritten for each small one.
+        // Rename the smaller star, so that a growing hub is not rewritten at every collapse.
         let [kept, removed] = if degree(a) >= degree(b) { [a, b] } else { [b, a] };
         complex.collapse(kept, removed, sphere);
         let gone = quadrics[removed as usize];
         quadrics[kept as usize] += &gone;
         let around = complex.neighbours(kept);
+        // Both branches push in the order of the neighbours: results do not depend on threads.
         let renewed = |&v: &u32| candidate(complex, quadrics, params, [kept, v]);
         if around.len() < LARGE_STAR {
             around.iter().for_each(|v| queue.push(renewed(v)));
@@ -241,7 +246,7 @@ impl Contraction {
         self.tally.unlocked
     }
 
-    /// Largest error of a sphere left, over the slabs it stands for.
+    /// Largest error of a remaining sphere against the slabs that were merged into it.
     #[cfg(test)]
     pub(super) fn largest_error(&self) -> f64 {
         let error = |v| self.quadrics[v as usize].value(self.complex.sphere(v));
@@ -320,8 +325,8 @@ fn edge_quadric(
     (quadric, [complex.sphere(a), complex.sphere(b)])
 }
 
-/// The sphere of least error (equation 6 and below): the minimiser; the midpoint when its radius
-/// would be negative; the best of three when there is none, or none within reach.
+/// The sphere of least error (equation 6 and below): the minimiser; the midpoint if the minimiser has
+/// a negative radius; the best of both ends and the midpoint if there is no minimiser within reach.
 fn minimise(quadric: &Quadric, ends: [Sphere; 2], singular_ratio: f64) -> Sphere {
     let midpoint = ends[0].lerp(ends[1], 0.5);
     match quadric.minimiser(singular_ratio) {

@@ -10,8 +10,8 @@
 //!    `(E + k) Γ²` (equation 8), with the stability ratio `Γ` (equation 3).
 //! 3. The cheapest edge is taken. From `η` spheres on (by default: always) it must satisfy the link
 //!    condition (section 4.5).
-//! 4. A placement that folds a face over is replaced by the best of both ends and the midpoint that
-//!    does not; without one the edge is left alone (section 4.6).
+//! 4. A placement that folds a face over is replaced by the best of both ends and the midpoint, if
+//!    one of them folds none; otherwise the edge is not collapsed (section 4.6).
 //! 5. The edge is collapsed, the quadrics added, the edges of the merged sphere evaluated again.
 //!
 //! # Notation
@@ -23,9 +23,9 @@
 //! # Where the paper is silent
 //!
 //! - "Invertible" means that the smallest eigenvalue of `A` is above `singular_ratio` times the
-//!   largest: independent of scale and of how many quadrics were summed.
+//!   largest, which depends neither on scale nor on the number of summed quadrics.
 //! - A minimiser with a negative radius is replaced by the midpoint of the edge.
-//! - Equal costs, in the main the zeros of contained spheres, are ordered by `E`, then by ids.
+//! - Equal costs, mostly the zeros of contained spheres, are ordered by `E`, then by ids.
 //! - Centres closer than `1e-12` are one point: `Γ` and the cost are 0, and they go first, small
 //!   stars before large ones.
 //! - A face whose balls have no common outer tangent plane, or whose centres are collinear, adds
@@ -36,27 +36,28 @@
 //! # Deviations from the paper
 //!
 //! - The topology is kept from the first collapse on (`topology_from=all`, the meaning of `auto` at
-//!   every level but the published one). The paper checks from `η = 200` spheres on, which bounds
-//!   the time and not the loss: what the collapses before that broke stays broken. With
-//!   `topology_from=200` 1,000 spheres have wrong Betti numbers on seven of the twelve shared meshes,
-//!   checked from the start on none whose initial mesh has the right ones. [`Level::Published`]
-//!   checks from 200 on unless told otherwise.
-//! - Section 4.6 collapses an edge whose optimum folds a face over at the best other placement at
-//!   once. That costs more than the edge was queued at. Here the edge goes back into the queue at
-//!   that cost, and is collapsed when nothing cheaper is left.
-//! - An edge that the link condition or folding faces reject comes back when what held it back is
-//!   part of a collapse; the paper says of the latter only that it "will not be collapsed".
+//!   every level but the published one). The paper checks only once `η = 200` spheres are left, which
+//!   saves time but leaves what earlier collapses broke. With
+//!   `topology_from=200` the results of 1,000 spheres have wrong Betti numbers on seven of the twelve
+//!   shared meshes; with checks from the start, on none whose initial mesh has the right ones.
+//!   [`Level::Published`] checks from 200 spheres on unless told otherwise.
+//! - If the optimum of an edge folds a face over, section 4.6 collapses the edge at once at the best
+//!   other placement, which costs more than the edge was queued at. Here the edge goes back into the
+//!   queue at that cost, and is collapsed when nothing cheaper is left.
+//! - An edge that the link condition or the folding test rejects is tried again once a collapse
+//!   changes the vertices that held it back. The paper says of the folding test only that the edge
+//!   "will not be collapsed".
 //! - The link condition is that of Dey et al. in full, for holes and for voids, after elementary
 //!   expansions ([`keeps_homotopy`](medial::complex::collapse::CollapseComplex::keeps_homotopy)): a
-//!   collapse that closes a hole and a void at once passes. As it stands in their paper it blocks
-//!   pockets of spheres for good.
-//! - Even so it is sufficient, not necessary: when it holds back all that is left, at 500 spheres or
-//!   fewer, an edge whose collapse brings the Betti numbers no farther from those of the initial
-//!   mesh is taken (`unlock.rs`); by section 4.5 the simplification stops. With `topology_from=200` unchecked
-//!   collapses make voids, which would otherwise be kept.
+//!   collapse that closes a hole and a void at once passes. As printed in their paper the condition
+//!   blocks pockets of spheres for good.
+//! - Even so the condition is sufficient, not necessary. When it rejects every edge left, at 500
+//!   spheres or fewer, an edge is taken whose collapse brings the Betti numbers no farther from those
+//!   of the initial mesh (`unlock.rs`); section 4.5 would stop. With `topology_from=200` this also
+//!   removes voids that unchecked collapses made.
 //! - A minimiser farther from the midpoint of its edge than the two balls extend, `d + max r`, is
-//!   not used, as if `A` were singular. `A` can pass for invertible where slabs are nearly parallel,
-//!   and then a single sphere lands far outside the shape.
+//!   not used, as if `A` were singular. Where slabs are nearly parallel, `A` can pass as invertible
+//!   and place a sphere far outside the shape.
 
 mod accumulate;
 mod contract;
@@ -120,6 +121,7 @@ fn prepare<'s>(
         return Err(ShapeError::EmptyMedialMesh.into());
     }
     run.step(0, initial.spheres.len())?;
+    // At the preparation the level is unknown; most levels share the parameters of this one.
     let contraction = Contraction::new(&initial, params.at(Level::Spheres(1)));
     Ok(Box::new(Prepared { initial, params, run: run.clone(), contraction, asked: false }))
 }
@@ -173,6 +175,7 @@ impl Prepared {
         let params = self.params.at(level);
         let mut work = if self.asked { Work::Continued } else { Work::Anew };
         let is_of_other = self.contraction.params() != params;
+        // Collapses are not undone, so a finer level starts anew.
         if is_of_other || self.contraction.sphere_count() < target {
             self.contraction = Contraction::new(&self.initial, params);
             work = Work::Anew;

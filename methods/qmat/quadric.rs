@@ -9,7 +9,7 @@ use std::ops::AddAssign;
 use medial::Vec3;
 use medial::complex::Sphere;
 
-/// The function `E`; two cache lines.
+/// The function `E`, in exactly two cache lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(64))]
 pub(super) struct Quadric {
@@ -42,7 +42,7 @@ impl AddAssign<&Quadric> for Quadric {
 }
 
 impl Quadric {
-    /// Adds `weight * ((normal, 1) · (m - touching))²`. The normal need not be of unit length.
+    /// Adds `weight * ((normal, 1) · (m - touching))²`. The normal need not have unit length.
     pub(super) fn add_plane(&mut self, normal: Vec3, touching: Sphere, weight: f64) {
         let n = [normal.x, normal.y, normal.z, 1.0];
         let offset = dot(n, coordinates(touching));
@@ -85,8 +85,8 @@ impl Quadric {
     /// The minimiser by `L D Lᵀ` without exchanges, which is stable for a definite matrix, or `None`
     /// when it could be singular.
     ///
-    /// With the trace `t` no eigenvalue exceeds `t`, and three of them multiply to `(t/3)³` at most.
-    /// So the smallest is no less than the determinant over that.
+    /// With the trace `t`, no eigenvalue exceeds `t`, and the product of any three is at most
+    /// `(t/3)³`. So the smallest eigenvalue is at least the determinant divided by `(t/3)³`.
     #[inline]
     fn plainly_regular(&self, singular_ratio: f64) -> Option<Sphere> {
         let [a00, a01, a02, a03, a11, a12, a13, a22, a23, a33] = self.a;
@@ -100,7 +100,8 @@ impl Quadric {
         let d33 = c33 - l32 * c32;
         let definite = a00 > 0.0 && b11 > 0.0 && c22 > 0.0 && d33 > 0.0;
         let determinant = a00 * b11 * c22 * d33;
-        // Twice as much as needed, for the rounding of the pivots.
+        // Needed: det / (t/3)³ > ratio · t = 3 ratio · (t/3). Twice that, for the rounding of pivots;
+        // negated, so that a pivot that is not a number fails.
         if !(definite && determinant > 6.0 * singular_ratio * third * third * third * third) {
             return None;
         }
@@ -132,7 +133,7 @@ impl Quadric {
             if k == 0 {
                 largest = d;
             }
-            // So written that a pivot that is not a number is not regular.
+            // A pivot that is not a number fails both comparisons.
             let regular = d > 0.0 && d > singular_ratio * largest;
             if !regular {
                 return None;
@@ -145,6 +146,7 @@ impl Quadric {
                 x[i] -= factor * x[k];
             }
         }
+        // λ_min / λ_max is at least d₄ / (31 · 4 d₁): beyond that the eigenvalues are not needed.
         let in_doubt = m[3][3] <= 124.0 * singular_ratio * largest;
         if in_doubt && self.eigenvalue_ratio() <= singular_ratio {
             return None;
@@ -155,6 +157,7 @@ impl Quadric {
                 x[k] -= m[i][k] * x[i];
             }
             x[k] /= m[k][k];
+            // Undoes the exchanges of the pivots.
             solution[order[k]] = x[k];
         }
         let [cx, cy, cz, radius] = solution;
@@ -175,7 +178,7 @@ impl Quadric {
     #[cold]
     fn eigenvalue_ratio(&self) -> f64 {
         let mut m = self.matrix();
-        // Off-diagonal entries of this size move no eigenvalue by more.
+        // An off-diagonal entry moves no eigenvalue by more than its own size.
         let negligible = 1e-20 * (m[0][0] + m[1][1] + m[2][2] + m[3][3]);
         for _sweep in 0..12 {
             for p in 0..3 {
@@ -207,7 +210,7 @@ fn pivot(m: &mut [[f64; 4]; 4], x: &mut [f64; 4], order: &mut [usize; 4], k: usi
     }
     x.swap(k, p);
     order.swap(k, p);
-    // Columns before `k` hold the factors, to the right of it only the lower triangle counts.
+    // Only the lower triangle is stored. Columns before `k` hold the factors, which move along.
     for j in 0..k {
         let kept = m[k][j];
         m[k][j] = m[p][j];
@@ -229,6 +232,7 @@ fn pivot(m: &mut [[f64; 4]; 4], x: &mut [f64; 4], order: &mut [usize; 4], k: usi
 /// Zeroes the entry `(p, q)` of a symmetric matrix by a rotation.
 fn rotate(m: &mut [[f64; 4]; 4], p: usize, q: usize) {
     let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
+    // The smaller root, of a rotation by at most 45 degrees: Jacobi's sweeps then converge.
     let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
     let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
     let sine = tangent * cosine;

@@ -1,13 +1,13 @@
-//! What the link condition holds back although the topology would not suffer.
+//! Collapses against the link condition that do not harm the topology.
 //!
 //! The link condition is sufficient for a collapse to keep the topology, not necessary. When it
-//! holds back every edge that is left of a small complex, the Betti numbers decide: a collapse is
-//! taken when it brings them no farther from those of the initial mesh. So a void that was closed
-//! off before the topology was watched can be filled again, and a knot of spheres in which each
-//! edge violates the condition in two ways that cancel can be contracted.
+//! rejects every edge left of a small complex, the Betti numbers decide: a collapse is taken if it
+//! brings them no farther from those of the initial mesh. So a void that arose before the topology
+//! was checked can be filled again, and a knot of spheres can be contracted in which each edge
+//! violates the condition in two ways that cancel.
 //!
-//! Spheres whose centres are one point up to rounding can be such a knot that no single edge
-//! undoes. They are contracted together, on the same terms: as points in space they are one.
+//! Spheres whose centres coincide up to rounding can form a knot that no single collapse undoes.
+//! Since they are one point in space, they are contracted together, on the same terms.
 
 use std::collections::HashSet;
 
@@ -16,8 +16,8 @@ use medial::complex::{MedialMesh, Sphere, betti};
 
 use super::contract::{Contraction, Decision, are_coincident};
 
-/// Spheres up to which Betti numbers are computed for single collapses.
-const SMALL: usize = 500;
+/// Betti numbers of single collapses are computed up to this many spheres.
+const MAX_UNLOCKED_SPHERES: usize = 500;
 
 /// Spheres that become one: the others are merged into the first in their order, each of which then
 /// shares an edge with it.
@@ -31,12 +31,13 @@ impl Contraction {
     /// The cheapest edge whose collapse violates the link condition but not the topology of
     /// `initial`, else the first such cluster of coincident spheres. `None` when there is neither.
     pub(super) fn unlock(&mut self, initial: &MedialMesh) -> Option<Cluster> {
-        if self.sphere_count() > SMALL || !self.keeps_topology() {
+        if self.sphere_count() > MAX_UNLOCKED_SPHERES || !self.keeps_topology() {
             return None;
         }
         let goal = betti(initial);
         let mesh = self.to_mesh();
         let ids: Vec<u32> = self.complex().vertices().collect();
+        // The mesh numbers the vertices left by ascending id.
         let place = |id: u32| ids.partition_point(|&other| other < id) as u32;
         let now = difference(betti(&mesh), goal);
         let keeps = |cluster: &Cluster| {
@@ -68,7 +69,7 @@ impl Contraction {
             while next < members.len() {
                 let v = members[next];
                 next += 1;
-                // Lists of neighbours are in no particular but a deterministic order.
+                // The order of neighbours is deterministic, so the order of the members is, too.
                 for &w in complex.neighbours(v) {
                     if are_coincident(complex.sphere(v), complex.sphere(w)) && seen.insert(w) {
                         members.push(w);
@@ -83,17 +84,18 @@ impl Contraction {
         clusters
     }
 
-    /// Where the merged sphere of an edge goes, if anywhere without folding a face over.
+    /// The placement of the merged sphere of an edge; `None` if each folds a face over.
     fn placement_whatever_the_topology(&self, candidate: Candidate) -> Option<Sphere> {
         match self.place(candidate) {
             Decision::Collapse(sphere) => Some(sphere),
-            // At the cost of the placement itself nothing is dearer.
+            // Ends: at the cost of its placement the candidate is not postponed again.
             Decision::Postpone(dearer) => self.placement_whatever_the_topology(dearer),
             Decision::Hold(_) | Decision::Fold(_) => None,
         }
     }
 }
 
+/// The sum of the absolute differences of the Betti numbers.
 fn difference(betti: [u64; 3], goal: [u64; 3]) -> u64 {
     betti.iter().zip(goal).map(|(&number, goal)| number.abs_diff(goal)).sum()
 }

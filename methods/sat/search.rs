@@ -19,7 +19,7 @@ use super::{Prepared, Scaled};
 const FIRST_STEP: f64 = 0.1;
 
 /// Steps until the search gives up: scale 3,277.
-const MOST_STEPS: usize = 16;
+const MAX_STEPS: usize = 16;
 
 /// Before scale 7.4 the count can rise for long and fall later.
 const STEPS_BEFORE_STALL: usize = 7;
@@ -28,7 +28,7 @@ const STEPS_BEFORE_STALL: usize = 7;
 const STALL: (usize, f64) = (3, 0.03);
 
 /// Scales that are tried between two of these steps.
-const MOST_TRIES: usize = 8;
+const MAX_TRIES: usize = 8;
 
 /// A count within this fraction below the one asked ends the search.
 const TOLERANCE: f64 = 0.01;
@@ -42,7 +42,7 @@ pub(super) fn to_count(
 ) -> Result<Arc<Scaled>, SimplifyError> {
     let mut tried = 0;
     let mut at = |scale: f64| {
-        sat.run.step(tried, MOST_TRIES + 3)?;
+        sat.run.step(tried, MAX_TRIES + 3)?;
         tried += 1;
         sat.at_scale(scale)
     };
@@ -86,7 +86,7 @@ fn ladder(
     }
     let mut smallest = Arc::clone(&fine);
     let mut least = vec![fine.size()];
-    for step in 0..MOST_STEPS {
+    for step in 0..MAX_STEPS {
         let scaled = at(1.0 + FIRST_STEP * f64::powi(2.0, step as i32))?;
         if scaled.size() <= count {
             return Ok(Ladder::Passed { fine, coarse: scaled });
@@ -121,7 +121,7 @@ fn between(
     let point = |s: &Scaled| (s.scale.ln(), (s.size() as f64).max(0.5).ln() - target);
     let (mut low, mut high) = (point(fine), point(&coarse));
     let mut last_was_above = None;
-    for _ in 0..MOST_TRIES {
+    for _ in 0..MAX_TRIES {
         if coarse.size() as f64 >= (1.0 - TOLERANCE) * count as f64 {
             break;
         }

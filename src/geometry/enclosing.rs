@@ -6,7 +6,7 @@ use crate::Vec3;
 const SLACK: f64 = 1e-12;
 
 /// Points up to which all subsets are tried.
-const FEW: usize = 6;
+const MAX_ENUMERATED: usize = 6;
 
 /// Centre and radius of the smallest ball that encloses `points`; radius 0 for fewer than two.
 ///
@@ -20,7 +20,7 @@ const FEW: usize = 6;
 /// Gärtner 1999, *Fast and robust smallest enclosing balls*, doi:10.1007/3-540-48481-7_29 (the
 /// farthest-point rule).
 pub fn enclosing_ball(points: &[Vec3]) -> (Vec3, f64) {
-    if points.len() <= FEW {
+    if points.len() <= MAX_ENUMERATED {
         let ball = by_enumeration(points);
         return (ball.centre, ball.radius);
     }
@@ -32,7 +32,7 @@ pub fn enclosing_ball(points: &[Vec3]) -> (Vec3, f64) {
             .max_by(|p, q| {
                 p.distance_squared(ball.centre).total_cmp(&q.distance_squared(ball.centre))
             })
-            .expect("more points than FEW");
+            .expect("more points than MAX_ENUMERATED");
         if ball.contains(&[far]) {
             return (ball.centre, ball.radius);
         }

@@ -4,7 +4,7 @@ use crate::Vec3;
 
 /// Pairs whose squared chord falls short of the longest by this share may still have the wider
 /// angle: near 180 degrees chords hardly tell angles apart.
-const NEARLY: f64 = 1.0 - 1e-12;
+const NEARLY_LONGEST: f64 = 1.0 - 1e-12;
 
 /// Largest angle between two of `points` seen from `centre`, in radians, from 0 to pi; 0 for fewer
 /// than two. Points at the centre are in no direction and are left out. Cost `O(n^2)`.
@@ -20,7 +20,7 @@ pub fn separation_angle(centre: Vec3, points: &[Vec3]) -> f64 {
     for (i, &u) in directions.iter().enumerate() {
         for &v in &directions[i + 1..] {
             let squared = u.distance_squared(v);
-            if squared < NEARLY * longest {
+            if squared < NEARLY_LONGEST * longest {
                 continue;
             }
             longest = longest.max(squared);

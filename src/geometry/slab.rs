@@ -20,7 +20,7 @@ use crate::Vec3;
 
 /// Height of the centres' triangle, relative to its size and radius, below which the tangent planes
 /// are not told. Distances stay exact: the objective is flat there.
-const THIN: f64 = 1e-10;
+const MIN_RELATIVE_HEIGHT: f64 = 1e-10;
 
 /// The convex hull of three balls, prepared for distance queries.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -208,7 +208,7 @@ impl SlabFace {
 
     /// Whether the gradient across the triangle is not known to at least five digits.
     fn is_thin(&self) -> bool {
-        self.frame.apex[1] <= THIN * (self.frame.length + self.radius)
+        self.frame.apex[1] <= MIN_RELATIVE_HEIGHT * (self.frame.length + self.radius)
     }
 
     pub(super) fn planes(&self) -> SlabPlanes {

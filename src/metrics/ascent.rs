@@ -1,22 +1,22 @@
 //! Local ascent from the largest samples of a distance, so that a maximum does not depend on how
-//! near a sample happened to fall to it.
+//! close to it a sample happens to be.
 //!
-//! A sampled maximum falls short by what the nearest sample misses: nothing where the maximum is at
-//! a vertex, which is sampled, and much where it is at the tip of a ball or in a notch between
-//! two cones. Methods would be flattered differently. Therefore, from the samples:
+//! A sampled maximum is too small by what the nearest sample misses: nothing if the maximum is at a
+//! vertex, which is sampled, but much if it is at the tip of a ball or in a notch between two cones.
+//! That would favour some methods over others. Therefore, from the samples:
 //!
 //! 1. *Seeds*: the largest samples, the largest first, each at least a step from those before it.
 //! 2. *Rounds*: around each seed the points at one step in twelve directions (those of an
 //!    icosahedron, turned from round to round) are carried onto the surface, and measured. The seed
-//!    moves to the best one where that is better, by more than rounding.
-//! 3. After some rounds the step is halved, and the worse half of the seeds is given up, but for the
-//!    last few. Seeds that even the distance of all further steps could not bring to the best one
-//!    are given up at once, because distances are 1-Lipschitz.
+//!    moves to the best of them if that is better by more than rounding.
+//! 3. After some rounds the step is halved, and the worse half of the seeds is dropped, except the
+//!    last few. A seed is dropped at once if all further steps together could not raise it to the
+//!    best one: distances are 1-Lipschitz.
 //!
 //! The result is the distance at an actual point of the surface: still a lower bound of the true
-//! maximum. Directions follow the pose and ties are decided in it, so that the result moves along
-//! with the shape as the samples do ([`super::pose`]). Each round ends before the next begins, and seeds
-//! do not see each other within it: the result is the same for any number of threads.
+//! maximum. Directions and ties follow the pose, so the result does not change when the shape is
+//! turned ([`super::pose`]). Each round ends before the next begins, and seeds are independent within
+//! it: the result is the same for any number of threads.
 
 use rayon::prelude::*;
 
@@ -25,7 +25,7 @@ use crate::Vec3;
 use crate::complex::MedialUnion;
 use crate::surface::TriangleBvh;
 
-/// So many seeds are followed to the end.
+/// Seeds that are followed to the last step.
 const LAST_SEEDS: usize = 6;
 
 /// Rounds at one step.
@@ -34,7 +34,7 @@ const ROUNDS: usize = 3;
 /// Times that the step is halved: to a thousandth of the distance between samples.
 const HALVINGS: usize = 10;
 
-/// Seeds are taken from so many times more samples: the largest are often all in one place.
+/// Seeds are chosen among this many times as many samples: the largest are often all in one place.
 const CROWD: usize = 40;
 
 /// Smaller gains than this fraction of the diameter are rounding.
@@ -47,7 +47,7 @@ pub(super) struct Peak {
     pub value: f64,
 }
 
-/// Where the searches of the last query ended; the next one begins there.
+/// The results of the last searches, from which the next ones start.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Near {
     place: usize,
@@ -101,11 +101,11 @@ pub(super) struct Start<'a> {
     pub values: &'a [f64],
     /// Typical distance between samples.
     pub spacing: f64,
-    /// Seeds are at most so many.
+    /// Largest number of seeds.
     pub seeds: usize,
 }
 
-/// The points that are reached uphill from the largest of some samples, one for each seed.
+/// The points that the ascent reaches from the largest of some samples, one for each seed.
 pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Peak> {
     let mut climbers: Vec<(Peak, Near)> =
         start.pick().into_iter().map(|seed| (seed, Near::default())).collect();
@@ -121,7 +121,7 @@ pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Peak> {
         step *= 0.5;
         let keep = climbers.len().div_ceil(2).max(LAST_SEEDS);
         let best = climbers.first().map_or(0.0, |(peak, _)| peak.value);
-        // All steps still to come add up to two of the next ones for each round.
+        // Steps halve, so all that are still to come add up to twice the next ones.
         let hopeless = best - 2.0 * ROUNDS as f64 * step;
         let kept = climbers.partition_point(|(peak, _)| peak.value >= hopeless).min(keep);
         given_up.extend(climbers.drain(kept..).map(|(peak, _)| peak));
@@ -129,7 +129,7 @@ pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Peak> {
     climbers.into_iter().map(|(peak, _)| peak).chain(given_up).collect()
 }
 
-/// Moves a climber to the best of the points around it, where that is better.
+/// Moves a climber to the best of the points around it, if that is better.
 fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Peak, Near)) {
     let here = peak.point;
     for &arm in arms {
@@ -142,8 +142,8 @@ fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Peak, N
 }
 
 impl Start<'_> {
-    /// The largest samples that are apart from each other. Those that are equal up to rounding are
-    /// taken along the pose's curve, so that neither their numbering nor their orientation decides.
+    /// The largest samples that are at least a step apart. Samples equal up to rounding are taken in
+    /// the order of the pose's curve, which depends neither on numbering nor on orientation.
     fn pick(&self) -> Vec<Peak> {
         let grain = GAIN * self.pose.diameter();
         let rank =
@@ -164,8 +164,8 @@ impl Start<'_> {
         seeds
     }
 
-    /// The samples that seeds are taken from: whole classes of equal values, so that their order in
-    /// the list does not decide. What is no number has been reported as the maximum already.
+    /// The samples among which seeds are chosen: whole classes of equal values, so that their order
+    /// in the list does not matter. A value that is not a number is the maximum anyway.
     fn largest(&self) -> Vec<usize> {
         let values = self.values;
         let mut order: Vec<usize> = (0..values.len()).filter(|&k| values[k].is_finite()).collect();
@@ -186,7 +186,7 @@ impl Start<'_> {
 /// The corners of an icosahedron, turned differently in each round.
 fn directions(pose: &Pose, round: usize) -> [Vec3; 12] {
     const GOLDEN: f64 = 1.618_033_988_749_895;
-    // An angle that is no simple fraction of a turn, about an axis of no symmetry.
+    // Not a simple fraction of a turn, nor an axis of symmetry: no direction repeats.
     let axis = Vec3::new(0.267_261, 0.534_522, 0.801_784).normalize();
     let turn = glam::DQuat::from_axis_angle(axis, 2.399_963_2 * (round as f64 + 0.3));
     let [x, y, z] = pose.axes();

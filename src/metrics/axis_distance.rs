@@ -3,15 +3,16 @@
 //! Each axis is sampled and measured against the triangles, lone edges and isolated points of the
 //! other.
 //!
-//! - In space, radii are left aside. With radii an axis is a set of points `(x, y, z, r)`, linear
-//!   over each simplex, and distances are those of four-dimensional space: two axes in one place
-//!   whose radii differ by `d` everywhere are `d` apart.
+//! - In space, radii are ignored. With radii, an axis is a set of points `(x, y, z, r)`, linear over
+//!   each simplex, in four-dimensional space: two axes in the same place whose radii differ by `d`
+//!   everywhere are `d` apart.
 //! - Maxima are over samples of all triangles and lone edges, and all spheres.
-//! - Means are over the parts of the highest dimension that the sampled axis has: by area where it
-//!   has triangles, else by length, else over its points. A curve has no area to weigh it against
+//! - Means are over the parts of the highest dimension that the sampled axis has: by area if it has
+//!   triangles, else by length, else over its points. A curve has no area, so it has no weight beside
 //!   a sheet.
-//! - The *sheets* of the true axis are its sets of triangles that are connected across edges of
-//!   just two triangles. A sheet is covered where the computed axis is within [`COVERED`] in space.
+//! - A *sheet* of the true axis is a set of triangles connected across edges of exactly two
+//!   triangles. A point of a sheet is covered if the computed axis is within [`COVERED`] of it in
+//!   space.
 
 use glam::DVec4;
 
@@ -54,7 +55,7 @@ pub fn axis_distance(
     prepared_axis_distance(&computed, &truth, options)
 }
 
-/// As [`axis_distance`], of axes that may have been measured before.
+/// [`axis_distance`] for prepared axes, which can be measured several times.
 pub(super) fn prepared_axis_distance(
     computed: &PreparedAxis,
     truth: &PreparedAxis,
@@ -94,6 +95,7 @@ fn sheets(mesh: &MedialMesh) -> Vec<u32> {
     }
     let mut sheets = DisjointSets::singletons(mesh.faces.len());
     for (count, [first, second]) in faces_of_edge {
+        // Three triangles at an edge are a seam, where sheets end.
         if count == 2 {
             sheets.join(first, second);
         }

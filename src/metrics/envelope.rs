@@ -5,14 +5,14 @@
 //! another primitive are dropped:
 //!
 //! 1. Patches and their areas: `4 pi r^2`; `pi (1 - s^2) l (r_1 + r_2)`; two triangles for a slab.
-//! 2. A pilot run with an eighth of the samples tells which share survives.
-//! 3. The run proper is denser by that share, so that about the asked number survives; where less
-//!    than a tenth of the area does, by at most ten times, and more only as long as less than a
-//!    quarter of the asked number survives.
+//! 2. A pilot run with an eighth of the samples estimates the share that survives.
+//! 3. The main run is denser by that share, so that about the requested number survives. It makes at
+//!    most ten times as many candidates as requested samples, or more until a quarter of the
+//!    requested number survives.
 //!
-//! Spheres are sampled along an equal-area spiral, cones and triangles by low-discrepancy
-//! sequences, each patch turned or shifted at random, so that a patch with a single sample has it
-//! anywhere on it with equal probability.
+//! Spheres are sampled along an equal-area spiral, cones and triangles by low-discrepancy sequences.
+//! Each patch is turned or shifted at random, so that even a single sample is uniformly distributed
+//! over its patch.
 
 use std::f64::consts::{PI, TAU};
 
@@ -37,18 +37,20 @@ pub struct EnvelopeOptions {
     pub seed: u64,
 }
 
-/// The pilot run has so many times fewer candidates than samples are asked, but not fewer than this.
+/// The pilot run has one candidate for this many requested samples.
 const PILOT: f64 = 8.0;
-const LEAST_PILOT: f64 = 1000.0;
+/// The pilot run has at least this many candidates.
+const MIN_PILOT: f64 = 1000.0;
 
-/// The run proper makes at most this many candidates for each sample asked: beyond, nearly all of
-/// the patches' area is buried, and fewer samples than asked are returned.
+/// The main run makes at most this many candidates per requested sample. If more were needed, nearly
+/// all of the area is buried, and fewer samples than requested are returned.
 const USUAL_CANDIDATES: f64 = 10.0;
 
-/// More candidates are made only for as many samples as a maximum can rest on: this share of those asked.
-/// Where there are many balls they bury nearly all of each other.
-const LEAST_SHARE: f64 = 0.25;
-const MOST_CANDIDATES: f64 = 200.0;
+/// More candidates are made only until this share of the requested samples survives, enough for a
+/// maximum: many balls bury nearly all of each other.
+const MIN_SHARE: f64 = 0.25;
+/// But never more candidates per requested sample than this.
+const MAX_CANDIDATES: f64 = 200.0;
 
 /// The golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -83,29 +85,29 @@ pub(super) fn sample_envelope_along(
     let patches = patches(mesh);
     let total = patches.iter().map(Patch::area).sum::<f64>();
     let asked = options.samples as f64;
-    // The densest run's candidates per area: a total so small that this overflows is no area.
-    let densest = (asked * MOST_CANDIDATES).max(LEAST_PILOT) / total;
+    // Candidates per area of the densest run: if this overflows, the union has no area to speak of.
+    let densest = (asked * MAX_CANDIDATES).max(MIN_PILOT) / total;
     if !(total > 0.0 && total.is_finite() && densest.is_finite()) {
         return Ok(mesh.spheres.iter().map(|m| m.centre).collect());
     }
     let sampled = |candidates| sample_patches(&patches, axes, candidates / total, union, options);
-    let pilot = (asked / PILOT).max(LEAST_PILOT);
+    let pilot = (asked / PILOT).max(MIN_PILOT);
     let share = sampled(pilot).len() as f64 / pilot;
     let mut points = sampled(asked * candidates_for(share));
     let survivors = points.len() as f64 / (asked * candidates_for(share));
-    if (points.len() as f64) < LEAST_SHARE * asked
+    if (points.len() as f64) < MIN_SHARE * asked
         && candidates_for(survivors) > candidates_for(share)
     {
-        // The pilot run had too few survivors to tell their share.
+        // The pilot run had too few survivors to estimate their share.
         points = sampled(asked * candidates_for(survivors));
     }
     Ok(points)
 }
 
-/// Candidates for each sample asked where a share of them survives.
+/// Candidates per requested sample, if this share of them survives.
 fn candidates_for(share: f64) -> f64 {
     let usual = (1.0 / share).clamp(1.0, USUAL_CANDIDATES);
-    (LEAST_SHARE / share).clamp(usual, MOST_CANDIDATES)
+    (MIN_SHARE / share).clamp(usual, MAX_CANDIDATES)
 }
 
 /// A piece of the boundary of one primitive.
@@ -158,6 +160,7 @@ fn sample_patches(
         .zip(&counts)
         .enumerate()
         .flat_map_iter(|(index, (patch, &count))| {
+            // A stream per patch: points do not depend on which thread samples which patch.
             let stream = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let mut points = Vec::new();
             if count > 0 {
@@ -211,6 +214,7 @@ impl Patch {
             }
             Self::Triangle([a, b, c]) => points.extend((0..count).map(|i| {
                 let [mut s, mut t] = [0, 1].map(|k| (i as f64 * PLASTIC[k] + shift[k]).fract());
+                // The sequence fills a parallelogram; its other half is reflected into the triangle.
                 if s + t > 1.0 {
                     (s, t) = (1.0 - s, 1.0 - t);
                 }
@@ -221,11 +225,11 @@ impl Patch {
 }
 
 /// The unit vector orthogonal to a cone's axis in the direction of the first of `axes` that is not
-/// nearly along it.
+/// nearly parallel to the cone's axis.
 fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
     let [x, y, _] = axes;
-    // Below one half, so that the second will do where the first does not; and no simple fraction, so
-    // that rounding does not decide.
+    // Below one half, so that one of two orthogonal axes always qualifies; not a simple fraction, so
+    // that rounding does not decide for symmetric shapes.
     let is_across = |axis: Vec3| axis.reject_from_normalized(frame.u).length_squared() > 0.2137;
     frame.across(if is_across(x) { x } else { y }).unwrap_or(frame.v)
 }

@@ -13,7 +13,7 @@ pub struct Evaluation {
     /// Distances between the surface and the union of spheres, cones and slabs.
     #[serde(flatten)]
     pub distances: Distances,
-    /// An interval that holds the Hausdorff distance, where it was asked for.
+    /// An interval that contains the Hausdorff distance, if it was requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certified: Option<Certificate>,
     /// Volume of the symmetric difference of solid and union, over the solid's volume.
@@ -32,7 +32,7 @@ pub struct Evaluation {
     pub betti: [u64; 3],
     /// Euler number of the medial mesh, vertices - edges + faces.
     pub euler: i64,
-    /// What the solid's own topology demands: components, total genus, cavities.
+    /// The Betti numbers that the solid's topology implies: components, total genus, cavities.
     pub expected_betti: Option<[u64; 3]>,
     /// Sizes of the complex.
     pub counts: Counts,
@@ -76,12 +76,12 @@ pub struct Distances {
     pub spheres_only: f64,
     /// Number of surface samples, the mesh vertices included.
     pub samples: usize,
-    /// Number of samples on the boundary of the union: those that no primitive buries. A small number
-    /// says that nearly all of the primitives' area is buried, and that `reverse` rests on these few.
+    /// Number of samples on the boundary of the union, which no primitive buries. If it is small,
+    /// nearly all of the primitives' area is buried, and `reverse` rests on few samples.
     pub reverse_samples: usize,
 }
 
-/// Angles of the medial triangles, in degrees; Table I of the Q-MAT paper and two shares more.
+/// Angles of the medial triangles, in degrees: Table I of the Q-MAT paper and two further shares.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TriangleQuality {
     /// Mean over the triangles of the smallest angle.
@@ -94,11 +94,11 @@ pub struct TriangleQuality {
     pub below_10: Option<f64>,
     /// The same below 1 degree.
     pub below_1: Option<f64>,
-    /// Triangles of a height below 1e-12, counted here and in no mean or share.
+    /// Triangles with a height below 1e-12, which are counted here only and enter no mean or share.
     pub zero_area: u64,
 }
 
-/// Spike measures; none is defined in a paper, METHODOLOGY.md gives each definition.
+/// Spike measures. No paper defines them; METHODOLOGY.md does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spikes {
     /// For each threshold on the stability ratio: shares and counts.
@@ -107,8 +107,8 @@ pub struct Spikes {
     pub dangling_edges: u64,
     /// Faces with two or three boundary edges and a smallest angle below 10 degrees.
     pub fins: u64,
-    /// Boundary spheres whose ball sticks out of that of a neighbour at least as large by less than
-    /// 0.001.
+    /// Boundary spheres whose ball protrudes by less than 0.001 from the ball of a neighbour at least
+    /// as large.
     pub idle_spheres: u64,
     /// Spheres with a separation angle below 20 degrees, where contact points are known.
     pub angle_spikes: Option<u64>,
@@ -167,7 +167,8 @@ pub struct AxisDistances {
     pub in_space: AxisSpan,
     /// As sets of points with radii, in four-dimensional space.
     pub with_radius: AxisSpan,
-    /// How much of each sheet of the true axis the computed one covers, the largest sheet first.
+    /// For each sheet of the true axis how much of it the computed axis covers; the largest sheet
+    /// first.
     pub coverage: Vec<SheetCoverage>,
 }
 

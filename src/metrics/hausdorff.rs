@@ -1,25 +1,26 @@
 //! Distances between a surface and the union of medial primitives, both ways.
 //!
-//! 1. The surface S is sampled uniformly by area; its vertices are added, because the largest
-//!    error is usually at one. The same samples for every medial mesh ([`super::samples`]).
+//! 1. The surface S is sampled uniformly by area, and its vertices are added, because the largest
+//!    error is usually at one. Every medial mesh gets the same samples ([`super::samples`]).
 //! 2. Each sample is measured against the union U: `|sigma|` and `mu` of
 //!    [`MedialUnion`], and `|sigma|` of the spheres alone.
 //! 3. The boundary of U is sampled uniformly by area ([`super::envelope`]) and measured against S.
-//! 4. From the largest samples of each distance, the maximum is sought uphill ([`super::ascent`]).
+//! 4. From the largest samples of each distance, local ascent looks for the maximum
+//!    ([`super::ascent`]).
 //!
-//! Means, root mean squares and percentiles are those of the area-uniform samples; maxima are over
-//! all samples and the points that were reached from them.
+//! Means, root mean squares and percentiles are over the area-uniform samples; maxima are over all
+//! samples and the points that the ascent reached.
 //!
 //! # Biases
-//! - A maximum is the distance at an actual point, so a lower bound of the true one. Distances are
-//!   1-Lipschitz: it falls short by at most the largest distance from a point of the surface to the
-//!   nearest sample, and by that only where no ascent led to the true place. The ascent is local: nothing
-//!   but [`certify`](super::certify) proves a maximum.
+//! - A reported maximum is the distance at an actual point, so a lower bound of the true one. Since
+//!   distances are 1-Lipschitz, it falls short by at most the largest distance from a point of the
+//!   surface to the nearest sample, and only if no ascent reached the true place. The ascent is local:
+//!   only [`certify`](super::certify) proves a maximum.
 //! - Where S runs inside U, `|sigma|` is a lower bound of the distance to the boundary of U:
 //!   `epsilon_union` is the distance between the surfaces only where S runs outside U. The reverse
 //!   distance, which is exact, covers the other case.
-//! - Points of U's boundary that some primitive covers by less than the burial depth are kept, so
-//!   strips along the tangent curves of neighbouring primitives count more than once in
+//! - A point that another primitive covers by less than the burial depth counts as on U's boundary.
+//!   So strips along the curves where neighbouring primitives touch count more than once in
 //!   `reverse_mean`.
 
 use super::Distances;
@@ -146,9 +147,10 @@ pub(super) fn distances_with_envelope(
     let epsilon_union = highest(bvh, &start, signed);
     let unsigned = |p, near: &mut usize| union.unsigned_from(p, near);
     let epsilon = highest(bvh, &Start { values: &mu, ..start }, unsigned);
-    // Where the nearest surface of a primitive is far, so is that of the union.
+    // |sigma| >= mu at every point, so the maximum found for mu bounds it, too.
     let epsilon_union = epsilon_union.max(epsilon);
     let of_balls = |p, near: &mut usize| balls.signed_from(p, near).abs();
+    // Fewer seeds: this is a figure beside the others, not one that results are compared by.
     let aside = Start { values: &spheres, seeds: SEEDS / 3, ..start };
     let spheres_only = highest(bvh, &aside, of_balls);
     let envelope = EnvelopeOptions {
@@ -158,6 +160,7 @@ pub(super) fn distances_with_envelope(
     };
     let envelope = sample_envelope_along(pose.axes(), mesh, union, &envelope)?;
     let mut envelope = Envelope { distances: bvh.distance_batch(&envelope), points: envelope };
+    // Before the ascent adds points, which are not uniform.
     let reverse_mean = Summary::new(&envelope.distances).mean;
     let reverse_samples = envelope.points.len();
     let hill = OnUnion { union, surface: bvh, burial: EXPOSED * pose.diameter() };
@@ -184,7 +187,7 @@ pub(super) fn distances_with_envelope(
 }
 
 impl Envelope {
-    /// Adds points that are samples of no mean.
+    /// Adds points that count for the maximum but not for the mean.
     fn extend(&mut self, peaks: Vec<Peak>) {
         self.points.extend(peaks.iter().map(|peak| peak.point));
         self.distances.extend(peaks.iter().map(|peak| peak.value));
@@ -202,12 +205,12 @@ pub(super) fn highest(
     largest(&[largest(start.values), largest(&peaks)])
 }
 
-/// Depth, as a fraction of the surface's diameter, from which a point that was reached uphill is not on
+/// Depth, as a fraction of the surface's diameter, from which a point reached by the ascent is not on
 /// the union's boundary.
 const EXPOSED: f64 = 1e-12;
 
-/// Depth, as a fraction of the surface's diameter, from which a point of one primitive's surface
-/// counts as buried in another primitive and not as a point of the union's boundary.
+/// Depth, as a fraction of the surface's diameter, from which a sample of one primitive's surface
+/// counts as buried in another primitive, and not as on the union's boundary.
 const BURIAL: f64 = 1e-7;
 
 fn absolute(mut values: Vec<f64>) -> Vec<f64> {
@@ -217,7 +220,7 @@ fn absolute(mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// Largest of some distances; not a number if one is not, so that it cannot pass for a small error.
+/// Largest of some distances; not a number if one is not, which must not pass for a small error.
 fn largest(values: &[f64]) -> f64 {
     let larger = |a: f64, b: f64| if a.is_nan() || b <= a { a } else { b };
     values.iter().copied().fold(0.0, larger)
@@ -232,7 +235,8 @@ struct Summary {
 }
 
 impl Summary {
-    /// Percentiles are nearest ranks: the smallest value that at least that share does not exceed.
+    /// Percentiles are nearest ranks: the smallest value that at least this share of all values does
+    /// not exceed.
     fn new(values: &[f64]) -> Self {
         let count = values.len().max(1) as f64;
         let mut sorted = values.to_vec();

@@ -17,11 +17,11 @@ use crate::complex::{MedialMesh, MedialUnion, betti, euler};
 use crate::surface::TriangleBvh;
 use crate::surface::{InsideTest, Side, TriMesh};
 
-/// Mean error from which radii that do not fit the surface are named. Below, the result is right
-/// whatever its radii.
+/// Mean error from which radii that do not fit the surface cause a warning. A result with a smaller
+/// error is right, whatever its radii.
 const LARGE_MEAN: f64 = 0.005;
 
-/// Centres nearer to the surface than this say nothing about radii.
+/// For centres closer to the surface than this the ratio of radius to distance means nothing.
 const ON_SURFACE: f64 = 1e-6;
 
 /// How results are measured.
@@ -30,7 +30,7 @@ pub struct JudgeOptions {
     /// Area-uniform samples on the surface, beside its vertices, and about as many on the
     /// boundary of the union.
     pub samples: usize,
-    /// Levels of division of space for the volume difference; 0 leaves it out.
+    /// Levels of subdivision of space for the volume difference; 0 skips it.
     pub volume_depth: u32,
     /// Seed of every sample.
     pub seed: u64,
@@ -42,10 +42,10 @@ impl Default for JudgeOptions {
     }
 }
 
-/// What a result must agree with, whatever method it came from.
+/// Known facts that every result should agree with, whatever its method.
 #[derive(Clone, Debug, Default)]
 pub struct Truth {
-    /// Betti numbers that the solid's topology demands of its medial axis.
+    /// Betti numbers that the medial axis must have by the solid's topology.
     pub betti: Option<[u64; 3]>,
     /// The exactly known medial axis, in the units of the surface.
     pub axis: Option<MedialMesh>,
@@ -59,10 +59,10 @@ pub struct Judge {
     tree: Arc<TriangleBvh>,
     inside: Arc<InsideTest>,
     truth: Truth,
-    /// Those of the surface, laid out once for all medial meshes.
+    /// Samples of the surface, made once for all medial meshes.
     samples: Result<SurfaceSamples, MetricError>,
-    /// The true axis, prepared at once and not on demand: waiting for another thread to do so, a
-    /// worker would wait for itself.
+    /// The true axis. Prepared eagerly: prepared on demand inside a parallel task, a worker could
+    /// wait for itself.
     true_axis: Option<Result<PreparedAxis, MetricError>>,
     options: JudgeOptions,
 }
@@ -87,7 +87,7 @@ impl Judge {
         self.options
     }
 
-    /// What results must agree with.
+    /// The known facts about the true axis.
     pub fn truth(&self) -> &Truth {
         &self.truth
     }
@@ -98,12 +98,12 @@ impl Judge {
     /// # Errors
     /// When the mesh has no sphere or is not valid.
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
-        // Random numbers and sums follow the order of the spheres.
+        // In the order of the pose, since random numbers and sums follow the order of the spheres.
         let samples = self.samples()?;
         let (mesh, union) = &samples.ordered(mesh)?;
         let axis = || self.true_axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
         let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
-        // Side by side, because parts of each run on one thread.
+        // In parallel with each other, because each has serial parts.
         let distances =
             || distances_with_envelope(&self.tree, mesh, union, samples, &self.distance_options());
         let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
@@ -114,7 +114,7 @@ impl Judge {
         let mut warnings = self.misfits(mesh, union, &distances);
         warnings.extend(topology_warning(betti, self.truth.betti));
         let volume_error = match volume_error {
-            // All else is defined, and the surface was taken for a solid.
+            // The surface was accepted as a solid, and all other measures are defined.
             Err(MetricError::NoVolume(volume)) => {
                 warnings.push(format!(
                     "the surface's volume is lost to rounding ({volume:.1e} of the cube of its \
@@ -211,8 +211,8 @@ impl Judge {
         prepared_axis_distance(&PreparedAxis::new(mesh)?, truth, &options)
     }
 
-    /// Signs that the medial mesh does not belong to this surface: published files have had the
-    /// wrong units or radii.
+    /// Signs that the medial mesh does not belong to this surface: some published files have wrong
+    /// units or radii.
     fn misfits(
         &self,
         mesh: &MedialMesh,
@@ -247,7 +247,7 @@ impl Judge {
             && distances.mean > LARGE_MEAN
         {
             let off = !(2.0 / 3.0..=1.5).contains(&median);
-            // One factor for all, which no simplification gives.
+            // The same factor for all radii is not the work of a simplification.
             let scaled = (median - 1.0).abs() > 0.1 && high < 1.1 * low;
             if off || scaled {
                 let times = match median {
@@ -264,8 +264,8 @@ impl Judge {
         misfits
     }
 
-    /// Quartiles of the radii over the distances of their centres to the surface; `None` where all
-    /// centres lie on it.
+    /// Quartiles of the ratio of radius to distance of the centre from the surface; `None` if all
+    /// centres lie on the surface.
     fn radius_quartiles(&self, mesh: &MedialMesh) -> Option<[f64; 3]> {
         let centres: Vec<_> = mesh.spheres.iter().map(|s| s.centre).collect();
         let depths = self.tree.distance_batch(&centres);

@@ -1,7 +1,7 @@
 //! A medial axis as a set of spheres: points `(x, y, z, r)` of four-dimensional space.
 //!
-//! Triangles, segments and points are searched through the tree of their boxes in space, which is a
-//! projection and so never farther than they are.
+//! Triangles, segments and points are found through a tree of their boxes in space. Space is a
+//! projection of the four dimensions, so a box is never farther than its contents.
 
 use std::ops::Range;
 
@@ -12,8 +12,8 @@ use crate::Vec3;
 use crate::complex::Sphere;
 use crate::geometry::trees::{Bounds, Node, Plan, Search, Tree};
 
-/// Squared sine of the angle of two sides below which a triangle is measured by its sides alone.
-const THIN: f64 = 1e-24;
+/// Squared sine of the angle of two sides, below which only the sides of a triangle are measured.
+const MIN_SINE_SQUARED: f64 = 1e-24;
 
 /// The sphere as a point.
 pub(super) fn lifted(sphere: &Sphere) -> DVec4 {
@@ -36,8 +36,8 @@ impl LiftedAxis {
         Self { tree, simplices }
     }
 
-    /// Distances of some points, in their order, in parallel. Quicker where each point is close to the
-    /// one before, whose nearest simplex is tried first.
+    /// Distances of some points, in their order, in parallel. Faster if each point is close to the one
+    /// before, because that one's nearest simplex is tried first.
     pub fn distances(&self, points: &[DVec4]) -> Vec<f64> {
         let along = |chunk: &[DVec4]| {
             let mut nearest = None;
@@ -73,12 +73,12 @@ impl<'a> Nearest<'a> {
         Self { axis, p, place: p.truncate(), distance, simplex: None, to: DVec4::ZERO }
     }
 
-    /// Whether all corners lie beyond the plane through the nearest point so far, across the way to
-    /// it: then so does the simplex, and a quick look will do.
+    /// Whether all corners, and so the simplex, lie beyond the plane through the nearest point so far
+    /// orthogonal to the direction to it. Then the simplex is no nearer, and need not be measured.
     #[inline]
     fn is_beyond(&self, corners: &[DVec4; 3]) -> bool {
-        let most = self.distance * self.distance;
-        corners.iter().all(|&corner| (corner - self.p).dot(self.to) >= most)
+        let squared = self.distance * self.distance;
+        corners.iter().all(|&corner| (corner - self.p).dot(self.to) >= squared)
     }
 }
 
@@ -108,14 +108,14 @@ impl Search for Nearest<'_> {
     }
 }
 
-/// From a point to the nearest one of a triangle, in any position.
+/// The vector from a point to the nearest point of a triangle, degenerate or not.
 #[inline]
 fn towards(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> DVec4 {
     let (u, v, w) = (b - a, c - a, p - a);
     let [uu, uv, vv] = [u.dot(u), u.dot(v), v.dot(v)];
     let [wu, wv] = [w.dot(u), w.dot(v)];
     let determinant = uu * vv - uv * uv;
-    if determinant > THIN * uu * vv {
+    if determinant > MIN_SINE_SQUARED * uu * vv {
         let (s, t) = ((wu * vv - wv * uv) / determinant, (wv * uu - wu * uv) / determinant);
         if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
             return s * u + t * v - w;
@@ -126,7 +126,7 @@ fn towards(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> DVec4 {
     shorter(sides, towards_segment(p, b, c))
 }
 
-/// From a point to the nearest one of a segment.
+/// The vector from a point to the nearest point of a segment.
 #[inline]
 fn towards_segment(p: DVec4, from: DVec4, to: DVec4) -> DVec4 {
     let (along, w) = (to - from, p - from);

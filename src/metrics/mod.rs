@@ -1,6 +1,6 @@
-//! What a medial mesh is judged by: Hausdorff distances, triangle quality, spikes, topology.
+//! Measures of a medial mesh: Hausdorff distances, triangle quality, spikes, topology.
 //!
-//! [`Judge`] runs them all; each can be had alone.
+//! [`Judge`] runs them all; each can be computed alone.
 
 mod ascent;
 mod axis_distance;

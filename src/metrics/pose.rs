@@ -1,24 +1,24 @@
 //! A frame that moves along with a surface.
 //!
-//! Samples are laid out along axes and in the order of a list. Were these the coordinate axes and
-//! the order of the file, then a rotation or another numbering of the same input would give other
-//! samples and, within what sampling misses, other numbers. The pose has axes and orders that
-//! depend on nothing but the shape:
+//! Samples depend on axes and on the order of a list. With the coordinate axes and the order of the
+//! file, a rotation or another numbering of the same input would give other samples, and slightly
+//! other numbers. The axes and orders of the pose depend on the shape alone:
 //!
-//! 1. The origin `c` is the mean of the surface's vertices. It is summed in fixed point, so that no
-//!    bit of it depends on their order.
+//! 1. The origin `c` is the mean of the surface's vertices, summed in fixed point, so that it does not
+//!    depend on their order.
 //! 2. The first axis leads from `c` to the vertex `p` that is farthest from it, the second to the
 //!    vertex `q` that is farthest from that axis. Distances are weighted by the area around a
 //!    vertex (up to a tenth), so that the vertices of a round shape are not all equally far. The
 //!    third is the cross product: reflections are told apart.
-//! 3. A shape with symmetries has several such pairs, equal up to rounding. The least of a sum
-//!    of one function, neither odd nor even, over all triangles in the frame decides. Where all is equal
-//!    even then, the frames are images of each other under a symmetry of the surface, and the first by
-//!    coordinates is taken. A medial mesh that shares the symmetry gets the same numbers in any of
-//!    them; one that does not is measured by another set of samples once both are turned.
+//! 3. A shape with symmetries has several such pairs, equal up to rounding. Then a function that is
+//!    neither odd nor even is summed over all triangles in each frame, and the frame with the least
+//!    sum is taken. Frames with equal sums are images of each other under a symmetry of the surface,
+//!    and the first by coordinates is taken. A medial mesh with the same symmetry gets the same
+//!    numbers in any of them. A medial mesh without it may be measured by other samples when both are
+//!    turned.
 //!
-//! What is ordered is ordered along a Morton curve in this frame, through cells set off from all round
-//! numbers, so that the rounding of a rotation moves nothing into another cell.
+//! All lists are ordered along a Morton curve in this frame. Its cells are offset from all round
+//! numbers, so that the rounding of a rotation hardly ever moves a point into another cell.
 
 use std::cell::LazyCell;
 use std::cmp::Ordering;
@@ -34,17 +34,17 @@ use crate::surface::TriMesh;
 /// Candidates whose distances agree to this, as a fraction, are equally far.
 const EQUAL: f64 = 1e-9;
 
-/// Sums over everything that agree to this belong to symmetric frames.
+/// Frames whose sums over all triangles agree to this are symmetric to each other.
 const SYMMETRIC: f64 = 1e-10;
 
-/// Candidates times the triangles that they are compared by. A polyhedral group has 120
-/// elements, the rim of a solid of revolution some hundreds of vertices. Of more candidates the first by
-/// coordinates are compared, so that samples may depend on the orientation where a million triangles have
-/// more than a hundred symmetries.
-const MOST_COMPARISONS: usize = 1 << 27;
+/// Bound on the number of candidates times the number of triangles. A polyhedral group has 120
+/// elements, the rim of a solid of revolution some hundreds of vertices. Beyond the bound only the
+/// first candidates by coordinates are compared. So for a million triangles with more than a hundred
+/// symmetries the samples may depend on the orientation.
+const MAX_COMPARISONS: usize = 1 << 27;
 
-/// Second axes that are compared for a first one, the first by coordinates: bounds the memory.
-const MOST_SECOND_AXES: usize = 1024;
+/// Bound on the second axes that are compared for each first axis, to bound the memory.
+const MAX_SECOND_AXES: usize = 1024;
 
 /// Axes and origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +57,8 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    /// The pose of a surface; along the coordinate axes when it has no extent. Linear but for shapes with
-    /// symmetries, where it is linear for each of them.
+    /// The pose of a surface; along the coordinate axes if the surface has no extent. Linear time, for
+    /// shapes with symmetries times their number.
     ///
     /// # Panics
     /// If a face names a vertex that does not exist.
@@ -84,8 +84,8 @@ impl Pose {
         self.axes
     }
 
-    /// Twice the distance of the farthest vertex from the origin: of the order of the bounding box's
-    /// diagonal, but the same however the surface is turned.
+    /// Twice the distance of the farthest vertex from the origin: about as large as the diagonal of
+    /// the bounding box, but independent of the orientation.
     pub fn diameter(&self) -> f64 {
         2.0 * self.size
     }
@@ -142,9 +142,9 @@ impl Pose {
         self.place(p, 0.0)
     }
 
-    /// Where a point is on the curve; points in one cell by finer coordinates, and by a radius.
+    /// The place of a point on the curve; within a cell finer coordinates decide, then the radius.
     fn place(&self, p: Vec3, radius: f64) -> Place {
-        // From 0.17 to 0.83, off all simple fractions.
+        // From 0.17 to 0.83: the surface is inside the curve's cube, with room around it.
         let local = self.local(p) / (3.0 * self.size) + OFFSET;
         let fine = [local.x, local.y, local.z, radius / self.size + OFFSET.x];
         Place {
@@ -154,10 +154,10 @@ impl Pose {
     }
 }
 
-/// Half, and a little that is no simple fraction.
+/// A half plus a little, so that the cells of the curve do not start at simple fractions.
 const OFFSET: Vec3 = Vec3::new(0.500_731_923_846_1, 0.500_263_847_195_7, 0.500_519_283_746_3);
 
-/// Far above rounding, far below what matters.
+/// Resolution of the finer coordinates: far coarser than rounding, far finer than any sample.
 const FINE: f64 = (1_u64 << 38) as f64;
 
 /// A place on the curve.
@@ -170,7 +170,7 @@ pub(super) struct Place {
 /// The vertices that faces use.
 struct Corners {
     points: Vec<Vec3>,
-    /// One and up to a tenth more, by the area around.
+    /// From 1 to 1.1, growing with the area around the vertex.
     weights: Vec<f64>,
 }
 
@@ -241,12 +241,12 @@ fn centroids(surface: &TriMesh, origin: Vec3, size: f64) -> Vec<Vec3> {
 }
 
 impl Corners {
-    /// Steps 2 and 3; `marks` are what breaks symmetries, made only where there may be some.
+    /// Steps 2 and 3; `marks` gives the points that break ties, computed only if there are ties.
     fn axes(&self, origin: Vec3, marks: impl Fn() -> Vec<Vec3>) -> Option<[Vec3; 3]> {
         let marks = LazyCell::new(marks);
         let first = self.farthest(|v| v.distance(origin));
         let first = first.into_iter().filter_map(|p| (p - origin).try_normalize()).collect();
-        // By what is the same all around the axis.
+        // A function that is the same all around the axis, since the other two are not yet chosen.
         let first = least(
             first,
             || &*marks,
@@ -259,9 +259,9 @@ impl Corners {
             let across = move |v: Vec3| (v - origin).reject_from_normalized(x);
             let second = self.farthest(|v| across(v).length());
             let frame = move |v: Vec3| across(v).try_normalize().map(|y| [x, y, x.cross(y)]);
-            second.into_iter().take(MOST_SECOND_AXES).filter_map(frame).collect::<Vec<_>>()
+            second.into_iter().take(MAX_SECOND_AXES).filter_map(frame).collect::<Vec<_>>()
         };
-        let most = (MOST_COMPARISONS / self.points.len()).max(1);
+        let most = (MAX_COMPARISONS / self.points.len()).max(1);
         let frames = first[..first.len().min(most)].par_iter().flat_map_iter(frames).collect();
         let frames = least(
             frames,
@@ -274,8 +274,8 @@ impl Corners {
     }
 }
 
-/// Of several candidates those with the least sum over all marks, up to rounding; the sum is that of a
-/// function that is neither odd nor even of `argument`.
+/// Of several candidates those with the least sum over all marks, up to rounding. The summed function
+/// of `argument` is neither odd nor even, so that reflected frames differ.
 fn least<'m, T: Copy + Send + Sync>(
     mut candidates: Vec<T>,
     marks: impl Fn() -> &'m Vec<Vec3>,
@@ -285,7 +285,7 @@ fn least<'m, T: Copy + Send + Sync>(
         return candidates;
     }
     let marks = marks();
-    candidates.truncate((MOST_COMPARISONS / marks.len().max(1)).max(1));
+    candidates.truncate((MAX_COMPARISONS / marks.len().max(1)).max(1));
     let value = |candidate: &T| {
         let mut sum = Sum::default();
         for &d in marks {

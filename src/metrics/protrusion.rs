@@ -1,13 +1,14 @@
-//! How far the union of the medial primitives leaves the solid.
+//! How far the union of the medial primitives extends beyond the solid.
 //!
-//! Of the points of the union's boundary at which the reverse distance is measured (samples, and those
-//! reached uphill from them), the first one outside the solid, from the farthest from the surface on, gives the protrusion.
+//! The points are those of the reverse distance: samples of the union's boundary, and points that the
+//! ascent reached from them. They are tested from the farthest from the surface on; the first one
+//! outside the solid gives the protrusion.
 
 use super::hausdorff::Envelope;
 use crate::complex::MedialMesh;
 use crate::surface::{InsideTest, Side};
 
-/// Points that are tested together.
+/// Points that are tested together. Usually the first batch has the answer.
 const BATCH: usize = 1024;
 
 /// Largest distance from the surface of a boundary point of the union that is outside the solid, 0

@@ -6,8 +6,8 @@ use super::TriangleQuality;
 use crate::Vec3;
 use crate::complex::{MedialMesh, ZERO_LENGTH};
 
-/// Angles of the triangles of centres. Triangles whose smallest height is below [`ZERO_LENGTH`]
-/// have no angles to speak of; they are counted apart and enter no mean or share.
+/// Angles of the triangles of centres. The angles of triangles with a height below [`ZERO_LENGTH`] are
+/// rounding; such triangles are counted separately and enter no mean or share.
 ///
 /// Lengths are in units of the bounding-box diagonal. Means and shares are `None` when no
 /// triangle is left. Cost `O(F)`.

@@ -1,8 +1,8 @@
 //! Samples of a surface, the same for every medial mesh that is measured against it.
 //!
-//! They are laid out in a frame of the surface ([`Pose`]) and in the order of a curve in it, so that neither
-//! its orientation nor the order of its file matters. Only where the surface looks the same in several
-//! frames and the medial mesh does not, the samples of a turned input are another set.
+//! They are made in a frame of the surface ([`Pose`]) and in the order of a curve in it, so that
+//! neither the orientation of the surface nor the order of its file matters. There is one exception:
+//! if the surface is symmetric and the medial mesh is not, a turned input can get other samples.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -28,11 +28,11 @@ pub(super) struct SurfaceSamples {
     spacing: f64,
 }
 
-/// Largest samples from which an ascent starts.
+/// Number of samples from which an ascent starts.
 pub(super) const SEEDS: usize = 72;
 
 impl SurfaceSamples {
-    /// So many area-uniform samples of a surface. `O(n log n)`.
+    /// `count` area-uniform samples of a surface, and its vertices. `O(n log n)`.
     pub fn new(surface: &TriMesh, count: usize, seed: u64) -> Result<Self, MetricError> {
         if count == 0 {
             return Err(MetricError::NoSamples("surface_samples"));
@@ -76,15 +76,15 @@ fn area(surface: &TriMesh) -> f64 {
     sum.value()
 }
 
-/// Sets the random numbers apart from those of [`crate::surface::sample`] with the same seed: a medial
-/// mesh made from samples has no error at just these.
+/// Makes the random numbers differ from those of [`crate::surface::sample`] with the same seed. A
+/// medial mesh has no error at the samples that it was made from, so it must not be measured there.
 const STREAM: u64 = 0x6d65_6173_7572_6521;
 
 /// `count` points, uniform by area and stratified along the list of triangles; `None` when there
 /// is no area or it is not finite.
 ///
-/// Stratified, unlike the independent points of [`crate::surface::Sampling::AreaUniform`]: their
-/// means scatter less, and small parts are not left out by chance.
+/// Stratified, unlike the independent points of [`crate::surface::Sampling::AreaUniform`]: means
+/// have less variance, and small parts are not missed by chance.
 fn sample_triangles(triangles: &[[Vec3; 3]], count: usize, seed: u64) -> Option<Vec<Vec3>> {
     let placed = place_on_triangles(triangles, count, seed)?;
     Some(placed.iter().map(|placed| placed.on(triangles)).collect())
@@ -99,7 +99,7 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// The point, on the triangle in whatever space.
+    /// The point, for triangles in a space of any dimension.
     pub fn on<V>(&self, triangles: &[[V; 3]]) -> V
     where
         V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f64, Output = V>,
@@ -143,6 +143,7 @@ pub(super) fn place_on_triangles(
 }
 
 fn uniform_in(triangle: usize, rng: &mut Pcg64) -> Placed {
+    // The root makes the density uniform: it compensates for rows that widen away from a corner.
     let root = rng.random::<f64>().sqrt();
     let v = rng.random::<f64>();
     Placed { triangle, weights: [root * (1.0 - v), root * v] }

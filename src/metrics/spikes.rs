@@ -1,4 +1,4 @@
-//! Spike measures. No paper defines a count; these look at a spike from six sides.
+//! Spike measures. No paper defines a count, so there are six measures of different aspects.
 //!
 //! With the stability ratio `G` of an edge ([`stability_ratio`]) and a threshold `tau`:
 //!
@@ -7,20 +7,20 @@
 //!    "number of spikes";
 //! 3. dangling edges: no face, and an end with no other edge; all, and those with `G < tau`;
 //! 4. fins: faces with two or three boundary edges and a smallest angle below 10 degrees;
-//! 5. idle spheres: on the boundary, with a ball that sticks out of a neighbour's at least as
-//!    large, but for rounding, by less than `eta`;
+//! 5. idle spheres: on the boundary, with a ball that protrudes by less than `eta` from the ball of a
+//!    neighbour that is, up to rounding, at least as large;
 //! 6. angle spikes: spheres whose contact points subtend less than 20 degrees at the centre.
 //!
-//! Spheres that coincide (edges below [`ZERO_LENGTH`], triangles without area) make no spike: such
-//! edges enter measures 1 to 3, and such triangles measure 4, neither above nor below the line. A
-//! regular grid has as many coincident circumcentres as others, and with their ratio of zero by
-//! convention a perfect axis would look worse than a noisy one.
+//! Coincident spheres make no spike: edges below [`ZERO_LENGTH`] are left out of measures 1 to 3 (of
+//! the shares in numerator and denominator), triangles without area out of measure 4. In a regular
+//! grid many circumcentres coincide. Their edges have the ratio zero by convention, so a perfect axis
+//! would look worse than a noisy one.
 //!
 //! An edge is a *boundary edge* when it has one face, a sphere is *on the boundary* when one of
 //! its edges has at most one face.
 //!
-//! None is zero on every exact axis. On a sheet with object angle `a` the ratio goes down to
-//! `1 - cos a`: 0.29 on a box, 0.13 at a convex edge of 120 degrees, 0 at the rim of a smooth
+//! No measure is zero on every exact axis. On a sheet with object angle `a` the ratio can be as small
+//! as `1 - cos a`: 0.29 on a box, 0.13 at a convex edge of 120 degrees, 0 at the rim of a smooth
 //! shape. Compare with the value on the exact axis, not with zero.
 
 use super::counts::degrees;
@@ -32,10 +32,10 @@ use crate::geometry::separation_angle;
 
 /// The thresholds `tau` on the stability ratio.
 pub const RATIO_THRESHOLDS: [f64; 3] = [0.05, 0.1, 0.2];
-/// How far an idle sphere may stick out, as a fraction of the bounding-box diagonal.
+/// Largest protrusion of an idle sphere, as a fraction of the bounding-box diagonal.
 pub const IDLE_PROTRUSION: f64 = 1e-3;
-/// Radii that differ by less are equal, so that rounding does not decide about plates and tubes, whose
-/// radii are all the same; as a fraction of the bounding-box diagonal.
+/// Radii that differ by less count as equal, as a fraction of the bounding-box diagonal. Otherwise
+/// rounding would decide about plates and tubes, whose radii are all the same.
 pub const EQUAL_RADII: f64 = 1e-9;
 /// Smallest angle of a fin, in degrees.
 pub const FIN_ANGLE: f64 = 10.0;
@@ -60,7 +60,7 @@ pub fn spikes(mesh: &MedialMesh) -> Spikes {
     }
 }
 
-/// What measures 1 to 3 ask of the edges, once for all thresholds.
+/// The properties of edges for measures 1 to 3, computed once for all thresholds.
 struct EdgeFacts {
     ratios: Vec<f64>,
     /// Zero where the ends coincide.
@@ -112,7 +112,7 @@ impl EdgeFacts {
         }
     }
 
-    /// Measure 2. Edges without length carry a component on, but do not make one.
+    /// Measure 2. Edges without length extend a component, but alone they are none.
     fn spikes_on_the_boundary(&self, mesh: &MedialMesh, threshold: f64) -> u64 {
         let weak = || (0..self.ratios.len()).filter(|&edge| self.ratios[edge] < threshold);
         let mut components = DisjointSets::singletons(mesh.spheres.len());
@@ -158,8 +158,8 @@ fn idle_spheres(mesh: &MedialMesh, boundary: &[bool]) -> u64 {
     idle.into_iter().filter(|&i| i).count() as u64
 }
 
-/// Whether a ball sticks out of another, at least as large but for [`EQUAL_RADII`], by less than
-/// [`IDLE_PROTRUSION`].
+/// Whether a ball protrudes by less than [`IDLE_PROTRUSION`] from another that is at least as large,
+/// up to [`EQUAL_RADII`].
 fn is_idle_beside(ball: Sphere, neighbour: Sphere) -> bool {
     let growth = neighbour.radius - ball.radius;
     growth > -EQUAL_RADII && ball.centre.distance(neighbour.centre) - growth < IDLE_PROTRUSION

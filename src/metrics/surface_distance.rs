@@ -1,15 +1,14 @@
-//! Distances between two triangle meshes, both ways: what a surface that was simplified directly
-//! is measured by, with the samples and definitions of [`super::distances`].
+//! Distances between two triangle meshes, both ways: the measure of directly simplified surfaces,
+//! with the samples and definitions of [`super::distances`].
 //!
 //! 1. The reference S is sampled as there: the same points for the same seed, its vertices added.
 //! 2. Each sample is measured against the other surface T.
-//! 3. T is sampled uniformly by area, its vertices added, and measured against S. The boundary of a
-//!    union has no vertices to add; where a decimated surface is farthest is often one of its own.
+//! 3. T is sampled uniformly by area, its vertices are added, and both are measured against S. A
+//!    decimated surface is often farthest at one of its vertices; the boundary of a union has none.
+//! 4. Local ascent from the largest samples looks for the maxima, as there.
 //!
-//! 4. Maxima are sought uphill from the largest samples, as there.
-//!
-//! Distances between surfaces are exact, so nothing here is a bound but the maxima, which may fall
-//! short of the true ones.
+//! Distances between surfaces are exact, so only the maxima are bounds: they may fall short of the
+//! true ones.
 
 use serde::{Deserialize, Serialize};
 

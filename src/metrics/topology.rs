@@ -1,6 +1,6 @@
-//! What is to be said of Betti numbers that are not the solid's.
+//! The warning about Betti numbers that differ from the solid's.
 
-/// A sentence where the Betti numbers of a medial mesh are known not to be the solid's.
+/// A sentence about the difference, if the Betti numbers of a medial mesh are not the solid's.
 ///
 /// ```
 /// use medial::metrics::topology_warning;

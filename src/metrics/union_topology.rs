@@ -1,19 +1,19 @@
 //! Betti numbers of the union of spheres, cones and slabs: the reconstruction, not the medial mesh.
 //!
 //! A medial mesh and its union can differ: where parts that are far apart along the mesh meet in
-//! space, the union has a loop that the mesh has not (Li et al. 2015, figure 20).
+//! space, the union has a loop that the mesh does not have (Li et al. 2015, figure 20).
 //!
-//! The primitives are replaced by balls at a given spacing, and the Betti numbers are those of the
-//! dual complex of these balls, which are exact for the balls (Edelsbrunner 1995). The surface of the
-//! balls runs below that of a primitive of radius `r` by up to about `spacing^2 / (8 r)`, in slabs
-//! twice that, so that contacts shallower than this are missed, and a gap is never taken for one.
+//! The primitives are replaced by balls at a given spacing. The Betti numbers are those of the dual
+//! complex of the balls, which are exact for the balls (Edelsbrunner 1995). The surface of the balls
+//! lies below that of a cone of radius `r` by up to about `spacing^2 / (8 r)`, of a slab by twice
+//! that. So contacts shallower than this are missed, but a gap never counts as a contact.
 
 use super::MetricError;
 use crate::complex::{MedialMesh, UnionError};
 use crate::geometry::{DualComplex, Sphere};
 
-/// More balls than this are refused.
-const MOST_BALLS: usize = 5_000_000;
+/// Bound on the number of balls.
+const MAX_BALLS: usize = 5_000_000;
 
 /// The Betti numbers `[b0, b1, b2]` of the union, from balls at most `spacing` apart.
 ///
@@ -45,8 +45,8 @@ fn balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
     let on_edges: f64 = mesh.edges.iter().map(|e| parts(e.map(sphere))).sum();
     let in_faces: f64 = mesh.faces.iter().map(|f| sides(f) * sides(f) / 2.0).sum();
     let count = mesh.spheres.len() as f64 + on_edges + in_faces;
-    if count > MOST_BALLS as f64 {
-        return Err(MetricError::TooManyBalls { count, most: MOST_BALLS });
+    if count > MAX_BALLS as f64 {
+        return Err(MetricError::TooManyBalls { count, most: MAX_BALLS });
     }
     let mut balls = mesh.spheres.clone();
     for edge in &mesh.edges {

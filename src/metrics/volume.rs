@@ -1,9 +1,9 @@
 //! Volume of the symmetric difference between a solid and the union of its medial primitives.
 //!
-//! 1. A box around both, along the coordinate axes or (for [`super::Judge`]) those of their pose, is
-//!    divided into cells. A cell that neither the surface nor the boundary of
-//!    the union can reach is wholly in the difference or wholly out: distances are 1-Lipschitz, so
-//!    one query at its centre tells. Other cells are divided into eight.
+//! 1. A box around both, along the coordinate axes or (for [`super::Judge`]) those of the pose, is
+//!    divided into cells. A cell that neither the surface nor the boundary of the union reaches is
+//!    wholly inside the difference or wholly outside. One query at its centre decides this, because
+//!    distances are 1-Lipschitz. Other cells are divided into eight.
 //! 2. At the finest level each cell is decided by one random point.
 //!
 //! Only a shell around the two boundaries is ever refined, so the finest cells are those of a
@@ -38,7 +38,7 @@ impl Default for VolumeOptions {
     }
 }
 
-/// Levels divided on one thread: `8^COARSE` independent tasks.
+/// Levels that are divided first, on one thread, into `8^COARSE` independent tasks.
 const COARSE: u32 = 2;
 
 /// Signed volume that a closed surface encloses, exact up to rounding by the divergence theorem;
@@ -52,6 +52,7 @@ pub fn enclosed_volume(surface: &TriMesh) -> f64 {
             a.dot(b.cross(c))
         })
         .collect();
+    // Sorted, so that rounding does not depend on the order of the faces.
     terms.sort_unstable_by(f64::total_cmp);
     let mut six_times = Sum::default();
     terms.into_iter().for_each(|term| six_times.add(term));
@@ -89,7 +90,7 @@ pub(super) fn box_in(pose: &Pose, surface: &TriMesh, balls: &[Sphere]) -> (Vec3,
     })
 }
 
-/// What lies in a solid, and what in a union.
+/// A solid and a union that are compared.
 pub(super) struct Sides<'a, F> {
     pub surface: &'a TriMesh,
     pub bvh: &'a TriangleBvh,
@@ -123,7 +124,7 @@ struct Cell {
     lo: Vec3,
     size: Vec3,
     level: u32,
-    /// The octants that lead here from the root, three bits each behind a leading one.
+    /// The octants from the root to this cell, three bits each, after a leading 1.
     path: u64,
 }
 
@@ -154,8 +155,8 @@ impl<F: Fn(Vec3) -> bool> Division<'_, F> {
     fn difference(&self, cell: &Cell) -> f64 {
         let Sides { bvh, union, inside, .. } = self.sides;
         if cell.level >= self.depth {
-            // Of the cell's own, so that it does not matter which others were divided: a boundary that
-            // just touches a cell does so or not by rounding.
+            // A generator per cell: whether a boundary just touches another cell is up to rounding,
+            // and must not change the random numbers of this one.
             let mut rng = Pcg64::seed_from_u64(splitmix(self.seed) ^ cell.path);
             let jitter = Vec3::new(rng.random(), rng.random(), rng.random());
             let point = self.pose.world(cell.lo + jitter * cell.size);
@@ -164,8 +165,8 @@ impl<F: Fn(Vec3) -> bool> Division<'_, F> {
         }
         let (centre, reach) = (cell.lo + cell.size * 0.5, cell.size.length() * 0.5);
         let centre = self.pose.world(centre);
-        // Most cells are near the surface, which is the quickest to find out; and none of these
-        // questions needs the distance itself.
+        // The surface first: most cells are near it, and that test is the cheapest. None of these
+        // tests computes the distance itself.
         if !bvh.any_within(centre, reach) {
             let covered = union.buries(centre, reach);
             if covered || !union.buries(centre, -reach) {

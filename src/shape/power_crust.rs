@@ -26,7 +26,7 @@ const BOX: f64 = 2.5;
 /// reach far to the other side; the side of the centre says nothing of them. They are few, but can make a
 /// false handle. With too large a share thin parts lose poles that they need. The published program has no surface to ask, and estimates the same from the shape of
 /// Voronoi cells.
-const LEAST_DEPTH: f64 = 0.25;
+const MIN_DEPTH: f64 = 0.25;
 
 impl Shape {
     /// The polar balls of the samples, in normalised units: no pole is at infinity, because the
@@ -61,7 +61,7 @@ impl Shape {
         let depths = tree.distance_batch(&centres);
         let mut labelled = PolarBalls::default();
         for ((&ball, side), depth) in balls.iter().zip(sides).zip(depths) {
-            if depth < LEAST_DEPTH * ball.radius {
+            if depth < MIN_DEPTH * ball.radius {
                 labelled.rejected += 1;
                 continue;
             }

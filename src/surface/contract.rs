@@ -120,7 +120,7 @@ pub fn contract_short_edges_while(
 type ShortEdge = (u64, u32, u32);
 
 /// The cosine of the angle by which a face may turn.
-const LEAST_COSINE: f64 = 0.5;
+const MIN_COSINE: f64 = 0.5;
 
 /// A surface while its edges are contracted.
 struct Shrinking<'a> {
@@ -223,7 +223,7 @@ impl<'a> Shrinking<'a> {
                 };
                 let before = normal(face);
                 let after = normal(face.map(|v| if v == gone { stays } else { v }));
-                before.dot(after) < LEAST_COSINE * before.length() * after.length()
+                before.dot(after) < MIN_COSINE * before.length() * after.length()
             })
     }
 

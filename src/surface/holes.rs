@@ -28,7 +28,7 @@ use super::report::Repair;
 use crate::Vec3;
 
 /// Edges of the longest loop that is filled.
-const MOST_EDGES: usize = 500;
+const MAX_EDGES: usize = 500;
 
 /// Closes all holes of consistently oriented faces; what was done, a line for each hole.
 ///
@@ -42,8 +42,8 @@ pub(super) fn fill(vertices: &[Vec3], faces: &mut Vec<[u32; 3]>) -> Result<Vec<R
     let mut edges = rim.edges;
     for corners in loops(vertices, &rim.next)? {
         let first = named(vertices, corners[0]);
-        if corners.len() > MOST_EDGES {
-            let (edges, most) = (corners.len(), MOST_EDGES);
+        if corners.len() > MAX_EDGES {
+            let (edges, most) = (corners.len(), MAX_EDGES);
             return Err(Fault::LongHole { edges, most, first });
         }
         let patch = Patch::new(vertices, faces, &rim.face_at, &corners, &edges).triangles();

@@ -40,7 +40,7 @@ pub(super) struct Intersections {
 /// Faces looked at between two looks at the budget.
 const BLOCK: usize = 512;
 /// Neighbours in space of one face that are tested at most.
-const MOST_OF_ONE: usize = 10_000;
+const MAX_TESTS_PER_FACE: usize = 10_000;
 
 /// Finds all intersections. `O(F log F + pairs)`, but gives up, and says so, after a number of
 /// tests that no surface of practical use needs.
@@ -120,7 +120,7 @@ fn meets(tree: &BoxTree, item: usize, faces: &[[u32; 3]], component: &[u32]) -> 
     let mut look_at = |other_item: usize| {
         let (other, other_triangle) = (tree.ids[other_item], tree.triangles[other_item]);
         part.tests += 1;
-        if part.tests > MOST_OF_ONE {
+        if part.tests > MAX_TESTS_PER_FACE {
             part.complete = false;
             return ControlFlow::Break(());
         }

@@ -52,9 +52,9 @@ pub enum Sampling {
 pub struct ParseSamplingError(String);
 
 /// More samples than this are surely a slip of the finger.
-const MOST: usize = 10_000_000;
+const MAX_SAMPLES: usize = 10_000_000;
 /// Elimination takes some two kilobytes for each sample of blue noise.
-const MOST_BLUE: usize = 1_000_000;
+const MAX_BLUE_SAMPLES: usize = 1_000_000;
 
 impl FromStr for Sampling {
     type Err = ParseSamplingError;
@@ -72,9 +72,9 @@ impl FromStr for Sampling {
         let count = parts.next().and_then(|c| c.parse().ok()).ok_or_else(error)?;
         let seed = parts.next().map_or(Ok(0), str::parse).map_err(|_| error())?;
         match kind {
-            _ if parts.next().is_some() || !(1..=MOST).contains(&count) => Err(error()),
+            _ if parts.next().is_some() || !(1..=MAX_SAMPLES).contains(&count) => Err(error()),
             Some("uniform") => Ok(Self::AreaUniform { count, seed }),
-            Some("blue") if count <= MOST_BLUE => Ok(Self::BlueNoise { count, seed }),
+            Some("blue") if count <= MAX_BLUE_SAMPLES => Ok(Self::BlueNoise { count, seed }),
             _ => Err(error()),
         }
     }

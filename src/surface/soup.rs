@@ -51,7 +51,7 @@ impl PolygonSoup {
         if let Some(value) = [x, y, z].into_iter().find(|c| !c.is_finite()) {
             return Err(Fault::Coordinate { at: at(), vertex, value });
         }
-        if vertex >= MOST {
+        if vertex >= MAX_FACES {
             return Err(Fault::TooLarge { what: "vertices", count: vertex as u64 + 1 });
         }
         self.vertices.push(Vec3::new(x, y, z));
@@ -69,7 +69,7 @@ impl PolygonSoup {
             let at = line.map_or(Place::Element("face", face), Place::Line);
             return Err(Fault::TooFewCorners { at, face, corners });
         }
-        if self.corners.len() > MOST {
+        if self.corners.len() > MAX_FACES {
             return Err(Fault::TooLarge { what: "corners", count: self.corners.len() as u64 });
         }
         self.ends.push(self.corners.len() as u32);
@@ -79,4 +79,4 @@ impl PolygonSoup {
 }
 
 /// Half-edge indices, three for each triangle, have to fit 32 bits with one value to spare.
-const MOST: usize = (u32::MAX - 1) as usize / 3;
+const MAX_FACES: usize = (u32::MAX - 1) as usize / 3;

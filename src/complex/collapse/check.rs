@@ -2,7 +2,7 @@
 
 use super::CollapseComplex;
 
-/// The first violation that [`CollapseComplex::check`] met.
+/// The first violation that [`CollapseComplex::check`] found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CollapseError {
     /// A vertex names a neighbour that is gone, is the vertex itself, or does not name it back.
@@ -39,14 +39,14 @@ pub enum CollapseError {
         /// The vertex.
         vertex: u32,
     },
-    /// A count kept along the way differs from the counted one.
+    /// A count that the complex keeps up to date is wrong.
     #[error("{kept} {what} were kept count of, there are {counted}")]
     Count {
         /// `"spheres"`, `"edges"` or `"faces"`.
         what: &'static str,
-        /// As kept.
+        /// The count that the complex keeps up to date.
         kept: usize,
-        /// As counted.
+        /// The count of its lists.
         counted: usize,
     },
 }
@@ -71,6 +71,7 @@ impl CollapseComplex {
             neighbours += self.neighbours(vertex).len();
             sides += self.opposite_sides(vertex).len();
         }
+        // Each edge is named by both ends, each face by all three vertices.
         let counts = [
             ("spheres", self.sphere_count, spheres),
             ("edges", self.edge_count, neighbours / 2),

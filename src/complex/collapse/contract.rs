@@ -18,6 +18,7 @@ impl CollapseComplex {
     pub fn collapse(&mut self, kept: u32, removed: u32, sphere: Sphere) {
         let is_edge = self.is_alive(removed) && self.neighbours(removed).contains(&kept);
         assert!(is_edge, "{kept} and {removed} are not the ends of an edge");
+        // The marks and shared sides describe both links before either changes.
         self.find_shared(kept, removed);
         self.rename_in_neighbours(kept, removed);
         self.absorb_neighbours(kept, removed);
@@ -41,15 +42,18 @@ impl CollapseComplex {
         let mut shared = std::mem::take(&mut self.shared);
         shared.clear();
         for &[c, d] in self.opposite_sides(b) {
+            // Marks first: they rule out almost every side without a search through links.
             if self.marks.contains(c) && self.marks.contains(d) && self.has_face(a, c, d) {
                 shared.push([c, d]);
             }
         }
+        // Sorted for the binary searches of the collapse.
         shared.sort_unstable();
         self.shared = shared;
     }
 
     fn rename_in_neighbours(&mut self, kept: u32, removed: u32) {
+        // By index: the lists of other vertices change in the same pool meanwhile.
         let around = self.neighbours[removed as usize];
         for index in 0..around.len() {
             let v = self.neighbour_pool.at(around, index);
@@ -64,6 +68,7 @@ impl CollapseComplex {
         let list = &mut self.neighbours[v as usize];
         let position = self.neighbour_pool.get(*list).iter().position(|&w| w == removed);
         let position = position.expect("neighbours name each other");
+        // A common neighbour names `kept` already: its two edges merge.
         if self.marks.contains(v) {
             self.neighbour_pool.swap_remove(list, position);
             self.edge_count -= 1;
@@ -87,7 +92,9 @@ impl CollapseComplex {
             };
             let merges = !self.shared.is_empty()
                 && self.shared.binary_search(&[v.min(other), v.max(other)]).is_ok();
+            // A face with both ends vanishes; of two that merge, the one of `kept` stays.
             if other == kept || merges {
+                // `index` stays, since the last side has moved here.
                 self.side_pool.swap_remove(list, index);
             } else {
                 self.side_pool.get_mut(*list)[index] = [kept.min(other), kept.max(other)];
@@ -104,6 +111,7 @@ impl CollapseComplex {
         self.edge_count -= 1;
         for index in 0..self.neighbours[b].len() {
             let v = self.neighbour_pool.at(self.neighbours[b], index);
+            // Marked vertices are neighbours of `kept` already.
             if v != kept && !self.marks.contains(v) {
                 self.neighbour_pool.push(&mut self.neighbours[a], v);
             }
@@ -114,6 +122,7 @@ impl CollapseComplex {
     fn absorb_sides(&mut self, kept: u32, removed: u32) {
         let [a, b] = [kept as usize, removed as usize];
         let mut index = 0;
+        // Faces with both ends are counted here, faces that merge in the next loop.
         while index < self.sides[a].len() {
             if self.side_pool.at(self.sides[a], index).contains(&removed) {
                 self.side_pool.swap_remove(&mut self.sides[a], index);
@@ -124,6 +133,7 @@ impl CollapseComplex {
         }
         for index in 0..self.sides[b].len() {
             let side = self.side_pool.at(self.sides[b], index);
+            // A face with both ends: it was removed and counted above.
             if side.contains(&kept) {
                 continue;
             }

@@ -1,19 +1,20 @@
-//! A priority queue for items most of which are out of date before their turn comes.
+//! A priority queue for items of which most are out of date before they would be popped.
 
 use std::cmp::Ordering;
 
-/// The heap is filled with about so many items at a time, few enough for the cache.
-const NEAR: usize = 1 << 12;
+/// The heap is refilled with at most this many items at a time, few enough for the cache.
+const HEAP_SIZE: usize = 1 << 12;
 
-/// Share of a group that is taken from it when its turn comes.
+/// While a group is too large for the heap, a refill keeps its first `1 / SHARE` and splits off the
+/// rest.
 const SHARE: usize = 8;
 
-/// What a [`LazyHeap`] holds: small, copied about, in a total order.
+/// An item of a [`LazyHeap`]: small, cheap to copy, totally ordered.
 pub trait Prioritised: Copy {
     /// The order in which items come out.
     fn order(&self, other: &Self) -> Ordering;
 
-    /// Whether this item comes out first. To be overridden where that is faster.
+    /// Whether this item comes out before another. Override it where a shorter test will do.
     #[inline]
     fn is_before(&self, other: &Self) -> bool {
         self.order(other) == Ordering::Less
@@ -22,34 +23,34 @@ pub trait Prioritised: Copy {
 
 /// A priority queue that sorts late and forgets early.
 ///
-/// Only the first items are in a heap; the others wait in groups, one behind the other, in no order
-/// within a group. When the heap has run empty the next group is looked at: items out of date are
-/// dropped, and what does not come soon is split off into groups of its own, as quicksort would.
-/// So most items are never sorted at all. Items that are equal in order must be equal in every
-/// respect: then equal contents come out in the same order whatever the history.
+/// Only the first items are in a heap. The others wait in groups: the groups are ordered, the items
+/// of one group are not. When the heap is empty, the next group replaces it: its outdated items are
+/// dropped, and its later items are split off into new groups, as quicksort would. So most items are
+/// never sorted at all. Items that compare as equal must be identical: then the order in which
+/// items come out depends on the contents of the queue alone, not on its history.
 #[derive(Clone, Debug)]
 pub struct LazyHeap<T> {
-    /// Four children a node: the items of one family lie close together.
+    /// A heap with four children per node, which lie side by side in memory.
     near: Vec<T>,
-    /// The next group last.
+    /// The groups, the next one last.
     far: Vec<Group<T>>,
     /// Number of items in the groups.
     waiting: usize,
-    /// With more items than this those out of date are dropped, to save memory.
-    most: usize,
+    /// With more items than this all outdated ones are dropped, to bound the memory.
+    prune_above: usize,
 }
 
-/// Items that wait.
+/// Waiting items.
 #[derive(Clone, Debug)]
 struct Group<T> {
     items: Vec<T>,
-    /// None of the items is before this one; all that are not in this group or a later one are.
+    /// Pivot: every item of this group is >= it, every item due earlier is < it.
     from: T,
 }
 
 impl<T> Default for LazyHeap<T> {
     fn default() -> Self {
-        Self { near: Vec::new(), far: Vec::new(), waiting: 0, most: NEAR }
+        Self { near: Vec::new(), far: Vec::new(), waiting: 0, prune_above: HEAP_SIZE }
     }
 }
 
@@ -66,6 +67,7 @@ impl<T: Prioritised> LazyHeap<T> {
     #[inline]
     pub fn push(&mut self, item: T) {
         match self.far.last() {
+            // Only an item before every pivot may go into the heap, which is emptied first.
             Some(next) if !item.is_before(&next.from) => self.push_far(item),
             _ => {
                 self.near.push(item);
@@ -75,12 +77,13 @@ impl<T: Prioritised> LazyHeap<T> {
     }
 
     fn push_far(&mut self, item: T) {
+        // Pivots descend along `far`: the first group that does not start after the item is its own.
         let group = self.far.partition_point(|group| item.is_before(&group.from));
         self.far[group].items.push(item);
         self.waiting += 1;
     }
 
-    /// Number of items, those out of date that were not met yet included.
+    /// Number of items, including outdated ones that were not dropped yet.
     pub fn len(&self) -> usize {
         self.near.len() + self.waiting
     }
@@ -90,11 +93,12 @@ impl<T: Prioritised> LazyHeap<T> {
         self.len() == 0
     }
 
-    /// Takes the first item that is still current. An item that was out of date once must stay
-    /// so. Never more than a constant and three times as many items are queued as were current
-    /// when all were last looked through.
+    /// Takes the first item that is still current. An item that was outdated once must stay so.
+    ///
+    /// After a call the queue holds at most a constant plus three times the items that were current
+    /// when outdated ones were last dropped.
     pub fn pop(&mut self, is_current: impl Fn(&T) -> bool) -> Option<T> {
-        if self.len() > self.most {
+        if self.len() > self.prune_above {
             self.drop_outdated(&is_current);
         }
         loop {
@@ -105,12 +109,14 @@ impl<T: Prioritised> LazyHeap<T> {
             }
             let mut group = self.far.pop()?.items;
             self.waiting -= group.len();
+            // Before any sorting, since most of the group is usually outdated by now.
             group.retain(&is_current);
             self.refill(group);
         }
     }
 
     fn drop_outdated(&mut self, is_current: &impl Fn(&T) -> bool) {
+        // A group may become empty; its pivot still bounds what is pushed later.
         self.near.retain(is_current);
         self.heapify();
         for group in &mut self.far {
@@ -120,14 +126,16 @@ impl<T: Prioritised> LazyHeap<T> {
         self.note_size();
     }
 
+    /// Three times the size: then the cost of dropping is constant per item pushed.
     fn note_size(&mut self) {
-        self.most = NEAR + 3 * self.len();
+        self.prune_above = HEAP_SIZE + 3 * self.len();
     }
 
-    /// Makes the first of `items` the heap, which is empty, and the others the next groups.
+    /// Fills the empty heap with the first of `items`; the others become the next groups.
     fn refill(&mut self, mut items: Vec<T>) {
-        while items.len() > NEAR {
-            let share = (NEAR / 2).max(items.len() / SHARE);
+        // The latest group is split off first, so the earliest ends up last in `far`.
+        while items.len() > HEAP_SIZE {
+            let share = (HEAP_SIZE / 2).max(items.len() / SHARE);
             let (_, &mut from, _) = items.select_nth_unstable_by(share, T::order);
             let group = items.split_off(share);
             self.waiting += group.len();
@@ -142,12 +150,14 @@ impl<T: Prioritised> LazyHeap<T> {
         let Some(first) = self.near.first().copied() else {
             return Some(last);
         };
+        // The last leaf fills the gap at the root and sinks to its place.
         self.near[0] = last;
         self.sift_down(0);
         Some(first)
     }
 
     fn heapify(&mut self) {
+        // From the last parents to the root: linear in total. Leaves beyond need nothing.
         for index in (0..self.near.len().div_ceil(4)).rev() {
             self.sift_down(index);
         }
@@ -244,7 +254,7 @@ mod tests {
             // Far behind what is current, so that it is never popped.
             (0..4).for_each(|extra| queue.push((1_000 + extra, id)));
             queue.push((0, id + 1));
-            assert!(queue.len() < 3 * NEAR, "{}", queue.len());
+            assert!(queue.len() < 3 * HEAP_SIZE, "{}", queue.len());
         }
     }
 }

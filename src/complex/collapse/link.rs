@@ -6,11 +6,11 @@ impl CollapseComplex {
     /// Whether `Lk(a) ∩ Lk(b) = Lk(ab)` for the edge `{a, b}`: then its collapse keeps the homotopy
     /// type of the complex.
     ///
-    /// In a complex of dimension two these are two tests:
-    /// - T1: every vertex `c` adjacent to both ends forms a face `{a, b, c}`; otherwise a hole
-    ///   bounded by three edges closes.
-    /// - T2: no edge `{c, d}` has both faces `{a, c, d}` and `{b, c, d}`; otherwise a void bounded
-    ///   by faces closes.
+    /// In a complex of dimension two this is the conjunction of two tests:
+    /// - T1: every vertex `c` adjacent to both ends has the face `{a, b, c}`; otherwise the collapse
+    ///   fills a hole bounded by three edges.
+    /// - T2: no edge `{c, d}` has both faces `{a, c, d}` and `{b, c, d}`; otherwise the collapse
+    ///   fills a void bounded by faces.
     ///
     /// Source: Dey, Edelsbrunner, Guha, Nekhayev 1999, *Topology preserving edge contraction*,
     /// Publ. Inst. Math. 66. Cost: the two links.
@@ -23,8 +23,8 @@ impl CollapseComplex {
         !self.neighbours(b).iter().any(|&c| self.marks.contains(c))
     }
 
-    /// Unmarks the third vertices of the faces at the edge: marked neighbours that are left form no
-    /// face with it.
+    /// Unmarks the third vertices of the faces at the edge. The common neighbours that stay marked
+    /// have no face with it.
     fn unmark_roots(&mut self, a: u32, b: u32) {
         let sides = self.side_pool.get(self.sides[b as usize]);
         for &[p, q] in sides.iter().filter(|side| side.contains(&a)) {
@@ -35,16 +35,16 @@ impl CollapseComplex {
     /// Whether the link condition holds after elementary expansions: a weaker condition on the edge
     /// `{a, b}` under which its collapse still keeps the homotopy type.
     ///
-    /// The vertices of `Lk(a) ∩ Lk(b)` and its edges are a graph, in which the vertices of `Lk(ab)`
-    /// are the *roots*. The condition is that each component of it is a tree with exactly one root.
-    /// The link condition is the case without edges.
+    /// The vertices and edges of `Lk(a) ∩ Lk(b)` form a graph; call its vertices in `Lk(ab)` *roots*.
+    /// The condition: each component of the graph is a tree with exactly one root. The link condition
+    /// is the special case of a graph without edges.
     ///
     /// Why it suffices: take a vertex `c` of such a tree whose neighbour `d` towards the root has
-    /// the face `{a, b, d}`. The faces `{a, c, d}`, `{b, c, d}`, `{a, b, d}` are a tetrahedron but
-    /// for its interior and the face `{a, b, c}`; adding these two is an elementary expansion, which
-    /// keeps the homotopy type. From the roots outwards all faces `{a, b, c}` are added so, and then
-    /// the link condition holds. The collapse makes the same complex with these simplices as
-    /// without: its image of `{a, b, c}` and of the tetrahedron is there already.
+    /// the face `{a, b, d}`. The faces `{a, c, d}`, `{b, c, d}`, `{a, b, d}` are a tetrahedron
+    /// without its interior and the face `{a, b, c}`. Adding these two is an elementary expansion,
+    /// which keeps the homotopy type. From the roots outwards all faces `{a, b, c}` can be added like
+    /// this; then the link condition holds. The result of the collapse is the same with or without
+    /// the added simplices, since their images are in the complex already.
     ///
     /// Cost: the two links, and the square of what they share.
     pub fn keeps_homotopy(&mut self, a: u32, b: u32) -> bool {
@@ -53,10 +53,12 @@ impl CollapseComplex {
         let Self { marks, shared, .. } = self;
         let around = self.neighbour_pool.get(self.neighbours[b as usize]);
         let mut unreached = around.iter().filter(|&&c| marks.contains(c)).count();
-        // As many edges as vertices that are no roots: trees if all are reached, cycles if not.
+        // A forest with one root per tree has as many edges as vertices that are not roots.
         if unreached != shared.len() {
             return false;
         }
+        // Grow from the roots along edges. With the counts equal, reaching every vertex excludes
+        // cycles and second roots.
         let mut before = usize::MAX;
         while unreached < before {
             before = unreached;
@@ -71,21 +73,22 @@ impl CollapseComplex {
         unreached == 0
     }
 
-    /// Where [`CollapseComplex::keeps_homotopy`] is false for `{a, b}`, it stays so while no collapse
-    /// takes one of these vertices, nor `a` or `b`; empty where it is true.
+    /// The vertices that make [`CollapseComplex::keeps_homotopy`] false for `{a, b}`: it stays false
+    /// until a collapse takes one of them, or `a` or `b`. Empty where the condition holds.
     ///
-    /// They come from one component that is no tree with one root. What is there of a component
-    /// stays while its vertices do: faces with `a`, `b` and two of them change with one of the four
-    /// alone. So its own vertices are enough where it has a cycle or two roots. A tree without a root
-    /// can still grow one, by a new edge `{c, e}` from one of its vertices: `e` is then merged from a
-    /// vertex `x` of a face `{a, c, x}` and a vertex `y` of a face `{b, c, y}`. All such `x`, or all
-    /// such `y`, are obstacles too.
+    /// They come from one component that is not a tree with one root. A component keeps its vertices
+    /// and edges until one of its vertices, `a` or `b` is part of a collapse, since only then can a
+    /// face of `a` or `b` with two of them change. So its own vertices suffice where it has a cycle or
+    /// two roots. A tree without a root can still gain one, by a new edge `{c, e}` from one of its
+    /// vertices: `e` is then merged from a vertex `x` of a face `{a, c, x}` and a vertex `y` of a face
+    /// `{b, c, y}`. So either all such `x` or all such `y` are obstacles, too.
     ///
     /// Cost: as for the condition, and the links of the component.
     pub fn homotopy_obstacles(&mut self, a: u32, b: u32) -> Vec<u32> {
         self.find_shared(a, b);
         let around = self.neighbours(b).iter();
         let mut common: Vec<u32> = around.copied().filter(|&c| self.marks.contains(c)).collect();
+        // One component that violates the condition is enough.
         while let Some(first) = common.pop() {
             let (mut component, edges) = self.shared_component(first);
             common.retain(|c| !component.contains(c));
@@ -107,7 +110,7 @@ impl CollapseComplex {
         Vec::new()
     }
 
-    /// The vertices that shared sides join to one of them, and the number of these sides.
+    /// The component of a vertex in the graph of shared sides: its vertices, and its number of sides.
     fn shared_component(&self, first: u32) -> (Vec<u32>, usize) {
         let mut component = vec![first];
         let (mut next, mut ends) = (0, 0);
@@ -121,6 +124,7 @@ impl CollapseComplex {
                 }
             }
         }
+        // Each side was met from both its ends.
         (component, ends / 2)
     }
 

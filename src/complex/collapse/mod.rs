@@ -1,13 +1,13 @@
 //! Edge collapse on a non-manifold simplicial complex of dimension at most two.
 //!
-//! [`CollapseComplex`] is the complex while it shrinks, [`CollapseQueue`] the order in which its
-//! edges are taken. The driver, the costs and the placement belong to the method:
+//! [`CollapseComplex`] is the shrinking complex, [`CollapseQueue`] decides which edge is next. The
+//! main loop, the costs and the placement belong to the method:
 //!
 //! 1. [`CollapseComplex::from_mesh`]; a [`Candidate`] for each edge into the queue.
 //! 2. [`CollapseQueue::pop`] the cheapest candidate that is still current.
-//! 3. Where wanted, [`CollapseComplex::keeps_homotopy`] and [`CollapseComplex::folded_face`]; a
-//!    candidate that fails is parked with [`CollapseQueue::park`] at what holds it back, such as
-//!    [`CollapseComplex::homotopy_obstacles`].
+//! 3. Optional tests: [`CollapseComplex::keeps_homotopy`] and [`CollapseComplex::folded_face`]. A
+//!    candidate that fails is set aside with [`CollapseQueue::park`] at the vertices that hold it
+//!    back, such as [`CollapseComplex::homotopy_obstacles`].
 //! 4. [`CollapseComplex::collapse`]; new candidates for the edges of the merged sphere;
 //!    [`CollapseQueue::wake`] for both ends.
 //! 5. [`CollapseComplex::to_mesh`].
@@ -16,17 +16,16 @@
 //!
 //! Each vertex `v` stores its link: the neighbours of `v`, and for each face `{v, p, q}` the side
 //! `{p, q}` opposite `v`. An edge is a pair of vertices that name each other as neighbours, a face
-//! a triple in which each vertex names the side of the other two; neither has an id. This fits an
-//! edge with any number of faces, and a collapse reads and writes contiguous short lists only.
+//! a triple in which each vertex names the side of the other two; neither has an id. An edge can
+//! have any number of faces, and a collapse reads and writes short contiguous lists only.
 //!
 //! A collapse of `(a, b)` is the simplicial map that sends `b` to `a` (Dey, Edelsbrunner, Guha,
-//! Nekhayev 1999, *Topology preserving edge contraction*): simplices that become equal are one,
+//! Nekhayev 1999, *Topology preserving edge contraction*): simplices that become equal merge, and
 //! faces with both ends become edges. [`replay`] computes the same map on the initial mesh from
-//! the record alone, which is how levels of a hierarchy are made and how the engine is tested.
+//! the record alone: levels of a hierarchy are made so, and the engine is tested against it.
 //!
-//! Every vertex has a stamp that moves when its sphere or its link changes by a collapse at the
-//! vertex itself. A queued candidate remembers the stamps of its edge and is dropped when it is
-//! popped and they differ.
+//! Every vertex has a stamp, which grows with each collapse at the vertex itself. A queued candidate
+//! remembers the stamps of its edge; if they differ when it is popped, it is out of date and dropped.
 
 mod check;
 mod contract;
@@ -65,7 +64,7 @@ pub struct CollapseComplex {
     sides: Vec<List>,
     side_pool: Pool<[u32; 2]>,
     marks: Marks,
-    /// Sides that the links of both ends of a collapsing edge share; kept to save allocations.
+    /// The sides in the links of both ends of a collapsing edge; a field to save allocations.
     shared: Vec<[u32; 2]>,
     record: Option<Vec<Collapse>>,
     sphere_count: usize,
@@ -141,7 +140,7 @@ impl CollapseComplex {
         let new = |v: u32| renumbered[v as usize];
         let mut edges = Vec::with_capacity(self.edge_count);
         let mut faces = Vec::with_capacity(self.face_count);
-        // Renumbering keeps the order, so each vertex's own simplices need sorting only.
+        // Renumbering keeps the order, so sorting within each vertex sorts the whole.
         for v in self.vertices() {
             let (first_edge, first_face) = (edges.len(), faces.len());
             edges.extend(self.neighbours(v).iter().filter(|&&w| v < w).map(|&w| [new(v), new(w)]));
@@ -173,7 +172,7 @@ impl CollapseComplex {
         (0..self.spheres.len() as u32).filter(|&v| self.alive[v as usize])
     }
 
-    /// Edges left, as ascending pairs, in no particular but a deterministic order.
+    /// Edges left, as ascending pairs, in an unspecified but deterministic order.
     pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
         self.vertices()
             .flat_map(|v| self.neighbours(v).iter().filter(move |&&w| v < w).map(move |&w| [v, w]))
@@ -216,24 +215,24 @@ impl CollapseComplex {
         self.opposite_sides(v).contains(&[p.min(q), p.max(q)])
     }
 
-    /// A number that differs from earlier ones once either end of an edge was part of a collapse,
-    /// or `None` when an end is gone.
+    /// The stamp of an edge, which changes with every collapse at either end; `None` when an end is
+    /// gone.
     #[inline]
     pub(super) fn stamp(&self, a: u32, b: u32) -> Option<u32> {
         let [i, j] = [a as usize, b as usize];
-        // Stamps only move up, so the sum of two moves whenever one of them does.
+        // Stamps only grow, so the sum changes whenever one of them does.
         (self.alive[i] && self.alive[j]).then(|| self.stamps[i].wrapping_add(self.stamps[j]))
     }
 
-    /// Declares everything queued at `v` out of date; for methods whose costs depend on more than
-    /// the two ends of an edge.
+    /// Declares every candidate with the end `v` out of date. For methods whose costs depend on more
+    /// than the two ends of an edge.
     pub fn touch(&mut self, v: u32) {
         let stamp = &mut self.stamps[v as usize];
         *stamp = stamp.wrapping_add(1);
     }
 }
 
-/// A set of vertices that is emptied in constant time.
+/// A set of vertices that is cleared in constant time: `v` is in it if its mark is `current`.
 #[derive(Clone, Debug)]
 struct Marks {
     of_vertex: Vec<u32>,
@@ -247,6 +246,7 @@ impl Marks {
 
     fn clear(&mut self) {
         self.current = self.current.wrapping_add(1);
+        // After 2^32 clears old marks would become valid again.
         if self.current == 0 {
             self.of_vertex.fill(0);
             self.current = 1;

@@ -1,12 +1,13 @@
-//! Many short lists in one allocation: the adjacency of a complex without an allocation a vertex.
+//! Many short lists in one allocation: the adjacency of a complex without an allocation per vertex.
 //!
-//! Capacities are powers of two. A list that outgrows its block takes one of the next class from
-//! the free list, so the memory of removed vertices is used again and the pool stays bounded.
+//! Capacities are powers of two. A list that outgrows its block moves to a block of the next class,
+//! from the free list if there is one. So the memory of removed vertices is reused and the pool stays
+//! bounded.
 
 /// Capacity of the smallest block.
 const SMALLEST: usize = 4;
 
-/// Where a list lies in its [`Pool`].
+/// The place of a list in its [`Pool`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct List {
     start: u32,
@@ -93,6 +94,7 @@ impl<T: Copy + Default> Pool<T> {
 
     fn grow(&mut self, list: &mut List) {
         let (old, len) = (list.start as usize, list.len as usize);
+        // Doubling keeps the copies linear in the pushes. Take before give: the blocks must differ.
         let class = list.class + 1;
         let start = self.take(class);
         self.items.copy_within(old..old + len, start as usize);

@@ -4,10 +4,10 @@ use std::cmp::Ordering;
 
 use super::{CollapseComplex, LazyHeap, Prioritised};
 
-/// Absent index of a parked candidate.
+/// End of a list of nodes.
 const NONE: u32 = u32::MAX;
 
-/// An edge with its cost at the moment it was made.
+/// An edge with its cost at the time the candidate was made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     cost: f64,
@@ -25,8 +25,9 @@ impl Candidate {
     #[inline]
     pub fn new(complex: &CollapseComplex, [a, b]: [u32; 2], cost: f64, tie: f64) -> Self {
         let stamp = complex.stamp(a, b).expect("both ends are left");
-        let finite = |key: f64| if key.is_nan() { f64::INFINITY } else { key };
-        Self { cost: finite(cost), tie: finite(tie), ends: [a.min(b), a.max(b)], stamp }
+        // `is_before` compares with `<`, which is a total order only without not-a-number.
+        let ordered = |key: f64| if key.is_nan() { f64::INFINITY } else { key };
+        Self { cost: ordered(cost), tie: ordered(tie), ends: [a.min(b), a.max(b)], stamp }
     }
 
     /// The cost.
@@ -48,6 +49,7 @@ impl Candidate {
     /// Whether this candidate comes out of a queue before another; see [`Candidate::order`].
     #[inline]
     pub fn is_before(&self, other: &Self) -> bool {
+        // Costs almost always differ: one comparison then decides in the inner loop of the heap.
         if self.cost != other.cost {
             return self.cost < other.cost;
         }
@@ -98,23 +100,23 @@ impl CollapseQueue {
         self.heap.pop(|candidate| candidate.is_current(complex))
     }
 
-    /// The first candidate that is still current, left in its place: what the next
-    /// [`CollapseQueue::pop`] will take.
+    /// The first candidate that is still current, without taking it: the one that the next
+    /// [`CollapseQueue::pop`] will return.
     pub fn peek(&mut self, complex: &CollapseComplex) -> Option<Candidate> {
         let first = self.pop(complex)?;
-        // It came from the front of the heap, so it is before `bound` if there is one.
+        // It is before every pivot, so it goes back into the heap and not into a group.
         self.push(first);
         Some(first)
     }
 
     /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of
-    /// `obstacles`: the vertices without a change at which it would be rejected again.
+    /// `obstacles`: while none of these vertices changes, it would be rejected again.
     pub fn park(&mut self, candidate: Candidate, obstacles: &[u32]) {
         self.parked.insert(candidate, obstacles);
     }
 
-    /// Queues what is parked at `v` and still current. To be called for both ends of an edge that
-    /// was collapsed.
+    /// Queues the candidates parked at `v` that are still current. Call it for both ends of every
+    /// collapsed edge.
     #[inline]
     pub fn wake(&mut self, complex: &CollapseComplex, v: u32) {
         while let Some(candidate) = self.parked.take(v) {
@@ -142,15 +144,16 @@ struct Node {
 
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
-    /// `None` once it was woken from one of its obstacles.
+    /// `None` once it was woken at one of its obstacles.
     candidate: Option<Candidate>,
-    /// Lists that still name it.
+    /// Number of obstacles whose lists still name it; at zero the slot is free.
     lists: u32,
 }
 
 impl Parked {
     fn insert(&mut self, candidate: Candidate, obstacles: &[u32]) {
         let lists = obstacles.len() as u32;
+        // Nothing could ever wake it.
         if lists == 0 {
             return;
         }
@@ -171,6 +174,7 @@ impl Parked {
             let Node { waiting, next } = self.nodes.remove(*head);
             *head = next;
             let entry = &mut self.candidates.items[waiting as usize];
+            // Another obstacle may have woken it; then this list still has to let go of it.
             let candidate = entry.candidate.take();
             entry.lists -= 1;
             if entry.lists == 0 {
@@ -184,7 +188,7 @@ impl Parked {
     }
 }
 
-/// Items with stable indices; those of removed items are used again.
+/// Items with stable indices; the indices of removed items are reused.
 #[derive(Clone, Debug)]
 struct Slab<T> {
     items: Vec<T>,

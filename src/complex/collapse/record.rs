@@ -1,11 +1,11 @@
-//! The record of collapses, and any level of it made from the initial mesh.
+//! The record of collapses, and the mesh after any number of them.
 
 use crate::complex::{MedialMesh, Sphere};
 
 /// One collapse, in the ids of the initial mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collapse {
-    /// The end whose id the merged vertex has.
+    /// The end whose id the merged vertex keeps.
     pub kept: u32,
     /// The end whose id is retired.
     pub removed: u32,
@@ -13,8 +13,8 @@ pub struct Collapse {
     pub sphere: Sphere,
 }
 
-/// The mesh after the first collapses of a record, without repeating them: the image of the
-/// initial mesh under the simplicial map of all of them together.
+/// The mesh after the first collapses of a record, without doing them one by one: the image of the
+/// initial mesh under the composition of their simplicial maps.
 ///
 /// `replay(initial, &record[..t])` is, bit for bit, the mesh that the engine had after `t`
 /// collapses, for every `t` and in any order of asking. Cost `O(n log n)`.
@@ -28,7 +28,7 @@ pub fn replay(initial: &MedialMesh, collapses: &[Collapse]) -> MedialMesh {
         spheres[collapse.kept as usize] = collapse.sphere;
         image[collapse.removed as usize] = collapse.kept;
     }
-    // Where a kept vertex went is decided by later collapses: resolve from the last to the first.
+    // Later collapses decide where a kept vertex ends up: resolve from the last to the first.
     for collapse in collapses.iter().rev() {
         image[collapse.removed as usize] = image[collapse.kept as usize];
     }
@@ -46,6 +46,8 @@ pub fn replay(initial: &MedialMesh, collapses: &[Collapse]) -> MedialMesh {
     for face in &mut faces {
         face.sort_unstable();
     }
+    // Simplices whose vertices merged are degenerate; their lower-dimensional images are listed
+    // anyway.
     edges.retain(|e| e[0] < e[1]);
     faces.retain(|f| f[0] < f[1] && f[1] < f[2]);
     edges.sort_unstable();

@@ -22,7 +22,7 @@ use crate::geometry::hash::splitmix;
 pub(super) const STEPS: u32 = 1 << 20;
 
 /// The most bisections of one tetrahedron: after three for each bit of the steps, sides are one step.
-pub(super) const MOST_BISECTIONS: u8 = 60;
+pub(super) const MAX_BISECTIONS: u8 = 60;
 
 /// What is known of a vertex.
 #[derive(Clone, Copy, Debug)]
@@ -147,7 +147,7 @@ impl Bisection {
                 self.values.extend(values(chunk));
             }
             let is_split = |leaf: &Leaf| {
-                let may = leaf.generation < MOST_BISECTIONS;
+                let may = leaf.generation < MAX_BISECTIONS;
                 let wanted = !leaf.settled && may && wanted(leaf, self.values_of(leaf));
                 (wanted || self.has_hanging_vertex(leaf), wanted)
             };
@@ -268,7 +268,7 @@ mod tests {
         let values = |points: &[Vec3]| {
             points.iter().map(|p| Value { signed: p.distance(target), radius: 1.0 }).collect()
         };
-        let sizes: Vec<f64> = (0..=MOST_BISECTIONS).map(|g| all.longest_edge(g)).collect();
+        let sizes: Vec<f64> = (0..=MAX_BISECTIONS).map(|g| all.longest_edge(g)).collect();
         let wanted = |leaf: &Leaf, values: [Value; 4]| {
             let size = sizes[usize::from(leaf.generation)];
             size > smallest && values.iter().all(|v| v.signed <= size)

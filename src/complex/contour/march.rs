@@ -27,10 +27,10 @@ const PAIRS: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]];
 
 /// How near to the boundary a vertex is, in lengths of its edge.
-const ENOUGH: f64 = 1e-9;
+const VERTEX_TOLERANCE: f64 = 1e-9;
 
 /// Evaluations on one edge: halving alone would reach the resolution of doubles.
-const MOST_STEPS: usize = 60;
+const MAX_STEPS: usize = 60;
 
 /// The surface, and for each of its vertices the length of the edge that it is on.
 pub(super) fn march(grid: &Bisection, union: &MedialUnion) -> (TriMesh, Vec<f64>) {
@@ -121,9 +121,9 @@ fn crossing(
 ) -> Vec3 {
     let (mut s, mut t) = (0.0, 1.0);
     let (mut low, mut high) = (at_a, at_b);
-    let enough = ENOUGH * a.distance(b);
+    let enough = VERTEX_TOLERANCE * a.distance(b);
     let mut best = if at_a.abs() < at_b.abs() { (at_a.abs(), 0.0) } else { (at_b.abs(), 1.0) };
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         if best.0 <= enough || t - s <= f64::EPSILON {
             break;
         }

@@ -28,7 +28,7 @@
 mod bisection;
 mod march;
 
-use bisection::{Bisection, Leaf, MOST_BISECTIONS, Unfinished, Value};
+use bisection::{Bisection, Leaf, MAX_BISECTIONS, Unfinished, Value};
 
 use super::{MedialMesh, MedialUnion, UnionError};
 use crate::Vec3;
@@ -96,10 +96,10 @@ const CONTRACTED: f64 = 0.25;
 
 /// Tetrahedra are refined to the radius of the union's balls, but to no less than this share of
 /// what the tolerance demands anyway.
-const THINNEST: f64 = 1.0 / 16.0;
+const MIN_SHARE_OF_CELL: f64 = 1.0 / 16.0;
 
 /// About 4 GB.
-const MOST_TETRAHEDRA: usize = 50_000_000;
+const MAX_TETRAHEDRA: usize = 50_000_000;
 
 /// The boundary of the union of all primitives of a medial mesh as triangles. `tolerance` is in the unit of
 /// the mesh; the head of this file says what it means.
@@ -124,7 +124,7 @@ const MOST_TETRAHEDRA: usize = 50_000_000;
 /// When the mesh has no union, the tolerance is not positive, or so fine that more than 50 million
 /// tetrahedra would be needed, and when nothing is thick enough to show.
 pub fn union_surface(mesh: &MedialMesh, tolerance: f64) -> Result<UnionSurface, ContourError> {
-    union_surface_within(mesh, tolerance, MOST_TETRAHEDRA)
+    union_surface_within(mesh, tolerance, MAX_TETRAHEDRA)
 }
 
 /// [`union_surface`] with at most so many tetrahedra, of some 80 bytes each.
@@ -159,9 +159,9 @@ pub fn union_surface_while(
         return Err(ContourError::NoInside);
     }
     let longest = EDGE_SHARE * tolerance;
-    let smallest = THINNEST * longest;
+    let smallest = MIN_SHARE_OF_CELL * longest;
     let mut grid = cube_around(&union, longest);
-    let sizes: Vec<f64> = (0..=MOST_BISECTIONS).map(|g| grid.longest_edge(g)).collect();
+    let sizes: Vec<f64> = (0..=MAX_BISECTIONS).map(|g| grid.longest_edge(g)).collect();
     let goal = sizes.iter().position(|&s| s <= longest).unwrap_or(sizes.len() - 1) as u8;
     let wanted = |leaf: &Leaf, values: [Value; 4]| {
         let size = sizes[usize::from(leaf.generation)];
@@ -175,7 +175,7 @@ pub fn union_surface_while(
     grid.refine(goal, most, values, wanted, &mut go_on).map_err(|unfinished| match unfinished {
         Unfinished::TooMany { generation, leaves } => {
             // Enough even if everything is thin and has to be refined as far as that goes.
-            let size = sizes[usize::from(generation)] / THINNEST;
+            let size = sizes[usize::from(generation)] / MIN_SHARE_OF_CELL;
             let feasible = size / EDGE_SHARE * f64::max(1.0, (leaves as f64 / most as f64).sqrt());
             ContourError::TooFine { tolerance, most, feasible }
         }

@@ -21,7 +21,7 @@ pub(super) const EDGE: usize = 1;
 pub(super) const FACE: usize = 2;
 
 /// More words than this follow no record.
-const MOST_WORDS: usize = 3;
+const MAX_WORDS: usize = 3;
 
 /// The flags of all records read so far.
 #[derive(Default)]
@@ -29,7 +29,7 @@ pub(super) struct Flags {
     /// Whether the header has a fourth count, that of tetrahedra.
     four_counts: bool,
     /// Number of records by kind and by number of words behind their values.
-    records: [[usize; MOST_WORDS + 1]; 3],
+    records: [[usize; MAX_WORDS + 1]; 3],
     /// For each kind, which records are marked as deleted.
     deleted: [Vec<bool>; 3],
     /// Faces with three words under a header of three counts, and what the words say if they are
@@ -54,7 +54,7 @@ impl Flags {
         kind: usize,
         words: impl Iterator<Item = &'a str>,
     ) -> Result<(), MaErrorKind> {
-        let words: Vec<&str> = words.take(MOST_WORDS + 1).collect();
+        let words: Vec<&str> = words.take(MAX_WORDS + 1).collect();
         let deleted = match (kind, words.as_slice()) {
             (_, []) => false,
             (FACE, [word]) => zero_or_one(word).ok_or_else(|| {
@@ -84,7 +84,7 @@ impl Flags {
                 integer(kind_of_feature)?;
                 false
             }
-            (_, &[kind_of_feature, deleted, ..]) if words.len() <= MOST_WORDS => {
+            (_, &[kind_of_feature, deleted, ..]) if words.len() <= MAX_WORDS => {
                 integer(kind_of_feature)?;
                 words.get(2).map_or(Ok(0.0), |copies| integer(copies))?;
                 integer(deleted)? != 0.0

@@ -83,7 +83,7 @@ pub struct Readings {
 }
 
 /// Coordinates and radii beyond this would overflow when squared.
-const LARGEST: f64 = 1e150;
+const MAX_COORDINATE: f64 = 1e150;
 
 /// Why a medial mesh has no union.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -113,7 +113,8 @@ impl MedialUnion {
     /// squares would overflow.
     pub fn new(mesh: &MedialMesh) -> Result<Self, UnionError> {
         mesh.check()?;
-        let too_large = |m: &Sphere| m.centre.abs().max_element() > LARGEST || m.radius > LARGEST;
+        let too_large =
+            |m: &Sphere| m.centre.abs().max_element() > MAX_COORDINATE || m.radius > MAX_COORDINATE;
         if let Some(sphere) = mesh.spheres.iter().position(too_large) {
             return Err(UnionError::TooLarge { sphere });
         }
@@ -198,7 +199,7 @@ impl MedialUnion {
     /// again and again. `None` where it ends more than `burial` inside some primitive.
     pub(crate) fn boundary_near(&self, p: Vec3, burial: f64, near: &mut usize) -> Option<Vec3> {
         let mut point = p;
-        for _ in 0..MOST_EXITS {
+        for _ in 0..MAX_EXITS {
             let (nearest, place) = self.parts.nearest::<Signed>(point, *near);
             *near = place;
             let (signed, centre) = self.parts.shape(place).nearest_centre(point)?;
@@ -341,7 +342,7 @@ impl MedialUnion {
 }
 
 /// Primitives that are left one after the other on the way out of a union.
-const MOST_EXITS: usize = 12;
+const MAX_EXITS: usize = 12;
 
 /// How many primitives are remembered that buried a point.
 const RECENT: usize = 4;

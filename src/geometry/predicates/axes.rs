@@ -1,8 +1,8 @@
 //! The exact stage for axes of very different extents, such as a solid flattened to `1e-100`.
 //!
-//! On one common quantum such coordinates span hundreds of bits, though those of each axis do not.
-//! A determinant keeps its sign when an axis is scaled by a power of two. So does the lifted one,
-//! once its lifts are put together in the common unit again: of all factors, they alone are long.
+//! With one common quantum such coordinates span hundreds of bits, although those of each axis do
+//! not. A determinant keeps its sign when an axis is scaled by a power of two. So does the lifted
+//! determinant, provided that the lifts are still summed in a common unit: only they become long.
 //!
 //! 1. Each axis is scaled so that its largest coordinate is in `[1/2, 1)`.
 //! 2. Differences, minors and `3 x 3` determinants are those of the first two tiers.
@@ -14,7 +14,8 @@ use super::exact::{det3, lifted_det};
 use super::wide::Wide;
 use super::{Sign, narrow};
 
-/// Shifts that fit the two widths of a lift, beside the bits of three squares and a sign.
+/// The largest shifts for the two widths of a lift, with room for the bits of three squares and a
+/// sign.
 const SHORT_SHIFT: i32 = 14 * 64 - 256;
 const LONG_SHIFT: i32 = 44 * 64 - 256;
 
@@ -38,6 +39,7 @@ fn scaled<const K: usize>(points: [&[f64; 3]; K], origin: &[f64; 3]) -> Option<S
             continue;
         }
         exponents[k] = top.max(LOWEST);
+        // The scaled coordinates must be exact, so their lowest bit must not underflow.
         if low - exponents[k] < LOWEST {
             return None;
         }

@@ -6,19 +6,19 @@ use crate::Vec3;
 /// The centre and radius of the sphere through four points; `None` if they are coplanar or the
 /// centre is not representable.
 ///
-/// In double precision relative to `p[0]`; where the distances to the four points then differ from
-/// the radius by more than `1e-6` of it, or flatness makes the solution doubtful, once more with
+/// Computed in double precision relative to `p[0]`. If the distances to the four points then differ
+/// from the radius by more than `1e-6` of it, or the cell is nearly flat, it is computed again with
 /// exact numerators and denominator. The unit is that of the points.
 pub fn circumsphere(p: [Vec3; 4]) -> Option<(Vec3, f64)> {
     let (offset, _) = relative_orthocentre(p, [0.0; 4])?;
     Some((p[0] + offset, norm(offset)))
 }
 
-/// The orthocentre of four weighted points `(p, w)` and the power `rho^2` that is common to all
-/// four, `|o - p|^2 - w`, which may be negative; `None` if the points are coplanar or the centre
-/// is not representable.
+/// The orthocentre `o` of four weighted points `(p, w)` and its power `|o - p|^2 - w`, which is the
+/// same for all four and may be negative; `None` if the points are coplanar or the centre is not
+/// representable.
 ///
-/// Robust in the sense of [`circumsphere`], which it equals for zero weights.
+/// As robust as [`circumsphere`], to which it reduces for zero weights.
 pub fn orthosphere(p: [Vec3; 4], w: [f64; 4]) -> Option<(Vec3, f64)> {
     let (offset, power) = relative_orthocentre(p, w)?;
     Some((p[0] + offset, power))
@@ -44,6 +44,7 @@ fn relative_orthocentre(p: [Vec3; 4], w: [f64; 4]) -> Option<(Vec3, f64)> {
 /// `|v|` without underflow or overflow on the way.
 fn norm(v: Vec3) -> f64 {
     let largest = v.abs().max_element();
+    // Squares of these are normal numbers.
     if (1e-140..1e140).contains(&largest) || largest == 0.0 {
         v.length()
     } else {
@@ -51,7 +52,7 @@ fn norm(v: Vec3) -> f64 {
     }
 }
 
-/// The residual test, and a determinant well above its own rounding error.
+/// Whether the solution passes the residual test and its determinant is well above rounding error.
 fn is_trustworthy(d: &[Vec3; 3], w: [f64; 4], det: f64, offset: Vec3, power: f64) -> bool {
     let reach = d[0].length() * d[1].length() * d[2].length();
     if det.abs() <= 1e-9 * reach || !offset.is_finite() {

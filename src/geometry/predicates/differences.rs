@@ -1,4 +1,4 @@
-//! Differences of coordinates as integers, exactly: in one word where they fit, in two where not.
+//! Exact differences of coordinates as integers: in one word if they fit, else in two or in twenty.
 
 use super::narrow;
 use super::wide::Wide;
@@ -16,6 +16,7 @@ fn parts(x: f64) -> Parts {
     let bits = x.to_bits();
     let biased = (bits >> 52) as i32 & 0x7ff;
     let fraction = bits & ((1 << 52) - 1);
+    // Subnormal numbers have no implicit bit, and the exponent of the smallest normal ones.
     let implicit = u64::from(biased != 0) << 52;
     Parts {
         mantissa: fraction | implicit,
@@ -73,7 +74,8 @@ pub(super) enum Differences<const K: usize> {
     Any([[Wide<20>; 3]; K]),
 }
 
-/// A grid of coordinates whose differences are narrow: multiples of the reciprocal of its scale.
+/// A grid on which differences fit one word: coordinates are multiples of `1 / scale`, a power of
+/// two.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     scale: f64,
@@ -94,6 +96,7 @@ impl Grid {
         origin: &[f64; 3],
     ) -> [[i64; 3]; K] {
         let mut d = [[0; 3]; K];
+        // Both conversions are exact: a power of two times a multiple of its reciprocal.
         for k in 0..3 {
             let o = (origin[k] * self.scale) as i64;
             for i in 0..K {
@@ -104,10 +107,10 @@ impl Grid {
     }
 }
 
-/// Differences that are exact as doubles, as integers, and their quantum; `None` if some
-/// difference is rounded or they span too many bits.
+/// Differences as integers, and their quantum, computed through doubles; `None` if a difference is
+/// rounded or they span too many bits.
 ///
-/// The usual case: neighbouring points differ by little, so that their differences are exact.
+/// The usual case: the differences of neighbouring points are exact as doubles.
 #[inline]
 fn close_differences<const K: usize>(
     points: [&[f64; 3]; K],
@@ -120,6 +123,7 @@ fn close_differences<const K: usize>(
         for k in 0..3 {
             let (a, b) = (points[i][k], origin[k]);
             let difference = a - b;
+            // Knuth's error term of a sum, which is zero exactly if nothing was rounded.
             let virtual_b = a - difference;
             let virtual_a = difference + virtual_b;
             exact &= (a - virtual_a) + (virtual_b - b) == 0.0;
@@ -171,6 +175,7 @@ pub(super) fn differences<const K: usize>(
         return (Differences::One(grid.differences(points, origin)), quantum);
     }
     let bits = top - quantum;
+    // A difference has one bit more, and its sign another: i128 holds up to here.
     if bits > 125 {
         let o = origin.map(|x| to_wide::<20>(x, quantum));
         let d = points.map(|p| [0, 1, 2].map(|k| to_wide::<20>(p[k], quantum).sub(o[k])));
@@ -185,6 +190,7 @@ pub(super) fn differences<const K: usize>(
             reach |= wide[i][k].unsigned_abs();
         }
     }
+    // Coordinates may be long and their differences short.
     if reach >> narrow::BITS == 0 {
         (Differences::One(wide.map(|p| p.map(|x| x as i64))), quantum)
     } else {

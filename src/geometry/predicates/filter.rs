@@ -2,29 +2,29 @@
 //!
 //! Notation: `u = 2^-53`; `M` the largest distance of the points to the origin of the call.
 //!
-//! Rounding errors multiply along a formula: a sum of products, each the result of at most `k`
-//! roundings on its way, is off by at most `((1 + u)^k - 1)` times the sum of the absolute values
-//! of the products, the *permanent*.
+//! If every product in a sum of products passes through at most `k` roundings, the computed sum is
+//! off by at most `(1 + u)^k - 1` times the sum of the absolute values of the products, the
+//! *permanent*.
 //!
 //! * Orientation: `k = 8` (two differences, product, difference of products, third difference,
 //!   product, two sums). The permanent is computed.
 //! * In-sphere: `k = 16` (`3 x 3` minors 8, lift 5, product, two sums), 17 with weights. By
 //!   Cauchy-Schwarz `|x y'| + |y x'| <= M^2`, so the permanent is at most `12 M^3 B`, where `B` bounds
 //!   the lifts, and the error at most `17 * 12 u M^3 B`.
-//! * In-sphere where that bound does not decide: the permanent itself, which follows points that
-//!   are flat along an axis, as `M` does not.
+//! * In-sphere, if that bound does not decide: the permanent itself. It shrinks with points that are
+//!   flat along an axis, while `M` does not.
 //!
-//! Differences of coordinates may underflow gradually, which is exact; products may underflow
-//! with an absolute error below `2^-1074` each, which [`UNDERFLOW`] covers when `M <= 1` and the slack
-//! of the constants when `M > 1`.
+//! Differences of coordinates may underflow gradually, which is exact. Products may underflow with an
+//! absolute error below `2^-1074` each: [`UNDERFLOW`] covers it when `M <= 1`, the slack of the
+//! constants when `M > 1`.
 
 use super::differences::Grid;
 use super::lanes::{Pair, Real};
 use super::{Sign, exact};
 
-/// A point with its weight; the weight of a Delaunay site is zero and never read.
+/// A point with its weight. The weight of a Delaunay site is zero and never read.
 ///
-/// Aligned so that a site never straddles two cache lines.
+/// Aligned so that a site never straddles two cache lines: sites are read in random order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
 pub(crate) struct Site {
@@ -63,7 +63,8 @@ fn sub(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// `det(b - a, c - a, d - a)` in double precision, for walks that are finished exactly.
+/// `det(b - a, c - a, d - a)` in double precision, without a bound on its error: for walks that are
+/// finished with exact tests.
 #[inline(always)]
 pub(crate) fn approximate_orientation(
     a: &[f64; 3],
@@ -77,11 +78,11 @@ pub(crate) fn approximate_orientation(
         + d[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
-/// The filters, with what is known of all sites.
+/// The filters, with knowledge common to all sites of a triangulation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Filter {
-    /// Error bounds up to these values belong to calls in which nothing is rounded at all, because
-    /// every intermediate value is a small multiple of a power of the common quantum.
+    /// If the error bound of a call is at most this, the call rounds nothing at all: every
+    /// intermediate value is a small multiple of a power of the common quantum.
     exact_orientation: f64,
     exact_power: f64,
     /// The grid of the exact stage.
@@ -89,7 +90,7 @@ pub(crate) struct Filter {
 }
 
 impl Filter {
-    /// The filter that knows nothing of the sites.
+    /// The filter without knowledge of the sites.
     pub(crate) const ANY: Self = Self { exact_orientation: -1.0, exact_power: -1.0, grid: None };
 
     /// The filter for sites whose coordinates are multiples of `2^quantum` and below `2^top`, and
@@ -122,7 +123,7 @@ impl Filter {
         if det.abs() > bound + UNDERFLOW || bound <= self.exact_orientation {
             return Sign::of(det);
         }
-        // Points in a plane across an axis need no arithmetic.
+        // The usual degenerate case, points in an axis-parallel plane, needs no arithmetic.
         if (0..3).any(|k| b1[k] == 0.0 && c1[k] == 0.0 && d1[k] == 0.0) {
             return Sign::Zero;
         }
@@ -159,7 +160,7 @@ impl Filter {
         lifted_determinant::<f64, M>(cell.map(|s| (s.p, s.w)), (e.p, e.w))
     }
 
-    /// The same for two cells at once.
+    /// [`Filter::lifted_determinant`] for two cells at once.
     #[inline(always)]
     pub(crate) fn lifted_determinants<M: Metric>(
         [a, b]: [[&Site; 4]; 2],
@@ -189,6 +190,7 @@ fn lifted_determinant<R: Real, M: Metric>(
 ) -> (R, R) {
     let relative = |p: [R; 3]| [p[0] - e.0[0], p[1] - e.0[1], p[2] - e.0[2]];
     let (ap, bp, cp, dp) = (relative(a.0), relative(b.0), relative(c.0), relative(d.0));
+    // The four 3 x 3 minors share six 2 x 2 minors.
     let ab = ap[0] * bp[1] - bp[0] * ap[1];
     let bc = bp[0] * cp[1] - cp[0] * bp[1];
     let cd = cp[0] * dp[1] - dp[0] * cp[1];
@@ -211,6 +213,7 @@ fn lifted_determinant<R: Real, M: Metric>(
         dl = dl + dw;
         lift = lift + aw.abs().max(bw.abs()).max(cw.abs().max(dw.abs()));
     }
+    // Two independent pairs, as the count of roundings in the head presumes.
     let det = (al * bcd - bl * cda) + (cl * dab - dl * abc);
     (det, R::splat(IN_SPHERE_BOUND) * (reach2 * reach2.sqrt()) * lift)
 }
@@ -218,7 +221,7 @@ fn lifted_determinant<R: Real, M: Metric>(
 #[cold]
 #[inline(never)]
 fn precise_power_test<M: Metric>(cell: [&Site; 4], e: &Site, grid: Option<Grid>) -> Sign {
-    // On a grid the exact stage is as quick as this filter, and most calls are for zeros.
+    // On a grid the exact stage is as fast as this filter, and most calls are exact zeros.
     if grid.is_none() {
         let (det, bound) = permanent_bound::<M>(cell, e);
         if det.abs() > bound {
@@ -249,6 +252,7 @@ fn permanent_bound<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
         + lifts[1] * triple(0, 2, 3)
         + lifts[2] * triple(0, 1, 3)
         + lifts[3] * triple(0, 1, 2);
+    // At least 1, as the bound on underflow in the documentation needs.
     let reach = lifts.into_iter().fold(1.0, f64::max);
     (det, PERMANENT_BOUND * permanent + UNDERFLOW * (reach * reach))
 }
@@ -256,6 +260,7 @@ fn permanent_bound<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
 #[cold]
 #[inline(never)]
 fn exact_power_test<M: Metric>(s: [&Site; 4], e: &Site, grid: Option<Grid>) -> Sign {
+    // Equal weights cancel: the test without weights has narrower tiers.
     if M::WEIGHTED && s.iter().any(|s| s.w != e.w) {
         exact::power_test(s.map(|s| (&s.p, s.w)), (&e.p, e.w))
     } else {

@@ -20,6 +20,7 @@ impl Real for f64 {
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
+        // One instruction, unlike `f64::max`, which treats not-a-number; coordinates are finite.
         if self > other { self } else { other }
     }
 

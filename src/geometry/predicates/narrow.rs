@@ -1,7 +1,8 @@
 //! The determinants of the exact stage for differences below 2^61, in native 128-bit integers.
 //!
-//! Tier 1 decides almost every call of the exact stage, on spheres and grids many for each point:
-//! written out, it takes half the time of the same formula in general [`super::wide`] integers.
+//! Tier 1 decides almost every call of the exact stage, and samples of spheres and grids make many
+//! calls per point. So the formula is written out here, which is faster than the general integers of
+//! [`super::wide`].
 
 use super::Sign;
 
@@ -29,6 +30,7 @@ fn minor(a: &[i64; 3], b: &[i64; 3]) -> i128 {
 /// `a x + b y + c z`.
 #[inline(always)]
 fn combine(minors: [i128; 3], z: [i64; 3]) -> Triple {
+    // Halves of 64 bits: each of the three partial products stays below 2^125, so no sum overflows.
     let (mut low, mut high) = (0i128, 0i128);
     for (m, z) in minors.into_iter().zip(z) {
         low += i128::from(m as u64) * i128::from(z);
@@ -48,7 +50,8 @@ pub(super) fn det3_sign([a, b, c]: &[[i64; 3]; 3]) -> Sign {
     }
 }
 
-/// A sum of products in columns of 64 bits, carried at the end.
+/// A sum of products in columns of 64 bits. A column has 64 bits to spare, so carries wait until the
+/// end.
 struct Columns([i128; 5]);
 
 impl Columns {
@@ -59,7 +62,7 @@ impl Columns {
         self.0[column + 1] += i128::from((p >> 64) as u64);
     }
 
-    /// `a` is a high limb, signed, and `b` a low one or the like.
+    /// Adds the product of two limbs of which at least one is signed.
     #[inline(always)]
     fn add_signed(&mut self, column: usize, p: i128) {
         self.0[column] += i128::from(p as u64);
@@ -81,6 +84,7 @@ impl Columns {
 
     #[inline(always)]
     fn sign(self) -> Sign {
+        // The last carry has the sign of the whole; if it is 0, any bit left makes it positive.
         let mut rest = 0u64;
         let mut carry = 0i128;
         for column in self.0 {
@@ -96,8 +100,8 @@ impl Columns {
     }
 }
 
-/// The sign of the lifted determinant of four differences, the lifts increased by `offset`, each
-/// below `2^123`.
+/// The sign of the lifted determinant of four differences. Each lift is increased by its `offset`,
+/// which is below `2^123` in absolute value.
 #[inline]
 pub(super) fn lifted_sign([a, b, c, d]: &[[i64; 3]; 4], offset: &[i128; 4]) -> Sign {
     let lift = |p: &[i64; 3]| product(p[0], p[0]) + product(p[1], p[1]) + product(p[2], p[2]);

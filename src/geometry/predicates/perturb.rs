@@ -3,14 +3,14 @@
 //! O. Devillers, M. Teillaud: *Perturbations for Delaunay and weighted Delaunay 3D
 //! triangulations*, Computational Geometry 44 (2011), <https://doi.org/10.1016/j.comgeo.2010.09.010>.
 //!
-//! The lift of the site that is the `k`-th in lexicographic order grows by `eps^(n - k)`: the
-//! larger the site, the larger its growth. Where the test is zero, its sign is that of the first
-//! non-zero cofactor, from the largest of the five sites downwards, and the cofactor of a vertex is
-//! the orientation of the cell with that vertex replaced by the query. The query's own cofactor is
-//! the orientation of the cell, never zero, so there always is an answer.
+//! The lift of the `k`-th of `n` sites in lexicographic order grows by `eps^(n - k)`: the larger the
+//! site, the larger its growth. If the test is zero, its perturbed sign is that of the first non-zero
+//! cofactor, from the largest of the five sites downwards. The cofactor of a vertex is the
+//! orientation of the cell with that vertex replaced by the query. The query's own cofactor is the
+//! orientation of the cell, which is never zero, so there always is an answer.
 //!
-//! Orientation is never perturbed, hence no cell is flat. The result is the one weighted Delaunay
-//! triangulation of infinitesimally different weights: unique, whatever the order of insertion.
+//! Orientation is never perturbed, hence no cell is flat. The result is the regular triangulation of
+//! infinitesimally different weights: unique, whatever the order of insertion.
 
 use std::cmp::Ordering;
 
@@ -26,7 +26,7 @@ pub(crate) fn in_conflict<M: Metric>(filter: Filter, cell: [&Site; 4], e: &Site)
     in_conflict_given::<M>(filter, det, bound, cell, e)
 }
 
-/// The same from what [`Filter::lifted_determinant`] returned.
+/// [`in_conflict`] with the determinant and the bound that [`Filter::lifted_determinant`] returned.
 #[inline(always)]
 pub(crate) fn in_conflict_given<M: Metric>(
     filter: Filter,
@@ -52,6 +52,7 @@ fn perturbed(filter: Filter, cell: [&Site; 4], e: &Site) -> bool {
         above[count] = i;
         count += usize::from(precedes(&e.p, &s.p));
     }
+    // One step of a selection sort per cofactor, since the first usually decides.
     for rank in 0..count {
         for i in rank + 1..count {
             if precedes(&cell[above[rank]].p, &cell[above[i]].p) {
@@ -67,6 +68,7 @@ fn perturbed(filter: Filter, cell: [&Site; 4], e: &Site) -> bool {
             Sign::Zero => {}
         }
     }
+    // The query is next: its lift grows, which moves it out of the sphere.
     false
 }
 

@@ -31,8 +31,8 @@ fn orient2d_exact(a: Point2, b: Point2, c: Point2) -> Sign {
     Sign::of(robust::orient2d(coord(a), coord(b), coord(c)))
 }
 
-/// The point without its coordinate `axis`, such that a triangle whose normal has a positive
-/// component along `axis` turns left.
+/// The point without its coordinate `axis`. The order of the other two is such that a triangle whose
+/// normal has a positive component along `axis` turns left.
 #[inline]
 pub fn project(p: Vec3, axis: usize) -> Point2 {
     match axis {
@@ -42,8 +42,8 @@ pub fn project(p: Vec3, axis: usize) -> Point2 {
     }
 }
 
-/// A coordinate axis along which the triangle does not project to a segment, and the sense of
-/// rotation of its projection; `None` for exactly collinear corners.
+/// A coordinate axis along which the projection of the triangle is not degenerate, and the sense of
+/// rotation of the projection; `None` for exactly collinear corners.
 pub fn projection_axis([a, b, c]: [Vec3; 3]) -> Option<(usize, Sign)> {
     let normal = (b - a).cross(c - a).abs();
     // The axis with the largest component first: the projection is then far from degenerate.

@@ -1,8 +1,8 @@
 //! The exact stage of [`super::power_size`]: its polynomials in fixed-width integers.
 //!
-//! Tiers as in [`super::exact`]. Words of the size of a tetrahedron, of degree 8: 8, 16, 160. In
-//! the first two the weights have at most 122 and 250 bits in units of the squared quantum, so that
-//! a lift has at most 125 and 254 and no sum below reaches its sign bit.
+//! Tiers as in [`super::exact`]. The size of a tetrahedron, the longest value (degree 8), takes 8, 16
+//! or 160 words. In the first two tiers weights have at most 122 and 250 bits in units of the squared
+//! quantum. So a lift has at most 125 and 254 bits, and no sum below reaches its sign bit.
 
 use super::differences::{Differences, differences, highest_bit, lowest_bit, to_wide, widen};
 use super::exact::minor;

@@ -26,8 +26,8 @@
 //! Filters: with `u = 2^-53` a sum of products of at most `k` roundings each is off by at most
 //! `k u` times the sum of the products' absolute values, up to a second-order term that the slack
 //! of the constants covers. Inner products and cross products are bounded by Cauchy-Schwarz, lifts
-//! by their *weight* `|d|^2 + |w_0 - w|`. Where a difference is so short that products may
-//! underflow, and where products overflow, no filter decides.
+//! by their *reach* `|d|^2 + |w_0 - w|`. The filter never decides when a difference is so short that
+//! products may underflow, or when a product overflows.
 
 use super::power_exact::{
     self, EdgeClearance, EdgeSize, TetrahedronSize, TriangleClearance, TriangleSize,
@@ -37,11 +37,12 @@ use super::{Sign, Site};
 
 const U: f64 = f64::EPSILON / 2.0;
 
-/// The shortest squared difference for which a filter is trusted. Above it, an error of `2^-1074`
-/// in a product is far below `u` times the bound of the whole sum, whatever multiplies it.
+/// The smallest squared difference for which a filter is trusted. Above it, the error of `2^-1074`
+/// of a product that underflows, even multiplied by other factors, is far below `u` times the bound
+/// of the whole sum.
 const SHORTEST2: f64 = 1e-60;
 
-/// A site as seen from the origin of a call.
+/// A site relative to the origin of a call.
 #[derive(Clone, Copy)]
 struct Seen {
     d: [f64; 3],
@@ -49,7 +50,7 @@ struct Seen {
     square: f64,
     /// 7 roundings.
     lift: f64,
-    /// A bound on the absolute values that the lift is the sum of.
+    /// The sum of the absolute values of the terms of the lift.
     reach: f64,
 }
 
@@ -75,8 +76,7 @@ fn see(origin: &Site, s: &Site) -> Seen {
 #[inline(always)]
 fn decided<const K: usize>(value: f64, error: f64, seen: [&Seen; K]) -> Option<Sign> {
     let long = seen.iter().all(|s| s.square >= SHORTEST2);
-    // Infinite or undefined values fail the comparison, since the error exceeds `u` times each
-    // term and overflows no later.
+    // An error that overflows fails the comparison. A value that overflows is excluded as such.
     (long && value.abs() > error && value.is_finite()).then(|| Sign::of(value))
 }
 
@@ -88,7 +88,7 @@ pub(crate) fn tetrahedron_size([o, a, b, c]: [&Site; 4]) -> Sign {
     let n = [0, 1, 2].map(|k| x.lift * yz[k] + y.lift * zx[k] + z.lift * xy[k]);
     let det = dot(&x.d, &yz);
     let value = dot(&n, &n) - 4.0 * det * det * o.w;
-    // A vector of absolute values |y z'| + |z y'| is at most sqrt(2) |d| |d'| long.
+    // Cauchy-Schwarz: the vector of the sums |y z'| + |z y'| is at most sqrt(2) |d| |d'| long.
     let (px, py, pz) = (
         x.reach * x.reach * y.square * z.square,
         y.reach * y.reach * z.square * x.square,

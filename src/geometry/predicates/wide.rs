@@ -1,6 +1,6 @@
 //! Signed integers of a fixed number of 64-bit limbs, two's complement, least significant first.
 //!
-//! The widths are chosen by the caller so that no result overflows; nothing here checks it.
+//! The caller chooses widths at which no result overflows; nothing here checks it.
 
 use super::Sign;
 
@@ -125,7 +125,9 @@ impl<const N: usize> Wide<N> {
         }
     }
 
-    /// The value as `m * 2^e` with `m` rounded to double precision, `|m|` in `[2^63, 2^128]` or small.
+    /// The value as `m * 2^e` with `m` in double precision: `|m|` is at most `2^128`, and at least
+    /// `2^64` unless the value fits one limb. Two limbs are read, so `m` is off by a little more than
+    /// half a unit in the last place at most.
     pub(super) fn to_scaled_f64(self) -> (f64, i32) {
         let negative = self.is_negative();
         let magnitude = if negative { self.neg() } else { self };

@@ -1,9 +1,9 @@
 //! Building the tree: binned surface-area heuristic.
 //!
 //! 1. The centres of the items' boxes are sorted into bins along each axis.
-//! 2. Of all planes between bins the one of least expected cost is taken.
-//! 3. When no plane is cheaper than a leaf, or only one bin is filled, the range becomes a leaf if
-//!    it is small, and is halved by count otherwise.
+//! 2. The plane between bins with the least expected cost splits the range.
+//! 3. A small range becomes a leaf if that is cheaper, or if all centres share one bin. A large range
+//!    whose centres share one bin is halved by count.
 
 use super::{Bounds, Node, Tree};
 use crate::Vec3;
@@ -11,8 +11,8 @@ use crate::Vec3;
 const BINS: usize = 16;
 /// Cost of descending into a node, in units of one item.
 const DESCENT: f64 = 1.0;
-/// From here on ranges are halved by count, so that no input makes a tree deeper than
-/// [`MAX_DEPTH`]: geometrically growing coordinates would peel off one item at a time.
+/// From this depth on ranges are halved by count, so that no tree is deeper than [`MAX_DEPTH`]:
+/// geometrically growing coordinates would split off one item at a time.
 const HALVING_DEPTH: usize = 40;
 /// Bound on the depth of any tree: `HALVING_DEPTH` plus the halvings of `2^32` items.
 pub(super) const MAX_DEPTH: usize = HALVING_DEPTH + 33;
@@ -32,15 +32,16 @@ struct Bin {
     count: usize,
 }
 
-/// What a tree is built for.
+/// The use that a tree is built for.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     /// Leaves never hold more items.
     pub max_leaf: usize,
-    /// Items that are looked at together, at the cost of one: a share of a group costs a group.
+    /// Number of items that are measured together at the cost of one; part of a group costs as much
+    /// as a whole one.
     pub group: usize,
-    /// Added to the sides of boxes when costs are compared: how much farther than a box itself
-    /// its items are felt. Also what tells flat boxes apart, which have no area.
+    /// Added to the sides of boxes when costs are compared: the distance beyond its box at which an
+    /// item still matters. It also gives flat boxes an area.
     pub padding: f64,
 }
 
@@ -52,8 +53,8 @@ impl Plan {
 }
 
 impl Tree {
-    /// A tree over the boxes of items, each with a value that is not negative, whose maximum and
-    /// minimum are kept in the nodes.
+    /// A tree over items, each a box and a non-negative value. Each node stores the largest and the
+    /// smallest value below it.
     ///
     /// Cost `O(n log n)`.
     pub fn build(items: &[(Bounds, f64)], plan: Plan) -> Self {
@@ -85,7 +86,7 @@ struct Place {
     depth: usize,
 }
 
-/// Turns the leaf `index` over `items`, which start at `first`, into a subtree where that pays.
+/// Turns the leaf `index` over `items`, which start at `place.first`, into a subtree if that pays.
 fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], place: Place, plan: Plan) {
     let Place { first, depth } = place;
     let count = items.len();
@@ -94,7 +95,7 @@ fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], place: Place, 
         _ if count < 2 => return,
         Some(plane) => {
             let cost = DESCENT + plane.cost / nodes[index].bounds.half_area(plan.padding);
-            // Also false when the area vanishes and the cost is not a number.
+            // A box without area makes the cost not a number, and this false.
             let pays = cost < plan.cost(count);
             if count <= plan.max_leaf && !pays {
                 return;
@@ -106,6 +107,7 @@ fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], place: Place, 
     };
     let (left, right) = items.split_at_mut(middle);
     let child = nodes.len();
+    // Both children before the subtree of either, so that they are adjacent.
     nodes.push(node(left, first));
     nodes.push(node(right, first + middle));
     nodes[index].first = child as u32;
@@ -145,6 +147,7 @@ fn cheapest_plane(items: &[Item], plan: Plan) -> Option<Plane> {
     for axis in 0..3 {
         let extent = centres.hi[axis] - centres.lo[axis];
         let scale = BINS as f64 / extent;
+        // Subnormal extents overflow the scale.
         if !(extent > 0.0 && scale.is_finite()) {
             continue;
         }
@@ -156,6 +159,7 @@ fn cheapest_plane(items: &[Item], plan: Plan) -> Option<Plane> {
             bin.count += 1;
         }
         let (bin, cost) = sweep(&bins, plan);
+        // Strictly cheaper: ties go to the first axis, so that the tree is determined.
         if best.as_ref().is_none_or(|b| cost < b.cost) {
             best = Some(Plane { axis, binning, bin, cost });
         }

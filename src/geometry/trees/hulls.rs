@@ -1,7 +1,8 @@
-//! Four hulls of balls measured together in single precision, to tell which are worth measuring.
+//! Four hulls of balls measured together in single precision, to select those worth measuring in
+//! double precision.
 //!
-//! The errors are those of coordinates and radii, however steep a hull is: its distance is a least
-//! value, and the place where it is taken counts in second order only.
+//! However steep a hull is, the error is that of the coordinates and radii: the distance is a
+//! minimum over interpolated spheres, so an error of the minimiser counts in second order only.
 
 use super::wide::{Frame, Lanes, Query};
 use crate::{Cone, SlabFace};
@@ -29,7 +30,7 @@ fn dot(u: &[Lanes; 3], v: &[Lanes; 3]) -> Lanes {
 }
 
 impl ConeBlock {
-    /// Up to four cones; those beyond are left out.
+    /// Up to four cones; any others are ignored.
     pub fn new(cones: &[Cone], frame: &Frame) -> Self {
         let s = frame.scale;
         Self {
@@ -47,6 +48,7 @@ impl ConeBlock {
     pub fn signed(&self, query: &Query) -> Lanes {
         let w = [0, 1, 2].map(|k| query.p[k] - self.start[k]);
         let xi = dot(&w, &self.axis);
+        // Not |w|² - xi², which cancels near the axis.
         let across = [0, 1, 2].map(|k| w[k] - xi * self.axis[k]);
         let y_squared = dot(&across, &across);
         let tau = (xi + y_squared.sqrt() * self.lead).fast_max(Lanes::ZERO).fast_min(self.length);
@@ -74,7 +76,7 @@ pub struct FaceBlock {
 }
 
 impl FaceBlock {
-    /// Up to four faces; those beyond are left out.
+    /// Up to four faces; any others are ignored.
     pub fn new(faces: &[SlabFace], frame: &Frame) -> Self {
         let s = frame.scale;
         let inward = |run: fn(&SlabFace) -> f64, turn: f64| {
@@ -104,8 +106,8 @@ impl FaceBlock {
         }
     }
 
-    /// The signed distances where a face may have one, and infinite where it leaves the answer to
-    /// the cones of its sides.
+    /// The signed distances; infinite where the face certainly has none and the cones of its sides
+    /// decide.
     #[inline]
     pub fn signed(&self, query: &Query) -> Lanes {
         let w = [0, 1, 2].map(|k| query.p[k] - self.origin[k]);
@@ -114,14 +116,15 @@ impl FaceBlock {
         let [gx, gy] = self.gradient;
         let ahead = height * self.lead;
         let (cx, cy) = (x + ahead * gx, y + ahead * gy);
-        // A steep face throws its centre far ahead, and multiplies the errors by as much.
+        // On a steep face the best centre is far from the foot of the query, and its error grows with
+        // that distance.
         let blur = Lanes::splat(query.blur()) * (Lanes::ONE + self.lead + ahead);
         let [left, right] = &self.sides;
         let least = cy
             .fast_min(left[0] * cx + left[1] * cy)
             .fast_min(right[0] * cx + right[1] * cy + self.offset);
         let outside = least.simd_lt(-blur);
-        // In closed form: |h| lead at the best centre, less the radius there.
+        // In closed form: the distance to the best centre minus the radius there.
         let signed = height * self.rise - (self.radius + gx * x + gy * y);
         outside.bitselect(Lanes::splat(f32::INFINITY), signed)
     }

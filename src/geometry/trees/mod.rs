@@ -1,10 +1,10 @@
 //! Bounding-volume hierarchy: a flat binary tree over boxes, built by the binned surface-area
 //! heuristic (Wald 2007, doi:10.1109/RT.2007.4342588), searched nearest box first.
 //!
-//! The tree knows boxes only. What is in a leaf, and how far it is, is the business of the
-//! [`Search`], or of what descends ([`Tree::descend`]). Many queries are faster in a copy with four
-//! children a node and boxes in single precision ([`WideTree`]), to hulls of balls in one that knows
-//! radii too ([`ReachTree`]), with four hulls measured at a time ([`ConeBlock`], [`FaceBlock`]).
+//! The tree stores boxes only. The items of a leaf and their distances belong to the [`Search`], or
+//! to the caller of [`Tree::descend`]. Two copies speed up many queries: [`WideTree`] has four
+//! children per node and boxes in single precision; [`ReachTree`], for distances to hulls of balls,
+//! stores radii too. [`ConeBlock`] and [`FaceBlock`] measure four hulls at a time.
 //!
 //! ```
 //! use std::ops::Range;
@@ -46,10 +46,10 @@
 //! ```
 //!
 //! # Deviations from the literature
-//! Answers are independent of the order in which the tree is searched and of the bound that a
-//! search starts from: boxes are given up only when they are farther than the best answer by more
-//! than rounding can explain, and equal distances are decided by the smaller index. Batches may
-//! therefore start each query from its neighbour's answer, in any chunks, on any number of threads.
+//! Answers depend neither on the order in which the tree is searched nor on the bound that a search
+//! starts from: a box is skipped only if it is farther than the best answer by more than rounding
+//! can explain, and equal distances are decided by the smaller index. So a batch may start each query
+//! from its neighbour's answer, in any chunks, on any number of threads.
 
 mod build;
 mod hulls;
@@ -82,7 +82,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box of nothing, within every other.
+    /// The empty box, which lies within every other.
     pub const EMPTY: Self =
         Self { lo: Vec3::splat(f64::INFINITY), hi: Vec3::splat(f64::NEG_INFINITY) };
 
@@ -140,7 +140,7 @@ pub struct Node {
 #[derive(Clone, Debug)]
 pub struct Tree {
     nodes: Vec<Node>,
-    /// For each place the item that was put there.
+    /// For each place in leaf order the original index of the item.
     order: Vec<u32>,
 }
 
@@ -158,7 +158,7 @@ impl Tree {
     /// For each node the places of the items below it.
     pub fn ranges(&self) -> Vec<Range<usize>> {
         let mut ranges = vec![0..0; self.nodes.len()];
-        // Children follow their parents, and the left one has the smaller places.
+        // Children follow their parents, so backwards they are known; the left has smaller places.
         for (index, node) in self.nodes.iter().enumerate().rev() {
             let first = node.first as usize;
             ranges[index] = match node.count {

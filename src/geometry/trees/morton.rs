@@ -1,17 +1,17 @@
-//! Points along a Morton curve, and batches of queries along it, each starting from the answer of
-//! the one before.
+//! Points along a Morton curve, and batches of queries along it, in which each query may start from
+//! the answer of the one before.
 
 use rayon::prelude::*;
 
 use super::Bounds;
 use crate::Vec3;
 
-/// Queries that follow each other on one thread. Long enough that the first one, which starts
-/// from nothing, does not matter; short enough to balance the load.
+/// Consecutive queries on one thread: enough that the first, which starts from nothing, does not
+/// matter, and few enough to balance the load.
 const CHUNK: usize = 1024;
 
-/// Answers a query for each point. `answer` may keep in its state whatever helps the next, nearby
-/// query, but its answer must not depend on it.
+/// Answers a query for each point. `answer` may keep in its state anything that speeds up the next,
+/// nearby query, but no answer may depend on the state.
 pub fn in_morton_order<S, R>(points: &[Vec3], answer: impl Fn(&mut S, Vec3) -> R + Sync) -> Vec<R>
 where
     S: Default,
@@ -26,6 +26,7 @@ where
             chunk.iter().map(move |&(_, point)| answer(&mut state, points[point as usize]))
         })
         .collect();
+    // The inverse order first, so that the results can be gathered in parallel.
     let mut places = vec![0_u32; points.len()];
     for (place, &(_, point)) in (0..).zip(&order) {
         places[point as usize] = place;
@@ -38,15 +39,16 @@ pub fn morton_order(points: &[Vec3]) -> Vec<(u64, u32)> {
     let Bounds { lo, hi } = Bounds::of_points(points.iter().copied());
     let scale = (hi - lo).map(|extent| if extent > 0.0 { (1 << 21) as f64 / extent } else { 0.0 });
     let code = |p: Vec3| morton_code((p - lo) * scale);
+    // The index breaks ties, so that an unstable parallel sort has one result.
     let mut order: Vec<(u64, u32)> =
         (0..points.len()).into_par_iter().map(|i| (code(points[i]), i as u32)).collect();
     order.par_sort_unstable();
     order
 }
 
-/// An order of points of which every beginning is spread over all of them: their places along a
-/// Morton curve, stepped through by the golden ratio. Indices matter to coincident points only.
-/// `O(n log n)`.
+/// An order of points of which every prefix is spread evenly over all of them: it steps through
+/// their Morton curve by the golden ratio. Input indices matter for coincident points only.
+/// Cost `O(n log n)`.
 ///
 /// ```
 /// use medial_geometry::{Vec3, trees::spread_order};
@@ -57,7 +59,7 @@ pub fn morton_order(points: &[Vec3]) -> Vec<(u64, u32)> {
 /// assert!(first[0] < 20 && first[4] >= 80);
 /// ```
 pub fn spread_order(points: &[Vec3]) -> Vec<u32> {
-    // Its multiples, modulo one, leave no gap much larger than another. As a fraction of 2^32.
+    // The golden ratio as a fraction of 2^32: its multiples modulo one leave nearly equal gaps.
     const GOLDEN: u32 = 0x9e37_79b9;
     let along = morton_order(points);
     let keyed = (0_u32..).zip(along).map(|(place, (_, point))| (place.wrapping_mul(GOLDEN), point));

@@ -45,8 +45,8 @@ impl PointTree {
         self.points.is_empty()
     }
 
-    /// The index of the nearest point, the smallest of equally near ones, and its squared distance;
-    /// `None` without points, or for a query that is not finite.
+    /// The index of the nearest point, of equally near ones the smallest, and its squared distance.
+    /// `None` if there are no points, or the query is not finite.
     pub fn nearest(&self, query: Vec3) -> Option<(u32, f64)> {
         let mut search = Nearest { of: self, query, best: (f64::INFINITY, u32::MAX) };
         self.tree.search(&mut search);

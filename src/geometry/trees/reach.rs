@@ -1,10 +1,10 @@
-//! The tree with four children a node over balls: each box holds centres, and knows the largest and
-//! the smallest radius below it.
+//! A wide tree over balls: each node has a box of centres, and the largest and the smallest radius
+//! below it.
 
 use super::wide::{Lanes, Query};
 use super::{Bounds, Node, Tree, WideTree};
 
-/// Which distance to the boundaries of hulls of balls is looked for.
+/// The distance to the boundaries of hulls of balls that a search minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// Negative inside.
@@ -32,8 +32,8 @@ pub struct ReachTree {
     radii: Vec<[Lanes; 2]>,
 }
 
-/// Centres closer together than this, in half sides of the frame, are not told apart in single
-/// precision: they make one leaf, in which the binary tree is searched.
+/// Single precision does not separate centres closer together than this, in half sides of the frame:
+/// they form one leaf, in which the binary tree is searched.
 const CLUSTER: f64 = 1e-5;
 
 impl ReachTree {
@@ -60,13 +60,13 @@ impl ReachTree {
         &self.wide
     }
 
-    /// The node of the binary tree in which a leaf is searched if its primitives are too close
-    /// together for single precision, or too many.
-    pub fn cluster(&self, leaf: usize, tree: &Tree, most: usize) -> Option<u32> {
+    /// The node of the binary tree in which to search a leaf that is too narrow for single precision
+    /// and has more than `max_items` primitives; `None` for every other leaf.
+    pub fn cluster(&self, leaf: usize, tree: &Tree, max_items: usize) -> Option<u32> {
         let node = self.wide.source(leaf);
         let Bounds { lo, hi } = tree.nodes[node].bounds;
         let close = (hi - lo).max_element() * self.wide.frame().scale < CLUSTER;
-        (close && self.wide.leaves()[leaf].len() > most).then_some(node as u32)
+        (close && self.wide.leaves()[leaf].len() > max_items).then_some(node as u32)
     }
 
     /// Shows the leaves within a limit, roughly from near to far. `visit` gets the leaf and the

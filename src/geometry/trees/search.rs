@@ -1,16 +1,16 @@
-//! Searching the tree: nearest box first, giving up boxes beyond the limit.
+//! Searching the tree: nearest box first, without the boxes beyond the limit.
 
 use std::ops::{ControlFlow, Range};
 
 use super::build::MAX_DEPTH;
 use super::{Node, Tree};
 
-/// What is looked for in a tree.
+/// A search in a tree for the least of some measure.
 pub trait Search {
-    /// A lower bound over all items below a node, in whatever measure `limit` is in.
+    /// A lower bound of the measure over all items below a node.
     fn bound(&self, node: &Node) -> f64;
 
-    /// Nodes whose bound is above this hold nothing of interest.
+    /// The best value so far: nodes with a larger bound are skipped.
     fn limit(&self) -> f64;
 
     /// Looks at the items of a leaf, given as places in [`Tree::order`].
@@ -45,6 +45,7 @@ impl Tree {
                 // Not by `map`, which is not inlined here.
                 let bounds =
                     [search.bound(&self.nodes[first]), search.bound(&self.nodes[first + 1])];
+                // Straight into the nearer child: it is the most likely to lower the limit.
                 let near = usize::from(bounds[1] < bounds[0]);
                 let limit = search.limit();
                 if bounds[near] <= limit {
@@ -62,6 +63,7 @@ impl Tree {
                 }
                 height -= 1;
                 let (bound, index) = stack[height];
+                // Again, since the limit may have fallen while the node waited.
                 if bound <= search.limit() {
                     node = &self.nodes[index as usize];
                     break;
@@ -90,6 +92,7 @@ impl Tree {
             }
             let first = node.first as usize;
             if node.count == 0 {
+                // The left child on top, so that leaves come in order.
                 stack[height] = node.first + 1;
                 stack[height + 1] = node.first;
                 height += 2;

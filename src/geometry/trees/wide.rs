@@ -1,13 +1,13 @@
-//! The tree with four children a node, whose boxes are tested together in single precision.
+//! The tree with four children per node, whose boxes are tested together in single precision.
 //!
 //! 1. The binary tree is collapsed: of a node's children the largest inner one is replaced by its
 //!    own two until there are four (I. Wald, C. Benthin, S. Boulos, *Getting rid of packets*, 2008,
 //!    doi:10.1109/RT.2008.4634620).
 //! 2. Boxes are moved to the centre of the mesh, scaled by a power of two to half a side of at most
 //!    1, and rounded outward to single precision. Queries are moved, scaled and rounded alike.
-//! 3. A distance so computed is off by no more than [`BLUR`] for each unit of the query's distance
-//!    from the centre and one more. Limits are larger by that: nothing is given up that double
-//!    precision would look at, so that answers do not depend on any of this.
+//! 3. A computed distance is off by at most [`BLUR`] times one plus the query's distance from the
+//!    centre. Limits are enlarged by that, so nothing is skipped that double precision would visit,
+//!    and answers do not depend on any of this.
 
 use std::ops::{ControlFlow, Range};
 
@@ -18,14 +18,16 @@ use super::build::MAX_DEPTH;
 use super::{Bounds, Tree};
 use crate::Vec3;
 
-/// Bound of the error of distances in single precision, to boxes and to triangles. The longest
-/// computation, a triangle's, makes less than 25 roundings of 2^-24 each.
+/// Bound on the error of distances in single precision, to boxes and to triangles. The longest
+/// computation, for a triangle, has less than 25 roundings of 2^-24 each.
 const BLUR: f64 = 6e-6;
-/// Errors of signed distances to hulls of balls and to boxes with radii, over those of distances:
-/// they add the rounding of a radius, which is no larger than the frame, and of three dot products.
-const HULL: f64 = 2.0;
-/// Queries farther away than this, in half sides, would prune too little.
-const FARTHEST: f64 = 64.0;
+/// Factor by which errors of signed distances to hulls of balls, and to boxes with radii, exceed
+/// [`BLUR`]: they add the rounding of a radius, which is at most the frame, and of three dot products.
+const HULL_FACTOR: f64 = 2.0;
+/// The error grows with the distance of the query: farther away than this, in half sides of the
+/// frame, single precision would exclude too little.
+const MAX_QUERY_DISTANCE: f64 = 64.0;
+/// The bit that marks a child as a leaf.
 const LEAF: u32 = 1 << 31;
 
 /// Four values, one for each child.
@@ -51,7 +53,7 @@ pub struct WideTree {
     frame: Frame,
 }
 
-/// The similarity to single precision.
+/// The similarity transform to the coordinates of single precision.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
     centre: Vec3,
@@ -82,10 +84,11 @@ pub struct Query {
 }
 
 impl Query {
-    /// The value up to which computed signed distances to hulls of balls may mean `signed` or less.
+    /// The largest computed signed distance to a hull of balls whose true value may be `signed` or
+    /// less.
     #[inline]
     pub fn signed_limit(&self, signed: f64) -> f32 {
-        ((signed * self.scale + HULL * self.blur) as f32).next_up()
+        ((signed * self.scale + HULL_FACTOR * self.blur) as f32).next_up()
     }
 
     /// Largest error of coordinates in a plane.
@@ -94,9 +97,10 @@ impl Query {
         self.blur as f32
     }
 
-    /// The square up to which computed distances may mean `distance` or less.
+    /// The square of the largest computed distance whose true value may be `distance` or less.
     #[inline]
     pub fn limit(&self, distance: f64) -> f32 {
+        // The factor covers the rounding of the square to single precision.
         let limit = (distance * self.scale + self.blur) * (1.0 + 1e-6);
         (limit * limit) as f32
     }
@@ -162,6 +166,7 @@ impl WideTree {
         let children = descendants(tree, index);
         each(&children.iter().map(|&child| &tree.nodes[child]).collect::<Vec<_>>());
         let place = self.nodes.len();
+        // The place is taken before the children's, so that parents precede them.
         let empty = Lanes::splat(f32::INFINITY);
         self.nodes.push(Node { lo: [empty; 3], hi: [-empty; 3], children: [0; 4] });
         let (mut lo, mut hi) = ([[f32::INFINITY; 4]; 3], [[f32::NEG_INFINITY; 4]; 3]);
@@ -169,6 +174,7 @@ impl WideTree {
             let Bounds { lo: l, hi: h } = tree.nodes[child].bounds;
             let (l, h) = (self.frame.forward(l), self.frame.forward(h));
             for axis in 0..3 {
+                // Outward by one more step: the cast itself rounds to nearest.
                 lo[axis][lane] = (l[axis] as f32).next_down();
                 hi[axis][lane] = (h[axis] as f32).next_up();
             }
@@ -184,7 +190,7 @@ impl WideTree {
     pub fn query(&self, p: Vec3) -> Option<Query> {
         let q = self.frame.forward(p);
         let far = q.length();
-        (far <= FARTHEST).then(|| Query {
+        (far <= MAX_QUERY_DISTANCE).then(|| Query {
             p: q.to_array().map(|x| Lanes::splat(x as f32)),
             scale: self.frame.scale,
             blur: BLUR * (1.0 + far),
@@ -198,8 +204,8 @@ impl WideTree {
         self.search(limit, |place| self.nodes[place].distance_squared(query), visit);
     }
 
-    /// As [`WideTree::nearest`], in whatever measure `bounds` of the children of a node, given by
-    /// its place, and the limits are in. A bound that is not a number is beyond every limit.
+    /// As [`WideTree::nearest`] with another measure: `bounds` gives lower bounds for the children of
+    /// the node at a place. A bound that is not a number is beyond every limit.
     #[inline]
     pub(super) fn search(
         &self,
@@ -220,7 +226,7 @@ impl WideTree {
                 while hits != 0 {
                     let lane = hits.trailing_zeros() as usize;
                     hits &= hits - 1;
-                    // Sorted in: the nearest on top.
+                    // Insertion sort of at most four entries, the nearest on top.
                     let entry = (bounds[lane], children[lane]);
                     let mut at = height;
                     while at > bottom && stack[at - 1].0 < entry.0 {
@@ -249,8 +255,7 @@ impl WideTree {
 }
 
 impl WideTree {
-    /// Shows the leaves whose boxes, rounded outward, reach above `p` or to it along `z`, and have
-    /// `x` and `y` of `p`.
+    /// Shows the leaves whose boxes, rounded outward, meet the ray from `p` in the direction of `z`.
     #[inline]
     pub fn above(&self, p: Vec3, mut visit: impl FnMut(Range<u32>) -> ControlFlow<()>) {
         // Moving, scaling and rounding keep the order of coordinates, ties included.
@@ -268,7 +273,8 @@ impl WideTree {
             }
             let node = &self.nodes[current as usize];
             let mut hits = node.above(&p).to_bitmask();
-            // The left ones on top: a search that ends at the point itself ends sooner from below.
+            // The left child on top: leaves then come roughly from below, and a search that ends at
+            // the point itself ends sooner.
             while hits != 0 {
                 let lane = hits.ilog2();
                 stack[height] = node.children[lane as usize];

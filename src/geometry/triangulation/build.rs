@@ -19,9 +19,9 @@
 //! 4. The zone is *stellated*: its cells are replaced by the cone of its boundary from the site.
 //!    Neighbours are linked through a table of the boundary's edges.
 //!
-//! An infinite cell is in conflict with the sites strictly beyond its facet; with a site in the
-//! facet's plane, if its finite neighbour is, since the sphere through three coplanar points meets
-//! the plane in their circle, perturbed alike.
+//! An infinite cell is in conflict with every site strictly beyond its facet. A site in the plane of
+//! the facet is in conflict with it exactly if it is with the finite neighbour: the neighbour's
+//! sphere meets that plane in the circle of the facet, and both are perturbed alike.
 
 use super::Division;
 use super::cells::{Cell, FRONTIER, Face, INFINITE, OPPOSITE};
@@ -30,7 +30,7 @@ use super::stellate::{ABSENT, TABLE};
 use super::zone::{Candidate, FOREIGN, UNKNOWN, Wall};
 use crate::predicates::{Filter, Metric, Sign, Site, approximate_orientation, sites_collinear};
 
-/// A walk in rounded arithmetic may turn in a circle; after this many steps it goes on exactly.
+/// Rounding can make an approximate walk cycle; after this many steps the exact walk takes over.
 const MAX_ROUNDED_STEPS: usize = 256;
 
 /// What became of a site.
@@ -44,10 +44,10 @@ pub(super) enum Outcome {
     Straddling,
 }
 
-/// A triangulation that grows, or the part of one that grows apart from the rest.
+/// A growing triangulation, or one part of it that grows independently of the rest.
 ///
-/// Record 0 is the *frontier*: it stands for all cells of other parts, looks infinite, so that
-/// walks end at it, and is marked [`FOREIGN`], so that conflict zones that reach it are given up.
+/// Record 0 is the *frontier*, which stands for all cells of other parts. It looks infinite, so
+/// walks end there; it is marked [`FOREIGN`], so a conflict zone that reaches it is abandoned.
 pub(super) struct Builder<'s, M> {
     /// Sites by vertex, in the order of insertion; the first is a dummy for the vertex at infinity.
     pub(super) sites: &'s [Site],
@@ -69,7 +69,7 @@ pub(super) struct Builder<'s, M> {
 impl<'s, M: Metric> Builder<'s, M> {
     /// Triangulates distinct sites; `sites[0]` is a dummy, and 1 to 4 are affinely independent.
     ///
-    /// `rounds` are the ends of the rounds of insertion; `division` says which of them
+    /// `rounds` holds the end of each round of insertion; `division` says which of them
     /// are divided.
     pub(super) fn build(
         sites: &'s [Site],
@@ -77,9 +77,11 @@ impl<'s, M: Metric> Builder<'s, M> {
         division: Division,
         filter: Filter,
     ) -> Result<Self, TriangulationError> {
+        // A divided round reserves its own memory, so reserve for the rounds before it only.
         let alone = rounds.iter().take_while(|&&end| end < division.smallest).last();
         let mut builder = Self::new(sites, filter, alone.map_or(sites.len(), |&n| n as usize));
         builder.start();
+        // Sites 1 to 4 are the first cell, whichever rounds they belong to.
         let mut start = 5;
         for &end in rounds {
             if end.saturating_sub(start) < division.smallest {
@@ -118,8 +120,9 @@ impl<'s, M: Metric> Builder<'s, M> {
 
     /// Makes room for the cells of so many further sites.
     ///
-    /// Surfaces need up to 8 cells for each site. Reserved memory that is not touched costs
-    /// nothing, while growing would hold two copies for a moment; without it, growth it is.
+    /// Samples of surfaces need up to 8 cells per site. Reserved pages cost nothing until they are
+    /// touched, while growing a vector holds two copies for a moment. If the reservation fails, the
+    /// vectors grow on demand.
     pub(super) fn reserve(&mut self, sites: usize) {
         let expected = 9 * sites + 64;
         let _ = self.cells.try_reserve_exact(expected);
@@ -142,6 +145,7 @@ impl<'s, M: Metric> Builder<'s, M> {
     fn start(&mut self) {
         let s = self.sites;
         let positive = self.filter.orient3d(&s[1].p, &s[2].p, &s[3].p, &s[4].p) == Sign::Positive;
+        // Every predicate relies on positive cells.
         let v = if positive { [1, 2, 3, 4] } else { [1, 2, 4, 3] };
         self.cells.push(Cell { v, n: [Face::NONE; 4] });
         for i in 0..4 {
@@ -185,11 +189,12 @@ impl<'s, M: Metric> Builder<'s, M> {
         Ok(Outcome::Done)
     }
 
-    /// A cell in conflict with a site, or the frontier where the walk to it ended there; none for
-    /// a hidden site.
+    /// A cell in conflict with a site, [`FRONTIER`] if the walk ended there, `None` if the site is
+    /// hidden.
     #[inline(always)]
     pub(super) fn locate(&self, vertex: u32) -> Option<u32> {
         let near = self.walk_approximately(vertex);
+        // Any cell in conflict will do as a seed, so a walk that rounding led astray often suffices.
         if near == FRONTIER || self.conflicts(near, vertex) {
             return Some(near);
         }
@@ -201,6 +206,7 @@ impl<'s, M: Metric> Builder<'s, M> {
     pub(super) fn walk_approximately(&self, vertex: u32) -> u32 {
         let p = &self.sites[vertex as usize].p;
         let mut c = self.last;
+        // Orientation tests need four finite vertices.
         if self.cells[c as usize].is_infinite() {
             c = self.cells[c as usize].n[3].cell();
         }
@@ -214,6 +220,7 @@ impl<'s, M: Metric> Builder<'s, M> {
             let s = [site(0), site(1), site(2), site(3)];
             let exit = (0..4).find(|&i| {
                 let f = OPPOSITE[i];
+                // Not back through the facet just crossed: that test is known, up to rounding.
                 cell.n[i].cell() != from
                     && approximate_orientation(p, s[f[0]], s[f[1]], s[f[2]]) < 0.0
             });
@@ -228,11 +235,11 @@ impl<'s, M: Metric> Builder<'s, M> {
         c
     }
 
-    /// Walks to the cell that contains the site, to an infinite cell that it is strictly beyond the
-    /// facet of, or to the frontier.
+    /// Walks to the cell that contains the site, to an infinite cell whose facet the site is strictly
+    /// beyond, or to the frontier.
     ///
-    /// Visibility walks end in Delaunay and regular triangulations, because they climb the power
-    /// of the site.
+    /// A visibility walk ends in every Delaunay and regular triangulation: with each step the power
+    /// of the site with respect to the cell's orthosphere falls.
     fn walk_exactly(&self, vertex: u32, start: u32) -> u32 {
         let p = &self.sites[vertex as usize].p;
         let mut c = start;
@@ -270,6 +277,7 @@ pub(super) fn bring_independent_to_front(
     let third = (3..sites.len()).find(|&i| !sites_collinear(&a, &b, &sites[i].p));
     let third = third.ok_or(TriangulationError::Collinear { distinct })?;
     sites.swap(3, third);
+    // `ids` has no dummy in front: site `i` is `ids[i - 1]`.
     ids.swap(2, third - 1);
     let c = sites[3].p;
     let fourth =

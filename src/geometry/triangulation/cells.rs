@@ -3,13 +3,13 @@
 /// The vertex at infinity while a triangulation is built; sites count from one.
 pub(super) const INFINITE: u32 = 0;
 
-/// In the first vertex of a record that no cell uses.
+/// The first vertex of a record that no cell uses.
 pub(super) const UNUSED: u32 = u32::MAX;
 
-/// The record that stands for cells of other parts, see [`super::build::Builder`].
+/// The record that stands for all cells of other parts, see [`super::build::Builder`].
 pub(super) const FRONTIER: u32 = 0;
 
-/// The most cells that a [`Face`] can name.
+/// The most cells that a [`Face`] can name: two of its 32 bits hold the index of the vertex.
 pub(super) const MAX_CELLS: usize = 1 << 30;
 
 /// For each vertex of a positive cell the opposite facet, counter-clockwise from outside the cell.
@@ -34,7 +34,7 @@ impl Face {
         self.0 >> 2
     }
 
-    /// The same facet when cells are renumbered by an offset.
+    /// The same facet after all cells were renumbered by an offset.
     #[inline(always)]
     pub(super) fn moved(self, offset: u32) -> Self {
         Self(self.0.wrapping_add(offset << 2))
@@ -46,8 +46,8 @@ impl Face {
     }
 }
 
-/// A positively oriented cell; an infinite one has [`INFINITE`] as its last vertex, and is positive
-/// for every point beyond its finite facet in that place.
+/// A positively oriented cell. An infinite cell has [`INFINITE`] as its last vertex; with any point
+/// beyond its finite facet in that place it is positively oriented too.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 pub(super) struct Cell {

@@ -4,7 +4,7 @@ use super::cells::OPPOSITE;
 use super::{CellId, Facet, Triangulation, VertexId};
 use crate::predicates::{Filter, Metric, Sign, Site, in_conflict};
 
-/// The first violation that a check met.
+/// The first violation that a check found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Violation {
     /// The vertex at infinity is where it must not be, or a vertex does not exist.
@@ -20,7 +20,7 @@ pub enum Violation {
     Adjacency {
         /// The facet.
         facet: Facet,
-        /// What the cell has as its mirror image.
+        /// The mirror facet that the cell records.
         mirror: Facet,
     },
     /// Euler's relation fails, or the cells around a vertex are not connected.
@@ -106,6 +106,7 @@ impl Triangulation {
         }
         let ours = self.facet_vertices(facet);
         let mut theirs = self.facet_vertices(mirror);
+        // Each side lists the facet counter-clockwise from its own outside.
         theirs.reverse();
         let turned = (0..3).any(|_| {
             theirs.rotate_left(1);
@@ -114,7 +115,7 @@ impl Triangulation {
         if turned { Ok(()) } else { Err(violation) }
     }
 
-    /// `V - E + F - C = 0`, with edges counted by turning around each.
+    /// `V - E + F - C = 0`, with each edge counted at the smallest cell around it.
     fn check_euler(&self) -> Result<(), Violation> {
         let mut edges = 0i64;
         for cell in self.cells() {
@@ -124,6 +125,7 @@ impl Triangulation {
                 }
             }
         }
+        // The vertex at infinity counts, and two cells share each facet: F = 2 C.
         let cells = self.cell_count() as i64;
         let found = self.vertex_count() as i64 + 1 - edges + 2 * cells - cells;
         if found == 0 { Ok(()) } else { Err(Violation::Euler { found }) }
@@ -174,6 +176,7 @@ impl Triangulation {
             match filter.orient3d(a, b, c, &site.p) {
                 Sign::Positive => return true,
                 Sign::Negative => return false,
+                // In the plane of the facet the finite neighbour decides.
                 Sign::Zero => cell = self.neighbours(cell)[3],
             }
         }
@@ -183,7 +186,8 @@ impl Triangulation {
     /// The cell that contains a position, by an exact walk from `start`; an infinite cell if the
     /// position is strictly outside the convex hull.
     ///
-    /// A walk for a position that is not a site climbs its power, too, and ends.
+    /// Ends for any position, a site or not: its power with respect to the orthosphere of the cell
+    /// falls with each step.
     pub(crate) fn walk(&self, sites: &[Site], start: CellId, p: &[f64; 3]) -> CellId {
         let mut cell = if self.is_infinite(start) { self.neighbours(start)[3] } else { start };
         loop {

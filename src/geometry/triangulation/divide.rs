@@ -3,19 +3,19 @@
 //! 1. A plane *cuts* the cells of the earlier rounds into two parts by their centres. Each part is
 //!    copied into a builder of its own, in which the frontier stands for the cells of the other.
 //! 2. Each part inserts the sites on its side of the plane. A site whose conflict zone touches the
-//!    frontier is deferred, so cells at the frontier stay as they are, and neither part can notice
-//!    the other. So is a site that a walk, and another one from a second place, does not reach.
-//! 3. The parts are put together along the frontier, and the deferred sites are inserted.
+//!    frontier is *deferred*: cells at the frontier never change, so the parts are independent. A
+//!    site is deferred, too, if neither a walk from the last cell nor one from a hint reaches it.
+//! 3. The parts are joined along the frontier, and the deferred sites are inserted.
 //!
-//! The parts are the same whatever the number of threads, and so is the result, to the order of
-//! cells: a single thread grows one part after the other, the second behind the first. Since the
-//! perturbed triangulation is unique, the set of cells is that of any order of insertion.
+//! The parts do not depend on the number of threads, nor does the result, down to the order of
+//! cells: a single thread grows one part after the other and stores the second behind the first.
+//! The perturbed triangulation is unique, so any order of insertion gives the same set of cells.
 //!
-//! The plane halves the sites. Of 13 directions, and of two kinds of centres, those are taken that
-//! the fewest conflict zones of a sample of the sites straddle. Orthocentres suit samples
-//! of surfaces: there the conflict zone of a site consists of the cells whose orthocentres are about
-//! its Voronoi cell, a thin prism that reaches to the medial axis on both sides of the surface,
-//! while the cells themselves reach across the solid. Centroids suit points on a common sphere.
+//! The plane halves the sites. Its direction (of 13) and the kind of cell centre (of two) are those
+//! for which the fewest conflict zones, of a sample of the sites, straddle the plane. Orthocentres
+//! suit samples of surfaces: the conflict zone of a site consists of cells whose orthocentres lie
+//! near its Voronoi cell, a thin prism that reaches to the medial axis on both sides of the surface,
+//! while the cells themselves span the solid. Centroids suit points on a common sphere.
 
 use std::ops::Range;
 
@@ -28,10 +28,10 @@ use super::zone::UNKNOWN;
 use crate::Vec3;
 use crate::predicates::{Metric, Site};
 
-/// About so many sites are tried on all cuts.
+/// Every cut is tried on about this many sites.
 const TRIED_SITES: usize = 512;
 
-/// About so many sites are looked at to halve them.
+/// The median height of the sites is estimated from about this many.
 const SAMPLED_SITES: usize = 4096;
 
 /// Directions of planes, up to sign: axes, and diagonals of the faces and of the body of a cube.
@@ -51,13 +51,13 @@ const DIRECTIONS: [Vec3; 13] = [
     Vec3::new(-1.0, 1.0, 1.0),
 ];
 
-/// For one of so many sites a cell near it is noted before the division.
+/// Sites between two hints: for each hint a cell near the site is noted before the division.
 const HINT_STRIDE: usize = 256;
 
 /// The cuts to choose from, each direction with both kinds of centres.
 const CUTS: usize = 2 * DIRECTIONS.len();
 
-/// What decides on the part of a cell.
+/// The point of a cell that decides to which part it belongs.
 #[derive(Clone, Copy, Debug)]
 enum Centre {
     Orthocentre,
@@ -93,15 +93,15 @@ impl Place {
     }
 }
 
-/// Cells that grow apart from the others, and where they meet them.
+/// One part: its cells, and its facets on the frontier.
 struct Part<'s, M> {
     builder: Builder<'s, M>,
-    /// The sites on its side of the cut; once it has grown, those that were deferred.
+    /// The sites on its side of the cut; after `grow`, the deferred ones among them.
     sites: Vec<u32>,
-    /// Where to go on after a walk has met the frontier, see [`Builder::hints`].
+    /// Where to start again after a walk has met the frontier, see [`Builder::hints`].
     hints: Vec<u32>,
-    /// Its facets on the frontier, each with the same facet before the division as seen from the
-    /// other part.
+    /// Its facets on the frontier, each with its mirror in the other part, named as before the
+    /// division.
     frontier: Vec<(Face, Face)>,
     /// By how much its records have been moved, see [`Part::follow`].
     offset: u32,
@@ -121,7 +121,7 @@ impl<'s, M: Metric> Builder<'s, M> {
         };
         let ([mut first, mut second], places) = self.divide(cut, &range);
         if rayon::current_num_threads() == 1 {
-            // In one array from the start: fresh memory would cost, and so would moving.
+            // One array from the start: no fresh memory is touched, and the second part never moves.
             first.grow()?;
             second.follow(&mut first)?;
             second.grow()?;
@@ -167,8 +167,8 @@ impl<'s, M: Metric> Builder<'s, M> {
         })
     }
 
-    /// One bit for each cut for which a site would be deferred: the cells that its insertion reads
-    /// or replaces are not all in the part of its side.
+    /// The cuts that would defer a site, one bit each: some cell that its insertion reads or
+    /// replaces is not in the part of the site's side.
     fn unsuitable_cuts(&mut self, vertex: u32, cuts: &[Cut; CUTS]) -> u32 {
         let Some(seed) = self.locate(vertex) else { return 0 };
         self.last = seed;
@@ -191,6 +191,7 @@ impl<'s, M: Metric> Builder<'s, M> {
             }
         }
         self.forget_zone();
+        // A cut suits if all agree: site and cells below it, or none of them.
         (side | any) & !(side & all)
     }
 
@@ -226,6 +227,7 @@ impl<'s, M: Metric> Builder<'s, M> {
             Place::new(usize::from(!cut.is_below(centre)), 0)
         };
         let mut places: Vec<Place> = (0..cells.len()).into_par_iter().map(part_of).collect();
+        // Numbered in sequence, so the records do not depend on threads; from 1, after the frontier.
         let mut counts = [0; 2];
         for place in places.iter_mut().filter(|p| **p != Place::NOWHERE) {
             let part = place.part();
@@ -235,7 +237,8 @@ impl<'s, M: Metric> Builder<'s, M> {
         (places, counts)
     }
 
-    /// For every so many sites of a part a record of it near the first of them, or the frontier.
+    /// For each run of [`HINT_STRIDE`] sites of a part, a record of the part near the first of
+    /// them, or the frontier.
     fn hints(&mut self, part: usize, sites: &[u32], places: &[Place]) -> Vec<u32> {
         let hint = |&vertex: &u32| {
             self.last = self.walk_approximately(vertex);
@@ -252,6 +255,7 @@ impl<'s, M: Metric> Builder<'s, M> {
         if first.builder.last != FRONTIER {
             self.last = first.builder.last;
         }
+        // Records are reused from the end, with any number of threads in the same order.
         self.free.splice(..0, first.builder.free);
         for &(face, before) in first.frontier.iter().chain(&second.frontier) {
             let place = places[before.cell() as usize];
@@ -259,6 +263,7 @@ impl<'s, M: Metric> Builder<'s, M> {
             let other = if place.part() == 0 { other } else { other.moved(offset) };
             self.cells[face.cell() as usize].n[face.index()] = other;
         }
+        // Back to the order of the curve, so that walks stay short.
         let mut deferred = [first.sites, second.sites].concat();
         deferred.sort_unstable();
         deferred
@@ -288,7 +293,7 @@ impl<M: Metric> Part<'_, M> {
         builder.state.resize(builder.cells.len(), UNKNOWN);
     }
 
-    /// Takes over the records of the first part, and puts its own behind, without its frontier.
+    /// Takes over the records of the first part and appends its own, except its frontier.
     fn follow(&mut self, first: &mut Self) -> Result<(), TriangulationError> {
         let Self { builder, hints, frontier, .. } = self;
         let mut cells = std::mem::take(&mut first.builder.cells);
@@ -296,6 +301,7 @@ impl<M: Metric> Part<'_, M> {
             let points = builder.sites.len() - 1;
             return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
         }
+        // Record 1 comes after the last of the first part, since record 0 is dropped.
         let offset = cells.len() as u32 - 1;
         let id = |id: u32| if id == FRONTIER { id } else { id + offset };
         let face = |face: Face| if face.cell() == FRONTIER { face } else { face.moved(offset) };
@@ -326,12 +332,13 @@ impl<M: Metric> Part<'_, M> {
         for i in 0..sites.len() {
             let mut outcome = builder.insert(sites[i])?;
             let hint = hints[i / HINT_STRIDE];
-            // Records are used again near where they were, so that the hint's is still close.
+            // Records are reused near where they were, so the hint is still close if it was reused.
             if outcome == Outcome::Unreached && builder.cells[hint as usize].v[0] != UNUSED {
                 builder.last = hint;
                 outcome = builder.insert(sites[i])?;
             }
             if outcome != Outcome::Done {
+                // In place: `deferred` never overtakes `i`.
                 sites[deferred] = sites[i];
                 deferred += 1;
             }
@@ -342,7 +349,7 @@ impl<M: Metric> Part<'_, M> {
 }
 
 impl Cut {
-    /// Whether a point is below the plane; so it is where rounding leaves no answer.
+    /// Whether a point is below the plane. A centre that overflowed counts as below.
     fn is_below(self, point: Vec3) -> bool {
         let height = self.direction.dot(point);
         height < self.at || height.is_nan()
@@ -361,8 +368,8 @@ impl Centre {
     }
 }
 
-/// The finite cell that decides about conflicts with a cell: itself, or the neighbour of an
-/// infinite one, which is always in the same part.
+/// The finite cell that decides about conflicts with a cell: itself, or the finite neighbour of an
+/// infinite cell. An infinite cell is therefore always in the part of this neighbour.
 fn decisive(cells: &[Cell], cell: u32) -> &Cell {
     let record = &cells[cell as usize];
     if record.is_infinite() { &cells[record.n[3].cell() as usize] } else { record }

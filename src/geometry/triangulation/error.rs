@@ -1,4 +1,4 @@
-//! What can be wrong with points that are to be triangulated.
+//! Why points cannot be triangulated.
 
 use crate::Vec3;
 use crate::predicates::MAX_COORDINATE;

@@ -1,13 +1,13 @@
 //! From a grown triangulation to its final form.
 //!
-//! 1. Finite cells come first, then infinite ones, both by the vertex that is first along the curve
-//!    of insertion: what is close in the triangulation is close in memory, which all that walks from
-//!    cell to cell needs. Records that no cell uses go last, and away.
+//! 1. Finite cells come first, then infinite ones, each sorted by the vertex that is first along the
+//!    curve of insertion: neighbours are then close in memory, which makes walks from cell to cell
+//!    fast. Unused records go last and are cut off.
 //! 2. Neighbours are renamed to this order, and the cells brought into it.
 //! 3. Vertices are renamed to the indices of the input.
 //!
-//! All in place: to touch fresh memory for the cells would take longer than to move them. One pass
-//! does one thing, since accesses that depend on each other wait for each other.
+//! All in place: touching fresh memory for the cells would take longer than moving them. One
+//! indirection per pass: chained loads would stall on cache misses.
 
 use rayon::prelude::*;
 
@@ -15,17 +15,17 @@ use super::Triangulation;
 use super::cells::{Cell, Face, INFINITE, UNUSED};
 use super::{CellId, VertexId};
 
-/// Cells handed to a thread at once.
+/// The fewest cells handed to a thread at once.
 const MIN_LEN: usize = 1024;
 
-/// About so many segments exchange cells: so few that the ends of all of them stay in cache.
+/// Cells are exchanged between about this many segments, so few that the heads of all stay in cache.
 const SEGMENTS: usize = 16;
 
 /// The fewest cells of a segment.
 const SMALLEST_SEGMENT: usize = 4096;
 
 /// Brings `cells` over sites `1..=ids.len()` into final form; `ids[s - 1]` is the input index of
-/// site `s`, and `along_curve` has for each input point its place on the curve.
+/// site `s`, `along_curve[i]` the place of input point `i` on the curve.
 pub(super) fn freeze(mut cells: Vec<Cell>, ids: &[u32], along_curve: &[u32]) -> Triangulation {
     let Order { places, finite, used } = order_along_curve(&cells, ids, along_curve);
     cells.par_iter_mut().with_min_len(MIN_LEN).for_each(|cell| {
@@ -43,7 +43,7 @@ pub(super) fn freeze(mut cells: Vec<Cell>, ids: &[u32], along_curve: &[u32]) -> 
             *v = if *v == INFINITE { VertexId::INFINITE.0 } else { ids[*v as usize - 1] };
         }
     });
-    // Hidden sites have none.
+    // Repeated and hidden sites have no cell.
     let vertices = incident.iter().filter(|&&c| c != CellId::NONE).count();
     Triangulation { cells, finite, vertices, incident }
 }
@@ -63,13 +63,14 @@ fn order_along_curve(cells: &[Cell], ids: &[u32], along_curve: &[u32]) -> Order 
     let on_curve = |&site: &u32| curve[site as usize - 1];
     let points = along_curve.len();
     let first = |sites: &[u32]| sites.iter().map(on_curve).min().unwrap_or(0);
-    // Infinite cells are counted behind all finite ones, and unused records behind these.
+    // Three ranges of keys in one counting sort: finite cells, infinite cells, unused records.
     let key = |cell: &Cell| match (cell.v[0], cell.is_infinite()) {
         (UNUSED, _) => 2 * points as u32,
         (_, true) => points as u32 + first(&cell.v[..3]),
         (_, false) => first(&cell.v),
     };
     let mut places: Vec<u32> = cells.par_iter().with_min_len(MIN_LEN).map(key).collect();
+    // Counting sort: linear, and stable, so equal keys keep the order of the records.
     let mut next = vec![0_u32; 2 * points + 2];
     for &key in &places {
         next[key as usize + 1] += 1;
@@ -86,15 +87,15 @@ fn order_along_curve(cells: &[Cell], ids: &[u32], along_curve: &[u32]) -> Order 
     Order { places, finite, used }
 }
 
-/// Brings each cell to its place: by exchange into its segment of the places, and there through a
-/// copy of the segment.
+/// Brings each cell to its place: first by exchanges into the right segment, then, inside the
+/// segment, through a copy of it.
 ///
 /// P. M. McIlroy, K. Bostic, M. D. McIlroy: *Engineering radix sort*, Computing Systems 6 (1993)
 /// (*American flag sort*).
 fn permute(cells: &mut [Cell], mut places: Vec<u32>) {
     let size = (cells.len() / SEGMENTS).next_power_of_two().max(SMALLEST_SEGMENT);
     exchange(cells, &mut places, size);
-    // One copy for each thread.
+    // One run of segments per thread, so that each thread allocates one copy.
     let each = cells.len().div_ceil(size) / rayon::current_num_threads();
     let segments = cells.par_chunks_mut(size).zip(places.par_chunks(size));
     segments.with_min_len(each.max(1)).for_each_init(Vec::new, |copy, (cells, places)| {
@@ -106,15 +107,16 @@ fn permute(cells: &mut [Cell], mut places: Vec<u32>) {
     });
 }
 
-/// Exchanges cells until each is in its segment, of so many places, a power of two.
+/// Exchanges cells until each is in its segment. A segment has `size` places, a power of two.
 fn exchange(cells: &mut [Cell], places: &mut [u32], size: usize) {
     let segment = |place: u32| place as usize >> size.trailing_zeros();
-    // Before its head, a segment has its own cells alone.
+    // Invariant: every cell of a segment before its head belongs there.
     let mut heads: Vec<usize> = (0..cells.len()).step_by(size).collect();
     for s in 0..heads.len() {
         let end = cells.len().min((s + 1) * size);
         while heads[s] < end {
             let (mut cell, mut place) = (cells[heads[s]], places[heads[s]]);
+            // Follow the cycle: each swap settles one cell, so all swaps together are linear.
             while segment(place) != s {
                 let head = &mut heads[segment(place)];
                 std::mem::swap(&mut cell, &mut cells[*head]);
@@ -129,7 +131,7 @@ fn exchange(cells: &mut [Cell], places: &mut [u32], size: usize) {
 
 /// For each input point its first cell.
 fn first_cells(cells: &[Cell], ids: &[u32], points: usize) -> Vec<CellId> {
-    // By site, and for the vertex at infinity, which is 0; backwards, so that the first remains.
+    // By site; entry 0 is the vertex at infinity. Backwards, so that the smallest id is written last.
     let mut first = vec![CellId::NONE; ids.len() + 1];
     for (c, cell) in cells.iter().enumerate().rev() {
         for v in cell.v {

@@ -1,8 +1,8 @@
-//! Three-dimensional triangulations: who is next to whom, without coordinates.
+//! Three-dimensional triangulations: adjacency alone, without coordinates.
 //!
-//! A triangulation of points in space is kept as that of a topological 3-sphere: every facet of
-//! the convex hull is closed by an *infinite* cell with the vertex [`VertexId::INFINITE`], so that
-//! every cell has four neighbours. [`super::delaunay::Delaunay`] and
+//! A triangulation of points in space is stored as one of a topological 3-sphere: every facet of
+//! the convex hull has, on its outer side, an *infinite* cell with the vertex
+//! [`VertexId::INFINITE`], so that every cell has four neighbours. [`super::delaunay::Delaunay`] and
 //! [`super::regular::Regular`] build it.
 //!
 //! Vertex ids are indices of the input points. Cell ids count finite cells first, then infinite
@@ -71,7 +71,7 @@ pub struct Triangulation {
     cells: Vec<Cell>,
     finite: usize,
     vertices: usize,
-    /// For each input point one of its cells, the first.
+    /// For each input point its cell with the smallest id.
     incident: Vec<CellId>,
 }
 
@@ -84,10 +84,10 @@ struct Division {
     most_deferred: (u32, u32),
 }
 
-/// Rounds of at least this many sites are inserted in two parts.
+/// Rounds of at least this many sites are inserted in two independent parts.
 const DIVISION: Division = Division { smallest: 1 << 14, most_deferred: (1, 2) };
 
-/// A triangulation of sites, with what did not become a vertex.
+/// A triangulation of sites, and the sites that repeat the position of another.
 pub(super) struct Triangulated {
     pub(super) triangulation: Triangulation,
     /// Pairs (site, the kept site at the same position), ascending.
@@ -115,6 +115,7 @@ fn triangulate_dividing<M: Metric>(
         return Err(TriangulationError::TooFewPoints { points: sites.len(), distinct });
     }
     let filter = filter_of::<M>(sites);
+    // Vertex 0 is the one at infinity: a read of its position by mistake must not look valid.
     let dummy = Site { p: [f64::NAN; 3], w: f64::NAN };
     let mut ordered =
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
@@ -132,6 +133,7 @@ fn filter_of<M: Metric>(sites: &[Site]) -> Filter {
         let mut quantum = s.p.map(lowest_bit).into_iter().min().unwrap_or(i32::MAX);
         let top = s.p.map(highest_bit).into_iter().max().unwrap_or(i32::MIN);
         if M::WEIGHTED && weights_differ && s.w != 0.0 {
+            // A weight is a squared length: its exponent counts half.
             quantum = quantum.min(lowest_bit(s.w).div_euclid(2));
         }
         (quantum, top)

@@ -9,7 +9,7 @@
 //!    cell of the curve's grid are sorted along a curve through their own bounding box, or
 //!    lexicographically when they are few, so that clusters stay local and equal points end side by
 //!    side.
-//! 2. Of equal points one is kept.
+//! 2. Of points at the same position one is kept.
 //! 3. Each point falls into a round by a hash of its index: 7/8 of all into the last, 7/8 of the
 //!    rest into the one before, and so on. Within a round the order is that of the curve.
 
@@ -26,10 +26,10 @@ const BITS: u32 = 16;
 /// Runs of equal index up to this length are sorted lexicographically.
 const SHORT_RUN: usize = 24;
 
-/// Below this number a round is not split further.
+/// The first round has at least about this many sites.
 const SMALLEST_ROUND: usize = 64;
 
-/// Next state and digit for a state of the curve and an octant.
+/// For each state of the curve and each octant: the next state, and the octant's digit of the index.
 const CURVE: [[(u8, u8); 8]; 24] = hilbert_states();
 
 const fn rotate_left(x: usize, by: usize) -> usize {
@@ -49,7 +49,9 @@ const fn hilbert_states() -> [[(u8, u8); 8]; 24] {
         while octant < 8 {
             let turn = (direction + 1) % 3;
             let gray = rotate_left(octant ^ entry, (3 - turn) % 3);
+            // The inverse of a Gray code of three bits.
             let digit = gray ^ (gray >> 1) ^ (gray >> 2);
+            // Hamilton's entry corner `e(digit)` and direction `d(digit)` of the octant's own curve.
             let corner = if digit == 0 { 0 } else { (digit - 1) / 2 * 2 };
             let corner = corner ^ (corner >> 1);
             let along = if digit == 0 {
@@ -98,6 +100,7 @@ impl Grid {
                 high[k] = high[k].max(s.p[k]);
             }
         }
+        // A cube, so that the curve has the same resolution along each axis.
         let side = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
         let scale = f64::from((1u32 << BITS) - 1) / side;
         Self { low, scale: if scale.is_finite() { scale } else { 0.0 } }
@@ -116,6 +119,7 @@ fn hilbert_sort(sites: &[Site], indices: &mut [u32]) {
         indices.sort_unstable_by(|&i, &j| by_position(sites, i, j));
         return;
     }
+    // The index breaks ties, so that the unstable parallel sort has one result.
     let key = |&i: &u32| (grid.index(&sites[i as usize]), i);
     let mut keyed: Vec<(u64, u32)> = indices.par_iter().map(key).collect();
     keyed.par_sort_unstable();
@@ -127,6 +131,7 @@ fn hilbert_sort(sites: &[Site], indices: &mut [u32]) {
         let part = &mut indices[start..start + run.len()];
         start += run.len();
         if part.len() > SHORT_RUN {
+            // Ends: the box of a run shrinks by 2^16 each time, and equal points have no grid.
             hilbert_sort(sites, part);
         } else if part.len() > 1 {
             part.sort_unstable_by(|&i, &j| by_position(sites, i, j));
@@ -142,16 +147,17 @@ fn by_position(sites: &[Site], i: u32, j: u32) -> Ordering {
 pub(crate) struct Order {
     /// Indices of the sites to insert.
     pub(crate) inserted: Vec<u32>,
-    /// For each round the number of sites inserted after it, and one more.
+    /// The end of each round: the number of sites inserted by then plus one, since sites count
+    /// from one.
     pub(crate) rounds: Vec<u32>,
     /// Pairs (site, the kept site at the same position), ascending.
     pub(crate) repeated: Vec<(u32, u32)>,
-    /// For each site that is inserted its place along the curve.
+    /// For each inserted site its place along the curve.
     pub(crate) along_curve: Vec<u32>,
 }
 
-/// The order of insertion of `sites`; of equal positions the one with the largest weight is kept,
-/// among these the first.
+/// The order of insertion of `sites`. Of sites at the same position the one with the largest weight
+/// is kept, or the first of several such.
 pub(crate) fn insertion_order(sites: &[Site]) -> Order {
     let mut sorted: Vec<u32> = (0..sites.len() as u32).collect();
     hilbert_sort(sites, &mut sorted);
@@ -191,8 +197,8 @@ fn remove_repeated(sites: &[Site], sorted: &mut Vec<u32>) -> Vec<(u32, u32)> {
     repeated
 }
 
-/// Splits a sequence stably into rounds of growing size; returns also where each ends, counted
-/// from one.
+/// Splits a sequence into rounds of growing size, each in the order of the sequence; returns also
+/// where each round ends, counted from one.
 fn into_rounds(sorted: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
     let mut rounds = 1u32;
     while sorted.len() >> (3 * rounds) > SMALLEST_ROUND {
@@ -211,6 +217,7 @@ fn into_rounds(sorted: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
     for r in 0..rounds as usize {
         starts[r + 1] += starts[r];
     }
+    // A stable counting sort by round: within a round the curve's order stays.
     let mut ordered = vec![0; sorted.len()];
     for &i in &sorted {
         let slot = &mut starts[(rounds - 1 - round(i)) as usize];

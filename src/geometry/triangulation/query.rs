@@ -1,4 +1,4 @@
-//! Questions that adjacency alone answers.
+//! Queries that need adjacency alone.
 
 use super::cells::{Cell, Face, OPPOSITE};
 use super::{CellId, Triangulation, VertexId};
@@ -23,7 +23,7 @@ impl Triangulation {
         self.finite
     }
 
-    /// The number of infinite cells, equally of the facets of the convex hull.
+    /// The number of infinite cells, which is the number of facets of the convex hull.
     pub fn infinite_cell_count(&self) -> usize {
         self.cells.len() - self.finite
     }
@@ -102,7 +102,7 @@ impl Triangulation {
     /// The finite edges, each once, as a cell and the indices of its two vertices there; the cell
     /// is the one with the smallest id around the edge.
     ///
-    /// Costs a turn around each edge for each of its cells.
+    /// Cost: for each edge and each of its cells, one turn around the edge.
     pub fn finite_edges(&self) -> impl Iterator<Item = (CellId, usize, usize)> + '_ {
         const PAIRS: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
         self.finite_cells().flat_map(move |cell| {

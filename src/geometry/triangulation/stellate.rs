@@ -18,7 +18,7 @@ impl<M: Metric> Builder<'_, M> {
         self.allocate()?;
         let Self { cells, state, zone, walls, .. } = self;
         for (wall, &id) in walls.iter_mut().zip(zone.iter()) {
-            // The vertex at infinity goes last.
+            // The vertex at infinity goes last; a rotation keeps the orientation.
             if wall.v[0] == INFINITE {
                 wall.v.rotate_left(1);
             } else if wall.v[1] == INFINITE {
@@ -29,8 +29,10 @@ impl<M: Metric> Builder<'_, M> {
             cells[id as usize] = Cell { v: [vertex, a, b, c], n: [outside; 4] };
             state[id as usize] = UNKNOWN;
             cells[outside.cell() as usize].n[outside.index()] = Face::new(id, 0);
+            // Each tested cell outside the zone is behind a wall, so this resets all their marks.
             state[outside.cell() as usize] = UNKNOWN;
         }
+        // The next site is close on the curve, so the walk to it starts at a new cell.
         self.last = self.zone[self.walls.len() - 1];
         for &id in &self.zone[self.walls.len()..] {
             self.cells[id as usize].v[0] = UNUSED;
@@ -68,10 +70,12 @@ impl<M: Metric> Builder<'_, M> {
     /// Links new cells with each other: two share a facet where their walls share an edge, and
     /// each directed edge belongs to one wall.
     ///
-    /// Vertices of the walls are numbered, and a table of their pairs filled and read; it need not
-    /// be cleared, since exactly the edges that are read have been written.
+    /// The vertices of the walls are numbered, and a table indexed by pairs of numbers is filled,
+    /// then read. It need not be cleared: the walls form a closed surface, so every edge that is
+    /// read was written just before.
     fn link_by_table(&mut self) {
         let Self { walls, local, rim, table, cells, zone, .. } = self;
+        // Numbers are below TABLE, so the remainder changes nothing; it spares the bounds check.
         let at = |a: u8, b: u8| (usize::from(a) * TABLE + usize::from(b)) % (TABLE * TABLE);
         let mut count = 0;
         for (wall, &id) in walls.iter_mut().zip(zone.iter()) {
@@ -80,6 +84,7 @@ impl<M: Metric> Builder<'_, M> {
                 let fresh = *known == ABSENT;
                 *known = if fresh { count as u8 } else { *known };
                 *number = *known;
+                // Branch-free: a vertex that is not fresh is overwritten by the next one.
                 rim[count] = v;
                 count += usize::from(fresh);
             }
@@ -113,6 +118,7 @@ impl<M: Metric> Builder<'_, M> {
                 let face = Face::new(id, i + 1);
                 // Never zero, the mark of a free slot, since the ends differ.
                 let key = u64::from(x.min(y)) << 32 | u64::from(x.max(y));
+                // Fibonacci hashing with linear probing: the upper half depends on both ends.
                 let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % size;
                 while edges[slot].0 != 0 && edges[slot].0 != key {
                     slot = (slot + 1) % size;

@@ -5,13 +5,14 @@ use super::cells::{Cell, FRONTIER, Face, INFINITE, OPPOSITE};
 use super::stellate::ABSENT;
 use crate::predicates::{Filter, Metric, Sign, Site, UNDERFLOW, in_conflict_given};
 
-/// What is known of a cell while a conflict zone grows: nothing, tested or about to be, and in
-/// conflict. The last two are bits, the second never without the first.
+/// Mark of a cell that the growing conflict zone has not met.
 pub(super) const UNKNOWN: u8 = 0;
+/// Mark of a cell that was tested, or is about to be: bit 0.
 pub(super) const TESTED: u8 = 1;
+/// Mark of a cell in conflict: bit 1, always together with that of [`TESTED`].
 pub(super) const CONFLICT: u8 = 3;
 
-/// The mark of the frontier: never to be tested.
+/// Mark of the frontier: bit 2, together with that of [`TESTED`] so that it is never tested.
 pub(super) const FOREIGN: u8 = 5;
 
 /// A facet of the boundary of the conflict zone: its vertices, counter-clockwise from outside, and
@@ -20,11 +21,12 @@ pub(super) const FOREIGN: u8 = 5;
 pub(super) struct Wall {
     pub(super) v: [u32; 3],
     pub(super) outside: Face,
-    /// Numbers of the vertices among those of all walls.
+    /// The vertices' numbers among the vertices of all walls.
     pub(super) local: [u8; 3],
 }
 
-/// A cell beside the conflict zone, and what decides whether it belongs to it.
+/// A cell beside the conflict zone, with the determinant that decides whether it joins the zone
+/// and the error bound of that determinant.
 #[derive(Clone, Copy)]
 pub(super) struct Candidate {
     pub(super) cell: u32,
@@ -43,9 +45,9 @@ impl<M: Metric> Builder<'_, M> {
 
     /// Marks and lists the cells in conflict with the site.
     ///
-    /// Generation by generation: the neighbours of the last one are collected, then tested
-    /// together, so that no test waits for the verdict on another. Returns false, with no cell
-    /// marked, if the zone reaches the frontier.
+    /// Breadth first: the unknown neighbours of a whole generation are collected, then tested in one
+    /// batch, so no test waits for the result of another. Returns false, with no cell marked, if the
+    /// zone reaches the frontier.
     pub(super) fn find_conflict_zone(&mut self, vertex: u32, seed: u32) -> bool {
         self.zone.clear();
         self.zone.push(seed);
@@ -62,7 +64,7 @@ impl<M: Metric> Builder<'_, M> {
         true
     }
 
-    /// Takes back all marks.
+    /// Resets the marks of the zone and of its neighbours.
     pub(super) fn forget_zone(&mut self) {
         let Self { cells, state, zone, .. } = self;
         for &c in zone.iter() {
@@ -71,19 +73,21 @@ impl<M: Metric> Builder<'_, M> {
                 state[n.cell() as usize] = UNKNOWN;
             }
         }
+        // The loop may have erased it as a neighbour of the zone.
         state[FRONTIER as usize] = FOREIGN;
     }
 
-    /// Collects the unknown neighbours of the zone from `generation` on; returns their number,
-    /// nothing if the frontier is among them.
+    /// Collects the unknown neighbours of the zone from `generation` on; returns their number, or
+    /// `None` if the frontier is a neighbour.
     ///
-    /// Every neighbour is written, and counted if it was unknown: whether it is cannot be
-    /// predicted, and a wrong guess would cost more than the write.
+    /// Branch-free: every neighbour is written, but the count moves past unknown ones only. The
+    /// branch would be unpredictable, and a misprediction costs more than the write.
     fn collect_front(&mut self, generation: usize) -> Option<usize> {
         let Self { cells, state, zone, front, .. } = self;
-        let most = 4 * (zone.len() - generation);
-        if front.len() < most {
-            front.resize(most, Candidate { cell: 0, det: 0.0, bound: 0.0 });
+        // Room for all four neighbours of each cell, since known ones are written as well.
+        let room = 4 * (zone.len() - generation);
+        if front.len() < room {
+            front.resize(room, Candidate { cell: 0, det: 0.0, bound: 0.0 });
         }
         let (mut count, mut met) = (0, UNKNOWN);
         for &c in &zone[generation..] {
@@ -95,6 +99,7 @@ impl<M: Metric> Builder<'_, M> {
                 *known |= TESTED;
             }
         }
+        // Only the frontier has bit 2; the TESTED bit is common.
         (met & FOREIGN & !TESTED == 0).then_some(count)
     }
 
@@ -103,6 +108,7 @@ impl<M: Metric> Builder<'_, M> {
         let Self { cells, sites, state, zone, front, filter, .. } = self;
         let site = &sites[vertex as usize];
         let front = &mut front[..count];
+        // Two determinants at a time fill the lanes of the vector unit.
         let mut pairs = front.chunks_exact_mut(2);
         for pair in &mut pairs {
             let finite = |i: usize| sites_of(sites, finite_side(cells, pair[i].cell));
@@ -113,10 +119,12 @@ impl<M: Metric> Builder<'_, M> {
         for candidate in pairs.into_remainder() {
             (candidate.det, candidate.bound) = determinant::<M>(cells, sites, candidate.cell, site);
         }
+        // Branch-free append, as in `collect_front`.
         let mut size = zone.len();
         zone.resize(size + count, 0);
         for &candidate in front.iter() {
             let Candidate { cell, det, bound } = candidate;
+            // The usual case inline; the call is for doubtful signs and infinite cells.
             let decided = det.abs() > bound + UNDERFLOW && !cells[cell as usize].is_infinite();
             let conflict = if decided {
                 det > 0.0
@@ -133,9 +141,9 @@ impl<M: Metric> Builder<'_, M> {
     /// Lists the facets between the conflict zone and the cells around it.
     pub(super) fn collect_walls(&mut self) {
         let Self { cells, state, zone, walls, .. } = self;
-        let most = 4 * zone.len();
+        let room = 4 * zone.len();
         walls.clear();
-        walls.resize(most, Wall { v: [0; 3], outside: Face::NONE, local: [ABSENT; 3] });
+        walls.resize(room, Wall { v: [0; 3], outside: Face::NONE, local: [ABSENT; 3] });
         let mut count = 0;
         for &c in zone.iter() {
             let cell = &cells[c as usize];
@@ -144,6 +152,7 @@ impl<M: Metric> Builder<'_, M> {
                 let [a, b, c] = OPPOSITE[i];
                 walls[count] =
                     Wall { v: [cell.v[a], cell.v[b], cell.v[c]], outside, local: [ABSENT; 3] };
+                // Tested and not in conflict: outside. Branch-free, as in `collect_front`.
                 count += usize::from(state[outside.cell() as usize] == TESTED);
             }
         }
@@ -151,8 +160,8 @@ impl<M: Metric> Builder<'_, M> {
     }
 }
 
-/// The finite cell whose orthosphere decides about conflict with a cell, itself or the finite
-/// neighbour of an infinite one.
+/// The vertices of the finite cell whose orthosphere decides about conflict: the cell itself, or
+/// the finite neighbour of an infinite cell.
 #[inline(always)]
 fn finite_side(cells: &[Cell], cell: u32) -> [u32; 4] {
     let record = &cells[cell as usize];
@@ -170,8 +179,8 @@ fn determinant<M: Metric>(cells: &[Cell], sites: &[Site], cell: u32, site: &Site
     Filter::lifted_determinant::<M>(sites_of(sites, finite_side(cells, cell)), site)
 }
 
-/// Whether a site is in conflict with a cell, see the head of this file; `det` and `bound` are
-/// those of [`determinant`].
+/// Whether a site is in conflict with a cell, see the head of `build.rs`; `det` and `bound` come
+/// from [`determinant`].
 #[inline(always)]
 fn conflicts_given<M: Metric>(
     filter: Filter,
@@ -186,6 +195,7 @@ fn conflicts_given<M: Metric>(
         match filter.orient3d(&a.p, &b.p, &c.p, &site.p) {
             Sign::Positive => return true,
             Sign::Negative => return false,
+            // In the plane of the facet: the finite neighbour decides.
             Sign::Zero => {}
         }
     }

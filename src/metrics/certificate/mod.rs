@@ -10,25 +10,26 @@
 //! U, `sigma` is the distance to U; inside, `-sigma` is the depth in the deepest single
 //! primitive, which is less than the depth in U where primitives cover each other.
 //!
-//! Branch and bound. Triangles of S, and the triangles, cone laterals and spherical triangles that
-//! make up the surfaces of all primitives, are divided until each is known to lie below
-//! `lower + tolerance`, where `lower` is the largest distance found so far at a point that is
-//! certainly on S or on the boundary of U:
+//! The method is branch and bound. The pieces are triangles of S, and the triangles, cone laterals
+//! and spherical triangles that make up the surfaces of all primitives. They are divided until the
+//! distances in each are known to be below `lower + tolerance`, where `lower` is the largest distance
+//! found so far at a point that is certainly on S or on the boundary of U:
 //!
-//! 1. Distances are 1-Lipschitz: none in a piece is farther from that at its centre than the piece
-//!    extends.
+//! 1. Distances are 1-Lipschitz: in a piece they differ from that at its centre by at most the extent
+//!    of the piece.
 //! 2. The signed distance to a primitive, a convex body, is a convex function, and so is the
 //!    distance to one triangle. Over a piece neither exceeds its largest value at the corners of a
-//!    convex polytope around the piece. One primitive bounds `sigma`, one triangle the distance to S,
-//!    from above: an error of second order in the size of the piece (file `union_side.rs`).
-//! 3. From below, a convex function is no less than its tangent plane. Of each primitive that could
-//!    be deep enough the tangent plane at the centre of the piece is taken (file
-//!    `surface_side.rs`).
-//! 4. A piece of the boundary of one primitive that another holds, by 1 or by 2, is not on the
-//!    boundary of U and is dropped.
+//!    convex polytope around the piece. So one primitive bounds `sigma` from above, and one triangle
+//!    the distance to S. The error is of second order in the size of the piece (file
+//!    `union_side.rs`).
+//! 3. A convex function is nowhere below its tangent plane. For each primitive that could be deep
+//!    enough, the tangent plane at the centre of the piece bounds its signed distance from below
+//!    (file `surface_side.rs`).
+//! 4. If 1 or 2 prove that another primitive contains a piece, the piece is not on the boundary of U
+//!    and is dropped.
 //!
-//! Pieces are evaluated in rounds, all those of one size together, so that the result is the same
-//! for any number of threads.
+//! All pieces of one size are evaluated in one round, so the result is the same for any number of
+//! threads.
 //!
 //! Rounding: all of this is double precision, whose errors, at coordinates of the order of the
 //! surface's diagonal, are below [`ROUNDING`] diagonals. The interval is wider by that on both sides.
@@ -51,27 +52,27 @@ use crate::surface::TriangleBvh;
 use surface_side::SurfaceSide;
 use union_side::UnionSide;
 
-/// What rounding can contribute to a distance, in units of the surface's diagonal.
+/// Bound on the rounding error of a distance, in units of the surface's diagonal.
 pub const ROUNDING: f64 = 1e-9;
 
 /// Finer intervals than this, in diagonals, are refused: rounding would be a part of them.
 pub const FINEST: f64 = 1e-6;
 
-/// So many pieces are held at a time at most: about 2 GB.
-const MOST_PIECES: usize = 1 << 24;
+/// Bound on the pieces of a round: about 2 GB.
+const MAX_PIECES: usize = 1 << 24;
 
 /// An interval that holds the Hausdorff distance between a surface and the boundary of a union.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
-    /// No more than the distance: that of the witness, but for rounding.
+    /// A lower bound: the distance at the witness, less the bound on rounding.
     pub lower: f64,
-    /// No less than the distance.
+    /// An upper bound.
     pub upper: f64,
-    /// `upper - lower` was to be no more than this.
+    /// The requested bound on `upper - lower`.
     pub tolerance: f64,
-    /// Pieces that were looked at.
+    /// Number of pieces that were evaluated.
     pub pieces: u64,
-    /// A point that is as far from the other surface as `lower` says.
+    /// A point at which the distance is `lower`, up to rounding.
     pub witness: Witness,
 }
 
@@ -97,8 +98,8 @@ pub enum WitnessSide {
 /// Encloses the Hausdorff distance in an interval no wider than `tolerance`, in the unit of both,
 /// for a surface of diagonal about 1. The same for any number of threads.
 ///
-/// Costs more the smaller the tolerance is beside the distance: most of the work is done where the
-/// distance is within a tolerance of its maximum.
+/// The cost grows as the tolerance shrinks relative to the distance: most of the work is done where
+/// the distance is within one tolerance of its maximum.
 ///
 /// # Errors
 /// A tolerance below [`FINEST`] or not a number; an interval that would need too many pieces; a
@@ -117,9 +118,10 @@ pub fn certify(
     }
     let union = MedialUnion::new(mesh)?;
     let hulls = Hulls::new(mesh);
-    // A little less than both sides add, for the rounding of these sums.
+    // Both ends are widened by ROUNDING below; half of one more covers the rounding of these sums.
     let goal = tolerance - 2.5 * ROUNDING;
     let side = SurfaceSide { union: &union, hulls: &hulls };
+    // A good lower bound before the first piece is divided: the maximum is often at a vertex.
     let (lower, point) = side.farthest_of(&surface.vertices);
     let witness = Witness { point, on: WitnessSide::Surface };
     let mut search = Search { lower, witness, upper: 0.0, goal, pieces: 0 };
@@ -143,8 +145,8 @@ trait Side: Sync {
     /// Which surface this is.
     const SIDE: WitnessSide;
 
-    /// What can be said about the distances in a piece. `known` is reached somewhere; an upper bound
-    /// needs to be no better than `enough`.
+    /// Bounds of the distances in a piece. The distance `known` is reached somewhere already; an upper
+    /// bound below `enough` need not be improved.
     fn bound(&self, piece: &Self::Piece, known: f64, enough: f64) -> Bound;
 
     /// Appends pieces that together cover a piece.
@@ -154,18 +156,18 @@ trait Side: Sync {
 /// Bounds of the largest distance in a piece.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
-    /// Reached at `centre`; 0 where that is not known to be on the surface.
+    /// The distance at `centre`; 0 if that point is not known to be on the surface.
     reached: f64,
     /// A point of the piece.
     centre: Vec3,
-    /// Not exceeded in the piece.
+    /// No distance in the piece exceeds it.
     upper: f64,
 }
 
 /// The state of the branch and bound.
 struct Search {
     lower: f64,
-    /// Where `lower` is reached.
+    /// The point at which `lower` is reached.
     witness: Witness,
     upper: f64,
     goal: f64,
@@ -182,6 +184,7 @@ impl Search {
                 .with_min_len(64)
                 .map(|piece| side.bound(piece, known, enough))
                 .collect();
+            // In the order of the pieces, and only now: `lower` must not depend on threads.
             for bound in &bounds {
                 if bound.reached > self.lower {
                     self.lower = bound.reached;
@@ -197,7 +200,7 @@ impl Search {
                     side.divide(piece, &mut parts);
                 }
             }
-            if parts.len() > MOST_PIECES {
+            if parts.len() > MAX_PIECES {
                 return Err(MetricError::TooFine { tolerance: self.goal, pieces: parts.len() });
             }
             pieces = parts;

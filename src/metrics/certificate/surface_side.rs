@@ -5,8 +5,9 @@ use crate::Vec3;
 use crate::complex::MedialUnion;
 use crate::surface::TriMesh;
 
-/// Nearer than this to the centre that attains a distance, its gradient is rounding.
-const BLIND: f64 = 1e-9;
+/// Closer than this to the centre that attains a distance, the direction of its gradient is mostly
+/// rounding.
+const MIN_ARM: f64 = 1e-9;
 
 /// The triangles of a surface against a union.
 pub(super) struct SurfaceSide<'a> {
@@ -30,8 +31,8 @@ impl SurfaceSide<'_> {
         farthest
     }
 
-    /// A bound of `sigma` over a triangle: of the primitives that are deepest at the centre or
-    /// at a corner one that rises least.
+    /// An upper bound of `sigma` over a triangle: the best one from the primitives that are deepest at
+    /// the centre or at a corner.
     fn above(&self, triangle: &[Vec3; 3], enough: f64, first: f64) -> f64 {
         let mut least = first;
         for &corner in triangle {
@@ -44,14 +45,16 @@ impl SurfaceSide<'_> {
         least
     }
 
-    /// A bound of `-sigma` over a triangle, where that can exceed `enough`.
+    /// An upper bound of `-sigma` over a triangle, from the primitives with which it can exceed
+    /// `enough`.
     fn below(&self, triangle: &[Vec3; 3], centre: Vec3, reach: f64, enough: f64) -> f64 {
         let mut depth = 0.0_f64;
         self.union.each_nearer(centre, reach - enough, |signed, attained_at| {
             let arm = centre - attained_at;
             let length = arm.length();
             let mut lowest = signed - reach;
-            if length > BLIND {
+            if length > MIN_ARM {
+                // The tangent plane of a convex function lies below it.
                 let rise = |&corner: &Vec3| signed + arm.dot(corner - centre) / length;
                 lowest = triangle.iter().map(rise).fold(f64::INFINITY, f64::min).max(lowest);
             }
@@ -80,7 +83,7 @@ impl Side for SurfaceSide<'_> {
         if above > enough {
             return Bound { reached, centre, upper: above };
         }
-        // Primitives that are not looked at are no deeper than `enough`.
+        // Primitives that `below` skips are no deeper than `enough`.
         let unseen = enough.min(reach - deepest.signed);
         let below = self.below(triangle, centre, reach, enough).max(unseen);
         Bound { reached, centre, upper: above.max(below) }

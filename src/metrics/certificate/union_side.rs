@@ -10,11 +10,11 @@ use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 use crate::surface::TriMesh;
 use crate::surface::TriangleBvh;
 
-/// A point of a primitive's surface that no primitive holds deeper than this is on the boundary
-/// of the union, up to rounding.
+/// A point of a primitive's surface is on the boundary of the union, up to rounding, if it is no
+/// deeper than this in any primitive.
 const EXPOSED: f64 = 1e-12;
 
-/// Parts that a cone's lateral is cut into around its axis at first.
+/// Initial parts of a cone's lateral around its axis.
 const SECTORS: u32 = 6;
 
 /// The surfaces of all primitives against a surface.
@@ -95,7 +95,7 @@ impl<'a> UnionSide<'a> {
         self.mesh.spheres[v as usize]
     }
 
-    /// Of a lateral: the sphere at a share of the axis, and the frame.
+    /// The interpolated sphere of a cone at a share of its axis, and the cone's frame.
     fn interpolated(&self, edge: u32, share: f64) -> (Sphere, ConeFrame) {
         let [a, b] = self.mesh.edges[edge as usize].map(|v| self.sphere(v));
         (a.lerp(b, share), self.frames[edge as usize].expect("laterals have a frame"))
@@ -134,8 +134,8 @@ impl<'a> UnionSide<'a> {
     }
 }
 
-/// The point of a sphere of a cone in the direction of the lateral's normal, that direction
-/// lengthened by `lift` across the axis.
+/// The point of a cone's sphere in the direction of the lateral's normal, with the component of the
+/// normal across the axis multiplied by `lift`.
 fn lateral_point(sphere: Sphere, frame: &ConeFrame, angle: f64, lift: f64) -> Vec3 {
     let (sin, cos) = angle.sin_cos();
     sphere.centre + sphere.radius * frame.normal(lift * (cos * frame.v + sin * frame.w))
@@ -164,6 +164,7 @@ impl Side for UnionSide<'_> {
         let reach = farthest(centre, corners);
         let closest = self.bvh.closest(centre);
         let lipschitz = closest.distance + reach;
+        // Cheapest exit first; it needs no look at the union, since the piece cannot raise `lower`.
         if lipschitz <= enough && closest.distance <= known {
             return Bound { reached: 0.0, centre, upper: lipschitz };
         }
@@ -194,6 +195,7 @@ impl Side for UnionSide<'_> {
             Piece::Lateral(edge, [t0, t1], [from, to]) => {
                 let [(first, _), (second, _)] = [t0, t1].map(|t| self.interpolated(edge, t));
                 let around = (to - from) * first.radius.max(second.radius);
+                // The longer direction, so that pieces stay compact and the bounds sharp.
                 if around > first.centre.distance(second.centre) {
                     let middle = 0.5 * (from + to);
                     let halves = [[from, middle], [middle, to]];

@@ -227,9 +227,9 @@ impl Token<'_> {
 
 /// Text from a file for a message: shortened, unreadable bytes replaced.
 pub(super) fn quote(text: &[u8]) -> String {
-    const LONGEST: usize = 40;
-    let shown = String::from_utf8_lossy(&text[..text.len().min(LONGEST)]);
-    format!("{shown:?}{}", if text.len() > LONGEST { "..." } else { "" })
+    const MAX_BYTES: usize = 40;
+    let shown = String::from_utf8_lossy(&text[..text.len().min(MAX_BYTES)]);
+    format!("{shown:?}{}", if text.len() > MAX_BYTES { "..." } else { "" })
 }
 
 #[cfg(test)]

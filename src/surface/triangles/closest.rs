@@ -9,7 +9,7 @@ use crate::geometry::trees::{Bounds, Node, Plan, Search, Tree, WideTree, in_mort
 use crate::surface::TriMesh;
 
 /// Coordinates beyond this would overflow when squared.
-const LARGEST: f64 = 1e150;
+const MAX_COORDINATE: f64 = 1e150;
 
 /// A bounding-volume tree over triangles. Triangles of no area are segments or points, and valid.
 ///
@@ -94,7 +94,8 @@ pub(super) fn check_corners(triangles: &[[Vec3; 3]]) -> Result<(), BvhError> {
         return Err(BvhError::Empty);
     }
     for (face, corners) in triangles.iter().enumerate() {
-        let fits = |corner: &&Vec3| corner.abs().max_element() <= LARGEST && !corner.is_nan();
+        let fits =
+            |corner: &&Vec3| corner.abs().max_element() <= MAX_COORDINATE && !corner.is_nan();
         if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
             return Err(BvhError::Corner { face, corner });
         }

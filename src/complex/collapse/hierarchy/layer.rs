@@ -4,52 +4,53 @@ use std::ops::Range;
 
 use super::HierarchyError;
 
-/// Simplices of one dimension are numbered with 32 bits; far below the end, since they take some
-/// 20 bytes each.
-const MOST: usize = 1 << 30;
+/// The most simplices of one dimension. Ids have 32 bits; the bound is lower because each simplex
+/// takes some 20 bytes.
+const MAX_SIMPLICES: usize = 1 << 30;
 
 /// Absent id.
 const NONE: u32 = u32::MAX;
 
-/// A simplex that never lives: of rank 0, and not initial.
+/// The placeholder of a simplex that never lives. No stage selects it: stage 0 takes initial
+/// simplices only, the others only ranks from 1 on.
 fn nothing<const K: usize>() -> [u32; K] {
     [0; K]
 }
 
 /// All simplices with `K` vertices that exist at some stage.
 ///
-/// A vertex goes by its *rank*, the number of vertices that are removed before it. So a simplex,
-/// its ranks ascending, begins with the vertex that is removed first, and lives up to the stage of
-/// that number. Then its image replaces it: one that was there already, a new one, or, where the
-/// kept vertex was its own, one of lower dimension. A vertex never comes back, so each simplex
+/// A vertex is named by its *rank*, the number of vertices that are removed before it. So a simplex
+/// with ascending ranks begins with the vertex that is removed first, and lives up to the stage of
+/// that number. Then its image replaces it: a simplex that exists already, a new one, or, if the
+/// kept vertex belongs to it, one of lower dimension. A vertex never comes back, so each simplex
 /// lives through one interval of stages.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layer<const K: usize> {
-    /// The initial simplices in the order of their deaths, then all others in that of their
-    /// births. One that arises while it exists already is replaced by [`nothing`].
+    /// The initial simplices in the order of their deaths, then all others in the order of their
+    /// births. A copy that arises while the same simplex lives is replaced by [`nothing`].
     simplices: Vec<[u32; K]>,
-    /// Of the simplices, the first `born[t]` were born up to stage `t`.
+    /// The first `born[t]` of `simplices` were born up to stage `t`.
     born: Vec<u32>,
-    /// Those that ever live, in the order of their deaths, the survivors last.
+    /// The ids of those that ever live, in the order of their deaths, the survivors last.
     by_death: Vec<u32>,
-    /// Of `by_death`, the first `died[t]` are gone at stage `t`.
+    /// The first `died[t]` of `by_death` are gone at stage `t`.
     died: Vec<u32>,
     /// Number of simplices at each stage.
     count: Vec<u32>,
 }
 
-/// What became of the simplices that a step moved.
+/// Counts of the simplices that a step removed without a new one in their place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Moved {
-    /// Those that became equal to another one.
+    /// Those that became equal to another simplex.
     pub(super) merged: u32,
-    /// Those that held both ends.
+    /// Those with both ends of the collapsed edge.
     pub(super) vanished: u32,
 }
 
 impl<const K: usize> Layer<K> {
-    /// The layer of a complex when the vertices of ranks 0, 1, ... are collapsed into those of the
-    /// ranks `kept`, and what each of these steps did to it. `ranks` are those of all vertices.
+    /// The layer of a complex whose vertices of ranks 0, 1, ... are collapsed into the vertices of
+    /// ranks `kept`, and the counts of each step. `ranks` holds the ranks of all vertices.
     /// Cost: the simplices at the removed vertices when they are removed, sorted at each.
     pub(super) fn new(
         initial: &[[u32; K]],
@@ -95,8 +96,8 @@ impl<const K: usize> Layer<K> {
     }
 
     /// The simplices with ids in `births` whose first vertices have ranks in `firsts`: initial
-    /// ones, then others. The ids of all of them are among `deaths` of the list by death, and
-    /// every id there that is in `births` is one of theirs.
+    /// ones, then others. Requires that the range `deaths` of `by_death` holds the ids of all of
+    /// them, and no other id of `births`.
     fn select(
         &self,
         births: Range<usize>,
@@ -109,6 +110,7 @@ impl<const K: usize> Layer<K> {
         let before = |rank: usize| among.partition_point(|s| (s[0] as usize) < rank);
         let slice = &among[before(firsts.start)..before(firsts.end)];
         let births = births.start.max(initial)..births.end.max(initial);
+        // Either range holds them all; scan the shorter one.
         let by_birth = births.len() <= deaths.len();
         let later = if by_birth { &self.simplices[births.clone()] } else { &[] };
         let ids = if by_birth { &[] } else { &self.by_death[deaths] };
@@ -118,25 +120,25 @@ impl<const K: usize> Layer<K> {
     }
 }
 
-/// A layer while it is made: each simplex waits at its first vertex.
+/// A layer under construction: each simplex waits at its first vertex, the next of its vertices to
+/// be removed.
 struct Builder<const K: usize> {
     layer: Layer<K>,
-    /// Of the initial simplices, those from `start[r]` to `start[r + 1]` wait at rank `r`.
+    /// Initial simplices `start[r]..start[r + 1]` wait at rank `r`.
     start: Vec<u32>,
-    /// The simplex born last that waits at each rank.
+    /// For each rank the simplex born last of those that wait there: the head of a linked list.
     last: Vec<u32>,
-    /// Of each born simplex, the one before it that waits at the same rank, and the step that
-    /// made it.
+    /// For each simplex made by a step: the one before it in its list, and the step.
     previous: Vec<(u32, u32)>,
     moved: Vec<Moved>,
-    /// What waits at the vertex that is being removed: the other vertices, then the id. Kept to
-    /// save allocations.
+    /// The simplices that wait at the vertex being removed: their other vertices, then their id. A
+    /// field to save allocations.
     here: Vec<[u32; K]>,
 }
 
 impl<const K: usize> Builder<K> {
     fn new(initial: &[[u32; K]], ranks: &[u32], steps: usize) -> Result<Self, HierarchyError> {
-        if initial.len() > MOST {
+        if initial.len() > MAX_SIMPLICES {
             return Err(HierarchyError::TooManySimplices);
         }
         let ranked = |simplex: &[u32; K]| {
@@ -151,10 +153,11 @@ impl<const K: usize> Builder<K> {
         for rank in 0..ranks.len() {
             start[rank + 1] += start[rank];
         }
-        // Half of each star is born anew in a sheet.
+        // In a sheet each collapse moves about half a star, so this many are born in all.
         let mut simplices = Vec::with_capacity(initial.len() * 5 / 2);
         simplices.resize(initial.len(), nothing());
         let mut place = start.clone();
+        // Counting sort by the first rank, which is the order of the deaths.
         for simplex in initial {
             let simplex = ranked(simplex);
             let place = &mut place[simplex[0] as usize];
@@ -182,6 +185,7 @@ impl<const K: usize> Builder<K> {
             }
             let mut image = self.here[index];
             self.layer.by_death.push(image[K - 1]);
+            // With both ends: it shrinks to a simplex of the layer below, which has its own record.
             if image[..K - 1].contains(&kept) {
                 self.moved[removed as usize].vanished += 1;
                 continue;
@@ -196,7 +200,7 @@ impl<const K: usize> Builder<K> {
 
     fn add(&mut self, simplex: [u32; K], step: u32) -> Result<(), HierarchyError> {
         let id = self.layer.simplices.len();
-        if id >= MOST {
+        if id >= MAX_SIMPLICES {
             return Err(HierarchyError::TooManySimplices);
         }
         self.layer.simplices.push(simplex);
@@ -206,7 +210,7 @@ impl<const K: usize> Builder<K> {
         Ok(())
     }
 
-    /// Takes what waits at a rank, equal simplices side by side, the earliest born first.
+    /// Lists the simplices that wait at a rank, equal ones side by side, the earliest born first.
     fn open(&mut self, rank: u32) {
         let Self { layer, start, last, previous, here, .. } = self;
         let simplices = &layer.simplices;
@@ -226,7 +230,8 @@ impl<const K: usize> Builder<K> {
         here.sort_unstable();
     }
 
-    /// Whether an opened simplex is equal to the one before; then it merged when it was born.
+    /// Whether an opened simplex equals the one before it. Then it merged when it was born, which is
+    /// noticed only now: a search at birth would cost more.
     fn is_repeated(&mut self, index: usize) -> bool {
         let here = &self.here;
         if index == 0 || here[index - 1][..K - 1] != here[index][..K - 1] {
@@ -241,6 +246,7 @@ impl<const K: usize> Builder<K> {
     }
 
     fn finish(mut self) -> (Layer<K>, Vec<Moved>) {
+        // The survivors, which no step opens: their copies are still to be found.
         for rank in self.moved.len()..self.last.len() {
             self.open(rank as u32);
             for index in 0..self.here.len() {

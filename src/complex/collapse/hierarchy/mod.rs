@@ -1,7 +1,7 @@
-//! All levels of detail of a medial mesh at once, and the way from any of them to any other.
+//! All levels of detail of a medial mesh at once, and the changes from any level to any other.
 //!
-//! A sequence of collapses that leave the kept spheres as they are makes a hierarchy of meshes on
-//! subsets of the initial spheres (Hoppe 1996, *Progressive meshes*; Faraj, Thiery, Boubekeur 2013,
+//! A sequence of collapses that do not move the kept spheres gives a hierarchy of meshes on subsets
+//! of the initial spheres (Hoppe 1996, *Progressive meshes*; Faraj, Thiery, Boubekeur 2013,
 //! <https://doi.org/10.1145/2542355.2542359>, section 2). *Stage* `t` is the mesh after the first
 //! `t` collapses; stage 0 is the initial mesh.
 //!
@@ -10,15 +10,15 @@
 //! A removed vertex never comes back, and two vertices of an edge share it until one of them is
 //! removed. So every sphere, edge and face, initial or made by a collapse, exists in one interval
 //! of stages. A [`Hierarchy`] stores each of them once, in the order of their births, and their ids
-//! in the order of their deaths. The simplices of stage `t` are those born by then that die later:
+//! in the order of their deaths. The simplices of stage `t` are those born up to `t` that die later:
 //!
-//! - they are found by a scan of the births up to `t`, or of the deaths after `t`, whichever are
-//!   fewer. In a mesh of bounded degree that is in proportion to the simplices of stage `t`;
-//! - those that come and go between two stages are found by a scan of the births and deaths
-//!   between them, forward and backward alike, or by one as above where that is shorter.
+//! - They are found by a scan of the births up to `t` or of the deaths after `t`, whichever are
+//!   fewer. In a mesh of bounded degree this takes time in proportion to the simplices of stage `t`.
+//! - Those that come and go between two stages, in either direction, are found by a scan of the
+//!   births and deaths between them, or by a scan as above where that is shorter.
 //!
-//! A [`Stage`] is a view and costs nothing; nothing has to be replayed to reach it, so there is no
-//! state that could go astray: each stage is the same bits from wherever it is asked.
+//! A [`Stage`] is a view and costs nothing. Nothing is replayed to reach it and there is no current
+//! stage, so a stage is the same, bit for bit, whatever was asked for before.
 
 mod file;
 mod layer;
@@ -45,7 +45,7 @@ pub struct Step {
     pub cost: f64,
 }
 
-/// A medial mesh and a sequence of collapses into one end; every stage of it at hand.
+/// A medial mesh and a sequence of collapses into one end, with direct access to every stage.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -69,7 +69,7 @@ pub struct Step {
 pub struct Hierarchy {
     initial: Arc<MedialMesh>,
     steps: Vec<Step>,
-    /// Of each vertex how many are removed before it; those that are never removed are last.
+    /// For each vertex the number of vertices removed before it; those never removed come last.
     ranks: Vec<u32>,
     /// The vertices by rank.
     by_rank: Vec<u32>,
@@ -79,7 +79,7 @@ pub struct Hierarchy {
     against_link: Vec<u32>,
 }
 
-/// Why steps make no hierarchy.
+/// Why a sequence of steps is not a hierarchy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HierarchyError {
     /// A step names a sphere that the initial mesh does not have, or that is gone.
@@ -127,12 +127,13 @@ impl Hierarchy {
             || Layer::new(&initial.faces, &ranks, &kept),
         );
         let ((edges, moved_edges), (faces, moved_faces)) = (edges?, faces?);
+        // The collapsed edge is the one edge with both ends; without it the step names no edge.
         if let Some(step) = moved_edges.iter().position(|moved| moved.vanished != 1) {
             let Step { removed, kept, .. } = steps[step];
             return Err(HierarchyError::Edge { step, removed, kept });
         }
-        // T1: each common neighbour spans a face with the edge, which then vanishes. T2: no two
-        // faces become one.
+        // The link condition in counts. T1: each common neighbour (two edges that merge) has a face
+        // with the edge (which vanishes). T2: no two faces merge.
         let violates = |step: &u32| {
             let [edges, faces] = [&moved_edges, &moved_faces].map(|moved| moved[*step as usize]);
             edges.merged != faces.vanished || faces.merged > 0
@@ -153,8 +154,7 @@ impl Hierarchy {
 
     /// The index of each sphere in the initial mesh, by its *rank*: the number of spheres that are
     /// removed before it. Those that are never removed come last, by index. The spheres of stage
-    /// `t` are those of rank `t` and more, so that whoever keeps spheres in this order has every
-    /// stage as a suffix.
+    /// `t` are those of rank `t` and more: in a list of spheres by rank every stage is a suffix.
     pub fn by_rank(&self) -> &[u32] {
         &self.by_rank
     }

@@ -1,4 +1,4 @@
-//! Views on a hierarchy: one stage, and what lies between two.
+//! Views of a hierarchy: one stage, and the difference between two.
 
 use std::ops::Range;
 
@@ -19,12 +19,12 @@ impl<'h> Stage<'h> {
         Self { hierarchy, stage }
     }
 
-    /// Number of collapses up to here.
+    /// Number of collapses up to this stage.
     pub fn index(&self) -> usize {
         self.stage
     }
 
-    /// Number of spheres. Cost `O(1)`, as of the other counts.
+    /// Number of spheres. Cost `O(1)`, like the other counts.
     pub fn sphere_count(&self) -> usize {
         self.hierarchy.by_rank.len() - self.stage
     }
@@ -44,22 +44,22 @@ impl<'h> Stage<'h> {
         self.stage as u32..self.hierarchy.by_rank.len() as u32
     }
 
-    /// The edges, as ascending pairs of ranks, in no particular but a deterministic order. Cost:
-    /// in proportion to their number, for degrees that are bounded in the mean.
+    /// The edges, as ascending pairs of ranks, in an unspecified but deterministic order. Cost: in
+    /// proportion to their number, if the mean degree is bounded.
     pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
         self.hierarchy.edges.at(self.stage)
     }
 
-    /// The faces, as ascending triples of ranks, in no particular but a deterministic order. Cost
-    /// as of the edges.
+    /// The faces, as ascending triples of ranks, in an unspecified but deterministic order. Cost as
+    /// for the edges.
     pub fn faces(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
         self.hierarchy.faces.at(self.stage)
     }
 
     /// The stage as a mesh of its own, in canonical form, without contacts; the spheres keep the
-    /// order that they have in the initial mesh. Bit for bit that of
+    /// order that they have in the initial mesh. Bit for bit the mesh of
     /// [`replay`](super::super::replay). Cost: `O(k log d)` for `k` simplices at the stage and
-    /// degrees up to `d`; two threads are used where there are.
+    /// degrees up to `d`; uses two threads if available.
     pub fn to_mesh(&self) -> MedialMesh {
         let Hierarchy { initial, edges, faces, by_rank, .. } = self.hierarchy;
         if self.stage == 0 {
@@ -84,7 +84,7 @@ impl<'h> Stage<'h> {
     fn in_initial_order(&self) -> Vec<(u32, u32)> {
         let Hierarchy { ranks, by_rank, .. } = self.hierarchy;
         let mut left = Vec::with_capacity(self.sphere_count());
-        // Sorting few costs less than passing over all.
+        // Sorting a few costs less than a pass over all spheres.
         if self.sphere_count() < ranks.len() / 16 {
             left.extend(self.spheres().map(|rank| (by_rank[rank as usize], rank)));
             left.sort_unstable();
@@ -96,8 +96,8 @@ impl<'h> Stage<'h> {
     }
 }
 
-/// Simplices, their ranks replaced by new numbers, in lexicographic order: dealt out by their first
-/// vertices, then sorted at each.
+/// Simplices with their ranks replaced by new numbers, in lexicographic order: a counting sort by the
+/// first vertex, then a sort of each short run.
 fn in_order<const K: usize>(
     simplices: impl Iterator<Item = [u32; K]>,
     count: usize,
@@ -121,7 +121,7 @@ fn in_order<const K: usize>(
         sorted[*place as usize] = simplex;
         *place += 1;
     }
-    // Each place has moved on to where the next vertex began.
+    // After the distribution each place is the end of its run.
     let mut start = 0;
     for &end in &places[..vertices] {
         sorted[start..end as usize].sort_unstable();
@@ -130,9 +130,10 @@ fn in_order<const K: usize>(
     sorted
 }
 
-/// What comes and goes on the way from one stage to another, in either direction, vertices named
-/// by their ranks. The lists are in no particular but a deterministic order. Cost: in proportion
-/// to what the collapses between the stages change, or to the finer stage, whichever is less.
+/// The difference between two stages, in either direction: the simplices that go and those that
+/// come, their vertices named by rank, in an unspecified but deterministic order. Cost: in proportion
+/// to the simplices that the collapses between the stages change, or to the finer stage, whichever
+/// are fewer.
 #[derive(Clone, Copy, Debug)]
 pub struct Change<'h> {
     hierarchy: &'h Hierarchy,
@@ -153,7 +154,7 @@ impl<'h> Change<'h> {
         self.spheres(!self.backward)
     }
 
-    /// The ranks of the spheres that come; that which was removed first comes last.
+    /// The ranks of the spheres that come, the last removed first.
     pub fn spheres_added(&self) -> std::iter::Rev<Range<u32>> {
         self.spheres(self.backward).rev()
     }
