@@ -305,7 +305,7 @@ mod tests {
         keys.extend(item().keys().into_iter().skip(1));
         keys.sort_unstable();
         keys.dedup();
-        assert_eq!(keys.len(), 13);
+        assert_eq!(keys.len(), 14);
     }
 
     #[test]

@@ -159,7 +159,7 @@ impl Scene {
 /// An input in another unit of length, or why that bounds no solid.
 fn scaled(input: Input, factor: f64) -> Result<Input, String> {
     let Input { name, hash, mut mesh, axis, .. } = input;
-    mesh.vertices.iter_mut().for_each(|v| *v = *v * factor);
+    mesh.vertices.iter_mut().for_each(|v| *v *= factor);
     let report = surface::validate(&mesh).map_err(|error| format!("times {factor}: {error}"))?;
     let axis = axis.map(|axis| axis.transformed(factor, |p| p * factor));
     Ok(Input { name, hash, mesh, report, axis })

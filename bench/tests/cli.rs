@@ -180,3 +180,14 @@ fn published_tables_are_repeated_or_say_what_is_missing() {
     assert!(stdout.contains("bear.off is not there: see --meshes"), "{stdout}");
     assert_eq!(run(&["paper", "nothing"]).0, 2);
 }
+
+#[test]
+fn published_noise_can_be_measured_against_the_clean_surface() {
+    let (code, object) = json(&["paper", "chazal-noise", "--samples", "200", "--quiet"]);
+    assert_eq!(code, 0, "{object}");
+    for row in object["exhibits"][0]["rows"].as_array().expect("rows") {
+        let ours = |key: &str| row["ours"][key].as_f64().expect("measured");
+        // The axis of a noisy surface is another, and a filter keeps what noise moves little.
+        assert!(0.0 < ours("to") && ours("to") < ours("whole_to"), "{row}");
+    }
+}
