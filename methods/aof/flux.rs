@@ -20,7 +20,7 @@ use medial::Vec3;
 
 use super::spiral::Spiral;
 
-/// Relative to the distance, how much nearer the surface must be for it to be another point.
+/// The surface has another closest point only if it is nearer by this fraction of the distance.
 const SAME: f64 = 1e-10;
 
 /// The samples of one level.
@@ -32,7 +32,7 @@ pub struct Sphere {
     pub radius: f64,
     /// Mean of the unit vectors: its product with a constant field is that field's flux.
     pub mean: Vec3,
-    /// Length of the mean: what a constant field's flux is off by at most.
+    /// Length of the mean: the largest flux of a constant unit field, which should be 0.
     pub bias: f64,
 }
 
@@ -81,6 +81,7 @@ impl<'a> Probe<'a> {
             let along = near.gradient.dot(normal);
             if !near.on_fan {
                 beside_faces += along;
+            // For `along >= 0` the fan is two-sided and adds nothing, see the head.
             } else if along < 0.0 {
                 let step = -2.0 * sphere.radius * along;
                 let point = normal * sphere.radius + near.gradient * step;
@@ -88,6 +89,7 @@ impl<'a> Probe<'a> {
                 inward.push(along);
             }
         });
+        // Queries were `radius` times the unit directions.
         let mut sum = inside_faces / sphere.radius + beside_faces;
         if !self.opposite.is_empty() {
             triangles.closest(set, &mut self.opposite);

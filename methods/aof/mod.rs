@@ -38,29 +38,30 @@
 //!   and a lattice of 369 has far more voxels than the other methods have spheres.
 //!   [`Level::Published`] has the paper's: `resolution=369`, `variant=plain`, a flux of -0.2,
 //!   `spiral=classic`, `start=coarse`, `dismiss=zero`, `refine=false`, unless set otherwise.
-//!   Where 369 does not fit into `max_memory`, or no coarse voxel into the solid, it says what is done.
+//!   If 369 does not fit into `max_memory`, or no coarse voxel fits into the solid, a warning names
+//!   what is done instead.
 //! - Either spiral has a mean direction that is not zero, so that a constant field has a flux of up
 //!   to that length. Coarse voxels are dismissed if `AOF'` is not below minus this length
 //!   (`dismiss=bias`); with the paper's 0 (`dismiss=zero`) half the directions of a plane are never
 //!   dismissed. Neither reproduces its Table 2: of the box 45.9 % go at the first level there, of
 //!   the built-in box 31 % with zero and 64 % with bias.
-//! - A lattice on which the start set has other Betti numbers than the solid, or leaves part of the
-//!   surface far from every voxel, is made finer up to three times, and the best is taken (file
-//!   `base.rs`). What is lost in the end is named (file `losses.rs`).
-//! - Line 3 of Algorithm 1, read literally, begins with the smallest spheres; what is meant is
+//! - If the start set on a lattice has other Betti numbers than the solid, or leaves part of the
+//!   surface far from every voxel, the lattice is refined up to three times, and the best one is used
+//!   (file `base.rs`). Warnings name what is still lost (file `losses.rs`).
+//! - Line 3 of Algorithm 1, read literally, begins with the smallest spheres. The intended meaning is
 //!   `sigma` at the coarsest level and `sigma / d^j` after `j` divisions.
 //! - The equal-area spiral is the default: its largest error on a plane through the centre is about
 //!   0.6 of that of the classic one (held by a test in `spiral.rs`). `spiral=classic` is the paper's.
-//! - A coarse voxel whose sphere does not fit inside is split, not lost, so that the start set is
-//!   that of the finest level (`start=fine`). The paper's own (`start=coarse`) loses whatever is thinner
-//!   than twice the coarsest voxel.
+//! - A coarse voxel whose sphere does not fit inside is split instead of dropped, so that the start
+//!   set is that of the finest level (`start=fine`). The paper's rule (`start=coarse`) loses every part
+//!   thinner than twice the coarsest voxel.
 //! - `homotopy` deletes at the finest level alone, where dismissed voxels count as flux 0; the
 //!   paper deletes simple voxels at each level. Both keep the homotopy type of the start set; this
 //!   way it is the start set of the finest level.
 //! - [`Level::Spheres`] is not in the paper. Ranking the voxels of a fine lattice by `AOF'` leaves
-//!   scattered pieces of the flattest sheet. Instead the lattice is made as coarse, or as fine, as
-//!   the count demands while its start set keeps the topology, and its thinned axis is taken down to
-//!   the count by deleting simple voxels, largest `AOF'` first (file `count.rs`).
+//!   scattered pieces of the flattest sheet. Instead the lattice is made as coarse or as fine as the
+//!   count requires, while its start set keeps the topology. Then simple voxels are deleted from its
+//!   thinned axis, largest `AOF'` first, down to the count (file `count.rs`).
 
 mod advice;
 mod base;

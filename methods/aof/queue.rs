@@ -1,8 +1,8 @@
 //! A queue of places by a key, in buckets.
 //!
-//! Keys are rounded to one of 65,536 steps of their range, far below what samples can tell of a
-//! flux; places of a step leave in the order in which they came. So a plateau of equal keys is
-//! peeled layer by layer from all sides, whatever its place in the lattice.
+//! Keys are rounded to one of 65,536 steps of their range, far finer than the sampling error of a
+//! flux. Places of the same step leave in the order in which they came. So a plateau of equal keys is
+//! peeled layer by layer from all sides, whatever its position in the lattice.
 
 use super::bricks::Place;
 
@@ -19,7 +19,7 @@ pub struct BucketQueue {
     nodes: Vec<Node>,
     /// First of the nodes that are free.
     free: u32,
-    /// A bit for each bucket that is not empty, and one for each word of these with such a bit.
+    /// A bit for each non-empty bucket, and in `summary` a bit for each non-zero word.
     words: Vec<u64>,
     summary: [u64; BUCKETS / 4096],
 }
@@ -30,7 +30,7 @@ struct Node {
 }
 
 impl BucketQueue {
-    /// An empty queue for keys in a range; those beyond it count as its ends.
+    /// An empty queue for keys in a range; a key outside counts as the nearer end.
     pub fn new([least, most]: [f32; 2]) -> Self {
         let span = most - least;
         Self {

@@ -1,4 +1,4 @@
-//! From the centre of a voxel onto the axis, between opposite closest points.
+//! Moves the centre of a voxel onto the axis, between opposite closest points.
 //!
 //! S. Stolpner, S. Whitesides, K. Siddiqi, *Sampled medial loci for 3D shape representation*,
 //! Computer Vision and Image Understanding 115(5), 2011, doi:10.1016/j.cviu.2010.10.014: a point
@@ -6,16 +6,16 @@
 //!
 //! 1. A sample `p` with `a = grad D . N < 0` and closest point `B` looks into the sphere along the
 //!    ray from `B` through `p`. Up to the axis, `B` stays the closest point of the points of the ray.
-//! 2. If `B` is not the closest point of the opposite `p'` of `p` any more, the axis lies between.
-//!    Bisection for the last point `x` with `D(x) = |x - B|`: of a point nearer to some `B'`, all
-//!    of the ray beyond the plane midway between `B` and `B'` is too, so that the interval is cut
-//!    there, and in the middle only where that is slow.
-//! 3. There the ball of radius `D(x)` is inside the solid, and touches the surface at `B` and
-//!    within the tolerance at a second point `B'`. Of the samples that look nearest past the centre
-//!    the one whose `B`, `B'` subtend the largest angle is taken.
+//! 2. If `B` is no longer the closest point of the opposite `p'` of `p`, the axis lies between. The
+//!    last point `x` with `D(x) = |x - B|` is found by cutting an interval: if a point of the ray is
+//!    nearer to some `B'`, so is the whole ray beyond the bisector plane of `B` and `B'`, and the
+//!    interval ends there. It is halved only when that is slow.
+//! 3. The ball of radius `D(x)` around `x` is inside the solid. It touches the surface at `B` and,
+//!    within the tolerance, at a second point `B'`. Of the samples whose rays pass closest to the
+//!    centre, the one whose `B`, `B'` subtend the largest angle is taken.
 //!
-//! All of this happens in the sphere of the voxel, and needs the triangles near it alone. These
-//! are collected for all voxels, then for halves of them, and so on.
+//! All of this happens in the sphere of the voxel, so only triangles near it matter. They are
+//! collected for all voxels, then for halves of them, and so on.
 
 use super::nearby::{NearBatch, NearSet, NearbyTriangles};
 use medial::Vec3;
@@ -30,27 +30,27 @@ use super::flux::Sphere;
 const FOLLOWED_SAMPLES: usize = 4;
 /// Width of the last interval, in radii of the voxel's sphere.
 const TOLERANCE: f64 = 1e-9;
-/// Relative to the distance, how much nearer the surface must be for it to be another point.
+/// The surface has another closest point only if it is nearer by this fraction of the distance.
 const SAME: f64 = 1e-12;
-/// One in so many cuts is in the middle.
+/// Every fourth cut halves the interval.
 const HALVING: u32 = 4;
-/// Voxels that share a set of triangles, at least.
-const TOGETHER: usize = 8;
-/// Voxels that are worth a task of their own.
-const TASK: usize = 512;
+/// Groups of at most this many voxels share a set of triangles.
+const MAX_GROUP: usize = 8;
+/// Largest number of voxels of a task.
+const MAX_TASK: usize = 512;
 
 /// A ball on the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refined {
     /// The ball: its radius is the distance of its centre to the surface.
     pub ball: Ball,
-    /// Two closest points, the second within the tolerance; the same twice where the centre was
+    /// Two closest points, the second within the tolerance; the same point twice if the centre was
     /// not moved.
     pub contacts: [Vec3; 2],
 }
 
-/// The balls on the axis near `centres`, or around a centre itself where no sample and its
-/// opposite have different closest points.
+/// The balls on the axis near `centres`; around the centre itself if no sample and its opposite have
+/// different closest points.
 ///
 /// # Errors
 /// When the run was cancelled.
@@ -78,6 +78,7 @@ pub fn refine(
         })
         .collect();
     let mut refined = parts?.concat();
+    // Groups reorder the voxels: back to the order of `centres`.
     refined.sort_unstable_by_key(|&(index, _)| index);
     Ok(refined.into_iter().map(|(_, refined)| refined).collect())
 }
@@ -100,7 +101,7 @@ impl Refiner<'_> {
         groups: &mut Vec<(&'v mut [Centre], NearSet)>,
     ) {
         let set = self.near(voxels, around);
-        if voxels.len() <= TASK {
+        if voxels.len() <= MAX_TASK {
             groups.push((voxels, set));
             return;
         }
@@ -111,7 +112,7 @@ impl Refiner<'_> {
 
     /// Halves a group until few voxels share a set.
     fn group(&self, voxels: &mut [Centre], set: &NearSet, refined: &mut Vec<(u32, Refined)>) {
-        if voxels.len() > TOGETHER {
+        if voxels.len() > MAX_GROUP {
             let [low, high] = halves(voxels);
             for half in [low, high] {
                 let set = self.near(half, set);
@@ -156,6 +157,7 @@ impl Refiner<'_> {
                 rays.push((along, Ray { triangles, set, start, gradient, foot, distance }));
             }
         }
+        // Most inward first: these rays pass closest to the centre. Stable, so ties are by sample.
         rays.sort_by(|a, b| a.0.total_cmp(&b.0));
         let found = rays
             .iter()
@@ -212,7 +214,7 @@ impl Ray<'_> {
         Some(point - self.set.centre())
     }
 
-    /// Where the ray is as far from the foot as from another point.
+    /// The parameter at which the ray is equally far from the foot and from another point.
     fn even(&self, other: Vec3) -> f64 {
         let apart = other - self.foot;
         0.5 * apart.length_squared() / self.gradient.dot(apart) - self.distance
@@ -227,6 +229,7 @@ impl Ray<'_> {
             if high - low <= tolerance {
                 break;
             }
+            // Just below the cut succeeds at once if no third point interferes.
             let in_the_middle = cut.is_multiple_of(HALVING);
             let at = if in_the_middle { low.midpoint(high) } else { high - tolerance };
             if !(low < at && at < high) {

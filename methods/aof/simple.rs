@@ -12,9 +12,9 @@
 //!
 //! Exactly 25,985,144 of the `2^26` neighbourhoods are simple.
 //!
-//! A *neighbourhood* is 27 bits: bit `dx + 1 + 3 (dy + 1) + 9 (dz + 1)`, the voxel itself bit 13,
-//! which does not matter. The table has a bit for each and is built 64 at a time: a word for each
-//! neighbour, whose bit `i` is that neighbour in the `i`-th neighbourhood.
+//! A *neighbourhood* is 27 bits: bit `dx + 1 + 3 (dy + 1) + 9 (dz + 1)`. Bit 13 is the voxel itself and
+//! does not matter. The table has one bit for each neighbourhood. It is built 64 at a time, with one
+//! word per neighbour: bit `i` of the word tells whether the neighbour is in the `i`-th neighbourhood.
 
 use std::sync::OnceLock;
 
@@ -71,13 +71,14 @@ pub fn is_simple(neighbourhood: u32) -> bool {
     if object == 0 || seeds == 0 {
         return false;
     }
+    // From the lowest bit: if there is one component, it is reached from any seed.
     if flood(seeds & seeds.wrapping_neg(), rest, grow_6) & seeds != seeds {
         return false;
     }
     flood(object & object.wrapping_neg(), object, grow_26) == object
 }
 
-/// What can be reached from a seed within a mask.
+/// The bits that can be reached from a seed within a mask.
 #[inline]
 fn flood(seed: u32, mask: u32, grow: impl Fn(u32) -> u32) -> u32 {
     let mut reached = seed;
@@ -97,6 +98,7 @@ fn neighbours(bits: u32, axis: usize) -> u32 {
 
 #[inline]
 fn grow_26(bits: u32) -> u32 {
+    // Axis after axis, so that diagonal neighbours are reached too.
     (0..3).fold(bits, |bits, axis| bits | neighbours(bits, axis))
 }
 
@@ -176,8 +178,8 @@ fn simple_word(word: u32) -> u64 {
         & one_component(&background, &NEAREST_6, &ADJACENCY.by_6, false)
 }
 
-/// In which of 64 graphs the vertices at `seeds` are there and connected with each other. With
-/// `all`, every other vertex must be connected with them too.
+/// The graphs, of 64 at once, in which at least one vertex of `seeds` exists and all that exist are
+/// connected with each other. With `all`, `seeds` are all vertices.
 fn one_component(there: &[u64; 27], seeds: &[usize], near: &[u32; 27], all: bool) -> u64 {
     debug_assert!(!all || seeds.len() == 27);
     let mut reached = [0_u64; 27];
@@ -188,6 +190,7 @@ fn one_component(there: &[u64; 27], seeds: &[usize], near: &[u32; 27], all: bool
     }
     loop {
         let mut grown = 0;
+        // Forward and backward, so that paths in either direction are followed in one round.
         for vertex in (0..27).chain((0..27).rev()) {
             let open = there[vertex] & !reached[vertex];
             if open == 0 {

@@ -3,15 +3,15 @@
 //! - *Outermost first* (section 6.3): voxels above the flux threshold, by distance to the surface.
 //! - *By flux*: K. Siddiqi, S. Bouix, A. Tannenbaum, S. W. Zucker, *Hamilton-Jacobi skeletons*,
 //!   International Journal of Computer Vision 48(3), 2002, doi:10.1023/A:1016376116653, section
-//!   3.3: simple voxels in a heap, the least medial first; one that is an end point with a flux
-//!   below a threshold stays for good.
+//!   3.3: simple voxels in a heap, the least medial first; an end point with a flux below a threshold
+//!   is never deleted.
 //!
-//! 1. All border voxels that may go are put into a queue by key (file `queue.rs`).
-//! 2. The first is taken. If it is simple and not to be kept, it is deleted, and its neighbours
-//!    that may go and are not in the queue are put in.
+//! 1. All border voxels that may be deleted are queued by key (file `queue.rs`).
+//! 2. The first is taken. If it is simple and need not be kept, it is deleted, and those of its
+//!    neighbours that may be deleted and are not queued are queued.
 //!
-//! An *end point* ends an open curve in one of nine digital planes through it: of the eight
-//! neighbours in the plane one is there, or two that touch.
+//! An *end point* ends an open curve in one of nine digital planes through it: of its eight neighbours
+//! in the plane exactly one exists, or two that touch.
 
 use medial::simplifier::{RunContext, SimplifyError};
 
@@ -79,10 +79,10 @@ impl Order {
     }
 }
 
-/// Voxels from which on the table of simple neighbourhoods is worth building.
+/// From this number of voxels on the table of simple neighbourhoods is worth building.
 const WITH_TABLE: usize = 40_000_000;
 
-/// Deletes voxels that are simple when their turn comes.
+/// Deletes the voxels that are simple at the time they are taken from the queue.
 ///
 /// # Errors
 /// When the run was cancelled.
@@ -90,9 +90,10 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), S
     let total = voxels.len();
     let table = (total >= WITH_TABLE).then(SimpleTable::get);
     let mut queue = BucketQueue::new(order.keys(voxels));
-    // Places in the queue, and those that must not come in again.
+    // Places in the queue, and end points that must not be queued again.
     let mut barred = Marks::of(voxels);
     for voxel in voxels.iter() {
+        // With all six face neighbours a voxel is not simple; a deletion beside it will queue it.
         let surrounded = voxels.neighbourhood(voxel.place) & FACES == FACES;
         if order.may_go(&voxel) && !surrounded {
             barred.set(voxel.place);
@@ -114,6 +115,7 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), S
             Some(table) => table.is_simple(neighbourhood),
             None => is_simple(neighbourhood),
         };
+        // Not simple now; a deletion beside it will queue it again.
         if !simple {
             continue;
         }

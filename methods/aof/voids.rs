@@ -1,18 +1,19 @@
-//! Triangles that close voids which the voxels do not have.
+//! Triangles to be left out of the medial mesh, because they would close voids that the voxels do not
+//! have.
 //!
-//! The clique complex of the voxels, with a simplex for any number of voxels that are mutually
-//! 26-adjacent, has the homotopy type of the union of closed voxels: boxes that meet in pairs have
-//! a common point (nerve theorem). A medial mesh has its triangles but not its tetrahedra, so that
-//! each tetrahedron is a void. As many triangles are left out as there are voids to open:
+//! The clique complex of the voxels has a simplex for any number of mutually 26-adjacent voxels. It
+//! has the homotopy type of the union of closed voxels, because boxes that meet in pairs have a common
+//! point (nerve theorem). A medial mesh has its triangles but not its tetrahedra, so each tetrahedron
+//! is a void. As many triangles are left out as there are voids to open:
 //!
 //! 1. Voxels around a common corner of the lattice are a simplex. The tetrahedra at its first voxel
 //!    have boundaries that span those of all its tetrahedra.
 //! 2. A tetrahedron with a triangle that belongs to no other one is taken out with this triangle: an
 //!    elementary collapse. The triangles with the longest sides go first.
-//! 3. Where no such tetrahedron is left, the boundaries of the others are reduced to distinct
-//!    last triangles (H. Edelsbrunner, J. Harer, *Computational Topology*, 2010, section
-//!    VII.1), and these are left out. Each of them lies on the boundary of a union of tetrahedra
-//!    without the ones before it: no loop opens, and one void less is there.
+//! 3. When no such tetrahedron is left, the boundaries of the others are reduced to distinct last
+//!    triangles (H. Edelsbrunner, J. Harer, *Computational Topology*, 2010, section VII.1), and these
+//!    are left out. Each of them lies on the boundary of a union of tetrahedra that does not contain
+//!    the ones before it. So no loop opens, and there is one void less.
 //!
 //! So the Betti numbers are those of the voxels, exactly.
 
@@ -97,6 +98,7 @@ fn tetrahedra(
         let (there, after) = after(voxel);
         own.clear();
         for block in BLOCKS {
+            // Another voxel of the block comes first; the block is listed there.
             if there & block & before != 0 {
                 continue;
             }
@@ -123,9 +125,10 @@ struct Collapse<'a> {
     lengths: &'a [u8],
     is_open: Vec<bool>,
     left_out: Vec<bool>,
-    /// For each triangle the number of tetrahedra that are left, and their exclusive or.
+    /// For each triangle the number of tetrahedra left at it, and the exclusive or of their ids: with
+    /// one left, that is its id.
     beside: Vec<(u32, u32)>,
-    /// Triangles of one tetrahedron, or that had been.
+    /// Triangles that have, or had, one tetrahedron.
     free: BinaryHeap<(u8, Reverse<u32>)>,
 }
 
@@ -200,7 +203,7 @@ fn reduce(
     Ok(())
 }
 
-/// What is in one of two ascending lists.
+/// The symmetric difference of two ascending lists: their sum over Z2.
 fn without_common(a: &[(u8, u32)], b: &[(u8, u32)]) -> Vec<(u8, u32)> {
     let (mut i, mut j) = (0, 0);
     let mut sum = Vec::with_capacity(a.len() + b.len());

@@ -1,4 +1,4 @@
-//! Step 5 by the Delaunay edges: which of them the surface encloses.
+//! Step 4 by Delaunay edges: those that the surface encloses.
 
 use medial::Vec3;
 use medial::geometry::{Delaunay, VertexId};
@@ -8,9 +8,10 @@ use medial::surface::Side;
 
 use super::{PUBLISHED, Strength};
 
-/// Keeps the facets whose edge has its middle inside, and counts how the two readings of step 5 differ
-/// at the paper's constants: `facets_of_edges_not_enclosed` have all vertices inside but the middle of
-/// the edge outside, `enclosed_edges_without_facet` the reverse. `O(n log n)`.
+/// Keeps the facets whose edge has its middle inside, and counts the differences between the two
+/// readings of step 4 at the paper's constants: `facets_of_edges_not_enclosed` have all vertices
+/// inside but the middle of the edge outside, `enclosed_edges_without_facet` the reverse.
+/// `O(n log n)`.
 pub(super) fn restrict(
     strength: &mut Strength,
     shape: &Shape,
@@ -37,7 +38,7 @@ pub(super) fn restrict(
     Ok(())
 }
 
-/// The finite Delaunay edges, each once, but for some.
+/// The finite Delaunay edges, each once, except `some`.
 fn edges_but(delaunay: &Delaunay, some: &[[VertexId; 2]]) -> Vec<[VertexId; 2]> {
     let ordered = |[p, q]: [VertexId; 2]| if p.0 < q.0 { [p, q] } else { [q, p] };
     let mut known: Vec<[u32; 2]> = some.iter().map(|&edge| ordered(edge).map(|v| v.0)).collect();

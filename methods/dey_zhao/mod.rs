@@ -7,7 +7,7 @@
 //! 1. The Delaunay triangulation of the samples.
 //! 2. For each sample `p` its *umbrella* `U_p`: the Delaunay triangles whose dual Voronoi edges cross
 //!    the plane through `p` normal to its pole vector `v_p` (file `umbrella.rs`).
-//! 3. Each Delaunay edge `pq` that is no edge of `U_p` is tested from `p`:
+//! 3. Each Delaunay edge `pq` that is not an edge of `U_p` is tested from `p`:
 //!    - angle condition `[theta]`: `pq` makes an angle of less than `pi/2 - theta` with the normal of
 //!      every triangle of `U_p`, angles between lines;
 //!    - ratio condition `[rho]`: `|pq|` exceeds `rho` times the circumradius of every triangle of
@@ -20,30 +20,30 @@
 //! change under scaling.
 //!
 //! # The level
-//! The paper has none: what decides the size of its result is the density of the samples. So a number of
-//! spheres is met by a search over the number of samples at the paper's constants (`size=density`;
-//! `methods/size_search.rs`): the same kind of sampling as the shape's, blue noise in place of vertices. All other
-//! levels are those of the shape's own samples.
+//! The paper has none: the density of the samples decides the size of the result. So a requested
+//! number of spheres is met by a search over the number of samples, at the paper's constants
+//! (`size=density`; `methods/size_search.rs`). The sampling is of the same kind as the shape's, with
+//! blue noise in place of vertices. All other levels use the shape's own samples.
 //!
-//! For comparison there is the *strength* `t`, 1 for the paper's: both thresholds at once, `[t theta]`
-//! and `[t rho]`. A facet's value is the largest `t` at which it would be kept. With `size=ranking` a
-//! number of spheres asks for the facets of largest value. From `t = 4` on no angle is enough, and only
-//! ratios count. Facets that tie are kept by the size of their balls, then spread over the shape
-//! (`methods/ties.rs`).
+//! For comparison there is the *strength* `t`, which multiplies both thresholds, `[t theta]` and
+//! `[t rho]`; the paper has `t = 1`. The value of a facet is the largest `t` at which it is kept. With
+//! `size=ranking` a number of spheres is met by the facets of largest value. From `t = 4` on no angle
+//! suffices, and only ratios count. Facets of equal value are kept in the order of the size of their
+//! balls, then spread over the shape (`methods/ties.rs`).
 //!
 //! # Deviations from the paper
 //! - The paper restricts the result to the inside of a watertight surface that it reconstructs;
 //!   here the surface is given.
-//! - Step 5: the paper keeps the facets of the Delaunay edges that the surface encloses. Here a facet is
-//!   inside if all its vertices are, so that every sphere is centred inside. A part thinner than the
-//!   samples are apart has enclosed edges whose facets reach outside: these are lost. An edge that cuts
-//!   across a dent of the surface, with a facet inside, is kept. `inside=edge` drops the latter, as far
-//!   as the middle of the edge tells, and counts both (`enclosed_edges_without_facet`,
-//!   `facets_of_edges_not_enclosed`).
-//! - A triangle without area has no normal and is left out of its umbrellas, and counted. A sample
+//! - Step 4: the paper keeps the facets of the Delaunay edges that the surface encloses. Here a facet
+//!   is inside if all its vertices are, so that every sphere is centred inside. In a part thinner than
+//!   the spacing of the samples, enclosed edges have facets that reach outside; these are lost. The
+//!   facet of an edge that crosses a dent of the surface can be inside; it is kept. `inside=edge`
+//!   drops the latter, judged by the middle of the edge, and counts both kinds
+//!   (`enclosed_edges_without_facet`, `facets_of_edges_not_enclosed`).
+//! - A triangle without area has no normal. It is left out of its umbrellas, and counted. A sample
 //!   without umbrella keeps no facet.
-//! - A facet of the box of the samples, which the paper adds to bound cells, is not needed: an
-//!   unbounded Voronoi edge has the outward normal of its hull triangle for its far end.
+//! - The paper adds a bounding box to the samples, to make cells bounded. Here an unbounded Voronoi
+//!   edge ends at infinity, in the direction of the outward normal of its hull triangle.
 
 mod enclosed;
 #[cfg(test)]
@@ -78,23 +78,24 @@ pub struct DeyZhaoParams {
     pub rho: f64,
     /// Which of the two conditions are tested.
     pub condition: Condition,
-    /// What a number of spheres is met by.
+    /// How a requested number of spheres is met.
     pub size: Size,
-    /// What has to be inside for a facet to be inside.
+    /// The part of a facet that must be inside.
     pub inside: Inside,
 }
 
-/// What has to be inside for a facet to be inside.
+/// The part of a facet that must be inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Inside {
     /// All of its vertices.
     Vertices,
-    /// All of its vertices and the middle of its Delaunay edge; how these two differ is counted.
+    /// All of its vertices and the middle of its Delaunay edge; differences between the two readings
+    /// are counted.
     Edge,
 }
 
-/// What a number of spheres is met by.
+/// How a requested number of spheres is met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {
@@ -245,7 +246,7 @@ struct Strength {
     facets: Arc<VoronoiFacets>,
     umbrellas: Umbrellas,
     params: DeyZhaoParams,
-    /// Of each facet, where not all of them count: whether its edge is enclosed.
+    /// For each facet whether its edge is enclosed; `None` if that is not required.
     enclosed: Option<Vec<bool>>,
 }
 
@@ -279,8 +280,8 @@ impl FacetValue for Strength {
     }
 }
 
-/// A strength as the cosine and the ratio that decide without an angle or a quotient, but within
-/// [`ROUNDING`] of them.
+/// A strength as a cosine and a ratio, with which a facet is decided without computing an angle or a
+/// quotient, except within [`ROUNDING`] of the threshold.
 struct Threshold {
     level: f64,
     cosine: f64,
@@ -289,7 +290,7 @@ struct Threshold {
     rims: bool,
 }
 
-/// Relative, more than what a strength and a threshold are rounded by.
+/// Bound on the relative rounding error of a strength and a threshold together.
 const ROUNDING: f64 = 1e-12;
 
 impl Strength {
@@ -345,6 +346,7 @@ impl Strength {
             let mut least = length;
             for normal in normals {
                 least = f64::min(least, normal.dot(edge).abs());
+                // One normal suffices to fail, and most edges fail at the first.
                 if least <= bound * (1.0 - ROUNDING) {
                     return false;
                 }
@@ -356,6 +358,8 @@ impl Strength {
             length > bound * (1.0 - ROUNDING)
                 && (length > bound * (1.0 + ROUNDING) || self.by_ratio(p, length) > threshold.level)
         };
+        // The ratio first: one comparison against a product per normal. The search through the rim
+        // last, since few edges pass.
         let passes = (condition != Condition::Angle && is_long())
             || (condition != Condition::Ratio && is_steep());
         passes && !(threshold.rims && self.umbrellas.has_edge(p, q))

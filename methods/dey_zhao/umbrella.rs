@@ -7,17 +7,17 @@ use medial::geometry::{CellId, Delaunay, Sphere, VertexId};
 use rayon::prelude::*;
 use wide::u32x4;
 
-/// Cells that one task looks at.
+/// Cells per task.
 const CHUNK: u32 = 1024;
 
-/// A sample by the place of its first cell among those of all samples: what is close in the
-/// triangulation is close in memory, in whatever order the samples came.
+/// A sample's number in the order of first cells: samples close in the triangulation are then close
+/// in memory, whatever the order of the input.
 pub(super) type Place = u32;
 
 /// The umbrellas of all samples: about `p` the Delaunay triangles whose dual Voronoi edge has its
 /// ends on both sides of the plane through `p` normal to the pole vector.
 pub(super) struct Umbrellas {
-    /// Of each sample; that of one that is no vertex is never asked for.
+    /// For each sample its place; never read for a sample that is not a vertex.
     places: Vec<Place>,
     positions: Vec<Vec3>,
     /// The triangles of sample `p` are those in `start[p]..start[p + 1]`, in the order of the cells.
@@ -49,11 +49,11 @@ impl Umbrellas {
         Self::of_triangles(places.of_sample, positions, &parts)
     }
 
-    /// The triangles by samples: counted, then each put in its place.
+    /// Groups the triangles by sample, with a counting sort.
     fn of_triangles(places: Vec<Place>, positions: Vec<Vec3>, parts: &[Crossing]) -> Self {
         let triangles = || parts.iter().flat_map(|part| &part.triangles);
-        // Shifted by one while the lists are filled, so that in the end each start is where it
-        // belongs.
+        // Starts are stored one entry further on. Filling advances each to the next start, so that at
+        // the end every start is where it belongs.
         let mut start = vec![0_u32; positions.len() + 2];
         for triangle in triangles() {
             for (k, p) in triangle.corners.into_iter().enumerate() {
@@ -84,7 +84,7 @@ impl Umbrellas {
         Self { places, positions, start, normals, rims, largest, flat }
     }
 
-    /// The place of a vertex, by which all else is asked.
+    /// The place of a vertex, which the other functions take.
     #[inline]
     pub fn place(&self, v: VertexId) -> Place {
         self.places[v.index()]
@@ -176,7 +176,7 @@ fn with_poles(
     spheres: &[Option<Sphere>],
     Places { of_sample, samples, corners }: &Places,
 ) -> Vec<Sample> {
-    // How far the Voronoi cells reach first: that needs no branch that cannot be foreseen.
+    // First the reach of each Voronoi cell, without unpredictable branches.
     let mut reach = vec![f64::NEG_INFINITY; samples.len()];
     for (sphere, corners) in spheres.iter().zip(corners) {
         let Some(Sphere { radius, .. }) = *sphere else { continue };
@@ -186,7 +186,7 @@ fn with_poles(
     }
     let plain = |&v: &VertexId| Sample { position: delaunay.point(v), pole_vector: Vec3::ZERO };
     let mut with_poles: Vec<Sample> = samples.iter().map(plain).collect();
-    // Backwards: of equally far ones that of the smallest cell is what remains.
+    // Backwards, so that of equally far vertices the one of the smallest cell is written last.
     for (sphere, corners) in spheres.iter().zip(corners).rev() {
         let Some(Sphere { centre, radius }) = *sphere else { continue };
         for &p in corners {
@@ -202,15 +202,17 @@ fn with_poles(
     with_poles
 }
 
-/// The corners of a cell as places, those with [`AHEAD`] to which its Voronoi vertex is on the
-/// pole's side: two cells of a facet are on different sides of a corner if and only if their numbers
-/// for it differ in that bit, which four lanes find at once, whatever the corners' order.
+/// The corners of a cell as places. [`AHEAD`] is set for a corner if the cell's Voronoi vertex is on
+/// the side of the corner's pole. The Voronoi edge between two cells crosses the plane of a common
+/// corner if and only if their numbers for it differ in that bit. Four lanes compare this at once,
+/// whatever the order of the corners.
 type Sides = [u32; 4];
 
-/// Places are smaller.
+/// All places are smaller than this bit.
 const AHEAD: u32 = 1 << 31;
 
-/// No corner: of a cell whose Voronoi vertex is not representable, and the vertex at infinity.
+/// Stands for the vertex at infinity, and for the corners of a cell whose Voronoi vertex is not
+/// representable.
 const NO_CORNER: u32 = AHEAD - 2;
 
 /// The sides of all cells. The Voronoi vertex of an infinite cell is at infinity, outwards.
@@ -249,7 +251,7 @@ fn tagged(place: Place, product: f64) -> u32 {
 /// A triangle of the umbrellas of some of its corners.
 struct Triangle {
     corners: [Place; 3],
-    /// The corners, as bits, to whose umbrellas it belongs.
+    /// One bit for each corner to whose umbrella it belongs.
     members: u8,
     normal: Vec3,
     circumradius: f64,
@@ -263,9 +265,9 @@ struct Crossing {
 }
 
 impl Crossing {
-    /// Of a range of cells, no more than [`CHUNK`].
+    /// The triangles from a range of at most [`CHUNK`] cells.
     fn of(delaunay: &Delaunay, sides: &[Sides], samples: &[Sample], cells: Range<u32>) -> Self {
-        // First which facets cross, without a branch, since that cannot be foreseen; then these.
+        // Select crossing facets without branches, which would be unpredictable; then measure them.
         let first = cells.start;
         let mut facets = [0_u32; 4 * CHUNK as usize];
         let mut count = 0;
@@ -297,13 +299,13 @@ impl Crossing {
     }
 }
 
-/// For each facet of a cell, the one opposite to each vertex, the vertices as bits to whose
-/// umbrellas it belongs; none where it is the other cell's to tell, the one with the smaller id.
+/// For the facet opposite to each vertex of a cell, one bit for each vertex to whose umbrella it
+/// belongs. Empty if the other cell has the smaller id, which then reports the facet.
 #[inline]
 fn crossing(delaunay: &Delaunay, sides: &[Sides], cell: CellId) -> [u32; 4] {
     let here = u32x4::from(sides[cell.index()]) ^ u32x4::splat(AHEAD);
     delaunay.neighbours(cell).map(|other| {
-        // Against itself, whose sides are at hand, nothing crosses.
+        // Compared with itself, a cell crosses nothing: this replaces a branch.
         let other = if other > cell { other } else { cell };
         let there = sides[other.index()].map(|side| here.simd_eq(u32x4::splat(side)));
         ((there[0] | there[1]) | (there[2] | there[3])).to_bitmask()
@@ -316,7 +318,7 @@ fn measure([a, b, c]: [Vec3; 3]) -> Option<(Vec3, f64)> {
     let (u, v) = (b - a, c - a);
     let normal = u.cross(v);
     let area = normal.length();
-    // Two roots instead of three; the products are as large as those for the area.
+    // Two roots instead of three; these products overflow no earlier than the area.
     let sides = (u.length_squared() * v.length_squared()).sqrt() * (c - b).length();
     let circumradius = sides / (2.0 * area);
     (area > 0.0 && circumradius.is_finite()).then(|| (normal * area.recip(), circumradius))

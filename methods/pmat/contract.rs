@@ -1,15 +1,14 @@
-//! Algorithm 1 of the paper: the edge that is absorbed at the least scale first, to the last edge.
+//! Algorithm 1 of the paper: collapses the edge of least scale, until no edge is left.
 //!
-//! A collapse leaves the larger sphere as it is, and costs depend on the two spheres of an edge
-//! alone. So the cost of an edge never changes while both of its ends are there, a queued edge is
-//! out of date only when an end is gone, and of the edges at the survivor only those that it takes
-//! over are to be queued. Faces play no part in the order; they follow from it
-//! ([`medial::complex::collapse::Hierarchy`]).
+//! A collapse does not move the larger sphere, and the cost of an edge depends on its two spheres
+//! alone. So the cost never changes while both ends exist, a queued edge is outdated only when an end
+//! is gone, and only the edges that the survivor takes over must be queued. Faces do not affect the
+//! order; they follow from it ([`medial::complex::collapse::Hierarchy`]).
 //!
-//! The adjacency is a list for each sphere. An entry may name a sphere that is gone; it stands for
-//! the one that absorbed it, found by the paths of a disjoint-set forest. A list is read once, when
-//! its sphere is absorbed: what is left of it, each neighbour once, is then hung on the list of the
-//! survivor, in the same memory. No other list is touched.
+//! Each sphere has a list of neighbours. An entry may name a sphere that is gone; it stands for the
+//! sphere that absorbed it, found through a disjoint-set forest. A list is read once, when its sphere
+//! is absorbed. Its remaining neighbours, each once, are then appended to the list of the survivor,
+//! in the same memory. No other list is touched.
 
 use medial::complex::collapse::{LazyHeap, Prioritised, Step};
 use medial::complex::{MedialMesh, Sphere};
@@ -21,7 +20,7 @@ use super::cost::{Key, absorbed_first};
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 4096;
 
-/// Edges that one task evaluates.
+/// Fewest edges that one task evaluates.
 const TASK: usize = 4096;
 
 /// An edge in the queue.
@@ -46,7 +45,7 @@ impl Prioritised for Candidate {
 
     #[inline]
     fn is_before(&self, other: &Self) -> bool {
-        // As one number: without a branch.
+        // Compared as one number, because a branch per field would be unpredictable.
         let whole = |c: &Self| {
             let ends = u64::from(c.ends[0]) << 32 | u64::from(c.ends[1]);
             u128::from(c.key.bits()) << 64 | u128::from(ends)
@@ -86,7 +85,7 @@ pub(super) fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>,
     Ok(steps)
 }
 
-/// A set of spheres that fits into the cache. An edge stays one as long as both ends are left.
+/// A set of spheres, one bit each, so that it fits into the cache.
 struct Bits(Vec<u64>);
 
 impl Bits {
@@ -105,24 +104,25 @@ impl Bits {
     }
 }
 
-/// The edges of the spheres that are left.
+/// The neighbours of the spheres that are left.
 struct Graph {
     nodes: Vec<Node>,
     entries: Vec<u32>,
-    /// What [`Graph::look_ahead`] found; kept to save allocations.
+    /// The result of [`Graph::look_ahead`]; a field to save allocations.
     ahead: Vec<u32>,
 }
 
-/// A sphere: all that is read of a neighbour, in one line of the cache.
+/// A sphere, with everything that is read of a neighbour in one cache line.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Node {
     sphere: Sphere,
-    /// The sphere that absorbed this one, or one that absorbed that; itself while it is left.
+    /// The sphere that absorbed this one, or a later one on the path to the survivor; itself while it
+    /// is left.
     parent: u32,
-    /// The sphere at whose absorption this one was last met as a neighbour.
+    /// The last absorbed sphere of which this one was a neighbour.
     met_by: u32,
-    /// What began as the list of this sphere.
+    /// The memory of this sphere's initial list, which later holds a part of the survivor's.
     segment: Segment,
 }
 
@@ -131,9 +131,9 @@ struct Node {
 struct Segment {
     start: u32,
     len: u32,
-    /// The sphere whose segment goes on with the list.
+    /// The sphere whose segment continues the list.
     next: u32,
-    /// That of the last segment, in the first one of a list.
+    /// In the first segment of a list, the sphere of the last one.
     last: u32,
 }
 
@@ -171,7 +171,7 @@ impl Graph {
         self.nodes[v as usize].sphere
     }
 
-    /// The sphere that a sphere is now part of.
+    /// The survivor that a sphere was merged into.
     #[inline]
     fn find(&mut self, mut v: u32) -> u32 {
         loop {
@@ -179,14 +179,15 @@ impl Graph {
             if parent == v {
                 return v;
             }
+            // Path halving: amortised almost constant, without a second pass.
             let grandparent = self.nodes[parent as usize].parent;
             self.nodes[v as usize].parent = grandparent;
             v = grandparent;
         }
     }
 
-    /// One step from each entry of a segment towards the sphere that it is now part of. The steps
-    /// do not depend on each other, so the memory is waited for once and not once for each.
+    /// One step from each entry of a segment towards its survivor. The loads are independent, so
+    /// their cache misses overlap instead of adding up.
     #[inline]
     fn look_ahead(&mut self, start: u32, len: u32) {
         self.ahead.clear();
@@ -194,15 +195,15 @@ impl Graph {
         self.ahead.extend(entries.iter().map(|&v| self.nodes[v as usize].parent));
     }
 
-    /// Collapses the edge between two spheres and calls `visit` with each other neighbour of the
-    /// removed one, once: new neighbours of the kept one, and some that it had already.
+    /// Collapses the edge between two spheres and calls `visit` once for each other neighbour of the
+    /// removed one, whether or not it was a neighbour of the kept one before.
     #[inline]
     fn absorb(&mut self, removed: u32, kept: u32, mut visit: impl FnMut(u32, Sphere)) {
         for v in [removed, kept] {
             self.nodes[v as usize].met_by = removed;
         }
         self.nodes[removed as usize].parent = kept;
-        // What is left is written over what was read, in the same segments.
+        // The remaining neighbours overwrite what was read: writing never overtakes reading.
         let (mut target, mut written) = (removed, 0);
         let mut source = removed;
         while source != NONE {
@@ -227,6 +228,7 @@ impl Graph {
         }
         let end = &mut self.nodes[target as usize].segment;
         (end.len, end.next) = (written, NONE);
+        // Append in constant time; segments behind `target` are empty now and are dropped.
         let tail = self.nodes[kept as usize].segment.last;
         self.nodes[tail as usize].segment.next = removed;
         self.nodes[kept as usize].segment.last = target;

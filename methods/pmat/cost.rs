@@ -1,11 +1,11 @@
-//! The cost of an edge, and which of its spheres goes.
+//! The cost of an edge, and the choice of the sphere to be absorbed.
 
 use medial::complex::{Sphere, ZERO_LENGTH};
 
-/// The scale at which the larger of two spheres absorbs the smaller, when both grow by it:
-/// `c = |p_a - p_b| / |r_a - r_b|` (section 2). At most 1 where one ball holds the other already;
-/// infinite for equal radii; 0 for centres closer than [`ZERO_LENGTH`], which are one point up to
-/// rounding, whatever their radii. Lengths are in units of the bounding-box diagonal.
+/// The factor `c = |p_a - p_b| / |r_a - r_b|` (section 2): scaled by it, the larger of two spheres
+/// absorbs the smaller. At most 1 if one ball contains the other already; infinite for equal radii;
+/// 0, whatever the radii, for centres closer than [`ZERO_LENGTH`], which count as one point. Lengths
+/// are in units of the bounding-box diagonal.
 ///
 /// With the stability ratio `G` of the same edge, `G = max(0, 1 - 1 / c)`.
 pub fn absorption_scale(a: Sphere, b: Sphere) -> f64 {
@@ -13,7 +13,7 @@ pub fn absorption_scale(a: Sphere, b: Sphere) -> f64 {
     if d < ZERO_LENGTH { 0.0 } else { d / (a.radius - b.radius).abs() }
 }
 
-/// The ends of an edge, the one that is absorbed first: the smaller sphere, of equal ones that
+/// The ends of an edge, first the one to be absorbed: the smaller sphere, or, of equal ones, the one
 /// with the larger id.
 #[inline]
 pub(super) fn absorbed_first([a, b]: [u32; 2], radius: impl Fn(u32) -> f64) -> [u32; 2] {
@@ -21,9 +21,10 @@ pub(super) fn absorbed_first([a, b]: [u32; 2], radius: impl Fn(u32) -> f64) -> [
     if r < s || (r == s && a > b) { [a, b] } else { [b, a] }
 }
 
-/// The place of an edge in the order of collapses: by cost, those of infinite cost by length.
+/// The key of an edge in the order of collapses: the cost, or the length if the cost is infinite.
 ///
-/// A non-negative number orders as its bits do; the free sign bit tells a length from a cost.
+/// Non-negative numbers have the order of their bits. The unused sign bit marks a length, so lengths
+/// come after all costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key(u64);
 

@@ -11,9 +11,9 @@
 //! 4. The record of the collapses is the hierarchy; a level is the mesh after a prefix of it.
 //!
 //! The survivors of every level are a subset of the initial spheres, and the number of components
-//! never changes. Loops may close: the paper prescribes no test of the topology. Collapses that
-//! violate the link condition, which alone can do that, are counted; the Betti numbers of a level
-//! are the evaluation's to tell.
+//! never changes. Loops may close, because the paper prescribes no test of the topology. Only
+//! collapses that violate the link condition can do that; they are counted. The evaluation computes
+//! the Betti numbers of a level.
 //!
 //! # Notation
 //!
@@ -22,32 +22,31 @@
 //!
 //! # Where the paper is silent
 //!
-//! - Popped costs do not ascend, since a new edge may cost less than the one just taken. The scale
-//!   of a level is the largest cost in its prefix, so that "scale at most `s`" selects a prefix.
-//!   Scales begin at 1: at `s = 1` what is inside a larger ball already is gone.
+//! - The costs of successive collapses need not ascend, since a new edge may cost less than the one
+//!   just taken. The scale of a level is the largest cost in its prefix, so that "scale at most `s`"
+//!   selects a prefix. Scales begin at 1: at `s = 1` every ball inside a larger one is gone.
 //! - Edges between equal radii have an infinite cost. They come last, the shortest first, so that no
-//!   edge is left in the end; no finite scale reaches them.
+//!   edge is left at the end; no finite scale reaches them.
 //! - Centres closer than `1e-12` are one point: the cost is 0, whatever the radii.
 //! - Equal costs are ordered by the smaller, then by the larger id; of two equal radii the smaller
 //!   id stays.
 //! - There is no published scale: Table 1 has scales between 1.18 and 17.38, picked by eye for each
-//!   shape. The published level is `s = 1.18`, the least of them, and says so; the end of the
-//!   algorithm, where no edge is left, is `Level::Spheres(1)`. Every level comes with the whole
+//!   shape. The published level is the least of them, `s = 1.18`, with a warning that says so. The end
+//!   of the algorithm, when no edge is left, is `Level::Spheres(1)`. Every level comes with the whole
 //!   hierarchy.
 //!
 //! # Deviations from the paper
 //!
-//! - *The initial mesh.* The paper starts from a medial mesh made like that of the scale axis
-//!   transform, from inner polar balls. Here it is the initial mesh of the harness, all Voronoi
-//!   vertices inside with the Voronoi edges and facets between them, or one that is given, so that
-//!   all methods that collapse edges start alike. Vertices near the surface that are no poles are
-//!   the first to be absorbed.
-//! - Algorithm 1 queues all edges of the survivor again at each collapse. Its own edges still have
-//!   the costs that they are queued at, so here only those that it takes over are added. The
-//!   collapses are the same; a test compares the two.
+//! - *The initial mesh.* The paper starts from inner polar balls, as the scale axis transform does.
+//!   Here the start is the initial mesh of the harness (all Voronoi vertices inside, with the Voronoi
+//!   edges and facets between them) or a given mesh, so that all methods that collapse edges start
+//!   alike. Vertices near the surface that are not poles are the first to be absorbed.
+//! - Algorithm 1 queues all edges of the survivor again at each collapse. The costs of its old edges
+//!   have not changed, so here only the edges that it takes over are added. The collapses are the
+//!   same; a test compares the two.
 //! - The paper updates one mesh step by step along the record. Here each simplex is stored with the
 //!   interval of stages in which it exists ([`medial::complex::collapse::Hierarchy`]), which gives
-//!   the same meshes in any order of asking.
+//!   the same meshes without replaying the record.
 
 mod contract;
 mod cost;

@@ -1,10 +1,10 @@
 //! Betti numbers of a set of voxels, as the union of closed cubes (26-connectivity).
 //!
 //! - `b0` counts the 26-connected components.
-//! - `b2` counts the bounded 6-connected components of the rest: the complement of the union is
-//!   open, and by Alexander duality has one component more than the union has voids.
-//! - The Euler number counts cells: vertices, edges, squares of the lattice that are faces of some
-//!   voxel, and the voxels. `b1 = b0 + b2 - chi`.
+//! - `b2` counts the bounded 6-connected components of the other voxels: the complement of the union
+//!   is open, and by Alexander duality it has one component more than the union has voids.
+//! - The Euler number `chi` counts, with alternating signs, the voxels and the vertices, edges and
+//!   squares of the lattice on them. `b1 = b0 + b2 - chi`.
 //!
 //! Components are found over runs of voxels along `x` (J. Hoshen, R. Kopelman, "Percolation and
 //! cluster distribution", Physical Review B 14, 1976, doi:10.1103/PhysRevB.14.3438, on runs).
@@ -34,7 +34,7 @@ pub fn cubical_betti(voxels: &[[u32; 3]]) -> [u64; 3] {
         return [0; 3];
     };
     let b0 = rows.components(&[[-1, 0], [-1, -1], [0, -1], [1, -1]], 1);
-    // The component outside is not bounded.
+    // One component of the complement is outside and unbounded.
     let b2 = rows.complement().components(&[[-1, 0], [0, -1]], 0) - 1;
     let chi = rows.euler();
     let b1 = (b0 + b2) as i64 - chi;
@@ -133,6 +133,7 @@ impl Rows {
             if a0 < b1 + grown && b0 < a1 + grown {
                 sets.join(a, b);
             }
+            // Merge step: the run that ends first overlaps nothing further on.
             if a1 < b1 {
                 a += 1;
             } else {
@@ -141,9 +142,9 @@ impl Rows {
         }
     }
 
-    /// Vertices minus edges plus squares minus cubes, each cell counted with the row of the
-    /// lattice that it is in. Over a set of rows of voxels, the cells along a row are, for merged
-    /// runs of total length `n` in `m` runs, `n` intervals and `n + m` points.
+    /// Vertices minus edges plus squares minus cubes, each cell counted in its row of the lattice. A
+    /// row of the lattice borders one, two or four rows of voxels. If these merge to `m` runs of total
+    /// length `n`, the lattice row has `n` intervals and `n + m` points: their difference is `m`.
     fn euler(&self) -> i64 {
         let [ny, nz] = self.size;
         let mut merged = Vec::new();

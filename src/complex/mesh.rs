@@ -1,4 +1,5 @@
-//! The medial mesh as plain arrays: what methods take and return, what files hold, what metrics read.
+//! The medial mesh as plain arrays: the type that methods take and return, files store, and metrics
+//! read.
 
 use std::sync::Arc;
 
@@ -8,7 +9,7 @@ use super::closure::{ascending_edge, ascending_face, closure};
 use crate::Vec3;
 use crate::geometry::Sphere;
 
-/// The boundary samples that each sphere touches, as known from the triangulation it came from.
+/// The boundary samples that each sphere touches, from the triangulation that it was made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contacts {
     /// The boundary samples, in the unit of the spheres.
@@ -33,11 +34,11 @@ pub struct MedialMesh {
     pub edges: Vec<[u32; 2]>,
     /// Triples of sphere indices.
     pub faces: Vec<[u32; 3]>,
-    /// Contact points, where the mesh came with them.
+    /// Contact points, if known.
     pub contacts: Option<Contacts>,
 }
 
-/// The first violation that [`MedialMesh::check`] met.
+/// The first violation that [`MedialMesh::check`] found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ComplexError {
     /// A centre or radius is not a number, or the radius is negative.
@@ -138,7 +139,7 @@ impl MedialMesh {
         }
         check_order("edge", &self.edges)?;
         check_order("face", &self.faces)?;
-        // In order, so that the edges of a sphere are a short run.
+        // Edges are sorted by now, so those of a sphere are a short run.
         let first = run_starts(&self.edges, spheres);
         let is_missing = |&[a, b]: &[u32; 2]| {
             let run = &self.edges[first[a as usize] as usize..first[a as usize + 1] as usize];

@@ -1,11 +1,11 @@
 //! Rank of a sparse matrix over `Z_2` by column reduction.
 //!
-//! Left to right, the reduced column with the same lowest entry is added to each column until its
-//! lowest entry is new or nothing is left. The column in work is a set of bits with two levels of
+//! From left to right, each column is reduced: as long as an earlier reduced column has the same
+//! lowest entry, that column is added. The column being reduced is a set of bits with levels of
 //! summaries, after U. Bauer, M. Kerber, J. Reininghaus, H. Wagner, "PHAT - Persistent Homology
 //! Algorithms Toolbox", Journal of Symbolic Computation 78 (2017),
-//! <https://doi.org/10.1016/j.jsc.2016.03.008>: adding costs one step for each entry, and the
-//! largest entry is found at once, whatever the number of rows.
+//! <https://doi.org/10.1016/j.jsc.2016.03.008>. Adding a column costs one step per entry, and finding
+//! the largest entry a few steps, whatever the number of rows.
 
 /// Rank over `Z_2` of the matrix whose columns hold one at the listed rows.
 ///
@@ -30,7 +30,7 @@ pub(super) fn rank(columns: &[Vec<u32>]) -> usize {
     rank
 }
 
-/// A set of small integers: a bit for each, a bit for each word that is not zero, and so on.
+/// A set of small integers: a bit for each, and on each level above a bit for each non-zero word.
 struct BitSet {
     levels: Vec<Vec<u64>>,
 }
@@ -45,7 +45,7 @@ impl BitSet {
         Self { levels }
     }
 
-    /// Puts `value` in if it is not there, and takes it out if it is.
+    /// Inserts `value` if it is absent, else removes it.
     fn flip(&mut self, value: u32) {
         let mut bit = value as usize;
         for level in &mut self.levels {

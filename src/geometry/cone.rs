@@ -28,9 +28,9 @@ pub struct Cone {
     /// Radius at `start`.
     radius: f64,
     slope: f64,
-    /// `s / sqrt(1 - s^2)`: how far the best centre lies ahead, for each unit of `y`.
+    /// `s / sqrt(1 - s^2)`: the shift of the best centre along the axis, per unit of `y`.
     lead: f64,
-    /// Which of the two balls holds the other.
+    /// The ball (0 or 1) that holds the other, if one does.
     larger: Option<usize>,
 }
 
@@ -130,8 +130,8 @@ impl Cone {
         (tau, (xi - tau) * (xi - tau) + y_squared)
     }
 
-    /// Where `p` is nearest to the boundary of the hull. On the axis, where a whole circle is
-    /// nearest, one of its points is returned.
+    /// The point of the hull's boundary nearest to `p`. For `p` on the axis a whole circle is
+    /// nearest; one of its points is returned.
     pub fn foot(&self, p: Vec3) -> HullFoot<2> {
         let (tau, _) = self.best_centre(p);
         let radius = (self.radius + tau * self.slope).max(0.0);
@@ -150,7 +150,7 @@ impl Cone {
         if tau <= 0.0 || tau >= self.length {
             return HullFoot::towards(sphere, weights, p, || frame.normal(frame.v));
         }
-        // On the lateral the direction follows from the axis: near it the arm is mere rounding.
+        // On the lateral take the direction from the axis: near the axis `p - c(t)` is rounding.
         let across = frame.across(p - self.start).unwrap_or(frame.v);
         HullFoot::along(sphere, weights, p, frame.normal(across))
     }

@@ -18,8 +18,8 @@
 //! * The poles of unbounded cells are kept as directions. The published program inserts the corners of a
 //!   large box instead and discards their cells; then no cell of a sample is unbounded.
 //!
-//! Ties go to the cell with the smallest id. Cospherical samples have several cells with one
-//! circumcentre, up to rounding; which of them is named as the pole follows from the rounded radii.
+//! Ties go to the cell with the smallest id. Several cells of cospherical samples can have the same
+//! circumcentre up to rounding; the rounded radii then decide which of them is the pole.
 
 use super::triangulation::{CellId, VertexId};
 use super::{Delaunay, Sphere};
@@ -122,8 +122,8 @@ impl Poles {
         self.balls.binary_search_by_key(&cell, |b| b.cell).ok()
     }
 
-    /// The polar balls of the cells that the labelling has inside, by ascending cell. Poles at
-    /// infinity are outside.
+    /// The polar balls of the cells labelled as inside, by ascending cell. Poles at infinity are
+    /// outside.
     pub fn inner_balls(&self, is_inside: impl Fn(CellId) -> bool) -> Vec<PolarBall> {
         self.balls.iter().filter(|b| is_inside(b.cell)).copied().collect()
     }
@@ -136,6 +136,7 @@ fn first_poles(delaunay: &Delaunay, spheres: &[Option<Sphere>]) -> Vec<Option<Po
     for cell in delaunay.finite_cells() {
         let Some(sphere) = spheres[cell.index()] else { continue };
         for v in delaunay.vertices(cell).map(VertexId::index) {
+            // Cells come by ascending id, so a strict comparison gives ties to the smallest.
             if sphere.radius > farthest[v] {
                 farthest[v] = sphere.radius;
                 first[v] = Some(Pole::Vertex(cell));

@@ -14,14 +14,14 @@
 //!
 //! # Why it is a closed manifold
 //!
-//! Corners are named by the cell of the triangulation, not by position. A cell has four vertices, so
-//! that exactly zero or two facets of the crust meet at each of its triangles, which are the edges of
-//! the power diagram, and at each cell the crust's facets form one cycle of three or four. Ties are
-//! broken by the triangulation's symbolic perturbation, which leaves four balls at each corner
-//! however many there are in truth. So the crust is a closed manifold for any balls, whatever their labels.
+//! Corners are identified by the cell of the triangulation, not by position. A triangle of the
+//! triangulation is dual to an edge of the power diagram, and zero or two facets of the crust meet
+//! there. At each cell, which has four vertices, the facets of the crust form one cycle of three or
+//! four. Ties are broken by the triangulation's symbolic perturbation, which leaves exactly four balls
+//! at each corner. So the crust is a closed manifold for any balls, whatever their labels.
 //!
-//! In truth many balls meet in one point: all polar balls of a sample do. There the crust has corners at
-//! one position up to rounding, with edges of no length between them.
+//! Without the perturbation many balls meet in one point: all polar balls of a sample do. There the
+//! crust has several corners at one position, up to rounding, with edges of zero length between them.
 //! [`PowerCrust::surface`] merges them along these edges, which keeps the crust a manifold.
 //!
 //! Deviations from the paper
@@ -69,8 +69,8 @@ pub struct PowerCrust {
     balls: Vec<[u32; 2]>,
 }
 
-/// How far beyond the box around all balls' centres its corners are put, in diagonals of that box:
-/// far enough that their cells do not come near the balls.
+/// Distance of the added corners from the box around all centres, in diagonals of that box: far
+/// enough that their cells do not come near the balls.
 const MARGIN: f64 = 1.0;
 
 impl PowerCrust {
@@ -124,8 +124,8 @@ impl PowerCrust {
             start.push(rings.len() as u32);
         }
         let corner = |&cell: &CellId| {
-            // The box around the balls has inner balls on no hull edge: no infinite cell is met. An
-            // orthocentre beyond the largest double is that of a cell of nearly coplanar balls.
+            // Inner balls are inside the box, so never on the hull: no cell here is infinite. Only
+            // nearly coplanar balls have an orthocentre that is not representable.
             let mean =
                 || regular.vertices(cell).map(|v| regular.point(v)).iter().sum::<Vec3>() / 4.0;
             regular.orthosphere(cell).map_or_else(mean, |(centre, _)| centre)

@@ -2,8 +2,8 @@
 
 use crate::Vec3;
 
-/// Pairs whose squared chord falls short of the longest by this share may still have the wider
-/// angle: near 180 degrees chords hardly tell angles apart.
+/// Pairs whose squared chord is at least this share of the longest may have the wider angle: near 180
+/// degrees chords hardly change with the angle.
 const NEARLY_LONGEST: f64 = 1.0 - 1e-12;
 
 /// Largest angle between two of `points` seen from `centre`, in radians, from 0 to pi; 0 for fewer

@@ -18,8 +18,8 @@ use super::planar_frame::PlanarFrame;
 use super::{Cone, HullFoot, SlabPlanes, Sphere};
 use crate::Vec3;
 
-/// Height of the centres' triangle, relative to its size and radius, below which the tangent planes
-/// are not told. Distances stay exact: the objective is flat there.
+/// Height of the centres' triangle, relative to its length and radius, below which its tangent planes
+/// are mostly rounding. Distances stay exact, because the objective is flat there.
 const MIN_RELATIVE_HEIGHT: f64 = 1e-10;
 
 /// The convex hull of three balls, prepared for distance queries.
@@ -62,8 +62,8 @@ impl Slab {
         HullFoot::towards(foot.sphere, weights, p, || self.free_direction(foot.sphere))
     }
 
-    /// A direction in which `sphere`, on some side, reaches the boundary of the hull: of the
-    /// slab's tangent planes and some of each cone the one that the three balls overstep least.
+    /// A direction in which `sphere`, centred on some side, touches the boundary of the hull. Of the
+    /// tangent planes of the slab and some of each cone, the one beyond which the balls reach least.
     fn free_direction(&self, sphere: Sphere) -> Vec3 {
         let mut candidates: Vec<Vec3> = self.planes().map_or(vec![], |p| p.normals().to_vec());
         for (side, cone) in self.cones.iter().enumerate() {
@@ -95,8 +95,8 @@ impl Slab {
 
 /// The part of a slab between its two tangent triangles, without the cones of its sides.
 ///
-/// For whoever evaluates the cones anyway: the distance to the slab is the least of the three cones'
-/// and of this part's, where it has one.
+/// For callers that evaluate the cones anyway: the distance to the slab is the least of the distances
+/// to the three cones and to this part, where it has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlabFace {
     frame: PlanarFrame,
@@ -206,7 +206,7 @@ impl SlabFace {
         Some((sphere, weights))
     }
 
-    /// Whether the gradient across the triangle is not known to at least five digits.
+    /// Whether the radius gradient across the triangle has fewer than about five correct digits.
     fn is_thin(&self) -> bool {
         self.frame.apex[1] <= MIN_RELATIVE_HEIGHT * (self.frame.length + self.radius)
     }

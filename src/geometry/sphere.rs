@@ -49,13 +49,13 @@ pub struct HullFoot<const N: usize> {
     pub point: Vec3,
 }
 
-/// Share of the radius below which the arm from a centre to the query is too short to tell a
-/// direction: its own rounding turns it as much as leaving it out would.
+/// The vector from a centre to the query, if shorter than this share of the radius, gives no
+/// direction: its rounding error is too large.
 const SHORT_ARM: f64 = 1e-8;
 
 impl<const N: usize> HullFoot<N> {
     /// The foot of `p` on the interpolated sphere that attains its distance: on the ray from the
-    /// centre through `p`, or, when `p` is as good as the centre, in the direction `apart`.
+    /// centre through `p`, or in the direction `apart` if `p` is too close to the centre.
     pub(super) fn towards(
         sphere: Sphere,
         weights: [f64; N],

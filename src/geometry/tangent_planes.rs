@@ -1,4 +1,4 @@
-//! Planes tangent to two or three balls from outside: what Q-MAT's slab quadrics are made of.
+//! Planes tangent to two or three balls from outside, as Q-MAT's slab quadrics need them.
 //!
 //! A plane with unit normal `n` touches the balls `(c_i, r_i)` from outside when `n . c_i + r_i`
 //! is the same for all of them.
@@ -57,7 +57,7 @@ impl ConeFrame {
     /// along the axis up to rounding.
     pub fn across(&self, towards: Vec3) -> Option<Vec3> {
         let rejected = towards.reject_from_normalized(self.u).try_normalize()?;
-        // What rounding leaves of a vector along the axis is not orthogonal to it.
+        // The remainder of a vector along the axis is rounding, and not orthogonal to the axis.
         let again = rejected.reject_from_normalized(self.u);
         let length = again.length();
         (length > 0.5).then(|| again / length)

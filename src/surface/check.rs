@@ -11,7 +11,7 @@ use super::unit::Unit;
 use crate::Vec3;
 use crate::sum::Sum;
 
-/// A mesh with its report, and why it may not be used.
+/// A mesh with its report, and the reason why it may not be used, if any.
 pub(super) struct Examined {
     pub mesh: TriMesh,
     pub report: SurfaceReport,
@@ -87,8 +87,8 @@ pub(super) fn examine_unrepaired(mesh: &TriMesh) -> Result<SurfaceReport, Fault>
     Ok(report)
 }
 
-/// What the repairs guarantee for files: finite coordinates, valid and distinct corners, no face
-/// twice, no vertex without a face.
+/// Checks what repairs guarantee for files: finite coordinates, valid and distinct corners, no
+/// repeated face, no vertex without a face.
 fn check_indices(mesh: &TriMesh) -> Result<(), Fault> {
     use super::error::Place;
     let vertices = mesh.vertices.len();
@@ -128,7 +128,7 @@ fn check_indices(mesh: &TriMesh) -> Result<(), Fault> {
     }
 }
 
-/// What is known of a mesh when it is judged.
+/// A mesh and everything that was found out about it.
 struct Evidence<'a> {
     mesh: &'a TriMesh,
     topology: &'a Topology,
@@ -146,7 +146,7 @@ impl Evidence<'_> {
         VertexName { index, position: self.mesh.vertices[vertex as usize] }
     }
 
-    /// Why the mesh bounds no solid, as far as adjacency tells.
+    /// The first reason, from extent and adjacency, why the mesh does not bound a solid.
     fn structural_fault(&self) -> Option<Fault> {
         let t = self.topology;
         if !Normalisation::of(self.mesh).is_some_and(|n| n.diagonal.is_normal()) {
@@ -239,7 +239,7 @@ impl Evidence<'_> {
         warnings
     }
 
-    /// What only makes sense for a closed two-sided manifold.
+    /// Adds the figures that are defined only for a closed two-sided manifold.
     fn add_solid(&self, report: &mut SurfaceReport, shells: &[Shell]) {
         let genus = report.components as i64 - report.euler / 2;
         let cavities = shells.iter().filter(|s| s.is_cavity()).count();
@@ -261,9 +261,9 @@ impl Evidence<'_> {
     }
 }
 
-/// The diagonal of a bounding box without size, or one that overflows.
+/// The diagonal of the bounding box, also if that has no size or its diagonal overflows.
 fn raw_diagonal(mesh: &TriMesh) -> f64 {
-    // The normalisation does not underflow where squares do; it has no answer for an overflow.
+    // The normalisation survives an underflow of squares, but has no answer to an overflow.
     let plain = || mesh.bounding_box().map_or(0.0, |(lo, hi)| (hi - lo).length());
     Normalisation::of(mesh).map_or_else(plain, |n| n.diagonal)
 }

@@ -1,15 +1,15 @@
-//! Contracts short edges of a closed manifold without changing what it is.
+//! Contracts short edges of a closed manifold without changing its topology.
 //!
 //! T. K. Dey, H. Edelsbrunner, S. Guha, D. V. Nekhayev: *Topology preserving edge contraction*,
 //! Publications de l'Institut Mathematique 66 (1999): on a 2-manifold an edge `ab` may be contracted
-//! if and only if `Lk a` and `Lk b` meet in `Lk ab` alone: `a` and `b` have the two corners opposite to the
-//! edge as common neighbours and no other, and are not two corners of a tetrahedron.
+//! if and only if the intersection of `Lk a` and `Lk b` is `Lk ab`. That is: the only common neighbours
+//! of `a` and `b` are the two corners opposite to the edge, and the component is not a tetrahedron.
 //!
-//! 1. Shortest edge first (ties: smaller vertex ids), `a` is moved to `b` or `b` to `a`, whichever moves
-//!    the vertices that were contracted into it before less; the survivor stays in place.
+//! 1. Shortest edge first (ties: smaller vertex ids). Either `a` moves to `b` or `b` to `a`: the way
+//!    in which the vertices contracted so far move less. The other vertex stays in place.
 //! 2. An edge is contracted only if no vertex ends up farther than its limit from where it started.
 //! 3. Edges that the link condition refused are tried again, until nothing changes.
-//! 4. What is left of a component whose edges are all below their limits, a tetrahedron, is dropped.
+//! 4. A component with all edges below their limits shrinks to a tetrahedron, which is dropped.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -17,7 +17,7 @@ use std::collections::BinaryHeap;
 use super::mesh::TriMesh;
 use crate::Vec3;
 
-/// What contracting the short edges of a surface gave.
+/// The result of contracting the short edges of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contraction {
     /// The surface, without the vertices and faces that disappeared.
@@ -31,7 +31,7 @@ pub struct Contraction {
     pub dropped: usize,
 }
 
-/// What decides whether a short edge is contracted, beside the link condition.
+/// Whether an edge may be contracted if faces fold over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Folds {
     /// Faces may turn over: for limits at the level of rounding, where normals mean nothing.
@@ -103,6 +103,7 @@ pub fn contract_short_edges_while(
                 None => refused.push(edge),
             }
         }
+        // An edge can be queued more than once, by each contraction beside it.
         refused.sort_unstable();
         refused.dedup();
         refused.retain(|&(_, a, b)| surface.is_edge(a, b));
@@ -119,7 +120,7 @@ pub fn contract_short_edges_while(
 /// Length as an integer in the same order, and both ends, ascending.
 type ShortEdge = (u64, u32, u32);
 
-/// The cosine of the angle by which a face may turn.
+/// The cosine of the largest angle by which a face may turn.
 const MIN_COSINE: f64 = 0.5;
 
 /// A surface while its edges are contracted.
@@ -130,7 +131,7 @@ struct Shrinking<'a> {
     faces: Vec<[u32; 3]>,
     /// The faces of each vertex, none where it is gone.
     stars: Vec<Vec<u32>>,
-    /// How far the vertices contracted into each are from it at most.
+    /// For each vertex a bound on the distance of all vertices that were contracted into it.
     reach: Vec<f64>,
 }
 
@@ -155,7 +156,7 @@ impl<'a> Shrinking<'a> {
     fn short_edge(&self, a: u32, b: u32) -> Option<Reverse<ShortEdge>> {
         let length = self.point(a).distance(self.point(b));
         let limit = self.limits[a as usize].min(self.limits[b as usize]);
-        // The bits of numbers that are not negative are in their order.
+        // As integers, the bits of non-negative numbers are in the order of the numbers.
         (length < limit).then(|| Reverse((length.to_bits(), a.min(b), a.max(b))))
     }
 
@@ -188,6 +189,7 @@ impl<'a> Shrinking<'a> {
         let (of_a, of_b) = (self.neighbours(a), self.neighbours(b));
         let common = of_a.iter().filter(|v| of_b.binary_search(v).is_ok()).count();
         let is_tetrahedron = of_a.len() == 3 && of_b.len() == 3;
+        // The link condition for closed manifolds, see the head.
         if common != 2 || is_tetrahedron {
             return None;
         }

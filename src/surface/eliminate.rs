@@ -8,13 +8,13 @@
 //! 2. Weight of each sample (eq. 4): the sum over samples `j` within `2 r` of
 //!    `(1 - d / 2r)^8`, with `d` not below the `2 r_min` of eq. 5,
 //!    `r_min = r (1 - (N / M)^1.5) 0.65`, so that clusters do not decide alone.
-//! 3. Take away the heaviest sample, subtract its share from its neighbours, repeat until `N` of
-//!    the `M` samples are left.
+//! 3. Remove the heaviest sample and subtract its contribution from the weights of its neighbours.
+//!    Repeat until `N` of the `M` samples are left.
 //!
 //! Deviations from the paper:
-//! - Samples whose faces look in opposite directions are no neighbours: on a thin wall the two
-//!   sides are sampled independently, which is what a Voronoi diagram needs to separate them.
-//! - Ties of weight take the sample with the smaller index away.
+//! - Samples whose faces look in opposite directions are not neighbours: on a thin wall the two
+//!   sides are sampled independently, which a Voronoi diagram needs to separate them.
+//! - Of equally heavy samples the one with the smaller index is removed.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -52,7 +52,7 @@ pub(super) fn eliminate(points: &[Vec3], normals: &[Vec3], area: f64, count: usi
     while left > count {
         let Some(Heaviest { weight: recorded, sample }) = heap.pop() else { break };
         let current = weights[sample as usize];
-        // Weights only fall, so an entry is an upper bound until it is brought up to date.
+        // Weights only fall, so an old entry is an upper bound: put it back at its present weight.
         if recorded != current {
             heap.push(Heaviest { weight: current, sample });
             continue;
@@ -117,6 +117,7 @@ impl Neighbours {
             let [x, y, z] = cell(points[i]);
             let mut near = Vec::new();
             for (x, y) in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (x, y))) {
+                // Keys of three cells along z are consecutive: one search instead of three.
                 let (first, last) = (key([x, y, z - 1]), key([x, y, z + 1]));
                 let from = order.partition_point(|&(k, _)| k < first);
                 for &(_, j) in order[from..].iter().take_while(|&&(k, _)| k <= last) {

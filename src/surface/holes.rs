@@ -1,4 +1,4 @@
-//! Holes of a surface, closed by triangles between their vertices; nothing is moved or added.
+//! Closes holes of a surface by triangles between their vertices; no vertex is moved or added.
 //!
 //! * G. Barequet, M. Sharir: *Filling gaps in the boundary of a polyhedron*, Computer Aided
 //!   Geometric Design 12 (1995), <https://doi.org/10.1016/0167-8396(94)00011-G>: the triangulation
@@ -8,14 +8,15 @@
 //!   then its area; section 3.
 //!
 //! 1. Edges with one face are chained to loops, against the direction of their faces.
-//! 2. `W(i, k)`, the least weight of a triangulation of the chain from corner `i` to corner `k`, from
-//!    shorter chains: `min over m of W(i, m) + W(m, k) + triangle (i, m, k)`, chains by length.
-//! 3. The triangles are read off from the whole loop backwards.
+//! 2. `W(i, k)` is the least weight of a triangulation of the chain from corner `i` to corner `k`. It
+//!    follows from shorter chains, so these come first:
+//!    `W(i, k) = min over m of W(i, m) + W(m, k) + triangle (i, m, k)`.
+//! 3. The triangles are read off backwards, from the whole loop to shorter chains.
 //!
 //! # Deviations from the papers
 //!
-//! - A chord that is an edge of the surface already is not taken: it would have more than two faces.
-//! - The filling is not refined or made fair: that would add and move vertices.
+//! - An existing edge of the surface is not used as a chord: it would get more than two faces.
+//! - The filling is neither refined nor smoothed, because that would add and move vertices.
 //!
 //! # Cost
 //! `O(n^3)` time and `O(n^2)` memory for a loop of `n` edges, so that long loops are refused.
@@ -27,10 +28,10 @@ use super::error::{Fault, VertexName};
 use super::report::Repair;
 use crate::Vec3;
 
-/// Edges of the longest loop that is filled.
+/// Number of edges of the longest loop that is filled.
 const MAX_EDGES: usize = 500;
 
-/// Closes all holes of consistently oriented faces; what was done, a line for each hole.
+/// Closes all holes of consistently oriented faces; returns one repair for each hole.
 ///
 /// # Errors
 /// When a loop is too long, meets itself, or has no triangulation with new edges alone. Then nothing

@@ -1,9 +1,9 @@
 //! The inside test: an exact winding number from the crossings of a vertical ray.
 //!
 //! For a closed, oriented surface the winding number of `p` is the number of faces above `p` that
-//! look up, minus those that look down (the degree of the surface around `p`). It is right for
-//! surfaces that overlap themselves, for several components and for cavities: a point is inside
-//! if and only if its winding number is at least 1.
+//! look up, minus the number of those that look down (the degree of the surface around `p`). It is
+//! correct for surfaces that overlap themselves, for several components and for cavities: a point is
+//! inside if and only if its winding number is at least 1.
 //!
 //! 1. The ray starts at `p = (x, y, z)` and goes up. Degenerate hits of edges and vertices are
 //!    resolved by moving the ray, not the surface: it runs through `(x + e, y + e^2)` for an
@@ -11,8 +11,8 @@
 //!    10.1145/77635.77639). With `d = orient2d(a, b, p)` a tie `d = 0` is decided by the sign of
 //!    `a.y - b.y`, then of `b.x - a.x`: the derivatives of `d` along `e` and `e^2`.
 //!    Neighbouring faces see opposite signs for their common edge, so exactly one of them is hit.
-//! 2. A face is above `p` by the sign of `orient3d`. Is that zero and `p` within the face, then
-//!    `p` lies on the surface, where there is no winding number.
+//! 2. The sign of `orient3d` decides whether a face is above `p`. If it is zero and `p` is within the
+//!    face, `p` lies on the surface, where there is no winding number.
 //! 3. A tree of boxes, tested four at a time and rounded outward, finds the faces: those whose box
 //!    reaches above `p` and contains `(x, y)`.
 //!
@@ -168,10 +168,12 @@ impl InsideTest {
     }
 }
 
-/// How a triangle whose box, from `low` on, is in the column of `p` meets the ray from there.
+/// How the ray from `p` meets a triangle whose box contains `p` in `x` and `y` and starts at height
+/// `low`.
 #[inline]
 fn crossing(triangle: [Vec3; 3], low: f64, p: Vec3) -> Option<Crossing> {
     let looks_up = crossed_by_column(triangle, p);
+    // Below the box the whole triangle is above, which spares the test in space.
     if p.z >= low {
         let [a, b, c] = triangle;
         // Positive on the side that the face looks at.
@@ -222,7 +224,7 @@ fn contains(triangle: [Vec3; 3], p: Vec3) -> bool {
             let (a, b) = (project(triangle[i], axis), project(triangle[(i + 1) % 3], axis));
             !orient2d(a, b, project(p, axis)).opposes(turn)
         }),
-        // A segment or a point: within its box, so on it if on its line, seen along every axis.
+        // A segment or a point: in the box, so it holds `p` if `p` is on its line along every axis.
         None => {
             let Bounds { lo, hi } = Bounds::of_points(triangle);
             (0..3).all(|axis| {

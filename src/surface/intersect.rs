@@ -1,17 +1,17 @@
-//! Pairs of faces that meet elsewhere than in their common vertices and edges. Exact.
+//! Pairs of faces that meet outside their common vertices and edges. Exact.
 //!
 //! Two triangles intersect if and only if an edge of one meets the other, both taken with their
 //! boundary. By the number of vertices they share:
 //!
-//! - none: each edge against the other triangle, after rejecting pairs where one lies strictly on
-//!   one side of the other's plane;
-//! - one: the edge opposite to it, of each, against the other triangle. If they meet in more than
-//!   the shared vertex they do so in a segment from there, which ends on one of these two edges
-//!   (or runs along an edge to its end, which lies on one of them);
+//! - none: each edge of one is tested against the other, unless one triangle lies strictly on one
+//!   side of the other's plane;
+//! - one: in each, the edge opposite to the shared vertex is tested against the other triangle. If
+//!   they meet in more than the vertex, they meet in a segment from there, which ends on one of these
+//!   two edges (or runs along an edge to its end, which lies on one of them);
 //! - two: they meet in more than the edge if and only if they lie in one plane on the same side.
 //!
-//! Vertices are shared if they have the same index. Faces of zero area are left out; they are
-//! reported by themselves.
+//! Vertices are shared if they have the same index. Faces of zero area are not tested; they are
+//! reported separately.
 
 use std::ops::ControlFlow;
 
@@ -28,7 +28,7 @@ pub(super) struct Intersections {
     pub pairs: usize,
     /// The pair with the smallest indices.
     pub first: Option<[u32; 2]>,
-    /// Whether all pairs were looked at.
+    /// Whether all pairs were tested.
     pub complete: bool,
     /// Faces with exactly collinear corners.
     pub degenerate_faces: usize,
@@ -37,9 +37,9 @@ pub(super) struct Intersections {
     pub components: Vec<[u32; 2]>,
 }
 
-/// Faces looked at between two looks at the budget.
+/// Faces tested in parallel before the budget is checked again.
 const BLOCK: usize = 512;
-/// Neighbours in space of one face that are tested at most.
+/// Bound on the faces that are tested against one face.
 const MAX_TESTS_PER_FACE: usize = 10_000;
 
 /// Finds all intersections. `O(F log F + pairs)`, but gives up, and says so, after a number of
@@ -104,7 +104,7 @@ impl BoxTree {
     }
 }
 
-/// What one face contributes: pairs with faces of larger index.
+/// The intersections of one face with faces of larger index.
 struct Partial {
     pairs: usize,
     tests: usize,
@@ -124,6 +124,7 @@ fn meets(tree: &BoxTree, item: usize, faces: &[[u32; 3]], component: &[u32]) -> 
             part.complete = false;
             return ControlFlow::Break(());
         }
+        // Each pair once, from the smaller index, and cheap tests before exact ones.
         if other <= face
             || !own.overlaps(&Bounds::of_points(other_triangle))
             || !faces_meet(faces[face as usize], triangle, faces[other as usize], other_triangle)
@@ -193,11 +194,12 @@ fn segment_meets([p, q]: [Vec3; 2], triangle: [Vec3; 3]) -> bool {
     if above == below {
         return false;
     }
+    // The line pq passes the triangle if it turns the same way around all three sides.
     let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
     !(turns.contains(&Sign::Positive) && turns.contains(&Sign::Negative))
 }
 
-/// The same within the plane of the triangle.
+/// Whether a segment in the plane of a triangle meets it.
 fn meets_in_plane([p, q]: [Vec3; 2], triangle: [Vec3; 3]) -> bool {
     let Some((axis, turn)) = projection_axis(triangle) else { return false };
     let flat = triangle.map(|v| project(v, axis));

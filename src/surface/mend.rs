@@ -1,4 +1,4 @@
-//! Repairs that are made only on demand: parts left out, parts that touch taken apart, holes filled.
+//! Repairs on demand: small components dropped, touching parts separated, holes filled.
 
 use std::path::Path;
 
@@ -25,18 +25,19 @@ pub enum Components {
 /// Repairs on demand, beside those of [`read`](super::read).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MendOptions {
-    /// Whether holes are closed by triangles between their vertices, so that no angle at them is
-    /// larger than needed.
+    /// Whether holes are closed by triangles between their vertices, with the largest dihedral angle
+    /// as small as possible.
     pub fill_holes: bool,
-    /// Whether parts that touch in a vertex are drawn back from it, by a thousandth of the faces
-    /// there.
+    /// Whether parts that touch in a vertex are moved apart there, by a thousandth of the size of the
+    /// faces at the vertex.
     pub separate: bool,
     /// Which parts are kept.
     pub components: Components,
 }
 
-/// Reads a surface and repairs it beyond what [`read`](super::read) does, which accepts the result.
-/// No vertex is moved but those of parts that are separated. The report lists every repair in its order.
+/// Reads a surface and repairs more than [`read`](super::read) does; the result must pass the checks
+/// of [`read`](super::read). Only vertices of separated parts are moved. The report lists all repairs
+/// in order.
 ///
 /// # Errors
 /// As [`read`](super::read) for what is left after the repairs, and when a hole is too long to be
@@ -81,7 +82,7 @@ fn mended(bytes: &[u8], format: Format, options: MendOptions) -> Result<Loaded, 
     let mut mesh = examined.mesh;
     let mut repairs = examined.report.repairs;
     let mut warnings = match &examined.fault {
-        // Warnings of the examination come again with the result; these are of the reader.
+        // The examination of the result repeats its warnings; a failed one has none of the reader.
         Some(_) => Vec::new(),
         None => examined.report.warnings,
     };

@@ -35,8 +35,8 @@ impl NearBatch {
         self.len = 0;
     }
 
-    /// Adds a query, relative to the centre of the set that it will be asked of. Triangles at
-    /// `bound` or farther will not be looked for; infinity for no bound.
+    /// Adds a query, relative to the centre of the set that will answer it. Only triangles nearer than
+    /// `bound` count; infinity for no bound.
     pub fn push(&mut self, point: Vec3, bound: f64) {
         let lane = self.len % 2;
         if lane == 0 {
@@ -142,6 +142,7 @@ impl Spread {
             let right = cy * beyond + across * y;
             y.simd_ge(zero) & left.simd_ge(zero) & right.simd_ge(zero)
         };
+        // Queries of a pair are neighbours: usually both feet are inside, and the sides do not count.
         let squared = if inside.all() {
             over
         } else {

@@ -1,22 +1,22 @@
 //! Closest points for many queries close to each other: the few triangles that can matter are
-//! collected once, and handed down from a region to the regions inside it.
+//! collected once, and passed from a region to the regions inside it.
 //!
 //! 1. For a ball of radius `reach` around `c`, every closest point lies within `D(c) + 2 reach` of
 //!    `c`, with `D` the distance to the surface. The triangles that come so near are the
 //!    [`NearSet`] of the ball. The set of a ball inside it is a part of its set.
 //! 2. A triangle is convex: with `u` the unit vector from `c` to its closest point and `d` the
 //!    distance, it lies beyond the plane `(y - c) . u = d`. A query `p` is therefore at least
-//!    `d - (p - c) . u` away from it. Most triangles of a set need no more than this.
+//!    `d - (p - c) . u` away from it. This bound excludes most triangles of a set.
 //! 3. With `u0` and `D` those of the nearest triangle, and `w = p - c`, the closest point to `c` is at
 //!    most `D - u0 . w + e` away from `p`, `e = D - sqrt(D^2 - reach^2)`. By step 2 a triangle
 //!    matters only if `d <= D + |u - u0| reach + e`. That is far less than `D + 2 reach` on the side
 //!    where the nearest triangle is.
 //! 4. Queries are measured two at a time in double precision.
 //!
-//! Only the closest point inside the surface is of interest here, so features are told apart by
-//! what they do to the distance: a *fan* feature is an edge or vertex that is the closest point of
-//! a whole wedge of space, a concave one. Edges between coplanar faces, convex edges, and vertices
-//! without a concave edge are closest points of the planes beside them alone.
+//! Queries are inside the surface, so features differ in their effect on the distance there. A *fan*
+//! feature is a concave edge or a vertex of one: it is the closest point of a whole wedge of space.
+//! Edges between coplanar faces, convex edges, and vertices without a concave edge are the closest
+//! point of points straight above them only, as any other point of their faces.
 
 mod batch;
 
@@ -31,7 +31,7 @@ use batch::{Spread, dot};
 /// Sine of the dihedral deviation below which two faces are coplanar.
 const COPLANAR: f64 = 1e-7;
 
-/// How far the normals of triangles in one plane may be apart.
+/// Largest distance between the normals of triangles in one plane.
 const SAME_NORMAL: f64 = 1e-12;
 
 /// Triangles in their own frames, with the kinds of their sides and corners.
@@ -139,7 +139,7 @@ impl NearbyTriangles {
                 }
             }
         }
-        // The same as for the entries of the new set, with what the old one knows of a triangle.
+        // The bound from the old set first: it excludes most triangles without measuring them.
         let relevant = Relevant::new(&best, reach);
         let mut nearest = f64::INFINITY;
         for entry in &within.entries {
@@ -182,9 +182,8 @@ impl NearbyTriangles {
         }
     }
 
-    /// The gradient of the distance in the whole ball, where all triangles of the set lie in one
-    /// plane. A closest point at their border would be one of a triangle beyond it too, which the
-    /// set would hold.
+    /// The gradient of the distance in the whole ball, if all triangles of the set lie in one plane.
+    /// No closest point lies at their border: the triangle beyond the border would be in the set.
     pub fn constant_gradient(&self, set: &NearSet) -> Option<Vec3> {
         let frame = |entry: &Entry| &self.frames[entry.triangle as usize];
         let own = frame(set.entries.get(set.nearest)?);
@@ -199,8 +198,9 @@ impl NearbyTriangles {
         all.then(|| own.normal * height.signum())
     }
 
-    /// Answers a batch. Queries that have a bound keep it where no triangle of the set is nearer.
+    /// Answers a batch. A query with a bound stays unanswered if no triangle of the set is nearer.
     pub fn closest(&self, set: &NearSet, batch: &mut NearBatch) {
+        // The nearest triangle of the centre first: its distances exclude most of the others.
         let Some(first) = set.entries.get(set.nearest) else {
             return;
         };
@@ -228,7 +228,7 @@ impl NearbyTriangles {
         }
     }
 
-    /// What was found for query `k` of a batch, or `None` where its bound stood.
+    /// The result for query `k` of a batch; `None` if nothing is nearer than its bound.
     #[inline]
     pub fn answer(&self, set: &NearSet, batch: &NearBatch, k: usize) -> Option<NearPoint> {
         let (answer, lane) = (&batch.answers[k / 2], k % 2);
@@ -303,11 +303,11 @@ impl NearbyTriangles {
     }
 }
 
-/// Step 3.
+/// The test of step 3.
 struct Relevant {
     /// `u0`.
     toward: Vec3,
-    /// `D + e`, and `D + 2 reach`, with more than rounding can take.
+    /// `D + e` and `D + 2 reach`, increased by a bound on rounding.
     limits: [f64; 2],
     reach: f64,
 }
@@ -325,6 +325,7 @@ impl Relevant {
     /// may be nearest to a point of the ball.
     #[inline]
     fn may_be_nearest(&self, distance: f64, toward: Vec3) -> bool {
+        // Squared, so that most triangles are decided without a root.
         let beyond = distance - self.limits[0];
         let turned = self.reach * self.reach * toward.distance_squared(self.toward);
         beyond <= 0.0 || (distance <= self.limits[1] && beyond * beyond <= turned)

@@ -7,8 +7,9 @@
 //! 2. A tetrahedron of tag `k` is bisected at the middle `z` of `x0 xk` into `(x0 .. x(k-1), z, x(k+1) ..)`
 //!    and `(x1 .. xk, z, x(k+1) ..)`, both of tag `k - 1`, or 3 after 1. Three bisections halve all
 //!    lengths; there are three shapes of tetrahedra, however often they are bisected.
-//! 3. A tetrahedron is bisected if it is wanted, or if the middle of one of its edges is a vertex.
-//!    Once no one is, the tetrahedra are conforming: any two share a common face or nothing.
+//! 3. A tetrahedron is bisected if it is too coarse, or if the middle of one of its edges is a vertex.
+//!    When no tetrahedron is left to bisect, they are conforming: any two share a face, an edge, a
+//!    vertex or nothing.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -18,13 +19,13 @@ use rayon::prelude::*;
 use crate::Vec3;
 use crate::geometry::hash::splitmix;
 
-/// The side of the cube is cut into so many steps of the integer grid that vertices are on.
+/// Steps of the integer grid of the vertices along a side of the cube.
 pub(super) const STEPS: u32 = 1 << 20;
 
 /// The most bisections of one tetrahedron: after three for each bit of the steps, sides are one step.
 pub(super) const MAX_BISECTIONS: u8 = 60;
 
-/// What is known of a vertex.
+/// The values at a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Value {
     /// Signed distance to the union.
@@ -74,13 +75,13 @@ pub(super) enum Unfinished {
     Stopped,
 }
 
-/// Vertices whose values are found between two questions whether to go on.
+/// Vertices that are evaluated between two calls of `go_on`.
 const CHUNK: usize = 1 << 16;
 
-/// How many times too many tetrahedra have to be foreseen for giving up at once.
+/// Refinement gives up early if the predicted number of tetrahedra exceeds the limit by this factor.
 const HOPELESS: f64 = 8.0;
 
-/// From this generation on it is foreseen: before, the boundary is not told from its surroundings.
+/// Predictions start at this generation: earlier, the tetrahedra near the boundary are too coarse.
 const FORESIGHT: u8 = 15;
 
 impl Bisection {
@@ -192,7 +193,7 @@ impl Bisection {
         high.copy_within(1..=k, 0);
         high[k] = middle;
         let tag = if k > 1 { leaf.tag - 1 } else { 3 };
-        // What holds for a whole tetrahedron holds for its parts.
+        // If a tetrahedron needs no refinement, neither do its parts.
         let settled = leaf.settled;
         for vertices in [low, high] {
             let generation = leaf.generation + 1;
@@ -204,12 +205,12 @@ impl Bisection {
         let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
         pairs.iter().any(|&(i, j)| {
             let (a, b) = (leaf.vertices[i], leaf.vertices[j]);
-            // A tetrahedron that was tested before has a vertex there only since the last round.
+            // An edge tested before can have got a middle vertex only in the last round.
             let is_new = |v: u32| self.bisected_in[v as usize] == self.round;
             if !(leaf.fresh || is_new(a) && is_new(b)) {
                 return false;
             }
-            // Between neighbours on the grid there is nothing.
+            // Ends one step apart have no grid point between them.
             let odd = (self.keys[a as usize] ^ self.keys[b as usize]) & ODD;
             odd == 0 && self.vertex_at.contains_key(&self.middle(a, b))
         })

@@ -26,7 +26,7 @@ const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 const PAIRS: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]];
 
-/// How near to the boundary a vertex is, in lengths of its edge.
+/// Largest distance of a vertex from the boundary, in lengths of its edge.
 const VERTEX_TOLERANCE: f64 = 1e-9;
 
 /// Evaluations on one edge: halving alone would reach the resolution of doubles.
@@ -127,7 +127,7 @@ fn crossing(
         if best.0 <= enough || t - s <= f64::EPSILON {
             break;
         }
-        // Illinois: the end that stays twice counts half.
+        // Illinois: the value of the end that stays is halved, so that both ends converge.
         let u = (s + (t - s) * (low / (low - high))).clamp(s, t);
         let value = union.signed_from(a.lerp(b, u), near);
         if value.abs() < best.0 {

@@ -3,9 +3,9 @@
 //! With `sigma` the least signed distance to a primitive, negative inside and 1-Lipschitz
 //! ([`MedialUnion`]):
 //!
-//! 1. A cube around the union is filled with tetrahedra, which are bisected where the boundary may be, as
-//!    the values of `sigma` at their vertices allow, until none has an edge longer than 4/5 of the
-//!    tolerance, or than the radius of the union's balls there where that is less (file `bisection.rs`).
+//! 1. A cube around the union is filled with tetrahedra. Those that may meet the boundary, judged by
+//!    `sigma` at their vertices, are bisected until no edge is longer than 4/5 of the tolerance, or
+//!    than the radius of the union's balls there if that is less (file `bisection.rs`).
 //! 2. Marching tetrahedra: a closed manifold with its vertices on the boundary (file `march.rs`).
 //! 3. Edges shorter than a quarter of the tetrahedron's edge are contracted: a closed manifold stays one,
 //!    and vertices stay on the boundary ([`contract_short_edges_while`]).
@@ -14,16 +14,17 @@
 //!
 //! Every point with `sigma > tolerance` is outside the surface, and every point with
 //! `sigma < -tolerance` is inside. Proof: let `d` be the longest edge of the tetrahedron that holds the
-//! point. If `|sigma| > d` there, all four vertices are on the same side as the point, so that the surface
-//! does not enter. If `d` is larger than 4/5 of the tolerance, `|sigma| > d` at a vertex, and the tetrahedron
-//! is on one side as a whole, rightly. Contraction moves the surface by at most `d / 4`.
+//! point. If `|sigma| > d` at the point, all four vertices are on its side, so the surface does not
+//! enter the tetrahedron. If `d` is larger than 4/5 of the tolerance, the tetrahedron was not refined
+//! because `|sigma| > d` at a vertex; then it is on one side as a whole. Contraction moves the surface
+//! by at most `d / 4`.
 //!
 //! So no point of the surface is farther than the tolerance from the union, or deeper in it. On smooth
-//! parts the distance is much less, about `d^2 / 8 r` for curvature radius `r`. What is thinner than a
+//! parts the distance is much less, about `d^2 / 8 r` for curvature radius `r`. Features thinner than a
 //! tetrahedron can be missed: parts of the union with a radius below 1/20 of the tolerance
-//! ([`UnionSurface::lost`]), and crevices and holes narrower than the tolerance. A crevice that is missed
-//! in some places and not in others has bridges, and the surface has loops that the union has not:
-//! [`union_betti`](crate::metrics::union_betti) tells.
+//! ([`UnionSurface::lost`]), and crevices and holes narrower than the tolerance. A crevice that is
+//! missed only in some places is bridged there, so the surface has loops that the union does not have;
+//! [`union_betti`](crate::metrics::union_betti) detects this.
 
 mod bisection;
 mod march;
@@ -91,14 +92,14 @@ pub enum ContourError {
 /// Tetrahedra's edges as a share of the tolerance; contraction takes the rest.
 const EDGE_SHARE: f64 = 0.8;
 
-/// Edges are contracted below this share of the tetrahedron's edge that the vertex is on.
+/// Edges shorter than this share of the tetrahedron's edge that the vertex is on are contracted.
 const CONTRACTED: f64 = 0.25;
 
-/// Tetrahedra are refined to the radius of the union's balls, but to no less than this share of
-/// what the tolerance demands anyway.
+/// Tetrahedra are refined to the radius of the union's balls, but no further than to this share of the
+/// edge that the tolerance requires.
 const MIN_SHARE_OF_CELL: f64 = 1.0 / 16.0;
 
-/// About 4 GB.
+/// Bound on the number of tetrahedra: about 4 GB.
 const MAX_TETRAHEDRA: usize = 50_000_000;
 
 /// The boundary of the union of all primitives of a medial mesh as triangles. `tolerance` is in the unit of
@@ -174,7 +175,7 @@ pub fn union_surface_while(
     };
     grid.refine(goal, most, values, wanted, &mut go_on).map_err(|unfinished| match unfinished {
         Unfinished::TooMany { generation, leaves } => {
-            // Enough even if everything is thin and has to be refined as far as that goes.
+            // Feasible even if everything is thin and refined as far as possible.
             let size = sizes[usize::from(generation)] / MIN_SHARE_OF_CELL;
             let feasible = size / EDGE_SHARE * f64::max(1.0, (leaves as f64 / most as f64).sqrt());
             ContourError::TooFine { tolerance, most, feasible }
@@ -187,7 +188,7 @@ pub fn union_surface_while(
     }
     let (raw, edges) = march::march(&grid, &union);
     if raw.faces.is_empty() {
-        // Half a radius is enough for a vertex of the tetrahedra to be in the ball.
+        // With edges of half its radius, a ball certainly contains a vertex.
         let feasible = 0.5 * largest / EDGE_SHARE;
         return Err(ContourError::TooThin { smallest, feasible });
     }

@@ -1,27 +1,26 @@
 //! Spheres that differ by no more than rounding.
 //!
-//! A round solid has one medial sphere, and a method that takes it from samples has hundreds, equal
-//! to the last few digits, with cones and slabs among all of them. None of these is nearer than
-//! another by more than these digits, so that no bound tells them apart, and each query would measure
-//! them all. They are measured once: of the simplices on the same groups of equal spheres the first.
+//! A round solid has one medial sphere. A method that computes it from samples gets hundreds of
+//! spheres, equal up to the last few digits, with cones and slabs between them. Their distances differ
+//! in these digits only, so no bound separates them, and each query would measure them all. So of all
+//! simplices on the same groups of equal spheres only the first is measured.
 
 use std::collections::HashSet;
 
 use crate::complex::MedialMesh;
 use crate::geometry::Sphere;
 
-/// Spheres whose coordinates and radii agree to this share of the radius count as one. Distances
-/// change by at most six times as much: a sphere is so far from the one that stands for it, in centre
-/// and in radius, and that one from the sphere that is measured.
+/// Spheres whose coordinates and radii agree to this share of the radius count as one. Distances change
+/// by at most six times that share: a sphere can differ by it, in centre and radius, from the one that
+/// stands for its group, and this one again from the sphere that is measured.
 pub(super) const EQUAL: f64 = 1e-13;
 
-/// A direction in space and radius that is none of a mesh: spheres in the same place along it are
-/// likely the same, and concentric ones of other radii are not.
+/// A generic direction in space and radius: spheres at the same place along it are most likely equal.
 const GENERIC: [f64; 4] = [0.612_372_4, 0.573_576_4, 0.543_988_1, 0.518_304_7];
 
 /// The simplices of a mesh that are to be measured.
 pub(super) struct Distinct {
-    /// For each sphere the one that stands for it, itself where it is the only one.
+    /// For each sphere the one that stands for its group.
     group: Vec<u32>,
     /// Whether some spheres are equal.
     any: bool,
@@ -65,8 +64,8 @@ impl Distinct {
         self.group[v as usize]
     }
 
-    /// Whether a ball within another one is smaller by more than equal balls can be. (Of two groups
-    /// each may else have a ball within one of the other, and neither would be measured.)
+    /// Whether a ball within another one is smaller by more than equal balls can differ. (Otherwise two
+    /// groups could each have a ball within one of the other, and neither would be measured.)
     pub fn is_smaller(&self, inner: &Sphere, outer: &Sphere) -> bool {
         !self.any || outer.radius - inner.radius > 4.0 * EQUAL * outer.radius
     }

@@ -9,9 +9,9 @@
 //!   inside other primitives. The reading of the Q-MAT paper (Li et al. 2015,
 //!   doi:10.1145/2753755). Never more than `|sigma|`.
 //!
-//! Each edge is evaluated once and not once for every face: the sides of a face are edges of the
-//! mesh, so a face adds only the part between its two tangent triangles. A sphere with an edge
-//! lies in that edge's cone. Of primitives on spheres that are equal up to rounding one is evaluated
+//! Each edge is evaluated once, not once for every face: the sides of a face are edges of the mesh, so
+//! a face adds only the part between its two tangent triangles. A sphere with an edge lies in the
+//! edge's cone. If several primitives have the same spheres up to rounding, only one is evaluated
 //! ([`coincident`]).
 
 mod coincident;
@@ -31,8 +31,8 @@ use search::{Buried, Nearer, Signed, Unsigned};
 
 /// The union of the medial primitives of a mesh, prepared for distance queries.
 ///
-/// Distances are those of all primitives, each measured in double precision. Spheres that agree to 1e-13 of
-/// their radius count as one, which changes distances by at most six times as much.
+/// Distances are the least over all primitives, in double precision. Spheres that agree to 1e-13 of
+/// their radius count as one, which changes distances by at most six times that.
 ///
 /// ```
 /// use medial::Vec3;
@@ -82,7 +82,7 @@ pub struct Readings {
     pub mu: f64,
 }
 
-/// Coordinates and radii beyond this would overflow when squared.
+/// Larger coordinates and radii would overflow when squared.
 const MAX_COORDINATE: f64 = 1e150;
 
 /// Why a medial mesh has no union.
@@ -120,8 +120,8 @@ impl MedialUnion {
         }
         let sphere = |v: u32| mesh.spheres[v as usize];
         let mut distinct = Distinct::new(mesh);
-        // Spheres that need no part of their own: ends of proper cones, and those that lie in a
-        // neighbour, whose own parts are then nearer everywhere.
+        // Spheres that need no part of their own: ends of proper cones, and spheres inside a neighbour,
+        // which is nearer everywhere.
         let mut covered = vec![false; mesh.spheres.len()];
         let mut parts = Vec::with_capacity(mesh.edges.len() + mesh.faces.len());
         for (e, &ends) in (0..).zip(&mesh.edges) {
@@ -186,17 +186,17 @@ impl MedialUnion {
         self.deepest(p).signed
     }
 
-    /// `sigma(p)`, beginning with the primitive that the last call with the same `near` found:
-    /// faster for points that follow each other, with the same answer.
+    /// `sigma(p)`, searched from the primitive that the last call with the same `near` found. Faster
+    /// for consecutive nearby points; the answer is the same.
     pub(crate) fn signed_from(&self, p: Vec3, near: &mut usize) -> f64 {
         let (nearest, place) = self.parts.nearest::<Signed>(p, *near);
         *near = place;
         nearest.signed
     }
 
-    /// A point of the union's boundary near to `p`, begun as in [`signed_from`](Self::signed_from):
-    /// the closest one where `p` is outside; from inside, the way leads out of the deepest primitive,
-    /// again and again. `None` where it ends more than `burial` inside some primitive.
+    /// A point of the union's boundary near to `p`, searched as in [`signed_from`](Self::signed_from).
+    /// If `p` is outside, the closest point. From inside, the point leaves the deepest primitive, again
+    /// and again; `None` if it ends more than `burial` inside some primitive.
     pub(crate) fn boundary_near(&self, p: Vec3, burial: f64, near: &mut usize) -> Option<Vec3> {
         let mut point = p;
         for _ in 0..MAX_EXITS {
@@ -303,10 +303,10 @@ impl MedialUnion {
         self.burier(p, depth).is_some()
     }
 
-    /// Keeps of some points those that no primitive [`buries`](Self::buries) deeper than `depth`.
-    /// Quicker where few primitives bury them all, as on the surface of another one.
+    /// Removes the points that some primitive [`buries`](Self::buries) deeper than `depth`. Fast if few
+    /// primitives bury most points, as on the surface of another primitive.
     pub fn retain_unburied(&self, points: &mut Vec<Vec3>, depth: f64) {
-        // Those that buried a point are tried first, the last one before the others.
+        // Primitives that buried a point are tried first, the most recent one before the others.
         let mut recent = [None; RECENT];
         points.retain(|&p| {
             let holds = |place: &Option<usize>| {
@@ -325,8 +325,7 @@ impl MedialUnion {
         });
     }
 
-    /// A primitive that holds `p` more than `depth` below its surface, by its place, where one
-    /// does.
+    /// The place of a primitive that holds `p` more than `depth` below its surface, if there is one.
     fn burier(&self, p: Vec3, depth: f64) -> Option<usize> {
         let mut search = Buried { parts: &self.parts, p, limit: -depth, place: None };
         self.parts.search(&mut search);
@@ -334,17 +333,17 @@ impl MedialUnion {
     }
 
     /// Calls `each` for all primitives nearer to `p` than `limit` by signed distance, with that
-    /// distance and the centre of the interpolated sphere that attains it. A slab counts where its
-    /// nearest sphere is inside the triangle, and is else represented by the cones of its sides.
+    /// distance and the centre of the interpolated sphere that attains it. A slab is passed only if its
+    /// nearest sphere is inside the triangle; else the cones of its sides stand for it.
     pub(crate) fn each_nearer(&self, p: Vec3, limit: f64, each: impl FnMut(f64, Vec3)) {
         self.parts.search(&mut Nearer { parts: &self.parts, p, limit, each });
     }
 }
 
-/// Primitives that are left one after the other on the way out of a union.
+/// Bound on the primitives that are left, one after the other, on the way out of a union.
 const MAX_EXITS: usize = 12;
 
-/// How many primitives are remembered that buried a point.
+/// Number of remembered primitives that buried a point.
 const RECENT: usize = 4;
 
 fn ball_box(balls: &[Sphere]) -> Bounds {

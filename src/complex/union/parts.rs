@@ -1,22 +1,22 @@
 //! The primitives of a union, in a tree, in the order in which a search meets them.
 //!
-//! A search runs on four boxes and four primitives at a time in single precision ([`ReachTree`],
-//! [`ConeBlock`], [`FaceBlock`]), which only tells what is worth measuring: each primitive that
-//! could matter by more than their errors is measured in double precision. A query too far away
-//! for single precision searches the tree of two children a node.
+//! A search tests four boxes and four primitives at a time in single precision ([`ReachTree`],
+//! [`ConeBlock`], [`FaceBlock`]). This only selects: every primitive that may matter, within the error
+//! bounds, is measured in double precision. A query too far away for single precision searches the
+//! binary tree.
 
 use super::Primitive;
 use crate::Vec3;
 use crate::geometry::trees::{Bounds, ConeBlock, FaceBlock, Plan, ReachTree, Tree};
 use crate::geometry::{Cone, SlabFace, Sphere};
 
-/// More than the rounding errors of a bound and of a signed distance together, relative to the
-/// distances and lengths that they are computed from: the distance itself, the radius, and how far
-/// the primitive extends. These are differences of coordinates, so where the union lies does not
-/// matter. Counted operation by operation, a slab has about 30 units of 2^-53 and a box 5.
+/// Bound on the rounding errors of a box's bound and of a signed distance together, relative to the
+/// lengths that they are computed from: the distance itself, the radius, and the extent of the
+/// primitive. These are differences of coordinates, so the position of the union does not matter.
+/// Counted operation by operation, a slab has about 30 units of 2^-53 and a box 5.
 pub(super) const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Leaves hold up to so many primitives, clusters aside.
+/// Largest number of primitives of a leaf, except clusters.
 const LEAF: usize = 12;
 
 /// Primitives measured together.
@@ -30,7 +30,7 @@ pub(super) enum Shape {
 }
 
 impl Shape {
-    /// Signed distance, infinite where a slab leaves the answer to the cones of its sides.
+    /// Signed distance; infinite where the cones of a slab's sides decide instead.
     #[inline]
     pub fn signed(&self, p: Vec3) -> f64 {
         match self {
@@ -80,8 +80,7 @@ impl Part {
 pub(super) struct Parts {
     pub tree: Tree,
     pub quick: ReachTree,
-    /// For each leaf of the quick tree its first block of each kind, and one more: those of the
-    /// leaf after the last.
+    /// For each leaf of the quick tree its first block of each kind, and one more entry for the end.
     pub leaves: Vec<Leaf>,
     pub cones: Vec<ConeBlock>,
     pub faces: Vec<FaceBlock>,
@@ -89,7 +88,7 @@ pub(super) struct Parts {
     shapes: Vec<Shape>,
     /// In the order of the shapes.
     primitives: Vec<Primitive>,
-    /// More than rounding can contribute to a distance, beside its share of that distance.
+    /// Bound on the rounding error of a distance, in addition to [`ROUNDING`] times the distance.
     slack: f64,
 }
 
@@ -182,7 +181,7 @@ impl Parts {
         &self.primitives
     }
 
-    /// More than rounding can contribute to a distance, beside its share of that distance.
+    /// Bound on the rounding error of a distance, in addition to [`ROUNDING`] times the distance.
     #[inline]
     pub fn slack(&self) -> f64 {
         self.slack

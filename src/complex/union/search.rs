@@ -1,4 +1,4 @@
-//! What is looked for among the primitives of a union.
+//! Searches among the primitives of a union.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -10,13 +10,13 @@ use crate::geometry::trees::{Lanes, Measure, Node, Query, Search};
 
 /// A search among the primitives around a point.
 pub(super) trait UnionSearch {
-    /// Which distance its limit is in.
+    /// The measure of its limit.
     const MEASURE: Measure;
 
     /// The point.
     fn point(&self) -> Vec3;
 
-    /// Primitives farther away than this are of no interest.
+    /// Primitives farther away than this are skipped.
     fn limit(&self) -> f64;
 
     /// Looks at the primitive at a place.

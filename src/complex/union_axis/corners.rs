@@ -1,4 +1,4 @@
-//! Step 1: the vertices of the boundary, each once, with the balls that meet there.
+//! Step 1: the corners (vertices of the boundary, each position once) and the balls that meet there.
 
 use rayon::prelude::*;
 
@@ -13,12 +13,12 @@ use crate::geometry::{
 /// The corners of a union of balls and their Delaunay triangulation.
 pub(super) struct Corners {
     points: Vec<Vec3>,
-    /// The first vertex of the boundary at each corner.
+    /// For each corner the first vertex of the boundary there.
     vertices: Vec<UnionVertex>,
     /// The balls of corner `i` are `balls[start[i]..start[i + 1]]`, ascending.
     start: Vec<u32>,
     balls: Vec<u32>,
-    /// For each facet of each cell of the regular triangulation the corner on that cell's side.
+    /// For each facet of each cell of the regular triangulation, the corner on the side of the cell.
     at: Vec<u32>,
     /// The centres of all balls.
     centres: Vec<Vec3>,
@@ -88,7 +88,7 @@ impl Corners {
         self.delaunay.as_ref().map_or(0, |d| d.finite_cell_count())
     }
 
-    /// The corner of a triangle of the dual complex on the side of the facet's cell.
+    /// The corner of a triangle of the dual complex, on the side of the facet's cell.
     pub(super) fn at(&self, facet: Facet) -> u32 {
         self.at[4 * facet.cell.index() + facet.opposite]
     }
@@ -148,7 +148,8 @@ fn corners_of_sides(
     for (vertex, &corner) in boundary.vertices().iter().zip(of_vertex) {
         at[index(regular.mirror(vertex.facet))] = corner;
     }
-    // Spheres that touch in a point of a singular triangle's plane have it on both sides.
+    // Three spheres that meet in a single point, in the plane of a singular triangle: it is the corner
+    // on both sides, but reported once.
     for (facet, _) in complex.triangles().filter(|f| f.1 == Class::Singular) {
         let [one, other] = [facet, regular.mirror(facet)].map(index);
         if at[one] == NONE {
@@ -160,15 +161,16 @@ fn corners_of_sides(
     at
 }
 
-/// The box of all centres, which the dual complex is in.
+/// The box of all centres, which contains the dual complex.
 pub(super) fn bounds(balls: &[Sphere]) -> [Vec3; 2] {
     let first = balls.first().map_or(Vec3::ZERO, |b| b.centre);
     let low = balls.iter().fold(first, |m, b| m.min(b.centre));
     [low, balls.iter().fold(first, |m, b| m.max(b.centre))]
 }
 
-/// For each point the first at its position.
+/// For each point the first one at the same position.
 fn same_position(points: &[Vec3]) -> Vec<u32> {
+    // Adding 0 turns -0 into +0, which is the same position with other bits.
     let key = |&i: &u32| points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     order.sort_unstable_by_key(|i| (key(i), *i));
@@ -181,8 +183,8 @@ fn same_position(points: &[Vec3]) -> Vec<u32> {
     first
 }
 
-/// The Delaunay triangulation of the corners; with four anchors where they do not span space, so far
-/// away that no point among the balls is nearest to one.
+/// The Delaunay triangulation of the corners. If they do not span space, four *anchors* are added, so
+/// far away that no point among the balls is nearest to one.
 fn spanning(corners: &[Vec3], balls: &[Sphere]) -> Result<Delaunay, TriangulationError> {
     match Delaunay::new(corners) {
         Err(

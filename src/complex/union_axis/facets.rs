@@ -81,7 +81,7 @@ pub(super) fn voronoi_sides(
             let corners = [v[i].min(v[j]), v[i].max(v[j])];
             let here = balls + c;
             let (to, _) = station(leave);
-            // What enters from another cell leaves that one.
+            // A side that enters from another cell inside is reported by that cell as leaving.
             let (from, is_ball) = station(enter);
             let entering = is_ball.then_some(Side { corners, from, to: here });
             [Some(Side { corners, from: here, to }), entering].into_iter().flatten()
@@ -109,8 +109,8 @@ pub(super) fn close_up(sides: &[Side], corners: usize, tally: &mut AxisTally) ->
     traced.into_iter().flat_map(|t| t.single.into_iter().chain(t.several)).collect()
 }
 
-/// The sides in the order of their smaller corners: a comparison sort of them all is the slowest part of
-/// the whole axis.
+/// The sides in the order of their smaller corners, by a counting sort: a comparison sort of all sides
+/// would take longer than the rest of the axis.
 fn by_first_corner(sides: &[Side], corners: usize) -> Vec<Side> {
     let mut next = vec![0_u32; corners + 1];
     for side in sides {
@@ -133,12 +133,13 @@ fn by_first_corner(sides: &[Side], corners: usize) -> Vec<Side> {
 struct Traced {
     single: Option<Polygon>,
     several: Vec<Polygon>,
-    /// Whether some sides were left over.
+    /// Whether some sides do not close up.
     open: bool,
 }
 
-/// The polygon of sides that are one, through different vertices: almost all facets are.
+/// If the sides form one simple polygon (the usual case), that polygon.
 fn single(sides: &[Side]) -> Option<Polygon> {
+    // Sorted by start: two sides from one vertex are neighbours, and make the polygon not simple.
     if sides.len() < 3 || sides.windows(2).any(|pair| pair[0].from == pair[1].from) {
         return None;
     }
@@ -155,11 +156,11 @@ fn single(sides: &[Side]) -> Option<Polygon> {
     is_whole.then(|| Polygon { between: sides[0].corners, vertices, ..Polygon::default() })
 }
 
-/// The simple polygons of any facet.
+/// The simple polygons of a facet in the general case.
 fn trace(sides: &[Side]) -> Traced {
     let sides = without_opposites(sides);
     let between = sides.first().map_or([NONE; 2], |s| s.corners);
-    // Sides from one vertex follow each other; the first of them stands for the vertex.
+    // Sides from one vertex are consecutive; the index of the first stands for the vertex.
     let vertex = |v: u32| sides.partition_point(|s| s.from < v);
     let mut taken = vec![false; sides.len()];
     let mut on_path = vec![NONE; sides.len()];
@@ -170,7 +171,7 @@ fn trace(sides: &[Side]) -> Traced {
         loop {
             let at = vertex(here);
             if on_path.get(at).is_some_and(|&p| p != NONE) {
-                // A vertex again: what lies between is a polygon.
+                // The path meets itself: the part since the first visit is a simple polygon.
                 let cycle = path.split_off(on_path[at] as usize);
                 for &v in &cycle {
                     on_path[vertex(v)] = NONE;
@@ -195,7 +196,7 @@ fn trace(sides: &[Side]) -> Traced {
     Traced { single: None, several: polygons, open }
 }
 
-/// The sides whose opposite is not among them, in order.
+/// The sides that are left, in order, after each pair of opposite sides has cancelled.
 fn without_opposites(sides: &[Side]) -> Vec<Side> {
     let mut left: Vec<Side> = Vec::with_capacity(sides.len());
     for run in sides.chunk_by(|a, b| a == b) {

@@ -12,7 +12,7 @@ use crate::predicates::{
 };
 use crate::triangulation::{CellId, Facet, VertexId};
 
-/// The smallest number of cells that a thread takes.
+/// The fewest cells handed to a thread at once.
 const GRAIN: usize = 1 << 10;
 
 /// Classifies the simplices of a triangulation of `balls` balls and anchors.
@@ -40,7 +40,7 @@ fn tetrahedra(regular: &Regular) -> Vec<bool> {
 /// Step 2: two bits for each facet of each cell, the same from both sides.
 fn triangles(regular: &Regular, cells: &[bool]) -> Vec<u8> {
     let is_in = |c: CellId| cells.get(c.index()).is_some_and(|&c| c);
-    // From the cell with the smaller id, then from the other.
+    // Computed once, at the cell with the smaller id, then copied to the other.
     let ids = || (0..regular.cell_count() as u32).into_par_iter().with_min_len(GRAIN);
     let first = |c| {
         let cell = CellId(c);
@@ -81,8 +81,8 @@ fn is_singular_triangle(regular: &Regular, facet: Facet, mirror: Facet) -> bool 
     triangle_size(triangle) != Sign::Positive && is_clear(facet) && is_clear(mirror)
 }
 
-/// For each set of vertices with a later cell across the opposite facet, the pairs whose edge has
-/// later cells on both sides, by bits.
+/// Indexed by the set of vertices across whose opposite facets lie later cells: the pairs, as bits,
+/// whose edge has later cells on both sides.
 const FIRST_AT: [u8; 16] = {
     let mut table = [0; 16];
     let mut later = 0;
@@ -106,8 +106,8 @@ fn edges(regular: &Regular, cells: &[bool], facets: &[u8]) -> Vec<u16> {
     let of_cell = |ring: &mut Vec<CellId>, c| {
         let cell = CellId(c);
         let v = regular.vertices(cell);
-        // Both neighbours at the edge first: they are in the cell's own record, and tell for two
-        // thirds of the edges that the cell is not their first. Without a branch for each.
+        // Two neighbours of the cell are at the edge. They are in the cell's own record and show, for
+        // two thirds of the edges, that the cell is not the first. The table spares a branch per edge.
         let neighbours = regular.neighbours(cell);
         let later = (0..4).fold(0, |bits, n| bits | usize::from(neighbours[n] > cell) << n);
         let mut candidates = FIRST_AT[later];
@@ -146,7 +146,7 @@ fn edge_class(
     if members > 0 {
         return Class::Regular as u8;
     }
-    // For each cell the indices of its vertices beside the edge, opposite to facets that have it.
+    // The cell's two vertices off the edge: the facets opposite to them contain the edge.
     let others = |cell: CellId| {
         let v = regular.vertices(cell);
         (0..4).filter(move |&k| !ends.contains(&v[k])).map(move |k| (k, v[k]))
@@ -201,8 +201,7 @@ fn vertices(regular: &Regular, cells: &[bool], edges: &[u16]) -> Vec<u8> {
     class
 }
 
-/// Those of the given vertices that are attached to a neighbour, in no particular order and some
-/// more than once.
+/// The given vertices that are attached to a neighbour, in unspecified order, with repetitions.
 fn attached(regular: &Regular, isolated: &[bool]) -> Vec<u32> {
     let cells = (0..regular.finite_cell_count() as u32).into_par_iter().with_min_len(GRAIN);
     let of_cell = |c| {

@@ -5,8 +5,8 @@
 //! * H. Edelsbrunner, E. P. Muecke: *Three-dimensional alpha shapes*, ACM Transactions on Graphics
 //!   13 (1994), <https://doi.org/10.1145/174462.156635>.
 //!
-//! The dual complex `K` of a union `U` of balls is the part of the regular triangulation whose
-//! simplices have a dual power face that meets `U`: the alpha complex for alpha zero, homotopy
+//! The dual complex `K` of a union `U` of balls consists of the simplices of the regular
+//! triangulation whose dual power faces meet `U`: the alpha complex for alpha zero. It is homotopy
 //! equivalent to `U`.
 //!
 //! 1. A tetrahedron is in `K` if and only if its orthoball's power `rho^2` is at most zero.
@@ -17,17 +17,18 @@
 //! 4. A simplex of `K` is *interior* if all tetrahedra around it are finite and in `K`, *singular* if
 //!    it has no coface in `K`, and *regular* otherwise.
 //!
-//! All signs are exact ([`super::predicates`]). Rule 2 is that of the alpha shape, which asks a
-//! Gabriel triangle for its own `rho^2` alone: if a coface is in `K`, so is the triangle, because
-//! the minimum of the power over a power face is at most that over a part of its boundary. The
-//! same holds where signs are zero, although the triangulation is that of infinitesimally
-//! perturbed weights: power faces depend continuously on the weights, so the rules decide whether
-//! the limit of a face, a closed polytope, meets the closed set `U`. So `K` is closed under
-//! faces for every input, and it has the homotopy type of `U`: that of slightly larger balls.
-//! Which of several cospherical simplices it has is up to the perturbation.
+//! All signs are exact ([`super::predicates`]). Rule 2 is that of alpha shapes: if a coface is in
+//! `K`, so is the triangle, because the minimum of the power over a power face is at most the minimum
+//! over a part of its boundary. For a Gabriel triangle its own `rho^2` decides.
 //!
-//! Ties, in one line: balls are closed. Two balls that touch in a point are joined by an edge,
-//! four that close a hole in a point fill it.
+//! The rules hold even where signs are zero, although the triangulation belongs to infinitesimally
+//! perturbed weights. Power faces depend continuously on the weights, so the rules decide whether the
+//! limit of a face, a closed polytope, meets the closed set `U`. So `K` is closed under faces for
+//! every input, and it has the homotopy type of `U`, which is that of slightly larger balls. The
+//! perturbation decides which of several cospherical simplices belong to `K`.
+//!
+//! In short: balls are closed. Two balls that touch in a point are joined by an edge; four balls that
+//! close a hole in a point fill it.
 
 mod balls;
 mod build;
@@ -121,9 +122,9 @@ impl DualComplex<'static> {
     /// or in a plane.
     ///
     /// Weights are the squared radii in double precision, rounded once; everything after that is
-    /// exact. Where the centres do not span space, the regular triangulation gets four *anchors*,
-    /// points of negative weight, as its last points. They change nothing: where any ball is, its
-    /// power is at most zero and an anchor's positive, so that no anchor's cell meets the union.
+    /// exact. If the centres do not span space, the regular triangulation gets four *anchors*, points
+    /// of negative weight, as its last points. They change nothing: inside a ball its power is at most
+    /// zero, while that of an anchor is positive, so no anchor's cell meets the union.
     ///
     /// # Errors
     /// A centre that is not finite or too large, a radius that is negative or not finite, as in
@@ -210,7 +211,7 @@ impl DualComplex<'_> {
         self.regular.finite_cells().flat_map(|cell| self.edges_of(cell))
     }
 
-    /// The edges that a finite cell is the first of.
+    /// The edges whose first cell is this finite cell.
     pub(super) fn edges_of(&self, cell: CellId) -> impl Iterator<Item = (CellEdge, Class)> + '_ {
         let bits = self.edges[cell.index()];
         // Most cells are the first of no edge.

@@ -1,4 +1,4 @@
-//! Step 2: which points are one, exactly.
+//! Step 2: the points that coincide, decided exactly.
 
 use rayon::prelude::*;
 
@@ -82,13 +82,13 @@ fn is_point(complex: &DualComplex<'_>, start: Facet, end: Facet) -> bool {
     let (Some(c), Some(d)) = (apex(f, g), apex(g, f)) else { return false };
     let sites = |t: [VertexId; 3]| t.map(|v| regular.site(v));
     let [s, t, u] = sites(f);
-    // Where the four centres are in one plane this is zero if and only if the four balls have a
-    // point of equal powers, and so the points of the two triangles are the same.
+    // For coplanar centres this is zero if and only if the four balls have a point of equal powers,
+    // so that the points of both triangles coincide.
     if tetrahedron_size([s, t, u, regular.site(d)]) != Sign::Zero {
         return false;
     }
-    // The orthocentre of all four is on a triangle's side of the fourth if the clearance from that
-    // is positive, and in its plane if that is zero.
+    // A positive clearance from the fourth ball puts the orthocentre of all four on the fourth's side
+    // of the triangle, a clearance of zero in its plane.
     let is_on_gap_side = |triangle: [VertexId; 3], fourth: VertexId| {
         let [p, q, r] = triangle.map(|v| regular.point(v));
         let clearance = triangle_clearance(sites(triangle), regular.site(fourth));

@@ -15,8 +15,8 @@ pub struct MergedVertices {
 }
 
 impl MergedVertices {
-    /// The positions, in the order of the first vertex of each: that of its vertex with the most
-    /// nearly rectangular triangle.
+    /// The positions, in the order of the first vertex of each. A position is taken from the vertex
+    /// with the most nearly rectangular triangle, which determines it best.
     pub fn points(&self) -> &[Vec3] {
         &self.points
     }

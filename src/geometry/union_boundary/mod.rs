@@ -8,8 +8,8 @@
 //! With the dual complex `K` of the balls:
 //!
 //! 1. The spheres of a triangle of `K` meet in two points, mirror images across its plane. A regular
-//!    triangle gives the one on the side away from its tetrahedron in `K`, a singular one both, or
-//!    one if the spheres touch in a point of the plane, which is decided exactly.
+//!    triangle gives the point on the side without a tetrahedron of `K`. A singular triangle gives
+//!    both, or one if the spheres touch in a point of the plane, which is decided exactly.
 //! 2. Around an edge of `K`, the triangles of `K` leave *gaps*, runs of tetrahedra that are not in
 //!    `K`. Each gap is dual to one arc of the boundary, on the circle where the edge's spheres
 //!    meet; the arc joins the points of the two triangles that bound the gap. The arc has length
@@ -43,8 +43,8 @@ pub struct UnionVertex {
     pub facet: Facet,
 }
 
-/// The vertices of the boundary of a union of balls, as many times as triangles of the dual complex
-/// have them.
+/// The vertices of the boundary of a union of balls, each once for every triangle of the dual complex
+/// that gives it.
 ///
 /// ```
 /// use medial_geometry::{Vec3, DualComplex, Sphere, UnionBoundary};
@@ -64,7 +64,8 @@ pub struct UnionVertex {
 #[derive(Clone, Debug)]
 pub struct UnionBoundary {
     vertices: Vec<UnionVertex>,
-    /// The squared sine of each triangle at its first vertex: how well it determines the point.
+    /// The squared sine of each triangle's angle at its first vertex: the larger, the better the point
+    /// is determined.
     quality: Vec<f64>,
     /// Pairs of vertices that are one point.
     coincident: Vec<[u32; 2]>,

@@ -1,8 +1,9 @@
-//! Four triangles measured together in single precision, to tell which are worth measuring.
+//! Four triangles measured together in single precision, to select those worth measuring in double
+//! precision.
 //!
-//! The distance is [`PlanarFrame::distance_squared`] in other order: the least of the distances to
-//! the three sides unless the query is over the inside. A wrong side of a line, by rounding, then
-//! changes the distance by no more than rounding does.
+//! The distance is that of [`PlanarFrame::distance_squared`], computed differently: the least
+//! distance to the three sides, unless the query projects into the triangle. So if rounding puts the
+//! query on the wrong side of a line, the distance changes by no more than rounding.
 
 use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::trees::{Frame, Lanes, Query};
@@ -21,8 +22,8 @@ pub(super) struct Block {
     reciprocal: [Lanes; 2],
 }
 
-/// Squared lengths below this have no reciprocal in single precision. The side is then measured
-/// at its start, which is as near as rounding tells.
+/// Squared lengths below this have no reciprocal in single precision. The distance to such a side is
+/// measured from its start, which differs by less than rounding.
 const NEGLIGIBLE: f64 = 1e-30;
 
 impl Block {
@@ -49,7 +50,7 @@ impl Block {
         }
     }
 
-    /// Which of the triangles may be within a limit, by bits. Lanes that are no numbers may.
+    /// The triangles that may be within a limit, one bit each.
     #[inline]
     pub fn within(&self, query: &Query, limit: f32) -> u32 {
         let w = [0, 1, 2].map(|k| query.p[k] - self.origin[k]);

@@ -8,7 +8,7 @@ use crate::geometry::planar_frame::{Part, PlanarFrame};
 use crate::geometry::trees::{Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order};
 use crate::surface::TriMesh;
 
-/// Coordinates beyond this would overflow when squared.
+/// Larger coordinates would overflow when squared.
 const MAX_COORDINATE: f64 = 1e150;
 
 /// A bounding-volume tree over triangles. Triangles of no area are segments or points, and valid.
@@ -39,12 +39,11 @@ pub struct TriangleBvh {
     frames: Vec<PlanarFrame>,
     /// In leaf order.
     corners: Vec<[Vec3; 3]>,
-    /// In leaf order, which corner the frame starts at.
+    /// In leaf order, the corner that the frame starts at.
     firsts: Vec<u8>,
     /// For each face its place in leaf order.
     places: Vec<u32>,
-    /// More than rounding can contribute to a distance between a query and these triangles, as
-    /// long as the query is not farther away than the mesh is large.
+    /// Bound on the rounding error of a distance, for queries no farther away than the mesh is large.
     slack: f64,
 }
 
@@ -88,7 +87,7 @@ pub enum BvhError {
     },
 }
 
-/// That there are triangles, whose corners can be squared.
+/// Checks that there are triangles, with finite corners that can be squared.
 pub(super) fn check_corners(triangles: &[[Vec3; 3]]) -> Result<(), BvhError> {
     if triangles.is_empty() {
         return Err(BvhError::Empty);
@@ -150,8 +149,8 @@ impl TriangleBvh {
         self.closest_from(p, None)
     }
 
-    /// The closest point to `p`, found sooner when `start` is a face near to it. The answer is the
-    /// same for every start.
+    /// The closest point to `p`. A face `start` near to it speeds up the search; the answer does not
+    /// depend on it.
     ///
     /// # Panics
     /// If `start` is not a face.
@@ -175,7 +174,7 @@ impl TriangleBvh {
         self.distance_batch_with(points, |_, distance| distance)
     }
 
-    /// What `finish` makes of many queries and their distances.
+    /// The results of `finish` for many queries and their distances.
     pub(crate) fn distance_batch_with(
         &self,
         points: &[Vec3],
@@ -221,6 +220,7 @@ impl TriangleBvh {
         let limit = query.limit(search.reach());
         self.wide.nearest(&query, limit, |leaf, limit| {
             let places = self.wide.leaves()[leaf].clone();
+            // Lanes beyond the leaf repeat its first triangle.
             let mut near = self.blocks[leaf].within(&query, limit) & ((1 << places.len()) - 1);
             let before = search.squared;
             while near != 0 {
@@ -256,13 +256,13 @@ impl TriangleBvh {
 /// No place.
 const NONE: usize = usize::MAX;
 
-/// A distance increased by more than rounding can have taken from it.
+/// A distance increased by a bound on its rounding error.
 #[inline]
 fn padded(distance: f64, slack: f64) -> f64 {
     distance * (1.0 + 1e-14) + slack
 }
 
-/// The square of a bound, such that a distance found earlier is within itself.
+/// The square of a bound, rounded up, so that a distance found earlier is within the bound of itself.
 fn inclusive_square(bound: f64) -> f64 {
     bound * bound * (1.0 + 4.0 * f64::EPSILON)
 }
@@ -295,7 +295,7 @@ impl<'a> Nearest<'a> {
         self.limit = reach * reach;
     }
 
-    /// Nothing farther away can be as near as the best.
+    /// The distance beyond which no box can hold anything as near as the best, rounding included.
     #[inline]
     fn reach(&self) -> f64 {
         padded(self.squared.sqrt(), self.bvh.slack)
@@ -307,6 +307,7 @@ impl<'a> Nearest<'a> {
         if squared > self.squared {
             return;
         }
+        // Of equally near faces the smallest, so that the answer does not depend on the search.
         let order = self.bvh.tree.order();
         let first = self.place == NONE || order[place] < order[self.place];
         if squared < self.squared || first {

@@ -11,7 +11,7 @@
 //! with the moments `S = sum int n`, `Q = sum int n y`, `O = sum int n y y`, in units of `R`.
 //!
 //! 1. The kernel is harmonic and symmetric in its indices, so only the symmetric, trace-free parts
-//!    of `Q` and `O` count. These are stored.
+//!    of `Q` and `O` contribute. Only these are stored.
 //! 2. *Error bound.* `1/|x - p| = sum_k |y|^k P_k(cos g) / d^(k+1)`. By the inequality of Bernstein
 //!    and Szego, `(dT/dg)^2 + k^2 T^2 <= k^2 max T^2` for trigonometric polynomials `T` of degree
 //!    `k`, the gradient of `|y|^k P_k(cos g)` is at most `k |y|^(k-1)`. The polynomial holds `k <= 3`;
@@ -26,7 +26,7 @@ use crate::Vec3;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expansion {
     pub centre: Vec3,
-    /// Every point of every triangle is within it.
+    /// Radius of a ball around the centre that holds all triangles.
     pub radius: f64,
     /// `S`.
     dipole: Vec3,
@@ -34,11 +34,11 @@ pub(super) struct Expansion {
     quadrupole: [f64; 6],
     /// `O`: xxx, yyy, zzz, xxy, xxz, yyx, yyz, zzx, zzy, xyz.
     octupole: [f64; 10],
-    /// `M`, from above.
+    /// An upper bound of `M`.
     third: f64,
 }
 
-/// A solid angle, and how far from the truth it can be.
+/// A solid angle, and a bound of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate {
     pub omega: f64,
@@ -88,7 +88,7 @@ impl Expansion {
         for (value, (i, j, k)) in self.octupole.iter_mut().zip(TRIPLES) {
             *value += (n[i] * second(j, k) + n[j] * second(k, i) + n[k] * second(i, j)) / 3.0;
         }
-        // The integrand is convex.
+        // The integrand is convex: its mean over a triangle is at most the mean over the corners.
         let mean = corners.iter().map(|v| v.length_squared() * v.length()).sum::<f64>() / 3.0;
         self.third += n.length() * mean;
     }
@@ -147,7 +147,7 @@ fn centroid(facets: &[Facet]) -> Vec3 {
     if centre.is_finite() { centre } else { by_corners / facets.len() as f64 }
 }
 
-/// Subtracts from symmetric tensors what harmonic kernels do not see.
+/// Subtracts the traces from symmetric tensors, to which harmonic kernels are blind.
 fn remove_traces(second: &mut [f64; 6], third: &mut [f64; 10]) {
     let trace = (second[0] + second[1] + second[2]) / 3.0;
     for diagonal in &mut second[..3] {

@@ -8,14 +8,14 @@
 //!
 //! 1. A node that is farther away than `beta` times its radius is replaced by its expansion, which
 //!    comes with a bound of its error ([`super::expansion`]).
-//! 2. Nearer nodes are opened, the triangles of nearer leaves summed ([`super::solid_angle`]).
+//! 2. Nearer nodes are opened; the triangles of nearer leaves are summed ([`super::solid_angle`]).
 //!
 //! # Deviations from the papers
-//! - The paper fixes `beta = 2` and reports the errors seen. Here the bounds are added up; is the
-//!   sum above the tolerance, then the query is repeated with the `beta` that promises to meet it.
-//!   No answer is farther from the sum of the solid angles than the tolerance, rounding aside.
-//! - The expansion is about the centre of the triangles by area with their exact integrals; the
-//!   paper's third term lacks some of these for triangles.
+//! - The paper fixes `beta = 2` and reports observed errors. Here the error bounds are summed. If the
+//!   sum exceeds the tolerance, the query is repeated with a `beta` that should meet it. Up to
+//!   rounding, no answer differs from the sum of the solid angles by more than the tolerance.
+//! - The expansion is about the area-weighted centre of the triangles, with exact integrals over them;
+//!   the paper's third term omits some of these for triangles.
 
 use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
@@ -29,22 +29,22 @@ use crate::geometry::planar_frame::power_of_two_below;
 use crate::geometry::trees::{Bounds, Node, Plan, Tree, in_morton_order};
 use crate::surface::TriMesh;
 
-/// Where queries start; Barill's constant.
+/// The first `beta` of each query: Barill's constant.
 const FIRST_BETA: f64 = 2.0;
-/// A tolerance not met by this is met by summing everything.
+/// If this `beta` would not meet the tolerance, all triangles are summed.
 const LAST_BETA: f64 = 1e4;
 
 /// Generalised winding numbers of any set of oriented triangles: the sum of their signed solid
 /// angles over `4 pi`.
 ///
 /// For a closed, outward-oriented surface this is the integer winding number of
-/// [`InsideTest`](crate::surface::InsideTest), 1 inside. Holes, gaps and overlaps disturb it little, and
-/// above 1/2 points count as inside.
+/// [`InsideTest`](crate::surface::InsideTest), 1 inside. Holes, gaps and overlaps change it little;
+/// points with a number above 1/2 count as inside.
 ///
-/// *On the surface* it jumps. There a triangle that holds the point to rounding counts nothing,
-/// which makes the value the mean of the two sides within a face, and the solid angle of the
-/// inside over `4 pi` at edges and vertices. Near it, at the distance `e` from an edge of a triangle
-/// of size `l` and area `a`, rounding is at most about `1e-16 l^3 / (a e)`.
+/// *On the surface* the number jumps. There a triangle that contains the point, up to rounding, counts
+/// as zero. So within a face the value is the mean of both sides, and at an edge or a vertex it is the
+/// solid angle of the inside over `4 pi`. At a distance `e` from an edge of a triangle of size `l` and
+/// area `a`, the rounding error is at most about `1e-16 l^3 / (a e)`.
 ///
 /// ```
 /// use medial::Vec3;
@@ -68,12 +68,13 @@ pub struct WindingTree {
     tolerance: f64,
 }
 
-/// A winding number and what is known of its error.
+/// A winding number and a bound of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Winding {
     /// The generalised winding number.
     pub number: f64,
-    /// The sum of the triangles' solid angles over `4 pi` differs by no more, rounding aside.
+    /// Bound, up to rounding, on the difference from the sum of the triangles' solid angles over
+    /// `4 pi`.
     pub error: f64,
 }
 
