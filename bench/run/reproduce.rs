@@ -79,8 +79,12 @@ impl<'a> Reproducer<'a> {
         if matches!(&source, Source::File(path) if !path.exists()) {
             return Err(format!("{} is not there: see --meshes", argument.display()));
         }
-        // Without a column of errors nothing is measured.
-        let samples = if exhibit.needs_evaluation() { self.samples } else { 0 };
+        // Without a column of errors nothing is measured, without one of distances next to nothing.
+        let samples = match exhibit.needs_evaluation() {
+            true if exhibit.needs_samples() => self.samples,
+            true => 1,
+            false => 0,
+        };
         let union_spacing = exhibit.needs_union().then_some(BALL_SPACING);
         let all = JudgeOptions::default();
         let volume_depth = if exhibit.needs_volume() { all.volume_depth } else { 0 };

@@ -241,6 +241,16 @@ impl Exhibit {
         self.reads_below("/evaluate") || self.reads_below("/noise")
     }
 
+    /// Whether any column asks for what surface samples decide: not topology, counts and angles.
+    pub fn needs_samples(&self) -> bool {
+        let exact = ["betti", "expected_betti", "counts", "quality", "spikes"];
+        let sampled = |place: &String| match place.strip_prefix("/evaluate/") {
+            Some(rest) => !exact.contains(&rest.split('/').next().unwrap_or(rest)),
+            None => place.starts_with("/noise"),
+        };
+        self.columns.iter().flat_map(|c| &c.of).any(sampled)
+    }
+
     /// Whether any column asks for the volume difference, which costs as much as all else.
     pub fn needs_volume(&self) -> bool {
         self.reads_below("/evaluate/volume_error")

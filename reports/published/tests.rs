@@ -37,13 +37,18 @@ fn only_what_a_column_reads_is_measured() {
     let mut needs = |place: &str| {
         exhibit.columns.truncate(1);
         exhibit.columns[0].of = vec![place.to_owned()];
-        (exhibit.needs_evaluation(), exhibit.needs_volume(), exhibit.needs_union())
+        [
+            exhibit.needs_evaluation(),
+            exhibit.needs_samples(),
+            exhibit.needs_volume(),
+            exhibit.needs_union(),
+        ]
     };
-    assert_eq!(needs("/simplify/spheres"), (false, false, false));
-    assert_eq!(needs("/evaluate/betti/0"), (true, false, false));
-    assert_eq!(needs("/evaluate/volume_error"), (true, true, false));
-    assert_eq!(needs("/noise/shift/in_space/computed_to_true_max"), (true, false, false));
-    assert_eq!(needs("/union/betti/1"), (false, false, true));
+    assert_eq!(needs("/simplify/spheres"), [false, false, false, false]);
+    assert_eq!(needs("/evaluate/betti/0"), [true, false, false, false]);
+    assert_eq!(needs("/evaluate/volume_error"), [true, true, true, false]);
+    assert_eq!(needs("/noise/shift/in_space/computed_to_true_max"), [true, true, false, false]);
+    assert_eq!(needs("/union/betti/1"), [false, false, false, true]);
 }
 
 #[test]
