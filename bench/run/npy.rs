@@ -5,8 +5,8 @@
 //! of the header (two bytes in version 1, four in 2 and 3), the header (a Python dictionary with the
 //! keys `descr`, `fortran_order` and `shape`), the numbers.
 //!
-//! Read are two-dimensional arrays of little-endian f8 and f4, in C or Fortran order. Memory grows
-//! with what the file holds, never with what its header claims.
+//! Supported are two-dimensional arrays of little-endian f8 and f4, in C or Fortran order. Memory grows
+//! with the numbers in the file, never with the size that its header claims.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
