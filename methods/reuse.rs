@@ -1,5 +1,5 @@
-//! What a search over levels keeps from one request to the next, and the seconds of a request as
-//! if it had been made alone.
+//! Results that a search over levels reuses from earlier requests, and the seconds of a request as if
+//! it had been made alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! How the filters compare a value with a level, and what is asked of them.
+//! How the filters compare a value with a level, and the requests that they answer.
 
 use std::ops::RangeInclusive;
 
@@ -12,7 +12,7 @@ pub(crate) struct Scale {
     pub range: RangeInclusive<f64>,
     /// `true` keeps values at the level (`>=`), `false` only those above it (`>`).
     pub inclusive: bool,
-    /// What [`Level::Published`] is.
+    /// The meaning of [`Level::Published`].
     pub published: Published,
 }
 
@@ -26,7 +26,7 @@ pub(crate) enum Published {
     None(&'static str),
 }
 
-/// What a filter is asked, once that has been found to mean something.
+/// A valid request to a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Wanted {
     /// At least one sphere.

@@ -77,8 +77,10 @@ impl<'a> Search<'a> {
     ) -> Self {
         let ratio = (most as f64 / MIN_SPHERES).powf(1.0 / (COUNTS - 1) as f64).max(RATIO);
         let count = |step: usize| (most as f64 / ratio.powi(step as i32)).round() as usize;
-        let counts =
-            (0..COUNTS).map(count).filter(|&count| count >= most.min(MIN_SPHERES as usize)).collect();
+        let counts = (0..COUNTS)
+            .map(count)
+            .filter(|&count| count >= most.min(MIN_SPHERES as usize))
+            .collect();
         let sweep = info.sweep.iter().copied().map(Level::Native);
         let own = sweep.chain([Level::Published]).collect();
         let (probes, tried, refusal) = (Vec::new(), 0, None);

@@ -7,15 +7,15 @@
 //! 4. The faces, as squares of two triangles on the corners of the voxels. The radius at a corner is
 //!    its distance from the surface.
 //!
-//! A number of spheres is met by the resolution (file `resolution.rs`), or, with `size=ranking`, by as
-//! many of the faces of largest angle as have so many corners.
+//! A number of spheres is met by the resolution (file `resolution.rs`) or, with `size=ranking`, by the
+//! faces of largest angle that together have at most this many corners.
 //!
 //! # Deviations from the paper
 //! - The paper rasterises distance fields in graphics hardware, slice by slice; here the closest points
 //!   are exact, from a tree.
-//! - No medial sphere is centred outside the solid. A face with one corner outside is the triangle of the
-//!   others, one with a side inside is that edge, any other is left out and counted. Only parts about
-//!   as thin as a voxel have any.
+//! - No medial sphere is centred outside the solid. A face with one corner outside becomes the triangle
+//!   of the others, a face with only one side inside becomes that edge, any other is left out and
+//!   counted. Such faces occur only in parts about as thin as a voxel.
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};

@@ -39,8 +39,7 @@ impl Ruler {
         let Some(surface) = &self.surface else {
             return Ok(at_samples);
         };
-        let options =
-            EnvelopeOptions { samples: ENVELOPE_SAMPLES, burial: MAX_BURIAL, seed: 0 };
+        let options = EnvelopeOptions { samples: ENVELOPE_SAMPLES, burial: MAX_BURIAL, seed: 0 };
         let boundary = sample_envelope(mesh, &union, &options).map_err(no_boundary)?;
         let nearest = surface.closest_batch(&boundary);
         Ok(nearest.iter().map(|n| n.distance).fold(at_samples, f64::max))

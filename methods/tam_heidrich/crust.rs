@@ -1,7 +1,7 @@
 //! The last step of the paper's pipeline, section 5: the poles that are left, for the power crust.
 //!
-//! 1. An inner pole is left if its polar ball is on what remains of the axis. One whose ball another
-//!    ball hides is on no part, and is not.
+//! 1. An inner pole is left if its polar ball is on the remaining axis. A pole whose ball is hidden by
+//!    another is on no part, so it is not left.
 //! 2. For objects with sharp corners the outer poles of removed features go too. An outer pole is
 //!    that of a removed feature if no inner polar ball that is left touches any of its samples.
 //! 3. The power crust of both ([`medial::geometry::PowerCrust`]). The balls are the polar balls as they

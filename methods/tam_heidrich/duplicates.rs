@@ -1,4 +1,4 @@
-//! Step 1, section 3: what is a duplicate, told by samples.
+//! Step 1, section 3: duplicates, recognised by their samples.
 //!
 //! 1. *Poles.* The inner pole of a sample is its farthest Voronoi vertex inside. Vertices that are
 //!    equally far, up to rounding, all are poles: on a grid every sample has several, and which one

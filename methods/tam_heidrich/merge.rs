@@ -1,4 +1,4 @@
-//! Step 1, section 3: vertices of the axis that are left nearly at one position are one.
+//! Step 1, section 3: merges vertices of the axis that are still nearly at one position.
 //!
 //! Several polar balls pass through one sample, so that the boundary of their perturbed union has several
 //! corners there, and the axis several vertices where the exact one has one. Those are merged by their

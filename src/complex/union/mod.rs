@@ -113,7 +113,8 @@ impl MedialUnion {
     /// squares would overflow.
     pub fn new(mesh: &MedialMesh) -> Result<Self, UnionError> {
         mesh.check()?;
-        let too_large = |m: &Sphere| m.centre.abs().max_element() > MAX_COORDINATE || m.radius > MAX_COORDINATE;
+        let too_large =
+            |m: &Sphere| m.centre.abs().max_element() > MAX_COORDINATE || m.radius > MAX_COORDINATE;
         if let Some(sphere) = mesh.spheres.iter().position(too_large) {
             return Err(UnionError::TooLarge { sphere });
         }

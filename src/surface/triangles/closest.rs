@@ -93,7 +93,8 @@ pub(super) fn check_corners(triangles: &[[Vec3; 3]]) -> Result<(), BvhError> {
         return Err(BvhError::Empty);
     }
     for (face, corners) in triangles.iter().enumerate() {
-        let fits = |corner: &&Vec3| corner.abs().max_element() <= MAX_COORDINATE && !corner.is_nan();
+        let fits =
+            |corner: &&Vec3| corner.abs().max_element() <= MAX_COORDINATE && !corner.is_nan();
         if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
             return Err(BvhError::Corner { face, corner });
         }
