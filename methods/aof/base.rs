@@ -1,9 +1,9 @@
-//! The lattice that the parameters ask for, or a finer one that does not lose what they would.
+//! The lattice of the parameters, or a finer one if that loses parts of the solid.
 //!
-//! Variants that keep the topology of their start set need one that has the solid's, and that no limb
-//! is missing from. Lattices half as fine again are tried until one has both; else the best of them is
-//! taken: the least difference of Betti numbers, then the least loss (file `losses.rs`), then the
-//! finest. What is lost is named.
+//! Variants that keep the topology of their start set need a start set with the solid's topology and
+//! without missing limbs. Lattices finer by half are tried until one has both; else the best is taken:
+//! the least difference of Betti numbers, then the least loss (file `losses.rs`), then the finest. A
+//! warning names what is lost.
 
 use medial::simplifier::{Diagnostics, SimplifyError};
 

@@ -213,7 +213,7 @@ impl Bits {
         (0..9).fold(0, |bits, k| {
             let (y, z) = (y + k % 3 - 1, z + k / 3 - 1);
             let row = |x: i32| u32::from(self.row([x, y, z]));
-            // From the bit before the row to the one after it.
+            // The row with one bit of room on either side, for neighbours in the bricks beside.
             let mut ten = row(x) << 1;
             match x % 8 {
                 0 => ten |= row(x - 1) >> 7,

@@ -2,9 +2,9 @@
 //! elsewhere.
 //!
 //! 1. The bounding box is halved down to blocks of coarse voxels; blocks outside are left out.
-//! 2. Each voxel gets the candidate triangles of its sphere and its descendants' from those of its
-//!    parent, with them its distance `D`, and from `D` its side: no test is needed where the parent
-//!    is farther from the surface than its descendants from it.
+//! 2. Each voxel gets the candidate triangles for its own sphere and those of its descendants from the
+//!    candidates of its parent. They give its distance `D` to the surface. A voxel has the side of its
+//!    parent, without a test, if the parent's distance exceeds that of its farthest descendant.
 //! 3. Above the finest level: where the sphere of radius `sigma` lies inside (`D >= sigma`), `AOF'`
 //!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, by default up
 //!    to the flux of the samples themselves in a constant field.

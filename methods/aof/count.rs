@@ -10,8 +10,8 @@
 //!    to the coarsest lattice that has both.
 //! 4. The rest is deleted, simple voxels of the largest flux first.
 //!
-//! Which lattices are tried depends on the count alone, so that the same count has the same answer
-//! whatever was asked before. Lattices that are there already are not made again.
+//! The lattices tried depend on the count alone, so that the same count has the same answer, whatever
+//! was asked before. Lattices made before are reused.
 
 use std::sync::Arc;
 

@@ -1,8 +1,8 @@
 //! Parts of a solid that a lattice loses: found, and named.
 //!
-//! A part that is thinner than two voxels has no voxel whose sphere fits inside. Where it is a limb the
-//! Betti numbers do not tell. So points of the surface, its vertices and the middles of its faces, are
-//! measured against the spheres of the voxels:
+//! A part thinner than two voxels has no voxel whose sphere fits inside. If it is a limb, its loss does
+//! not change the Betti numbers. So points of the surface, its vertices and the middles of its faces,
+//! are measured against the spheres of the voxels:
 //!
 //! 1. The spheres of voxels at the border of the start set; those inside reach no farther.
 //! 2. The point that is farthest from all of them is lost where it is farther than [`LOST`] voxels.

@@ -26,8 +26,8 @@ pub(super) struct DistinctBalls {
     pub(super) volumes: Vec<f64>,
 }
 
-/// Circumcentres nearer than this share of the radius are one, and radii nearer are equal: above rounding, which flat tetrahedra
-/// amplify, and far below the distance of samples.
+/// Circumcentres closer than this share of the radius count as one, and radii as equal: above rounding,
+/// which flat tetrahedra amplify, and far below the distance of samples.
 const COINCIDENT: f64 = 1e-7;
 
 impl DistinctBalls {

@@ -1,6 +1,6 @@
-//! Words behind the values of a `.ma` record: types of features and marks of deletion.
+//! Words after the values of a `.ma` record: types of features and marks of deletion.
 //!
-//! The tools of the field write different numbers of them; their number says what they are:
+//! Known tools write different numbers of them, and the number determines their meaning:
 //!
 //! | record | 1 word | 2 words | 3 words |
 //! |---|---|---|---|

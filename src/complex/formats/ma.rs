@@ -19,7 +19,7 @@ use super::scan::{Line, lines, shortened};
 use super::{LoadedMa, MaError, MaErrorKind};
 use crate::complex::{MedialMesh, Sphere};
 
-/// Bytes of the shortest possible line, `e 0 1`: what bounds an allocation by the file's size.
+/// Bytes of the shortest possible line, `e 0 1`: bounds allocations by the size of the file.
 const SHORTEST_RECORD: usize = 5;
 
 /// Reads a medial mesh from the text of a `.ma` file; `name` stands for the file in errors.

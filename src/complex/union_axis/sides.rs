@@ -1,4 +1,4 @@
-//! Step 3: which Voronoi vertices of the corners are inside the dual complex.
+//! Step 3: the Voronoi vertices of the corners that are inside the dual complex.
 
 use rayon::prelude::*;
 
@@ -139,7 +139,7 @@ fn joined(delaunay: &Delaunay, stations: &[[u32; 4]], free: &[bool]) -> Disjoint
     groups
 }
 
-/// How many sectors put a Voronoi vertex inside and outside.
+/// The numbers of sectors that put a Voronoi vertex inside and outside.
 #[derive(Clone, Copy, Default)]
 struct Votes {
     inside: u32,
