@@ -105,6 +105,7 @@ pub fn coarse_to_fine(
     let parts: Result<Vec<_>, SimplifyError> = blocks.par_iter().map(descend).collect();
     run.step(blocks.len(), blocks.len())?;
     let mut descent = Descent { voxels: Bricks::new(grid.size), tally: levels.tally() };
+    // In the order of the blocks: brick numbers, and with them every later order, are deterministic.
     for (voxels, tally) in parts? {
         voxels.into_iter().for_each(|voxel| descent.voxels.insert(voxel));
         descent.tally.add(&tally);
@@ -132,6 +133,7 @@ impl Levels {
             (0..params.levels).map(|level| params.d.pow(params.levels - 1 - level)).collect();
         let radius = |size: u32| grid.side * f64::from(size);
         let mut reaches: Vec<f64> = sizes.iter().map(|&size| radius(size)).collect();
+        // From fine to coarse: a reach covers the shift to a child's centre plus the child's reach.
         for level in (0..reaches.len() - 1).rev() {
             let moved = HALF_DIAGONAL * (radius(sizes[level]) - radius(sizes[level + 1]));
             reaches[level] = reaches[level].max(moved + reaches[level + 1]);
@@ -203,6 +205,7 @@ fn blocks(surface: &Surface, grid: &Grid, levels: &Levels) -> Vec<Block> {
             let half = (corner(hi) - corner(lo)).length() * 0.5;
             let mut set = NearSet::default();
             surface.triangles.narrow(&block.set, centre, half + levels.reaches[0], &mut set);
+            // A block farther from the surface than its own corners is on one side as a whole.
             if set.distance() <= half || surface.inside.side(centre) == Side::Inside {
                 open.push(Block { lo, hi, set });
             }
@@ -272,12 +275,14 @@ impl<'a> Walk<'a> {
         // Farthest centre of a descendant.
         let spread = HALF_DIAGONAL * (sigma - self.grid.side);
         let finest = level + 1 == self.levels.sizes.len();
+        // The sphere does not fit. Only the depth of the solid, for messages, may need the side.
         if finest && distance < sigma {
             if distance > self.tally.deepest && self.is_inside(known, centre) {
                 self.tally.deepest = distance;
             }
             return;
         }
+        // Farther from the surface than any descendant's centre is away: all have this side.
         if distance > spread {
             if !self.is_inside(known, centre) {
                 return;
@@ -302,6 +307,7 @@ impl<'a> Walk<'a> {
                 return;
             }
         }
+        // The spheres of all descendants fit, and no values are needed: skip the recursion.
         if self.wanted == Wanted::Places && distance >= spread + self.grid.side {
             self.emit_all(base, size, distance);
             return;

@@ -100,6 +100,8 @@ impl Solid<'_> {
         let mut at = search.high;
         while search.tried < MAX_TRIES && size(&search.best) < count {
             let ideal = search.growth.resolution_of(AIM * count as f64);
+            // At least a sixteenth finer, so that few tries suffice; at most twice, since estimates
+            // from a coarse lattice are poor.
             let next = ideal.clamp(at + 1 + at / 16, 2 * at + 1);
             if self.check_resolution(next).is_err() || self.visits(next) > MAX_VISITS {
                 break;
@@ -131,12 +133,13 @@ impl Solid<'_> {
         let mut is_lost = false;
         while search.tried < MAX_TRIES && size(&search.best) as f64 > ENOUGH * count as f64 {
             let Search { low, high, .. } = *search;
-            // Below a lattice that lost the topology not much is gained by going close to it.
+            // The bracket is narrow enough, the sooner if its lower end lost the topology.
             if high - low <= 1 + high / if is_lost { 8 } else { 16 } {
                 break;
             }
             search.tried += 1;
             let ideal = search.growth.resolution_of(AIM * count as f64);
+            // An estimate outside the bracket has been refuted: bisect.
             let next = if low < ideal && ideal < high { ideal } else { low.midpoint(high) };
             let lattice = lattices.get(next, || self.faithful_axis(next, base))?;
             is_lost |= lattice.is_none();
@@ -156,7 +159,7 @@ impl Solid<'_> {
     fn faithful_axis(&self, resolution: u32, base: &Base) -> Result<Option<Axis>, SimplifyError> {
         let start = self.descend(resolution, self.wanted())?;
         let (topology, base_loss) = (base.topology, base.loss.map_or(0.0, |loss| loss.distance));
-        // A finer lattice may have what the base misses.
+        // Another topology than the base's is accepted if it is the solid's: the base may lack it.
         let is_other = |b, t| b != t && Some(b) != self.shape.expected_betti();
         if topology.is_some_and(|t| is_other(betti_of(&start.voxels), t)) {
             return Ok(None);
@@ -199,6 +202,7 @@ impl Solid<'_> {
     ) -> Result<(), SimplifyError> {
         let before = axis.voxels.len();
         if self.params().variant == Variant::Plain {
+            // Most negative flux first. Stable, so ties go by place; then back to the order of places.
             axis.voxels.sort_by(|a, b| a.flux.total_cmp(&b.flux));
             axis.voxels.truncate(count);
             axis.voxels.sort_unstable_by_key(|v| [v.place[2], v.place[1], v.place[0]]);

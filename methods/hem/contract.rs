@@ -294,6 +294,7 @@ impl Contraction {
             edge.sound(&ground, ends, change.witnesses[place], star);
             edge
         });
+        // Simplices with `other` itself vanish from the hypothetical star when the edge collapses.
         let added = change.around.iter().map(|&x| [x, NONE]);
         let added = added.chain(change.sides.iter().copied());
         let added = added.filter(|simplex| !simplex.contains(&other));

@@ -251,6 +251,7 @@ impl Prepared {
             self.run.step(record.len() - collapses, record.len())?;
             self.ruler.error(&replay(&self.initial, &record[..collapses]))
         };
+        // The contraction itself goes on from its own end later; levels are replayed from the record.
         let kept = match last_within(record.len(), epsilon, error_at)? {
             Found::Within(kept) => kept,
             Found::None { best, error, measured } => {
