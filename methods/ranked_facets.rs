@@ -102,7 +102,7 @@ impl<'s> RankedFacets<'s> {
         })
     }
 
-    /// How many of the best facets have at most so many vertices together, at least one.
+    /// The number of best facets that together have at most `spheres` vertices; at least one.
     fn facets_for(&self, spheres: usize) -> usize {
         let mut seen = vec![false; self.set.mesh.spheres.len()];
         let mut count = 0;

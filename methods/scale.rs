@@ -16,7 +16,7 @@ pub(crate) struct Scale {
     pub published: Published,
 }
 
-/// What [`Level::Published`] is.
+/// The meaning of [`Level::Published`].
 pub(crate) enum Published {
     /// The paper's own level.
     Native(f64),
@@ -36,7 +36,7 @@ pub(crate) enum Wanted {
 }
 
 impl Scale {
-    /// What a level asks for; a documented level is announced in `diagnostics`.
+    /// The request of a level; a documented level is announced in `diagnostics`.
     pub(crate) fn wanted(
         &self,
         level: Level,

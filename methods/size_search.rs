@@ -168,7 +168,7 @@ struct Path<'a> {
     tried: Vec<f64>,
     /// How often it has gone outward since both values met.
     outward: i32,
-    /// The largest value with at most so many spheres, the smallest with more.
+    /// The bracket: the largest value with at most the requested count, the smallest with more.
     below: Option<End>,
     above: Option<End>,
     last_was_above: Option<bool>,

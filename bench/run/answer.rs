@@ -91,7 +91,7 @@ fn speaks_of_memory(why: &str) -> bool {
 }
 
 /// Starts a simplification on a view of a shape and asks it for every level, from fine to coarse.
-/// `on_level` is told of each level before it is asked.
+/// `on_level` is called with each level before it is asked.
 ///
 /// The view must be fresh: the answer lists as used everything that was used through it.
 pub fn answer<'s>(

@@ -62,12 +62,12 @@ impl Matrix {
 pub struct NpyError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The defect.
     #[source]
     pub kind: NpyErrorKind,
 }
 
-/// What is wrong with an `.npy` file.
+/// A defect of an `.npy` file.
 #[derive(Debug, thiserror::Error)]
 pub enum NpyErrorKind {
     /// The file cannot be opened or read.

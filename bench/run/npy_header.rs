@@ -38,7 +38,7 @@ pub(super) struct Header {
     pub(super) shape: Vec<u64>,
 }
 
-/// What is wrong with the header of an `.npy` file.
+/// A defect of the header of an `.npy` file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HeaderError {
     /// The file ends within the header.

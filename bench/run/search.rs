@@ -90,7 +90,7 @@ impl<'a> Search<'a> {
     /// The fewest spheres found with an error of at most `bound`.
     ///
     /// # Errors
-    /// What the method or the measure said last, where not one level gave a result.
+    /// The last error of the method or the measure, if no level gave a result.
     pub fn within(&mut self, bound: f64) -> Result<Found, SimplifyError> {
         for count in std::mem::take(&mut self.counts) {
             self.probe(Level::Spheres(count))?;
@@ -185,7 +185,7 @@ impl<'a> Search<'a> {
 }
 
 impl Found {
-    /// What is to be said where no level is within a bound.
+    /// The message for a bound that no level meets.
     pub fn refusal(&self, bound: f64) -> String {
         let percent = |fraction: f64| format!("{:.3} %", 100.0 * fraction);
         let best = self.best.map_or_else(String::new, |Probe { level, spheres, error }| {

@@ -35,7 +35,7 @@ pub struct Store {
     pub remarks: Vec<String>,
 }
 
-/// What decides whether a level has to be run again.
+/// The facts that decide whether a level has to be run again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Known {
     status: Status,

@@ -252,7 +252,7 @@ impl<'a> Supervisor<'a> {
                 worker.end();
                 return Err(RunError::Interrupted);
             }
-            // Also between events: whoever talks without end must not talk past the limit.
+            // Also between events: a worker that sends events without end must not escape the limit.
             if since.elapsed() > limits.time() {
                 worker.end();
                 return Ok(Attempt::Ended(stage, ending::timed_out(stage, &limits)));

@@ -58,7 +58,7 @@ pub(super) struct Peeled {
     sheets: Sheets,
     /// Sheets in the order of their removal, with their effective values, ascending.
     removed: Vec<(u32, f64)>,
-    /// Spheres left after so many removals.
+    /// Number of spheres left after each number of removals.
     left: Vec<usize>,
     scale: Scale,
     diagnostics: Diagnostics,
@@ -166,7 +166,7 @@ fn nearest_of_triangle([a, b, c]: [Vec3; 3], m: Vec3) -> Vec3 {
 }
 
 impl Peeled {
-    /// The axis without the first so many of the removed sheets.
+    /// The axis without the first `count` of the removed sheets.
     fn mesh(&self, count: usize) -> MedialMesh {
         let mut without = Without::none(&self.sheets);
         for &(sheet, _) in &self.removed[..count] {

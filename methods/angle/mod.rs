@@ -47,20 +47,20 @@ use crate::scale::{Published, Scale};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AngleParams {
-    /// What is filtered.
+    /// The elements that are filtered.
     pub variant: Variant,
     /// Where the angle of a facet is measured; `facet` alone.
     pub at: FacetAngle,
     /// Voxels along the longest side of the bounding box, which may have a fraction; `grid` alone.
     pub resolution: f64,
-    /// What a number of spheres is met by; `grid` and `homotopy` alone.
+    /// How a number of spheres is met; for `grid` and `homotopy` only.
     pub size: Size,
     /// Separation angle, in degrees, of [`Level::Published`], and
     /// of a number of spheres that is met by the sampling.
     pub theta: f64,
 }
 
-/// What is filtered.
+/// The elements that are filtered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variant {
@@ -74,7 +74,7 @@ pub enum Variant {
     Homotopy,
 }
 
-/// What a number of spheres is met by.
+/// How a number of spheres is met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {

@@ -24,9 +24,9 @@ pub struct Base {
     pub descent: Descent,
     /// Betti numbers of its voxels, where the variant keeps them.
     pub topology: Option<[u64; 3]>,
-    /// What it loses of the surface.
+    /// The part of the surface that it loses.
     pub loss: Option<Loss>,
-    /// What is to be said of it.
+    /// Counts and warnings about it.
     pub diagnostics: Diagnostics,
 }
 
@@ -89,7 +89,7 @@ impl Solid<'_> {
         Ok(Tried { resolution, betti, voxels: start.tally.start, loss })
     }
 
-    /// What may be lost, a fraction of the diagonal.
+    /// The largest loss that is accepted, a fraction of the diagonal.
     fn allowed(&self) -> f64 {
         LOST * self.grid(self.params().resolution).side
     }
@@ -159,7 +159,7 @@ impl Solid<'_> {
         }
     }
 
-    /// What a lattice other than that of the base loses, in words.
+    /// Warns about the losses of a lattice other than that of the base.
     ///
     /// # Errors
     /// As [`Solid::descend`].

@@ -132,7 +132,7 @@ impl Marks {
         *self.0.word(place) &= !(1 << inside(place).1);
     }
 
-    /// Which of the 27 neighbours have a mark, as for [`Bricks::neighbourhood`].
+    /// The marked places among the 27 around and at a place, as bits as in [`Bricks::neighbourhood`].
     #[inline]
     pub fn neighbourhood(&self, place: Place) -> u32 {
         self.0.neighbourhood(place)

@@ -39,7 +39,7 @@ const HALF_DIAGONAL: f64 = 0.866_025_403_784_438_6;
 pub struct Surface {
     /// Closest points.
     pub triangles: NearbyTriangles,
-    /// Which side.
+    /// The inside test.
     pub inside: Arc<InsideTest>,
 }
 
@@ -50,7 +50,7 @@ impl Surface {
     }
 }
 
-/// What to find out about the voxels.
+/// The values of the voxels that are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
     /// Places alone.
@@ -78,7 +78,7 @@ pub struct Tally {
 pub struct Descent {
     /// The voxels.
     pub voxels: Bricks,
-    /// What happened to them.
+    /// Counts of what happened to them.
     pub tally: Tally,
 }
 
@@ -228,7 +228,7 @@ struct Walk<'a> {
     tally: Tally,
 }
 
-/// What is known of a voxel from its ancestors.
+/// The facts about a voxel that follow from its ancestors.
 #[derive(Clone, Copy)]
 struct Known {
     /// Whether it and its descendants are inside, if that is the same for all.

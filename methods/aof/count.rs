@@ -34,7 +34,7 @@ pub type Lattices = Reuse<u32, Option<Axis>>;
 const ENOUGH: f64 = 1.15;
 /// A lattice may lose so much more of the surface than the base does or may.
 const WORSE: f64 = 1.2;
-/// What the estimate aims at, in counts.
+/// The size that the estimate aims at, in requested counts.
 const AIM: f64 = 1.06;
 /// Lattices that are tried for a count.
 const MAX_TRIES: usize = 8;
@@ -171,7 +171,7 @@ impl Solid<'_> {
         self.axis(resolution, &start, self.params().angle).map(Some)
     }
 
-    /// What is missing of the spheres of an axis that was taken down to a count.
+    /// Warns about parts of the surface far from all spheres of an axis that was taken down to a count.
     fn say_what_the_count_loses(
         &self,
         axis: &Axis,
@@ -265,7 +265,7 @@ impl Growth {
         Self { sheets: sheets as f64 / (r * r), curves: (axis.voxels.len() - sheets) as f64 / r }
     }
 
-    /// The resolution, rounded up, that should have so many voxels.
+    /// The resolution, rounded up, that should give this number of voxels.
     fn resolution_of(&self, voxels: f64) -> u32 {
         // The root of a quadratic without cancellation, and without division where it is linear.
         let root = (self.curves * self.curves + 4.0 * self.sheets * voxels).sqrt();

@@ -16,7 +16,7 @@ use super::solid::Solid;
 
 /// How often the resolution is lowered for the medial mesh.
 const MAX_LOWERINGS: usize = 4;
-/// What a lower resolution aims at, as a share of the limit.
+/// The memory that a lower resolution aims at, as a share of the limit.
 const AIM: f64 = 0.95;
 
 /// The solid at the published level.

@@ -165,7 +165,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for AutoVisitor<T> {
     }
 }
 
-/// What there is to set.
+/// The parameters that can be set.
 pub(super) fn describe() -> Vec<ParamInfo> {
     let fixed = AofSettings::default();
     vec![

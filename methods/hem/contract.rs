@@ -44,7 +44,7 @@ pub(super) enum Stop {
 struct Taken {
     error: f64,
     ends: [u32; 2],
-    /// Which of the ends survives.
+    /// The end (0 or 1) that survives.
     survivor: usize,
 }
 

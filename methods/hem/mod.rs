@@ -132,7 +132,8 @@ const PUBLISHED: f64 = 1e-4;
 /// The HEM simplifier.
 ///
 /// Answers [`Level::Spheres`], and [`Level::Native`] with a bound that holds for every sample
-/// against the whole union: one-sided, unless the parameter `sides` asks for both directions. A request finer than the one before starts anew.
+/// against the whole union: one-sided, unless the parameter `sides` asks for both directions. A
+/// request finer than the one before starts anew.
 ///
 /// ```
 /// use medial::shape::{Shape, ShapeOptions};

@@ -42,13 +42,13 @@ use crate::scale::{Published, Scale};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LambdaParams {
-    /// What is filtered.
+    /// The elements that are filtered.
     pub variant: Variant,
     /// Whether edges and vertices are kept that pass without a facet; `cell` alone.
     pub leftovers: bool,
 }
 
-/// What is filtered.
+/// The elements that are filtered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variant {

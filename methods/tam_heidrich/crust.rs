@@ -24,7 +24,7 @@ pub struct RemainingPoles {
     pub is_touched: Vec<bool>,
 }
 
-/// Which outer poles the power crust takes.
+/// The outer poles that the power crust takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OuterPoles {
     /// All of the samples: what the paper does for most objects.
@@ -96,7 +96,7 @@ impl AxisPoles {
         Self { inner: inner.collect(), samples }
     }
 
-    /// What is left where some spheres of the axis are.
+    /// The poles left when these spheres of the axis are left.
     pub(super) fn remaining(&self, sphere_kept: &[bool]) -> RemainingPoles {
         let (mut inner, mut is_touched) = (Vec::new(), vec![false; self.samples]);
         for (ball, _, samples) in self.inner.iter().filter(|i| sphere_kept[i.1 as usize]) {

@@ -68,7 +68,7 @@
 //!   of the balls, and facets stay open.
 //! - The axis of the union is exact, not the subset of the Voronoi diagram of the corners that
 //!   intersects the power shape.
-//! - Inner and outer poles are told apart by the surface.
+//! - The inside test of the surface separates inner and outer poles.
 //! - A given medial mesh is pruned in place of step 1 (`axis=initial` does so with the Voronoi medial
 //!   mesh too). Where it was given, there are no poles on it: each interior tetrahedron counts for the face
 //!   nearest to its circumcentre. The Voronoi medial mesh holds all circumcentres, and each sphere
@@ -229,7 +229,7 @@ impl Prepared {
         }
     }
 
-    /// Step 6, without any test but for what it did.
+    /// Step 6: removes parts without a test of topology, and reports the effect.
     fn remove_by_hand(
         &self,
         remaining: &mut Remaining<'_>,

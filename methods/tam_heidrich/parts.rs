@@ -27,7 +27,7 @@ use medial::geometry::DisjointSets;
 use super::axis::Axis;
 use super::kept::kept_part;
 
-/// What is left of an axis.
+/// The remaining part of an axis.
 #[derive(Clone)]
 pub(super) struct Remaining<'a> {
     pub(super) axis: &'a Axis,

@@ -15,7 +15,7 @@ use super::parts::{Parts, Remaining};
 /// The threshold of a round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Measure {
-    /// Parts of at most so many triangles.
+    /// Parts of at most this many triangles.
     Triangles(usize),
     /// Parts of at most this relative volume in per cent.
     Volume(f64),
@@ -29,7 +29,7 @@ pub(super) struct Pruning<'a> {
     pub(super) diagnostics: Diagnostics,
     run: &'a RunContext,
     params: &'a TamHeidrichParams,
-    /// Rounds end as near to so many spheres as whole parts allow.
+    /// Rounds end as near to this number of spheres as whole parts allow.
     enough: usize,
     /// The number of spheres on the other side of `enough`, once the rounds ended there.
     pub(super) other_side: Option<usize>,

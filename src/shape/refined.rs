@@ -47,7 +47,7 @@ pub const BOUND: f64 = 0.01;
 /// Rounds at most.
 pub const ROUNDS: usize = 16;
 
-/// At most so many times the vertices become samples, or [`ENOUGH`] where that is more.
+/// Bound on the samples: this many times the vertices, or [`ENOUGH`] if that is more.
 pub const MOST_TIMES: usize = 8;
 
 /// So many samples are allowed to every surface.
@@ -57,10 +57,10 @@ pub const ENOUGH: usize = 20_000;
 /// of its radius. Other balls belong to slivers on the surface, which new samples would just replace.
 const PIERCED: f64 = 0.15;
 
-/// Where the topology is still wrong after so many rounds, balls count that are pierced by a third of this.
+/// If the topology is still wrong after this many rounds, balls pierced by a third of this count, too.
 const PATIENCE: usize = 8;
 
-/// After so many rounds that brought nothing the longest side of each face is halved.
+/// After this many rounds without progress the longest side of each face is halved.
 const STALLED: usize = 4;
 
 /// Samples nearer to a new one than this fraction of what a ball is pierced by are in its place.
@@ -111,7 +111,7 @@ struct Place {
 }
 
 impl Refined {
-    /// What is still wrong, for the reader of a result.
+    /// The remaining defects, for the reader of a result.
     pub fn warning(&self) -> Option<String> {
         let Self { samples, betti, expected, error, .. } = self;
         let topology = expected.filter(|expected| expected != betti).map(|expected| {
@@ -180,7 +180,7 @@ impl Refinement<'_> {
         expected.iter().zip(betti).map(|(a, b)| a.abs_diff(b)).sum()
     }
 
-    /// What is wrong with a diagram, and where, the worst first.
+    /// The defects of a diagram and their places, the worst first.
     fn judge(&self, diagram: &Diagram, tested: &[Vec3], rounds: usize) -> (Refined, Vec<Place>) {
         let betti = betti(&diagram.medial);
         let wrong = self.wrong(betti) > 0;

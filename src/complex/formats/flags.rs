@@ -152,7 +152,7 @@ impl Flags {
         self.records.iter().flat_map(|records| &records[1..]).sum()
     }
 
-    /// Which records of a kind are marked as deleted.
+    /// The records of a kind that are marked as deleted.
     pub(super) fn deleted(&self, kind: usize) -> &[bool] {
         &self.deleted[kind]
     }

@@ -56,7 +56,7 @@ pub fn parse_ma(text: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError>
     records.finish(name)
 }
 
-/// What has been read so far, and how much is to come.
+/// The records read so far, and the numbers still to come.
 struct Records {
     announced: [u64; 3],
     spheres: Vec<Sphere>,

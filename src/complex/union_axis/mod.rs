@@ -100,7 +100,7 @@ pub struct AxisTally {
     /// Groups of Voronoi vertices that no sector or contradictory sectors put on a side. Zero but
     /// for rounding.
     pub doubtful: usize,
-    /// Facets whose sides do not close up and are missing from the axis. Zero but for rounding.
+    /// Facets whose sides do not close up and are missing from the axis. Zero except for rounding.
     pub open: usize,
     /// Voronoi vertices that rounding had outside the box of all centres, moved into it.
     pub clamped: usize,
@@ -230,13 +230,13 @@ impl UnionAxis {
         &self.corners
     }
 
-    /// The Betti numbers of the union, exact: those of the axis, but for what is said in
+    /// The Betti numbers of the union, exact: those of the axis, except as described in
     /// [the module](self).
     pub fn union_betti(&self) -> [u64; 3] {
         self.union_betti
     }
 
-    /// What it was made from.
+    /// The sizes of its input, and counts of defects.
     pub fn tally(&self) -> &AxisTally {
         &self.tally
     }

@@ -111,7 +111,7 @@ fn has(balls: &[u32], ball: u32) -> bool {
 }
 
 impl Corners {
-    /// Which of two balls has its centre first along the outward normal of a facet.
+    /// The ball, of two, whose centre comes first along the outward normal of a facet.
     fn nearer(&self, delaunay: &Delaunay, facet: [VertexId; 3], a: u32, b: u32) -> u32 {
         let [p, q, r] = facet.map(|v| delaunay.point(v));
         let normal = (q - p).cross(r - p);
