@@ -1,5 +1,5 @@
-//! Methods whose number of spheres is met by a knob that is not their level: the density of the
-//! samples, the resolution of a lattice (`size_search.rs`).
+//! Methods that meet a number of spheres by a knob other than their level: the density of the samples,
+//! or the resolution of a lattice (`size_search.rs`).
 
 use medial::shape::{Cost, Shape};
 use medial::simplifier::{Level, RunContext, Simplification, Simplified, SimplifyError, Work};

@@ -1,7 +1,6 @@
 //! No simplification: the initial medial mesh as it is.
 //!
-//! What every method starts from, as a row like theirs, so that a table says which errors and which
-//! wrong Betti numbers are the start's own.
+//! As a row of its own, it shows which errors and wrong Betti numbers are those of the common start.
 
 use medial::shape::Shape;
 use medial::simplifier::{

@@ -42,7 +42,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
     ]
 }
 
-/// The method with an id, or `None`. [`initial`] simplifies nothing and is none of them.
+/// The method with an id, or `None`. [`initial`] simplifies nothing and is not among them.
 pub fn find(id: &str) -> Option<Box<dyn MedialSimplifier>> {
     registry().into_iter().find(|method| method.info().id == id)
 }

@@ -1,8 +1,8 @@
 //! Balls in general position, for methods on unions of polar balls.
 //!
-//! Polar balls meet in samples by construction, and only up to rounding: which of them overlap there
-//! is decided by nothing. Slightly larger radii and slightly moved centres, as in the authors' tool of
-//! the scale axis transform, let them overlap.
+//! Polar balls meet in samples by construction, but only up to rounding, which decides at random which
+//! of them overlap there. With slightly larger radii and slightly moved centres, as in the authors' tool
+//! of the scale axis transform, they all overlap.
 
 use medial::Vec3;
 use medial::complex::Sphere;

@@ -1,5 +1,5 @@
-//! What the per-sphere filters share: rank the spheres once, then keep those above a threshold or
-//! the best so many, and return the induced subcomplex.
+//! The common part of the per-sphere filters: rank the spheres once, then keep those above a threshold
+//! or a number of the best, and return the induced subcomplex.
 
 use std::sync::Arc;
 

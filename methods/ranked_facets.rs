@@ -1,4 +1,4 @@
-//! What the per-facet filters share: rank the Voronoi facets once, then keep those above a
+//! The common part of the per-facet filters: rank the Voronoi facets once, then keep those above a
 //! threshold, or as many of the best as a number of spheres allows, with their edges and vertices.
 
 use std::cell::OnceCell;
@@ -50,7 +50,7 @@ impl FacetSet {
     }
 }
 
-/// What the facets are ranked by.
+/// The value by which facets are ranked.
 pub(crate) trait FacetValue: Send + Sync {
     /// The value of a facet, in native units; larger values are kept longer.
     fn value(&self, facet: usize) -> f64;
@@ -102,7 +102,7 @@ impl<'s> RankedFacets<'s> {
         })
     }
 
-    /// How many of the best facets have at most so many vertices together, at least one.
+    /// The number of best facets that together have at most `spheres` vertices; at least one.
     fn facets_for(&self, spheres: usize) -> usize {
         let mut seen = vec![false; self.set.mesh.spheres.len()];
         let mut count = 0;

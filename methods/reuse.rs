@@ -1,5 +1,5 @@
-//! What a search over levels keeps from one request to the next, and the seconds of a request as
-//! if it had been made alone.
+//! Results that a search over levels reuses from earlier requests, and the seconds of a request as if
+//! it had been made alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ pub(crate) struct Reuse<K, T> {
     made: BTreeMap<K, (Arc<T>, Cost)>,
     /// Keys that the current request has asked for.
     asked: BTreeSet<K>,
-    /// What those of them cost that were made for earlier requests.
+    /// The cost of those of them that were made for earlier requests.
     earlier: Option<Cost>,
 }
 
@@ -78,7 +78,7 @@ mod tests {
             }
             (made, reuse.work(), reuse.made.clone())
         };
-        // What a request makes itself is in its own time, however often it asks.
+        // A value made by the request itself is in its own time, however often it is asked for.
         let (made, work, _) = request(&[1, 2, 1]);
         assert_eq!((made, work), (vec![1, 2], Work::Anew));
         let (made, work, costs) = request(&[2, 3, 2, 1]);

@@ -1,4 +1,4 @@
-//! How the filters compare a value with a level, and what is asked of them.
+//! How the filters compare a value with a level, and the requests that they answer.
 
 use std::ops::RangeInclusive;
 
@@ -12,11 +12,11 @@ pub(crate) struct Scale {
     pub range: RangeInclusive<f64>,
     /// `true` keeps values at the level (`>=`), `false` only those above it (`>`).
     pub inclusive: bool,
-    /// What [`Level::Published`] is.
+    /// The meaning of [`Level::Published`].
     pub published: Published,
 }
 
-/// What [`Level::Published`] is.
+/// The meaning of [`Level::Published`].
 pub(crate) enum Published {
     /// The paper's own level.
     Native(f64),
@@ -26,7 +26,7 @@ pub(crate) enum Published {
     None(&'static str),
 }
 
-/// What a filter is asked, once that has been found to mean something.
+/// A valid request to a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Wanted {
     /// At least one sphere.
@@ -36,7 +36,7 @@ pub(crate) enum Wanted {
 }
 
 impl Scale {
-    /// What a level asks for; a documented level is announced in `diagnostics`.
+    /// The request of a level; a documented level is announced in `diagnostics`.
     pub(crate) fn wanted(
         &self,
         level: Level,

@@ -1,7 +1,7 @@
-//! The complex of the Voronoi facets inside a surface, and what is left without some of them.
+//! The complex of the Voronoi facets inside a surface, and its subcomplexes without some of them.
 //!
-//! A facet is where two samples are the closest: a sheet of the medial axis as it is governed by
-//! two sites of the boundary.
+//! A facet consists of the points whose closest samples are a given pair: it is a sheet of the medial
+//! axis, governed by two sites of the boundary.
 
 use medial::complex::{MedialMesh, VoronoiFacets};
 

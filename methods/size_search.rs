@@ -1,16 +1,17 @@
-//! A number of spheres by a knob that is not the level: how densely the surface is sampled, how fine
-//! a lattice is. The level stays where it is.
+//! Meets a number of spheres by a knob other than the level: the density of the samples, or the
+//! resolution of a lattice. The level is not changed.
 //!
 //! 1. The first value is guessed by a power law between knob and spheres.
-//! 2. By the same law, from the nearest value so far, until the count lies between two values.
-//! 3. Between them the Illinois variant of regula falsi, on logarithms.
-//! 4. Counts jump: samples of another number are other samples. Where both values have met without the
-//!    count, those around them in growing distance.
+//! 2. The next values follow the same law from the nearest value so far, until two values bracket the
+//!    count.
+//! 3. Between them: the Illinois variant of regula falsi, on logarithms.
+//! 4. Counts jump, because another number of samples means other samples. If the bracket has closed
+//!    without the count, values around it are tried at growing distances.
 //!
-//! The search ends at a count of at most [`TOLERANCE`] below the one asked, after [`MAX_PROBES`], or
-//! where no value is left to try. The answer is the nearest count from below that was met. Which
-//! values are tried depends on the count alone, so that the same count has the same answer whatever
-//! was asked before; what was made for earlier counts is not made again.
+//! The search ends at a count of at most [`TOLERANCE`] below the requested one, after [`MAX_PROBES`]
+//! values, or when no value is left to try. The answer is the largest count met that does not exceed the
+//! request. The values tried depend on the count alone, so that the same request has the same answer,
+//! whatever was asked before; results for earlier requests are reused.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -21,8 +22,8 @@ use medial::simplifier::{Diagnostics, Extras, Level, RunContext, Simplified, Sim
 
 use crate::reuse::Reuse;
 
-/// A count within this fraction below the one asked ends the search; comparisons at equal counts take
-/// such a count for the one asked.
+/// A count within this fraction below the requested one ends the search; comparisons at equal counts
+/// accept such a count.
 const TOLERANCE: f64 = 0.02;
 
 /// Values that are tried at most.
@@ -37,14 +38,14 @@ const MAX_STEP: f64 = 16.0;
 /// Two values nearer to each other, as a fraction, have met.
 const MET: f64 = 2e-3;
 
-/// What step 4 goes outward by, as a fraction.
+/// Distance of the first values of step 4, as a fraction.
 const OUTWARD: f64 = 0.01;
 
-/// What a search turns.
+/// The knob that a search turns.
 pub(crate) struct Knob {
     /// Name under which the value is reported, times [`Knob::steps`].
     pub count: &'static str,
-    /// What the value is a number of, for messages.
+    /// The unit of the value, for messages.
     pub unit: &'static str,
     /// Values that can be tried.
     pub range: RangeInclusive<f64>,
@@ -167,7 +168,7 @@ struct Path<'a> {
     tried: Vec<f64>,
     /// How often it has gone outward since both values met.
     outward: i32,
-    /// The largest value with at most so many spheres, the smallest with more.
+    /// The bracket: the largest value with at most the requested count, the smallest with more.
     below: Option<End>,
     above: Option<End>,
     last_was_above: Option<bool>,
@@ -206,10 +207,10 @@ impl<'a> Path<'a> {
             self.next = None;
             return;
         }
-        // A little below the count, since one above is of no use.
+        // Aims a little below the count, since a larger count is of no use.
         let aim = (1.0 - TOLERANCE / 2.0) * self.count as f64;
         let end = End { value, excess: ((size as f64).max(0.5) / aim).ln() };
-        // An end that stays twice pulls half as hard.
+        // Illinois: an end that stays twice counts half.
         let pull = if self.last_was_above == Some(is_above) { 0.5 } else { 1.0 };
         let halved = |end: End| End { excess: pull * end.excess, ..end };
         if self.outward > 0 {

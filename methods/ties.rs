@@ -1,14 +1,13 @@
-//! What is kept first of items of equal value.
+//! The order of items of equal value.
 //!
-//! Values saturate: sheets through the middle of their two samples all have 180 degrees, facets of a plate
-//! all have half its thickness. Indices follow a curve, so that the first of the tied would be one
-//! lump at one end of the shape. So would be the first by rounding, which grows with the coordinates:
-//! values tie that agree but for that ([`tie`]).
+//! Many values are equal: sheets through the middle of their two samples all have 180 degrees, facets of
+//! a plate all have half its thickness. Ordered by index, the first of them would form one lump at one
+//! end of the shape, because indices follow a curve. Ordered by rounding errors, which grow with the
+//! coordinates, they would, too. So values that agree up to rounding count as equal ([`tie`]).
 //!
-//! The larger item is kept first, and of about equally large ones an order that spreads every
-//! beginning of it over all of them ([`spread_order`]). Sizes are compared by half octaves: compared
-//! exactly, they would gather the first items where the shape is thickest, and rounding would decide
-//! on a plate.
+//! Larger items are kept first. Items of about the same size are ordered such that every prefix is
+//! spread over all of them ([`spread_order`]). Sizes are compared by half octaves: compared exactly, the
+//! first items would gather where the shape is thickest, and rounding would decide on a plate.
 
 use medial::Vec3;
 use medial::complex::Sphere;
@@ -17,10 +16,10 @@ use medial::geometry::trees::spread_order;
 /// Size classes in a doubling of the radius.
 const CLASSES: f64 = 2.0;
 
-/// What rounding does to equal values, relative.
+/// Bound on the relative rounding error of equal values.
 const ROUNDING: f64 = 1e-12;
 
-/// Whether two values are the same but for rounding.
+/// Whether two values are equal up to rounding.
 pub(crate) fn tie(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }

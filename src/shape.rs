@@ -74,7 +74,7 @@ struct Store {
     report: SurfaceReport,
     options: ShapeOptions,
     samples: Cache<Sampling, Arc<[Vec3]>>,
-    /// What [`Sampling::Auto`] could not mend.
+    /// Defects that [`Sampling::Auto`] could not mend.
     unmended: OnceLock<String>,
     delaunay: Cache<Sampling, Arc<Delaunay>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
@@ -84,7 +84,7 @@ struct Store {
     of_surface: Arc<OfSurface>,
 }
 
-/// What does not depend on the samples.
+/// The part that does not depend on the samples.
 #[derive(Default)]
 struct OfSurface {
     tree: Cache<(), Arc<TriangleBvh>>,
@@ -201,7 +201,7 @@ impl Shape {
         &self.store.normalisation
     }
 
-    /// What was found and repaired when the surface was read, in input units.
+    /// The findings and repairs of reading the surface, in input units.
     pub fn report(&self) -> &SurfaceReport {
         &self.store.report
     }

@@ -1,4 +1,4 @@
-//! `medial check [ID ...]`: the conformance corpus on methods, built-in or from elsewhere.
+//! `medial check [ID ...]`: runs the conformance corpus on methods, built-in or plug-ins.
 
 use std::time::Instant;
 
@@ -45,8 +45,8 @@ struct Counts {
 /// Runs the verb.
 ///
 /// # Errors
-/// When a method, a case or a parameter does not exist, or no worker can be started. What a method
-/// does wrong is a line of the output and the exit code.
+/// When a method, a case or a parameter does not exist, or no worker can be started. A case that a
+/// method fails is no error here: it is a line of the output, and sets the exit code.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let entries = arguments.entries(registry)?;
     let cases = arguments.cases()?;
@@ -122,7 +122,7 @@ impl Arguments {
         let mut items = Vec::new();
         for entry in entries {
             let documented = &entry.method().info().params;
-            // Otherwise every case would fail for it.
+            // Refused at once, because every case would fail.
             if let Some(key) =
                 params.0.keys().find(|key| documented.iter().all(|p| p.name != **key))
             {
@@ -162,7 +162,7 @@ impl Arguments {
     }
 }
 
-/// The name of this program, which is another one where methods of a crate are added.
+/// The name of this program. A crate that adds methods builds a program of its own.
 fn program() -> String {
     let path = std::env::args_os().next().map(std::path::PathBuf::from);
     let name = path.as_ref().and_then(|path| path.file_stem());

@@ -1,4 +1,4 @@
-//! Hierarchies in files, and what each was made from: the label of the file.
+//! Hierarchies in files. The label of a file records the origin of its hierarchy.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::output::version;
 use crate::run::Input;
 use medial::shape::Cost;
 
-/// What a hierarchy was made from, and by which method.
+/// The input and the method that a hierarchy was made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
     method: String,
@@ -30,7 +30,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// What a method would start from now; `initial` is the file of the initial mesh, if it has one.
+    /// The origin that a hierarchy would have now; `initial` is the file of the initial mesh, if any.
     pub fn new(
         method: &str,
         params: &Params,
@@ -54,7 +54,7 @@ impl Origin {
         }
     }
 
-    /// Why a hierarchy of this origin does not fit the present one.
+    /// The first difference from the present origin, as a reason to refuse the hierarchy.
     fn mismatch(&self, now: &Self) -> Option<String> {
         if self.method != now.method {
             return Some(format!("it is of the method {}, not {}", self.method, now.method));
@@ -67,7 +67,7 @@ impl Origin {
             let (then, now) = (from(self.initial), from(now.initial));
             return Some(format!("it was made {then} --initial, and is asked for {now}"));
         }
-        // A given medial mesh is compared itself; how another would be made is of no matter.
+        // These options do not affect a given medial mesh, which is compared itself later.
         let made =
             [("--sampling", &self.sampling, &now.sampling), ("--dual", &self.dual, &now.dual)];
         if let Some((option, then, now)) =
@@ -84,7 +84,7 @@ impl Origin {
 pub struct Loaded {
     /// The hierarchy.
     pub hierarchy: Arc<Hierarchy>,
-    /// What reading and checking it took.
+    /// The cost of reading and checking it.
     pub read: Cost,
 }
 
@@ -92,13 +92,13 @@ impl Loaded {
     /// The levels of the hierarchy.
     ///
     /// # Errors
-    /// When it is not of the method.
+    /// When it was made by another method.
     pub fn resume(
         &self,
         method: &dyn MedialSimplifier,
         params: &Params,
     ) -> Result<Box<dyn Simplification>, SimplifyError> {
-        // One method has hierarchies so far; another will bring its own way to go on from them.
+        // So far one method has hierarchies; each further one needs its own way to resume.
         match &*method.info().id {
             "pmat" => medial_methods::pmat::resume(Arc::clone(&self.hierarchy), params),
             _ => Err(SimplifyError::unsupported(format!(

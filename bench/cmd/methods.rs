@@ -1,4 +1,4 @@
-//! `medial methods [ID]`: what methods there are.
+//! `medial methods [ID]`: lists the methods, or describes one.
 
 use clap::Args;
 use medial::simplifier::{MedialSimplifier, MethodInfo};

@@ -1,8 +1,8 @@
 //! First step of a run: a method answers, on the clock.
 //!
-//! The one place where methods are timed. [`answer`] prepares once and asks for every level, each
-//! within a guard against panics, and gives a [`LevelRun`] for each: the mesh, the times, the
-//! memory. Measuring and writing come later and count for nothing.
+//! This is the only place where methods are timed. [`answer`] prepares once and asks for every level,
+//! each guarded against panics. It gives a [`LevelRun`] for each: the mesh, the times, the memory.
+//! Measuring and writing come later and are not timed.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,26 +13,26 @@ use medial::simplifier::{Level, Simplification, Simplified, SimplifyError, Work}
 use medial_reports::{Stages, Status};
 use serde::{Deserialize, Serialize};
 
-/// What came of one level.
+/// The outcome of one level.
 pub struct LevelRun {
     /// The level that was asked.
     pub level: Level,
     /// The result, or why there is none.
     pub outcome: Result<Simplified, Fault>,
-    /// What the level took, and what it stands on.
+    /// The cost of the level, and of the substrates that it used.
     pub times: Times,
 }
 
-/// Seconds and memory of one level, as if it had been asked alone.
+/// Seconds and memory of one level, as if only this level had been asked.
 #[derive(Clone, Debug, Default)]
 pub struct Times {
     /// The substrates that the method used, each with its cost, whoever built it.
     pub substrates: Vec<(Substrate, Cost)>,
-    /// The method's own work that no level changes.
+    /// The method's own work that is the same for all levels.
     pub prepare: Cost,
-    /// From there to this level.
+    /// The work from there to this level.
     pub simplify: Cost,
-    /// The most live bytes at one time, with the substrates that the method used.
+    /// Peak of live bytes, with the substrates that the method used.
     pub peak_bytes: u64,
 }
 
@@ -48,7 +48,7 @@ impl Times {
     }
 
     fn stages(&self, part: fn(&Cost) -> f64) -> Stages {
-        // From +0: the sum of nothing is -0 otherwise, and prints so.
+        // A fold from +0, because an empty sum is -0 and prints as such.
         let substrates = self.substrates.iter().fold(0.0, |sum, (_, cost)| sum + part(cost));
         Stages::new(substrates, part(&self.prepare), part(&self.simplify))
     }
@@ -57,9 +57,9 @@ impl Times {
 /// Why a level has no result.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
-    /// What became of it.
+    /// The kind of failure.
     pub status: Status,
-    /// Why, in a sentence.
+    /// The reason, in a sentence.
     pub reason: String,
 }
 
@@ -80,8 +80,8 @@ impl From<SimplifyError> for Fault {
     }
 }
 
-/// Whether a program that failed says that it was refused memory. The limit of the worker holds for
-/// the programs that it starts, and most of them end by themselves when they meet it.
+/// Whether the message of a failed program says that it ran out of memory. Programs inherit the
+/// worker's limit, and most end with such a message when they reach it.
 fn speaks_of_memory(why: &str) -> bool {
     let why = why.to_lowercase();
     let words =
@@ -91,9 +91,9 @@ fn speaks_of_memory(why: &str) -> bool {
 }
 
 /// Starts a simplification on a view of a shape and asks it for every level, from fine to coarse.
-/// `on_level` is told of each level before it is asked.
+/// `on_level` is called with each level before it is asked.
 ///
-/// The view must be fresh: what is used through it is what the answer says was used.
+/// The view must be fresh: the answer lists as used everything that was used through it.
 pub fn answer<'s>(
     view: &Shape,
     start: impl FnOnce() -> Result<Box<dyn Simplification + 's>, SimplifyError>,
@@ -101,11 +101,11 @@ pub fn answer<'s>(
     mut on_level: impl FnMut(Level),
 ) -> Vec<LevelRun> {
     let (started, mut prepare) = Cost::of(|| guarded(start));
-    // Substrates are shared: what was spent on them here is told apart from the method's own work.
+    // Substrates are shared between methods, so building them here is not the method's own work.
     let built = view.spent();
     prepare.seconds = (prepare.seconds - built.seconds).max(0.0);
     prepare.cpu_seconds = (prepare.cpu_seconds - built.cpu_seconds).max(0.0);
-    // The substrates that were built here are live by now, and are counted with those that were found.
+    // Substrates built here are still live; they are counted with those that were found.
     prepare.usage = without(prepare.usage, built.usage);
     let mut clock =
         Clock { view, prepare, so_far: Cost::default(), held: prepare.usage.held_bytes };
@@ -138,7 +138,7 @@ pub fn answer<'s>(
     levels.iter().map(ask).collect()
 }
 
-/// Adds up what levels took, as if each had been asked alone.
+/// Adds up the costs of levels, as if each had been asked alone.
 struct Clock<'s> {
     view: &'s Shape,
     prepare: Cost,
@@ -170,7 +170,7 @@ impl Clock<'_> {
 
     fn times(&self) -> Times {
         let substrates = self.view.used();
-        // Each needs room for its building above those that are there, and leaves itself.
+        // Built one after another: each adds its own bytes, and needs its peak on top of the others.
         let mut built = Cost::default();
         substrates.iter().for_each(|(_, cost)| built += *cost);
         let Usage { held_bytes: held, peak_bytes: peak } = built.usage;
@@ -187,7 +187,7 @@ fn without(all: Usage, part: Usage) -> Usage {
     }
 }
 
-/// A result that is valid and not empty, or why not.
+/// A valid, non-empty result, or the fault.
 fn checked(simplified: Simplified) -> Result<Simplified, Fault> {
     simplified.mesh.check().map_err(SimplifyError::from)?;
     if simplified.mesh.spheres.is_empty() {
@@ -199,7 +199,7 @@ fn checked(simplified: Simplified) -> Result<Simplified, Fault> {
     Ok(simplified)
 }
 
-/// What work gives, or why it ended, panics included.
+/// The result of some work, with a panic turned into a fault.
 pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(outcome) => Ok(outcome?),
@@ -209,7 +209,7 @@ pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Res
     }
 }
 
-/// What a panic said.
+/// The message of a panic.
 pub(super) fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| payload.downcast_ref::<String>().cloned());

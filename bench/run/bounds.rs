@@ -1,4 +1,4 @@
-//! Error bounds as levels: a search, then the level that it found, asked alone on the clock.
+//! Error bounds as levels: a search, then a timed run of the level that it found.
 
 use medial::shape::Shape;
 use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
@@ -12,15 +12,15 @@ use super::{Fault, LevelRun, Times, answer};
 pub type Prepare<'a> =
     dyn for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError> + 'a;
 
-/// What a search for error bounds needs.
+/// A search for levels within error bounds.
 pub struct Bounds<'a> {
     /// The shape.
     pub shape: &'a Shape,
-    /// What the method says of itself.
+    /// The description of the method.
     pub info: &'a MethodInfo,
-    /// Begins the method.
+    /// Starts the method.
     pub prepare: &'a Prepare<'a>,
-    /// Measures what comes out.
+    /// Measures results.
     pub measure: &'a Measure<'a>,
     /// Is told each bound before it is searched for.
     pub searching: &'a dyn Fn(Level),
@@ -61,7 +61,7 @@ impl Bounds<'_> {
         let mut search =
             Search::new(simplification.as_mut(), self.info, most, self.measure, &|_| {});
         let mut found = Vec::new();
-        // The loosest first: what is tried for it is of use to the others.
+        // The loosest bound first: the levels tried for it help the others.
         for &bound in bounds.iter().rev() {
             (self.searching)(Level::MaxError(bound));
             let result = search.within(bound)?;

@@ -1,4 +1,4 @@
-//! Why a worker ended before it had finished, in words that a person can act on.
+//! Messages about workers that ended before they had finished, which tell the user what to do.
 
 use std::process::ExitStatus;
 use std::time::Duration;
@@ -7,14 +7,14 @@ use medial_reports::Status;
 
 use super::{Fault, Limits};
 
-/// What a worker was at when it ended.
+/// The stage that a worker had reached when it ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stage {
     /// Reading and preparing the input.
     Loading,
     /// The method prepared.
     Preparing,
-    /// The method was asked for its levels: so many had been answered.
+    /// The method was asked for its levels; this many had been answered.
     Asked(usize),
     /// The results were measured.
     Measuring,
@@ -55,9 +55,9 @@ pub fn out_of_memory(stage: Stage, limits: &Limits) -> Fault {
     Fault { status: Status::OutOfMemory, reason }
 }
 
-/// The worker ended by itself: what its exit status and its last words say.
+/// The worker ended by itself: the fault by its exit status and its last words.
 pub fn ended(stage: Stage, status: Option<ExitStatus>, last_words: &str, limits: &Limits) -> Fault {
-    // What the standard library prints before it aborts.
+    // The standard library prints this line before it aborts.
     let allocation =
         last_words.lines().rev().find(|line| line.starts_with("memory allocation of "));
     if let Some(line) = allocation {
@@ -112,5 +112,5 @@ fn last_line(text: &str) -> Option<String> {
     Some(line.chars().filter(|c| !c.is_control()).take(200).collect())
 }
 
-/// How long a supervisor waits before it looks at time and memory again.
+/// The interval at which a supervisor checks time and memory.
 pub const LOOK_AGAIN: Duration = Duration::from_millis(50);

@@ -1,16 +1,16 @@
-//! Inputs, items, workers, records: what is run, how it is timed, what is kept.
+//! Inputs, items, workers, records: everything from a study to the kept results.
 //!
-//! A run is a list of [`Item`]s, each plain data that decides its records. In a worker process an
-//! item takes three steps: the method answers on the clock ([`answer()`], a [`LevelRun`] for each
-//! level), its results are measured ([`judge`]), and both become records ([`record::record`]). The
-//! [`Supervisor`] gives items to workers and turns every end of one into records; the [`Store`]
-//! keeps them for ever.
+//! A run is a list of [`Item`]s. An item is plain data and determines its records. In a worker process
+//! it takes three steps: the method answers and is timed ([`answer()`], a [`LevelRun`] for each level),
+//! its results are measured ([`judge`]), and both become records ([`record::record`]). The
+//! [`Supervisor`] gives items to workers and turns every way in which one can end into records; the
+//! [`Store`] keeps the records.
 //!
 //! | files | step |
 //! |---|---|
 //! | `source`, `item`, `registry` | what is run |
 //! | `scene`, `answer`, `search`, `bounds`, `verdict`, `record` | the path of one item, inside a worker |
-//! | `protocol`, `serve`, `worker` | processes and what they say |
+//! | `protocol`, `serve`, `worker` | processes and their messages |
 //! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
 //! | `store` | the folder of results |
 

@@ -9,8 +9,8 @@
 //! brings twenty crates, some with C sources, for a dictionary of three keys; `ndarray-npy` stands on the same
 //! parser.
 //!
-//! Read are two-dimensional arrays of little-endian f8 and f4, in C or Fortran order. Memory grows
-//! with what the file holds, never with what its header claims.
+//! Supported are two-dimensional arrays of little-endian f8 and f4, in C or Fortran order. Memory grows
+//! with the numbers in the file, never with the size that its header claims.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
@@ -66,12 +66,12 @@ impl Matrix {
 pub struct NpyError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The defect.
     #[source]
     pub kind: NpyErrorKind,
 }
 
-/// What is wrong with an `.npy` file.
+/// A defect of an `.npy` file.
 #[derive(Debug, thiserror::Error)]
 pub enum NpyErrorKind {
     /// The file cannot be opened or read.

@@ -30,7 +30,7 @@ impl Element {
     }
 }
 
-/// What the header says.
+/// The contents of the header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub(super) element: Element,
@@ -38,7 +38,7 @@ pub(super) struct Header {
     pub(super) shape: Vec<u64>,
 }
 
-/// What is wrong with the header of an `.npy` file.
+/// A defect of the header of an `.npy` file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HeaderError {
     /// The file ends within the header.
@@ -60,8 +60,8 @@ pub enum HeaderError {
     Element(String),
 }
 
-/// The length of a header for a dictionary so that the numbers after the ten bytes before it and
-/// the line feed at its end begin at a multiple of 64.
+/// The length of the header for a dictionary of this length: padded so that the numbers, which follow
+/// ten bytes of preamble and the header with its line feed, begin at a multiple of 64.
 pub(super) fn header_length(dictionary: usize) -> usize {
     (10 + dictionary + 1).next_multiple_of(64) - 10
 }

@@ -1,4 +1,4 @@
-//! A run: a list of items of which what is missing is run, and every record is kept.
+//! A run of a list of items: the missing levels are run, and every record is kept.
 
 use medial_reports::{Record, Status};
 
@@ -7,7 +7,7 @@ use super::store::{Failures, Store, StoreError};
 use super::supervise::{RunError, Supervisor, merge};
 use super::{Item, Progress};
 
-/// What came of a run.
+/// The counts of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Levels that were run now.
@@ -27,7 +27,7 @@ pub enum PlanError {
     Store(#[from] StoreError),
 }
 
-/// What is done with the records of an item as soon as they are complete.
+/// Takes the records of an item as soon as they are complete.
 pub type Keep<'a> = dyn FnMut(&Item, &[Kept]) -> Result<(), StoreError> + 'a;
 
 /// The items with the levels that are missing in a store, and what was found there.
@@ -44,9 +44,9 @@ pub fn missing(items: &[Item], store: &Store, failures: Failures) -> (Vec<Item>,
     (left, tally)
 }
 
-/// Runs items and hands their records to `keep`, each item's as soon as it is done. With
-/// repetitions, the items of one scene take turns, so that a slow minute of the machine does not
-/// fall on one method; their records are kept when the last turn is over.
+/// Runs items and passes their records to `keep`, as soon as each item is done. With repetitions, the
+/// items of one scene take turns, so that a slow minute of the machine does not affect one method
+/// alone; then their records are kept after the last turn.
 ///
 /// # Errors
 /// When the user interrupts, no worker can be started, or `keep` fails.
@@ -94,7 +94,7 @@ pub fn run_items(
     Ok(())
 }
 
-/// Records whose seconds are those of the median repetition.
+/// The records, with their seconds replaced by those of the median repetition.
 fn finished(mut kept: Vec<Kept>) -> Vec<Kept> {
     for Kept { record, .. } in &mut kept {
         if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
@@ -105,7 +105,7 @@ fn finished(mut kept: Vec<Kept>) -> Vec<Kept> {
     kept
 }
 
-/// One remark for each failure, or a single one where all levels failed for the same reason.
+/// One remark for each failure, or a single one if all levels failed for the same reason.
 fn failures(records: &[&Record]) -> Vec<String> {
     let failed: Vec<&&Record> = records.iter().filter(|r| r.status.is_failure()).collect();
     let alike = failed.len() == records.len()

@@ -12,12 +12,12 @@ pub struct Progress {
     total: usize,
 }
 
-/// Whether anybody wants to see how far the work is.
+/// Whether progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verbosity {
-    /// Nothing on standard error but failures.
+    /// Only failures go to standard error.
     Quiet,
-    /// What is being done.
+    /// Progress goes there, too.
     Progress,
 }
 

@@ -1,8 +1,7 @@
-//! What the supervisor and a worker say to each other: JSON, one message a line.
+//! The messages between the supervisor and a worker: JSON, one message per line.
 //!
 //! Requests go to the worker's standard input. Events come from its standard output, each on a line
-//! of its own that begins with [`MARK`]: whatever else a method prints there is talk, and passed
-//! over.
+//! that begins with [`MARK`]. Methods may print there, too: lines without the mark are ignored.
 
 use std::io::{self, Read, Write};
 use std::path::PathBuf;
@@ -15,13 +14,13 @@ use crate::check::Outcome;
 
 use super::{Fault, Item, Kept, Limits, MethodSpec, Provenance};
 
-/// The record separator of ASCII, which no text begins with.
+/// The record separator of ASCII, with which no printed text begins.
 const MARK: u8 = 0x1e;
 
-/// A longer line is no message.
+/// A longer line is not a message.
 const MAX_LINE_BYTES: usize = 64 << 20;
 
-/// What a worker is asked to do.
+/// A request to a worker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Request {
     /// Run all levels of an item, measure, and give records.
@@ -30,10 +29,10 @@ pub enum Request {
         item: Item,
         /// Folder for results as `.ma`.
         axes: Option<PathBuf>,
-        /// What the records say of machine and command.
+        /// The machine and the command, for the records.
         provenance: Box<Provenance>,
     },
-    /// Prepare the method of an item on the smallest of shapes, to see whether it takes its parameters.
+    /// Prepare the method of an item on a very small shape, to check its parameters.
     Probe {
         /// The item.
         item: Item,
@@ -43,12 +42,12 @@ pub enum Request {
         /// The item.
         item: Item,
     },
-    /// Put a method to one case of the conformance corpus.
+    /// Run one case of the conformance corpus on a method.
     Check(CheckItem),
 }
 
 impl Request {
-    /// The item that it is about, where it is about one.
+    /// The item of the request, if it has one.
     pub fn item(&self) -> Option<&Item> {
         match self {
             Self::Run { item, .. } | Self::Probe { item } | Self::Again { item } => Some(item),
@@ -56,7 +55,7 @@ impl Request {
         }
     }
 
-    /// Threads of the worker that serves it, and what ends it by force.
+    /// The threads of the worker that serves it, and its limits.
     pub fn terms(&self) -> (usize, Limits) {
         match self {
             Self::Run { item, .. } | Self::Probe { item } | Self::Again { item } => {
@@ -76,11 +75,11 @@ pub struct CheckItem {
     pub case: String,
     /// Number of threads.
     pub threads: usize,
-    /// What ends the case by force.
+    /// The limits at which the case is killed.
     pub limits: Limits,
 }
 
-/// What a worker tells.
+/// A message from a worker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Event {
     /// The input is being read and prepared.
@@ -89,7 +88,7 @@ pub enum Event {
     Preparing(String),
     /// The method is asked for a level.
     Asked(Level),
-    /// The fewest spheres within a bound are searched, on a clock of their own.
+    /// The search for the fewest spheres within a bound begins; it is not timed as the method's work.
     Searching(Level),
     /// The results are being measured.
     Measuring,
@@ -99,9 +98,9 @@ pub enum Event {
     WrongParameter(String),
     /// The record of a level.
     Record(Box<Kept>),
-    /// What a level took once more, and a hash of its result.
+    /// The times of a repetition of a level, and a hash of its result.
     Repeated(Level, Result<(Repetition, String), Fault>),
-    /// A case of the conformance corpus begins, or goes on to this.
+    /// A case of the conformance corpus has reached this step.
     Doing(String),
     /// How the case ended.
     Checked(Outcome),
@@ -109,20 +108,20 @@ pub enum Event {
     Finished,
 }
 
-/// Writes an event where the supervisor reads.
+/// Writes an event to standard output, where the supervisor reads.
 ///
 /// # Errors
 /// When nobody reads any more.
 pub fn send(event: &Event) -> io::Result<()> {
     let text = serde_json::to_string(event)?;
-    // In one piece, and on a line of its own whatever was printed before.
+    // One write, and a line break first: a method may have printed an unfinished line.
     let line = [b"\n", &[MARK][..], text.as_bytes(), b"\n"].concat();
     let mut out = io::stdout().lock();
     out.write_all(&line)?;
     out.flush()
 }
 
-/// Reads events until the stream ends. Lines that are none are passed over, however long.
+/// Reads events until the stream ends. Other lines are ignored, however long.
 pub fn receive(mut from: impl Read, mut each: impl FnMut(Event)) {
     let mut line = Vec::new();
     let mut block = vec![0; 1 << 16];
@@ -142,9 +141,9 @@ pub fn receive(mut from: impl Read, mut each: impl FnMut(Event)) {
             }
             line.clear();
         }
-        // Talk is not collected, nor a message longer than any.
+        // Memory stays bounded: neither other lines nor overlong messages are collected.
         if line.is_empty() && rest.first() != Some(&MARK) {
-            // The rest of such a line is told from a message by its missing mark.
+            // One blank marks the line as no message until it ends.
             line.extend(rest.first().map(|_| b' '));
         } else if line.first() == Some(&MARK) || line.is_empty() {
             line.extend_from_slice(rest);

@@ -1,4 +1,4 @@
-//! Where a record comes from: machine, program, command line.
+//! The origin of a record: machine, program, command line.
 
 use std::env;
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use medial_reports::Machine;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// What is the same for every record of a run.
+/// The facts that are the same for every record of a run.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Provenance {
     /// The machine.
@@ -23,7 +23,7 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Of the running process.
+    /// The provenance of the running process.
     pub fn here() -> Self {
         Self {
             machine: machine(),
@@ -46,7 +46,7 @@ fn machine() -> Machine {
     }
 }
 
-/// Largest resident size of this process so far, in bytes, where the system tells.
+/// Largest resident size of this process so far, in bytes; `None` if the system does not provide it.
 pub fn peak_bytes() -> Option<u64> {
     proc_field("/proc/self/status", "VmHWM").and_then(|value| kibibytes(&value))
 }
@@ -71,7 +71,7 @@ fn command_line() -> String {
     shell_line(&words)
 }
 
-/// Words as a line for a shell, quoted where it would need that.
+/// Words as a shell command line, quoted where necessary.
 pub fn shell_line(words: &[String]) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
     let quoted = words.iter().map(|word| {

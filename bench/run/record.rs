@@ -1,4 +1,4 @@
-//! Third step of a run: what was asked, answered and measured, as records.
+//! Third step of a run: requests, answers and measurements as records.
 
 use std::path::Path;
 
@@ -13,11 +13,11 @@ use crate::plugin::{self, ProgramPeak};
 
 use super::{Fault, Item, LevelRun, Provenance, Scene, Times, Verdict};
 
-/// Largest relative difference between the spheres reached and the spheres asked at which a result
-/// still has the count that was asked.
+/// Largest relative difference between the number of spheres and the requested number at which a
+/// result still counts as having that number.
 const COUNT_TOLERANCE: f64 = 0.02;
 
-/// A record, and for a noisy input what is told beside it.
+/// A record, with additional figures for a noisy input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kept {
     /// The record.
@@ -36,7 +36,7 @@ pub struct NoisePart {
     pub shift: Option<AxisShift>,
 }
 
-/// The record of a level that was not run, or not to its end.
+/// The record of a level that was not run, or did not finish.
 pub fn failure_record(item: &Item, level: Level, fault: &Fault, provenance: &Provenance) -> Record {
     let Fault { status, reason } = fault;
     let simplify = Simplify {
@@ -85,8 +85,8 @@ fn conditions(item: &Item) -> Conditions {
     }
 }
 
-/// The record of one level. A result is saved as `.ma` in input units below `axes`, where that is
-/// given: a folder whose own name begins the path in the record.
+/// The record of one level. If the folder `axes` is given, the result is saved there as `.ma` in input
+/// units; the path in the record begins with the name of this folder.
 pub fn record(
     item: &Item,
     scene: &Scene,
@@ -115,7 +115,7 @@ pub fn record(
     fill_result(&mut record.simplify, result);
     record.simplify.warnings.extend(scene.shape().sampling_warning().map(str::to_owned));
     if let Some(ProgramPeak(bytes)) = result.extras.get() {
-        // The program ran beside the heap of this process, which held what it was given.
+        // The program ran while this process held its input, so both peaks add up.
         record.simplify.peak_bytes = Some(run.times.peak_bytes + bytes);
     }
     if let Some(Verdict { evaluation, seconds, union, hash }) = verdict {
@@ -123,7 +123,7 @@ pub fn record(
         record.union = union;
         match evaluation {
             Some(Ok(evaluation)) => {
-                // The level that a search found was asked once more: what it gives now is what counts.
+                // The level found by a search was run again: only the error of this run counts.
                 if let Level::MaxError(bound) = run.level
                     && evaluation.distances.hausdorff > bound
                 {
@@ -149,7 +149,7 @@ pub fn record(
     record
 }
 
-/// What the result itself says: counts, level, remarks.
+/// Copies the facts of the result itself: counts, level, remarks.
 pub fn fill_result(simplify: &mut Simplify, result: &Simplified) {
     let mesh = &result.mesh;
     simplify.reached = Some(mesh.spheres.len());
@@ -164,7 +164,7 @@ pub fn fill_result(simplify: &mut Simplify, result: &Simplified) {
     });
 }
 
-/// `ok`, or that the result has another count than the one asked, and why.
+/// `ok`, or the fault of a result with another count than the requested one.
 fn count_fault(level: Level, result: &Simplified) -> Fault {
     let reached = result.mesh.spheres.len();
     match level {
@@ -207,7 +207,7 @@ fn save(
     };
     let mesh = file_stem(&record.mesh);
     let method = file_stem(record.simplify.variant.as_ref().unwrap_or(&record.simplify.method));
-    // The key tells apart what else decides the result: parameters, seed, sampling, build.
+    // The key covers everything else that affects the result: parameters, seed, sampling, build.
     let key = &record.key[..12];
     let name = format!("{method}-{level}-{key}.ma");
     std::fs::create_dir_all(axes.join(&mesh))?;

@@ -1,4 +1,4 @@
-//! The methods that there are: those of the program, and those of plug-in files.
+//! The known methods: those of the program, and those of plug-in files.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,20 +9,21 @@ use medial_methods::initial;
 
 use crate::plugin::{self, PluginError};
 
-/// The row that simplifies nothing.
+/// Id of the pseudo-method that returns the initial medial mesh.
 pub const INITIAL: &str = "initial";
 
 /// Methods by id, in the order of the tables.
 pub struct Registry {
     entries: Vec<Entry>,
-    /// What can be run but is no method: the initial medial mesh as it is, and every pair of
-    /// methods, the second after the first. Made at once, so that an id means the same in a worker.
+    /// Entries that can be run but are not methods: the initial medial mesh as it is, and every
+    /// ordered pair of methods, run one after the other. Made eagerly, so that an id means the same in
+    /// a worker.
     others: Vec<Entry>,
     /// The plug-in files that were added, as absolute paths.
     files: Vec<PathBuf>,
 }
 
-/// A method, and what it is made of where it is not part of the program.
+/// A method, and for a plug-in a hash of its files.
 pub struct Entry {
     method: Arc<dyn MedialSimplifier>,
     fingerprint: Option<String>,
@@ -49,8 +50,8 @@ impl Entry {
         &self.method.info().id
     }
 
-    /// Hash of the declaration and the files of a plug-in; `None` for a method of the program,
-    /// which the program's own hash decides.
+    /// Hash of the declaration and the files of a plug-in; `None` for a method of the program, which
+    /// the program's own hash covers.
     pub fn fingerprint(&self) -> Option<&str> {
         self.fingerprint.as_deref()
     }
@@ -104,7 +105,7 @@ impl Registry {
         Ok(())
     }
 
-    /// Adds a method, and its chains with those that are there.
+    /// Adds a method, and its chains with the methods added before.
     fn add(&mut self, new: Entry) {
         for other in &self.entries {
             self.others.push(Entry::chain(other, &new));

@@ -1,16 +1,17 @@
 //! The coarsest level within an error bound, searched for every method alike.
 //!
 //! The error does not fall strictly with the number of spheres, and the finest level need not be
-//! the best: initial medial meshes have flaws that methods mend. So nothing is refused before it
-//! was tried.
+//! the best: initial medial meshes have flaws that methods mend. So no bound is refused before several
+//! levels were tried.
 //!
-//! 1. Counts from that of the initial medial mesh downwards, each a fixed part of the one before.
-//! 2. Where none of them is within the bound, the method's own levels: its sweep, and the published
-//!    one.
-//! 3. From the fewest spheres that are within, the count is halved in between (as logarithms) down
-//!    to the next count that is not; a method without counts is asked for its own level instead.
+//! 1. Counts are tried from that of the initial medial mesh downwards, each a fixed fraction of the
+//!    one before.
+//! 2. If none of them is within the bound, the method's own levels are tried: its sweep, and the
+//!    published one.
+//! 3. Bisection, on a logarithmic scale, between the fewest spheres within the bound and the next
+//!    count that exceeds it. For a method without counts it uses the method's own levels.
 //!
-//! A coarser level that happens to be within the bound can be missed; what is found is within it.
+//! The level found is within the bound; a coarser one that happens to be within it can be missed.
 
 use medial::complex::MedialMesh;
 use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
@@ -19,12 +20,12 @@ use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
 const COUNTS: usize = 7;
 /// The smallest factor between two of them.
 const RATIO: f64 = 4.0;
-/// Fewest spheres tried at first.
+/// Smallest count tried at first.
 const MIN_SPHERES: f64 = 4.0;
-/// Levels tried in between, for each bound. With those at first, at most 25 where a method has a
-/// sweep of ten levels.
+/// Bisections per bound. With the levels of steps 1 and 2, at most 25 levels for a method with a sweep
+/// of ten.
 const BISECTIONS: usize = 7;
-/// Relative difference of two counts at which nothing is searched in between.
+/// Two counts with at most this ratio are not bisected.
 const CLOSE_COUNTS: f64 = 1.02;
 
 /// How a medial mesh is measured: its error as a fraction of the diagonal.
@@ -41,7 +42,7 @@ pub struct Probe {
     pub error: f64,
 }
 
-/// What a search for one bound came to.
+/// The result of a search for one bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The fewest spheres within the bound; `None` where no level that was tried is.
@@ -89,7 +90,7 @@ impl<'a> Search<'a> {
     /// The fewest spheres found with an error of at most `bound`.
     ///
     /// # Errors
-    /// What the method or the measure said last, where not one level gave a result.
+    /// The last error of the method or the measure, if no level gave a result.
     pub fn within(&mut self, bound: f64) -> Result<Found, SimplifyError> {
         for count in std::mem::take(&mut self.counts) {
             self.probe(Level::Spheres(count))?;
@@ -112,7 +113,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Tries a level. A level that the method has not, or finds nothing at, is passed over.
+    /// Tries a level. If the method does not have it or has no result there, it is skipped.
     fn probe(&mut self, level: Level) -> Result<(), SimplifyError> {
         (self.trying)(level);
         self.tried += 1;
@@ -184,7 +185,7 @@ impl<'a> Search<'a> {
 }
 
 impl Found {
-    /// What is to be said where no level is within a bound.
+    /// The message for a bound that no level meets.
     pub fn refusal(&self, bound: f64) -> String {
         let percent = |fraction: f64| format!("{:.3} %", 100.0 * fraction);
         let best = self.best.map_or_else(String::new, |Probe { level, spheres, error }| {

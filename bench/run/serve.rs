@@ -1,8 +1,8 @@
-//! The worker: a child process that runs items one after another and tells what came of them.
+//! The worker: a child process that runs items one after another and reports the results.
 //!
 //! It keeps the scene of its last item, so that substrates and judge are built once for all items
-//! of a mesh. It ends when its standard input ends, in the middle of an item too: nobody waits for
-//! the answer then.
+//! of a mesh. It ends when its standard input ends, even in the middle of an item, because nobody
+//! waits for the answer then.
 
 use std::io::{self, BufRead};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -31,7 +31,7 @@ use super::{
     Entry, Fault, Input, Item, LevelRun, MethodSpec, Provenance, Registry, Source, answer,
 };
 
-/// Serves until nobody asks any more. `bytes` is the limit of memory of this process.
+/// Serves requests until standard input ends. `bytes` is the memory limit of this process.
 pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
     limit(bytes);
     process_tree::adopt_strays();
@@ -53,8 +53,8 @@ pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// No core files, and no more memory than allowed: an allocation beyond it fails at once, where
-/// watching from outside might be too late. What the system cannot limit is only watched.
+/// Forbids core files and limits the memory: an allocation beyond the limit fails at once, while
+/// the supervisor might notice too late. On systems without such a limit only the supervisor watches.
 fn limit(bytes: u64) {
     #[cfg(unix)]
     {
@@ -79,10 +79,10 @@ fn requests() -> Receiver<Request> {
             }
         }
         drop(sender);
-        // Time to end by itself, where it is idle.
+        // An idle worker gets the time to end by itself.
         thread::sleep(Duration::from_millis(200));
         process_tree::end_descendants();
-        // The supervisor removes it too, unless it was ended by force.
+        // The supervisor removes it, too, unless it was killed.
         if let Some(scratch) = std::env::var_os(SCRATCH) {
             let _ = std::fs::remove_dir_all(scratch);
         }
@@ -91,10 +91,10 @@ fn requests() -> Receiver<Request> {
     receiver
 }
 
-/// The scene of an item: the one that is there, or a new one in its place.
+/// The scene of an item: the present one if it fits, else a new one.
 fn enter<'s>(scene: &'s mut Option<Scene>, item: &Item) -> Result<&'s mut Scene, String> {
     if !scene.as_ref().is_some_and(|scene| scene.serves(&item.scene)) {
-        // The old one goes first, so that two are never there together.
+        // Drop the old scene first, so that two never share the memory.
         *scene = None;
         *scene = Some(Scene::load(&item.scene)?);
     }
@@ -135,7 +135,7 @@ fn survives_json(kept: &Kept) -> bool {
     serde_json::from_str::<Kept>(&text).is_ok_and(|back| back == *kept)
 }
 
-/// The record in place of one that no reader could read.
+/// The record that replaces one that cannot be read back.
 fn unreadable(item: &Item, run: &LevelRun, provenance: &Provenance) -> Kept {
     let reason = "a number of its record is not finite".to_owned();
     let fault = Fault { status: Status::InvalidOutput, reason };
@@ -156,7 +156,7 @@ fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Res
     Ok(())
 }
 
-/// Prepares the method of an item on the smallest of shapes.
+/// Prepares the method of an item on a very small shape.
 fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
     let resolution = medial_datasets::find("sphere").map(|shape| *shape.resolutions().start());
     let source = Source::BuiltIn { id: "sphere".into(), resolution };
@@ -166,7 +166,7 @@ fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
     let Ok(entry) = find(registry, &item.method) else { return Ok(()) };
     let method = entry.method();
     let context = RunContext::with_seed(item.seed);
-    // A panic is for the run itself to report.
+    // A panic is reported by the run itself, not here.
     let prepared = catch_unwind(AssertUnwindSafe(|| {
         method.prepare(&shape, &item.method.params, &context).map(|_| ())
     }));
@@ -178,8 +178,8 @@ fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
     }
 }
 
-/// The answers of an item's method on a shape of its scene, in the order of its levels, of which
-/// error bounds are the last.
+/// The answers of an item's method on a shape of its scene, in the order of its levels; error bounds
+/// come last.
 fn answer_item(registry: &Registry, item: &Item, scene: &Scene, shape: &Shape) -> Vec<LevelRun> {
     let entry = find(registry, &item.method);
     let context = RunContext::with_seed(item.seed);
@@ -219,8 +219,8 @@ fn answer_item(registry: &Registry, item: &Item, scene: &Scene, shape: &Shape) -
     runs
 }
 
-/// A closure that begins a simplification on any view: without a function that takes it, its
-/// lifetimes are not inferred.
+/// Returns its argument, a closure that starts a simplification on any view. Passing the closure
+/// through this function makes the compiler infer its lifetimes.
 fn preparing<F>(begin: F) -> F
 where
     F: for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError>,
@@ -228,7 +228,7 @@ where
     begin
 }
 
-/// Puts a method to one case of the conformance corpus.
+/// Runs one case of the conformance corpus on a method.
 fn put_to(registry: &Registry, item: &CheckItem) -> io::Result<()> {
     send(&Event::Doing("starting".into()))?;
     let outcome = match (find(registry, &item.method), check::find(&item.case)) {
@@ -261,8 +261,8 @@ fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, St
     Ok(entry)
 }
 
-/// The comparison of noisy results with those without noise, which are made where they are not
-/// there yet; `None` for items without noise.
+/// Compares noisy results with those without noise, which are computed if they are missing; `None` for
+/// items without noise.
 fn noise_parts(
     registry: &Registry,
     scene: &mut Scene,

@@ -1,6 +1,6 @@
-//! What a user may have meant by a word that names nothing.
+//! Suggestions for unknown words.
 
-/// Words less alike than this are different words: Jaro-Winkler similarity, 1 for equal ones.
+/// Smallest Jaro-Winkler similarity (1 for equal words) of a suggestion.
 const MIN_SIMILARITY: f64 = 0.8;
 
 /// `; did you mean ...?` for the known word that is most like the given one, or nothing.

@@ -1,4 +1,4 @@
-//! What a comparison runs on: a file of the user, or a built-in shape.
+//! The inputs of a comparison: files of the user, or built-in shapes.
 
 use std::fmt;
 use std::fs;

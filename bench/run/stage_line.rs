@@ -1,4 +1,4 @@
-//! What a verb on one mesh is at: a line on a terminal, for stages that last.
+//! The current stage of a verb on one mesh: a line on a terminal, shown for long stages.
 
 use std::io::{self, IsTerminal};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -12,22 +12,22 @@ use medial_reports::printable;
 
 use super::Verbosity;
 
-/// Stages that are over sooner are not worth a line.
+/// Shorter stages are not shown.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// How often the line is brought up to date.
+/// Interval between updates of the line.
 const INTERVAL: Duration = Duration::from_millis(250);
 
-/// A line on standard error with the current stage, where that is a terminal; gone when dropped.
+/// A line on standard error with the current stage, if that is a terminal; removed when dropped.
 ///
-/// A thread of its own draws it: most stages have nobody to report from within.
+/// A separate thread draws it, because most stages do not report progress themselves.
 pub struct StageLine {
     stage: Arc<Mutex<Stage>>,
     /// Dropping the sender ends the thread.
     drawer: Option<(mpsc::Sender<()>, JoinHandle<()>)>,
 }
 
-/// What is being done, since when, and how far it is.
+/// The current stage, its start, and its progress.
 struct Stage {
     what: String,
     since: Instant,
@@ -35,7 +35,7 @@ struct Stage {
 }
 
 impl StageLine {
-    /// No line where nobody would see it, or nobody wants to.
+    /// A line; none without a terminal or with [`Verbosity::Quiet`].
     pub fn new(verbosity: Verbosity) -> Self {
         let stage = Stage { what: String::new(), since: Instant::now(), steps: None };
         let stage = Arc::new(Mutex::new(stage));

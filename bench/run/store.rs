@@ -1,8 +1,8 @@
-//! The folder of results: records that accumulate, and what may be done to them.
+//! The folder of results: records that accumulate.
 //!
-//! `results.jsonl` is only ever appended to, one line for each level of each item, and a key on
-//! each line tells what was run. One process at a time adds to a store; the lock goes with the
-//! process that holds it, however that ends.
+//! `results.jsonl` is append-only: one line for each level of each item, with a key that identifies
+//! what was run. One process at a time adds to a store; its lock ends with the process, however that
+//! ends.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -29,13 +29,13 @@ pub struct Store {
     _lock: File,
     journal: Journal,
     known: HashMap<String, Known>,
-    /// Whether the page is of an earlier state of the records.
+    /// Whether the page of an earlier state of the records was removed.
     page_withdrawn: bool,
-    /// What is to be said of the folder as it was found.
+    /// Remarks about the folder as it was found.
     pub remarks: Vec<String>,
 }
 
-/// What decides whether a level has to be run again.
+/// The facts that decide whether a level has to be run again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Known {
     status: Status,
@@ -44,7 +44,7 @@ struct Known {
     bytes_limit: u64,
 }
 
-/// As much of a record as a store needs to know.
+/// The fields of a record that a store needs.
 #[derive(Deserialize)]
 struct Stub {
     #[serde(default)]
@@ -97,8 +97,8 @@ pub enum StoreError {
 impl Store {
     /// Opens or makes a folder of results, for `journal`, one of its lists of records.
     ///
-    /// What an interrupted process left unfinished is removed and said: temporary files, and a last
-    /// line that stops in the middle.
+    /// The remains of an interrupted process are removed, with a remark: temporary files, and an
+    /// incomplete last line.
     ///
     /// # Errors
     /// When it is no folder, is not writable, or another process holds it.
@@ -139,8 +139,8 @@ impl Store {
         &self.dir
     }
 
-    /// Removes all records, the results that they name and the page. Whatever else lies in the folder
-    /// is the user's and stays; the next report replaces its own tables and plots.
+    /// Removes all records, the results that they name and the page. Other files in the folder belong
+    /// to the user and stay; the next report replaces its own tables and plots.
     ///
     /// # Errors
     /// When a file cannot be removed.
@@ -156,8 +156,8 @@ impl Store {
         Ok(())
     }
 
-    /// The levels of an item that have to be run: those without a record, and those that a limit
-    /// ended that is wider now, or that failed, where failures are to be retried.
+    /// The levels of an item that have to be run: levels without a record, levels that were ended by a
+    /// limit that is larger now, and failed levels if failures are to be retried.
     pub fn missing(&self, item: &Item, failures: Failures) -> Vec<Level> {
         let missing = |key: &String| match self.known.get(key) {
             None => true,
@@ -177,7 +177,7 @@ impl Store {
         Ok(self.journal.append_lines(lines)?)
     }
 
-    /// A page of an earlier state of the records must not stand beside them.
+    /// Removes the page, which no longer matches the records.
     fn withdraw_page(&mut self) -> Result<(), StoreError> {
         if !self.page_withdrawn {
             let path = self.dir.join("index.html");
@@ -188,7 +188,7 @@ impl Store {
     }
 }
 
-/// What is done about levels that failed before.
+/// How levels that failed before are treated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failures {
     /// Their records stand.
@@ -233,7 +233,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
             };
             return Err(StoreError::Held { dir: dir.to_owned(), holder });
         }
-        // Some file systems have no locks; two runs into one folder cannot be told there.
+        // Some file systems have no locks; two runs into one folder go unnoticed there.
         Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
         Err(TryLockError::Error(error)) => return Err(failed(error)),
     }
@@ -244,7 +244,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
     Ok(file)
 }
 
-/// Cuts off a last line without its end, and says whether there was one.
+/// Cuts off an incomplete last line; returns whether there was one.
 fn cut_torn_line(path: &Path) -> io::Result<bool> {
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
@@ -264,7 +264,7 @@ fn cut_torn_line(path: &Path) -> io::Result<bool> {
     Ok(true)
 }
 
-/// What is known of each key, from its last line.
+/// The state of each key, from its last line.
 fn read_known(path: &Path) -> io::Result<HashMap<String, Known>> {
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(HashMap::new()),
@@ -296,8 +296,8 @@ fn stub(line: &[u8]) -> Option<Stub> {
     stub.filter(|stub| !stub.key.is_empty())
 }
 
-/// Removes the medial meshes that records name. What cannot be removed stays: without a record it is
-/// no result.
+/// Removes the medial meshes that records name. A file that cannot be removed stays: without a record
+/// it does not count as a result.
 fn remove_artifacts(dir: &Path, journal: &Path) {
     let Ok(journaled) = read_records(journal) else { return };
     for artifact in journaled.records.iter().filter_map(|record| record.artifact.as_deref()) {
@@ -311,8 +311,8 @@ fn remove_artifacts(dir: &Path, journal: &Path) {
     }
 }
 
-/// Removes what writers of this program left under temporary names, in the folders that it writes
-/// to and no other. The lock is held: none is in use.
+/// Removes temporary files that this program left behind, only in the folders that it writes to. The
+/// lock is held, so none is in use.
 fn remove_temporaries(dir: &Path) {
     let mut folders = vec![dir.to_owned(), dir.join("tables"), dir.join("plots")];
     for results in [AXES, "stability"] {

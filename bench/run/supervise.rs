@@ -1,5 +1,5 @@
-//! The supervisor: gives items to a worker, watches time and memory, and turns every end into
-//! records, so that one broken method never stops the rest.
+//! The supervisor: gives items to a worker, watches time and memory, and turns every way in which a
+//! worker can end into records, so that one broken method never stops the rest.
 
 use std::io;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ use super::record::{Kept, failure_record};
 use super::worker::{Said, Worker, WorkerOptions};
 use super::{Fault, Item, Provenance, SceneSpec};
 
-/// The user wants no more: what was under way is ended and not recorded.
+/// The user interrupted the run: the current item is ended and not recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interrupted;
 
@@ -44,7 +44,7 @@ pub struct Supervisor<'a> {
     provenance: Provenance,
     /// Folder for results as `.ma`.
     axes: Option<PathBuf>,
-    /// Set when the user wants no more.
+    /// Set when the user interrupts the run.
     interrupted: &'a AtomicBool,
     worker: Option<Worker>,
     /// SHA-256 of the input that was ready last.
@@ -53,12 +53,12 @@ pub struct Supervisor<'a> {
     lost: Option<(SceneSpec, Fault)>,
 }
 
-/// What a level took once more, and a hash of its result.
+/// The times of a repetition of a level, and a hash of its result.
 type Repeated = (Level, Result<(Repetition, String), Fault>);
 
 /// How an attempt at some levels ended.
 enum Attempt {
-    /// The worker told all it had to.
+    /// The worker finished the request.
     Finished,
     /// The input is refused.
     Refused(String),
@@ -88,8 +88,9 @@ impl<'a> Supervisor<'a> {
 
     /// Runs an item: a record for each level, in the order of the levels.
     ///
-    /// A worker that ends takes with it what it had not told. The levels that it had answered are
-    /// asked again, the one that ended it gets the reason, and the coarser ones are not tried.
+    /// When a worker ends, the results that it had not reported are lost. The levels that it had
+    /// answered are run again, the level that ended it gets the reason, and the coarser ones are not
+    /// tried.
     ///
     /// # Errors
     /// When the user interrupts, or no worker can be started.
@@ -123,7 +124,7 @@ impl<'a> Supervisor<'a> {
                     }
                 }
                 Attempt::Ended(Stage::Measuring, _) if missing.len() > 1 => {
-                    // One by one, to find the one that cannot be measured.
+                    // Run one by one, to find the result that cannot be measured.
                     groups.extend(missing.iter().rev().map(|&level| vec![level]));
                 }
                 Attempt::Ended(stage, fault) => {
@@ -251,7 +252,7 @@ impl<'a> Supervisor<'a> {
                 worker.end();
                 return Err(RunError::Interrupted);
             }
-            // Also between events: whoever talks without end must not talk past the limit.
+            // Also between events: a worker that sends events without end must not escape the limit.
             if since.elapsed() > limits.time() {
                 worker.end();
                 return Ok(Attempt::Ended(stage, ending::timed_out(stage, &limits)));

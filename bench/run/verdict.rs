@@ -1,4 +1,4 @@
-//! Second step of a run: results are measured. Nothing here is on a method's clock.
+//! Second step of a run: results are measured. None of this counts as a method's time.
 
 use std::time::Instant;
 
@@ -10,24 +10,24 @@ use sha2::{Digest, Sha256};
 
 use super::{LevelRun, Scene, hex};
 
-/// What was measured on one result.
+/// The measurements of one result.
 #[derive(Clone)]
 pub struct Verdict {
-    /// The evaluation; `None` where none was asked.
+    /// The evaluation; `None` if none was requested.
     pub evaluation: Option<Result<Evaluation, MetricError>>,
     /// Wall-clock seconds of the evaluation.
     pub seconds: f64,
-    /// Topology of the union, where it was asked.
+    /// Topology of the union, if requested.
     pub union: Option<UnionTopology>,
     /// SHA-256 of the result.
     pub hash: String,
 }
 
-/// Measures what came of each level, side by side. Levels with the same result are measured once.
+/// Measures the results of all levels, in parallel. Equal results are measured once.
 pub fn judge(scene: &Scene, runs: &[LevelRun]) -> Vec<Option<Verdict>> {
     let meshes: Vec<Option<&MedialMesh>> =
         runs.iter().map(|run| run.outcome.as_ref().ok().map(|result| &result.mesh)).collect();
-    // Its own index for the first of equal results.
+    // The index of an earlier equal result, if there is one.
     let first = |index: usize| meshes[..index].iter().position(|&m| m == meshes[index]);
     let firsts: Vec<usize> = (0..meshes.len()).map(|index| first(index).unwrap_or(index)).collect();
     let measure = |index: usize| {
@@ -53,7 +53,7 @@ fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
     Verdict { evaluation, seconds, union: measure.union_spacing.map(union), hash }
 }
 
-/// SHA-256 of spheres, edges and faces: equal for equal meshes alone.
+/// SHA-256 of spheres, edges and faces: equal for equal meshes only.
 pub fn mesh_hash(mesh: &MedialMesh) -> String {
     let mut hasher = Sha256::new();
     let counts = [mesh.spheres.len(), mesh.edges.len(), mesh.faces.len()];

@@ -1,4 +1,4 @@
-//! A worker as its supervisor sees it: a child process, its events, its last words, its end.
+//! A worker from the supervisor's side: a child process, its events, its last words, its end.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -16,10 +16,10 @@ use crate::process_tree;
 
 use super::protocol::{Event, Request, receive};
 
-/// So much of what a worker writes on standard error is kept: its last words.
+/// Bytes kept of a worker's standard error: its last words.
 const LAST_WORDS: usize = 16 << 10;
 
-/// How a worker is started, and what decides whether another item can use it.
+/// How a worker is started. Another item can use it only if its options are the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WorkerOptions {
     /// Threads of its pool.
@@ -43,7 +43,7 @@ pub struct Worker {
     pub options: WorkerOptions,
 }
 
-/// What a worker says next.
+/// The next message of a worker.
 pub enum Said {
     /// An event.
     Event(Box<Event>),
@@ -74,7 +74,7 @@ impl Worker {
         {
             use std::os::unix::process::CommandExt;
             command.process_group(0);
-            // In a list of processes it is what it is, not the link it was started by.
+            // Shown in lists of processes, instead of the link by which it was started.
             command.arg0("medial");
         }
         let mut child = command.spawn()?;
@@ -95,10 +95,10 @@ impl Worker {
         Ok(Self { child, requests: Some(requests), events, last_words, _scratch: scratch, options })
     }
 
-    /// Asks for something.
+    /// Sends a request.
     ///
     /// # Errors
-    /// When the worker does not read any more.
+    /// When the worker no longer reads.
     pub fn ask(&mut self, request: &Request) -> io::Result<()> {
         let requests = self.requests.as_mut().ok_or(io::ErrorKind::BrokenPipe)?;
         let mut line = serde_json::to_vec(request)?;
@@ -107,7 +107,7 @@ impl Worker {
         requests.flush()
     }
 
-    /// What it says within a time.
+    /// The next event, if it comes within `patience`.
     pub fn listen(&self, patience: Duration) -> Said {
         match self.events.recv_timeout(patience) {
             Ok(event) => Said::Event(Box::new(event)),
@@ -116,7 +116,7 @@ impl Worker {
         }
     }
 
-    /// Resident bytes of the worker and of what it started, together.
+    /// Resident bytes of the worker and of all processes that it started.
     pub fn resident_bytes(&self) -> u64 {
         process_tree::resident_bytes(self.child.id())
     }
@@ -126,7 +126,8 @@ impl Worker {
         process_tree::end_tree(&mut self.child)
     }
 
-    /// How it ended, after its output did. A process that only closed its output is ended.
+    /// The exit status and the last words, once its output has ended. A process that only closed its
+    /// output is killed.
     pub fn collect(mut self) -> (Option<ExitStatus>, String) {
         let deadline = Instant::now() + Duration::from_millis(500);
         let mut status = None;
@@ -164,7 +165,7 @@ impl Drop for Worker {
     }
 }
 
-/// The program that is running. On Linux by the link that survives a rebuild in its place.
+/// The running program: on Linux by a link that stays valid when the program is rebuilt.
 fn program() -> io::Result<PathBuf> {
     let link = PathBuf::from("/proc/self/exe");
     if cfg!(target_os = "linux") && link.exists() { Ok(link) } else { std::env::current_exe() }

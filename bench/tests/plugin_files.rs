@@ -1,4 +1,4 @@
-//! Files of plug-ins: what is refused, at which line, and what makes a plug-in another one.
+//! Plug-in files: wrong declarations are refused with their line, and changes alter the fingerprint.
 #![cfg(unix)]
 
 use std::fs;
@@ -21,7 +21,7 @@ fn a_changed_script_or_declaration_has_another_fingerprint() {
     fs::write(&path, toml.replace("title = \"X\"", "title = \"Y\"")).expect("written");
     let third = fingerprint();
     assert!(first != second && second != third && first != third);
-    // Elsewhere it is the same plug-in.
+    // The same files in another folder are the same plug-in.
     let (_elsewhere, path) = written(&toml, &[("run.sh", VALID)]);
     assert_eq!(plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint(), first);
 }

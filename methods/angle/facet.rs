@@ -8,8 +8,8 @@
 //!    allows, with their sides and corners.
 //!
 //! # Deviations from the papers
-//! - Attali and Montanvert do not say in the part that we know where on a facet the angle is
-//!   measured. The mean of the vertices is what the scale axis tool has for its own filter.
+//! - The part of Attali and Montanvert's paper that we know does not say where on a facet the angle is
+//!   measured. The scale axis tool uses the mean of the vertices for its own filter.
 
 use medial::Vec3;
 use medial::shape::Shape;
@@ -44,7 +44,7 @@ pub(super) fn prepare(
     Ok(RankedFacets::new(set, values, scale, Diagnostics::default()))
 }
 
-/// A point as near to the middle of two samples, in chords, is the middle but for rounding.
+/// A point closer than this, in chords, to the middle of two samples counts as the middle.
 const MIDDLE: f64 = 1e-9;
 
 /// Degrees between two points that are equally far from `x`. The arc tangent keeps its digits where

@@ -7,15 +7,15 @@
 //! 4. The faces, as squares of two triangles on the corners of the voxels. The radius at a corner is
 //!    its distance from the surface.
 //!
-//! A number of spheres is met by the resolution (file `resolution.rs`), or, with `size=ranking`, by as
-//! many of the faces of largest angle as have so many corners.
+//! A number of spheres is met by the resolution (file `resolution.rs`) or, with `size=ranking`, by the
+//! faces of largest angle that together have at most this many corners.
 //!
 //! # Deviations from the paper
 //! - The paper rasterises distance fields in graphics hardware, slice by slice; here the closest points
 //!   are exact, from a tree.
-//! - No medial sphere is centred outside the solid. A face with one corner outside is the triangle of the
-//!   others, one with a side inside is that edge, any other is left out and counted. Only parts about
-//!   as thin as a voxel have any.
+//! - No medial sphere is centred outside the solid. A face with one corner outside becomes the triangle
+//!   of the others, a face with only one side inside becomes that edge, any other is left out and
+//!   counted. Such faces occur only in parts about as thin as a voxel.
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
@@ -31,7 +31,7 @@ use super::AngleParams;
 use crate::scale::{Scale, Wanted};
 use crate::ties::{break_ties, mean};
 
-/// Most voxels along the longest side: a cube of so many takes about a gigabyte.
+/// Largest number of voxels along the longest side: a cube of this size takes about a gigabyte.
 pub(super) const MAX_RESOLUTION: f64 = 320.0;
 
 /// Fewest voxels along the longest side.
@@ -67,7 +67,7 @@ impl Grid {
     fn new(shape: &Shape, resolution: f64) -> Self {
         let (lo, hi) = shape.mesh().bounding_box().expect("a shape has vertices");
         let side = (hi - lo).max_element() / resolution;
-        // A side that is a whole number of voxels but for rounding does not get one more.
+        // Rounding must not add a voxel to a side that is a whole number of voxels.
         let voxels = |length: f64| (length / side * (1.0 - 1e-9)).ceil().max(1.0) as usize;
         Self { origin: lo, side, size: (hi - lo).to_array().map(voxels) }
     }
@@ -234,7 +234,7 @@ fn inner(radius: &[f64], face: Face) -> Vec<u32> {
 }
 
 impl Faces {
-    /// How many of the best faces have at most so many corners together, at least one.
+    /// The number of best faces that together have at most `spheres` corners; at least one.
     fn faces_for(&self, spheres: usize) -> usize {
         let mut seen = std::collections::HashSet::new();
         for (rank, face) in self.faces.iter().enumerate() {

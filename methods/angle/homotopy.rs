@@ -1,39 +1,39 @@
-//! Angle filter by sheets, none of whose removals changes the topology.
+//! Angle filter by sheets, which are removed only if that does not change the topology.
 //!
 //! Sud, Foskey, Manocha: *Homotopy-preserving medial axis simplification*, SPM 2005,
 //! doi:10.1145/1060244.1060250.
 //!
-//! 1. A sheet is where the same two sites of the boundary are closest: here two samples, so that a
-//!    sheet is a Voronoi facet. Its *rim* is where nothing else is. Its *seam* is what it shares with
-//!    other sheets and with edges that have no facet.
+//! 1. A sheet consists of the points with the same two closest sites of the boundary. Here sites are
+//!    samples, so a sheet is a Voronoi facet. Its *seam* is the part of its border that it shares with
+//!    other sheets or with edges that have no facet; the rest of the border is its *rim*.
 //! 2. The value of a sheet is its largest separation angle, at its point nearest to the middle of its
 //!    two samples.
-//! 3. A *frontier sheet* may go: its rim and its seam are not empty and connected. Of these the one of
-//!    the smallest value goes first, then its neighbours are looked at again.
+//! 3. A *frontier sheet* can be removed: its rim and its seam are both non-empty and connected. The
+//!    frontier sheet of the smallest value is removed first; then its neighbours are tested again.
 //! 4. The *effective* value of a sheet is the largest value up to its removal. At `theta` all sheets
-//!    are gone whose effective value is at most `theta`: those that would have gone had no sheet
-//!    above `theta` been touched.
+//!    with an effective value of at most `theta` are gone: those that can be removed without touching
+//!    a sheet above `theta`.
 //!
 //! # Numbers of spheres
 //! Sheets that hold the middle of their two samples have 180 degrees: 415 of the 24,564 of the bear stay up
-//! to 179.99999, all but 6 of the 3,181 of the built-in plate. Below their number `theta` says nothing more,
-//! and what the test of the topology leaves of them is one strip or lump. So a number of spheres is
-//! met by the number of samples at one `theta` (`methods/size_search.rs`). The topology is then that of
-//! the Voronoi diagram of those samples. With `size=ranking` sheets of the given samples go on in
-//! the order of step 3, which keeps their topology, as far as sheets can go.
+//! to 179.99999, all but 6 of the 3,181 of the built-in plate. `theta` cannot reach fewer spheres than
+//! theirs, and the topology test would leave one strip or lump of them. So a number of spheres is met by
+//! the number of samples at one `theta` (`methods/size_search.rs`); the topology is then that of the
+//! Voronoi diagram of those samples. With `size=ranking` the sheets of the given samples are removed
+//! further in the order of step 3, which keeps the topology, as long as one can be removed.
 //!
 //! # Why the topology stays
-//! A facet is a disc. A seam that is a connected part of its border and not all of it is an arc or a
-//! point, onto which the disc retracts. A part of a circle that is not the whole has as many pieces as
-//! its vertices outnumber its edges, so that step 3 is a count: one vertex more than edges, and an
-//! edge that is free. Betti numbers stay exactly.
+//! A facet is a disc. If its seam is connected and not the whole border, the seam is an arc or a point,
+//! onto which the disc retracts. A proper part of a circle has as many pieces as it has vertices more
+//! than edges. So step 3 is a count: the seam has one vertex more than edges, and some edge is free.
+//! Betti numbers do not change.
 //!
 //! # Deviations from the paper
 //! - The paper's axis is that of polyhedra, where two faces of the surface govern a sheet, and a sheet
 //!   can be large. Facets of samples are small, and are removed one by one.
-//! - Edges of the Voronoi diagram whose facets are all cut by the surface are kept as they are, and hold
-//!   the facets between them: the number of spheres has a lower limit, which is said.
-//! - The paper does not say in the part that we know which angle is a sheet's; here its largest.
+//! - Edges of the Voronoi diagram whose facets are all cut by the surface are kept, and with them the
+//!   facets between them: this sets a lower limit to the number of spheres, which a warning names.
+//! - The part of the paper that we know does not define the angle of a sheet; here it is the largest.
 
 use std::collections::BTreeSet;
 
@@ -58,7 +58,7 @@ pub(super) struct Peeled {
     sheets: Sheets,
     /// Sheets in the order of their removal, with their effective values, ascending.
     removed: Vec<(u32, f64)>,
-    /// Spheres left after so many removals.
+    /// Number of spheres left after each number of removals.
     left: Vec<usize>,
     scale: Scale,
     diagnostics: Diagnostics,
@@ -166,7 +166,7 @@ fn nearest_of_triangle([a, b, c]: [Vec3; 3], m: Vec3) -> Vec3 {
 }
 
 impl Peeled {
-    /// The axis without the first so many of the removed sheets.
+    /// The axis without the first `count` of the removed sheets.
     fn mesh(&self, count: usize) -> MedialMesh {
         let mut without = Without::none(&self.sheets);
         for &(sheet, _) in &self.removed[..count] {

@@ -8,8 +8,8 @@
 //! doi:10.1145/1060244.1060250.
 //!
 //! The separation angle of a point `x` of the axis is `S(x) = max over p, q in Pi(x) of the angle
-//! pxq`, with `Pi(x)` its closest boundary points; kept is what has `S > theta`. `S` does not change
-//! under scaling. The *object angle* of Stolpner and Siddiqi is half of it.
+//! pxq`, with `Pi(x)` its closest boundary points; points with `S > theta` are kept. `S` does not
+//! change under scaling. The *object angle* of Stolpner and Siddiqi is half of it.
 //!
 //! # Variants
 //! - `vertex` (file `vertex.rs`): the vertices of the Voronoi medial mesh, with the edges and faces
@@ -26,8 +26,8 @@
 //! Giesen, Pauly 2010) filters the sheets of its own results. A warning says so.
 //!
 //! # Equal angles
-//! Angles saturate at 180 degrees. Of those that tie, spheres and sheets of larger balls are kept first,
-//! and of about equally large ones such as are spread over the shape (`methods/ties.rs`).
+//! Many angles are exactly 180 degrees. Of equal angles, spheres and sheets of larger balls are kept
+//! first; those of about equal size are kept spread over the shape (`methods/ties.rs`).
 
 mod facet;
 mod grid;
@@ -47,20 +47,20 @@ use crate::scale::{Published, Scale};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AngleParams {
-    /// What is filtered.
+    /// The elements that are filtered.
     pub variant: Variant,
     /// Where the angle of a facet is measured; `facet` alone.
     pub at: FacetAngle,
     /// Voxels along the longest side of the bounding box, which may have a fraction; `grid` alone.
     pub resolution: f64,
-    /// What a number of spheres is met by; `grid` and `homotopy` alone.
+    /// How a number of spheres is met; for `grid` and `homotopy` only.
     pub size: Size,
     /// Separation angle, in degrees, of [`Level::Published`], and
     /// of a number of spheres that is met by the sampling.
     pub theta: f64,
 }
 
-/// What is filtered.
+/// The elements that are filtered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variant {
@@ -74,7 +74,7 @@ pub enum Variant {
     Homotopy,
 }
 
-/// What a number of spheres is met by.
+/// How a number of spheres is met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {

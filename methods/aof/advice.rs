@@ -1,7 +1,7 @@
 //! Lattices that are refused, and which one to ask for instead.
 //!
-//! What is advised was tried, or follows from a distance that was measured. Trying is bounded: a
-//! lattice of a solid that is all but flat has voxels by the square of its resolution.
+//! A suggested lattice was tried, or follows from a measured distance. The effort of trying is bounded:
+//! for a nearly flat solid the voxels grow with the square of the resolution.
 
 use medial::simplifier::SimplifyError;
 

@@ -1,9 +1,9 @@
-//! The lattice that the parameters ask for, or a finer one that does not lose what they would.
+//! The lattice of the parameters, or a finer one if that loses parts of the solid.
 //!
-//! Variants that keep the topology of their start set need one that has the solid's, and that no limb
-//! is missing from. Lattices half as fine again are tried until one has both; else the best of them is
-//! taken: the least difference of Betti numbers, then the least loss (file `losses.rs`), then the
-//! finest. What is lost is named.
+//! Variants that keep the topology of their start set need a start set with the solid's topology and
+//! without missing limbs. Lattices finer by half are tried until one has both; else the best is taken:
+//! the least difference of Betti numbers, then the least loss (file `losses.rs`), then the finest. A
+//! warning names what is lost.
 
 use medial::simplifier::{Diagnostics, SimplifyError};
 
@@ -24,9 +24,9 @@ pub struct Base {
     pub descent: Descent,
     /// Betti numbers of its voxels, where the variant keeps them.
     pub topology: Option<[u64; 3]>,
-    /// What it loses of the surface.
+    /// The part of the surface that it loses.
     pub loss: Option<Loss>,
-    /// What is to be said of it.
+    /// Counts and warnings about it.
     pub diagnostics: Diagnostics,
 }
 
@@ -89,7 +89,7 @@ impl Solid<'_> {
         Ok(Tried { resolution, betti, voxels: start.tally.start, loss })
     }
 
-    /// What may be lost, a fraction of the diagonal.
+    /// The largest loss that is accepted, a fraction of the diagonal.
     fn allowed(&self) -> f64 {
         LOST * self.grid(self.params().resolution).side
     }
@@ -159,7 +159,7 @@ impl Solid<'_> {
         }
     }
 
-    /// What a lattice other than that of the base loses, in words.
+    /// Warns about the losses of a lattice other than that of the base.
     ///
     /// # Errors
     /// As [`Solid::descend`].

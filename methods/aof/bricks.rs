@@ -132,7 +132,7 @@ impl Marks {
         *self.0.word(place) &= !(1 << inside(place).1);
     }
 
-    /// Which of the 27 neighbours have a mark, as for [`Bricks::neighbourhood`].
+    /// The marked places among the 27 around and at a place, as bits as in [`Bricks::neighbourhood`].
     #[inline]
     pub fn neighbourhood(&self, place: Place) -> u32 {
         self.0.neighbourhood(place)
@@ -213,7 +213,7 @@ impl Bits {
         (0..9).fold(0, |bits, k| {
             let (y, z) = (y + k % 3 - 1, z + k / 3 - 1);
             let row = |x: i32| u32::from(self.row([x, y, z]));
-            // From the bit before the row to the one after it.
+            // The row with one bit of room on either side, for neighbours in the bricks beside.
             let mut ten = row(x) << 1;
             match x % 8 {
                 0 => ten |= row(x - 1) >> 7,

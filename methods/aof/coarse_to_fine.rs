@@ -2,9 +2,9 @@
 //! elsewhere.
 //!
 //! 1. The bounding box is halved down to blocks of coarse voxels; blocks outside are left out.
-//! 2. Each voxel gets the candidate triangles of its sphere and its descendants' from those of its
-//!    parent, with them its distance `D`, and from `D` its side: no test is needed where the parent
-//!    is farther from the surface than its descendants from it.
+//! 2. Each voxel gets the candidate triangles for its own sphere and those of its descendants from the
+//!    candidates of its parent. They give its distance `D` to the surface. A voxel has the side of its
+//!    parent, without a test, if the parent's distance exceeds that of its farthest descendant.
 //! 3. Above the finest level: where the sphere of radius `sigma` lies inside (`D >= sigma`), `AOF'`
 //!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, by default up
 //!    to the flux of the samples themselves in a constant field.
@@ -39,7 +39,7 @@ const HALF_DIAGONAL: f64 = 0.866_025_403_784_438_6;
 pub struct Surface {
     /// Closest points.
     pub triangles: NearbyTriangles,
-    /// Which side.
+    /// The inside test.
     pub inside: Arc<InsideTest>,
 }
 
@@ -50,7 +50,7 @@ impl Surface {
     }
 }
 
-/// What to find out about the voxels.
+/// The values of the voxels that are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
     /// Places alone.
@@ -78,7 +78,7 @@ pub struct Tally {
 pub struct Descent {
     /// The voxels.
     pub voxels: Bricks,
-    /// What happened to them.
+    /// Counts of what happened to them.
     pub tally: Tally,
 }
 
@@ -105,6 +105,7 @@ pub fn coarse_to_fine(
     let parts: Result<Vec<_>, SimplifyError> = blocks.par_iter().map(descend).collect();
     run.step(blocks.len(), blocks.len())?;
     let mut descent = Descent { voxels: Bricks::new(grid.size), tally: levels.tally() };
+    // In the order of the blocks: brick numbers, and with them every later order, are deterministic.
     for (voxels, tally) in parts? {
         voxels.into_iter().for_each(|voxel| descent.voxels.insert(voxel));
         descent.tally.add(&tally);
@@ -132,6 +133,7 @@ impl Levels {
             (0..params.levels).map(|level| params.d.pow(params.levels - 1 - level)).collect();
         let radius = |size: u32| grid.side * f64::from(size);
         let mut reaches: Vec<f64> = sizes.iter().map(|&size| radius(size)).collect();
+        // From fine to coarse: a reach covers the shift to a child's centre plus the child's reach.
         for level in (0..reaches.len() - 1).rev() {
             let moved = HALF_DIAGONAL * (radius(sizes[level]) - radius(sizes[level + 1]));
             reaches[level] = reaches[level].max(moved + reaches[level + 1]);
@@ -203,6 +205,7 @@ fn blocks(surface: &Surface, grid: &Grid, levels: &Levels) -> Vec<Block> {
             let half = (corner(hi) - corner(lo)).length() * 0.5;
             let mut set = NearSet::default();
             surface.triangles.narrow(&block.set, centre, half + levels.reaches[0], &mut set);
+            // A block farther from the surface than its own corners is on one side as a whole.
             if set.distance() <= half || surface.inside.side(centre) == Side::Inside {
                 open.push(Block { lo, hi, set });
             }
@@ -225,7 +228,7 @@ struct Walk<'a> {
     tally: Tally,
 }
 
-/// What is known of a voxel from its ancestors.
+/// The facts about a voxel that follow from its ancestors.
 #[derive(Clone, Copy)]
 struct Known {
     /// Whether it and its descendants are inside, if that is the same for all.
@@ -272,12 +275,14 @@ impl<'a> Walk<'a> {
         // Farthest centre of a descendant.
         let spread = HALF_DIAGONAL * (sigma - self.grid.side);
         let finest = level + 1 == self.levels.sizes.len();
+        // The sphere does not fit. Only the depth of the solid, for messages, may need the side.
         if finest && distance < sigma {
             if distance > self.tally.deepest && self.is_inside(known, centre) {
                 self.tally.deepest = distance;
             }
             return;
         }
+        // Farther from the surface than any descendant's centre is away: all have this side.
         if distance > spread {
             if !self.is_inside(known, centre) {
                 return;
@@ -302,6 +307,7 @@ impl<'a> Walk<'a> {
                 return;
             }
         }
+        // The spheres of all descendants fit, and no values are needed: skip the recursion.
         if self.wanted == Wanted::Places && distance >= spread + self.grid.side {
             self.emit_all(base, size, distance);
             return;

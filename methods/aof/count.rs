@@ -10,8 +10,8 @@
 //!    to the coarsest lattice that has both.
 //! 4. The rest is deleted, simple voxels of the largest flux first.
 //!
-//! Which lattices are tried depends on the count alone, so that the same count has the same answer
-//! whatever was asked before. Lattices that are there already are not made again.
+//! The lattices tried depend on the count alone, so that the same count has the same answer, whatever
+//! was asked before. Lattices made before are reused.
 
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ pub type Lattices = Reuse<u32, Option<Axis>>;
 const ENOUGH: f64 = 1.15;
 /// A lattice may lose so much more of the surface than the base does or may.
 const WORSE: f64 = 1.2;
-/// What the estimate aims at, in counts.
+/// The size that the estimate aims at, in requested counts.
 const AIM: f64 = 1.06;
 /// Lattices that are tried for a count.
 const MAX_TRIES: usize = 8;
@@ -100,6 +100,8 @@ impl Solid<'_> {
         let mut at = search.high;
         while search.tried < MAX_TRIES && size(&search.best) < count {
             let ideal = search.growth.resolution_of(AIM * count as f64);
+            // At least a sixteenth finer, so that few tries suffice; at most twice, since estimates
+            // from a coarse lattice are poor.
             let next = ideal.clamp(at + 1 + at / 16, 2 * at + 1);
             if self.check_resolution(next).is_err() || self.visits(next) > MAX_VISITS {
                 break;
@@ -131,12 +133,13 @@ impl Solid<'_> {
         let mut is_lost = false;
         while search.tried < MAX_TRIES && size(&search.best) as f64 > ENOUGH * count as f64 {
             let Search { low, high, .. } = *search;
-            // Below a lattice that lost the topology not much is gained by going close to it.
+            // The bracket is narrow enough, the sooner if its lower end lost the topology.
             if high - low <= 1 + high / if is_lost { 8 } else { 16 } {
                 break;
             }
             search.tried += 1;
             let ideal = search.growth.resolution_of(AIM * count as f64);
+            // An estimate outside the bracket has been refuted: bisect.
             let next = if low < ideal && ideal < high { ideal } else { low.midpoint(high) };
             let lattice = lattices.get(next, || self.faithful_axis(next, base))?;
             is_lost |= lattice.is_none();
@@ -156,7 +159,7 @@ impl Solid<'_> {
     fn faithful_axis(&self, resolution: u32, base: &Base) -> Result<Option<Axis>, SimplifyError> {
         let start = self.descend(resolution, self.wanted())?;
         let (topology, base_loss) = (base.topology, base.loss.map_or(0.0, |loss| loss.distance));
-        // A finer lattice may have what the base misses.
+        // Another topology than the base's is accepted if it is the solid's: the base may lack it.
         let is_other = |b, t| b != t && Some(b) != self.shape.expected_betti();
         if topology.is_some_and(|t| is_other(betti_of(&start.voxels), t)) {
             return Ok(None);
@@ -168,7 +171,7 @@ impl Solid<'_> {
         self.axis(resolution, &start, self.params().angle).map(Some)
     }
 
-    /// What is missing of the spheres of an axis that was taken down to a count.
+    /// Warns about parts of the surface far from all spheres of an axis that was taken down to a count.
     fn say_what_the_count_loses(
         &self,
         axis: &Axis,
@@ -199,6 +202,7 @@ impl Solid<'_> {
     ) -> Result<(), SimplifyError> {
         let before = axis.voxels.len();
         if self.params().variant == Variant::Plain {
+            // Most negative flux first. Stable, so ties go by place; then back to the order of places.
             axis.voxels.sort_by(|a, b| a.flux.total_cmp(&b.flux));
             axis.voxels.truncate(count);
             axis.voxels.sort_unstable_by_key(|v| [v.place[2], v.place[1], v.place[0]]);
@@ -261,7 +265,7 @@ impl Growth {
         Self { sheets: sheets as f64 / (r * r), curves: (axis.voxels.len() - sheets) as f64 / r }
     }
 
-    /// The resolution, rounded up, that should have so many voxels.
+    /// The resolution, rounded up, that should give this number of voxels.
     fn resolution_of(&self, voxels: f64) -> u32 {
         // The root of a quadratic without cancellation, and without division where it is linear.
         let root = (self.curves * self.curves + 4.0 * self.sheets * voxels).sqrt();

@@ -28,7 +28,7 @@ impl Grid {
         let (lo, hi) = mesh.bounding_box().expect("a shape has vertices");
         let extent = hi - lo;
         let side = extent.max_element() / f64::from(resolution);
-        // A side that is a whole number of voxels but for rounding does not get one more.
+        // Rounding must not add a voxel to a side that is a whole number of voxels.
         let size = extent.to_array().map(|length| {
             let voxels = (length / side * (1.0 - 1e-9)).ceil().max(1.0) as u32;
             voxels.next_multiple_of(split)

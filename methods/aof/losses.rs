@@ -1,8 +1,8 @@
 //! Parts of a solid that a lattice loses: found, and named.
 //!
-//! A part that is thinner than two voxels has no voxel whose sphere fits inside. Where it is a limb the
-//! Betti numbers do not tell. So points of the surface, its vertices and the middles of its faces, are
-//! measured against the spheres of the voxels:
+//! A part thinner than two voxels has no voxel whose sphere fits inside. If it is a limb, its loss does
+//! not change the Betti numbers. So points of the surface, its vertices and the middles of its faces,
+//! are measured against the spheres of the voxels:
 //!
 //! 1. The spheres of voxels at the border of the start set; those inside reach no farther.
 //! 2. The point that is farthest from all of them is lost where it is farther than [`LOST`] voxels.
@@ -71,13 +71,13 @@ impl Solid<'_> {
         let ball = |v: &Voxel| Ball::new(grid.centre(v.place), f64::from(v.distance));
         let balls: Vec<Ball> = voxels.iter().map(ball).collect();
         let Ok(union) = MedialUnion::of_spheres(&balls) else {
-            // Without voxels all is lost, and other words are found for it.
+            // Without voxels everything is lost, which has a message of its own.
             return Ok(None);
         };
         let points = self.surface_points();
         let places: Vec<Vec3> = points.iter().map(|point| point.0).collect();
         let distances = union.signed_batch(&places);
-        // The first of equals.
+        // Reversed, because `max_by` returns the last of equal elements.
         let farthest =
             (0..places.len()).rev().max_by(|&a, &b| distances[a].total_cmp(&distances[b]));
         let Some(farthest) = farthest.filter(|&f| distances[f] > allowed) else {
@@ -87,6 +87,7 @@ impl Solid<'_> {
         let (place, distance) = (places[farthest], distances[farthest]);
         let around = points.iter().filter(|p| p.0.distance(place) <= allowed.max(0.2 * distance));
         let around: Vec<&Point> = around.collect();
+        // The thickest ball nearby decides: a lattice that fits it has voxels in the part.
         let some = around.iter().step_by(around.len().div_ceil(MAX_BALLS).max(1));
         let thickest = some.map(|&&point| shrunk(&tree, point)).fold(f64::MIN_POSITIVE, f64::max);
         let longest = grid.side * f64::from(resolution);
@@ -149,8 +150,9 @@ fn shrunk(tree: &TriangleBvh, (place, normal): Point) -> f64 {
             break;
         }
         let chord = place - nearest.point;
+        // The ball through both points that touches the surface at `place`.
         let smaller = chord.length_squared() / (2.0 * normal.dot(chord));
-        // Rounding: the ball cannot be told from its point any more.
+        // Fails only by rounding, when the ball has shrunk to its point.
         if !(smaller > 0.0 && smaller < radius) {
             break;
         }

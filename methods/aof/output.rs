@@ -50,6 +50,7 @@ pub fn medial_mesh(
     let around: Vec<[Option<u32>; 27]> =
         (0..keys.len() as u32).into_par_iter().map(around).collect();
     run.step(0, 1)?;
+    // Voxels are sorted like bits, so the later bits are the later voxels: each simplex once.
     let after = |k: u32| around[k as usize][CENTRE as usize + 1..].iter().flatten().copied();
     let (mut edges, mut faces, mut first) = (Vec::new(), Vec::new(), vec![0]);
     let mut lengths = Vec::new();

@@ -1,7 +1,7 @@
 //! The memory of a medial mesh before it is made.
 //!
-//! A sheet of a plain result is two voxels thick and more, and voxels that touch are joined: the
-//! triangles and the tetrahedra between them, which are looked at for voids, outnumber the voxels by far.
+//! A sheet of a plain result is at least two voxels thick, and voxels that touch are joined. The
+//! triangles between them, and the tetrahedra that are checked for voids, far outnumber the voxels.
 
 use medial::simplifier::SimplifyError;
 

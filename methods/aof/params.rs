@@ -30,11 +30,11 @@ pub struct AofParams {
     /// `mu` of the final threshold `-mu sin alpha`; 0 for 1/8 where voxels are kept by the
     /// threshold, and 3/8 where only end points are.
     pub mu: f64,
-    /// What is made of the flux.
+    /// The use of the flux.
     pub variant: Variant,
     /// How the samples lie on the sphere.
     pub spiral: Spiral,
-    /// Which voxels there are to begin with.
+    /// The start set of voxels.
     pub start: Start,
     /// From which flux on a coarse voxel is dismissed.
     pub dismiss: Dismiss,
@@ -44,7 +44,7 @@ pub struct AofParams {
     pub max_memory: f64,
 }
 
-/// What is made of the flux.
+/// The use of the flux.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variant {
@@ -57,7 +57,7 @@ pub enum Variant {
     Thinning,
 }
 
-/// Which voxels there are to begin with.
+/// The start set of voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Start {

@@ -1,7 +1,7 @@
 //! The published level: the paper's lattice, or the finest that fits.
 //!
-//! What the user sets is taken as it is. Of the rest, the resolution is lowered until the voxels and
-//! the medial mesh fit into memory, and a solid that holds no coarse voxel is begun with fine ones.
+//! Parameters set by the user are not changed. Otherwise the resolution is lowered until the voxels and
+//! the medial mesh fit into memory, and a solid without a coarse voxel starts with fine ones.
 
 use medial::shape::Shape;
 use medial::simplifier::{Level, RunContext, SimplifyError};
@@ -16,7 +16,7 @@ use super::solid::Solid;
 
 /// How often the resolution is lowered for the medial mesh.
 const MAX_LOWERINGS: usize = 4;
-/// What a lower resolution aims at, as a share of the limit.
+/// The memory that a lower resolution aims at, as a share of the limit.
 const AIM: f64 = 0.95;
 
 /// The solid at the published level.

@@ -54,6 +54,7 @@ impl BucketQueue {
                 self.words[bucket / 64] |= 1 << (bucket % 64);
                 self.summary[bucket / 4096] |= 1 << (bucket / 64 % 64);
             }
+            // At the end of its bucket: first in, first out.
             [_, last] => {
                 self.nodes[last as usize].next = node;
                 self.ends[bucket][1] = node;
@@ -63,6 +64,7 @@ impl BucketQueue {
 
     /// Takes out the place that came first of those with the least key.
     pub fn pop(&mut self) -> Option<Place> {
+        // Two levels of bits: a few words are read, however many buckets are empty.
         let part = self.summary.iter().position(|&bits| bits != 0)?;
         let word = 64 * part + self.summary[part].trailing_zeros() as usize;
         let bucket = 64 * word + self.words[word].trailing_zeros() as usize;

@@ -1,7 +1,7 @@
-//! What the user sets, and what it means at a level.
+//! The parameters as the user sets them, and their values at a level.
 //!
-//! Most defaults are ours at every level but the published one, where they are the paper's. So a
-//! parameter that is not set, or set to `auto`, has its value from the level.
+//! Most defaults are the paper's at the published level and our own at all others. So a parameter that
+//! is not set, or set to `auto`, gets its value from the level.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -165,7 +165,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for AutoVisitor<T> {
     }
 }
 
-/// What there is to set.
+/// The parameters that can be set.
 pub(super) fn describe() -> Vec<ParamInfo> {
     let fixed = AofSettings::default();
     vec![

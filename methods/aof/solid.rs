@@ -78,7 +78,7 @@ impl<'s> Solid<'s> {
         coarse_to_fine(&self.surface, &grid, &self.params, wanted, &self.run)
     }
 
-    /// What the run is surrounded by.
+    /// The context of the run.
     pub(super) fn run(&self) -> &RunContext {
         &self.run
     }

@@ -19,7 +19,7 @@ use super::bricks::{Bricks, Marks, Voxel};
 use super::queue::BucketQueue;
 use super::simple::{CENTRE, SimpleTable, is_simple, offset};
 
-/// Which voxels go, and in which order.
+/// The voxels that are deleted, and their order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
     /// Those with a flux above the threshold, the smallest distance first.
@@ -32,7 +32,7 @@ pub enum Order {
         /// Flux at or below which an end point stays.
         threshold: f32,
     },
-    /// All, the largest flux first, until so many are left.
+    /// All, the largest flux first, until `to` voxels are left.
     Down {
         /// Number of voxels to leave.
         to: usize,

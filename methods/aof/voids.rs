@@ -153,6 +153,7 @@ impl<'a> Collapse<'a> {
         let mut steps = 0_usize;
         while let Some((_, Reverse(triangle))) = self.free.pop() {
             let (count, tetrahedron) = self.beside[triangle as usize];
+            // Its tetrahedron may have been opened through another triangle meanwhile.
             if count != 1 {
                 continue;
             }

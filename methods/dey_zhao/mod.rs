@@ -76,7 +76,7 @@ pub struct DeyZhaoParams {
     pub theta: f64,
     /// `rho_0` of the ratio condition, a pure number.
     pub rho: f64,
-    /// Which of the two conditions are tested.
+    /// The conditions that are tested.
     pub condition: Condition,
     /// How a requested number of spheres is met.
     pub size: Size,

@@ -106,6 +106,7 @@ pub(super) fn last_within(
     mut error_at: impl FnMut(usize) -> Result<f64, SimplifyError>,
 ) -> Result<Found, SimplifyError> {
     let (mut best, mut measured) = ((f64::INFINITY, 0), 0);
+    // Remembers the best state, for the message of a refusal.
     let mut is_within = |collapses: usize| {
         let error = error_at(collapses)?;
         measured += 1;
@@ -122,6 +123,7 @@ pub(super) fn last_within(
         step *= 2;
         is_found = is_within(within)?;
     }
+    // From coarse to fine, so that the first state within is the coarsest of them.
     for k in (1..SPREAD_STATES).rev() {
         if is_found {
             break;

@@ -44,7 +44,7 @@ pub(super) enum Stop {
 struct Taken {
     error: f64,
     ends: [u32; 2],
-    /// Which of the ends survives.
+    /// The end (0 or 1) that survives.
     survivor: usize,
 }
 
@@ -203,6 +203,7 @@ impl Contraction {
             edge.evaluate(&Ground { complex, samples, inside: *inside }, ends, cutoff, star);
             self.tally.evaluations += 1;
         }
+        // Its candidate was popped; a barred edge is not queued again before a collapse renews it.
         edge.queued = f64::INFINITY;
         enqueue(&mut self.queue, &self.complex, ends, &mut edge);
         self.edges.insert(ends, edge);
@@ -242,6 +243,7 @@ impl Contraction {
 
     /// Steps 3 and 4: the collapse, the samples, the edges whose stars it changes.
     fn collapse(&mut self, ends: [u32; 2], survivor: usize) {
+        // Before the collapse, which retires the link of the removed vertex.
         let change = self.take_apart(ends[survivor], ends[1 - survivor]);
         let Change { kept, removed, .. } = change;
         self.complex.collapse(kept, removed, self.complex.sphere(kept));
@@ -292,6 +294,7 @@ impl Contraction {
             edge.sound(&ground, ends, change.witnesses[place], star);
             edge
         });
+        // Simplices with `other` itself vanish from the hypothetical star when the edge collapses.
         let added = change.around.iter().map(|&x| [x, NONE]);
         let added = added.chain(change.sides.iter().copied());
         let added = added.filter(|simplex| !simplex.contains(&other));

@@ -247,6 +247,7 @@ impl Directed {
         gone: u32,
         added: impl Iterator<Item = [u32; 2]>,
     ) -> u64 {
+        // Inside a primitive: the depth holds as long as that primitive does, see the head.
         if self.signed < 0.0 {
             if self.nearest.contains(&gone) {
                 self.signed = 0.0;

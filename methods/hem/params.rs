@@ -11,7 +11,7 @@ pub struct HemParams {
     pub inside: Inside,
     /// The directions that a bound covers.
     pub sides: Sides,
-    /// Which collapses are blocked.
+    /// The collapses that are blocked.
     pub blocking: Blocking,
 }
 
@@ -39,7 +39,7 @@ pub enum Sides {
     Both,
 }
 
-/// Which collapses are blocked for the sake of the topology.
+/// The collapses that are blocked to protect the topology.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Blocking {

@@ -73,6 +73,7 @@ fn merged(a: &[u32], b: &[u32]) -> Vec<u32> {
     let (mut a, mut b) = (a, b);
     while let ([x, ..], [y, ..]) = (a, b) {
         union.push(*x.min(y));
+        // Branch-free; a common element advances both lists, so it is kept once.
         let (skip_a, skip_b) = (usize::from(x <= y), usize::from(y <= x));
         (a, b) = (&a[skip_a..], &b[skip_b..]);
     }

@@ -137,6 +137,7 @@ impl Star {
 
     /// The primitive of least signed distance.
     fn deepest(&mut self, p: Vec3, floor: f64) -> Nearest {
+        // Start from the hub, which every primitive of the star but the rims contains.
         let mut best = self.at_hub(p);
         if self.is_within_hub(best.signed, limit(best.signed, floor)) {
             return best;
@@ -147,6 +148,7 @@ impl Star {
         for _ in 0..ROUNDS {
             let Some(k) = self.largest_excess(limit(best.signed, floor)) else { break };
             self.tested[k] = self.query;
+            // A new direction: excesses are valid for the direction they were measured in only.
             if best.improve(self.cone(k).nearest_centre(p), [k as u32, NONE]) {
                 hub = self.measure_excess(p, best.towards(p));
             }
@@ -319,6 +321,7 @@ impl<T> Built<T> {
     #[inline]
     fn get(&mut self, index: usize, make: impl FnOnce() -> T) -> &T {
         let (round, item) = &mut self.items[index];
+        // Built in an earlier round: forgotten now, not when the round began.
         if *round != self.round {
             (*round, *item) = (self.round, None);
         }

@@ -13,8 +13,8 @@
 //! 3. Facets are cut into triangles. Edges and vertices that pass without a facet stay as they are, or
 //!    are left out (`leftovers=false`).
 //!
-//! A number of spheres asks for the vertices of largest value; where several have the same value, for
-//! all of them or none. Without leftovers it asks for the facets of largest value.
+//! A number of spheres selects the vertices of largest value; of several with the same value, all or
+//! none. Without leftovers it selects the facets of largest value.
 //!
 //! # Deviations from the paper
 //! - Rounding must not open the result: a value is at least that of the cells around it.

@@ -4,8 +4,8 @@
 //! Chazal, Lieutier: *The lambda-medial axis*, Graphical Models 67(4), 2005,
 //! doi:10.1016/j.gmod.2005.01.002.
 //!
-//! `F(x)` is the radius of the smallest ball enclosing the closest boundary points `Pi(x)` of `x`; kept
-//! is what has `F >= lambda`. `lambda` is a length, a fraction of the input's bounding-box diagonal.
+//! `F(x)` is the radius of the smallest ball enclosing the closest boundary points `Pi(x)` of `x`; points
+//! with `F >= lambda` are kept. `lambda` is a length, a fraction of the input's bounding-box diagonal.
 //! `F(x) <= r(x)`, with equality where `x` lies in the convex hull of its closest points.
 //!
 //! # Variants
@@ -42,13 +42,13 @@ use crate::scale::{Published, Scale};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LambdaParams {
-    /// What is filtered.
+    /// The elements that are filtered.
     pub variant: Variant,
     /// Whether edges and vertices are kept that pass without a facet; `cell` alone.
     pub leftovers: bool,
 }
 
-/// What is filtered.
+/// The elements that are filtered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variant {

@@ -70,6 +70,7 @@ pub(super) fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>,
     let mut left = Bits::ones(total);
     while let Some(cheapest) = queue.pop(|edge: &Candidate| edge.ends.iter().all(|&v| left.has(v)))
     {
+        // Both ends are left, so their spheres, and with them the cost, are those of the queued edge.
         let [removed, kept] = absorbed_first(cheapest.ends, |v| graph.sphere(v).radius);
         let survivor = graph.sphere(kept);
         graph.absorb(removed, kept, |neighbour, sphere| {
@@ -199,6 +200,7 @@ impl Graph {
     /// removed one, whether or not it was a neighbour of the kept one before.
     #[inline]
     fn absorb(&mut self, removed: u32, kept: u32, mut visit: impl FnMut(u32, Sphere)) {
+        // Entries that name either end are then skipped like neighbours met before.
         for v in [removed, kept] {
             self.nodes[v as usize].met_by = removed;
         }
@@ -212,6 +214,7 @@ impl Graph {
             for index in 0..len as usize {
                 let neighbour = self.find(self.ahead[index]);
                 let node = &mut self.nodes[neighbour as usize];
+                // Entries that were absorbed by the same sphere name it several times.
                 if node.met_by == removed {
                     continue;
                 }

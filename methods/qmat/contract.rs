@@ -201,6 +201,7 @@ impl Contraction {
         if !faces.holds(&self.complex, [a, b], optimum) {
             return Decision::Collapse(optimum);
         }
+        // By ascending error, so the first placement that folds nothing is the cheapest.
         for (error, sphere) in by_error(&quadric, ends) {
             if faces.holds(&self.complex, [a, b], sphere) {
                 continue;
@@ -352,6 +353,7 @@ fn is_in_reach(sphere: Sphere, midpoint: Sphere, [a, b]: [Sphere; 2]) -> bool {
 /// Both ends and the midpoint with their errors, the least first.
 fn by_error(quadric: &Quadric, [a, b]: [Sphere; 2]) -> [(f64, Sphere); 3] {
     let mut candidates = [a, b, a.lerp(b, 0.5)].map(|sphere| (quadric.value(sphere), sphere));
+    // Stable: of equal errors the smaller id, then the larger one, then the midpoint.
     candidates.sort_by(|x, y| x.0.total_cmp(&y.0));
     candidates
 }

@@ -3,10 +3,10 @@
 use medial::simplifier::{Level, ParamInfo, SimplifyError};
 use serde::{Deserialize, Serialize};
 
-/// `η` of the paper: from so many spheres on it checks the link condition.
+/// `η` of the paper: the number of spheres from which on it checks the link condition.
 const PUBLISHED_FROM: usize = 200;
 
-/// Parameters of Q-MAT; the default is the paper's, but for [`QmatParams::topology_from`]. Lengths
+/// Parameters of Q-MAT; the defaults are the paper's, except [`QmatParams::topology_from`]. Lengths
 /// are fractions of the bounding-box diagonal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -56,7 +56,7 @@ pub enum TopologyFrom {
     Auto,
     /// From the first collapse on.
     All,
-    /// While at most so many spheres are left: `η` of the paper's Algorithm 1.
+    /// While at most this many spheres are left: `η` of the paper's Algorithm 1.
     Spheres(usize),
     /// Never.
     Never,
@@ -72,7 +72,7 @@ impl TopologyFrom {
         }
     }
 
-    /// What it means at a level: never [`TopologyFrom::Auto`].
+    /// Its meaning at a level: never [`TopologyFrom::Auto`].
     fn at(self, level: Level) -> Self {
         match (self, level) {
             (Self::Auto, Level::Published) => Self::Spheres(PUBLISHED_FROM),

@@ -46,6 +46,7 @@ impl Quadric {
     pub(super) fn add_plane(&mut self, normal: Vec3, touching: Sphere, weight: f64) {
         let n = [normal.x, normal.y, normal.z, 1.0];
         let offset = dot(n, coordinates(touching));
+        // Expanded: n̄n̄ᵀ goes into A, -2 (n̄·m₀) n̄ into b, (n̄·m₀)² into c.
         let mut entry = 0;
         for row in 0..4 {
             for column in row..4 {
@@ -138,6 +139,7 @@ impl Quadric {
             if !regular {
                 return None;
             }
+            // Lower triangle only: the matrix stays symmetric under elimination.
             for i in k + 1..4 {
                 let factor = m[i][k] / d;
                 for j in k + 1..=i {

@@ -34,6 +34,7 @@ impl Contraction {
         if self.sphere_count() > MAX_UNLOCKED_SPHERES || !self.keeps_topology() {
             return None;
         }
+        // Computed on demand: few runs get here.
         let goal = betti(initial);
         let mesh = self.to_mesh();
         let ids: Vec<u32> = self.complex().vertices().collect();

@@ -14,8 +14,8 @@
 //! 5. Optional: sheets of small object angle are removed from the outside in (file `sheets.rs`).
 //! 6. Radii are divided by `s`.
 //!
-//! Where grown parts touch, a tunnel closes or a loop appears. That is what the transform does: the
-//! result has the Betti numbers of the grown union.
+//! Where grown parts touch, a tunnel closes or a loop appears. This is part of the transform: the result
+//! has the Betti numbers of the grown union.
 //!
 //! # Deviations from the papers
 //!
@@ -23,8 +23,8 @@
 //!   refinement to `delta` = 0.01 of the model's size. The union approximates the shape as well as
 //!   these samples do.
 //! - Step 5 is off by default. The authors' tool removes sheets below 30 degrees at scales above 1;
-//!   `sat_angle=30` asks for it, and makes the published level that of the tool as it comes. It removes
-//!   facets one by one, so that a sheet can go in part.
+//!   `sat_angle=30` does the same, so that the published level is that of the tool's defaults. Facets
+//!   are removed one by one, so a sheet can be removed in part.
 //! - Step 6 undoes neither part of step 2: a result at scale 1 is 0.2 % larger than the union of
 //!   polar balls, and its centres keep the jitter, by which results of different seeds differ. As far as
 //!   we know the authors' tool does not undo it either. Without step 2 (`radius_factor=1`, `jitter=0`)
@@ -32,9 +32,9 @@
 //! - The authors choose the density of the samples, `delta`, beside `s`; with `size=density` a number of
 //!   spheres is met by the number of samples at `s` = 1.1 (`methods/size_search.rs`). Each count then
 //!   has balls of its own.
-//! - By default a number of spheres is met by a search on `s`. A scale has the count it has: the result
-//!   is the largest count at most as large as asked that the search meets, to 1 %, and is reported.
-//!   Scales are kept from request to request; the seconds of each are those of all scales that it needed.
+//! - By default a number of spheres is met by a search on `s`. Not every count occurs: the result is the
+//!   largest count met that does not exceed the request; a count within 1 % ends the search. Scales are
+//!   reused by later requests; the seconds of a request are those of all scales that it needed.
 
 mod params;
 mod search;

@@ -8,17 +8,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SatParams {
-    /// What all radii are multiplied by before anything else; a pure number.
+    /// Factor of all radii, applied before anything else; a pure number.
     pub radius_factor: f64,
     /// How far a centre is moved at most along each axis, as a fraction of the radius.
     pub jitter: f64,
     /// Facets with a smaller object angle are removed from the outside in; degrees, 0 for none.
     pub sat_angle: f64,
-    /// What a number of spheres is met by.
+    /// How a number of spheres is met.
     pub size: Size,
 }
 
-/// What a number of spheres is met by.
+/// How a number of spheres is met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {

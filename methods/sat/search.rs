@@ -1,13 +1,13 @@
 //! A scale for a number of spheres.
 //!
-//! 1. From scale 1 up, in steps that double, until the count is at most the one asked. The count
-//!    does not fall everywhere: facets that get more corners get more vertices. The ladder ends where
-//!    it has stalled.
+//! 1. From scale 1 up, in steps that double, until the count is at most the requested one. The count can
+//!    rise, because facets with more corners have more vertices. The ladder of scales ends when the
+//!    count has stalled.
 //! 2. Between the last two scales the Illinois variant of regula falsi, on logarithms of scale and
 //!    count.
 //!
-//! Which scales are tried depends on the count alone, so that the same count has the same answer
-//! whatever was asked before. Scales that are there already are not computed again.
+//! The scales tried depend on the count alone, so that the same count has the same answer, whatever was
+//! asked before. Scales computed before are reused.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ const FIRST_STEP: f64 = 0.1;
 /// Steps until the search gives up: scale 3,277.
 const MAX_STEPS: usize = 16;
 
-/// Before scale 7.4 the count can rise for long and fall later.
+/// Steps before the test for a stall, up to scale 7.4: there the count can rise for long and fall later.
 const STEPS_BEFORE_STALL: usize = 7;
 
 /// The count has stalled if as many steps brought it down by less than this fraction.
@@ -132,7 +132,7 @@ fn between(
         }
         let scaled = at(logarithm.exp())?;
         let is_above = scaled.size() > count;
-        // An end that stays twice pulls half as hard.
+        // Illinois: an end that stays twice counts half.
         let again = last_was_above == Some(is_above);
         if is_above {
             low = point(&scaled);

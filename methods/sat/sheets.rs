@@ -6,8 +6,8 @@
 //!    changes no topology. The frontier facet with the smallest angle goes first; the value of a
 //!    facet is the largest angle up to its removal. Facets whose value is below the limit go, that
 //!    is, the removal ends when all angles of the frontier reach the limit.
-//! 3. Sides that are left without a facet go from their loose ends. Edges that never had a facet
-//!    stay: they are parts of the shape that are like curves.
+//! 3. Sides left without a facet are removed from their loose ends on. Edges that never had a facet
+//!    stay: they are curve-like parts of the shape.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};

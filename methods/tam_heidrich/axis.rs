@@ -1,4 +1,4 @@
-//! Steps 1 and 2: the axis that is pruned, and the volume that each of its simplices stands for.
+//! Steps 1 and 2: the axis to be pruned, and the volume that each of its simplices represents.
 
 use medial::Vec3;
 use medial::complex::{Contacts, Incidence, MedialMesh, UnionAxis, betti};
@@ -14,25 +14,25 @@ use super::merge;
 use super::params::{AxisChoice, TamHeidrichParams};
 use crate::perturb::perturbed;
 
-/// A medial mesh with all that pruning asks of it.
+/// A medial mesh with everything that pruning needs.
 pub(super) struct Axis {
     pub(super) mesh: MedialMesh,
     pub(super) incidence: Incidence,
-    /// Whether a sphere is the end of an edge that has no face, or has no edge: it stays.
+    /// For each sphere whether it is the end of an edge without faces, or has no edge: it stays.
     pub(super) on_curve: Vec<bool>,
-    /// Relative volumes of the tetrahedra whose pole is this sphere.
+    /// For each sphere the relative volume of the tetrahedra whose pole it is.
     pub(super) at_sphere: Vec<f64>,
-    /// Relative volumes of the tetrahedra whose pole is nearest to this face, for a mesh whose
-    /// spheres are no poles.
+    /// For each face the relative volume of the tetrahedra whose pole is nearest to it, if the spheres
+    /// of the mesh are not poles.
     pub(super) at_face: Vec<f64>,
     /// The number of voids.
     pub(super) b2: u64,
-    /// The poles that are on it; none where its spheres are no polar balls of samples.
+    /// The poles on it; `None` if its spheres are not polar balls of samples.
     pub(super) poles: Option<AxisPoles>,
 }
 
 impl Axis {
-    /// An axis whose volumes and voids are not known.
+    /// An axis without volumes and voids, which are still to be computed.
     pub(super) fn of_mesh(mesh: MedialMesh) -> Self {
         let incidence = Incidence::of(&mesh);
         // Spheres without edges stay as well as the ends of edges without faces.
@@ -49,7 +49,7 @@ impl Axis {
         Self { mesh, incidence, on_curve, at_sphere, at_face, b2: 0, poles: None }
     }
 
-    /// The axis of a shape that the parameters ask for.
+    /// The axis of a shape, as the parameters specify it.
     pub(super) fn of_shape(
         shape: &Shape,
         params: &TamHeidrichParams,
@@ -99,7 +99,7 @@ impl Axis {
         let centre = |v: u32| self.mesh.spheres[v as usize].centre;
         let mut targets: Vec<[Vec3; 3]> =
             self.mesh.faces.iter().map(|face| face.map(centre)).collect();
-        // What is nearest to a curve belongs to no part.
+        // Curves take part in the search, since a tetrahedron nearest to a curve belongs to no part.
         let curves = self.mesh.edges.iter().zip(self.incidence.faces_at()).filter(|e| *e.1 == 0);
         targets.extend(curves.map(|(&[a, b], _)| [centre(a), centre(b), centre(b)]));
         let tree = TriangleBvh::from_triangles(&targets).map_err(ShapeError::from)?;
@@ -167,7 +167,7 @@ fn of_union(
     Ok(axis)
 }
 
-/// Which triangles of the axis of a union are between two corners at one sample.
+/// For each triangle of the axis of a union whether it lies between two corners at the same sample.
 fn fins_of(mesh: &MedialMesh, union: &UnionAxis, at: &[Option<u32>]) -> Vec<bool> {
     let sample = |corner: u32| at.get(corner as usize).copied().flatten();
     let is_between = |[a, b]: [u32; 2]| sample(a).is_some() && sample(a) == sample(b);

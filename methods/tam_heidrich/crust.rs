@@ -1,7 +1,7 @@
 //! The last step of the paper's pipeline, section 5: the poles that are left, for the power crust.
 //!
-//! 1. An inner pole is left if its polar ball is on what remains of the axis. One whose ball another
-//!    ball hides is on no part, and is not.
+//! 1. An inner pole is left if its polar ball is on the remaining axis. A pole whose ball is hidden by
+//!    another is on no part, so it is not left.
 //! 2. For objects with sharp corners the outer poles of removed features go too. An outer pole is
 //!    that of a removed feature if no inner polar ball that is left touches any of its samples.
 //! 3. The power crust of both ([`medial::geometry::PowerCrust`]). The balls are the polar balls as they
@@ -24,7 +24,7 @@ pub struct RemainingPoles {
     pub is_touched: Vec<bool>,
 }
 
-/// Which outer poles the power crust takes.
+/// The outer poles that the power crust takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OuterPoles {
     /// All of the samples: what the paper does for most objects.
@@ -96,7 +96,7 @@ impl AxisPoles {
         Self { inner: inner.collect(), samples }
     }
 
-    /// What is left where some spheres of the axis are.
+    /// The poles left when these spheres of the axis are left.
     pub(super) fn remaining(&self, sphere_kept: &[bool]) -> RemainingPoles {
         let (mut inner, mut is_touched) = (Vec::new(), vec![false; self.samples]);
         for (ball, _, samples) in self.inner.iter().filter(|i| sphere_kept[i.1 as usize]) {

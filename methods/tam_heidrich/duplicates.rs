@@ -1,4 +1,4 @@
-//! Step 1, section 3: what is a duplicate, told by samples.
+//! Step 1, section 3: duplicates, recognised by their samples.
 //!
 //! 1. *Poles.* The inner pole of a sample is its farthest Voronoi vertex inside. Vertices that are
 //!    equally far, up to rounding, all are poles: on a grid every sample has several, and which one
@@ -26,8 +26,8 @@ pub(super) struct DistinctBalls {
     pub(super) volumes: Vec<f64>,
 }
 
-/// Circumcentres nearer than this share of the radius are one, and radii nearer are equal: above rounding, which flat tetrahedra
-/// amplify, and far below the distance of samples.
+/// Circumcentres closer than this share of the radius count as one, and radii as equal: above rounding,
+/// which flat tetrahedra amplify, and far below the distance of samples.
 const COINCIDENT: f64 = 1e-7;
 
 impl DistinctBalls {

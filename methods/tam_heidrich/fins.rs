@@ -1,9 +1,9 @@
 //! Step 1, section 3: facets between duplicate corners.
 //!
 //! The axis of the perturbed balls has a *fin* between any two corners that are one sample: a facet that
-//! crosses a sheet or, where three sheets meet, reaches from the seam to the outside. Were the two one
-//! point, there would be none. Fins are taken away as far as that keeps the homotopy type, by elementary
-//! collapses:
+//! crosses a sheet or, where three sheets meet, reaches from the seam to the outside. If the two corners
+//! were one point, there would be no fin. Fins are removed by elementary collapses, as far as that keeps
+//! the homotopy type:
 //!
 //! 1. A triangle of a fin goes with an edge that nothing else has.
 //! 2. An edge that lost its last triangle goes with an end that no other edge has. What is left of the

@@ -2,7 +2,8 @@
 
 use medial::complex::MedialMesh;
 
-/// What is kept of a mesh, in its order. The sides of kept faces and the ends of kept edges are kept.
+/// A subcomplex of a mesh, in the mesh's order. It contains the sides of its faces and the ends of its
+/// edges.
 pub(super) fn kept_part(
     whole: &MedialMesh,
     sphere_kept: &[bool],

@@ -1,4 +1,4 @@
-//! Step 1, section 3: vertices of the axis that are left nearly at one position are one.
+//! Step 1, section 3: merges vertices of the axis that are still nearly at one position.
 //!
 //! Several polar balls pass through one sample, so that the boundary of their perturbed union has several
 //! corners there, and the axis several vertices where the exact one has one. Those are merged by their
@@ -52,7 +52,7 @@ pub(super) fn merged(
     }
     let mut number = vec![u32::MAX; mesh.spheres.len()];
     complex.vertices().zip(0..).for_each(|(old, new)| number[old as usize] = new);
-    // What a sphere went into is smaller, so that one pass finds the last of each chain.
+    // Spheres merge into smaller ids, so that one ascending pass resolves every chain.
     for v in 0..into.len() {
         into[v] = if into[v] == v as u32 { number[v] } else { into[into[v] as usize] };
     }

@@ -21,11 +21,11 @@
 //!    listed with ids, the largest first, in [`medial::simplifier::Extras`], as [`PartInfo`].
 //!
 //! # The level
-//! `t_v` in per cent, for all rounds by volume. A number of spheres ends the published schedule as near to
-//! it as whole parts allow, on either side: before the part that would take it farther below than it is
-//! above. If the end of the schedule is too early, rounds with twice the threshold follow, until nothing can
-//! go. So results of fewer spheres are always part of those of more, and a part is the smallest step. The
-//! diagnostics say how many spheres the level on the other side has.
+//! `t_v` in per cent, for all rounds by volume. A number of spheres ends the published schedule as close
+//! to it as whole parts allow, above or below: before the part whose removal would miss the number by
+//! more. If the schedule ends too early, rounds with twice the threshold follow, until no part can be
+//! removed. So results of fewer spheres are always contained in those of more, and a part is the smallest
+//! step. The diagnostics name the count on the other side of the number.
 //!
 //! # What does not reproduce
 //! - On an exact axis of a box there are twelve parts of level 1 and one of level 2, as in figure 5, and
@@ -68,13 +68,13 @@
 //!   of the balls, and facets stay open.
 //! - The axis of the union is exact, not the subset of the Voronoi diagram of the corners that
 //!   intersects the power shape.
-//! - Inner and outer poles are told apart by the surface.
+//! - The inside test of the surface separates inner and outer poles.
 //! - A given medial mesh is pruned in place of step 1 (`axis=initial` does so with the Voronoi medial
 //!   mesh too). Where it was given, there are no poles on it: each interior tetrahedron counts for the face
 //!   nearest to its circumcentre. The Voronoi medial mesh holds all circumcentres, and each sphere
 //!   counts with its tetrahedron; its sheets are smaller and more, since Voronoi vertices near the surface
 //!   do not converge to the axis.
-//! - A threshold is met by what does not exceed it.
+//! - A part that equals a threshold is removed.
 //! - The power crust (section 5) is not made here. The poles for it, inner ones on the remaining parts and
 //!   outer ones with or without those of removed features, come from the extras ([`RemainingPoles`], file
 //!   `crust.rs`); the spheres of the medial mesh are no substitute, since most of them are corners of sheets
@@ -229,7 +229,7 @@ impl Prepared {
         }
     }
 
-    /// Step 6, without any test but for what it did.
+    /// Step 6: removes parts without a test of topology, and reports the effect.
     fn remove_by_hand(
         &self,
         remaining: &mut Remaining<'_>,

@@ -7,21 +7,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TamHeidrichParams {
-    /// `t_t`: parts of at most so many triangles go in the first rounds.
+    /// `t_t`: the first rounds remove parts of at most this many triangles.
     pub t_t: usize,
-    /// Rounds by triangle count, at most; none of them checks topology.
+    /// Largest number of rounds by triangle count, which do not check topology.
     pub t_t_rounds: usize,
     /// These rounds end after one that removed less than this share of what the one before it did.
     pub drop: f64,
     /// `t_v`: for each of the later rounds, parts of at most this relative volume go; per cent.
     pub t_v: List<f64>,
-    /// Which rounds keep loops and components.
+    /// The rounds that keep loops and components.
     pub topology: Checked,
     /// The axis to work on.
     pub axis: AxisChoice,
     /// Ids of parts to remove in the end.
     pub remove: List<u32>,
-    /// What the radii of the polar balls are multiplied by; a pure number.
+    /// Factor of the radii of the polar balls; a pure number.
     pub radius_factor: f64,
     /// How far a polar ball is moved at most along each axis, as a fraction of its radius.
     pub jitter: f64,
@@ -29,7 +29,7 @@ pub struct TamHeidrichParams {
     pub merge: f64,
 }
 
-/// Which rounds keep loops and components.
+/// The rounds that keep loops and components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Checked {

@@ -1,4 +1,4 @@
-//! Step 3: parts, and what happens to the others when one goes.
+//! Step 3: parts, and how removing one changes the others.
 //!
 //! 1. Triangles grow together over edges that exactly two triangles share. The parts of level 1 are
 //!    those with a *free* edge, one of a single triangle.
@@ -17,9 +17,9 @@
 //!    a graph whose relative homology vanishes, a forest each tree of which hangs on `C` in one
 //!    point, which collapses too. If it is not zero, the exact sequence of the whole and what stays
 //!    says that `b1` falls or `b0` grows by that rank in all, and `b2` does not change.
-//! 4. A part that goes leaves simplices that only one other part has left: they become its own. Counters
-//!    of parts at each edge and vertex make the test of step 3 a comparison, and a removal linear in
-//!    the size of the part.
+//! 4. After a removal some simplices of the contact set belong to only one other part: they become its
+//!    own. With counters of parts at each edge and vertex, the test of step 3 is a comparison, and a
+//!    removal is linear in the size of the part.
 
 use medial::complex::MedialMesh;
 use medial::geometry::DisjointSets;
@@ -27,7 +27,7 @@ use medial::geometry::DisjointSets;
 use super::axis::Axis;
 use super::kept::kept_part;
 
-/// What is left of an axis.
+/// The remaining part of an axis.
 #[derive(Clone)]
 pub(super) struct Remaining<'a> {
     pub(super) axis: &'a Axis,

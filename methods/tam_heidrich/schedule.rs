@@ -1,9 +1,9 @@
 //! Steps 4 and 5: rounds.
 //!
-//! A round decomposes what is there, sorts the parts of level 1 whose significance does not exceed the
-//! threshold, and removes them from the least significant on: in rounds that do not check topology all,
-//! in the others those that keep loops and components, tested when their turn comes. No round removes a
-//! part that touches nothing, so that no component vanishes.
+//! A round decomposes the remaining axis, sorts the parts of level 1 whose significance does not exceed
+//! the threshold, and removes them, the least significant first. Rounds without a topology test remove
+//! all of them; the others remove a part only if that keeps loops and components at that moment. No
+//! round removes a part that touches nothing, so no component vanishes.
 
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
@@ -12,10 +12,10 @@ use super::graph::Graph;
 use super::params::{Checked, TamHeidrichParams};
 use super::parts::{Parts, Remaining};
 
-/// What a round removes at most.
+/// The threshold of a round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Measure {
-    /// Parts of at most so many triangles.
+    /// Parts of at most this many triangles.
     Triangles(usize),
     /// Parts of at most this relative volume in per cent.
     Volume(f64),
@@ -29,7 +29,7 @@ pub(super) struct Pruning<'a> {
     pub(super) diagnostics: Diagnostics,
     run: &'a RunContext,
     params: &'a TamHeidrichParams,
-    /// Rounds end as near to so many spheres as whole parts allow.
+    /// Rounds end as near to this number of spheres as whole parts allow.
     enough: usize,
     /// The number of spheres on the other side of `enough`, once the rounds ended there.
     pub(super) other_side: Option<usize>,

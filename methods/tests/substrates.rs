@@ -1,5 +1,5 @@
-//! What methods take of a shape. What every method must do, whatever it is, is demanded by
-//! `medial check`, whose corpus is in `bench/check`.
+//! The substrates that methods use of a shape. The requirements on every method are in the corpus of
+//! `medial check` (`bench/check`).
 
 use medial::metrics::JudgeOptions;
 use medial::shape::{Shape, ShapeOptions, Substrate};

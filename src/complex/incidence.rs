@@ -1,4 +1,4 @@
-//! Which edges bound which face: the combinatorics of a medial mesh, without coordinates.
+//! Incidence of edges and faces: the combinatorics of a medial mesh, without coordinates.
 
 use super::MedialMesh;
 

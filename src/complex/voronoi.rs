@@ -9,8 +9,8 @@
 //! 3. Each Delaunay edge all of whose cells are finite and inside has a convex planar Voronoi
 //!    polygon, which is triangulated ([`DualTriangulation`]).
 //!
-//! Coincident circumcentres stay apart: merging by position can close loops, and the published
-//! counts are those before any merging.
+//! Coincident circumcentres are not merged: merging by position can close loops, and the published
+//! counts are those without merging.
 
 use std::sync::Arc;
 
@@ -47,8 +47,8 @@ pub struct CellSpheres {
     circumspheres: Vec<Option<Sphere>>,
     /// For each finite cell.
     is_inside: Vec<bool>,
-    /// The cells centred inside, along a Morton curve of their centres: what is close in space is
-    /// close in memory, which contractions, that walk from neighbour to neighbour, need.
+    /// The cells centred inside, along a Morton curve of their centres: neighbours are then close in
+    /// memory, which speeds up contractions.
     kept: Vec<CellId>,
     /// Circumcentres inside the surface but within the guard band of it, counted as outside.
     pub in_guard_band: usize,

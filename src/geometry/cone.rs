@@ -99,7 +99,7 @@ impl Cone {
         self.lead
     }
 
-    /// Which ball (0 or 1) holds the other, if one does.
+    /// The ball (0 or 1) that holds the other, if one does.
     pub fn larger(&self) -> Option<usize> {
         self.larger
     }

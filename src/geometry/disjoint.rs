@@ -3,7 +3,7 @@
 //! By hand because the representative is the smallest member, whatever the order of the joins; that of
 //! `petgraph` depends on ranks.
 
-/// A partition of `0..n`, joined pair by pair. The representative of a set is its smallest member.
+/// A partition of `0..n` whose sets can be joined. The representative of a set is its smallest member.
 #[derive(Clone, Debug)]
 pub struct DisjointSets {
     parent: Vec<u32>,
@@ -26,6 +26,7 @@ impl DisjointSets {
     /// If `member` is out of range.
     pub fn find(&mut self, mut member: u32) -> u32 {
         while self.parent[member as usize] != member {
+            // Path halving: short paths without a second pass.
             let grandparent = self.parent[self.parent[member as usize] as usize];
             self.parent[member as usize] = grandparent;
             member = grandparent;
@@ -33,13 +34,14 @@ impl DisjointSets {
         member
     }
 
-    /// Joins the sets of two members; false if they were one already.
+    /// Joins the sets of two members; false if they were the same set already.
     ///
     /// # Panics
     /// If a member is out of range.
     pub fn join(&mut self, a: u32, b: u32) -> bool {
         let (a, b) = (self.find(a), self.find(b));
         if a != b {
+            // By index and not by rank: representatives must not depend on the order of joins.
             self.parent[a.max(b) as usize] = a.min(b);
             self.sets -= 1;
         }

@@ -5,7 +5,7 @@ use crate::Vec3;
 /// Relative slack when a candidate ball is tested against the points that it must contain.
 const SLACK: f64 = 1e-12;
 
-/// Points up to which all subsets are tried.
+/// Up to this many points, all subsets are tried.
 const MAX_ENUMERATED: usize = 6;
 
 /// Centre and radius of the smallest ball that encloses `points`; radius 0 for fewer than two.

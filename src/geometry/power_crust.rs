@@ -22,7 +22,7 @@
 //!
 //! Without the perturbation many balls meet in one point: all polar balls of a sample do. There the
 //! crust has several corners at one position, up to rounding, with edges of zero length between them.
-//! [`PowerCrust::surface`] merges them along these edges, which keeps the crust a manifold.
+//! `medial::surface::crust_surface` merges them along these edges, which keeps the crust a manifold.
 //!
 //! Deviations from the paper
 //!

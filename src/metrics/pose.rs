@@ -9,7 +9,7 @@
 //! 2. The first axis leads from `c` to the vertex `p` that is farthest from it, the second to the
 //!    vertex `q` that is farthest from that axis. Distances are weighted by the area around a
 //!    vertex (up to a tenth), so that the vertices of a round shape are not all equally far. The
-//!    third is the cross product: reflections are told apart.
+//!    third is the cross product, so reflected shapes have different poses.
 //! 3. A shape with symmetries has several such pairs, equal up to rounding. Then a function that is
 //!    neither odd nor even is summed over all triangles in each frame, and the frame with the least
 //!    sum is taken. Frames with equal sums are images of each other under a symmetry of the surface,

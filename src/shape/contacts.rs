@@ -8,7 +8,7 @@ use crate::Vec3;
 use crate::complex::{Contacts, MedialMesh};
 use crate::geometry::trees::PointTree;
 
-/// How far beyond the nearest one a sample still counts as touched.
+/// A sample counts as touched if its distance exceeds that of the nearest one by at most this share.
 const REACH: f64 = 1.0 + 1e-3;
 
 /// For each sphere of a medial mesh the boundary samples that it touches.
@@ -33,8 +33,8 @@ impl ContactSets {
     /// of the nearest one: the closest boundary points, by which papers define the contacts. None
     /// where even the nearest is beyond `(1 + 1e-3) r`, so that the sphere touches nothing.
     ///
-    /// For a sphere with no sample inside these are all samples within `(1 + 1e-3) r`. One that
-    /// sticks out of the surface holds samples by the thousands, which it does not touch.
+    /// For a sphere without samples inside, these are all samples within `(1 + 1e-3) r`. A sphere that
+    /// sticks out of the surface can contain thousands of samples, which it does not touch.
     ///
     /// Cost `O((n + m) log m + output)`.
     pub(super) fn search(mesh: &MedialMesh, samples: &Arc<[Vec3]>) -> Self {

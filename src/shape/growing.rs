@@ -1,10 +1,10 @@
-//! A set of points that grows while it is asked for the nearest one.
+//! Nearest-point queries on a growing set of points.
 
 use crate::Vec3;
 use crate::geometry::trees::PointTree;
 
-/// Points that are asked for distances while more come: trees over consecutive runs of them, each run
-/// longer than the next, and a tail that is looked through.
+/// A growing set of points: trees over consecutive runs, each run longer than the next, and a tail that
+/// is searched linearly.
 #[derive(Default)]
 pub(super) struct Growing {
     /// In the order in which they came.
@@ -12,7 +12,7 @@ pub(super) struct Growing {
     trees: Vec<PointTree>,
 }
 
-/// Points that are cheaper looked through than put in a tree.
+/// Up to this many points a linear search is cheaper than a tree.
 const TAIL: usize = 64;
 
 impl Growing {

@@ -1,10 +1,10 @@
-//! Samples that are added to the vertices of a surface until the Voronoi medial mesh is right.
+//! Adds samples to the vertices of a surface until the Voronoi medial mesh is right.
 //!
-//! The vertices of a surface often are too few where two sheets of it are close: the Voronoi medial mesh
-//! then leaves the solid, bridges a gap, or has a hole. Where that is so, samples are added one round
-//! after the other, as in surface Delaunay refinement (Boissonnat, Oudot: *Provably good sampling and
-//! meshing of surfaces*, Graphical Models 67, 2005, doi:10.1016/j.gmod.2005.01.004): the ball around a
-//! Voronoi vertex holds no sample, so a point of the surface in it is a new sample that removes it.
+//! Where two sheets of a surface are close, its vertices are often too few: the Voronoi medial mesh
+//! then leaves the solid, bridges a gap, or has a hole. Samples are added there in rounds, as in
+//! surface Delaunay refinement (Boissonnat, Oudot: *Provably good sampling and meshing of surfaces*,
+//! Graphical Models 67, 2005, doi:10.1016/j.gmod.2005.01.004). The ball around a Voronoi vertex
+//! contains no sample, so a point of the surface inside it, taken as a new sample, removes the ball.
 //!
 //! 1. The Voronoi medial mesh of the samples is built, with its Betti numbers.
 //! 2. *Error*. Balls, and the interpolated balls in the middle of edges and triangles, that reach beyond
@@ -13,20 +13,20 @@
 //! 3. *Topology*, where the Betti numbers are not the solid's: tetrahedra whose barycentre is on
 //!    another side of the surface than the centre of their ball, and simplices of the mesh whose
 //!    barycentre is outside.
-//! 4. Each of these places names a point of the surface: the one that is closest to the centre, or the
-//!    uncovered one. These become samples, the worst place first, none nearer to an earlier one of the
-//!    round than half of what its ball is pierced by. Where there is a sample already (between two balls
-//!    that are right a cone may still bulge), one of twelve points of the surface around is taken, the
-//!    farthest from all samples.
-//! 5. Where no place is found, or several rounds brought nothing, the longest side of each face is
-//!    halved as well.
+//! 4. Each of these places gives a point of the surface: the one closest to the centre, or the uncovered
+//!    one. These become samples, the worst place first. A point is skipped if an earlier one of the
+//!    round is nearer than half the depth to which the surface pierces its ball. If there is a sample
+//!    already (a cone between two correct balls may still bulge), the farthest from all samples of
+//!    twelve nearby points of the surface is taken instead.
+//! 5. If no place is found, or several rounds brought no progress, the longest side of each face is
+//!    halved, too.
 //!
-//! It ends when nothing is wrong, or at a limit of rounds or samples; then with the samples of the round
-//! that was best, and a warning.
+//! It ends when nothing is wrong, or at a limit of rounds or samples; then it returns the samples of the
+//! best round, with a warning.
 //!
 //! # Deviations from the paper
-//! No angle or size is asked of the triangles, and nothing is proved: the surface is not smooth. The balls of
-//! all Voronoi vertices are looked at, not those of Voronoi edges that cross the surface.
+//! There is no requirement on angles or sizes of triangles, and no guarantee, because the surface is not
+//! smooth. All Voronoi vertices are checked, not only Voronoi edges that cross the surface.
 
 use std::sync::Arc;
 
@@ -47,20 +47,20 @@ pub const BOUND: f64 = 0.01;
 /// Rounds at most.
 pub const ROUNDS: usize = 16;
 
-/// At most so many times the vertices become samples, or [`ENOUGH`] where that is more.
+/// Bound on the samples: this many times the vertices, or [`ENOUGH`] if that is more.
 pub const MOST_TIMES: usize = 8;
 
 /// So many samples are allowed to every surface.
 pub const ENOUGH: usize = 20_000;
 
-/// A ball is removed for the topology's sake where the surface pierces it by more than this fraction of
-/// its radius: shallower ones are slivers on the surface, which new samples would but replace.
+/// A ball is removed to repair the topology only if the surface pierces it by more than this fraction
+/// of its radius. Other balls belong to slivers on the surface, which new samples would just replace.
 const PIERCED: f64 = 0.15;
 
-/// Where the topology is still wrong after so many rounds, balls count that are pierced by a third of this.
+/// If the topology is still wrong after this many rounds, balls pierced by a third of this count, too.
 const PATIENCE: usize = 8;
 
-/// After so many rounds that brought nothing the longest side of each face is halved.
+/// After this many rounds without progress the longest side of each face is halved.
 const STALLED: usize = 4;
 
 /// Samples nearer to a new one than this fraction of what a ball is pierced by are in its place.
@@ -111,7 +111,7 @@ struct Place {
 }
 
 impl Refined {
-    /// What is still wrong, for the reader of a result.
+    /// The remaining defects, for the reader of a result.
     pub fn warning(&self) -> Option<String> {
         let Self { samples, betti, expected, error, .. } = self;
         let topology = expected.filter(|expected| expected != betti).map(|expected| {
@@ -180,7 +180,7 @@ impl Refinement<'_> {
         expected.iter().zip(betti).map(|(a, b)| a.abs_diff(b)).sum()
     }
 
-    /// What is wrong with a diagram, and where, the worst first.
+    /// The defects of a diagram and their places, the worst first.
     fn judge(&self, diagram: &Diagram, tested: &[Vec3], rounds: usize) -> (Refined, Vec<Place>) {
         let betti = betti(&diagram.medial);
         let wrong = self.wrong(betti) > 0;

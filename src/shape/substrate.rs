@@ -1,4 +1,4 @@
-//! Substrates by name, what each cost, and where they are kept.
+//! Substrates by name, their costs, and the place where they are kept.
 
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -51,7 +51,7 @@ impl Substrate {
     }
 }
 
-/// What a piece of work, such as building a substrate, cost when it was done.
+/// The cost of a piece of work, such as building a substrate, when it was done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Wall-clock seconds.
@@ -94,7 +94,7 @@ impl std::ops::AddAssign for Cost {
     }
 }
 
-/// What a view remembers of a substrate.
+/// The facts that a view remembers of a substrate.
 #[derive(Clone, Copy)]
 pub(super) struct Use {
     pub cost: Cost,

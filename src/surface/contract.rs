@@ -263,7 +263,7 @@ impl<'a> Shrinking<'a> {
         dropped
     }
 
-    /// What is left, vertices and faces in their old order.
+    /// The remaining mesh, vertices and faces in their old order.
     fn finish(self) -> TriMesh {
         let mut name = vec![u32::MAX; self.points.len()];
         let mut vertices = Vec::new();

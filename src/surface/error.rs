@@ -10,7 +10,7 @@ use crate::Vec3;
 pub struct SurfaceError {
     /// The file, where there is one.
     pub file: Option<PathBuf>,
-    /// What is wrong with it.
+    /// The defect.
     pub fault: Fault,
 }
 
@@ -85,7 +85,7 @@ impl fmt::Display for VertexName {
     }
 }
 
-/// What is wrong with a surface. Elements are counted from 0, lines from 1.
+/// A defect of a surface. Elements are counted from 0, lines from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
     /// The file could not be opened, read or written.

@@ -1,4 +1,4 @@
-//! How many components of a surface lie around each component.
+//! For each component of a surface the number of components around it.
 //!
 //! Component A lies in component B
 //! - if the two do not meet, and B winds around a vertex of A (then around all of them);

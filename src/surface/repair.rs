@@ -1,13 +1,13 @@
 //! From a polygon soup to an indexed triangle mesh. Nothing is changed without being reported.
 //!
 //! 1. Set coordinates below 2^-150 of the largest to zero, so that exact predicates stay exact.
-//! 2. Weld vertices at exactly the same position. No tolerance: one that is right for every file
-//!    does not exist, it closes slits that are meant and tears thin walls; formats that repeat
-//!    vertices (STL, OBJ with seams) repeat them bit by bit.
+//! 2. Weld vertices at exactly the same position. There is no tolerance, because none is right for
+//!    every file: it would close intended slits and tear thin walls. Formats that repeat vertices
+//!    (STL, OBJ with seams) repeat them bit by bit.
 //! 3. Drop corners that repeat their predecessor, then faces with fewer than three corners.
-//! 4. Drop faces with the same corners as an earlier one, whatever their orientation. Two faces
-//!    that close each other up on all sides stay: they are a component without volume, which is
-//!    told to the user as such.
+//! 4. Drop faces with the same corners as an earlier one, whatever their orientation. Two faces that
+//!    share all sides with each other and none with a third face stay: they are a component without
+//!    volume, which is reported as such.
 //! 5. Triangulate polygons.
 //! 6. Drop vertices without faces.
 //!
@@ -24,8 +24,8 @@ use super::triangulate::Triangulator;
 use super::unit::Unit;
 use crate::Vec3;
 
-/// A triangle mesh with what was done to get it. Its faces may still be of any kind but for
-/// repeated corners.
+/// A triangle mesh with the repairs made. Its faces have distinct corners, but may be defective
+/// otherwise.
 #[derive(Debug)]
 pub(super) struct Repaired {
     pub vertices: Vec<Vec3>,

@@ -1,4 +1,4 @@
-//! What was found and what was repaired, as data.
+//! Findings and repairs as data.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::counted;
 
-/// Everything worth knowing of a surface: the answer of `medial info`.
+/// The properties of a surface: the answer of `medial info`.
 ///
 /// Numbers describe the mesh after the listed repairs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

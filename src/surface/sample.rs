@@ -51,9 +51,9 @@ pub enum Sampling {
 )]
 pub struct ParseSamplingError(String);
 
-/// More samples than this are surely a slip of the finger.
+/// Bound on the number of samples: more are surely a typing error.
 const MAX_SAMPLES: usize = 10_000_000;
-/// Elimination takes some two kilobytes for each sample of blue noise.
+/// Bound for blue noise: elimination takes about two kilobytes for each sample.
 const MAX_BLUE_SAMPLES: usize = 1_000_000;
 
 impl FromStr for Sampling {

@@ -1,9 +1,9 @@
 //! Parts that touch in a vertex, taken apart; the only repair that moves a vertex.
 //!
 //! At such a vertex the faces form several fans. The flattest fan keeps the vertex. Each other one
-//! gets a vertex of its own, [`STEP`] of the way to the mean of its rim: towards its own part, so
-//! that two tips which touched no longer do. The flattest one stays because it has no such way to
-//! go: the mean of a flat fan's rim may be the vertex itself.
+//! gets a vertex of its own, at [`STEP`] of the way to the mean of its rim: towards its own part, so
+//! that two tips no longer touch. The flattest fan stays because it cannot move like this: the mean of
+//! a flat fan's rim may be the vertex itself.
 //!
 //! # Cost
 //! `O(F log F)` for `F` faces.

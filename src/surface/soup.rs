@@ -1,4 +1,4 @@
-//! What a file holds before anything is repaired: positions and polygons.
+//! The contents of a file before any repair: positions and polygons.
 
 use super::error::{Fault, Place};
 use crate::Vec3;
@@ -78,5 +78,6 @@ impl PolygonSoup {
     }
 }
 
-/// Half-edge indices, three for each triangle, have to fit 32 bits with one value to spare.
+/// Bound on the number of faces: half-edge indices, three for each triangle, have to fit 32 bits with
+/// one value to spare.
 const MAX_FACES: usize = (u32::MAX - 1) as usize / 3;

@@ -1,4 +1,4 @@
-//! Who is next to whom on a triangle mesh; no coordinates.
+//! Adjacency of a triangle mesh, without coordinates.
 //!
 //! Half-edge `3 f + k` runs from corner `k` of face `f` to the next corner. Two half-edges between
 //! the same vertices are neighbours if no third one is; they agree on the orientation if they run

@@ -16,7 +16,7 @@
 use crate::Vec3;
 use crate::geometry::predicates::{Point2, Sign, orient2d, project};
 
-/// What cutting polygons has cost and met.
+/// The budget for cutting polygons, and the defects found.
 #[derive(Debug)]
 pub(super) struct Triangulator {
     /// Point-in-triangle tests that may still be made.

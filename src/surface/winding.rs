@@ -16,9 +16,8 @@
 //!    `sin C` is therefore the exact one, with the ray's own perturbation, and a corner straight
 //!    above `p` is seen in the azimuth to which the perturbation moves it.
 //!
-//! Edges are boundary by count: how often faces run along them in one direction more than in the
-//! other, vertices of the same position being one. Closed surfaces have none, whatever they are
-//! made of, and get integers.
+//! An edge is a boundary edge if faces run along it more often in one direction than in the other;
+//! vertices at the same position count as one. Closed surfaces have no such edge and get integers.
 
 use std::ops::ControlFlow;
 
@@ -31,9 +30,8 @@ use crate::geometry::trees::in_morton_order;
 /// Generalised winding numbers of a mesh: 1 inside and 0 outside a closed outward-oriented surface,
 /// fractions near holes; points above 1/2 count as inside.
 ///
-/// The time of a query is that of [`InsideTest`] and a few tens of nanoseconds for each boundary
-/// edge; soups of many separate triangles are better served by
-/// [`WindingTree`](crate::surface::WindingTree), which approximates.
+/// The time of a query is that of [`InsideTest`] plus a constant for each boundary edge. For soups of
+/// many separate triangles [`WindingTree`](crate::surface::WindingTree), which approximates, is faster.
 ///
 /// ```
 /// use medial::Vec3;
@@ -57,7 +55,8 @@ pub struct GeneralisedWinding {
     boundary: Vec<BoundaryEdge>,
 }
 
-/// An edge, scaled, and how often more faces run along it from the first end than from the other.
+/// An edge, scaled, and the number of faces that run along it from the first end minus the number of
+/// those that run the other way.
 #[derive(Clone, Copy, Debug)]
 struct BoundaryEdge {
     ends: [Vec3; 2],

@@ -159,6 +159,7 @@ impl Spread {
                 .fast_min(base);
             over + inside.bitselect(zero, sides)
         };
+        // Strictly nearer: of equally near triangles the first measured stays, in a fixed order.
         let nearer = squared.simd_lt(answer.squared);
         if nearer.any() {
             answer.squared = nearer.bitselect(squared, answer.squared);

@@ -131,6 +131,7 @@ impl NearbyTriangles {
         let moved = centre - within.centre;
         let bound = |entry: &Entry| entry.distance - entry.toward.dot(moved);
         let mut best = self.measure(first.triangle, centre);
+        // Starting from the old nearest, which is usually still it, few others are measured.
         for entry in &within.entries {
             if bound(entry) < best.distance {
                 let measured = self.measure(entry.triangle, centre);
@@ -262,6 +263,7 @@ impl NearbyTriangles {
     ) -> f64 {
         let (mut sum, mut single) = (f64x2::ZERO, 0.0);
         for (pair, answer) in batch.answers.iter().enumerate() {
+            // The usual case without unpacking lanes; an odd last query has a copy in its second lane.
             if answer.interior.all() && 2 * pair + 1 < batch.len {
                 sum += answer.along;
                 continue;

@@ -115,7 +115,7 @@ impl Bisection {
         self.corner + self.step * Vec3::from_array(at)
     }
 
-    /// The longest edge of tetrahedra after so many bisections: a space diagonal, a diagonal of a
+    /// The longest edge of tetrahedra after `generation` bisections: a space diagonal, a diagonal of a
     /// face, or a side.
     pub(super) fn longest_edge(&self, generation: u8) -> f64 {
         let side = self.step * f64::from(STEPS) * f64::powi(0.5, i32::from(generation / 3));

@@ -64,7 +64,7 @@ pub enum ContourError {
          {feasible:e} is feasible"
     )]
     TooFine {
-        /// What was asked, in the unit of the mesh.
+        /// The requested tolerance, in the unit of the mesh.
         tolerance: f64,
         /// The most tetrahedra that are taken.
         most: usize,
@@ -128,7 +128,7 @@ pub fn union_surface(mesh: &MedialMesh, tolerance: f64) -> Result<UnionSurface, 
     union_surface_within(mesh, tolerance, MAX_TETRAHEDRA)
 }
 
-/// [`union_surface`] with at most so many tetrahedra, of some 80 bytes each.
+/// [`union_surface`] with at most `most` tetrahedra, of some 80 bytes each.
 ///
 /// # Errors
 /// As [`union_surface`].

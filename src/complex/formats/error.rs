@@ -32,7 +32,7 @@ impl MaError {
     }
 }
 
-/// What is wrong, without the place.
+/// The defect, without the place.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaErrorKind {

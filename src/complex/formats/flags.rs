@@ -1,6 +1,6 @@
-//! Words behind the values of a `.ma` record: types of features and marks of deletion.
+//! Words after the values of a `.ma` record: types of features and marks of deletion.
 //!
-//! The tools of the field write different numbers of them; their number says what they are:
+//! Known tools write different numbers of them, and the number determines their meaning:
 //!
 //! | record | 1 word | 2 words | 3 words |
 //! |---|---|---|---|
@@ -152,7 +152,7 @@ impl Flags {
         self.records.iter().flat_map(|records| &records[1..]).sum()
     }
 
-    /// Which records of a kind are marked as deleted.
+    /// The records of a kind that are marked as deleted.
     pub(super) fn deleted(&self, kind: usize) -> &[bool] {
         &self.deleted[kind]
     }

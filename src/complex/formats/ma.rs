@@ -19,7 +19,7 @@ use super::scan::{Line, lines, shortened};
 use super::{LoadedMa, MaError, MaErrorKind};
 use crate::complex::{MedialMesh, Sphere};
 
-/// Bytes of the shortest possible line, `e 0 1`: what bounds an allocation by the file's size.
+/// Bytes of the shortest possible line, `e 0 1`: bounds allocations by the size of the file.
 const SHORTEST_RECORD: usize = 5;
 
 /// Reads a medial mesh from the text of a `.ma` file; `name` stands for the file in errors.
@@ -56,7 +56,7 @@ pub fn parse_ma(text: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError>
     records.finish(name)
 }
 
-/// What has been read so far, and how much is to come.
+/// The records read so far, and the numbers still to come.
 struct Records {
     announced: [u64; 3],
     spheres: Vec<Sphere>,

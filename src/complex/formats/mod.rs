@@ -6,8 +6,8 @@
 //! | `.ply` | ASCII | ASCII | the same, with a vertex property `radius`, for viewers |
 //! | `.obj` | no | yes | centres, edges (`l`) and faces (`f`), without radii, for viewers |
 //!
-//! Coordinates are in the file's own unit both ways; who normalises them converts. Numbers are
-//! written with 17 significant digits, so that what is read back is bit for bit what was written.
+//! Coordinates are read and written in the unit of the file; normalisation is up to the caller. Numbers
+//! are written with 17 significant digits, so that they are read back bit for bit.
 
 mod canonical;
 mod error;

@@ -91,7 +91,7 @@ impl<'a> Words<'a> {
         Ok(indices)
     }
 
-    /// What has not been taken yet.
+    /// The words not yet taken.
     pub(super) fn rest(self) -> impl Iterator<Item = &'a str> {
         self.rest
     }

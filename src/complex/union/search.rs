@@ -75,7 +75,7 @@ impl Parts {
         values: Lanes,
         mut limit: f32,
     ) -> f32 {
-        // What is no number may be within.
+        // A distance that is not a number may be within.
         let mut near = !values.simd_gt(Lanes::splat(limit)).to_bitmask() & 0xf;
         let values = values.to_array();
         while near != 0 {
@@ -134,7 +134,7 @@ fn depth_bound(node: &Node, p: Vec3) -> f64 {
     node.least_reach - node.bounds.farthest_squared(p).sqrt()
 }
 
-/// Which of the two distances is minimised.
+/// The distance, of two, that is minimised.
 pub(super) trait Reading {
     const MEASURE: Measure;
     fn value(signed: f64) -> f64;

@@ -26,19 +26,16 @@
 //! 5. The polygons with the singular edges and vertices of `K` are the axis. Radii: of a ball at its
 //!    centre, the distance to the corners at a Voronoi vertex.
 //!
-//! Nothing in steps 2 to 4 is decided by coordinates but the Delaunay triangulation of the rounded
-//! corners, so that the axis has the topology of `K` wherever that triangulation has every facet of
-//! step 2 and no corner that rounding moved into a ball. [`AxisTally`] counts violations. On balls in
-//! random position there was none among 1,500 unions. Where balls touch in single points, or many
-//! spheres meet in one corner, parts of the axis can coincide and are then taken for one: 12 of 400
-//! unions of balls on small lattices have other Betti numbers than their axis, none once perturbed.
-//! [`UnionAxis::union_betti`] tells.
+//! In steps 2 to 4 only the Delaunay triangulation of the rounded corners depends on coordinates. So the
+//! axis has the topology of `K` if that triangulation has every facet of step 2, and rounding moved no
+//! corner into a ball. [`AxisTally`] counts violations; random balls have practically none. If balls
+//! touch in single points, or many spheres meet in one corner, parts of the axis can coincide and are
+//! then taken for one. Compare with [`UnionAxis::union_betti`]; a perturbation helps.
 //!
-//! Polar balls as they are, which meet in samples by construction but only up to rounding, are beyond
-//! this: their dual complex is decided by rounding, and their other corners are where spheres nearly
-//! touch. The polar balls of a smooth solid of 2,500 samples gave Betti numbers (146, 42, 16), and
-//! (12, 129, 91) with the samples in place of the corners there, instead of (1, 0, 0). With radii times
-//! 1.002 and centres moved by `1e-4 r` no facet was open on any solid tried.
+//! Unperturbed polar balls are out of scope. They meet in samples by construction, but only up to
+//! rounding: rounding decides their dual complex, and their other corners lie where spheres nearly
+//! touch. The axis of such balls falls into many pieces, even with the samples in place of the corners.
+//! With radii times 1.002 and slightly moved centres (`methods/perturb.rs`) facets close up.
 //!
 //! Deviations from the papers
 //!
@@ -90,7 +87,7 @@ pub struct UnionAxis {
     tally: AxisTally,
 }
 
-/// What the axis was made from, and what rounding spoilt.
+/// The sizes of the input of the axis, and counts of defects by rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisTally {
     /// Balls that are in the dual complex: those that contribute to the boundary of the union, or
@@ -103,7 +100,7 @@ pub struct AxisTally {
     /// Groups of Voronoi vertices that no sector or contradictory sectors put on a side. Zero but
     /// for rounding.
     pub doubtful: usize,
-    /// Facets whose sides do not close up and are missing from the axis. Zero but for rounding.
+    /// Facets whose sides do not close up and are missing from the axis. Zero except for rounding.
     pub open: usize,
     /// Voronoi vertices that rounding had outside the box of all centres, moved into it.
     pub clamped: usize,
@@ -233,13 +230,13 @@ impl UnionAxis {
         &self.corners
     }
 
-    /// The Betti numbers of the union, exact: those of the axis, but for what is said in
+    /// The Betti numbers of the union, exact: those of the axis, except as described in
     /// [the module](self).
     pub fn union_betti(&self) -> [u64; 3] {
         self.union_betti
     }
 
-    /// What it was made from.
+    /// The sizes of its input, and counts of defects.
     pub fn tally(&self) -> &AxisTally {
         &self.tally
     }

@@ -8,9 +8,9 @@ use crate::geometry::dual_complex::{CellEdge, Class};
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{CellId, DualComplex};
 
-/// A sector at the edge from ball `from` to ball `to` between two corners on their circle. Going round
-/// the part of the corners' facet in the sector, counter-clockwise about the direction from the
-/// smaller corner to the larger, the edge is passed in this direction.
+/// A sector at the edge from ball `from` to ball `to` between two corners on their circle. The boundary
+/// of the corners' facet in the sector runs counter-clockwise about the direction from the smaller corner
+/// to the larger, and passes the edge in the direction from `from` to `to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Sector {
     /// Two different corners, ascending.

@@ -1,4 +1,4 @@
-//! Step 3: which Voronoi vertices of the corners are inside the dual complex.
+//! Step 3: the Voronoi vertices of the corners that are inside the dual complex.
 
 use rayon::prelude::*;
 
@@ -111,7 +111,7 @@ fn has(balls: &[u32], ball: u32) -> bool {
 }
 
 impl Corners {
-    /// Which of two balls has its centre first along the outward normal of a facet.
+    /// The ball, of two, whose centre comes first along the outward normal of a facet.
     fn nearer(&self, delaunay: &Delaunay, facet: [VertexId; 3], a: u32, b: u32) -> u32 {
         let [p, q, r] = facet.map(|v| delaunay.point(v));
         let normal = (q - p).cross(r - p);
@@ -139,7 +139,7 @@ fn joined(delaunay: &Delaunay, stations: &[[u32; 4]], free: &[bool]) -> Disjoint
     groups
 }
 
-/// How many sectors put a Voronoi vertex inside and outside.
+/// The numbers of sectors that put a Voronoi vertex inside and outside.
 #[derive(Clone, Copy, Default)]
 struct Votes {
     inside: u32,

@@ -1,9 +1,9 @@
-//! What the dual complex looks like as a space: simplices, Euler number, Betti numbers.
+//! The topology of the dual complex: simplices, Euler number, Betti numbers.
 //!
 //! C. J. A. Delfinado, H. Edelsbrunner: *An incremental algorithm for Betti numbers of simplicial
 //! complexes on the 3-sphere*, Computer Aided Geometric Design 12 (1995),
-//! <https://doi.org/10.1016/0167-8396(95)00016-Y>: by Alexander duality the voids of a complex in
-//! the 3-sphere are the components of its complement but one.
+//! <https://doi.org/10.1016/0167-8396(95)00016-Y>: by Alexander duality a complex in the 3-sphere has
+//! one void less than its complement has components.
 
 use super::{DualComplex, VertexId};
 use crate::disjoint::DisjointSets;
@@ -77,14 +77,15 @@ impl DualComplex<'_> {
             let [a, b] = self.edge_vertices(edge);
             components.join(a.0, b.0);
         }
+        // Points that are not in the complex are singletons among the sets.
         let b0 = components.len() - (self.vertices.len() - vertices);
         let b2 = self.complement_components() - 1;
-        // The Euler number is the alternating sum.
+        // The Euler number is b0 - b1 + b2.
         let b1 = b0 as i64 + b2 as i64 - self.euler();
         [b0 as u64, u64::try_from(b1).expect("a closed complex"), b2 as u64]
     }
 
-    /// The number of components of the rest of the 3-sphere.
+    /// The number of components of the complement in the 3-sphere.
     fn complement_components(&self) -> usize {
         let regular = self.regular();
         let mut sets = DisjointSets::singletons(regular.cell_count());

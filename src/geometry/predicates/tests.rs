@@ -8,8 +8,8 @@ fn robust(p: Vec3) -> ::robust::Coord3D<f64> {
     ::robust::Coord3D { x: p.x, y: p.y, z: p.z }
 }
 
-/// `robust` is positive for a point below the plane and its in-sphere test follows its own
-/// orientation.
+/// In `robust` a point below the plane is positive, and the in-sphere test has the matching sign: both
+/// are the negatives of ours.
 fn oracle_orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
     -Sign::of(::robust::orient3d(robust(a), robust(b), robust(c), robust(d)))
 }
@@ -52,7 +52,7 @@ proptest! {
         prop_assert_eq!(sign, oracle_in_sphere([a, b, c, d], e));
         prop_assert_eq!(in_sphere(b, c, a, d, e), sign);
         prop_assert_eq!(in_sphere(b, a, c, d, e), -sign);
-        // Equal weights do not matter.
+        // Equal weights cancel.
         let w = 0.1;
         prop_assert_eq!(power_test((a, w), (b, w), (c, w), (d, w), (e, w)), sign);
     }

@@ -33,7 +33,7 @@ use crate::predicates::{Filter, Metric, Sign, Site, approximate_orientation, sit
 /// Rounding can make an approximate walk cycle; after this many steps the exact walk takes over.
 const MAX_ROUNDED_STEPS: usize = 256;
 
-/// What became of a site.
+/// The outcome of inserting a site.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
     /// It is a vertex, or hidden.
@@ -94,7 +94,7 @@ impl<'s, M: Metric> Builder<'s, M> {
         Ok(builder)
     }
 
-    /// A builder with no cell but the frontier, and room for so many sites.
+    /// A builder with only the frontier, and room for `expected` sites.
     pub(super) fn new(sites: &'s [Site], filter: Filter, expected: usize) -> Self {
         let mut builder = Self {
             sites,
@@ -118,7 +118,7 @@ impl<'s, M: Metric> Builder<'s, M> {
         builder
     }
 
-    /// Makes room for the cells of so many further sites.
+    /// Makes room for the cells of `sites` further sites.
     ///
     /// Samples of surfaces need up to 8 cells per site. Reserved pages cost nothing until they are
     /// touched, while growing a vector holds two copies for a moment. If the reservation fails, the

@@ -142,7 +142,7 @@ trait Side: Sync {
     /// A part of this surface.
     type Piece: Copy + Send + Sync;
 
-    /// Which surface this is.
+    /// The surface that this is.
     const SIDE: WitnessSide;
 
     /// Bounds of the distances in a piece. The distance `known` is reached somewhere already; an upper

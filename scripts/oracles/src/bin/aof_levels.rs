@@ -1,4 +1,4 @@
-//! Share of voxels dismissed at each level, and how long it takes: Table 2 of Stolpner and Siddiqi.
+//! Share of voxels dismissed at each level, with times, as in Table 2 of Stolpner and Siddiqi.
 //!
 //! ```text
 //! aof_levels RESOLUTION KEY=VALUE,... NAME ...     built-in shapes or mesh files

@@ -1,17 +1,17 @@
-//! One side of the comparison of closest points and fluxes with CGAL and Open3D, driven by
+//! Our side of the comparison of closest points and fluxes with CGAL and Open3D, driven by
 //! `scripts/oracles/flux.sh`.
 //!
 //! ```text
 //! flux_oracle make NAME RESOLUTION COUNT FILE
-//!     every so many voxels of the start set of a built-in shape or mesh file, COUNT of them, with the
+//!     writes COUNT evenly spaced voxels of the start set of a built-in shape or mesh file, with the
 //!     samples of their spheres: FILE as in distance_oracle.rs, and
 //!     FILE.voxels: number of voxels and samples, sigma, centres (f64)
 //! flux_oracle run FILE ANSWERS
-//!     closest points of the samples (x, y, z, distance) into ANSWERS, fluxes into ANSWERS.flux
+//!     writes closest points of the samples (x, y, z, distance) to ANSWERS, fluxes to ANSWERS.flux
 //! flux_oracle time NAME RESOLUTION
-//!     seconds of the whole flux at one level, voxels, samples
+//!     prints the seconds of all fluxes at one level, the number of voxels, the number of samples
 //! flux_oracle points NAME SIGMA X Y Z ...
-//!     for each point, in input units: D, closest point, flux through a sphere of radius SIGMA
+//!     prints for each point, in input units: D, closest point, flux through a sphere of radius SIGMA
 //! ```
 #![allow(clippy::print_stdout)]
 
@@ -137,7 +137,7 @@ fn run(file: &str, answers: &str) -> Outcome {
         fluxes.push(probe.flux(&triangles, &set));
         batch.clear();
         for &n in &sphere.directions {
-            // As the samples were written, so that both sides ask for the same points.
+            // Rounded as the written samples were, so that both sides query the same points.
             batch.push((centre + n * sphere.radius) - centre, f64::INFINITY);
         }
         triangles.closest(&set, &mut batch);

@@ -57,7 +57,7 @@ impl fmt::Display for HierarchyFileError {
     }
 }
 
-/// What is wrong, without the place.
+/// The defect, without the place.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum HierarchyFileErrorKind {
@@ -134,7 +134,7 @@ impl Hierarchy {
     /// When the file cannot be read, or does not hold a hierarchy; see [`Hierarchy::parse`].
     pub fn read(path: impl AsRef<Path>) -> Result<(Self, String), HierarchyFileError> {
         let (path, name) = (path.as_ref(), path.as_ref().display().to_string());
-        // What is no regular file may never end.
+        // Anything but a regular file may never end.
         let is_endless = fs::metadata(path).is_ok_and(|target| !target.is_file());
         let bytes = match is_endless {
             true => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file")),

@@ -172,7 +172,7 @@ impl Hierarchy {
         Stage::new(self, stage)
     }
 
-    /// What comes and goes between two stages, in either direction. Cost `O(1)`.
+    /// The difference between two stages, in either direction. Cost `O(1)`.
     ///
     /// # Panics
     /// If there are fewer collapses.
