@@ -262,6 +262,12 @@ def readme():
     yield Figure(file, row[0], "~" + re.search(r"\((\S+) spheres\)", row[0])[1], commands, counts("spheres"))
     yield Figure(file, row[0], row[1].removesuffix(" %"), commands, counts("hausdorff"))
     yield Figure(file, row[0], row[3].split()[0], commands, right)
+    others = ["aof", "dey-zhao", "angle", "sat-pairwise", "lambda", "tam-heidrich", "pmat", "sat"]
+    ratios = [float(readme_row(method)[5].split()[0]) for method in others]
+    for text, phrase in [(file, "live at 10 to 200 times as many:"),
+                         ("METHODOLOGY.md", "keep their quality at 10 to 200 times as many spheres.")]:
+        yield Figure(text, phrase, ">10", [], lambda _: min(ratios))
+        yield Figure(text, phrase, "<200", [], lambda _: max(ratios))
     methods = ["qmat", "hem", "angle", "lambda", "sat-pairwise", "pmat"]
     command = [f"compare {ALL_MESHES} --methods {','.join(methods)} --spheres 500 --counts-only --samples 10000"]
 
