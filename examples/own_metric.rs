@@ -1,5 +1,6 @@
 //! A metric of one's own on a medial mesh: how thick the solid is where its surface is farthest from the
 //! union of the primitives. `cargo run --release --example own_metric -- bear.off bear.ma`.
+#![allow(clippy::print_stdout)]
 
 use std::error::Error;
 

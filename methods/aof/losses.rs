@@ -17,6 +17,7 @@ use medial::surface::TriangleBvh;
 
 use super::advice::SURELY;
 use super::bricks::{Bricks, Voxel};
+use super::params::MAX_RESOLUTION;
 use super::solid::Solid;
 use super::thinning::FACES;
 
@@ -121,22 +122,26 @@ impl Solid<'_> {
     pub(super) fn in_words(&self, resolution: u32, loss: &Loss) -> String {
         let normal = self.shape.normalisation();
         let place = normal.backward(loss.place);
-        let (fine, limit) = (self.megabytes(loss.needed).0, self.params().max_memory);
-        let memory = if fine > limit {
-            format!(", and max_memory = {}", fine.ceil())
+        let advice = if loss.needed > MAX_RESOLUTION {
+            "no lattice is fine enough".to_owned()
         } else {
-            String::new()
+            let (fine, limit) = (self.megabytes(loss.needed).0, self.params().max_memory);
+            let memory = if fine > limit {
+                format!(", and max_memory = {}", fine.ceil())
+            } else {
+                String::new()
+            };
+            format!("it takes about resolution = {}{memory}", loss.needed)
         };
         format!(
             "the surface at ({:.6}, {:.6}, {:.6}) is {:.1} % of the diagonal away from every voxel's \
              sphere: parts thinner than {:.4} in units of the surface are not resolved at resolution \
-             {resolution}; it takes about resolution = {}{memory}",
+             {resolution}; {advice}",
             place.x,
             place.y,
             place.z,
             100.0 * loss.distance,
-            2.0 * self.grid(resolution).side * normal.diagonal,
-            loss.needed
+            2.0 * self.grid(resolution).side * normal.diagonal
         )
     }
 }

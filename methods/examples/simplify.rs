@@ -1,4 +1,5 @@
 //! A mesh in, a medial mesh out: `cargo run --release -p medial-methods --example simplify -- bear.off 200 bear.ma`.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::error::Error;
 

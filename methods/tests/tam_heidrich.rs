@@ -182,10 +182,6 @@ fn counts_are_met_from_either_side_and_results_are_nested() {
     for spheres in [whole.spheres.len() + 5, 9_500, 8_000, 6_000, 5_000, 1_000, 1] {
         let result = at(&shape, &[], Level::Spheres(spheres));
         let reached = result.mesh.spheres.len();
-        eprintln!(
-            "{spheres}: {reached} {:?} {:?}",
-            result.native_level, result.diagnostics.warnings
-        );
         assert!(reached == spheres || !result.diagnostics.warnings.is_empty());
         let in_finer = |s| finer.spheres.contains(s);
         assert!(result.mesh.spheres.iter().all(in_finer));
