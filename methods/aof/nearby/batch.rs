@@ -4,7 +4,7 @@ use medial::Vec3;
 use medial::geometry::planar_frame::PlanarFrame;
 use wide::f64x2;
 
-/// Queries relative to the centre of a [`NearSet`], answered together; reused without allocation.
+/// Queries relative to the centre of a [`NearSet`](super::NearSet), answered together; reused without allocation.
 #[derive(Clone, Debug, Default)]
 pub struct NearBatch {
     pub(super) points: Vec<[f64x2; 3]>,

@@ -40,7 +40,7 @@ impl UnionBoundary {
     /// with the same key, if `key` gives one.
     ///
     /// The balls of a power crust meet in the samples by construction but, being rounded, not
-    /// exactly: there [`shared_sample`] is the key.
+    /// exactly: there the sample is the key.
     pub fn merge(&self, key: impl Fn(&UnionVertex) -> Option<u32>) -> MergedVertices {
         let mut groups = DisjointSets::singletons(self.vertices.len());
         for &[a, b] in &self.coincident {
