@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// The critical scale of each ball. Parallel; the order of `O(n log n)` for medial spheres.
 pub(super) fn critical_scales(balls: &[Sphere]) -> Vec<f64> {
     let boxes = balls.iter().map(|ball| (Bounds::of_points([ball.centre]), ball.radius));
-    let plan = Plan { max_leaf: 8, group: 1, padding: 0.0 };
+    let plan = Plan { max_leaf: 8, group: 8, padding: 0.0 };
     let tree = Tree::build(&boxes.collect::<Vec<_>>(), plan);
     let sorted: Vec<Sphere> = tree.order().iter().map(|&item| balls[item as usize]).collect();
     let scale = |&ball: &Sphere| {

@@ -96,7 +96,7 @@ struct BoxTree {
 impl BoxTree {
     fn new(faces: Vec<u32>, corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
         let boxes = faces.iter().map(|&face| (Bounds::of_points(corners(face)), 0.0));
-        let plan = Plan { max_leaf: 4, group: 1, padding: 0.0 };
+        let plan = Plan { max_leaf: 4, group: 4, padding: 0.0 };
         let tree = Tree::build(&boxes.collect::<Vec<_>>(), plan);
         let ids: Vec<u32> = tree.order().iter().map(|&item| faces[item as usize]).collect();
         let triangles = ids.iter().map(|&face| corners(face)).collect();
