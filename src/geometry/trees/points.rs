@@ -45,13 +45,14 @@ impl PointTree {
         self.points.is_empty()
     }
 
-    /// The index of the nearest point, of equally near ones the smallest, and its squared distance.
-    /// `None` if there are no points, or the query is not finite.
+    /// The index of the nearest point, the smallest of equally near ones, and its squared distance;
+    /// `None` without points, or where no distance can be squared.
     pub fn nearest(&self, query: Vec3) -> Option<(u32, f64)> {
         let mut search = Nearest { of: self, query, best: (f64::INFINITY, u32::MAX) };
         self.tree.search(&mut search);
         let (squared, id) = search.best;
-        (id != u32::MAX).then_some((id, squared))
+        // Infinite without points; and among infinite distances no point is the nearest.
+        squared.is_finite().then_some((id, squared))
     }
 
     /// The indices of the points whose squared distance is at most `squared`, in the order of the tree.
@@ -101,6 +102,15 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn nothing_is_near_what_is_not_finite() {
+        let tree = PointTree::new(&[Vec3::ZERO, Vec3::X]);
+        for query in [Vec3::INFINITY, Vec3::NAN, Vec3::splat(1e200)] {
+            assert_eq!(tree.nearest(query), None);
+        }
+        assert_eq!(PointTree::new(&[]).nearest(Vec3::ZERO), None);
+    }
 
     proptest! {
         #[test]
