@@ -69,7 +69,7 @@ fn make(name: &str, count: usize, file: &str) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The bumpy torus of `benches/distance.rs`: `2 n m` triangles.
+/// The bumpy torus of `bench/benches/distance.rs`: `2 n m` triangles.
 fn torus(n: u32, m: u32) -> TriMesh {
     let angle = |k: u32, count: u32| TAU * f64::from(k) / f64::from(count);
     let point = |u: f64, v: f64| {
