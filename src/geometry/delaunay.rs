@@ -196,6 +196,16 @@ impl Delaunay {
         }
     }
 
+    /// Checks every invariant: [`check_combinatorics`](Triangulation::check_combinatorics), then
+    /// [`check_geometry`](Delaunay::check_geometry), which relies on it.
+    ///
+    /// # Errors
+    /// The first violation found.
+    pub fn check(&self) -> Result<(), Violation> {
+        self.check_combinatorics()?;
+        self.check_geometry()
+    }
+
     /// Checks exactly that every cell is positive, that every circumsphere is empty (facet by
     /// facet, which implies it globally), that the hull is convex, and that every input point is a
     /// vertex or recorded as the duplicate of one.

@@ -138,6 +138,16 @@ impl Regular {
         orthosphere(v.map(|v| self.point(v)), v.map(|v| self.weight(v)))
     }
 
+    /// Checks every invariant: [`check_combinatorics`](Triangulation::check_combinatorics), then
+    /// [`check_geometry`](Regular::check_geometry), which relies on it.
+    ///
+    /// # Errors
+    /// The first violation found.
+    pub fn check(&self) -> Result<(), Violation> {
+        self.check_combinatorics()?;
+        self.check_geometry()
+    }
+
     /// Checks exactly that every cell is positive, that no vertex across a facet is inside the
     /// orthosphere, that the hull is convex, and that every hidden point is outside the
     /// orthosphere of the cell that contains it.
