@@ -126,7 +126,8 @@ impl Delaunay {
     }
 
     /// The input points that repeat the position of another, each with the one that is a vertex:
-    /// the first at that position. Ascending.
+    /// the first at that position. Ascending. All other points are vertices, so
+    /// `vertex_count() + duplicates().len() == point_count()`.
     pub fn duplicates(&self) -> &[(VertexId, VertexId)] {
         &self.duplicates
     }

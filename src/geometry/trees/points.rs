@@ -15,7 +15,7 @@ use crate::Vec3;
 /// let (id, squared) = tree.nearest(Vec3::new(41.2, 1.0, 0.0)).expect("there are points");
 /// assert_eq!(points[id as usize], Vec3::new(41.0, 1.0, 0.0));
 /// assert!((squared.sqrt() - 0.2).abs() < 1e-12);
-/// let mut near = tree.within(Vec3::new(41.2, 1.0, 0.0), 2.0);
+/// let mut near = tree.within(Vec3::new(41.2, 1.0, 0.0), 1.5 * 1.5); // the distance squared
 /// near.sort_unstable();
 /// assert_eq!(near, [41, 42]);
 /// ```
@@ -55,7 +55,8 @@ impl PointTree {
         squared.is_finite().then_some((id, squared))
     }
 
-    /// The indices of the points whose squared distance is at most `squared`, in the order of the tree.
+    /// The indices of the points whose squared distance is at most `squared`, in the order of the
+    /// tree: for the points within 1.5, `squared` is `1.5 * 1.5`.
     pub fn within(&self, query: Vec3, squared: f64) -> Vec<u32> {
         let mut found = Vec::new();
         let is_near = |_: usize, node: &Node| node.bounds.distance_squared(query) <= squared;
