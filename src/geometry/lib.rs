@@ -7,7 +7,7 @@
 //! | [`Poles`], [`PowerCrust`] | polar balls of a sample, and the surface between inner and outer balls |
 //! | [`Sphere`], [`Cone`], [`Slab`] | signed distances to a ball and to the hulls of two and of three |
 //! | [`trees::PointTree`] | the nearest point, and the points within a distance |
-//! | [`trees`] | box trees for searches of one's own: best first, overlapping, four boxes at a time |
+//! | [`trees`] | box trees for your own searches: best first, overlapping, four boxes at a time |
 //! | [`predicates`] | signs that no rounding can turn |
 //!
 //! Coordinates are `f64`, in any one unit; every sign that a decision depends on is computed exactly, and
@@ -15,9 +15,8 @@
 //! no special case.
 //!
 //! Large inputs are divided among the threads of rayon's pool: that in which a function is called
-//! ([`install`](https://docs.rs/rayon/latest/rayon/struct.ThreadPool.html#method.install)), else the
-//! global one, whose number of threads the environment variable `RAYON_NUM_THREADS` sets. The same
-//! input gives the same output with any number of threads.
+//! (`ThreadPool::install`), else the global one, whose number of threads the environment variable
+//! `RAYON_NUM_THREADS` sets. The same input gives the same output with any number of threads.
 //!
 //! ```
 //! use medial_geometry::{Delaunay, Vec3};

@@ -78,7 +78,8 @@ impl Outputs {
     /// Writes what was asked for; `origin` says what a hierarchy is of.
     ///
     /// # Errors
-    /// When the poles have no power crust, and then nothing is written; when a file cannot be written.
+    /// When the poles have no power crust, and then nothing is written, or when a file cannot be
+    /// written.
     pub fn write(
         &self,
         result: &Simplified,

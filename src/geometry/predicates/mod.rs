@@ -154,8 +154,8 @@ pub fn in_sphere(a: Vec3, b: Vec3, c: Vec3, d: Vec3, e: Vec3) -> Sign {
 /// positive if the power of `e` to the orthosphere of the positively oriented `a, b, c, d` is
 /// negative, that is if `e` does not allow them to be a cell of the regular triangulation.
 ///
-/// Zero if that power is zero; the opposite sign for negatively oriented points, and none that means
-/// anything for coplanar ones.
+/// Zero if that power is zero; the opposite sign for negatively oriented points, and none that
+/// means anything for coplanar ones.
 ///
 /// Exact, the lift `|p|^2 - w` included, for finite coordinates of at most [`MAX_COORDINATE`] and
 /// finite weights of at most its square; of others the sign means nothing, and the call may panic.

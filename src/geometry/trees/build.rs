@@ -173,7 +173,7 @@ fn cheapest_plane(items: &[Item], plan: Plan) -> Option<Plane> {
 
 /// The best first bin of the right side, and its cost; infinite when one side would be empty.
 fn sweep(bins: &[Bin; BINS], plan: Plan) -> (usize, f64) {
-    // Planes on either side of an empty bin cost the same, and most bins of a small range are empty.
+    // Planes on either side of an empty bin cost the same; most bins of a small range are empty.
     let mut right_cost = [f64::INFINITY; BINS + 1];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
     for k in (1..BINS).rev() {

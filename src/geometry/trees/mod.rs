@@ -1,7 +1,7 @@
 //! Points and boxes in trees.
 //!
 //! [`PointTree`] answers the common questions about points: the nearest one, and those within a
-//! distance. The rest of this module is for searches of one's own, over any items that have boxes.
+//! distance. The rest of this module is for your own searches, over any items that have boxes.
 //!
 //! [`Tree`] is a bounding-volume hierarchy: a flat binary tree over boxes, built by the binned
 //! surface-area heuristic (Wald 2007, doi:10.1109/RT.2007.4342588), searched nearest box first.
