@@ -1,9 +1,12 @@
 //! Distances between surfaces against closed forms and brute force.
 
+use std::sync::Arc;
+
 use medial::Vec3;
-use medial::metrics::{DistanceOptions, SurfaceDistances, surface_distances};
-use medial::surface::TriMesh;
-use medial::surface::TriangleBvh;
+use medial::metrics::{
+    DistanceOptions, Judge, JudgeOptions, SurfaceDistances, Truth, surface_distances,
+};
+use medial::surface::{InsideTest, TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -91,6 +94,18 @@ fn random_soups_agree_with_brute_force() {
     let other = if found.mean > there + 1e-7 { found.mean } else { there };
     assert!((found.forward - other).abs() < 1e-6, "{found:?} {there}");
     assert_eq!((found.samples, found.reverse_samples), (19, 28));
+}
+
+#[test]
+fn a_judge_measures_the_same_from_the_samples_that_it_keeps() {
+    let (inner, outer) = (cuboid(Vec3::new(0.4, 0.3, 0.2)), cuboid(Vec3::new(0.41, 0.29, 0.25)));
+    let tree = Arc::new(TriangleBvh::new(&inner).unwrap());
+    let inside = Arc::new(InsideTest::new(&inner));
+    let options = JudgeOptions { samples: 3_000, volume_depth: 0, seed: 8 };
+    let judge = Judge::new(inner.clone(), Arc::clone(&tree), inside, Truth::default(), options);
+    let afresh = DistanceOptions { surface_samples: 3_000, envelope_samples: 3_000, seed: 8 };
+    let afresh = surface_distances(&inner, &tree, &outer, &afresh).unwrap();
+    assert_eq!(judge.surface_distances(&outer).unwrap(), afresh);
 }
 
 #[test]

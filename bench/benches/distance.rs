@@ -1,6 +1,8 @@
 //! Queries a second: closest points on a mesh, inside tests, winding numbers, signed distances, and
 //! distances to a union of medial primitives, also of one whose balls nearly coincide.
 
+mod bumpy_torus;
+
 use std::f64::consts::{PI, TAU};
 use std::hint::black_box;
 
@@ -8,38 +10,10 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion};
 use medial::geometry::Sphere;
-use medial::surface::{GeneralisedWinding, InsideTest, TriMesh};
+use medial::surface::{GeneralisedWinding, InsideTest};
 use medial::surface::{SignedDistance, TriangleBvh, WindingTree};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-
-/// Radius of the ring of the bumpy torus that the meshes are made of.
-const RING: f64 = 1.0;
-
-fn tube(u: f64, v: f64) -> f64 {
-    0.35 + 0.05 * (5.0 * u).sin() * (4.0 * v).cos()
-}
-
-fn torus_point(u: f64, v: f64, share: f64) -> Vec3 {
-    let r = share * tube(u, v);
-    let ring = RING + r * v.cos();
-    Vec3::new(ring * u.cos(), ring * u.sin(), r * v.sin())
-}
-
-/// A closed mesh of `2 n m` triangles.
-fn torus(n: u32, m: u32) -> TriMesh {
-    let angle = |k: u32, count: u32| TAU * f64::from(k) / f64::from(count);
-    let vertices = (0..n * m).map(|k| torus_point(angle(k / m, n), angle(k % m, m), 1.0)).collect();
-    let id = |i: u32, j: u32| i % n * m + j % m;
-    let quads = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
-    let faces = quads
-        .flat_map(|(i, j)| {
-            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
-            [[a, b, c], [a, c, d]]
-        })
-        .collect();
-    TriMesh { vertices, faces }
-}
 
 /// A strip of 50 x 10 spheres along the tube: 500 spheres, 900 faces, 1,400 edges.
 fn sheet() -> MedialMesh {
@@ -48,7 +22,7 @@ fn sheet() -> MedialMesh {
         .map(|k| {
             let (u, w) =
                 (TAU * f64::from(k / m) / f64::from(n), f64::from(k % m) / f64::from(m - 1) - 0.5);
-            let centre = Vec3::new(u.cos(), u.sin(), 0.0) * (RING + 0.4 * w);
+            let centre = Vec3::new(u.cos(), u.sin(), 0.0) * (bumpy_torus::RING + 0.4 * w);
             Sphere::new(centre + Vec3::Z * 0.05 * (3.0 * u).sin(), 0.3 - 0.3 * w * w)
         })
         .collect();
@@ -64,13 +38,13 @@ fn sheet() -> MedialMesh {
 }
 
 fn closest_point(criterion: &mut Criterion) {
-    let mesh = torus(224, 224);
+    let mesh = bumpy_torus::mesh(224, 224);
     let bvh = TriangleBvh::new(&mesh).expect("the torus has faces");
     let mut rng = Pcg64::seed_from_u64(1);
     let points: Vec<Vec3> = (0..100_000)
         .map(|_| {
             let [u, v] = [(); 2].map(|()| rng.random::<f64>() * TAU);
-            torus_point(u, v, rng.random::<f64>().sqrt())
+            bumpy_torus::point(u, v, rng.random::<f64>().sqrt())
         })
         .collect();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
@@ -102,7 +76,7 @@ fn cloud() -> MedialMesh {
 }
 
 fn sidedness(criterion: &mut Criterion) {
-    let mesh = torus(224, 224);
+    let mesh = bumpy_torus::mesh(224, 224);
     let mut holed = mesh.clone();
     holed.faces.drain(1000..1100);
     let (tree, inside) =
@@ -143,7 +117,7 @@ fn union_distance(criterion: &mut Criterion) {
     let points: Vec<Vec3> = (0..1_000_000)
         .map(|_| {
             let [u, v] = [rng.random::<f64>() * TAU, (rng.random::<f64>() * 2.0 - 1.0) * PI];
-            torus_point(u, v, 1.0)
+            bumpy_torus::point(u, v, 1.0)
         })
         .collect();
     let mut group = criterion.benchmark_group("union_distance");

@@ -108,6 +108,13 @@ fn poles_that_pruning_leaves_make_a_surface() {
     let (code, _, stderr) =
         run(&["simplify", "builtin:box", "-m", "qmat", "--power-crust", "x.ply"]);
     assert!(code == 2 && stderr.contains("qmat has no poles"), "{stderr}");
+    // Spheres that are given belong to no poles. Nothing is written then, the result neither.
+    let [given, pruned, crust] = ["given.ma", "pruned.ma", "none.ply"].map(at);
+    assert_eq!(run(&["axis", "builtin:box", "-o", &given]).0, 0);
+    let words = ["simplify", "builtin:box", "-m", "tam-heidrich", "--initial", &given];
+    let (code, _, stderr) = run(&[&words[..], &["-o", &pruned, "--power-crust", &crust]].concat());
+    assert!(code != 0 && stderr.contains("no pole is left"), "{code} {stderr}");
+    assert!(![pruned, crust].iter().any(|path| std::path::Path::new(path).exists()));
 }
 
 #[test]

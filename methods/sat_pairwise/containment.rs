@@ -9,10 +9,14 @@ use medial::complex::Sphere;
 use medial::geometry::trees::{Bounds, Node, Plan, Search, Tree};
 use rayon::prelude::*;
 
+/// Balls in a leaf. Many, since balls are quickly measured: with smaller leaves queries are no
+/// faster, while building the tree, which is not parallel, takes longer.
+const LEAF: usize = 32;
+
 /// The critical scale of each ball. Parallel; the order of `O(n log n)` for medial spheres.
 pub(super) fn critical_scales(balls: &[Sphere]) -> Vec<f64> {
     let boxes = balls.iter().map(|ball| (Bounds::of_points([ball.centre]), ball.radius));
-    let plan = Plan { max_leaf: 8, group: 8, padding: 0.0 };
+    let plan = Plan { max_leaf: LEAF, group: LEAF, padding: 0.0 };
     let tree = Tree::build(&boxes.collect::<Vec<_>>(), plan);
     let sorted: Vec<Sphere> = tree.order().iter().map(|&item| balls[item as usize]).collect();
     let scale = |&ball: &Sphere| {

@@ -20,6 +20,18 @@ use crate::Vec3;
 /// The convex hull of two balls, prepared for distance queries.
 ///
 /// When one ball holds the other (tangency and equality included) the hull is the larger ball.
+///
+/// ```
+/// use medial_geometry::{Cone, Sphere, Vec3};
+///
+/// // A rod of radius 1 with round ends, and a query above its middle.
+/// let rod = Cone::new(Sphere::new(Vec3::ZERO, 1.0), Sphere::new(4.0 * Vec3::X, 1.0));
+/// let above = Vec3::new(2.0, 3.0, 0.0);
+/// assert_eq!(rod.signed_distance(above), 2.0);
+/// assert_eq!(rod.signed_distance(2.0 * Vec3::X), -1.0);
+/// let foot = rod.foot(above);
+/// assert_eq!((foot.point, foot.weights), (Vec3::new(2.0, 1.0, 0.0), [0.5, 0.5]));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     start: Vec3,
@@ -104,7 +116,8 @@ impl Cone {
         self.larger
     }
 
-    /// Signed distance of `p` to the boundary of the hull, negative inside. Exact on both sides.
+    /// Signed distance of `p` to the boundary of the hull, negative inside: the true distance up to
+    /// rounding, inside as well as outside, not a bound.
     #[inline]
     pub fn signed_distance(&self, p: Vec3) -> f64 {
         let (tau, squared) = self.best_centre(p);

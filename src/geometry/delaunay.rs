@@ -126,7 +126,8 @@ impl Delaunay {
     }
 
     /// The input points that repeat the position of another, each with the one that is a vertex:
-    /// the first at that position. Ascending.
+    /// the first at that position. Ascending. All other points are vertices, so
+    /// `vertex_count() + duplicates().len() == point_count()`.
     pub fn duplicates(&self) -> &[(VertexId, VertexId)] {
         &self.duplicates
     }
@@ -194,6 +195,16 @@ impl Delaunay {
             [i, j, k] => Location::Facet(Facet { cell, opposite: 6 - i - j - k }),
             _ => Location::Cell(cell),
         }
+    }
+
+    /// Checks every invariant: [`check_combinatorics`](Triangulation::check_combinatorics), then
+    /// [`check_geometry`](Delaunay::check_geometry), which relies on it.
+    ///
+    /// # Errors
+    /// The first violation found.
+    pub fn check(&self) -> Result<(), Violation> {
+        self.check_combinatorics()?;
+        self.check_geometry()
     }
 
     /// Checks exactly that every cell is positive, that every circumsphere is empty (facet by

@@ -6,12 +6,17 @@
 //! | [`DualComplex`], [`UnionBoundary`] | the alpha complex of balls, and the vertices of their union's boundary |
 //! | [`Poles`], [`PowerCrust`] | polar balls of a sample, and the surface between inner and outer balls |
 //! | [`Sphere`], [`Cone`], [`Slab`] | signed distances to a ball and to the hulls of two and of three |
-//! | [`trees`] | box trees: best first, overlapping, four boxes at a time in single precision |
+//! | [`trees::PointTree`] | the nearest point, and the points within a distance |
+//! | [`trees`] | box trees for your own searches: best first, overlapping, four boxes at a time |
 //! | [`predicates`] | signs that no rounding can turn |
 //!
 //! Coordinates are `f64`, in any one unit; every sign that a decision depends on is computed exactly, and
 //! ties are broken by symbolic perturbation, so that four points on a circle or all points of a lattice are
-//! no special case. The same input gives the same output with any number of threads.
+//! no special case.
+//!
+//! Large inputs are divided among the threads of rayon's pool: that in which a function is called
+//! (`ThreadPool::install`), else the global one, whose number of threads the environment variable
+//! `RAYON_NUM_THREADS` sets. The same input gives the same output with any number of threads.
 //!
 //! ```
 //! use medial_geometry::{Delaunay, Vec3};
@@ -66,7 +71,10 @@ pub use tangent_planes::{ConeFrame, SlabPlanes};
 pub use triangulation::{CellId, TriangulationError, VertexId};
 pub use union_boundary::{MergedVertices, UnionBoundary, UnionVertex};
 
-/// A point or a vector in space, double precision.
+/// The crate of [`Vec3`], in the version that this crate uses.
+pub use glam;
+
+/// A point or a vector in space, double precision: `DVec3` of [`glam`] 0.34, with all its methods.
 pub type Vec3 = glam::DVec3;
 
 #[cfg(doctest)]

@@ -30,6 +30,41 @@ use crate::Vec3;
 /// assert_eq!(hidden.hidden()[0].index(), 4);
 /// # Ok::<(), medial_geometry::triangulation::TriangulationError>(())
 /// ```
+///
+/// # The power diagram
+/// Each face of the power diagram is dual to a simplex of the triangulation:
+///
+/// * The power cell of a vertex `v` has the orthocentres ([`Regular::orthosphere`]) of
+///   [`incident_cells`](Triangulation::incident_cells)`(v)` as its corners. It is bounded if and
+///   only if none of these cells is infinite, that is if `v` is not on the convex hull. Hidden
+///   points have no power cell.
+/// * The power facet between two vertices that an edge joins has the orthocentres of the cells
+///   around the edge ([`edge_ring`](Triangulation::edge_ring)) as its corners, in rotational order.
+/// * Two orthocentres are joined by an edge of the diagram if their cells are
+///   [`neighbours`](Triangulation::neighbours). To an infinite cell leads a ray instead,
+///   orthogonal to the facet that the cell has in common with its finite neighbour.
+///
+/// Where more than four power cells meet in one point, several cells have that orthocentre, and
+/// facets can have no area.
+///
+/// ```
+/// use medial_geometry::{Regular, Vec3, VertexId};
+///
+/// // A point in the middle, and six around it whose power cells start at x, y, z = 1 and -1.
+/// let axes = [Vec3::X, Vec3::Y, Vec3::Z];
+/// let mut points = vec![Vec3::ZERO];
+/// points.extend(axes.into_iter().flat_map(|a| [2.0 * a, -2.0 * a]));
+/// let regular = Regular::new(&points, &[1.0; 7])?;
+/// let middle = regular.incident_cells(VertexId(0));
+/// assert!(middle.iter().all(|&cell| !regular.is_infinite(cell)));
+/// let corner = |&cell| regular.orthosphere(cell).expect("representable").0;
+/// let corners: Vec<Vec3> = middle.iter().map(corner).collect();
+/// assert_eq!(corners.len(), 8);
+/// assert!(corners.iter().all(|c| c.abs() == Vec3::ONE)); // the corners of a cube
+/// let outer = regular.incident_cells(VertexId(1));
+/// assert!(outer.iter().any(|&cell| regular.is_infinite(cell))); // unbounded
+/// # Ok::<(), medial_geometry::TriangulationError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Regular {
     triangulation: Triangulation,
@@ -116,13 +151,17 @@ impl Regular {
     }
 
     /// The input points that are not vertices because their power cell is empty, ascending.
+    ///
+    /// None of them is among the [`duplicates`](Regular::duplicates), and every other point is a
+    /// vertex: `vertex_count() + hidden().len() + duplicates().len() == point_count()`.
     pub fn hidden(&self) -> &[VertexId] {
         &self.hidden
     }
 
     /// The input points that repeat position and weight of another, each with that other, ascending.
     ///
-    /// The other may itself be hidden.
+    /// The other may itself be hidden; the duplicate is listed here alone, never in
+    /// [`hidden`](Regular::hidden).
     pub fn duplicates(&self) -> &[(VertexId, VertexId)] {
         &self.duplicates
     }
@@ -136,6 +175,16 @@ impl Regular {
     pub fn orthosphere(&self, cell: CellId) -> Option<(Vec3, f64)> {
         let v = self.vertices(cell);
         orthosphere(v.map(|v| self.point(v)), v.map(|v| self.weight(v)))
+    }
+
+    /// Checks every invariant: [`check_combinatorics`](Triangulation::check_combinatorics), then
+    /// [`check_geometry`](Regular::check_geometry), which relies on it.
+    ///
+    /// # Errors
+    /// The first violation found.
+    pub fn check(&self) -> Result<(), Violation> {
+        self.check_combinatorics()?;
+        self.check_geometry()
     }
 
     /// Checks exactly that every cell is positive, that no vertex across a facet is inside the

@@ -23,6 +23,20 @@ use crate::Vec3;
 const MIN_RELATIVE_HEIGHT: f64 = 1e-10;
 
 /// The convex hull of three balls, prepared for distance queries.
+///
+/// ```
+/// use medial_geometry::{Slab, Sphere, Vec3};
+///
+/// // A triangular plate, 2 thick, with round edges, and queries above it and beside it.
+/// let corners = [Vec3::ZERO, 8.0 * Vec3::X, Vec3::new(4.0, 4.0, 0.0)];
+/// let plate = Slab::new(corners.map(|c| Sphere::new(c, 1.0)));
+/// let above = Vec3::new(4.0, 2.0, 3.0);
+/// assert_eq!(plate.signed_distance(above), 2.0);
+/// assert_eq!(plate.signed_distance(Vec3::new(4.0, -3.0, 0.0)), 2.0);
+/// assert_eq!(plate.signed_distance(Vec3::new(4.0, 2.0, 0.0)), -1.0);
+/// let foot = plate.foot(above);
+/// assert_eq!((foot.point, foot.weights), (Vec3::new(4.0, 2.0, 1.0), [0.25, 0.25, 0.5]));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slab {
     spheres: [Sphere; 3],
@@ -38,7 +52,8 @@ impl Slab {
         Self { spheres, face: SlabFace::new(spheres), cones }
     }
 
-    /// Signed distance of `p` to the boundary of the hull, negative inside. Exact on both sides.
+    /// Signed distance of `p` to the boundary of the hull, negative inside: the true distance up to
+    /// rounding, inside as well as outside, not a bound.
     pub fn signed_distance(&self, p: Vec3) -> f64 {
         if let Some(distance) = self.face.as_ref().and_then(|face| face.signed_distance(p)) {
             return distance;

@@ -8,7 +8,9 @@ use crate::Vec3;
 pub struct Sphere {
     /// Centre `c`.
     pub centre: Vec3,
-    /// Radius `r`, non-negative.
+    /// Radius `r`. It should not be negative, which is not enforced: distances follow their formula
+    /// with any number, while [`DualComplex::of_balls`](crate::DualComplex::of_balls) and
+    /// [`PowerCrust::new`](crate::PowerCrust::new) refuse a negative radius.
     pub radius: f64,
 }
 

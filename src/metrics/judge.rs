@@ -7,11 +7,11 @@ use super::hausdorff::distances_with_envelope;
 use super::pose::Pose;
 use super::protrusion::{centres_outside, protrusion};
 use super::samples::SurfaceSamples;
+use super::surface_distance::surface_distances_from;
 use super::volume::{Sides, box_in, volume_error_in};
 use super::{
     AxisDistances, AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, MetricError,
-    SurfaceDistances, VolumeOptions, certify, counts, spikes, surface_distances, topology_warning,
-    triangle_quality,
+    SurfaceDistances, VolumeOptions, certify, counts, spikes, topology_warning, triangle_quality,
 };
 use crate::complex::{MedialMesh, MedialUnion, betti, euler};
 use crate::surface::TriangleBvh;
@@ -172,7 +172,7 @@ impl Judge {
     /// # Errors
     /// When it has no area.
     pub fn surface_distances(&self, other: &TriMesh) -> Result<SurfaceDistances, MetricError> {
-        surface_distances(&self.surface, &self.tree, other, &self.distance_options())
+        surface_distances_from(self.samples()?, &self.tree, other, &self.distance_options())
     }
 
     /// An interval no wider than `tolerance` that holds the Hausdorff distance of

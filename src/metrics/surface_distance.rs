@@ -72,7 +72,17 @@ pub fn surface_distances(
     other: &TriMesh,
     options: &DistanceOptions,
 ) -> Result<SurfaceDistances, MetricError> {
-    let on_surface = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
+    let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
+    surface_distances_from(&samples, tree, other, options)
+}
+
+/// As [`surface_distances`], from samples of the surface that were made before.
+pub(super) fn surface_distances_from(
+    on_surface: &SurfaceSamples,
+    tree: &TriangleBvh,
+    other: &TriMesh,
+    options: &DistanceOptions,
+) -> Result<SurfaceDistances, MetricError> {
     let on_other = SurfaceSamples::new(other, options.envelope_samples, options.seed)?;
     let other_tree = TriangleBvh::new(other).map_err(MetricError::Tree)?;
     let there = other_tree.distance_batch(&on_surface.points);

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use medial::complex::{self, collapse::Hierarchy};
 use medial::shape::Shape;
 use medial::simplifier::{MedialSimplifier, Simplified};
-use medial::surface;
+use medial::surface::{self, TriMesh};
 use medial_methods::aof::{self, LatticeVoxels};
 use medial_methods::pmat;
 use medial_methods::tam_heidrich::{self, OuterPoles, RemainingPoles};
@@ -78,13 +78,19 @@ impl Outputs {
     /// Writes what was asked for; `origin` says what a hierarchy is of.
     ///
     /// # Errors
-    /// When a file cannot be written, or the poles have no power crust.
+    /// When the poles have no power crust, and then nothing is written, or when a file cannot be
+    /// written.
     pub fn write(
         &self,
         result: &Simplified,
         shape: &Shape,
         origin: &Origin,
     ) -> Result<(), Failure> {
+        // Before anything is written: whether there is a crust shows only when it is made.
+        let crust = match (&self.power_crust, result.extras.get()) {
+            (Some(path), Some(poles)) => Some((path, self.crust(path, poles, shape)?)),
+            _ => None,
+        };
         if let Some(path) = &self.output {
             let back = shape.normalisation();
             let mesh = result.mesh.transformed(back.diagonal, |p| back.backward(p));
@@ -96,18 +102,19 @@ impl Outputs {
         if let (Some(path), Some(voxels)) = (&self.voxels, result.extras.get::<LatticeVoxels>()) {
             voxels::write(path, voxels, shape)?;
         }
-        if let (Some(path), Some(poles)) = (&self.power_crust, result.extras.get()) {
-            self.write_crust(path, poles, shape)?;
+        if let Some((path, crust)) = crust {
+            surface::write(path, &crust).map_err(Failure::input)?;
         }
         Ok(())
     }
 
-    fn write_crust(
+    /// The power crust for the file `path`, in the units of the surface.
+    fn crust(
         &self,
         path: &Path,
         poles: &RemainingPoles,
         shape: &Shape,
-    ) -> Result<(), Failure> {
+    ) -> Result<TriMesh, Failure> {
         let outer = match self.outer_poles {
             Outer::All => OuterPoles::All,
             Outer::Remaining => OuterPoles::OfRemaining,
@@ -120,7 +127,7 @@ impl Outputs {
         }
         let back = shape.normalisation();
         crust.vertices.iter_mut().for_each(|vertex| *vertex = back.backward(*vertex));
-        surface::write(path, &crust).map_err(Failure::input)
+        Ok(crust)
     }
 
     /// What was written, a line each.

@@ -93,6 +93,30 @@ pub type CellEdge = (CellId, usize, usize);
 /// assert_eq!(complex.betti(), [1, 1, 0]);
 /// # Ok::<(), medial_geometry::TriangulationError>(())
 /// ```
+///
+/// # Other values of alpha
+/// The alpha complex for `alpha`, a squared length, is the dual complex of the balls with the
+/// squared radii `r^2 + alpha`: a larger weight of all points changes no cell of the regular
+/// triangulation. Pass radii `sqrt(r^2 + alpha)` to [`DualComplex::of_balls`], or these weights,
+/// which may be negative, to [`Regular::new`], and the result to [`DualComplex::new`].
+///
+/// ```
+/// use medial_geometry::{DualComplex, Regular, Vec3};
+///
+/// // The alpha shapes of the corners of a cube.
+/// let corners: Vec<Vec3> = (0..8u32)
+///     .map(|k| Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)))
+///     .collect();
+/// let betti = |alpha: f64| -> Result<_, medial_geometry::TriangulationError> {
+///     Ok(DualComplex::new(&Regular::new(&corners, &[alpha; 8])?).betti())
+/// };
+/// assert_eq!(betti(-0.01)?, [0, 0, 0]); // empty
+/// assert_eq!(betti(0.0)?, [8, 0, 0]); // points
+/// assert_eq!(betti(0.25)?, [1, 5, 0]); // edges
+/// assert_eq!(betti(0.5)?, [1, 0, 1]); // squares
+/// assert_eq!(betti(0.75)?, [1, 0, 0]); // the cube
+/// # Ok::<(), medial_geometry::TriangulationError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct DualComplex<'r> {
     regular: Cow<'r, Regular>,

@@ -1,15 +1,22 @@
-//! Exact geometric predicates behind cheap filters, and the symbolic perturbation of the
-//! in-sphere and power tests.
+//! Exact geometric predicates: signs that no rounding can turn.
 //!
-//! Each predicate is first evaluated in double precision with a bound on its rounding error
-//! (file `filter.rs`); where the bound does not decide, integers wide enough to hold the exact
-//! value do (file `exact.rs`).
+//! Each predicate is first evaluated in double precision with a bound on its rounding error; where
+//! the bound does not decide, integers wide enough to hold the exact value do.
 //!
-//! Orientation: [`orient3d`]`(a, b, c, d)` is the sign of `det(b - a, c - a, d - a)`, positive if
-//! `d` sees `a, b, c` counter-clockwise. [`in_sphere`] is positive for a point inside the
-//! circumsphere of a positively oriented tetrahedron.
+//! # Signs
+//! [`orient3d`]`(a, b, c, d)` is the sign of `det(b - a, c - a, d - a)`, positive if `d` sees
+//! `a, b, c` counter-clockwise. [`in_sphere`] is positive for a point inside the circumsphere of a
+//! positively oriented tetrahedron. Both are CGAL's (`orientation`, `side_of_oriented_sphere`) and
+//! opposite to Shewchuk's (`orient3d`, `insphere`), whose positive tetrahedron is our negative one.
 //!
-//! Coordinates must be finite and at most [`MAX_COORDINATE`] in absolute value.
+//! # Ties
+//! The functions here say [`Sign::Zero`] where points are coplanar or cospherical: nothing is
+//! perturbed. The triangulations break these ties by a symbolic perturbation of their own.
+//!
+//! # Range
+//! Nothing is checked. A sign means something for finite coordinates of at most
+//! [`MAX_COORDINATE`] in absolute value, however small. For others, NaN among them, any sign may
+//! come out, or the call panics. The triangulations refuse such points with an error.
 
 mod axes;
 mod circumsphere;
@@ -39,7 +46,8 @@ pub(crate) use power_size::{
 
 use crate::Vec3;
 
-/// The largest absolute value of a coordinate for which no product in a predicate overflows.
+/// The largest absolute value of a coordinate for which no product in a predicate overflows; the
+/// largest that a triangulation takes.
 pub const MAX_COORDINATE: f64 = 1e57;
 
 /// The sign of an exactly evaluated expression.
@@ -94,23 +102,48 @@ impl std::ops::Neg for Sign {
     }
 }
 
-/// The side of the plane `a, b, c` on which `d` lies: positive if `d` sees them counter-clockwise.
+/// The side of the plane `a, b, c` on which `d` lies: positive if `d` sees them counter-clockwise,
+/// zero if the four points are coplanar. The sign is CGAL's, and opposite to Shewchuk's.
 ///
-/// Exact for finite coordinates of at most [`MAX_COORDINATE`].
+/// Exact for finite coordinates of at most [`MAX_COORDINATE`]; of others (1e300, infinity, NaN)
+/// the sign means nothing, and the call may panic.
+///
+/// ```
+/// use medial_geometry::Vec3;
+/// use medial_geometry::predicates::{Sign, orient3d};
+///
+/// assert_eq!(orient3d(Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z), Sign::Positive);
+/// assert_eq!(orient3d(Vec3::ZERO, Vec3::Y, Vec3::X, Vec3::Z), Sign::Negative);
+/// assert_eq!(orient3d(Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X + Vec3::Y), Sign::Zero);
+/// ```
 #[inline]
 pub fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
     Filter::ANY.orient3d(&a.to_array(), &b.to_array(), &c.to_array(), &d.to_array())
 }
 
-/// Whether three points lie on one line, exactly.
+/// Whether three points lie on one line, exactly: for finite coordinates of at most
+/// [`MAX_COORDINATE`]. Of others the answer means nothing, and the call may panic.
 pub fn collinear(a: Vec3, b: Vec3, c: Vec3) -> bool {
     exact::collinear(&a.to_array(), &b.to_array(), &c.to_array())
 }
 
 /// The side of the circumsphere of `a, b, c, d` on which `e` lies: positive inside, zero on it,
-/// if [`orient3d`]`(a, b, c, d)` is positive, and the opposite sign if it is negative.
+/// if [`orient3d`]`(a, b, c, d)` is positive, and the opposite sign if it is negative. The sign is
+/// CGAL's, and opposite to Shewchuk's. Coplanar `a, b, c, d` have no sphere, and then the sign
+/// means nothing.
 ///
-/// Exact for finite coordinates of at most [`MAX_COORDINATE`].
+/// Exact for finite coordinates of at most [`MAX_COORDINATE`]; of others (1e300, infinity, NaN)
+/// the sign means nothing, and the call may panic.
+///
+/// ```
+/// use medial_geometry::Vec3;
+/// use medial_geometry::predicates::{Sign, in_sphere};
+///
+/// let [a, b, c, d] = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z]; // positively oriented
+/// assert_eq!(in_sphere(a, b, c, d, Vec3::splat(0.5)), Sign::Positive);
+/// assert_eq!(in_sphere(a, b, c, d, Vec3::splat(1.0)), Sign::Zero);
+/// assert_eq!(in_sphere(a, b, c, d, Vec3::splat(1.5)), Sign::Negative);
+/// ```
 #[inline]
 pub fn in_sphere(a: Vec3, b: Vec3, c: Vec3, d: Vec3, e: Vec3) -> Sign {
     let [a, b, c, d, e] = [a, b, c, d, e].map(|p| Site { p: p.to_array(), w: 0.0 });
@@ -121,8 +154,11 @@ pub fn in_sphere(a: Vec3, b: Vec3, c: Vec3, d: Vec3, e: Vec3) -> Sign {
 /// positive if the power of `e` to the orthosphere of the positively oriented `a, b, c, d` is
 /// negative, that is if `e` does not allow them to be a cell of the regular triangulation.
 ///
-/// Exact, the lift `|p|^2 - w` included, for coordinates of at most [`MAX_COORDINATE`] and weights
-/// of at most its square.
+/// Zero if that power is zero; the opposite sign for negatively oriented points, and none that
+/// means anything for coplanar ones.
+///
+/// Exact, the lift `|p|^2 - w` included, for finite coordinates of at most [`MAX_COORDINATE`] and
+/// finite weights of at most its square; of others the sign means nothing, and the call may panic.
 pub fn power_test(
     a: (Vec3, f64),
     b: (Vec3, f64),

@@ -8,8 +8,10 @@ use crate::Vec3;
 /// A point of a coordinate plane.
 pub type Point2 = [f64; 2];
 
-/// Positive when `a, b, c` turn to the left. Exact where products of two coordinates neither overflow nor
-/// underflow.
+/// Positive when `a, b, c` turn to the left, zero when they lie on one line.
+///
+/// Exact for finite coordinates of which products of two neither overflow nor underflow; of others
+/// the sign means nothing. It is Shewchuk's, and CGAL's.
 #[inline]
 pub fn orient2d(a: Point2, b: Point2, c: Point2) -> Sign {
     // Shewchuk's first stage, inlined: nearly every call ends here.

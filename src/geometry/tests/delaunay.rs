@@ -9,8 +9,7 @@ use rand_pcg::Pcg64;
 
 fn check(points: &[Vec3]) -> Delaunay {
     let delaunay = Delaunay::new(points).expect("the points span space");
-    delaunay.check_combinatorics().expect("combinatorially valid");
-    delaunay.check_geometry().expect("Delaunay");
+    delaunay.check().expect("valid");
     delaunay
 }
 
@@ -152,8 +151,7 @@ fn ten_thousand_small_inputs_are_valid_or_refused() {
         };
         assert_eq!(expected, None, "round {round}: {points:?}");
         valid += 1;
-        delaunay.check_combinatorics().unwrap_or_else(|e| panic!("round {round}: {e}"));
-        delaunay.check_geometry().unwrap_or_else(|e| panic!("round {round}: {e}"));
+        delaunay.check().unwrap_or_else(|e| panic!("round {round}: {e}"));
         check_by_brute_force(&delaunay);
         for i in (1..points.len()).rev() {
             points.swap(i, rng.random_range(0..=i));
@@ -182,8 +180,7 @@ fn cells_and_their_order_do_not_depend_on_the_number_of_threads() {
                 assert_eq!(one.neighbours(cell), other.neighbours(cell));
             }
         }
-        one.check_combinatorics().expect("combinatorially valid");
-        one.check_geometry().expect("Delaunay");
+        one.check().expect("valid");
     }
 }
 
@@ -323,7 +320,7 @@ fn points_that_are_flat_but_for_their_exponents_take_no_longer_than_others() {
         let flat = Delaunay::new(&points).expect("not flat");
         // A minute or so where every in-sphere test goes to the widest integers.
         assert!(start.elapsed().as_secs() < 5, "{:?}", start.elapsed());
-        flat.check_geometry().expect("valid");
+        flat.check().expect("valid");
     }
     // Cospherical by fours and more: every test is exact.
     let lattice: Vec<Vec3> =

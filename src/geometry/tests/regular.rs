@@ -10,8 +10,7 @@ use rand_pcg::Pcg64;
 
 fn check(points: &[Vec3], weights: &[f64]) -> Regular {
     let regular = Regular::new(points, weights).expect("the points span space");
-    regular.check_combinatorics().expect("combinatorially valid");
-    regular.check_geometry().expect("regular");
+    regular.check().expect("valid");
     regular
 }
 
@@ -117,8 +116,7 @@ fn small_weighted_inputs_agree_with_brute_force() {
         };
         valid += 1;
         hidden += regular.hidden().len();
-        regular.check_combinatorics().unwrap_or_else(|e| panic!("round {round}: {e}"));
-        regular.check_geometry().unwrap_or_else(|e| panic!("round {round}: {e}"));
+        regular.check().unwrap_or_else(|e| panic!("round {round}: {e}"));
         check_by_brute_force(&regular);
         for i in (1..points.len()).rev() {
             let j = rng.random_range(0..=i);

@@ -90,9 +90,13 @@ struct Place {
 fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], place: Place, plan: Plan) {
     let Place { first, depth } = place;
     let count = items.len();
+    // No plane is sought where none can pay: a split costs a descent beside its parts. With groups
+    // as large as leaves, that is half of all ranges.
+    if count < 2 || (count <= plan.max_leaf && plan.cost(count) <= DESCENT) {
+        return;
+    }
     let plane = if depth < HALVING_DEPTH { cheapest_plane(items, plan) } else { None };
     let middle = match plane {
-        _ if count < 2 => return,
         Some(plane) => {
             let cost = DESCENT + plane.cost / nodes[index].bounds.half_area(plan.padding);
             // A box without area makes the cost not a number, and this false.
@@ -169,21 +173,23 @@ fn cheapest_plane(items: &[Item], plan: Plan) -> Option<Plane> {
 
 /// The best first bin of the right side, and its cost; infinite when one side would be empty.
 fn sweep(bins: &[Bin; BINS], plan: Plan) -> (usize, f64) {
-    let mut right_cost = [f64::INFINITY; BINS];
+    // Planes on either side of an empty bin cost the same; most bins of a small range are empty.
+    let mut right_cost = [f64::INFINITY; BINS + 1];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
     for k in (1..BINS).rev() {
-        bounds = bounds.union(&bins[k].bounds);
-        count += bins[k].count;
-        if count > 0 {
+        right_cost[k] = right_cost[k + 1];
+        if bins[k].count > 0 {
+            bounds = bounds.union(&bins[k].bounds);
+            count += bins[k].count;
             right_cost[k] = plan.cost(count) * bounds.half_area(plan.padding);
         }
     }
     let mut best = (0, f64::INFINITY);
     (bounds, count) = (Bounds::EMPTY, 0);
     for k in 1..BINS {
-        bounds = bounds.union(&bins[k - 1].bounds);
-        count += bins[k - 1].count;
-        if count > 0 {
+        if bins[k - 1].count > 0 {
+            bounds = bounds.union(&bins[k - 1].bounds);
+            count += bins[k - 1].count;
             let cost = plan.cost(count) * bounds.half_area(plan.padding) + right_cost[k];
             if cost < best.1 {
                 best = (k, cost);

@@ -1,5 +1,10 @@
-//! Bounding-volume hierarchy: a flat binary tree over boxes, built by the binned surface-area
-//! heuristic (Wald 2007, doi:10.1109/RT.2007.4342588), searched nearest box first.
+//! Points and boxes in trees.
+//!
+//! [`PointTree`] answers the common questions about points: the nearest one, and those within a
+//! distance. The rest of this module is for your own searches, over any items that have boxes.
+//!
+//! [`Tree`] is a bounding-volume hierarchy: a flat binary tree over boxes, built by the binned
+//! surface-area heuristic (Wald 2007, doi:10.1109/RT.2007.4342588), searched nearest box first.
 //!
 //! The tree stores boxes only. The items of a leaf and their distances belong to the [`Search`], or
 //! to the caller of [`Tree::descend`]. Two copies speed up many queries: [`WideTree`] has four

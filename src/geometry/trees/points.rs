@@ -1,8 +1,8 @@
 //! Points in a tree: the nearest one, and those within a distance.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
-use super::{Bounds, Node, Plan, Search, Tree};
+use super::{Bounds, Node, Plan, Tree};
 use crate::Vec3;
 
 /// A tree over points.
@@ -15,7 +15,7 @@ use crate::Vec3;
 /// let (id, squared) = tree.nearest(Vec3::new(41.2, 1.0, 0.0)).expect("there are points");
 /// assert_eq!(points[id as usize], Vec3::new(41.0, 1.0, 0.0));
 /// assert!((squared.sqrt() - 0.2).abs() < 1e-12);
-/// let mut near = tree.within(Vec3::new(41.2, 1.0, 0.0), 2.0);
+/// let mut near = tree.within(Vec3::new(41.2, 1.0, 0.0), 1.5 * 1.5); // the distance squared
 /// near.sort_unstable();
 /// assert_eq!(near, [41, 42]);
 /// ```
@@ -48,14 +48,22 @@ impl PointTree {
     /// The index of the nearest point, the smallest of equally near ones, and its squared distance;
     /// `None` without points, or where no distance can be squared.
     pub fn nearest(&self, query: Vec3) -> Option<(u32, f64)> {
-        let mut search = Nearest { of: self, query, best: (f64::INFINITY, u32::MAX) };
-        self.tree.search(&mut search);
-        let (squared, id) = search.best;
+        let (mut squared, mut id) = (f64::INFINITY, u32::MAX);
+        self.tree.search_around(query, squared, |places| {
+            for place in places {
+                let found = (self.points[place].distance_squared(query), self.tree.order()[place]);
+                if found < (squared, id) {
+                    (squared, id) = found;
+                }
+            }
+            squared
+        });
         // Infinite without points; and among infinite distances no point is the nearest.
         squared.is_finite().then_some((id, squared))
     }
 
-    /// The indices of the points whose squared distance is at most `squared`, in the order of the tree.
+    /// The indices of the points whose squared distance is at most `squared`, in the order of the
+    /// tree: for the points within 1.5, `squared` is `1.5 * 1.5`.
     pub fn within(&self, query: Vec3, squared: f64) -> Vec<u32> {
         let mut found = Vec::new();
         let is_near = |_: usize, node: &Node| node.bounds.distance_squared(query) <= squared;
@@ -65,35 +73,6 @@ impl PointTree {
             ControlFlow::Continue(())
         });
         found
-    }
-}
-
-struct Nearest<'a> {
-    of: &'a PointTree,
-    query: Vec3,
-    best: (f64, u32),
-}
-
-impl Search for Nearest<'_> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        node.bounds.distance_squared(self.query)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.best.0
-    }
-
-    #[inline]
-    fn visit(&mut self, places: Range<usize>) {
-        for place in places {
-            let squared = self.of.points[place].distance_squared(self.query);
-            let id = self.of.tree.order()[place];
-            if (squared, id) < self.best {
-                self.best = (squared, id);
-            }
-        }
     }
 }
 

@@ -4,6 +4,7 @@ use std::ops::{ControlFlow, Range};
 
 use super::build::MAX_DEPTH;
 use super::{Node, Tree};
+use crate::Vec3;
 
 /// A search in a tree for the least of some measure.
 pub trait Search {
@@ -17,7 +18,39 @@ pub trait Search {
     fn visit(&mut self, places: Range<usize>);
 }
 
+/// The search whose measure is the squared distance from a point.
+struct Around<F> {
+    p: Vec3,
+    limit: f64,
+    visit: F,
+}
+
+impl<F: FnMut(Range<usize>) -> f64> Search for Around<F> {
+    #[inline]
+    fn bound(&self, node: &Node) -> f64 {
+        node.bounds.distance_squared(self.p)
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    #[inline]
+    fn visit(&mut self, places: Range<usize>) {
+        self.limit = (self.visit)(places);
+    }
+}
+
 impl Tree {
+    /// Shows the leaves to `visit`, roughly from near `p` to far, as places in [`Tree::order`].
+    /// Boxes whose squared distance from `p` exceeds the limit are skipped: `limit` at first, then
+    /// what `visit` returned last.
+    #[inline]
+    pub fn search_around(&self, p: Vec3, limit: f64, visit: impl FnMut(Range<usize>) -> f64) {
+        self.search(&mut Around { p, limit, visit });
+    }
+
     /// Shows the leaves to a search, roughly from near to far.
     #[inline]
     pub fn search(&self, search: &mut impl Search) {

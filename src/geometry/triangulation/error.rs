@@ -63,7 +63,9 @@ pub enum TriangulationError {
         /// Number of distinct positions.
         distinct: usize,
     },
-    /// All points lie in one plane.
+    /// All points lie in one plane. Triangulations of the plane are not offered here;
+    /// [`DualComplex::of_balls`](crate::DualComplex::of_balls) takes flat input, and fewer points,
+    /// too.
     #[error("all {distinct} distinct points lie in one plane: there is no tetrahedron")]
     Coplanar {
         /// Number of distinct positions.

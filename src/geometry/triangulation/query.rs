@@ -50,7 +50,13 @@ impl Triangulation {
         cell.index() >= self.finite
     }
 
-    /// The vertices of a cell.
+    /// The vertices of a cell. Those of a finite cell are positively oriented: `d` sees `a, b, c`
+    /// counter-clockwise ([`orient3d`](crate::predicates::orient3d)). In an infinite cell the last
+    /// one is [`VertexId::INFINITE`], and the others are counter-clockwise as seen from outside the
+    /// convex hull.
+    ///
+    /// # Panics
+    /// If there is no such cell.
     #[inline]
     pub fn vertices(&self, cell: CellId) -> [VertexId; 4] {
         self.cells[cell.index()].v.map(VertexId)

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::block::Block;
 use crate::Vec3;
 use crate::geometry::planar_frame::{Part, PlanarFrame};
-use crate::geometry::trees::{Bounds, Node, Plan, Search, Tree, WideTree, in_morton_order};
+use crate::geometry::trees::{Bounds, Plan, Tree, WideTree, in_morton_order};
 use crate::surface::TriMesh;
 
 /// Larger coordinates would overflow when squared.
@@ -202,9 +202,14 @@ impl TriangleBvh {
             return false;
         }
         let limit = padded(distance, self.slack).powi(2);
-        let mut search = Any { bvh: self, p, squared: inclusive_square(distance), limit };
-        self.tree.search(&mut search);
-        search.limit < 0.0
+        let squared = inclusive_square(distance);
+        let mut found = false;
+        self.tree.search_around(p, limit, |mut places| {
+            found = places.any(|k| self.frames[k].distance_squared(p) <= squared);
+            // Once one is found, no box is near enough.
+            if found { -1.0 } else { limit }
+        });
+        found
     }
 
     fn closest_at(&self, p: Vec3, start: u32) -> (u32, Closest) {
@@ -214,7 +219,10 @@ impl TriangleBvh {
 
     fn nearest<'a>(&'a self, mut search: Nearest<'a>) -> Nearest<'a> {
         let Some(query) = self.wide.query(search.p) else {
-            self.tree.search(&mut search);
+            self.tree.search_around(search.p, search.limit(), |places| {
+                places.for_each(|place| search.measure(place));
+                search.limit()
+            });
             return search;
         };
         let limit = query.limit(search.reach());
@@ -273,32 +281,26 @@ struct Nearest<'a> {
     p: Vec3,
     squared: f64,
     place: usize,
-    limit: f64,
 }
 
 impl<'a> Nearest<'a> {
     fn starting(bvh: &'a TriangleBvh, p: Vec3, place: usize) -> Self {
-        let squared = bvh.frames[place].distance_squared(p);
-        let mut search = Self { bvh, p, squared, place, limit: 0.0 };
-        search.tighten();
-        search
+        Self { bvh, p, squared: bvh.frames[place].distance_squared(p), place }
     }
 
     fn within(bvh: &'a TriangleBvh, p: Vec3, bound: f64) -> Self {
-        let mut search = Self { bvh, p, squared: inclusive_square(bound), place: NONE, limit: 0.0 };
-        search.tighten();
-        search
-    }
-
-    fn tighten(&mut self) {
-        let reach = self.reach();
-        self.limit = reach * reach;
+        Self { bvh, p, squared: inclusive_square(bound), place: NONE }
     }
 
     /// The distance beyond which no box can hold anything as near as the best, rounding included.
     #[inline]
     fn reach(&self) -> f64 {
         padded(self.squared.sqrt(), self.bvh.slack)
+    }
+
+    /// Its square.
+    fn limit(&self) -> f64 {
+        self.reach().powi(2)
     }
 
     #[inline]
@@ -313,55 +315,6 @@ impl<'a> Nearest<'a> {
         if squared < self.squared || first {
             self.place = place;
             self.squared = squared;
-        }
-    }
-}
-
-impl Search for Nearest<'_> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        node.bounds.distance_squared(self.p)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit
-    }
-
-    #[inline]
-    fn visit(&mut self, places: Range<usize>) {
-        let before = self.squared;
-        places.for_each(|place| self.measure(place));
-        if self.squared < before {
-            self.tighten();
-        }
-    }
-}
-
-/// Search for any triangle within a distance.
-struct Any<'a> {
-    bvh: &'a TriangleBvh,
-    p: Vec3,
-    squared: f64,
-    /// Negative once one is found.
-    limit: f64,
-}
-
-impl Search for Any<'_> {
-    #[inline]
-    fn bound(&self, node: &Node) -> f64 {
-        node.bounds.distance_squared(self.p)
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit
-    }
-
-    #[inline]
-    fn visit(&mut self, mut places: Range<usize>) {
-        if places.any(|k| self.bvh.frames[k].distance_squared(self.p) <= self.squared) {
-            self.limit = -1.0;
         }
     }
 }

@@ -19,8 +19,10 @@
 //! and distance of the closest point, or one of 1, 0, -1 for inside, on, outside.
 #![allow(clippy::print_stdout)]
 
+#[path = "../../../../bench/benches/bumpy_torus/mod.rs"]
+mod bumpy_torus;
+
 use std::error::Error;
-use std::f64::consts::TAU;
 use std::io::Write as _;
 
 use medial::Vec3;
@@ -48,7 +50,8 @@ struct Task {
 }
 
 fn make(name: &str, count: usize, file: &str) -> Result<(), Box<dyn Error>> {
-    let mesh = if name == "torus" { torus(224, 224) } else { surface::read(name)?.mesh };
+    let mesh =
+        if name == "torus" { bumpy_torus::mesh(224, 224) } else { surface::read(name)?.mesh };
     let (lo, hi) = mesh.bounding_box().ok_or("the mesh has no vertices")?;
     let mut rng = Pcg64::seed_from_u64(1);
     let mut random = |count: usize| -> Vec<Vec3> {
@@ -67,26 +70,6 @@ fn make(name: &str, count: usize, file: &str) -> Result<(), Box<dyn Error>> {
     let hard = degenerate(&mesh, count);
     Task { mesh, inside, around, hard }.write(file)?;
     Ok(())
-}
-
-/// The bumpy torus of `bench/benches/distance.rs`: `2 n m` triangles.
-fn torus(n: u32, m: u32) -> TriMesh {
-    let angle = |k: u32, count: u32| TAU * f64::from(k) / f64::from(count);
-    let point = |u: f64, v: f64| {
-        let r = 0.35 + 0.05 * (5.0 * u).sin() * (4.0 * v).cos();
-        let ring = 1.0 + r * v.cos();
-        Vec3::new(ring * u.cos(), ring * u.sin(), r * v.sin())
-    };
-    let vertices = (0..n * m).map(|k| point(angle(k / m, n), angle(k % m, m))).collect();
-    let id = |i: u32, j: u32| i % n * m + j % m;
-    let quads = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
-    let faces = quads
-        .flat_map(|(i, j)| {
-            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
-            [[a, b, c], [a, c, d]]
-        })
-        .collect();
-    TriMesh { vertices, faces }
 }
 
 /// Points on the surface, and points that share coordinates with it.
