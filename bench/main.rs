@@ -3,5 +3,6 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    medial_bench::main_with(medial_methods::registry())
+    let methods = medial_methods::registry().into_iter().chain(medial_methods::on_request());
+    medial_bench::main_with(methods.collect())
 }

@@ -1,4 +1,4 @@
-//! The published simplifiers of the medial axis, one module each.
+//! The published simplifiers of the medial axis, one module each, and one of this project.
 //!
 //! Every method implements [`medial::simplifier::MedialSimplifier`] and knows neither the others
 //! nor the runner. [`registry`] lists them all; its order is the order of every table.
@@ -25,8 +25,9 @@ mod sheets;
 mod size_search;
 pub mod tam_heidrich;
 mod ties;
+pub mod tight;
 
-/// All methods, in the order of the tables.
+/// The published methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
     vec![
         Box::new(angle::method()),
@@ -42,9 +43,14 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
     ]
 }
 
+/// Methods that run where they are named, because they take long.
+pub fn on_request() -> Vec<Box<dyn MedialSimplifier>> {
+    vec![Box::new(tight::method(qmat::method()))]
+}
+
 /// The method with an id, or `None`. [`initial`] simplifies nothing and is not among them.
 pub fn find(id: &str) -> Option<Box<dyn MedialSimplifier>> {
-    registry().into_iter().find(|method| method.info().id == id)
+    registry().into_iter().chain(on_request()).find(|method| method.info().id == id)
 }
 
 #[cfg(test)]

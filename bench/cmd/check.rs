@@ -18,7 +18,7 @@ use crate::run::{
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Methods [default: all, those of `--plugins` too].
+    /// Methods [default: all but those on request, those of `--plugins` too].
     ids: Vec<String>,
     /// Run these cases alone; can be given several times [default: all].
     #[arg(long = "case", value_name = "NAME")]
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
 impl Arguments {
     fn entries<'r>(&self, registry: &'r Registry) -> Result<Vec<&'r Entry>, Failure> {
         if self.ids.is_empty() {
-            return Ok(registry.entries().iter().collect());
+            return Ok(registry.usual().collect());
         }
         let known = || registry.entries().iter().map(|entry| entry.id().to_owned()).collect();
         let entry = |id: &String| {

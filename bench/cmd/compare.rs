@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     study: Option<PathBuf>,
     /// Methods, separated by commas, each with parameters of its own if wanted: `qmat,qmat:k=0`
-    /// [default: all].
+    /// [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
     /// Sphere counts, separated by commas [default: 1000,500,200,100].

@@ -34,7 +34,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         infos.into_iter().for_each(describe);
     } else {
         for info in infos {
-            print_line(&format!("{:<12} {}", info.id, info.title));
+            let note = if info.on_request { " (runs where it is named)" } else { "" };
+            print_line(&format!("{:<12} {}{note}", info.id, info.title));
             print_line(&format!("{:<12} {}", "", info.summary));
         }
     }

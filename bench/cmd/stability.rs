@@ -29,7 +29,7 @@ use crate::run::{
 pub struct Arguments {
     /// Surface files (OFF, OBJ, PLY, STL) or `builtin:ID[:RESOLUTION]` [default: all built-in shapes].
     meshes: Vec<MeshArgument>,
-    /// Methods, separated by commas, each with parameters of its own if wanted [default: all].
+    /// Methods, separated by commas, each with parameters of its own if wanted [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
     /// Sphere counts, separated by commas.

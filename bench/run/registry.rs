@@ -124,6 +124,11 @@ impl Registry {
         &self.entries
     }
 
+    /// The methods that run where none is named: all but those on request.
+    pub fn usual(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|entry| !entry.method().info().on_request)
+    }
+
     /// The plug-in files that were added.
     pub fn files(&self) -> &[PathBuf] {
         &self.files

@@ -56,6 +56,7 @@ fn methods_do_not_see_each_other() {
         "sat",
         "sat_pairwise",
         "tam_heidrich",
+        "tight",
     ];
     let mut folders = vec![std::path::PathBuf::from(root)];
     let mut read = 0;

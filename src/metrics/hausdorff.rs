@@ -207,11 +207,11 @@ pub(super) fn highest(
 
 /// Depth, as a fraction of the surface's diameter, from which a point reached by the ascent is not on
 /// the union's boundary.
-const EXPOSED: f64 = 1e-12;
+pub(super) const EXPOSED: f64 = 1e-12;
 
 /// Depth, as a fraction of the surface's diameter, from which a sample of one primitive's surface
 /// counts as buried in another primitive, and not as on the union's boundary.
-const BURIAL: f64 = 1e-7;
+pub(super) const BURIAL: f64 = 1e-7;
 
 fn absolute(mut values: Vec<f64>) -> Vec<f64> {
     for value in &mut values {

@@ -11,6 +11,7 @@ mod evaluation;
 mod hausdorff;
 mod judge;
 mod lifted_axis;
+mod peaks;
 mod pose;
 mod protrusion;
 mod quality;
@@ -31,6 +32,7 @@ pub use evaluation::{
 };
 pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{Judge, JudgeOptions, Truth};
+pub use peaks::{Peak, PeakSearch, Peaks};
 pub use quality::triangle_quality;
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
 pub use surface_distance::{SurfaceDistances, surface_distances};

@@ -43,6 +43,8 @@ pub struct MethodInfo {
     /// Whether there is one result for each shape, at [`Level::Published`](super::Level::Published)
     /// alone.
     pub fixed: bool,
+    /// Whether it runs only where it is named, because it takes long: not when all methods run.
+    pub on_request: bool,
     /// What [`Level::Published`](super::Level::Published) means here.
     pub published: Text,
     /// Parameters, in the order of the paper.
@@ -86,6 +88,11 @@ impl MethodInfo {
     /// With [`MethodInfo::fixed`]: no levels.
     pub fn fixed(self) -> Self {
         Self { fixed: true, ..self }
+    }
+
+    /// With [`MethodInfo::on_request`]: it runs where it is named, and only there.
+    pub fn on_request(self) -> Self {
+        Self { on_request: true, ..self }
     }
 
     /// With [`MethodInfo::published`].

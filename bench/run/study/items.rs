@@ -44,7 +44,7 @@ impl Study {
     ) -> Result<Vec<(StudyMethod, &'r Entry)>, StudyError> {
         let mut methods = self.methods.clone();
         if methods.is_empty() {
-            methods = registry.entries().iter().map(|e| StudyMethod::of(e.id())).collect();
+            methods = registry.usual().map(|e| StudyMethod::of(e.id())).collect();
         }
         for then in &self.after_filters {
             let filters = registry.entries().iter().filter(|e| e.method().info().filter.is_some());

@@ -1,0 +1,329 @@
+//! Passes of collapses of the edges that the samples around them miss least.
+//!
+//! The price of an edge is the change of `sum w e^8` over the samples that the primitives around it
+//! serve, plus what the new primitives protrude, for the best of four places of the merged sphere: both
+//! ends, the midpoint, and the minimiser of the two spheres' squares. Eighth powers, because one sample
+//! that is missed badly decides the maximum, and no later step mends a face across a hole.
+//!
+//! Samples see the new star and its rim alone. What another primitive would serve better counts too much,
+//! never too little.
+
+use medial::Vec3;
+use medial::complex::collapse::CollapseComplex;
+use medial::complex::{MedialMesh, Primitive, Sphere};
+use medial::geometry::{Cone, SlabFace};
+use rayon::prelude::*;
+
+use super::descent::{Descent, LEAST_RADIUS};
+use super::goal::Goal;
+use super::normal::{Block, backward, cholesky, forward};
+use super::rows::{uncovered, vertices};
+
+/// Exponent of the price.
+const POWER: i32 = 8;
+
+/// Weight of a point of a primitive that protrudes. Each stands for several samples.
+const PROTRUDING: f64 = 50.0;
+
+/// Share of the trace that pulls a minimiser towards the midpoint of its edge.
+const PULL: f64 = 1e-3;
+
+/// Distance between points of a new star at which it is tested for protruding.
+const SPACING: f64 = 0.02;
+
+/// An edge with the place of its merged sphere.
+#[derive(Clone, Copy, Debug)]
+struct Priced {
+    ends: [u32; 2],
+    sphere: Sphere,
+    price: f64,
+}
+
+/// A sample as a collapse sees it.
+#[derive(Clone, Copy, Debug)]
+struct Served {
+    point: Vec3,
+    weight: f64,
+    /// Depth of an interior point, negative for a sample of the surface.
+    depth: f64,
+    /// Its error to [`POWER`] as it is now.
+    now: f64,
+}
+
+impl Served {
+    fn error(&self, signed: f64) -> f64 {
+        if self.depth < 0.0 { signed.abs() } else { uncovered(self.depth, signed) }
+    }
+}
+
+/// Collapses the cheapest edges that have no end in common, until `target` spheres are left; `None` if no
+/// collapse is possible.
+///
+/// A `careful` pass looks at little more than the edges that it needs, and leaves the rest to the next one,
+/// which prices them anew.
+pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Option<MedialMesh> {
+    let mesh = &descent.mesh;
+    let mut complex = CollapseComplex::from_mesh(mesh);
+    let stars = Stars::new(descent);
+    let priced = mesh.edges.par_iter();
+    // Each thread has its own complex, because the homotopy test marks vertices.
+    let priced = priced
+        .map_init(|| complex.clone(), |complex, &ends| stars.price(complex, descent.goal, ends));
+    let priced: Vec<Option<Priced>> = priced.collect();
+    let mut candidates: Vec<Priced> = priced.into_iter().flatten().collect();
+    candidates.sort_by(|x, y| x.price.total_cmp(&y.price).then(x.ends.cmp(&y.ends)));
+    if careful {
+        candidates.truncate((mesh.spheres.len() - target) * 3 / 2 + 1);
+    }
+    let mut merged = vec![false; mesh.spheres.len()];
+    for Priced { ends: [a, b], sphere, .. } in candidates {
+        if complex.sphere_count() <= target {
+            break;
+        }
+        // The price of an edge of a merged sphere is out of date. So is, less so, that of its neighbours'.
+        if merged[a as usize] || merged[b as usize] || !complex.keeps_homotopy(a, b) {
+            continue;
+        }
+        (merged[a as usize], merged[b as usize]) = (true, true);
+        complex.collapse(a, b, sphere);
+    }
+    (complex.sphere_count() < mesh.spheres.len()).then(|| complex.to_mesh())
+}
+
+/// The samples that each simplex serves, and each sphere's share of the squares.
+struct Stars {
+    of_sphere: Vec<Vec<Served>>,
+    of_edge: Vec<Vec<Served>>,
+    of_face: Vec<Vec<Served>>,
+    /// For each sphere its edges and faces.
+    edges: Vec<Vec<u32>>,
+    faces: Vec<Vec<u32>>,
+    blocks: Vec<Block>,
+    downhill: Vec<[f64; 4]>,
+}
+
+impl Stars {
+    fn new(descent: &Descent<'_>) -> Self {
+        let Descent { mesh, points, residuals, .. } = descent;
+        let spheres = mesh.spheres.len();
+        let mut this = Self {
+            of_sphere: vec![vec![]; spheres],
+            of_edge: vec![vec![]; mesh.edges.len()],
+            of_face: vec![vec![]; mesh.faces.len()],
+            edges: vec![vec![]; spheres],
+            faces: vec![vec![]; spheres],
+            blocks: vec![[[0.0; 4]; 4]; spheres],
+            downhill: vec![[0.0; 4]; spheres],
+        };
+        for (e, edge) in (0..).zip(&mesh.edges) {
+            edge.iter().for_each(|&v| this.edges[v as usize].push(e));
+        }
+        for (f, face) in (0..).zip(&mesh.faces) {
+            face.iter().for_each(|&v| this.faces[v as usize].push(f));
+        }
+        let surface = points.samples.iter().map(|s| (s.point, s.weight, -1.0));
+        let interior = points.interior.iter().map(|x| (x.point, x.weight, x.depth));
+        for ((point, weight, depth), found) in surface.chain(interior).zip(&residuals.nearest) {
+            let mut served = Served { point, weight, depth, now: 0.0 };
+            served.now = served.error(found.signed).powi(POWER);
+            let list = match found.primitive {
+                Primitive::Sphere(v) => &mut this.of_sphere[v as usize],
+                Primitive::Edge(e) => &mut this.of_edge[e as usize],
+                Primitive::Face(f) => &mut this.of_face[f as usize],
+            };
+            list.push(served);
+        }
+        for row in &residuals.rows {
+            let (corners, count) = vertices(mesh, row.primitive);
+            for (v, a) in corners.into_iter().zip(row.weights).take(count) {
+                let scale = row.weight * a * a;
+                let block = &mut this.blocks[v as usize];
+                for (line, x) in block.iter_mut().zip(row.direction) {
+                    for (entry, y) in line.iter_mut().zip(row.direction) {
+                        *entry += scale * x * y;
+                    }
+                }
+                for (entry, x) in this.downhill[v as usize].iter_mut().zip(row.direction) {
+                    *entry -= row.weight * row.error * a * x;
+                }
+            }
+        }
+        this
+    }
+
+    /// The edge at its best place; `None` if its collapse changes the homotopy type or folds a face at
+    /// every place.
+    fn price(&self, complex: &mut CollapseComplex, goal: &Goal, ends: [u32; 2]) -> Option<Priced> {
+        let [a, b] = ends;
+        if !complex.keeps_homotopy(a, b) {
+            return None;
+        }
+        let served = self.served(ends);
+        let now: f64 = served.iter().map(|s| s.weight * s.now).sum();
+        let ring = Ring::new(complex, ends);
+        let [first, second] = ends.map(|v| complex.sphere(v));
+        let mut places = vec![first, second, first.lerp(second, 0.5)];
+        places.extend(self.minimiser(ends, [first, second]));
+        let mut tried: Vec<(f64, Sphere)> = Vec::with_capacity(places.len());
+        let mut worst = f64::INFINITY;
+        for sphere in places {
+            if complex.folded_face(a, b, sphere.centre).is_some() {
+                continue;
+            }
+            let energy = ring.energy(sphere, &served, worst);
+            worst = worst.min(2.0 * energy);
+            if energy < f64::INFINITY {
+                tried.push((energy, sphere));
+            }
+        }
+        tried.sort_by(|x, y| x.0.total_cmp(&y.0));
+        let mut best: Option<Priced> = None;
+        for (energy, sphere) in tried {
+            let so_far = best.map_or(f64::INFINITY, |best| best.price);
+            if energy - now >= so_far {
+                break;
+            }
+            let price = energy - now + ring.protrusion(sphere, goal);
+            if price < so_far {
+                best = Some(Priced { ends, sphere, price });
+            }
+        }
+        best
+    }
+
+    /// The samples that the stars of both ends serve.
+    fn served(&self, ends: [u32; 2]) -> Vec<Served> {
+        let [a, b] = ends.map(|v| v as usize);
+        let mut all = Vec::<Served>::new();
+        all.extend(&self.of_sphere[a]);
+        all.extend(&self.of_sphere[b]);
+        let merged = |of_a: &[u32], of_b: &[u32]| {
+            let mut ids: Vec<u32> = of_a.iter().chain(of_b).copied().collect();
+            ids.sort_unstable();
+            ids.dedup();
+            ids
+        };
+        for e in merged(&self.edges[a], &self.edges[b]) {
+            all.extend(&self.of_edge[e as usize]);
+        }
+        for f in merged(&self.faces[a], &self.faces[b]) {
+            all.extend(&self.of_face[f as usize]);
+        }
+        // The largest errors first, so that a bad place is given up early.
+        all.sort_by(|x, y| y.now.total_cmp(&x.now));
+        all
+    }
+
+    /// The minimiser of both ends' squares, if it is a sphere not far from both.
+    fn minimiser(&self, ends: [u32; 2], spheres: [Sphere; 2]) -> Option<Sphere> {
+        let mut sum: Block = [[0.0; 4]; 4];
+        let mut right = [0.0; 4];
+        for (v, sphere) in ends.into_iter().zip(spheres) {
+            let (block, down) = (&self.blocks[v as usize], &self.downhill[v as usize]);
+            let at = [sphere.centre.x, sphere.centre.y, sphere.centre.z, sphere.radius];
+            for i in 0..4 {
+                for j in 0..4 {
+                    sum[i][j] += block[i][j];
+                    right[i] += block[i][j] * at[j];
+                }
+                right[i] += down[i];
+            }
+        }
+        let trace: f64 = (0..4).map(|k| sum[k][k]).sum();
+        let middle = spheres[0].lerp(spheres[1], 0.5);
+        let at = [middle.centre.x, middle.centre.y, middle.centre.z, middle.radius];
+        // Pulled towards the midpoint in directions that no sample decides.
+        for k in 0..4 {
+            sum[k][k] += PULL * trace;
+            right[k] += PULL * trace * at[k];
+        }
+        let lower = cholesky(&sum)?;
+        let [x, y, z, r] = backward(&lower, forward(&lower, right));
+        let sphere = Sphere::new(Vec3::new(x, y, z), r.max(LEAST_RADIUS));
+        let reach = spheres[0].centre.distance(spheres[1].centre)
+            + spheres[0].radius.max(spheres[1].radius);
+        (sphere.centre.distance(middle.centre) <= reach && sphere.radius.is_finite())
+            .then_some(sphere)
+    }
+}
+
+/// What surrounds an edge once it is collapsed.
+struct Ring {
+    neighbours: Vec<Sphere>,
+    sides: Vec<[Sphere; 2]>,
+    rims: Vec<Cone>,
+}
+
+impl Ring {
+    fn new(complex: &CollapseComplex, [a, b]: [u32; 2]) -> Self {
+        let mut around: Vec<u32> =
+            complex.neighbours(a).iter().chain(complex.neighbours(b)).copied().collect();
+        around.retain(|&v| v != a && v != b);
+        around.sort_unstable();
+        around.dedup();
+        let mut sides: Vec<[u32; 2]> =
+            complex.opposite_sides(a).iter().chain(complex.opposite_sides(b)).copied().collect();
+        sides.retain(|side| !side.contains(&a) && !side.contains(&b));
+        sides.sort_unstable();
+        sides.dedup();
+        let sphere = |v: u32| complex.sphere(v);
+        let sides: Vec<[Sphere; 2]> = sides.into_iter().map(|side| side.map(sphere)).collect();
+        let rims = sides.iter().map(|&[p, q]| Cone::new(p, q)).collect();
+        Self { neighbours: around.into_iter().map(sphere).collect(), sides, rims }
+    }
+
+    /// The energy of some samples if the merged sphere is at a place; given up beyond `limit`.
+    fn energy(&self, sphere: Sphere, served: &[Served], limit: f64) -> f64 {
+        let mut cones: Vec<Cone> = self.neighbours.iter().map(|&n| Cone::new(sphere, n)).collect();
+        if cones.is_empty() {
+            cones.push(Cone::new(sphere, sphere));
+        }
+        let faces: Vec<SlabFace> =
+            self.sides.iter().filter_map(|&[p, q]| SlabFace::new([sphere, p, q])).collect();
+        let mut energy = 0.0;
+        for sample in served {
+            let p = sample.point;
+            let mut signed = f64::INFINITY;
+            for cone in cones.iter().chain(&self.rims) {
+                signed = signed.min(cone.signed_distance(p));
+            }
+            for face in &faces {
+                signed = signed.min(face.signed_distance(p).unwrap_or(f64::INFINITY));
+            }
+            energy += sample.weight * sample.error(signed).powi(POWER);
+            if energy > limit {
+                return f64::INFINITY;
+            }
+        }
+        energy
+    }
+
+    /// What protrudes of the merged sphere, its edges and faces, at a few points of each.
+    fn protrusion(&self, sphere: Sphere, goal: &Goal) -> f64 {
+        let mut balls = vec![sphere];
+        for &n in &self.neighbours {
+            let parts = (sphere.centre.distance(n.centre) / SPACING).ceil().clamp(2.0, 12.0);
+            balls.extend((1..parts as u32).map(|k| sphere.lerp(n, f64::from(k) / parts)));
+        }
+        for &[p, q] in &self.sides {
+            let longest =
+                (sphere.centre - p.centre).length().max((sphere.centre - q.centre).length());
+            let rows = (longest / SPACING).ceil().clamp(2.0, 10.0);
+            let width = p.centre.distance(q.centre);
+            // Rows parallel to the side that the merged sphere does not touch.
+            for k in 1..rows as u32 {
+                let t = f64::from(k) / rows;
+                let (from, to) = (sphere.lerp(p, t), sphere.lerp(q, t));
+                let parts = (t * width / SPACING).ceil().clamp(2.0, 10.0);
+                balls.extend((1..parts as u32).map(|l| from.lerp(to, f64::from(l) / parts)));
+            }
+        }
+        let centres: Vec<Vec3> = balls.iter().map(|ball| ball.centre).collect();
+        let depths = goal.depths_at(&centres);
+        let each = balls
+            .iter()
+            .zip(depths)
+            .map(|(ball, depth)| (ball.radius - depth).max(0.0).powi(POWER));
+        PROTRUDING * each.sum::<f64>()
+    }
+}

@@ -1,0 +1,197 @@
+//! Levenberg-Marquardt on all spheres at once, for sums of powers of the residuals.
+//!
+//! Minimises `sum_i w_i (x_i^p + mean x_i^2)` with `x = |error| / scale`. The second derivative of a power
+//! keeps its factor `p - 1`, so a step is Newton's for residuals that are linear in the spheres.
+
+use medial::Vec3;
+use medial::complex::MedialMesh;
+use medial::simplifier::{RunContext, SimplifyError};
+
+use super::goal::{Goal, Points};
+use super::guard::hold;
+use super::normal::{Normal, Pattern};
+use super::rows::{Held, Residuals, Row, places, residuals, vertices};
+
+/// Largest step of a sphere.
+const LONGEST: f64 = 0.02;
+
+/// Least radius.
+pub(super) const LEAST_RADIUS: f64 = 1e-5;
+
+/// Damping before the first step, a share of the diagonal.
+const FIRST_DAMPING: f64 = 1e-3;
+
+/// Steps that are refused one after the other before the descent ends.
+const REFUSED: usize = 4;
+
+/// A step that lessens the objective by a smaller share is the last.
+const SMALL: f64 = 1e-3;
+
+/// What is minimised.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Objective {
+    /// Exponent, at least 2.
+    pub power: f64,
+    /// Weight of the squares beside it.
+    pub mean: f64,
+    /// Error that counts as 1.
+    pub scale: f64,
+}
+
+impl Objective {
+    /// A power alone.
+    pub fn power(power: f64, scale: f64) -> Self {
+        Self { power, mean: 0.0, scale }
+    }
+
+    fn value(&self, rows: &[Row]) -> f64 {
+        let Self { power, mean, scale } = *self;
+        let one = |row: &Row| {
+            let x = row.error.abs() / scale;
+            row.weight * (x.powf(power) + mean * x * x)
+        };
+        rows.iter().map(one).sum()
+    }
+
+    /// First derivative by the error over the error, and second derivative.
+    fn derivatives(&self, row: &Row) -> (f64, f64) {
+        let Self { power, mean, scale } = *self;
+        let x = row.error.abs() / scale;
+        let steep = power * x.powf(power - 2.0);
+        let unit = row.weight / (scale * scale);
+        (unit * (steep + 2.0 * mean), unit * (steep * (power - 1.0) + 2.0 * mean))
+    }
+}
+
+/// A medial mesh of fixed connectivity whose spheres move.
+pub(super) struct Descent<'a> {
+    pub goal: &'a Goal,
+    pub points: Points,
+    pub mesh: MedialMesh,
+    pub residuals: Residuals,
+    held: Vec<Held>,
+    pattern: Pattern,
+    damping: f64,
+}
+
+impl<'a> Descent<'a> {
+    /// Evaluates the residuals of a mesh.
+    ///
+    /// # Errors
+    /// When the mesh has no union.
+    pub fn new(goal: &'a Goal, points: Points, mesh: MedialMesh) -> Result<Self, SimplifyError> {
+        let mut held = places(&mesh);
+        let residuals = residuals(&mesh, goal, &points, &mut held)?;
+        let pattern = Pattern::new(mesh.spheres.len(), &mesh.edges);
+        Ok(Self { goal, points, mesh, residuals, held, pattern, damping: FIRST_DAMPING })
+    }
+
+    /// The largest error of a residual.
+    pub fn largest(&self) -> f64 {
+        let errors = self.residuals.rows.iter().map(|row| row.error.abs());
+        errors.fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// The value of an objective.
+    pub fn value(&self, objective: &Objective) -> f64 {
+        objective.value(&self.residuals.rows)
+    }
+
+    /// Takes at most so many steps, each of which lessens the objective.
+    ///
+    /// # Errors
+    /// When the run is cancelled.
+    pub fn run(
+        &mut self,
+        objective: Objective,
+        steps: usize,
+        run: &RunContext,
+    ) -> Result<(), SimplifyError> {
+        let mut value = self.value(&objective);
+        let (mut done, mut refused) = (0, 0);
+        let (mut normal, mut downhill) = self.assemble(&objective);
+        while done < steps && refused < REFUSED {
+            run.step(done, steps)?;
+            let Some(trial) = self.trial(&normal, &downhill) else {
+                self.damping *= 10.0;
+                refused += 1;
+                continue;
+            };
+            let found = residuals(&trial, self.goal, &self.points, &mut self.held)?;
+            let lower = objective.value(&found.rows);
+            // A value that is not a number is not lower, so such a step is refused.
+            if lower < value {
+                let is_small = value - lower < SMALL * value;
+                (self.mesh, self.residuals, value) = (trial, found, lower);
+                self.damping = (self.damping * 0.3).max(1e-9);
+                (done, refused) = (done + 1, 0);
+                if is_small {
+                    break;
+                }
+                if done < steps {
+                    (normal, downhill) = self.assemble(&objective);
+                }
+            } else {
+                self.damping *= 5.0;
+                refused += 1;
+            }
+        }
+        self.damping = self.damping.clamp(1e-6, 1.0);
+        Ok(())
+    }
+
+    /// The normal equations of the residuals, and minus their gradient.
+    fn assemble(&self, objective: &Objective) -> (Normal, Vec<[f64; 4]>) {
+        let mut normal = Normal::zero(&self.pattern);
+        let mut downhill = vec![[0.0; 4]; self.mesh.spheres.len()];
+        for row in &self.residuals.rows {
+            let (first, second) = objective.derivatives(row);
+            let (corners, count) = vertices(&self.mesh, row.primitive);
+            for i in 0..count {
+                let (v, a) = (corners[i] as usize, row.weights[i]);
+                // A foot on a side of a slab has a weight of zero.
+                if a == 0.0 {
+                    continue;
+                }
+                let slope = first * row.error * a;
+                for (entry, d) in downhill[v].iter_mut().zip(row.direction) {
+                    *entry -= slope * d;
+                }
+                for j in i..count {
+                    let scale = second * a * row.weights[j];
+                    if scale != 0.0 {
+                        let pattern = &self.pattern;
+                        normal.add(pattern, corners[i], corners[j], scale, &row.direction);
+                    }
+                }
+            }
+        }
+        (normal, downhill)
+    }
+
+    /// The mesh after a damped step, kept within its limits; `None` if there is no step.
+    fn trial(&self, normal: &Normal, downhill: &[[f64; 4]]) -> Option<MedialMesh> {
+        let spheres = self.mesh.spheres.len();
+        let mut trace = 0.0;
+        let mut extra: Vec<[f64; 4]> = (0..spheres as u32)
+            .map(|v| {
+                let diagonal = normal.diagonal(&self.pattern, v);
+                trace += diagonal.iter().sum::<f64>();
+                diagonal.map(|entry| self.damping * entry)
+            })
+            .collect();
+        // Spheres that serve no sample have no equation of their own.
+        let least = 1e-6 * (trace / (4 * spheres) as f64) + f64::MIN_POSITIVE;
+        extra.iter_mut().flatten().for_each(|entry| *entry += least);
+        let step = normal.solve(&self.pattern, &extra, downhill)?;
+        let mut trial = self.mesh.clone();
+        for (sphere, [x, y, z, r]) in trial.spheres.iter_mut().zip(step) {
+            let length = (x * x + y * y + z * z + r * r).sqrt();
+            let share = if length > LONGEST { LONGEST / length } else { 1.0 };
+            sphere.centre += share * Vec3::new(x, y, z);
+            sphere.radius = (sphere.radius + share * r).max(LEAST_RADIUS);
+        }
+        hold(&self.mesh, &mut trial, self.goal);
+        trial.check().is_ok().then_some(trial)
+    }
+}

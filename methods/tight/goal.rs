@@ -1,0 +1,253 @@
+//! What the union of the primitives is to match: samples of the surface, points inside the solid, and
+//! depths of any point.
+
+use std::sync::Arc;
+
+use medial::Vec3;
+use medial::complex::Sphere;
+use medial::metrics::{DistanceOptions, MetricError, PeakSearch};
+use medial::shape::{Shape, ShapeError};
+use medial::surface::{Closest, InsideTest, Sampling, Side, TriMesh, TriangleBvh, sample};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// Samples of the surface, below 500 spheres; twice as many from there on.
+const SAMPLES: usize = 10_000;
+
+/// Makes the random numbers differ from those of the start and of the judge with the same seed.
+const STREAM: u64 = 0x7469_6768_7421_0a0b;
+
+/// Weight of a vertex of the surface and of a point inside; an area-uniform sample has 1.
+const ASIDE: f64 = 0.3;
+
+/// Interior points that are residuals from the start.
+const INTERIOR: usize = 4_000;
+
+/// Interior points among which uncovered ones are looked for.
+const POOL: usize = 60_000;
+
+/// Cells along the longest side of the grid in which interior points are laid out.
+const GRID: usize = 40;
+
+/// Times that a ball is shrunk at most; the share of its radius that may be occupied; its least radius.
+const SHRINKS: usize = 30;
+const EMPTY: f64 = 1e-3;
+const SMALLEST_BALL: f64 = 1e-4;
+
+/// A point and how much it counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    pub point: Vec3,
+    pub weight: f64,
+}
+
+/// A point inside the solid, with its depth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interior {
+    pub point: Vec3,
+    pub depth: f64,
+    pub weight: f64,
+}
+
+/// The points that residuals are made for.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Points {
+    /// Points that the union's boundary should pass through.
+    pub samples: Vec<Sample>,
+    /// Points that the union should hold.
+    pub interior: Vec<Interior>,
+}
+
+/// Depth of a point in the solid, negative outside, and its gradient.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Depth {
+    pub value: f64,
+    pub gradient: Vec3,
+}
+
+/// The depth of a point, and the face that is closest to it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known {
+    point: Vec3,
+    depth: f64,
+    face: u32,
+}
+
+/// The solid, as the residuals see it.
+pub(super) struct Goal {
+    surface: TriMesh,
+    tree: Arc<TriangleBvh>,
+    inside: Arc<InsideTest>,
+    /// Points inside, among which uncovered ones are looked for.
+    pub pool: Vec<Interior>,
+    seed: u64,
+}
+
+impl Goal {
+    /// Lays out the points inside.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn new(shape: &Shape, seed: u64) -> Result<Self, ShapeError> {
+        let surface = shape.mesh().clone();
+        let (tree, inside) = (shape.surface_tree()?, shape.inside_test());
+        let mut goal = Self { surface, tree, inside, pool: Vec::new(), seed };
+        goal.pool = goal.points_inside(POOL);
+        Ok(goal)
+    }
+
+    /// The points that residuals are made for, when so many spheres are left.
+    pub fn points(&self, spheres: usize) -> Points {
+        let Self { surface, pool, seed, .. } = self;
+        let count = if spheres < 500 { SAMPLES } else { 2 * SAMPLES };
+        let spread = sample(surface, &Sampling::BlueNoise { count, seed: seed ^ STREAM });
+        let mut used = vec![false; surface.vertices.len()];
+        surface.faces.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let vertices = surface.vertices.iter().zip(used).filter(|&(_, used)| used);
+        let vertices: Vec<Vec3> = vertices.map(|(&point, _)| point).collect();
+        // Of a finely meshed surface a share is enough: corners are sampled by the others, too.
+        let every = vertices.len().div_ceil(count);
+        let vertices = vertices.into_iter().step_by(every.max(1));
+        let vertices = vertices.map(|point| Sample { point, weight: ASIDE });
+        let samples = spread.into_iter().map(|point| Sample { point, weight: 1.0 });
+        let stride = (pool.len() / INTERIOR).max(1);
+        let interior = pool.iter().step_by(stride).copied().collect();
+        Points { samples: samples.chain(vertices).collect(), interior }
+    }
+
+    /// A search for the largest errors of a medial mesh.
+    ///
+    /// # Errors
+    /// When the surface has no area.
+    pub fn peaks(&self) -> Result<PeakSearch<'_>, MetricError> {
+        let count = 2 * SAMPLES;
+        let seed = self.seed ^ STREAM;
+        let options = DistanceOptions { surface_samples: count, envelope_samples: count, seed };
+        PeakSearch::new(&self.surface, &self.tree, options)
+    }
+
+    /// Depths and their gradients, in parallel.
+    pub fn depths(&self, points: &[Vec3]) -> Vec<Depth> {
+        let closest = self.tree.closest_batch(points);
+        let sides = self.inside.sides(points);
+        let depth = |((&p, closest), side)| self.signed(p, closest, side);
+        points.iter().zip(&closest).zip(sides).map(depth).collect()
+    }
+
+    fn signed(&self, p: Vec3, closest: &Closest, side: Side) -> Depth {
+        let inward = if side == Side::Inside { 1.0 } else { -1.0 };
+        let away = (p - closest.point).try_normalize();
+        // On the surface the gradient is the inward normal of the face.
+        let gradient = away.map_or_else(|| -self.normal(closest.face), |away| inward * away);
+        Depth { value: inward * closest.distance, gradient }
+    }
+
+    /// The depth of a place that moved: `known` holds what was found where it was before.
+    ///
+    /// Depths are 1-Lipschitz, so a place that moved less than its depth is on the same side, and one
+    /// that is deeper than `enough` all the same needs no query: `None`.
+    pub fn depth_of_moved(&self, p: Vec3, enough: f64, known: &mut Option<Known>) -> Option<Depth> {
+        let mut side = None;
+        if let Some(known) = known {
+            let moved = p.distance(known.point);
+            if known.depth - moved >= enough {
+                return None;
+            }
+            if known.depth.abs() > moved {
+                side = Some(if known.depth > 0.0 { Side::Inside } else { Side::Outside });
+            }
+        }
+        let closest = self.tree.closest_from(p, known.map(|known| known.face));
+        let side = side.unwrap_or_else(|| self.inside.side(p));
+        let depth = self.signed(p, &closest, side);
+        *known = Some(Known { point: p, depth: depth.value, face: closest.face });
+        (depth.value < enough).then_some(depth)
+    }
+
+    /// Depths of a few nearby points.
+    pub fn depths_at(&self, points: &[Vec3]) -> Vec<f64> {
+        let mut near = None;
+        let depth = |&p: &Vec3| {
+            let closest = self.tree.closest_from(p, near);
+            near = Some(closest.face);
+            if self.inside.side(p) == Side::Inside { closest.distance } else { -closest.distance }
+        };
+        points.iter().map(depth).collect()
+    }
+
+    /// A point of the surface closest to each centre that is outside of the solid.
+    pub fn clamped(&self, centres: &[Vec3]) -> Vec<Option<Vec3>> {
+        let outside = |side| side == Side::Outside;
+        let sides = self.inside.sides(centres);
+        let clamp = |(&c, side)| outside(side).then(|| self.tree.closest(c).point);
+        centres.iter().zip(sides).map(clamp).collect()
+    }
+
+    /// The largest ball inside the solid that touches the surface next to a point (Ma, Bae, Choi 2012,
+    /// *3D medial point approximation using nearest neighbors and the normal field*).
+    pub fn ball_at(&self, p: Vec3) -> Sphere {
+        let start = self.tree.closest(p);
+        let (q, inward) = (start.point, -self.normal(start.face));
+        // No ball inside is larger than half the diagonal.
+        let mut radius = 0.5;
+        for _ in 0..SHRINKS {
+            let centre = q + radius * inward;
+            let closest = self.tree.closest(centre);
+            if closest.distance >= radius * (1.0 - EMPTY) {
+                break;
+            }
+            let arm = closest.point - q;
+            let along = 2.0 * arm.dot(inward);
+            let next = arm.length_squared() / along.max(1e-12);
+            if next >= radius {
+                break;
+            }
+            radius = next.max(SMALLEST_BALL);
+        }
+        Sphere::new(q + radius * inward, radius)
+    }
+
+    fn normal(&self, face: u32) -> Vec3 {
+        let [a, b, c] = self.surface.triangle(face as usize);
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
+    /// About so many points inside, one in each cell of a grid that is fine enough.
+    fn points_inside(&self, count: usize) -> Vec<Interior> {
+        let (lo, hi) = self.surface.bounding_box().unwrap_or_default();
+        let extent = hi - lo;
+        let side = extent.max_element() / GRID as f64;
+        let cells = (extent / side).ceil().max(Vec3::ONE);
+        let [nx, ny, nz] = cells.to_array().map(|n| n as usize);
+        let middle = |i: usize| {
+            let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)].map(|k| k as f64 + 0.5);
+            lo + side * Vec3::new(x, y, z)
+        };
+        let middles: Vec<Vec3> = (0..nx * ny * nz).map(middle).collect();
+        let depths = self.depths(&middles);
+        // A cell farther outside than its half diagonal holds nothing.
+        let reach = side * 0.75_f64.sqrt();
+        let mixed: Vec<Vec3> =
+            middles.iter().zip(depths).filter(|(_, d)| d.value > -reach).map(|(&m, _)| m).collect();
+        let mut rng = Pcg64::seed_from_u64(self.seed ^ STREAM);
+        let each = (2 * count).div_ceil(mixed.len().max(1));
+        let mut points = Vec::with_capacity(each * mixed.len());
+        for &m in &mixed {
+            for _ in 0..each {
+                let [x, y, z] = [(); 3].map(|()| rng.random::<f64>() - 0.5);
+                points.push(m + side * Vec3::new(x, y, z));
+            }
+        }
+        let depths = self.depths(&points);
+        let inside = points.iter().zip(depths).filter(|(_, depth)| depth.value > 0.0);
+        let point =
+            |(&point, depth): (&Vec3, Depth)| Interior { point, depth: depth.value, weight: ASIDE };
+        let all: Vec<Interior> = inside.map(point).collect();
+        // Rarely more than asked: thinned evenly.
+        let keep = |k: usize| k * count / all.len() != (k + 1) * count / all.len();
+        if all.len() <= count {
+            return all;
+        }
+        (0..all.len()).filter(|&k| keep(k)).map(|k| all[k]).collect()
+    }
+}

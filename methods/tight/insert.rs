@@ -1,0 +1,172 @@
+//! Swaps: spheres are inserted where the error is largest, and as many edges collapsed elsewhere.
+//!
+//! A sphere is inserted by splitting the edge that serves the place best, with its faces, or by a cone over
+//! a vertex or an edge. Both are expansions, so the homotopy type stays.
+
+use std::collections::BTreeSet;
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, Primitive, Sphere};
+use medial::simplifier::{RunContext, SimplifyError};
+
+use super::collapse;
+use super::descent::{Descent, LEAST_RADIUS, Objective};
+use super::goal::Goal;
+use super::rows::{Row, vertices};
+
+/// Errors below this share of the largest are no reason to insert a sphere.
+const SHARE: f64 = 0.5;
+
+/// A ball whose centre is nearer to the union's than this share of the radius needs no new sheet.
+const NEAR: f64 = 0.5;
+
+/// A foot with a larger weight at one sphere splits nothing.
+const AT_END: f64 = 0.95;
+
+/// A foot with a smaller weight at one sphere does not use it.
+const UNUSED: f64 = 0.05;
+
+/// Steps between an insertion and the collapses.
+const STEPS: usize = 5;
+
+/// A mesh with as many spheres, up to `each` of them at other places; `None` if nothing can be inserted,
+/// or not as much be collapsed.
+///
+/// # Errors
+/// When the run is cancelled.
+pub(super) fn swapped<'a>(
+    descent: &Descent<'a>,
+    each: usize,
+    power: f64,
+    run: &RunContext,
+) -> Result<Option<Descent<'a>>, SimplifyError> {
+    let count = descent.mesh.spheres.len();
+    let Some(larger) = with_inserted(descent, each) else { return Ok(None) };
+    let mut trial = Descent::new(descent.goal, descent.points.clone(), larger)?;
+    trial.run(Objective::power(power, trial.largest()), STEPS, run)?;
+    while trial.mesh.spheres.len() > count {
+        run.step(0, 1)?;
+        let Some(smaller) = collapse::pass(&trial, count, true) else { return Ok(None) };
+        trial = Descent::new(trial.goal, trial.points, smaller)?;
+    }
+    Ok(Some(trial))
+}
+
+/// The mesh with up to `count` spheres more, at the largest errors, no two at one simplex.
+fn with_inserted(descent: &Descent<'_>, count: usize) -> Option<MedialMesh> {
+    let mesh = &descent.mesh;
+    let mut rows: Vec<&Row> = descent.residuals.rows.iter().collect();
+    rows.sort_by(|x, y| y.error.abs().total_cmp(&x.error.abs()));
+    let largest = rows.first()?.error.abs();
+    let mut edit = Edit::new(mesh);
+    let mut touched = vec![false; mesh.spheres.len()];
+    let mut inserted = 0;
+    for row in rows {
+        if inserted == count || row.error.abs() < SHARE * largest {
+            break;
+        }
+        let (corners, dimension) = vertices(mesh, row.primitive);
+        let corners = &corners[..dimension];
+        let is_free = corners.iter().all(|&v| !touched[v as usize]);
+        if is_free && edit.insert(descent.goal, row, corners) {
+            corners.iter().for_each(|&v| touched[v as usize] = true);
+            inserted += 1;
+        }
+    }
+    (inserted > 0).then(|| edit.mesh())
+}
+
+/// A complex to which simplices are added.
+struct Edit {
+    spheres: Vec<Sphere>,
+    edges: BTreeSet<[u32; 2]>,
+    faces: BTreeSet<[u32; 3]>,
+}
+
+impl Edit {
+    fn new(mesh: &MedialMesh) -> Self {
+        Self {
+            spheres: mesh.spheres.clone(),
+            edges: mesh.edges.iter().copied().collect(),
+            faces: mesh.faces.iter().copied().collect(),
+        }
+    }
+
+    fn mesh(self) -> MedialMesh {
+        MedialMesh {
+            spheres: self.spheres,
+            edges: self.edges.into_iter().collect(),
+            faces: self.faces.into_iter().collect(),
+            contacts: None,
+        }
+    }
+
+    /// Inserts a sphere at a residual, if there is a way.
+    fn insert(&mut self, goal: &Goal, row: &Row, corners: &[u32]) -> bool {
+        let (mut centre, mut radius) = (Vec3::ZERO, 0.0);
+        for (&v, a) in corners.iter().zip(row.weights) {
+            centre += a * self.spheres[v as usize].centre;
+            radius += a * self.spheres[v as usize].radius;
+        }
+        let foot = Sphere::new(centre, radius);
+        if row.covered {
+            // The union holds too much here, a new sphere in it can give way.
+            return self.split(row, corners, foot);
+        }
+        let ball = goal.ball_at(row.point);
+        let apart = ball.centre.distance(foot.centre);
+        if apart < NEAR * foot.radius {
+            return self.split(row, corners, foot);
+        }
+        // A cone over the part of the simplex that serves the place.
+        let mut base: Vec<u32> =
+            corners.iter().zip(row.weights).filter(|&(_, a)| a > UNUSED).map(|(&v, _)| v).collect();
+        if base.len() == 3 {
+            // Over a whole face it would close a void: over its nearest side instead.
+            let far = (0..3).min_by(|&i, &j| row.weights[i].total_cmp(&row.weights[j]));
+            base.remove(far.unwrap_or(0));
+        }
+        let new = self.push(ball);
+        for &v in &base {
+            self.edges.insert([v, new]);
+        }
+        if let [a, b] = *base {
+            self.faces.insert([a.min(b), a.max(b), new]);
+        }
+        true
+    }
+
+    fn push(&mut self, sphere: Sphere) -> u32 {
+        self.spheres.push(Sphere::new(sphere.centre, sphere.radius.max(LEAST_RADIUS)));
+        self.spheres.len() as u32 - 1
+    }
+
+    /// Splits the edge nearest to the foot of the place, with all its faces.
+    fn split(&mut self, row: &Row, corners: &[u32], foot: Sphere) -> bool {
+        let mut by_weight: Vec<(f64, u32)> =
+            corners.iter().zip(row.weights).map(|(&v, a)| (a, v)).collect();
+        by_weight.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+        let (a, b) = match row.primitive {
+            Primitive::Sphere(_) => return false,
+            _ => (by_weight[0].1, by_weight[1].1),
+        };
+        let (a, b) = (a.min(b), a.max(b));
+        if by_weight[0].0 > AT_END {
+            return false;
+        }
+        let new = self.push(foot);
+        self.edges.remove(&[a, b]);
+        self.edges.insert([a, new]);
+        self.edges.insert([b, new]);
+        let at_edge: Vec<[u32; 3]> =
+            self.faces.iter().copied().filter(|f| f.contains(&a) && f.contains(&b)).collect();
+        for face in at_edge {
+            self.faces.remove(&face);
+            let apex = face.into_iter().find(|&v| v != a && v != b).unwrap_or(a);
+            self.edges.insert([apex, new]);
+            self.faces.insert([a.min(apex), a.max(apex), new]);
+            self.faces.insert([b.min(apex), b.max(apex), new]);
+        }
+        true
+    }
+}

@@ -1,0 +1,239 @@
+//! The residuals of a medial mesh against the solid, each linear in the four numbers of up to three
+//! spheres.
+//!
+//! With `sigma(p)` the least signed distance to a primitive, attained by the sphere
+//! `(c(a), r(a)) = sum_j a_j m_j` on it, and `u` the unit vector from `c(a)` to `p`:
+//! `d sigma / d c_j = -a_j u`, `d sigma / d r_j = -a_j`. The weights `a` may be held, because `sigma` is a
+//! minimum over them (the envelope theorem).
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, MedialUnion, NearestPrimitive, Primitive, Sphere};
+use medial::geometry::{Cone, Slab};
+use medial::simplifier::SimplifyError;
+
+use rayon::prelude::*;
+
+use super::goal::{Goal, Known, Points};
+
+/// Depth from which on an uncovered interior point counts alike.
+const DEEP: f64 = 0.02;
+
+/// Weight of a point of the medial mesh whose ball may protrude.
+const PROTRUDING: f64 = 0.3;
+
+/// Golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+
+/// A residual `error`, whose derivative by the `j`-th sphere of its simplex is
+/// `weights[j] * direction`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub primitive: Primitive,
+    pub weights: [f64; 3],
+    pub direction: [f64; 4],
+    pub error: f64,
+    pub weight: f64,
+    /// The sample, or the centre of the ball that protrudes.
+    pub point: Vec3,
+    /// Whether the union holds too much there, and not too little.
+    pub covered: bool,
+}
+
+/// A point of the medial mesh, held to its simplex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    pub primitive: Primitive,
+    pub weights: [f64; 3],
+    /// Its depth where it was last looked at.
+    pub known: Option<Known>,
+}
+
+/// All residuals of a medial mesh that are not zero, and what each sample is served by.
+pub(super) struct Residuals {
+    pub rows: Vec<Row>,
+    /// For each sample of the surface, then each interior point.
+    pub nearest: Vec<NearestPrimitive>,
+}
+
+/// How much an interior point of a depth is uncovered, if positive.
+#[inline]
+pub(super) fn uncovered(depth: f64, signed: f64) -> f64 {
+    (2.0 * signed + depth.min(DEEP)).max(0.0)
+}
+
+/// The vertices of a simplex, and how many they are.
+pub(super) fn vertices(mesh: &MedialMesh, primitive: Primitive) -> ([u32; 3], usize) {
+    match primitive {
+        Primitive::Sphere(v) => ([v, v, v], 1),
+        Primitive::Edge(e) => {
+            let [a, b] = mesh.edges[e as usize];
+            ([a, b, b], 2)
+        }
+        Primitive::Face(f) => (mesh.faces[f as usize], 3),
+    }
+}
+
+/// The sphere of a medial mesh at some weights of a simplex.
+fn interpolated(mesh: &MedialMesh, held: &Held) -> Sphere {
+    let (corners, count) = vertices(mesh, held.primitive);
+    let (mut centre, mut radius) = (Vec3::ZERO, 0.0);
+    for (v, weight) in corners.into_iter().zip(held.weights).take(count) {
+        let sphere = mesh.spheres[v as usize];
+        centre += weight * sphere.centre;
+        radius += weight * sphere.radius;
+    }
+    Sphere::new(centre, radius)
+}
+
+/// About so many points of the medial mesh: all spheres, the rest spread evenly over edges and faces.
+fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
+    let centre = |v: u32| mesh.spheres[v as usize].centre;
+    let length = |e: &[u32; 2]| centre(e[0]).distance(centre(e[1]));
+    let area = |f: &[u32; 3]| {
+        let [a, b, c] = f.map(centre);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    let (total_length, total_area) =
+        (mesh.edges.iter().map(length).sum::<f64>(), mesh.faces.iter().map(area).sum::<f64>());
+    // The spacing `h` with length / h + area / h^2 = count.
+    let count = count as f64;
+    let root = (total_length * total_length + 4.0 * total_area * count).sqrt();
+    let h = (total_length + root) / (2.0 * count);
+    let mut all: Vec<Held> = (0..mesh.spheres.len() as u32)
+        .map(|v| Held { primitive: Primitive::Sphere(v), weights: [1.0, 0.0, 0.0], known: None })
+        .collect();
+    let points =
+        |size: f64| if size.is_finite() { (size.ceil() as usize).clamp(1, 1000) } else { 1 };
+    for (e, edge) in (0..).zip(&mesh.edges) {
+        let n = points(length(edge) / h);
+        let at = |k: usize| {
+            let t = (k as f64 + 0.5) / n as f64;
+            Held { primitive: Primitive::Edge(e), weights: [1.0 - t, t, 0.0], known: None }
+        };
+        all.extend((0..n).map(at));
+    }
+    for (f, face) in (0..).zip(&mesh.faces) {
+        let n = points(area(face) / (h * h));
+        let at = |k: usize| {
+            let [mut s, mut t] = PLASTIC.map(|step| ((k as f64 + 1.0) * step + GOLDEN).fract());
+            // The sequence fills a parallelogram; its other half is reflected into the triangle.
+            if s + t > 1.0 {
+                (s, t) = (1.0 - s, 1.0 - t);
+            }
+            Held { primitive: Primitive::Face(f), weights: [1.0 - s - t, s, t], known: None }
+        };
+        all.extend((0..n).map(at));
+    }
+    all
+}
+
+/// Points whose balls are watched for protruding.
+pub(super) fn places(mesh: &MedialMesh) -> Vec<Held> {
+    spread_over(mesh, 6_000)
+}
+
+/// The residuals of a medial mesh.
+///
+/// # Errors
+/// When the medial mesh has no union.
+pub(super) fn residuals(
+    mesh: &MedialMesh,
+    goal: &Goal,
+    points: &Points,
+    held: &mut [Held],
+) -> Result<Residuals, SimplifyError> {
+    let union = union_of(mesh)?;
+    let surface = points.samples.iter().map(|sample| sample.point);
+    let places: Vec<Vec3> = surface.chain(points.interior.iter().map(|x| x.point)).collect();
+    let nearest = union.deepest_batch(&places);
+    let hulls = Hulls::new(mesh);
+    let (on_surface, inside) = nearest.split_at(points.samples.len());
+    let mut rows = Vec::with_capacity(places.len());
+    for (sample, found) in points.samples.iter().zip(on_surface) {
+        let (weights, direction) = hulls.derivative(mesh, sample.point, found.primitive);
+        let (error, weight) = (found.signed, sample.weight);
+        rows.push(Row {
+            primitive: found.primitive,
+            weights,
+            direction,
+            error,
+            weight,
+            point: sample.point,
+            covered: error < 0.0,
+        });
+    }
+    for (point, found) in points.interior.iter().zip(inside) {
+        let error = uncovered(point.depth, found.signed);
+        if error > 0.0 {
+            let (weights, direction) = hulls.derivative(mesh, point.point, found.primitive);
+            let direction = direction.map(|d| 2.0 * d);
+            let weight = point.weight;
+            rows.push(Row {
+                primitive: found.primitive,
+                weights,
+                direction,
+                error,
+                weight,
+                point: point.point,
+                covered: false,
+            });
+        }
+    }
+    let protruding = held.par_iter_mut().map(|held| {
+        let ball = interpolated(mesh, held);
+        let depth = goal.depth_of_moved(ball.centre, ball.radius, &mut held.known)?;
+        let [x, y, z] = depth.gradient.to_array();
+        let Held { primitive, weights, .. } = *held;
+        Some(Row {
+            primitive,
+            weights,
+            direction: [-x, -y, -z, 1.0],
+            error: ball.radius - depth.value,
+            weight: PROTRUDING,
+            point: ball.centre,
+            covered: true,
+        })
+    });
+    let protruding: Vec<Option<Row>> = protruding.collect();
+    rows.extend(protruding.into_iter().flatten());
+    Ok(Residuals { rows, nearest })
+}
+
+pub(super) fn union_of(mesh: &MedialMesh) -> Result<MedialUnion, SimplifyError> {
+    MedialUnion::new(mesh).map_err(|error| SimplifyError::Level(error.to_string()))
+}
+
+/// The primitives of a medial mesh, for feet.
+struct Hulls {
+    cones: Vec<Cone>,
+    slabs: Vec<Slab>,
+}
+
+impl Hulls {
+    fn new(mesh: &MedialMesh) -> Self {
+        let sphere = |v: u32| mesh.spheres[v as usize];
+        let cone = |e: &[u32; 2]| Cone::new(sphere(e[0]), sphere(e[1]));
+        let slab = |f: &[u32; 3]| Slab::new(f.map(sphere));
+        let cones = mesh.edges.iter().map(cone).collect();
+        Self { cones, slabs: mesh.faces.iter().map(slab).collect() }
+    }
+
+    /// The weights of the sphere that attains the distance of a point, and the derivative by it.
+    fn derivative(&self, mesh: &MedialMesh, p: Vec3, primitive: Primitive) -> ([f64; 3], [f64; 4]) {
+        let (weights, centre) = match primitive {
+            Primitive::Sphere(v) => ([1.0, 0.0, 0.0], mesh.spheres[v as usize].centre),
+            Primitive::Edge(e) => {
+                let foot = self.cones[e as usize].foot(p);
+                let [a, b] = foot.weights;
+                ([a, b, 0.0], foot.sphere.centre)
+            }
+            Primitive::Face(f) => {
+                let foot = self.slabs[f as usize].foot(p);
+                (foot.weights, foot.sphere.centre)
+            }
+        };
+        let [x, y, z] = (p - centre).normalize_or_zero().to_array();
+        (weights, [-x, -y, -z, -1.0])
+    }
+}

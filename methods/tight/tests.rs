@@ -1,0 +1,211 @@
+use medial::Vec3;
+use medial::complex::{MedialMesh, Primitive, betti};
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, Params, RunContext};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::descent::{Descent, Objective};
+use super::goal::Goal;
+use super::insert::swapped;
+use super::normal::{Normal, Pattern};
+use super::rows::{Row, vertices};
+
+fn shape(id: &str, resolution: u32) -> Shape {
+    let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);
+    let report = medial::surface::validate(&mesh).expect("built-in shapes are solids");
+    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+/// Parameters that are good enough for simple shapes, and quick.
+fn quick() -> Params {
+    let mut params = Params::none();
+    params.set("samples", "1500");
+    params.set("start", "150");
+    params.set("rounds", "2");
+    params
+}
+
+/// A medial mesh of a shape with so many spheres.
+fn start(shape: &Shape, count: usize) -> MedialMesh {
+    let qmat = crate::find("qmat").unwrap();
+    let mut levels = qmat.prepare(shape, &Params::none(), &RunContext::default()).unwrap();
+    let mesh = levels.at(Level::Spheres(count)).unwrap().mesh;
+    MedialMesh { contacts: None, ..mesh }
+}
+
+#[test]
+fn the_factorisation_solves_what_it_is_given() {
+    let mut rng = Pcg64::seed_from_u64(7);
+    let edges: Vec<[u32; 2]> = vec![[0, 1], [1, 2], [2, 3], [0, 3], [3, 4], [1, 5], [4, 5], [0, 6]];
+    let pattern = Pattern::new(8, &edges);
+    let mut normal = Normal::zero(&pattern);
+    let mut dense = vec![vec![0.0; 32]; 32];
+    for _ in 0..400 {
+        let [v, w] = edges[rng.random_range(0..edges.len())];
+        let direction: [f64; 4] = std::array::from_fn(|_| rng.random::<f64>() - 0.5);
+        let weights: [f64; 2] = [rng.random(), rng.random()];
+        // A residual of two spheres: its outer product has a block for each pair.
+        for (v, a) in [v, w].into_iter().zip(weights) {
+            normal.add(&pattern, v, v, a * a, &direction);
+        }
+        normal.add(&pattern, v, w, weights[0] * weights[1], &direction);
+        for (i, a) in [v, w].into_iter().zip(weights) {
+            for (j, b) in [v, w].into_iter().zip(weights) {
+                for (r, x) in direction.iter().enumerate() {
+                    for (c, y) in direction.iter().enumerate() {
+                        dense[4 * i as usize + r][4 * j as usize + c] += a * b * x * y;
+                    }
+                }
+            }
+        }
+    }
+    let extra = vec![[0.01; 4]; 8];
+    let right: Vec<[f64; 4]> = (0..8).map(|_| std::array::from_fn(|_| rng.random())).collect();
+    let found = normal.solve(&pattern, &extra, &right).unwrap();
+    for (i, line) in dense.iter().enumerate() {
+        let product: f64 = line.iter().zip(found.as_flattened()).map(|(a, x)| a * x).sum();
+        let expected = right[i / 4][i % 4];
+        let got = product + 0.01 * found[i / 4][i % 4];
+        assert!((got - expected).abs() < 1e-9, "{i}: {got}, {expected}");
+    }
+    let indefinite = vec![[-1e3; 4]; 8];
+    assert!(normal.solve(&pattern, &indefinite, &right).is_none());
+}
+
+#[test]
+fn residuals_have_the_derivatives_that_differences_tell() {
+    let shape = shape("bracket", 6);
+    let goal = Goal::new(&shape, 0).unwrap();
+    let mesh = start(&shape, 30);
+    let mut points = goal.points(30);
+    points.samples.truncate(400);
+    points.interior.truncate(200);
+    let at = |mesh: &MedialMesh| Descent::new(&goal, points.clone(), mesh.clone()).unwrap();
+    let base = at(&mesh);
+    let step = 1e-6;
+    let mut compared = 0;
+    for v in [0_u32, 7, 19] {
+        for k in 0..4 {
+            let moved = |by: f64| {
+                let mut mesh = mesh.clone();
+                let sphere = &mut mesh.spheres[v as usize];
+                if k == 3 {
+                    sphere.radius += by;
+                } else {
+                    sphere.centre[k] += by;
+                }
+                at(&mesh)
+            };
+            let (up, down) = (moved(step), moved(-step));
+            for row in &base.residuals.rows {
+                // The same residual on both sides, served by the same primitive: no kink in between.
+                let same = |other: &Descent<'_>| -> Option<Row> {
+                    let is_same = |other: &&Row| {
+                        other.point == row.point
+                            && other.primitive == row.primitive
+                            && other.covered == row.covered
+                    };
+                    other.residuals.rows.iter().find(is_same).copied()
+                };
+                let (Some(up), Some(down)) = (same(&up), same(&down)) else { continue };
+                let (corners, dimension) = vertices(&mesh, row.primitive);
+                let place = corners[..dimension].iter().position(|&w| w == v);
+                let expected = place.map_or(0.0, |place| row.weights[place] * row.direction[k]);
+                let got = (up.error - down.error) / (2.0 * step);
+                assert!((got - expected).abs() < 1e-4, "{v} {k} {row:?}: {got}, {expected}");
+                compared += usize::from(place.is_some());
+            }
+        }
+    }
+    assert!(compared > 100, "{compared}");
+}
+
+#[test]
+fn a_descent_never_raises_its_objective_and_keeps_centres_inside() {
+    let shape = shape("bracket", 6);
+    let goal = Goal::new(&shape, 0).unwrap();
+    let mut descent = Descent::new(&goal, goal.points(40), start(&shape, 40)).unwrap();
+    let objective = Objective::power(4.0, descent.largest());
+    let mut before = descent.value(&objective);
+    for _ in 0..6 {
+        descent.run(objective, 1, &RunContext::default()).unwrap();
+        let value = descent.value(&objective);
+        assert!(value <= before, "{value} after {before}");
+        before = value;
+    }
+    let centres: Vec<Vec3> = descent.mesh.spheres.iter().map(|s| s.centre).collect();
+    assert!(goal.depths(&centres).iter().all(|depth| depth.value > -1e-6));
+}
+
+#[test]
+fn a_capsule_is_found_with_two_spheres() {
+    let shape = shape("capsule", 24);
+    let tight = crate::find("tight").unwrap();
+    let mut levels = tight.prepare(&shape, &quick(), &RunContext::default()).unwrap();
+    let mesh = levels.at(Level::Spheres(2)).unwrap().mesh;
+    assert_eq!((mesh.spheres.len(), mesh.edges.len()), (2, 1));
+    let judge = shape.judge(None, Default::default()).unwrap();
+    let hausdorff = judge.distances(&mesh).unwrap().hausdorff;
+    // Facets of the surface deviate from the capsule by as much.
+    assert!(hausdorff < 4e-3, "{hausdorff}");
+}
+
+#[test]
+fn a_swap_keeps_the_number_of_spheres_and_the_homotopy_type() {
+    let shape = shape("torus", 24);
+    let goal = Goal::new(&shape, 0).unwrap();
+    let mesh = start(&shape, 30);
+    let before = betti(&mesh);
+    let descent = Descent::new(&goal, goal.points(30), mesh).unwrap();
+    let run = RunContext::default();
+    let other = swapped(&descent, 4, 4.0, &run).unwrap().expect("a swap is possible");
+    other.mesh.check().unwrap();
+    assert_eq!(other.mesh.spheres.len(), 30);
+    assert_eq!(betti(&other.mesh), before);
+}
+
+#[test]
+fn a_given_mesh_of_no_more_spheres_keeps_its_connectivity_and_loses_error() {
+    let shape = shape("bracket", 6);
+    let given = start(&shape, 40);
+    let judge = shape.judge(None, Default::default()).unwrap();
+    let before = judge.distances(&given).unwrap().hausdorff;
+    let started = shape.starting_from(std::sync::Arc::new(given.clone())).unwrap();
+    let tight = crate::find("tight").unwrap();
+    let mut levels = tight.prepare(&started, &quick(), &RunContext::default()).unwrap();
+    let polished = levels.at(Level::Spheres(40)).unwrap().mesh;
+    assert_eq!((&polished.edges, &polished.faces), (&given.edges, &given.faces));
+    let after = judge.distances(&polished).unwrap().hausdorff;
+    assert!(after < 0.95 * before, "{before} before, {after} after");
+}
+
+#[test]
+fn a_ball_in_a_box_touches_its_nearest_sides() {
+    let shape = shape("box", 4);
+    let goal = Goal::new(&shape, 0).unwrap();
+    let (lo, hi) = shape.mesh().bounding_box().unwrap();
+    let extent = hi - lo;
+    let axis = (0..3).min_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap();
+    let (centre, half) = (0.5 * (lo + hi), 0.5 * extent[axis]);
+    let mut middle_of_side = centre;
+    middle_of_side[axis] = hi[axis];
+    let ball = goal.ball_at(middle_of_side);
+    assert!((ball.radius - half).abs() < 2e-3 * half, "{ball:?}, {half}");
+    assert!(ball.centre.distance(centre) < 2e-3 * half, "{ball:?}");
+}
+
+#[test]
+fn what_serves_a_sample_is_among_its_primitives() {
+    let shape = shape("capsule", 12);
+    let goal = Goal::new(&shape, 0).unwrap();
+    let mesh = start(&shape, 6);
+    let descent = Descent::new(&goal, goal.points(6), mesh).unwrap();
+    for row in &descent.residuals.rows {
+        let sum: f64 = row.weights.iter().sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{row:?}");
+        if let Primitive::Sphere(v) = row.primitive {
+            assert!((v as usize) < descent.mesh.spheres.len());
+        }
+    }
+}
