@@ -122,7 +122,8 @@ impl Goal {
     pub fn peaks(&self) -> Result<PeakSearch<'_>, MetricError> {
         let count = 2 * SAMPLES;
         let seed = self.seed ^ STREAM;
-        let options = DistanceOptions { surface_samples: count, envelope_samples: count, seed };
+        let envelope_samples = 3 * count;
+        let options = DistanceOptions { surface_samples: count, envelope_samples, seed };
         PeakSearch::new(&self.surface, &self.tree, options)
     }
 

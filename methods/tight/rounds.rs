@@ -131,7 +131,14 @@ fn measured(
     search: &PeakSearch<'_>,
 ) -> Result<Measured, SimplifyError> {
     let peaks = search.of(mesh).map_err(refused)?;
-    let error = peaks.hausdorff();
+    let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
+    let signed = union_of(mesh)?.signed_batch(&pool);
+    let gaps = || goal.pool.iter().zip(&signed);
+    // The union's boundary at a distance `sigma` from a point that it does not hold is as deep as that
+    // point, less `sigma`. This finds pockets that samples of the boundary miss.
+    let pockets = gaps().filter(|&(_, &signed)| signed > 0.0);
+    let pockets = pockets.map(|(inside, signed)| inside.depth - signed);
+    let error = pockets.fold(peaks.hausdorff(), f64::max);
     let large = |peaks: &[Peak]| -> Vec<Vec3> {
         let large = peaks.iter().take_while(|peak| peak.distance > WITNESS * error);
         large.take(WITNESSES).map(|peak| peak.point).collect()
@@ -145,10 +152,8 @@ fn measured(
             interior.push(Interior { point, depth: depth.value, weight: 1.0 });
         }
     }
-    let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
-    let signed = union_of(mesh)?.signed_batch(&pool);
-    let gaps = goal.pool.iter().zip(signed);
-    let gaps = gaps.filter(|(inside, signed)| uncovered(inside.depth, *signed) > WITNESS * error);
+    let gaps =
+        gaps().filter(|(inside, signed)| uncovered(inside.depth, **signed) > WITNESS * error);
     interior.extend(gaps.map(|(inside, _)| *inside));
     Ok(Measured { error, witnesses: Points { samples: samples.collect(), interior } })
 }
