@@ -66,7 +66,7 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
     let mut complex = CollapseComplex::from_mesh(mesh);
     let stars = Stars::new(descent);
     let priced = mesh.edges.par_iter();
-    // Each thread has its own complex, because the homotopy test marks vertices.
+    // A complex for each piece of work, because the homotopy test marks vertices.
     let priced = priced
         .map_init(|| complex.clone(), |complex, &ends| stars.price(complex, descent.goal, ends));
     let priced: Vec<Option<Priced>> = priced.collect();

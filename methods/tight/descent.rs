@@ -8,7 +8,7 @@ use medial::complex::MedialMesh;
 use medial::simplifier::{RunContext, SimplifyError};
 
 use super::goal::{Goal, Points};
-use super::guard::hold;
+use super::guard::{clamp, hold};
 use super::normal::{Normal, Pattern};
 use super::rows::{Held, Residuals, Row, places, residuals, vertices};
 
@@ -75,11 +75,17 @@ pub(super) struct Descent<'a> {
 }
 
 impl<'a> Descent<'a> {
-    /// Evaluates the residuals of a mesh.
+    /// Evaluates the residuals of a mesh, whose centres outside of the solid are first moved to the surface.
+    /// Left to the first step, that jump would be in every trial, however small the step.
     ///
     /// # Errors
     /// When the mesh has no union.
-    pub fn new(goal: &'a Goal, points: Points, mesh: MedialMesh) -> Result<Self, SimplifyError> {
+    pub fn new(
+        goal: &'a Goal,
+        points: Points,
+        mut mesh: MedialMesh,
+    ) -> Result<Self, SimplifyError> {
+        clamp(&mut mesh, goal);
         let mut held = places(&mesh);
         let residuals = residuals(&mesh, goal, &points, &mut held)?;
         let pattern = Pattern::new(mesh.spheres.len(), &mesh.edges);

@@ -141,7 +141,7 @@ impl Edit {
         self.spheres.len() as u32 - 1
     }
 
-    /// Splits the edge nearest to the foot of the place, with all its faces.
+    /// Splits the edge of the two largest weights, with all its faces.
     fn split(&mut self, row: &Row, corners: &[u32], foot: Sphere) -> bool {
         let mut by_weight: Vec<(f64, u32)> =
             corners.iter().zip(row.weights).map(|(&v, a)| (a, v)).collect();

@@ -11,10 +11,10 @@
 //! 2. *Residuals* (`rows.rs`): at samples of the surface `sigma`; at points of the primitives how far their
 //!    ball protrudes; at interior points how far they are from being held.
 //! 3. *Descent* (`descent.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
-//!    with a sparse Cholesky factorisation (`normal.rs`). No centre leaves the solid and no face folds
-//!    over in a step (`guard.rs`).
+//!    with a sparse Cholesky factorisation (`normal.rs`). A step that would take a centre out of the
+//!    solid, or fold a face over, is taken back there (`guard.rs`).
 //! 4. *Collapse* (`collapse.rs`): passes of the cheapest edges, priced by the samples that their stars
-//!    serve; a few steps of 3 at the power 2 after each pass.
+//!    serve; a few steps of 3 after each pass, at the power 2, near the end 3.
 //! 5. *Swap* (`insert.rs`): spheres are inserted where the error is largest, and as many edges collapsed
 //!    where it hurts least.
 //! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
@@ -34,8 +34,8 @@
 //! - The error is measured at samples and by ascent from them; it is not certified. `lambda` weighs the
 //!   mean against the maximum.
 //! - Faces that cross without being neighbours are not avoided.
-//! - The result depends on the samples, hence on the seed and on the orientation of the input; the largest
-//!   error varies by some ten to twenty per cent between seeds.
+//! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
+//!   says how much.
 //! - [`Level::Spheres`] alone: there is no level by error yet. A harness searches one.
 //!
 //! # Starting from a given mesh
@@ -76,8 +76,8 @@ use start::Start;
 /// Spheres of [`Level::Published`].
 const USUAL: usize = 100;
 
-/// Spheres that are placed together at most.
-const MOST: usize = 5_000;
+/// Spheres that are placed together at most, the start's included: memory and time stay bounded.
+const MOST: usize = 15_000;
 
 /// While there are more than this many times the target, collapses are made in large passes.
 const MANY: usize = 3;
@@ -155,12 +155,8 @@ impl Simplification for Prepared {
         };
         let mut diagnostics = Diagnostics::default();
         self.start.describe(&mut diagnostics);
-        let start = self.start.mesh(count, &self.run)?;
-        if start.spheres.len().min(count) > MOST {
-            return Err(SimplifyError::unsupported(format!(
-                "`tight` places at most {MOST} spheres together: ask for fewer"
-            )));
-        }
+        let start = self.start.mesh(count, &self.run, &mut diagnostics)?;
+        bounded(start.spheres.len())?;
         let mesh = self.simplified(start, count, &mut diagnostics)?;
         mesh.check()?;
         let (work, extras) = (Work::Anew, Extras::default());
@@ -177,9 +173,9 @@ impl Prepared {
         diagnostics: &mut Diagnostics,
     ) -> Result<MedialMesh, SimplifyError> {
         let Self { goal, params, run, .. } = self;
-        let is_given = start.spheres.len() <= count;
+        let is_polish = start.spheres.len() <= count;
         let mut descent = Descent::new(goal, goal.points(count), start)?;
-        if is_given {
+        if is_polish {
             if descent.mesh.spheres.len() < count {
                 let spheres = descent.mesh.spheres.len();
                 diagnostics
@@ -196,8 +192,20 @@ impl Prepared {
             }
             descent = swapped_often(descent, run)?;
         }
-        Polish { goal, params, run, swaps: !is_given }.run(descent, diagnostics)
+        Polish { goal, params, run, swaps: !is_polish }.run(descent, diagnostics)
     }
+}
+
+/// # Errors
+/// When there are more spheres than can be placed together.
+fn bounded(spheres: usize) -> Result<(), SimplifyError> {
+    if spheres <= MOST {
+        return Ok(());
+    }
+    Err(SimplifyError::unsupported(format!(
+        "{spheres} spheres to begin with; `tight` places at most {MOST} together: ask for fewer, or \
+         simplify them by another method first"
+    )))
 }
 
 /// Step 4: passes of collapses until `count` spheres are left, or no collapse is possible.

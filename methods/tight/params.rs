@@ -13,7 +13,7 @@ pub struct TightParams {
     pub start: usize,
     /// Blue-noise samples of the start's medial mesh.
     pub samples: usize,
-    /// Rounds of step 6, without those that swap.
+    /// Rounds of step 6, before each further one begins with a swap.
     pub rounds: usize,
 }
 
@@ -23,8 +23,11 @@ impl Default for TightParams {
     }
 }
 
-/// Most samples of the start.
+/// Most samples to begin with; they can be doubled twice.
 const MOST_SAMPLES: usize = 200_000;
+
+/// Most rounds.
+const MOST_ROUNDS: usize = 1_000;
 
 impl TightParams {
     pub(super) fn describe() -> Vec<ParamInfo> {
@@ -34,7 +37,7 @@ impl TightParams {
                 "lambda",
                 default.lambda,
                 "none",
-                "weight of the mean beside the maximum: 0 for the least maximum, 1 for the least mean",
+                "weight of the mean of the squares beside the high powers: larger for a smaller mean error",
             ),
             ParamInfo::new(
                 "start",
@@ -52,7 +55,7 @@ impl TightParams {
                 "rounds",
                 default.rounds,
                 "rounds",
-                "rounds of steps at high powers; swaps come after them",
+                "rounds of steps at high powers before each further one begins with a swap",
             ),
         ]
     }
@@ -67,6 +70,12 @@ impl TightParams {
             let samples = self.samples;
             return Err(SimplifyError::Parameter(format!(
                 "samples = {samples}: from 100 to {MOST_SAMPLES}"
+            )));
+        }
+        if self.rounds > MOST_ROUNDS {
+            let rounds = self.rounds;
+            return Err(SimplifyError::Parameter(format!(
+                "rounds = {rounds}: at most {MOST_ROUNDS}"
             )));
         }
         Ok(self)

@@ -44,7 +44,7 @@ const GAIN: f64 = 0.01;
 /// Rounds without a gain before swaps begin.
 const PATIENCE: usize = 2;
 
-/// Most rounds that swap, and how many of them may fail one after the other.
+/// Rounds beyond `rounds`, all of which swap, and how many may fail one after the other.
 const SWAPS: usize = 10;
 const FAILURES: usize = 4;
 
@@ -159,5 +159,5 @@ fn measured(
 }
 
 fn refused(error: MetricError) -> SimplifyError {
-    SimplifyError::Level(error.to_string())
+    SimplifyError::Failed(error.to_string())
 }

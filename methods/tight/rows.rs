@@ -21,6 +21,9 @@ const DEEP: f64 = 0.02;
 /// Weight of a point of the medial mesh whose ball may protrude.
 const PROTRUDING: f64 = 0.3;
 
+/// Points of the medial mesh that are watched: as many as a share of the samples that costs little beside them.
+const HELD: usize = 6_000;
+
 /// Golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
@@ -86,7 +89,8 @@ fn interpolated(mesh: &MedialMesh, held: &Held) -> Sphere {
     Sphere::new(centre, radius)
 }
 
-/// About so many points of the medial mesh: all spheres, the rest spread evenly over edges and faces.
+/// About so many points of the medial mesh, but at least one for each simplex: all spheres, the rest spread
+/// evenly over edges and faces.
 fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
     let centre = |v: u32| mesh.spheres[v as usize].centre;
     let length = |e: &[u32; 2]| centre(e[0]).distance(centre(e[1]));
@@ -130,7 +134,7 @@ fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
 
 /// Points whose balls are watched for protruding.
 pub(super) fn places(mesh: &MedialMesh) -> Vec<Held> {
-    spread_over(mesh, 6_000)
+    spread_over(mesh, HELD)
 }
 
 /// The residuals of a medial mesh.
@@ -201,7 +205,7 @@ pub(super) fn residuals(
 }
 
 pub(super) fn union_of(mesh: &MedialMesh) -> Result<MedialUnion, SimplifyError> {
-    MedialUnion::new(mesh).map_err(|error| SimplifyError::Level(error.to_string()))
+    MedialUnion::new(mesh).map_err(|error| SimplifyError::Failed(error.to_string()))
 }
 
 /// The primitives of a medial mesh, for feet.

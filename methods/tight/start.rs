@@ -46,16 +46,27 @@ impl Start {
             return Ok(Self { shape, starter, least, is_given: true, samples: 0, betti });
         }
         let expected = shape.expected_betti();
-        let (mut samples, mut doublings) = (params.samples, 0);
-        loop {
-            run.step(doublings, DOUBLINGS + 1)?;
+        let mut best: Option<(u64, Self)> = None;
+        for doubling in 0..=DOUBLINGS {
+            run.step(doubling, DOUBLINGS + 1)?;
+            let samples = params.samples << doubling;
             let fine = shape.resampled(Sampling::BlueNoise { count: samples, seed: run.seed });
             let betti = betti(fine.initial()?.as_ref());
-            if doublings == DOUBLINGS || expected.is_none_or(|expected| expected == betti) {
-                return Ok(Self { shape: fine, starter, least, is_given: false, samples, betti });
+            let wrong = expected.map_or(0, |expected| {
+                expected.iter().zip(betti).map(|(&expected, found)| expected.abs_diff(found)).sum()
+            });
+            // More samples can make it worse: the least wrong is kept, of equal ones the first.
+            if best.as_ref().is_none_or(|(least, _)| wrong < *least) {
+                let starter = Arc::clone(&starter);
+                let start = Self { shape: fine, starter, least, is_given: false, samples, betti };
+                best = Some((wrong, start));
             }
-            (samples, doublings) = (2 * samples, doublings + 1);
+            if wrong == 0 {
+                break;
+            }
         }
+        let (_, start) = best.expect("there is a first one");
+        Ok(start)
     }
 
     /// What is to be said of it.
@@ -70,14 +81,28 @@ impl Start {
     ///
     /// # Errors
     /// Those of the other method.
-    pub fn mesh(&self, count: usize, run: &RunContext) -> Result<MedialMesh, SimplifyError> {
+    pub fn mesh(
+        &self,
+        count: usize,
+        run: &RunContext,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<MedialMesh, SimplifyError> {
         let initial = self.shape.initial()?;
         let wanted = self.least.max(MANY.saturating_mul(count));
         let mesh = if initial.spheres.len() <= if self.is_given { count } else { wanted } {
             MedialMesh::clone(&initial)
         } else {
             let mut levels = self.starter.prepare(&self.shape, &Params::none(), run)?;
-            levels.at(Level::Spheres(wanted))?.mesh
+            let found = levels.at(Level::Spheres(wanted))?;
+            // More spheres are left than wanted where nothing more can be collapsed.
+            if found.mesh.spheres.len() > wanted {
+                found
+                    .diagnostics
+                    .warnings
+                    .into_iter()
+                    .for_each(|warning| diagnostics.warn(warning));
+            }
+            found.mesh
         };
         Ok(MedialMesh { contacts: None, ..mesh })
     }
