@@ -1,7 +1,8 @@
 //! The published simplifiers of the medial axis, one module each, and one of this project.
 //!
 //! Every method implements [`medial::simplifier::MedialSimplifier`] and knows neither the others
-//! nor the runner. [`registry`] lists them all; its order is the order of every table.
+//! nor the runner. [`registry`] lists the published ones, in the order of every table;
+//! [`on_request`] has what runs only where it is named.
 
 use medial::simplifier::MedialSimplifier;
 

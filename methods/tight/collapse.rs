@@ -80,7 +80,8 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
         if complex.sphere_count() <= target {
             break;
         }
-        // The price of an edge of a merged sphere is out of date. So is, less so, that of its neighbours'.
+        // The price of an edge of a merged sphere is out of date. Those of its neighbours' edges are less so,
+        // and passes that kept whole neighbourhoods apart ran out of cheap edges.
         if merged[a as usize] || merged[b as usize] || !complex.keeps_homotopy(a, b) {
             continue;
         }

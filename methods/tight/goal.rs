@@ -213,7 +213,7 @@ impl Goal {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// About so many points inside, one in each cell of a grid that is fine enough.
+    /// At most so many points inside: as many random ones in each cell of a grid that reaches the solid.
     fn points_inside(&self, count: usize) -> Vec<Interior> {
         let (lo, hi) = self.surface.bounding_box().unwrap_or_default();
         let extent = hi - lo;

@@ -35,7 +35,7 @@ const SETTLE: [(f64, usize); 2] = [(8.0, 5), (16.0, 5)];
 /// Errors above this share of the largest are witnesses.
 const WITNESS: f64 = 0.6;
 
-/// Most witnesses of a round from each side.
+/// Most witnesses that a round takes from the surface, and from the union's boundary.
 const WITNESSES: usize = 1_500;
 
 /// A round that lowers the error by a smaller share did not help.
@@ -44,7 +44,8 @@ const GAIN: f64 = 0.01;
 /// Rounds without a gain before swaps begin.
 const PATIENCE: usize = 2;
 
-/// Rounds beyond `rounds`, all of which swap, and how many may fail one after the other.
+/// Rounds beyond `rounds`, all of which swap; and rounds without a gain, beyond [`PATIENCE`], that end the
+/// search while it swaps.
 const SWAPS: usize = 10;
 const FAILURES: usize = 4;
 
