@@ -10,7 +10,7 @@
 
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
-use medial::complex::{MedialMesh, Primitive, Sphere};
+use medial::complex::{Incidence, MedialMesh, Primitive, Sphere};
 use medial::geometry::{Cone, SlabFace};
 use rayon::prelude::*;
 
@@ -27,6 +27,12 @@ const PROTRUDING: f64 = 50.0;
 
 /// Share of the trace that pulls a minimiser towards the midpoint of its edge.
 const PULL: f64 = 1e-3;
+
+/// Every so many samples are looked at first.
+const ROUGH: usize = 8;
+
+/// Edges that are priced before the limit is set anew, at least.
+const BLOCK: usize = 64;
 
 /// Distance between points of a new star at which it is tested for protruding.
 const SPACING: f64 = 0.02;
@@ -56,43 +62,59 @@ impl Served {
     }
 }
 
+/// A mesh after a pass, and the merged spheres in it.
+pub(super) struct Passed {
+    pub mesh: MedialMesh,
+    pub merged: Vec<u32>,
+}
+
 /// Collapses the cheapest edges that have no end in common, until `target` spheres are left; `None` if no
 /// collapse is possible.
 ///
 /// A `careful` pass looks at little more than the edges that it needs, and leaves the rest to the next one,
 /// which prices them anew.
-pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Option<MedialMesh> {
+pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Option<Passed> {
     let mesh = &descent.mesh;
     let mut complex = CollapseComplex::from_mesh(mesh);
     let stars = Stars::new(descent);
-    let priced = mesh.edges.par_iter();
-    // A complex for each piece of work, because the homotopy test marks vertices.
-    let priced = priced
-        .map_init(|| complex.clone(), |complex, &ends| stars.price(complex, descent.goal, ends));
-    let priced: Vec<Option<Priced>> = priced.collect();
-    let mut candidates: Vec<Priced> = priced.into_iter().flatten().collect();
-    candidates.sort_by(|x, y| x.price.total_cmp(&y.price).then(x.ends.cmp(&y.ends)));
-    if careful {
-        candidates.truncate((mesh.spheres.len() - target) * 3 / 2 + 1);
-    }
+    let needed = mesh.spheres.len() - target;
+    let wanted = if careful { needed * 3 / 2 + 1 } else { mesh.edges.len() };
     let mut merged = vec![false; mesh.spheres.len()];
-    for Priced { ends: [a, b], sphere, .. } in candidates {
+    let priced = stars.cheapest(&complex, descent.goal, wanted);
+    let dearest = priced.last()?.price.max(0.0);
+    for Priced { ends: [a, b], sphere, .. } in priced {
         if complex.sphere_count() <= target {
             break;
         }
         // The price of an edge of a merged sphere is out of date. Those of its neighbours' edges are less so,
-        // and passes that kept whole neighbourhoods apart ran out of cheap edges.
-        if merged[a as usize] || merged[b as usize] || !complex.keeps_homotopy(a, b) {
+        // and passes that kept whole neighbourhoods apart ran out of cheap edges. What a neighbour's collapse
+        // can make wrong is tested again.
+        if merged[a as usize]
+            || merged[b as usize]
+            || !complex.keeps_homotopy(a, b)
+            || complex.folded_face(a, b, sphere.centre).is_some()
+        {
+            continue;
+        }
+        let mut around = complex.neighbours(a).iter().chain(complex.neighbours(b));
+        if around.any(|&v| merged[v as usize])
+            && Ring::new(&complex, [a, b]).protrusion(sphere, descent.goal, dearest) > dearest
+        {
             continue;
         }
         (merged[a as usize], merged[b as usize]) = (true, true);
         complex.collapse(a, b, sphere);
     }
-    (complex.sphere_count() < mesh.spheres.len()).then(|| complex.to_mesh())
+    // The mesh numbers the spheres that are left in their order.
+    let left = complex.vertices().enumerate().filter(|&(_, v)| merged[v as usize]);
+    let merged = left.map(|(place, _)| place as u32).collect();
+    (complex.sphere_count() < mesh.spheres.len())
+        .then(|| Passed { mesh: complex.to_mesh(), merged })
 }
 
 /// The samples that each simplex serves, and each sphere's share of the squares.
-struct Stars {
+struct Stars<'a> {
+    mesh: &'a MedialMesh,
     of_sphere: Vec<Vec<Served>>,
     of_edge: Vec<Vec<Served>>,
     of_face: Vec<Vec<Served>>,
@@ -101,13 +123,16 @@ struct Stars {
     faces: Vec<Vec<u32>>,
     blocks: Vec<Block>,
     downhill: Vec<[f64; 4]>,
+    /// For each edge the part of the squares that both ends share.
+    shared: Vec<Block>,
 }
 
-impl Stars {
-    fn new(descent: &Descent<'_>) -> Self {
+impl<'a> Stars<'a> {
+    fn new(descent: &'a Descent<'_>) -> Self {
         let Descent { mesh, points, residuals, .. } = descent;
         let spheres = mesh.spheres.len();
         let mut this = Self {
+            mesh,
             of_sphere: vec![vec![]; spheres],
             of_edge: vec![vec![]; mesh.edges.len()],
             of_face: vec![vec![]; mesh.faces.len()],
@@ -115,6 +140,7 @@ impl Stars {
             faces: vec![vec![]; spheres],
             blocks: vec![[[0.0; 4]; 4]; spheres],
             downhill: vec![[0.0; 4]; spheres],
+            shared: vec![[[0.0; 4]; 4]; mesh.edges.len()],
         };
         for (e, edge) in (0..).zip(&mesh.edges) {
             edge.iter().for_each(|&v| this.edges[v as usize].push(e));
@@ -134,27 +160,74 @@ impl Stars {
             };
             list.push(served);
         }
+        let incidence = Incidence::of(mesh);
         for row in &residuals.rows {
             let (corners, count) = vertices(mesh, row.primitive);
             for (v, a) in corners.into_iter().zip(row.weights).take(count) {
-                let scale = row.weight * a * a;
-                let block = &mut this.blocks[v as usize];
-                for (line, x) in block.iter_mut().zip(row.direction) {
-                    for (entry, y) in line.iter_mut().zip(row.direction) {
-                        *entry += scale * x * y;
-                    }
-                }
+                add_product(&mut this.blocks[v as usize], row.weight * a * a, &row.direction);
                 for (entry, x) in this.downhill[v as usize].iter_mut().zip(row.direction) {
                     *entry -= row.weight * row.error * a * x;
                 }
+            }
+            let [a, b, c] = row.weights;
+            let products = [a * b, a * c, b * c];
+            let edges: &[u32] = match row.primitive {
+                Primitive::Sphere(_) => &[],
+                Primitive::Edge(ref e) => std::slice::from_ref(e),
+                Primitive::Face(f) => &incidence.face_edges()[f as usize],
+            };
+            for (&e, product) in edges.iter().zip(products) {
+                add_product(&mut this.shared[e as usize], row.weight * product, &row.direction);
             }
         }
         this
     }
 
-    /// The edge at its best place; `None` if its collapse changes the homotopy type or folds a face at
-    /// every place.
-    fn price(&self, complex: &mut CollapseComplex, goal: &Goal, ends: [u32; 2]) -> Option<Priced> {
+    /// At least the `wanted` cheapest edges that can be collapsed, cheapest first.
+    ///
+    /// Edges that look cheap by a few samples come first: what they cost is the limit for the others, most of
+    /// which exceed it soon.
+    fn cheapest(&self, complex: &CollapseComplex, goal: &Goal, wanted: usize) -> Vec<Priced> {
+        let edges = 0..self.mesh.edges.len();
+        let mut order: Vec<(f64, usize)> =
+            edges.into_par_iter().map(|e| (self.rough_price(complex, e), e)).collect();
+        order.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        let mut found: Vec<Priced> = vec![];
+        for block in order.chunks(wanted.max(BLOCK)) {
+            let limit = found.get(wanted - 1).map_or(f64::INFINITY, |last| last.price);
+            // A complex for each piece of work, because the homotopy test marks vertices.
+            let priced = block.par_iter().map_init(
+                || complex.clone(),
+                |complex, &(_, e)| self.price(complex, goal, e, limit),
+            );
+            let priced: Vec<Option<Priced>> = priced.collect();
+            found.extend(priced.into_iter().flatten());
+            found.sort_by(|x, y| x.price.total_cmp(&y.price).then(x.ends.cmp(&y.ends)));
+            found.truncate(wanted);
+        }
+        found
+    }
+
+    /// The price with the merged sphere at the midpoint, by a few samples.
+    fn rough_price(&self, complex: &CollapseComplex, e: usize) -> f64 {
+        let ends = self.mesh.edges[e];
+        let served: Vec<Served> = self.served(ends).into_iter().step_by(ROUGH).collect();
+        let now: f64 = served.iter().map(|s| s.weight * s.now).sum();
+        let [first, second] = ends.map(|v| complex.sphere(v));
+        let ring = Ring::new(complex, ends);
+        ring.energy(first.lerp(second, 0.5), &served, f64::INFINITY) - now
+    }
+
+    /// The edge at its best place; `None` if its collapse changes the homotopy type, or folds a face or costs
+    /// more than `limit` at every place.
+    fn price(
+        &self,
+        complex: &mut CollapseComplex,
+        goal: &Goal,
+        e: usize,
+        limit: f64,
+    ) -> Option<Priced> {
+        let ends = self.mesh.edges[e];
         let [a, b] = ends;
         if !complex.keeps_homotopy(a, b) {
             return None;
@@ -164,9 +237,9 @@ impl Stars {
         let ring = Ring::new(complex, ends);
         let [first, second] = ends.map(|v| complex.sphere(v));
         let mut places = vec![first, second, first.lerp(second, 0.5)];
-        places.extend(self.minimiser(ends, [first, second]));
+        places.extend(self.minimiser(e, [first, second]));
         let mut tried: Vec<(f64, Sphere)> = Vec::with_capacity(places.len());
-        let mut worst = f64::INFINITY;
+        let mut worst = now + limit;
         for sphere in places {
             if complex.folded_face(a, b, sphere.centre).is_some() {
                 continue;
@@ -180,12 +253,13 @@ impl Stars {
         tried.sort_by(|x, y| x.0.total_cmp(&y.0));
         let mut best: Option<Priced> = None;
         for (energy, sphere) in tried {
-            let so_far = best.map_or(f64::INFINITY, |best| best.price);
-            if energy - now >= so_far {
+            let so_far = best.map_or(limit, |best| best.price);
+            let change = energy - now;
+            if change > so_far {
                 break;
             }
-            let price = energy - now + ring.protrusion(sphere, goal);
-            if price < so_far {
+            let price = change + ring.protrusion(sphere, goal, so_far - change);
+            if price < so_far || (best.is_none() && price <= limit) {
                 best = Some(Priced { ends, sphere, price });
             }
         }
@@ -210,22 +284,25 @@ impl Stars {
         for f in merged(&self.faces[a], &self.faces[b]) {
             all.extend(&self.of_face[f as usize]);
         }
-        // The largest errors first, so that a bad place is given up early.
-        all.sort_by(|x, y| y.now.total_cmp(&x.now));
-        all
+        // A few of all come first, so that a bad place is given up early.
+        let spread = (0..ROUGH).flat_map(|k| all[k.min(all.len())..].iter().step_by(ROUGH));
+        spread.copied().collect()
     }
 
-    /// The minimiser of both ends' squares, if it is a sphere not far from both.
-    fn minimiser(&self, ends: [u32; 2], spheres: [Sphere; 2]) -> Option<Sphere> {
-        let mut sum: Block = [[0.0; 4]; 4];
+    /// The minimiser of the squares that both ends serve, if it is a sphere not far from both.
+    fn minimiser(&self, e: usize, spheres: [Sphere; 2]) -> Option<Sphere> {
+        // A residual with the weights `a` and `b` at the two ends has `a + b` at the merged sphere: its square
+        // is that of each, and twice the product.
+        let shared = &self.shared[e];
+        let mut sum: Block = shared.map(|row| row.map(|entry| 2.0 * entry));
         let mut right = [0.0; 4];
-        for (v, sphere) in ends.into_iter().zip(spheres) {
+        for (v, sphere) in self.mesh.edges[e].into_iter().zip(spheres) {
             let (block, down) = (&self.blocks[v as usize], &self.downhill[v as usize]);
             let at = [sphere.centre.x, sphere.centre.y, sphere.centre.z, sphere.radius];
             for i in 0..4 {
                 for j in 0..4 {
                     sum[i][j] += block[i][j];
-                    right[i] += block[i][j] * at[j];
+                    right[i] += (block[i][j] + shared[i][j]) * at[j];
                 }
                 right[i] += down[i];
             }
@@ -299,8 +376,9 @@ impl Ring {
         energy
     }
 
-    /// What protrudes of the merged sphere, its edges and faces, at a few points of each.
-    fn protrusion(&self, sphere: Sphere, goal: &Goal) -> f64 {
+    /// What protrudes of the merged sphere, its edges and faces, at a few points of each; given up beyond
+    /// `limit`.
+    fn protrusion(&self, sphere: Sphere, goal: &Goal, limit: f64) -> f64 {
         let mut balls = vec![sphere];
         for &n in &self.neighbours {
             let parts = (sphere.centre.distance(n.centre) / SPACING).ceil().clamp(2.0, 12.0);
@@ -319,12 +397,23 @@ impl Ring {
                 balls.extend((1..parts as u32).map(|l| from.lerp(to, f64::from(l) / parts)));
             }
         }
-        let centres: Vec<Vec3> = balls.iter().map(|ball| ball.centre).collect();
-        let depths = goal.depths_at(&centres);
-        let each = balls
-            .iter()
-            .zip(depths)
-            .map(|(ball, depth)| (ball.radius - depth).max(0.0).powi(POWER));
-        PROTRUDING * each.sum::<f64>()
+        let (mut sum, mut near) = (0.0, None);
+        for ball in balls {
+            let depth = goal.depth_near(ball.centre, &mut near);
+            sum += PROTRUDING * (ball.radius - depth).max(0.0).powi(POWER);
+            if sum > limit {
+                return f64::INFINITY;
+            }
+        }
+        sum
+    }
+}
+
+/// `block += scale * direction directionᵀ`.
+fn add_product(block: &mut Block, scale: f64, direction: &[f64; 4]) {
+    for (line, x) in block.iter_mut().zip(direction) {
+        for (entry, y) in line.iter_mut().zip(direction) {
+            *entry += scale * x * y;
+        }
     }
 }

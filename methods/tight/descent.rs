@@ -19,13 +19,20 @@ const LONGEST: f64 = 0.02;
 pub(super) const LEAST_RADIUS: f64 = 1e-5;
 
 /// Damping before the first step, a share of the diagonal.
-const FIRST_DAMPING: f64 = 1e-3;
+const FIRST_DAMPING: f64 = 1e-2;
+
+/// What holds a fixed sphere, times the mean of the diagonal.
+const STIFF: f64 = 1e12;
 
 /// Steps that are refused one after the other before the descent ends.
 const REFUSED: usize = 4;
 
 /// A step that lessens the objective by a smaller share is the last.
 const SMALL: f64 = 1e-3;
+
+/// From this power on, balls may protrude by this share of the scale.
+const HIGH: f64 = 4.0;
+const TOLERATED: f64 = 0.1;
 
 /// What is minimised.
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +57,16 @@ impl Objective {
             let x = row.error.abs() / scale;
             row.weight * (x.powf(power) + mean * x * x)
         };
-        rows.iter().map(one).sum()
+        rows.iter().filter(|row| self.counts(row)).map(one).sum()
+    }
+
+    /// How far a ball may protrude: what hardly counts at a high power need not be looked for.
+    fn tolerance(&self) -> f64 {
+        if self.power >= HIGH { TOLERATED * self.scale } else { 0.0 }
+    }
+
+    fn counts(&self, row: &Row) -> bool {
+        !row.protrudes || row.error > self.tolerance()
     }
 
     /// First derivative by the error over the error, and second derivative.
@@ -70,6 +86,10 @@ pub(super) struct Descent<'a> {
     pub mesh: MedialMesh,
     pub residuals: Residuals,
     held: Vec<Held>,
+    /// Spheres that do not move; empty if all do.
+    fixed: Vec<bool>,
+    /// For each sample the distance of what is not in the mesh; empty if there is nothing else.
+    limits: Vec<f64>,
     pattern: Pattern,
     damping: f64,
 }
@@ -80,16 +100,26 @@ impl<'a> Descent<'a> {
     ///
     /// # Errors
     /// When the mesh has no union.
-    pub fn new(
+    pub fn new(goal: &'a Goal, points: Points, mesh: MedialMesh) -> Result<Self, SimplifyError> {
+        Self::of_part(goal, points, mesh, vec![], vec![], 1.0)
+    }
+
+    /// As [`new`](Self::new), for a part of a mesh: marked spheres do not move, and the rest of the mesh is at
+    /// the distance `limits` from each sample. The part is a `share` of the whole.
+    pub fn of_part(
         goal: &'a Goal,
         points: Points,
         mut mesh: MedialMesh,
+        fixed: Vec<bool>,
+        limits: Vec<f64>,
+        share: f64,
     ) -> Result<Self, SimplifyError> {
         clamp(&mut mesh, goal);
-        let mut held = places(&mesh);
-        let residuals = residuals(&mesh, goal, &points, &mut held)?;
+        let mut held = places(&mesh, share);
+        let residuals = residuals(&mesh, goal, &points, &limits, &[], 0.0, &mut held)?;
         let pattern = Pattern::new(mesh.spheres.len(), &mesh.edges);
-        Ok(Self { goal, points, mesh, residuals, held, pattern, damping: FIRST_DAMPING })
+        let damping = FIRST_DAMPING;
+        Ok(Self { goal, points, mesh, residuals, held, fixed, limits, pattern, damping })
     }
 
     /// The largest error of a residual.
@@ -113,23 +143,31 @@ impl<'a> Descent<'a> {
         steps: usize,
         run: &RunContext,
     ) -> Result<(), SimplifyError> {
+        let tolerance = objective.tolerance();
+        self.residuals.rows.retain(|row| objective.counts(row));
         let mut value = self.value(&objective);
-        let (mut done, mut refused) = (0, 0);
+        let (mut done, mut refused, mut growth) = (0, 0, 2.0);
         let (mut normal, mut downhill) = self.assemble(&objective);
         while done < steps && refused < REFUSED {
             run.step(done, steps)?;
-            let Some(trial) = self.trial(&normal, &downhill) else {
+            let Some((trial, expected)) = self.trial(&normal, &downhill) else {
                 self.damping *= 10.0;
                 refused += 1;
                 continue;
             };
-            let found = residuals(&trial, self.goal, &self.points, &mut self.held)?;
+            let Self { goal, points, limits, held, residuals: Residuals { nearest, .. }, .. } =
+                self;
+            let found = residuals(&trial, goal, points, limits, nearest, tolerance, held)?;
             let lower = objective.value(&found.rows);
             // A value that is not a number is not lower, so such a step is refused.
             if lower < value {
                 let is_small = value - lower < SMALL * value;
+                // Nielsen 1999: the better the model foretold it, the longer the next step.
+                let told = ((value - lower) / expected).clamp(0.0, 1.0);
+                self.damping *= (1.0 - (2.0 * told - 1.0).powi(3)).max(0.2);
+                growth = 2.0;
                 (self.mesh, self.residuals, value) = (trial, found, lower);
-                self.damping = (self.damping * 0.3).max(1e-9);
+                self.damping = self.damping.max(1e-9);
                 (done, refused) = (done + 1, 0);
                 if is_small {
                     break;
@@ -138,7 +176,8 @@ impl<'a> Descent<'a> {
                     (normal, downhill) = self.assemble(&objective);
                 }
             } else {
-                self.damping *= 5.0;
+                self.damping *= growth;
+                growth *= 2.0;
                 refused += 1;
             }
         }
@@ -175,8 +214,9 @@ impl<'a> Descent<'a> {
         (normal, downhill)
     }
 
-    /// The mesh after a damped step, kept within its limits; `None` if there is no step.
-    fn trial(&self, normal: &Normal, downhill: &[[f64; 4]]) -> Option<MedialMesh> {
+    /// The mesh after a damped step, kept within its limits, and by how much the model lessens the objective;
+    /// `None` if there is no step.
+    fn trial(&self, normal: &Normal, downhill: &[[f64; 4]]) -> Option<(MedialMesh, f64)> {
         let spheres = self.mesh.spheres.len();
         let mut trace = 0.0;
         let mut extra: Vec<[f64; 4]> = (0..spheres as u32)
@@ -187,17 +227,27 @@ impl<'a> Descent<'a> {
             })
             .collect();
         // Spheres that serve no sample have no equation of their own.
-        let least = 1e-6 * (trace / (4 * spheres) as f64) + f64::MIN_POSITIVE;
+        let mean = trace / (4 * spheres) as f64;
+        let least = 1e-6 * mean + f64::MIN_POSITIVE;
         extra.iter_mut().flatten().for_each(|entry| *entry += least);
+        let fixed = |v: usize| self.fixed.get(v).copied().unwrap_or(false);
+        for (_, extra) in extra.iter_mut().enumerate().filter(|&(v, _)| fixed(v)) {
+            *extra = [STIFF * mean; 4];
+        }
         let step = normal.solve(&self.pattern, &extra, downhill)?;
+        let expected = (step.iter().flatten())
+            .zip(downhill.iter().flatten().zip(extra.iter().flatten()))
+            .map(|(h, (down, extra))| 0.5 * h * (down + extra * h))
+            .sum();
         let mut trial = self.mesh.clone();
-        for (sphere, [x, y, z, r]) in trial.spheres.iter_mut().zip(step) {
+        let moving = trial.spheres.iter_mut().zip(step).enumerate().filter(|&(v, _)| !fixed(v));
+        for (_, (sphere, [x, y, z, r])) in moving {
             let length = (x * x + y * y + z * z + r * r).sqrt();
             let share = if length > LONGEST { LONGEST / length } else { 1.0 };
             sphere.centre += share * Vec3::new(x, y, z);
             sphere.radius = (sphere.radius + share * r).max(LEAST_RADIUS);
         }
         hold(&self.mesh, &mut trial, self.goal);
-        trial.check().is_ok().then_some(trial)
+        trial.check().is_ok().then_some((trial, expected))
     }
 }

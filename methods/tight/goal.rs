@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::Sphere;
+use medial::geometry::trees::morton_order;
 use medial::metrics::{DistanceOptions, MetricError, PeakSearch};
 use medial::shape::{Shape, ShapeError};
 use medial::surface::{Closest, InsideTest, Sampling, Side, TriMesh, TriangleBvh, sample};
@@ -18,7 +19,7 @@ const SAMPLES: usize = 10_000;
 const STREAM: u64 = 0x7469_6768_7421_0a0b;
 
 /// Weight of a vertex of the surface and of a point inside; an area-uniform sample has 1.
-const ASIDE: f64 = 0.3;
+pub(super) const ASIDE: f64 = 0.3;
 
 /// Interior points that are residuals from the start.
 const INTERIOR: usize = 4_000;
@@ -112,7 +113,11 @@ impl Goal {
         let samples = spread.into_iter().map(|point| Sample { point, weight: 1.0 });
         let stride = (pool.len() / INTERIOR).max(1);
         let interior = pool.iter().step_by(stride).copied().collect();
-        Points { samples: samples.chain(vertices).collect(), interior }
+        // Along a curve: what serves a sample mostly serves the next one.
+        let samples: Vec<Sample> = samples.chain(vertices).collect();
+        let places: Vec<Vec3> = samples.iter().map(|sample| sample.point).collect();
+        let samples = morton_order(&places).into_iter().map(|(_, i)| samples[i as usize]).collect();
+        Points { samples, interior }
     }
 
     /// A search for the largest errors of a medial mesh.
@@ -165,15 +170,11 @@ impl Goal {
         (depth.value < enough).then_some(depth)
     }
 
-    /// Depths of a few nearby points.
-    pub fn depths_at(&self, points: &[Vec3]) -> Vec<f64> {
-        let mut near = None;
-        let depth = |&p: &Vec3| {
-            let closest = self.tree.closest_from(p, near);
-            near = Some(closest.face);
-            if self.inside.side(p) == Side::Inside { closest.distance } else { -closest.distance }
-        };
-        points.iter().map(depth).collect()
+    /// The depth of a point. The face that is closest to it begins the search for the next one nearby.
+    pub fn depth_near(&self, p: Vec3, near: &mut Option<u32>) -> f64 {
+        let closest = self.tree.closest_from(p, *near);
+        *near = Some(closest.face);
+        if self.inside.side(p) == Side::Inside { closest.distance } else { -closest.distance }
     }
 
     /// A point of the surface closest to each centre that is outside of the solid.

@@ -2,6 +2,7 @@
 
 use medial::Vec3;
 use medial::complex::MedialMesh;
+use medial::complex::collapse::folds_over;
 
 use super::goal::Goal;
 
@@ -22,7 +23,7 @@ pub(super) fn hold(before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) {
     clamp(after, goal);
     // Taking one vertex back can fold another face of it.
     for _ in 0..ROUNDS {
-        let folds = |face: &&[u32; 3]| normal(before, face).dot(normal(after, face)) < 0.0;
+        let folds = |face: &&[u32; 3]| folds_over(corners(before, face), corners(after, face));
         let folded: Vec<[u32; 3]> = before.faces.iter().filter(folds).copied().collect();
         if folded.is_empty() {
             break;
@@ -33,7 +34,6 @@ pub(super) fn hold(before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) {
     }
 }
 
-fn normal(mesh: &MedialMesh, face: &[u32; 3]) -> Vec3 {
-    let [a, b, c] = face.map(|v| mesh.spheres[v as usize].centre);
-    (b - a).cross(c - a)
+fn corners(mesh: &MedialMesh, face: &[u32; 3]) -> [Vec3; 3] {
+    face.map(|v| mesh.spheres[v as usize].centre)
 }

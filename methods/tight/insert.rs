@@ -9,9 +9,10 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Primitive, Sphere};
 use medial::simplifier::{RunContext, SimplifyError};
 
-use super::collapse;
-use super::descent::{Descent, LEAST_RADIUS, Objective};
+use super::collapse::{self, Passed};
+use super::descent::{Descent, LEAST_RADIUS};
 use super::goal::Goal;
+use super::patch::Patch;
 use super::rows::{Row, vertices};
 
 /// Errors below this share of the largest are no reason to insert a sphere.
@@ -26,51 +27,61 @@ const AT_END: f64 = 0.95;
 /// A foot with a smaller weight at one sphere does not use it.
 const UNUSED: f64 = 0.05;
 
-/// Steps between an insertion and the collapses.
-const STEPS: usize = 5;
+/// Powers and steps around what was inserted, and around what was collapsed.
+const INSERTED: [(f64, usize); 1] = [(8.0, 6)];
+const COLLAPSED: [(f64, usize); 2] = [(8.0, 5), (16.0, 5)];
 
-/// A mesh with as many spheres, up to `each` of them at other places; `None` if nothing can be inserted,
-/// or not as much be collapsed.
+/// A mesh with as many spheres, up to `each` of them at other places, the `skipped` worst of which are left
+/// as they are; `None` if nothing can be inserted, or not as much be collapsed.
 ///
 /// # Errors
 /// When the run is cancelled.
 pub(super) fn swapped<'a>(
     descent: &Descent<'a>,
     each: usize,
-    power: f64,
+    skipped: usize,
     run: &RunContext,
 ) -> Result<Option<Descent<'a>>, SimplifyError> {
     let count = descent.mesh.spheres.len();
-    let Some(larger) = with_inserted(descent, each) else { return Ok(None) };
-    let mut trial = Descent::new(descent.goal, descent.points.clone(), larger)?;
-    trial.run(Objective::power(power, trial.largest()), STEPS, run)?;
+    let Some(mut mesh) = with_inserted(descent, each, skipped) else { return Ok(None) };
+    let patch = Patch { goal: descent.goal, points: &descent.points };
+    let new: Vec<u32> = (count as u32..mesh.spheres.len() as u32).collect();
+    patch.settle(&mut mesh, &new, &INSERTED, run)?;
+    let mut trial = Descent::new(descent.goal, descent.points.clone(), mesh)?;
     while trial.mesh.spheres.len() > count {
         run.step(0, 1)?;
-        let Some(smaller) = collapse::pass(&trial, count, true) else { return Ok(None) };
-        trial = Descent::new(trial.goal, trial.points, smaller)?;
+        let Some(Passed { mut mesh, merged }) = collapse::pass(&trial, count, true) else {
+            return Ok(None);
+        };
+        patch.settle(&mut mesh, &merged, &COLLAPSED, run)?;
+        trial = Descent::new(trial.goal, trial.points, mesh)?;
     }
     Ok(Some(trial))
 }
 
-/// The mesh with up to `count` spheres more, at the largest errors, no two at one simplex.
-fn with_inserted(descent: &Descent<'_>, count: usize) -> Option<MedialMesh> {
+/// The mesh with up to `count` spheres more, at the largest errors but the `skipped` first, no two at one
+/// simplex.
+fn with_inserted(descent: &Descent<'_>, count: usize, skipped: usize) -> Option<MedialMesh> {
     let mesh = &descent.mesh;
     let mut rows: Vec<&Row> = descent.residuals.rows.iter().collect();
     rows.sort_by(|x, y| y.error.abs().total_cmp(&x.error.abs()));
     let largest = rows.first()?.error.abs();
     let mut edit = Edit::new(mesh);
     let mut touched = vec![false; mesh.spheres.len()];
-    let mut inserted = 0;
+    let (mut inserted, mut left) = (0, skipped);
     for row in rows {
         if inserted == count || row.error.abs() < SHARE * largest {
             break;
         }
         let (corners, dimension) = vertices(mesh, row.primitive);
         let corners = &corners[..dimension];
-        let is_free = corners.iter().all(|&v| !touched[v as usize]);
-        if is_free && edit.insert(descent.goal, row, corners) {
+        if corners.iter().any(|&v| touched[v as usize]) {
+            continue;
+        }
+        let is_done = left > 0 || edit.insert(descent.goal, row, corners);
+        if is_done {
             corners.iter().for_each(|&v| touched[v as usize] = true);
-            inserted += 1;
+            if left > 0 { left -= 1 } else { inserted += 1 }
         }
     }
     (inserted > 0).then(|| edit.mesh())

@@ -14,11 +14,11 @@
 //!    with a sparse Cholesky factorisation (`normal.rs`). A step that would take a centre out of the
 //!    solid, or fold a face over, is taken back there (`guard.rs`).
 //! 4. *Collapse* (`collapse.rs`): passes of the cheapest edges, priced by the samples that their stars
-//!    serve; a few steps of 3 after each pass, at the power 2, near the end 3.
+//!    serve; a few steps of 3 after each pass, at the power 4.
 //! 5. *Swap* (`insert.rs`): spheres are inserted where the error is largest, and as many edges collapsed
-//!    where it hurts least.
+//!    where it hurts least. Only the spheres around them move then (`patch.rs`).
 //! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
-//!    local ascent on both sides, join the samples; then swaps as in 5, one after the other. The state
+//!    local ascent on both sides, join the samples; then swaps as in 5, and rounds again. The state
 //!    with the least measured error is the answer.
 //!
 //! # Notation
@@ -50,6 +50,7 @@ mod guard;
 mod insert;
 mod normal;
 mod params;
+mod patch;
 mod rounds;
 mod rows;
 mod start;
@@ -81,6 +82,10 @@ const MOST: usize = 15_000;
 
 /// While there are more than this many times the target, collapses are made in large passes.
 const MANY: usize = 3;
+
+/// The power until the last rounds. With squares, the steps after a pass let a single ball protrude ever farther,
+/// up to faces across a hole.
+const POWER: f64 = 4.0;
 
 /// The share of spheres that a pass leaves, far from the target and near to it.
 const LEFT: [f64; 2] = [0.6, 0.8];
@@ -214,19 +219,15 @@ fn reduced<'a>(
     count: usize,
     run: &RunContext,
 ) -> Result<Descent<'a>, SimplifyError> {
-    let squares = |descent: &Descent<'_>| Objective::power(2.0, descent.largest());
-    descent.run(squares(&descent), 6, run)?;
+    descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
     while descent.mesh.spheres.len() > count {
         let spheres = descent.mesh.spheres.len();
         let near = usize::from(spheres <= MANY * count);
         let least = if near == 1 { count } else { MANY * count };
         let target = least.max((spheres as f64 * LEFT[near]) as usize);
-        let Some(mesh) = collapse::pass(&descent, target, near == 1) else { break };
-        descent = Descent::new(descent.goal, descent.points, mesh)?;
-        // The maximum begins to matter shortly before the end.
-        let is_last = descent.mesh.spheres.len() as f64 <= 1.3 * count as f64;
-        let power = if is_last { 3.0 } else { 2.0 };
-        descent.run(Objective::power(power, descent.largest()), STEPS[near], run)?;
+        let Some(passed) = collapse::pass(&descent, target, near == 1) else { break };
+        descent = Descent::new(descent.goal, descent.points, passed.mesh)?;
+        descent.run(Objective::power(POWER, descent.largest()), STEPS[near], run)?;
     }
     Ok(descent)
 }
@@ -237,18 +238,15 @@ fn swapped_often<'a>(
     run: &RunContext,
 ) -> Result<Descent<'a>, SimplifyError> {
     let mut each = (descent.mesh.spheres.len() / 12).max(2);
-    let fourth = |descent: &Descent<'_>| Objective::power(4.0, descent.largest());
-    descent.run(fourth(&descent), 6, run)?;
+    descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
     let judge = Objective::power(8.0, descent.largest());
     for _ in 0..SWAPS {
-        let Some(mut trial) = insert::swapped(&descent, each, 4.0, run)? else { break };
-        trial.run(fourth(&trial), 6, run)?;
-        if trial.value(&judge) < descent.value(&judge) {
-            descent = trial;
-        } else if each > 1 {
-            each /= 2;
-        } else {
-            break;
+        let trial = insert::swapped(&descent, each, 0, run)?;
+        let lower = |trial: &Descent<'_>| trial.value(&judge) < descent.value(&judge);
+        match trial.filter(lower) {
+            Some(trial) => descent = trial,
+            None if each > 1 => each /= 2,
+            None => break,
         }
     }
     Ok(descent)

@@ -4,10 +4,13 @@
 //! 2. Rounds: the places of the largest errors join the samples as witnesses, then steps at the power 16
 //!    or 32 beside `lambda` times the squares. Witnesses are found by local ascent on both sides, and
 //!    among the points inside.
-//! 3. When two rounds have not helped, each further one swaps spheres first, starting from the best state
-//!    so far, fewer of them after each failure.
+//! 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
+//!    first; where that lowers the sum of the powers all spheres take a few steps, and the error is
+//!    measured again.
 //!
 //! What is returned is the state of the least measured error.
+
+use std::collections::HashSet;
 
 use medial::Vec3;
 use medial::complex::MedialMesh;
@@ -15,7 +18,7 @@ use medial::metrics::{MetricError, Peak, PeakSearch};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
 use super::descent::{Descent, Objective};
-use super::goal::{Goal, Interior, Points, Sample};
+use super::goal::{ASIDE, Goal, Interior, Points, Sample};
 use super::insert::swapped;
 use super::params::TightParams;
 use super::rows::{uncovered, union_of};
@@ -29,25 +32,37 @@ const POWERS: [f64; 2] = [16.0, 32.0];
 /// Steps of a round.
 const STEPS: usize = 8;
 
-/// Powers and steps after a swap, before those of the round.
-const SETTLE: [(f64, usize); 2] = [(8.0, 5), (16.0, 5)];
-
 /// Errors above this share of the largest are witnesses.
 const WITNESS: f64 = 0.6;
 
-/// Most witnesses that a round takes from the surface, and from the union's boundary.
-const WITNESSES: usize = 1_500;
+/// Most witnesses that a round takes of each kind, the largest errors first.
+const WITNESSES: usize = 300;
+
+/// Of witnesses in a cube of this side one is enough: the errors of the others are hardly different.
+const APART: f64 = 0.003;
 
 /// A round that lowers the error by a smaller share did not help.
 const GAIN: f64 = 0.01;
 
-/// Rounds without a gain before swaps begin.
+/// A state that is worse than this many times the best is pushed as if it were no worse: its steps would be too
+/// timid otherwise.
+const WORSE: f64 = 1.15;
+
+/// Rounds without a gain that end the rounds.
 const PATIENCE: usize = 2;
 
-/// Rounds beyond `rounds`, all of which swap; and rounds without a gain, beyond [`PATIENCE`], that end the
-/// search while it swaps.
-const SWAPS: usize = 10;
-const FAILURES: usize = 4;
+/// Most swaps that are tried, and swaps without a gain, one after the other, that end the search.
+const SWAPS: usize = 60;
+const FAILURES: usize = 8;
+
+/// One sphere of so many is swapped at first, later fewer, and then one at a time.
+const SPHERES: usize = 25;
+
+/// A swap that raises the objective more than this many times is given up before all spheres take steps.
+const HOPELESS: f64 = 2.0;
+
+/// Steps of all spheres after a swap.
+const AFTER: usize = 4;
 
 /// The last rounds on one goal.
 pub(super) struct Polish<'a> {
@@ -58,10 +73,11 @@ pub(super) struct Polish<'a> {
     pub swaps: bool,
 }
 
-/// The measured error of a mesh, and where it is large.
-struct Measured {
+/// A mesh with its measured error.
+#[derive(Clone)]
+struct State {
+    mesh: MedialMesh,
     error: f64,
-    witnesses: Points,
 }
 
 impl Polish<'_> {
@@ -74,89 +90,166 @@ impl Polish<'_> {
         mut descent: Descent<'_>,
         diagnostics: &mut Diagnostics,
     ) -> Result<MedialMesh, SimplifyError> {
-        let Self { goal, params, run, swaps } = *self;
         for (power, steps) in WARM {
-            descent.run(Objective::power(power, descent.largest()), steps, run)?;
+            descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
         }
-        let search = goal.peaks().map_err(refused)?;
-        let (mut points, mut mesh) = (descent.points, descent.mesh);
-        let mut found = measured(&mesh, goal, &search)?;
-        let mut best = (found.error, mesh.clone());
-        let mut each = (mesh.spheres.len() / 25).max(1);
-        let (mut swapping, mut idle, mut kept) = (false, 0, 0);
-        let rounds = params.rounds + if swaps { SWAPS } else { 0 };
-        for round in 0..rounds {
-            points.samples.append(&mut found.witnesses.samples);
-            points.interior.append(&mut found.witnesses.interior);
-            // A little below the error, so that what exceeds it weighs heavily.
-            let scale = 0.9 * found.error.min(1.15 * best.0);
-            let objective = |power| Objective { power, mean: params.lambda, scale };
-            let from = if swapping { best.1.clone() } else { mesh };
-            let mut descent = Descent::new(goal, std::mem::take(&mut points), from)?;
-            if swapping {
-                let Some(other) = swapped(&descent, each, SETTLE[0].0, run)? else { break };
-                descent = other;
-                for (power, steps) in SETTLE {
-                    descent.run(objective(power), steps, run)?;
-                }
+        let mut witnesses = Witnesses {
+            goal: self.goal,
+            search: self.goal.peaks().map_err(refused)?,
+            seen: HashSet::new(),
+        };
+        let (mut points, mesh) = (descent.points, descent.mesh);
+        let mut best = self.rounds(mesh, &mut points, &mut witnesses)?;
+        if self.swaps {
+            let kept = self.swapped(&mut best, &mut points, &mut witnesses)?;
+            diagnostics.count("swaps_that_helped", kept);
+            // With all the witnesses that were found meanwhile.
+            let again = self.rounds(best.mesh.clone(), &mut points, &mut witnesses)?;
+            if again.error < best.error {
+                best = again;
             }
-            descent.run(objective(POWERS[usize::from(round >= 2)]), STEPS, run)?;
-            (points, mesh) = (descent.points, descent.mesh);
-            found = measured(&mesh, goal, &search)?;
-            let helped = found.error < (1.0 - GAIN) * best.0;
-            if found.error < best.0 {
-                best = (found.error, mesh.clone());
+        }
+        Ok(best.mesh)
+    }
+
+    /// Step 2. Returns the best state.
+    fn rounds(
+        &self,
+        mesh: MedialMesh,
+        points: &mut Points,
+        witnesses: &mut Witnesses<'_>,
+    ) -> Result<State, SimplifyError> {
+        let error = witnesses.measure(&mesh, points)?;
+        let mut now = State { mesh, error };
+        let mut best = now.clone();
+        let mut idle = 0;
+        for round in 0..self.params.rounds {
+            let mut descent = Descent::new(self.goal, std::mem::take(points), now.mesh)?;
+            let power = POWERS[usize::from(round >= 2)];
+            descent.run(
+                self.objective(power, now.error.min(WORSE * best.error)),
+                STEPS,
+                self.run,
+            )?;
+            *points = descent.points;
+            let error = witnesses.measure(&descent.mesh, points)?;
+            now = State { mesh: descent.mesh, error };
+            idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
+            if error < best.error {
+                best = now.clone();
             }
-            idle = if helped { 0 } else { idle + 1 };
-            kept += usize::from(helped && swapping);
-            if swapping && !helped {
-                each = (each / 2).max(1);
-                if idle >= PATIENCE + FAILURES {
-                    break;
-                }
-            }
-            swapping |= swaps && (idle >= PATIENCE || round + 1 >= params.rounds);
-            if !swaps && idle > PATIENCE {
+            if idle > PATIENCE {
                 break;
             }
         }
-        diagnostics.count("rounds_with_swaps_that_helped", kept);
-        Ok(best.1)
+        Ok(best)
+    }
+
+    /// Step 3. Returns how many swaps helped.
+    fn swapped(
+        &self,
+        best: &mut State,
+        points: &mut Points,
+        witnesses: &mut Witnesses<'_>,
+    ) -> Result<usize, SimplifyError> {
+        let mut each = (best.mesh.spheres.len() / SPHERES).max(1);
+        let (mut skipped, mut idle, mut helped) = (0, 0, 0);
+        let mut from = Descent::new(self.goal, std::mem::take(points), best.mesh.clone())?;
+        for _ in 0..SWAPS {
+            let objective = self.objective(POWERS[1], best.error);
+            let trial = swapped(&from, each, skipped, self.run)?;
+            let lower =
+                |trial: &Descent<'_>| trial.value(&objective) < HOPELESS * from.value(&objective);
+            let mut is_better = false;
+            if let Some(mut trial) = trial.filter(lower) {
+                trial.run(objective, AFTER, self.run)?;
+                if trial.value(&objective) < from.value(&objective) {
+                    let mut points = trial.points;
+                    let error = witnesses.measure(&trial.mesh, &mut points)?;
+                    is_better = error < best.error;
+                    if is_better {
+                        idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
+                        *best = State { mesh: trial.mesh, error };
+                        helped += 1;
+                    }
+                    from = Descent::new(self.goal, points, best.mesh.clone())?;
+                }
+            }
+            if is_better {
+                skipped = 0;
+            } else {
+                idle += 1;
+                // Fewer at once, then one at another place.
+                if each > 1 { each /= 2 } else { skipped += 1 }
+            }
+            if idle >= FAILURES {
+                break;
+            }
+        }
+        *points = from.points;
+        Ok(helped)
+    }
+
+    /// A little below the error counts as one, so that what exceeds it weighs heavily.
+    fn objective(&self, power: f64, error: f64) -> Objective {
+        Objective { power, mean: self.params.lambda, scale: 0.9 * error }
     }
 }
 
-/// Measures both ways and collects the places of large errors.
-fn measured(
-    mesh: &MedialMesh,
-    goal: &Goal,
-    search: &PeakSearch<'_>,
-) -> Result<Measured, SimplifyError> {
-    let peaks = search.of(mesh).map_err(refused)?;
-    let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
-    let signed = union_of(mesh)?.signed_batch(&pool);
-    let gaps = || goal.pool.iter().zip(&signed);
-    // The union's boundary at a distance `sigma` from a point that it does not hold is as deep as that
-    // point, less `sigma`. This finds pockets that samples of the boundary miss.
-    let pockets = gaps().filter(|&(_, &signed)| signed > 0.0);
-    let pockets = pockets.map(|(inside, signed)| inside.depth - signed);
-    let error = pockets.fold(peaks.hausdorff(), f64::max);
-    let large = |peaks: &[Peak]| -> Vec<Vec3> {
-        let large = peaks.iter().take_while(|peak| peak.distance > WITNESS * error);
-        large.take(WITNESSES).map(|peak| peak.point).collect()
-    };
-    let samples = large(&peaks.forward).into_iter().map(|point| Sample { point, weight: 1.0 });
-    let exposed = large(&peaks.reverse);
-    let mut interior: Vec<Interior> = Vec::new();
-    for (&point, depth) in exposed.iter().zip(goal.depths(&exposed)) {
-        // Boundary inside the solid is a pocket. Boundary outside protrudes, which other residuals see.
-        if depth.value > 0.0 {
-            interior.push(Interior { point, depth: depth.value, weight: 1.0 });
+/// The search for the places of the largest errors.
+struct Witnesses<'a> {
+    goal: &'a Goal,
+    search: PeakSearch<'a>,
+    /// Cubes of side [`APART`] that have a witness of a kind.
+    seen: HashSet<(u8, [i64; 3])>,
+}
+
+impl Witnesses<'_> {
+    /// The error of a mesh, both ways. Where it is large, samples join `points`.
+    fn measure(&mut self, mesh: &MedialMesh, points: &mut Points) -> Result<f64, SimplifyError> {
+        let Self { goal, search, .. } = self;
+        let peaks = search.of(mesh).map_err(refused)?;
+        let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
+        let signed = union_of(mesh)?.signed_batch(&pool);
+        // The union's boundary at a distance `sigma` from a point that it does not hold is as deep as that
+        // point, less `sigma`. This finds pockets that samples of the boundary miss.
+        let pockets = goal.pool.iter().zip(&signed).filter(|&(_, &signed)| signed > 0.0);
+        let pockets = pockets.map(|(inside, signed)| inside.depth - signed);
+        let error = pockets.fold(peaks.hausdorff(), f64::max);
+        let large = |peaks: &[Peak]| -> Vec<Vec3> {
+            let large = peaks.iter().take_while(|peak| peak.distance > WITNESS * error);
+            large.map(|peak| peak.point).collect()
+        };
+        let on_surface = self.new_ones(0, large(&peaks.forward));
+        points.samples.extend(on_surface.into_iter().map(|point| Sample { point, weight: 1.0 }));
+        let exposed = self.new_ones(1, large(&peaks.reverse));
+        for (&point, depth) in exposed.iter().zip(self.goal.depths(&exposed)) {
+            // Boundary inside the solid is a pocket. Boundary outside protrudes, which other residuals see.
+            if depth.value > 0.0 {
+                points.interior.push(Interior { point, depth: depth.value, weight: 1.0 });
+            }
         }
+        let mut gaps: Vec<(f64, &Interior)> = (self.goal.pool.iter().zip(&signed))
+            .map(|(inside, &signed)| (uncovered(inside.depth, signed), inside))
+            .filter(|&(gap, _)| gap > WITNESS * error)
+            .collect();
+        gaps.sort_by(|x, y| y.0.total_cmp(&x.0));
+        let gaps = self.new_ones(2, gaps.into_iter().map(|(_, inside)| inside.point).collect());
+        let depths = self.goal.depths(&gaps);
+        points.interior.extend(gaps.into_iter().zip(depths).map(|(point, depth)| Interior {
+            point,
+            depth: depth.value,
+            weight: ASIDE,
+        }));
+        Ok(error)
     }
-    let gaps =
-        gaps().filter(|(inside, signed)| uncovered(inside.depth, **signed) > WITNESS * error);
-    interior.extend(gaps.map(|(inside, _)| *inside));
-    Ok(Measured { error, witnesses: Points { samples: samples.collect(), interior } })
+
+    /// The first witnesses of a kind, of each cube one.
+    fn new_ones(&mut self, kind: u8, points: Vec<Vec3>) -> Vec<Vec3> {
+        let cube = |p: &Vec3| (kind, (*p / APART).floor().to_array().map(|x| x as i64));
+        let new = points.into_iter().filter(|p| self.seen.insert(cube(p)));
+        new.take(WITNESSES).collect()
+    }
 }
 
 fn refused(error: MetricError) -> SimplifyError {

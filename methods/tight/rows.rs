@@ -13,7 +13,7 @@ use medial::simplifier::SimplifyError;
 
 use rayon::prelude::*;
 
-use super::goal::{Goal, Known, Points};
+use super::goal::{Goal, Interior, Known, Points, Sample};
 
 /// Depth from which on an uncovered interior point counts alike.
 const DEEP: f64 = 0.02;
@@ -41,6 +41,8 @@ pub(super) struct Row {
     pub point: Vec3,
     /// Whether the union holds too much there, and not too little.
     pub covered: bool,
+    /// Whether it is of a ball that protrudes, and not of a sample.
+    pub protrudes: bool,
 }
 
 /// A point of the medial mesh, held to its simplex.
@@ -132,12 +134,13 @@ fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
     all
 }
 
-/// Points whose balls are watched for protruding.
-pub(super) fn places(mesh: &MedialMesh) -> Vec<Held> {
-    spread_over(mesh, HELD)
+/// Points whose balls are watched for protruding, for a mesh that is a `share` of the whole.
+pub(super) fn places(mesh: &MedialMesh, share: f64) -> Vec<Held> {
+    spread_over(mesh, (share * HELD as f64) as usize)
 }
 
-/// The residuals of a medial mesh.
+/// The residuals of a medial mesh. Another one that stays is at the distance `limits` from each sample, or
+/// there is none. `near` is what served each sample when the spheres were a little elsewhere, if that is known. Balls that protrude by no more than `tolerance` are left out.
 ///
 /// # Errors
 /// When the medial mesh has no union.
@@ -145,48 +148,63 @@ pub(super) fn residuals(
     mesh: &MedialMesh,
     goal: &Goal,
     points: &Points,
+    limits: &[f64],
+    near: &[NearestPrimitive],
+    tolerance: f64,
     held: &mut [Held],
 ) -> Result<Residuals, SimplifyError> {
     let union = union_of(mesh)?;
     let surface = points.samples.iter().map(|sample| sample.point);
     let places: Vec<Vec3> = surface.chain(points.interior.iter().map(|x| x.point)).collect();
-    let nearest = union.deepest_batch(&places);
+    let nearest = union.deepest_batch_near(&places, near);
     let hulls = Hulls::new(mesh);
-    let (on_surface, inside) = nearest.split_at(points.samples.len());
-    let mut rows = Vec::with_capacity(places.len());
-    for (sample, found) in points.samples.iter().zip(on_surface) {
-        let (weights, direction) = hulls.derivative(mesh, sample.point, found.primitive);
-        let (error, weight) = (found.signed, sample.weight);
+    let limit = |i: usize| limits.get(i).copied().unwrap_or(f64::INFINITY);
+    let row = |i: usize, point: Vec3, found: &NearestPrimitive, slope: f64| {
+        let primitive = found.primitive;
+        if limit(i) < found.signed {
+            // No sphere of this mesh decides.
+            return (limit(i), ([0.0; 3], [0.0; 4]), primitive);
+        }
+        let (weights, direction) = hulls.derivative(mesh, point, primitive);
+        (found.signed, (weights, direction.map(|d| slope * d)), primitive)
+    };
+    let count = points.samples.len();
+    let mut rows = Vec::with_capacity(nearest.len());
+    for (i, (sample, found)) in points.samples.iter().zip(&nearest).enumerate() {
+        let (error, (weights, direction), primitive) = row(i, sample.point, found, 1.0);
+        let Sample { point, weight } = *sample;
         rows.push(Row {
-            primitive: found.primitive,
+            primitive,
             weights,
             direction,
             error,
             weight,
-            point: sample.point,
+            point,
             covered: error < 0.0,
+            protrudes: false,
         });
     }
-    for (point, found) in points.interior.iter().zip(inside) {
-        let error = uncovered(point.depth, found.signed);
-        if error > 0.0 {
-            let (weights, direction) = hulls.derivative(mesh, point.point, found.primitive);
-            let direction = direction.map(|d| 2.0 * d);
-            let weight = point.weight;
+    for (i, (inside, found)) in points.interior.iter().zip(&nearest[count..]).enumerate() {
+        let Interior { point, depth, weight } = *inside;
+        if uncovered(depth, found.signed.min(limit(count + i))) > 0.0 {
+            let (signed, (weights, direction), primitive) = row(count + i, point, found, 2.0);
+            let error = uncovered(depth, signed);
             rows.push(Row {
-                primitive: found.primitive,
+                primitive,
                 weights,
                 direction,
                 error,
                 weight,
-                point: point.point,
+                point,
                 covered: false,
+                protrudes: false,
             });
         }
     }
     let protruding = held.par_iter_mut().map(|held| {
         let ball = interpolated(mesh, held);
-        let depth = goal.depth_of_moved(ball.centre, ball.radius, &mut held.known)?;
+        let enough = ball.radius - tolerance;
+        let depth = goal.depth_of_moved(ball.centre, enough, &mut held.known)?;
         let [x, y, z] = depth.gradient.to_array();
         let Held { primitive, weights, .. } = *held;
         Some(Row {
@@ -197,6 +215,7 @@ pub(super) fn residuals(
             weight: PROTRUDING,
             point: ball.centre,
             covered: true,
+            protrudes: true,
         })
     });
     let protruding: Vec<Option<Row>> = protruding.collect();

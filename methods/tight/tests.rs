@@ -9,6 +9,7 @@ use super::descent::{Descent, Objective};
 use super::goal::Goal;
 use super::insert::swapped;
 use super::normal::{Normal, Pattern};
+use super::patch::Patch;
 use super::rows::{Row, vertices};
 
 fn shape(id: &str, resolution: u32) -> Shape {
@@ -159,10 +160,42 @@ fn a_swap_keeps_the_number_of_spheres_and_the_homotopy_type() {
     let before = betti(&mesh);
     let descent = Descent::new(&goal, goal.points(30), mesh).unwrap();
     let run = RunContext::default();
-    let other = swapped(&descent, 4, 4.0, &run).unwrap().expect("a swap is possible");
+    let other = swapped(&descent, 4, 0, &run).unwrap().expect("a swap is possible");
     other.mesh.check().unwrap();
     assert_eq!(other.mesh.spheres.len(), 30);
     assert_eq!(betti(&other.mesh), before);
+}
+
+#[test]
+fn around_a_place_the_error_falls_and_elsewhere_nothing_moves() {
+    let shape = shape("torus", 24);
+    let goal = Goal::new(&shape, 0).unwrap();
+    let run = RunContext::default();
+    let before = Descent::new(&goal, goal.points(30), start(&shape, 30)).unwrap();
+    let worst = before.residuals.rows.iter().max_by(|x, y| x.error.abs().total_cmp(&y.error.abs()));
+    let (corners, _) = vertices(&before.mesh, worst.unwrap().primitive);
+    let mut mesh = before.mesh.clone();
+    let patch = Patch { goal: &goal, points: &before.points };
+    patch.settle(&mut mesh, &corners[..1], &[(4.0, 5)], &run).unwrap();
+    // A sphere two edges away moves, one three edges away does not.
+    let mut near = vec![false; mesh.spheres.len()];
+    near[corners[0] as usize] = true;
+    for _ in 0..2 {
+        let reached = near.clone();
+        for &[a, b] in &mesh.edges {
+            near[a as usize] |= reached[b as usize];
+            near[b as usize] |= reached[a as usize];
+        }
+    }
+    let moved: Vec<bool> =
+        mesh.spheres.iter().zip(&before.mesh.spheres).map(|(m, old)| m != old).collect();
+    assert!(moved.iter().zip(&near).all(|(&moved, &near)| near || !moved), "{moved:?} {near:?}");
+    assert!(moved[corners[0] as usize] && near.contains(&false));
+    // Of the whole, too: the rest was in the sums.
+    let objective = Objective::power(4.0, before.largest());
+    let after = Descent::new(&goal, before.points.clone(), mesh).unwrap();
+    let (before, after) = (before.value(&objective), after.value(&objective));
+    assert!(after < before, "{after} after {before}");
 }
 
 #[test]

@@ -32,11 +32,19 @@ impl CollapseComplex {
     #[inline]
     pub fn folds(&self, face: [u32; 3], centre: Vec3) -> bool {
         let [from, p, q] = face.map(|v| self.sphere(v).centre);
-        let before = (p - from).cross(q - from);
-        let after = (p - centre).cross(q - centre);
-        // Sign first: it is cheap, and few faces get past it.
-        before.dot(after) < 0.0 && !is_thin(before, p - from, q - from)
+        folds_over([from, p, q], [centre, p, q])
     }
+}
+
+/// Whether a triangle folds over when its corners move, as [`CollapseComplex::folds`] has it for one of
+/// them.
+#[inline]
+pub fn folds_over(before: [Vec3; 3], after: [Vec3; 3]) -> bool {
+    let [u, v] = [before[1] - before[0], before[2] - before[0]];
+    let normal = u.cross(v);
+    let moved = (after[1] - after[0]).cross(after[2] - after[0]);
+    // Sign first: it is cheap, and few faces get past it.
+    normal.dot(moved) < 0.0 && !is_thin(normal, u, v)
 }
 
 /// Whether the smallest height of the triangle with sides `u`, `v` and `u × v = normal` is noise.

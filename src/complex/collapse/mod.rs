@@ -44,6 +44,7 @@ pub use heap::{LazyHeap, Prioritised};
 pub use hierarchy::{
     Change, Hierarchy, HierarchyError, HierarchyFileError, HierarchyFileErrorKind, Stage, Step,
 };
+pub use inversion::folds_over;
 pub use queue::{Candidate, CollapseQueue};
 pub use record::{Collapse, replay};
 

@@ -20,6 +20,8 @@ mod search;
 #[cfg(test)]
 mod tests;
 
+use rayon::prelude::*;
+
 use super::{ComplexError, MedialMesh};
 use crate::Vec3;
 use crate::geometry::trees::{Bounds, in_morton_order};
@@ -278,6 +280,29 @@ impl MedialUnion {
         })
     }
 
+    /// [`deepest`](Self::deepest) for many points, in their order, in parallel. Each search begins with the
+    /// primitive that `near` names for the point, or, where it names none, with the one that was found last:
+    /// fast if these are near.
+    pub fn deepest_batch_near(
+        &self,
+        points: &[Vec3],
+        near: &[NearestPrimitive],
+    ) -> Vec<NearestPrimitive> {
+        let places = self.parts.places();
+        let runs = points.par_chunks(RUN).enumerate();
+        let runs = runs.flat_map_iter(|(run, points)| {
+            let mut last = 0;
+            let places = &places;
+            points.iter().zip(RUN * run..).map(move |(&p, i)| {
+                let named = near.get(i).and_then(|near| places.of(near.primitive));
+                let (nearest, place) = self.parts.nearest::<Signed>(p, named.unwrap_or(last));
+                last = place;
+                nearest
+            })
+        });
+        runs.collect()
+    }
+
     /// For many points, in their order, in parallel: [`signed`](Self::signed), and the radius of the
     /// ball on the primitive that attains it.
     pub fn deepest_ball_batch(&self, points: &[Vec3]) -> Vec<(f64, f64)> {
@@ -342,6 +367,9 @@ impl MedialUnion {
 
 /// Bound on the primitives that are left, one after the other, on the way out of a union.
 const MAX_EXITS: usize = 12;
+
+/// Queries that are answered one after the other on one thread.
+const RUN: usize = 512;
 
 /// Number of remembered primitives that buried a point.
 const RECENT: usize = 4;

@@ -92,6 +92,29 @@ pub(super) struct Parts {
     slack: f64,
 }
 
+/// Where each primitive is among the parts, if it has a part of its own.
+pub(super) struct Places([Vec<u32>; 3]);
+
+impl Places {
+    /// The place of a primitive, if it has a part.
+    #[inline]
+    pub fn of(&self, primitive: Primitive) -> Option<usize> {
+        let (kind, id) = kind_and_id(primitive);
+        self.0[kind].get(id).copied().filter(|&place| place != NONE).map(|place| place as usize)
+    }
+}
+
+/// No place.
+const NONE: u32 = u32::MAX;
+
+fn kind_and_id(primitive: Primitive) -> (usize, usize) {
+    match primitive {
+        Primitive::Sphere(v) => (0, v as usize),
+        Primitive::Edge(e) => (1, e as usize),
+        Primitive::Face(f) => (2, f as usize),
+    }
+}
+
 /// Where a leaf begins.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leaf {
@@ -173,6 +196,20 @@ impl Parts {
     #[inline]
     pub fn primitive(&self, place: usize) -> Primitive {
         self.primitives[place]
+    }
+
+    /// The places of all primitives.
+    pub fn places(&self) -> Places {
+        let mut places: [Vec<u32>; 3] = Default::default();
+        for (place, &primitive) in (0..).zip(&self.primitives) {
+            let (kind, id) = kind_and_id(primitive);
+            let list = &mut places[kind];
+            if list.len() <= id {
+                list.resize(id + 1, NONE);
+            }
+            list[id] = place;
+        }
+        Places(places)
     }
 
     /// All primitives that have a part of their own.

@@ -116,6 +116,24 @@ fn answers_are_those_of_all_primitives() {
     }
 }
 
+/// Where a search begins does not matter, even if that is nonsense.
+#[test]
+fn what_was_near_does_not_change_the_answers() {
+    let mut rng = Pcg64::seed_from_u64(17);
+    for kind in ["scattered", "clusters", "nested", "far apart"] {
+        let mut mesh = mesh(kind, 60, &mut rng);
+        let points: Vec<Vec3> = (0..700).map(|_| vector(&mut rng)).collect();
+        let before = MedialUnion::new(&mesh).unwrap().deepest_batch(&points);
+        mesh.spheres.iter_mut().for_each(|m| m.centre += 0.01 * vector(&mut rng));
+        let union = MedialUnion::new(&mesh).unwrap();
+        let fresh = union.deepest_batch(&points);
+        assert_eq!(union.deepest_batch_near(&points, &before), fresh, "{kind}");
+        assert_eq!(union.deepest_batch_near(&points, &[]), fresh, "{kind}");
+        let far = NearestPrimitive { signed: 0.0, primitive: Primitive::Face(u32::MAX) };
+        assert_eq!(union.deepest_batch_near(&points, &[far]), fresh, "{kind}");
+    }
+}
+
 /// The parts that stand for equal ones are as near as any, up to what equal means.
 #[test]
 fn no_primitive_is_nearer_than_its_part() {
