@@ -19,7 +19,7 @@ pub struct TightParams {
 
 impl Default for TightParams {
     fn default() -> Self {
-        Self { lambda: 0.05, start: 2_500, samples: 20_000, rounds: 8 }
+        Self { lambda: 0.15, start: 2_500, samples: 20_000, rounds: 8 }
     }
 }
 
