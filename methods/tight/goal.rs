@@ -4,10 +4,11 @@
 use std::sync::Arc;
 
 use medial::Vec3;
-use medial::complex::Sphere;
+use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::trees::morton_order;
-use medial::metrics::{DistanceOptions, MetricError, PeakSearch};
+use medial::metrics::{DistanceOptions, FINEST, MetricError, PeakSearch, certify};
 use medial::shape::{Shape, ShapeError};
+use medial::simplifier::SimplifyError;
 use medial::surface::{Closest, InsideTest, Sampling, Side, TriMesh, TriangleBvh, sample};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -130,6 +131,16 @@ impl Goal {
         let envelope_samples = 3 * count;
         let options = DistanceOptions { surface_samples: count, envelope_samples, seed };
         PeakSearch::new(&self.surface, &self.tree, options)
+    }
+
+    /// An upper bound of the Hausdorff distance of a medial mesh, by a certificate of a width.
+    ///
+    /// # Errors
+    /// When the certificate would need too many pieces.
+    pub fn certified(&self, mesh: &MedialMesh, width: f64) -> Result<f64, SimplifyError> {
+        let certificate = certify(&self.surface, &self.tree, mesh, width.max(FINEST));
+        let refused = |error: MetricError| SimplifyError::Failed(error.to_string());
+        Ok(certificate.map_err(refused)?.upper)
     }
 
     /// Depths and their gradients, in parallel.

@@ -36,13 +36,15 @@
 //! - Faces that cross without being neighbours are not avoided.
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   says how much.
-//! - [`Level::Spheres`] alone: there is no level by error yet. A harness searches one.
+//! - The level of its own is a bound of the two-sided error, a fraction of the diagonal, and is held by a
+//!   certificate (`bound.rs`). It takes a dozen times as long as a number of spheres.
 //!
 //! # Starting from a given mesh
 //!
 //! If the shape has an initial medial mesh of its own, that is the start. With no more spheres than are
 //! asked for, its connectivity stays as it is and its spheres are moved (step 6 without swaps).
 
+mod bound;
 mod collapse;
 mod descent;
 mod goal;
@@ -63,12 +65,13 @@ use std::sync::Arc;
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, Params, RunContext, Simplification,
-    Simplified, SimplifyError, Work,
+    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
+    Simplification, Simplified, SimplifyError, Work,
 };
 
 pub use params::TightParams;
 
+use bound::Within;
 use descent::{Descent, Objective};
 use goal::Goal;
 use rounds::Polish;
@@ -113,6 +116,7 @@ pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
              of them together to lessen its maximum.",
         )
         .published("nothing is published: 100 spheres")
+        .native(NativeLevel::larger_is_coarser("bound", "fraction of the diagonal"))
         .on_request()
         .params(TightParams::describe());
     Tight { info, starter: Arc::new(starter) }
@@ -153,23 +157,27 @@ impl Simplification for Prepared {
             Level::Spheres(count) => count,
             Level::Published => USUAL,
             Level::MaxError(_) => return Err(SimplifyError::searched()),
-            Level::Native(_) => {
-                let why = "`tight` has no level of its own yet; ask for a number of spheres";
-                return Err(SimplifyError::unsupported(why));
-            }
+            Level::Native(bound) => return self.within(bound),
         };
         let mut diagnostics = Diagnostics::default();
         self.start.describe(&mut diagnostics);
         let start = self.start.mesh(count, &self.run, &mut diagnostics)?;
         bounded(start.spheres.len())?;
         let mesh = self.simplified(start, count, &mut diagnostics)?;
-        mesh.check()?;
-        let (work, extras) = (Work::Anew, Extras::default());
-        Ok(Simplified { mesh, asked: level, native_level: None, work, diagnostics, extras })
+        answer(level, mesh, None, diagnostics)
     }
 }
 
 impl Prepared {
+    /// The level by error.
+    fn within(&self, bound: f64) -> Result<Simplified, SimplifyError> {
+        let Self { start, goal, params, run } = self;
+        let mut diagnostics = Diagnostics::default();
+        start.describe(&mut diagnostics);
+        let state = Within { start, goal, params, run, bound }.fewest(&mut diagnostics)?;
+        answer(Level::Native(bound), state.mesh, Some(state.error), diagnostics)
+    }
+
     /// Steps 2 to 6.
     fn simplified(
         &self,
@@ -197,8 +205,20 @@ impl Prepared {
             }
             descent = swapped_often(descent, run)?;
         }
-        Polish { goal, params, run, swaps: !is_polish }.run(descent, diagnostics)
+        let state = Polish { goal, params, run, swaps: !is_polish }.run(descent, diagnostics)?;
+        Ok(state.mesh)
     }
+}
+
+fn answer(
+    asked: Level,
+    mesh: MedialMesh,
+    native_level: Option<f64>,
+    diagnostics: Diagnostics,
+) -> Result<Simplified, SimplifyError> {
+    mesh.check()?;
+    let (work, extras) = (Work::Anew, Extras::default());
+    Ok(Simplified { mesh, asked, native_level, work, diagnostics, extras })
 }
 
 /// # Errors

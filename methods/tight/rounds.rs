@@ -75,9 +75,9 @@ pub(super) struct Polish<'a> {
 
 /// A mesh with its measured error.
 #[derive(Clone)]
-struct State {
-    mesh: MedialMesh,
-    error: f64,
+pub(super) struct State {
+    pub mesh: MedialMesh,
+    pub error: f64,
 }
 
 impl Polish<'_> {
@@ -89,7 +89,7 @@ impl Polish<'_> {
         &self,
         mut descent: Descent<'_>,
         diagnostics: &mut Diagnostics,
-    ) -> Result<MedialMesh, SimplifyError> {
+    ) -> Result<State, SimplifyError> {
         for (power, steps) in WARM {
             descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
         }
@@ -109,7 +109,7 @@ impl Polish<'_> {
                 best = again;
             }
         }
-        Ok(best.mesh)
+        Ok(best)
     }
 
     /// Step 2. Returns the best state.

@@ -1,7 +1,7 @@
 use medial::Vec3;
 use medial::complex::{MedialMesh, Primitive, betti};
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, Params, RunContext};
+use medial::simplifier::{Level, Params, RunContext, SimplifyError};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -212,6 +212,32 @@ fn a_given_mesh_of_no_more_spheres_keeps_its_connectivity_and_loses_error() {
     let after = judge.distances(&polished).unwrap();
     assert!(after.mean < 0.9 * before.mean, "{before:?} before, {after:?} after");
     assert!(after.hausdorff < 1.01 * before.hausdorff, "{before:?} before, {after:?} after");
+}
+
+#[test]
+fn a_bound_is_held_by_the_judge_and_with_fewer_spheres_if_it_is_wider() {
+    let shape = shape("torus", 24);
+    let tight = crate::find("tight").unwrap();
+    let mut params = quick();
+    params.set("samples", "600");
+    params.set("start", "60");
+    params.set("rounds", "1");
+    let mut levels = tight.prepare(&shape, &params, &RunContext::default()).unwrap();
+    let judge = shape.judge(None, Default::default()).unwrap();
+    let mut spheres = usize::MAX;
+    for bound in [0.015, 0.04] {
+        let found = levels.at(Level::Native(bound)).unwrap();
+        let certificate = judge.certify(&found.mesh, 1e-3).unwrap();
+        assert!(certificate.lower <= bound, "{certificate:?} with {bound}");
+        assert!(found.native_level.is_some_and(|held| held <= bound && held >= certificate.lower));
+        assert_eq!(betti(&found.mesh), [1, 1, 0]);
+        assert!(found.mesh.spheres.len() < spheres, "{bound}: {}", found.mesh.spheres.len());
+        spheres = found.mesh.spheres.len();
+    }
+    for nonsense in [0.0, -1.0, f64::NAN] {
+        let found = levels.at(Level::Native(nonsense));
+        assert!(matches!(found, Err(SimplifyError::Level(_))), "{nonsense}");
+    }
 }
 
 #[test]
