@@ -12,7 +12,7 @@ use super::goal::Goal;
 use super::params::TightParams;
 use super::rounds::{Polish, State};
 use super::start::Start;
-use super::{MANY, MOST, reduced};
+use super::{MANY, MOST, bounded, reduced};
 
 /// The share of spheres that is tried first, and the one from which on the search ends.
 const FIRST_SHARE: f64 = 0.7;
@@ -59,19 +59,18 @@ impl Within<'_> {
 
     /// A state within the bound to begin with: more spheres until one is.
     fn first(&self, diagnostics: &mut Diagnostics) -> Result<State, SimplifyError> {
-        let mut wanted = self.params.start;
+        let mut wanted = self.params.start.max(MANY);
         let mut least = f64::INFINITY;
         loop {
-            let start = self.start.mesh(wanted / MANY, self.run, diagnostics)?;
+            // Rounded up: a start of fewer spheres than wanted is all that there is.
+            let start = self.start.mesh(wanted.div_ceil(MANY), self.run, diagnostics)?;
             let spheres = start.spheres.len();
-            if spheres <= MOST {
-                let state = self.polished(start, false)?;
-                least = least.min(state.error);
-                if let Some(state) = self.held(state)? {
-                    return Ok(state);
-                }
+            bounded(spheres)?;
+            let state = self.polished(start, false)?;
+            least = least.min(state.error);
+            if let Some(state) = self.held(state)? {
+                return Ok(state);
             }
-            // No more spheres than these, or too many to be placed together.
             if spheres < wanted || wanted >= MOST {
                 return Err(SimplifyError::Level(format!(
                     "no state within {} of the diagonal was found: the least two-sided error was {least:.3e}, \

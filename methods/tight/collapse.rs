@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::descent::{Descent, LEAST_RADIUS};
 use super::goal::Goal;
-use super::normal::{Block, backward, cholesky, forward};
+use super::normal::{Block, add_product, backward, cholesky, forward};
 use super::rows::{uncovered, vertices};
 
 /// Exponent of the price.
@@ -406,14 +406,5 @@ impl Ring {
             }
         }
         sum
-    }
-}
-
-/// `block += scale * direction directionᵀ`.
-fn add_product(block: &mut Block, scale: f64, direction: &[f64; 4]) {
-    for (line, x) in block.iter_mut().zip(direction) {
-        for (entry, y) in line.iter_mut().zip(direction) {
-            *entry += scale * x * y;
-        }
     }
 }

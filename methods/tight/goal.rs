@@ -138,8 +138,7 @@ impl Goal {
     /// # Errors
     /// When the certificate would need too many pieces.
     pub fn certified(&self, mesh: &MedialMesh, width: f64) -> Result<f64, SimplifyError> {
-        let certificate = certify(&self.surface, &self.tree, mesh, width.max(FINEST));
-        let refused = |error: MetricError| SimplifyError::Failed(error.to_string());
+        let certificate = certify(&self.surface, &self.tree, mesh, width.clamp(FINEST, 1.0));
         Ok(certificate.map_err(refused)?.upper)
     }
 
@@ -263,4 +262,8 @@ impl Goal {
         }
         (0..all.len()).filter(|&k| keep(k)).map(|k| all[k]).collect()
     }
+}
+
+pub(super) fn refused(error: MetricError) -> SimplifyError {
+    SimplifyError::Failed(error.to_string())
 }

@@ -37,7 +37,7 @@
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   says how much.
 //! - The level of its own is a bound of the two-sided error, a fraction of the diagonal, and is held by a
-//!   certificate (`bound.rs`). It takes a dozen times as long as a number of spheres.
+//!   certificate (`bound.rs`). It takes several times as long as a number of spheres.
 //!
 //! # Starting from a given mesh
 //!
@@ -107,7 +107,8 @@ pub struct Tight {
 
 /// The `tight` simplifier, starting from what `starter` leaves.
 ///
-/// Answers [`Level::Spheres`] up to a few thousand. Cost: some hundred evaluations of all samples.
+/// Answers [`Level::Spheres`] up to a few thousand, at the cost of some hundred evaluations of all samples, and
+/// [`Level::Native`], a bound of the two-sided error, at several times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")
         .citation("This project; not published.")

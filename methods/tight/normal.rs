@@ -90,11 +90,7 @@ impl Normal {
             &mut self.below[i][place]
         };
         // Symmetric blocks: the transposed one is the same.
-        for (row, a) in block.iter_mut().zip(direction) {
-            for (entry, b) in row.iter_mut().zip(direction) {
-                *entry += scale * a * b;
-            }
-        }
+        add_product(block, scale, direction);
     }
 
     /// The diagonal entries of a vertex.
@@ -164,6 +160,16 @@ impl Normal {
             solution[v as usize] = x[k];
         }
         Some(solution)
+    }
+}
+
+/// `block += scale * direction directionᵀ`.
+#[inline]
+pub(super) fn add_product(block: &mut Block, scale: f64, direction: &[f64; 4]) {
+    for (line, x) in block.iter_mut().zip(direction) {
+        for (entry, y) in line.iter_mut().zip(direction) {
+            *entry += scale * x * y;
+        }
     }
 }
 

@@ -17,7 +17,7 @@ const RINGS: usize = 2;
 /// Samples that the rest of the mesh serves are looked at up to this distance from the moving part.
 const REACH: f64 = 0.02;
 
-/// A mesh and what is known about it, of which a part is to be moved.
+/// The solid and the samples that a part of a mesh is moved against.
 pub(super) struct Patch<'a> {
     pub goal: &'a Goal,
     pub points: &'a Points,

@@ -7,6 +7,7 @@
 //! 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
 //!    first; where that lowers the sum of the powers all spheres take a few steps, and the error is
 //!    measured again.
+//! 4. Rounds as in 2, with the witnesses that were found meanwhile.
 //!
 //! What is returned is the state of the least measured error.
 
@@ -14,11 +15,11 @@ use std::collections::HashSet;
 
 use medial::Vec3;
 use medial::complex::MedialMesh;
-use medial::metrics::{MetricError, Peak, PeakSearch};
+use medial::metrics::{Peak, PeakSearch};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
 use super::descent::{Descent, Objective};
-use super::goal::{ASIDE, Goal, Interior, Points, Sample};
+use super::goal::{ASIDE, Goal, Interior, Points, Sample, refused};
 use super::insert::swapped;
 use super::params::TightParams;
 use super::rows::{uncovered, union_of};
@@ -250,8 +251,4 @@ impl Witnesses<'_> {
         let new = points.into_iter().filter(|p| self.seen.insert(cube(p)));
         new.take(WITNESSES).collect()
     }
-}
-
-fn refused(error: MetricError) -> SimplifyError {
-    SimplifyError::Failed(error.to_string())
 }

@@ -21,7 +21,7 @@ const DEEP: f64 = 0.02;
 /// Weight of a point of the medial mesh whose ball may protrude.
 const PROTRUDING: f64 = 0.3;
 
-/// Points of the medial mesh that are watched: as many as a share of the samples that costs little beside them.
+/// Points of the medial mesh at which balls are watched for protruding: about half as many as there are samples.
 const HELD: usize = 6_000;
 
 /// Golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
@@ -140,7 +140,8 @@ pub(super) fn places(mesh: &MedialMesh, share: f64) -> Vec<Held> {
 }
 
 /// The residuals of a medial mesh. Another one that stays is at the distance `limits` from each sample, or
-/// there is none. `near` is what served each sample when the spheres were a little elsewhere, if that is known. Balls that protrude by no more than `tolerance` are left out.
+/// there is none. `near` is what served each sample when the spheres were a little elsewhere, if that is
+/// known. Balls that protrude by no more than `tolerance` are left out.
 ///
 /// # Errors
 /// When the medial mesh has no union.
