@@ -18,6 +18,7 @@ use super::descent::{Descent, LEAST_RADIUS};
 use super::goal::Goal;
 use super::normal::{Block, add_product, backward, cholesky, forward};
 use super::rows::{uncovered, vertices};
+use super::sheets::Sheets;
 
 /// Exponent of the price.
 const POWER: i32 = 8;
@@ -80,7 +81,8 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
     let needed = mesh.spheres.len() - target;
     let wanted = if careful { needed * 3 / 2 + 1 } else { mesh.edges.len() };
     let mut merged = vec![false; mesh.spheres.len()];
-    let priced = stars.cheapest(&complex, descent.goal, wanted);
+    let mut sheets = Sheets::new(mesh);
+    let priced = stars.cheapest(&complex, &sheets, descent.goal, wanted);
     let dearest = priced.last()?.price.max(0.0);
     for Priced { ends: [a, b], sphere, .. } in priced {
         if complex.sphere_count() <= target {
@@ -93,6 +95,7 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
             || merged[b as usize]
             || !complex.keeps_homotopy(a, b)
             || complex.folded_face(a, b, sphere.centre).is_some()
+            || sheets.would_cross(&complex, [a, b], sphere)
         {
             continue;
         }
@@ -103,6 +106,7 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
             continue;
         }
         (merged[a as usize], merged[b as usize]) = (true, true);
+        sheets.collapse(&complex, [a, b]);
         complex.collapse(a, b, sphere);
     }
     // The mesh numbers the spheres that are left in their order.
@@ -187,7 +191,13 @@ impl<'a> Stars<'a> {
     ///
     /// Edges that look cheap by a few samples come first: what they cost is the limit for the others, most of
     /// which exceed it soon.
-    fn cheapest(&self, complex: &CollapseComplex, goal: &Goal, wanted: usize) -> Vec<Priced> {
+    fn cheapest(
+        &self,
+        complex: &CollapseComplex,
+        sheets: &Sheets<'_>,
+        goal: &Goal,
+        wanted: usize,
+    ) -> Vec<Priced> {
         let edges = 0..self.mesh.edges.len();
         let mut order: Vec<(f64, usize)> =
             edges.into_par_iter().map(|e| (self.rough_price(complex, e), e)).collect();
@@ -198,7 +208,7 @@ impl<'a> Stars<'a> {
             // A complex for each piece of work, because the homotopy test marks vertices.
             let priced = block.par_iter().map_init(
                 || complex.clone(),
-                |complex, &(_, e)| self.price(complex, goal, e, limit),
+                |complex, &(_, e)| self.price(complex, sheets, goal, e, limit),
             );
             let priced: Vec<Option<Priced>> = priced.collect();
             found.extend(priced.into_iter().flatten());
@@ -218,11 +228,12 @@ impl<'a> Stars<'a> {
         ring.energy(first.lerp(second, 0.5), &served, f64::INFINITY) - now
     }
 
-    /// The edge at its best place; `None` if its collapse changes the homotopy type, or folds a face or costs
-    /// more than `limit` at every place.
+    /// The edge at its best place; `None` if its collapse changes the homotopy type, or folds a face, makes one
+    /// cross or costs more than `limit` at every place.
     fn price(
         &self,
         complex: &mut CollapseComplex,
+        sheets: &Sheets<'_>,
         goal: &Goal,
         e: usize,
         limit: f64,
@@ -238,6 +249,11 @@ impl<'a> Stars<'a> {
         let [first, second] = ends.map(|v| complex.sphere(v));
         let mut places = vec![first, second, first.lerp(second, 0.5)];
         places.extend(self.minimiser(e, [first, second]));
+        // Where the descent would put it: a merged centre must not be outside.
+        let merged: Vec<Vec3> = places[2..].iter().map(|sphere| sphere.centre).collect();
+        for (sphere, clamped) in places[2..].iter_mut().zip(goal.clamped(&merged)) {
+            sphere.centre = clamped.unwrap_or(sphere.centre);
+        }
         let mut tried: Vec<(f64, Sphere)> = Vec::with_capacity(places.len());
         let mut worst = now + limit;
         for sphere in places {
@@ -259,7 +275,8 @@ impl<'a> Stars<'a> {
                 break;
             }
             let price = change + ring.protrusion(sphere, goal, so_far - change);
-            if price < so_far || (best.is_none() && price <= limit) {
+            let is_better = price < so_far || (best.is_none() && price <= limit);
+            if is_better && !sheets.would_cross(complex, ends, sphere) {
                 best = Some(Priced { ends, sphere, price });
             }
         }

@@ -8,7 +8,7 @@ use medial::complex::MedialMesh;
 use medial::simplifier::{RunContext, SimplifyError};
 
 use super::goal::{Goal, Points};
-use super::guard::{clamp, hold};
+use super::guard::{Guard, Still, clamp};
 use super::normal::{Normal, Pattern};
 use super::rows::{Held, Residuals, Row, places, residuals, vertices};
 
@@ -79,6 +79,17 @@ impl Objective {
     }
 }
 
+/// What is around a part of a mesh; empty if there is nothing else.
+#[derive(Default)]
+pub(super) struct Rest {
+    /// Spheres of the part that do not move.
+    pub fixed: Vec<bool>,
+    /// For each sample the distance of what is not in the part.
+    pub limits: Vec<f64>,
+    /// Faces that are not in the part.
+    pub still: Still,
+}
+
 /// A medial mesh of fixed connectivity whose spheres move.
 pub(super) struct Descent<'a> {
     pub goal: &'a Goal,
@@ -90,6 +101,7 @@ pub(super) struct Descent<'a> {
     fixed: Vec<bool>,
     /// For each sample the distance of what is not in the mesh; empty if there is nothing else.
     limits: Vec<f64>,
+    guard: Guard,
     pattern: Pattern,
     damping: f64,
 }
@@ -101,25 +113,25 @@ impl<'a> Descent<'a> {
     /// # Errors
     /// When the mesh has no union.
     pub fn new(goal: &'a Goal, points: Points, mesh: MedialMesh) -> Result<Self, SimplifyError> {
-        Self::of_part(goal, points, mesh, vec![], vec![], 1.0)
+        Self::of_part(goal, points, mesh, Rest::default(), 1.0)
     }
 
-    /// As [`new`](Self::new), for a part of a mesh: marked spheres do not move, and the rest of the mesh is at
-    /// the distance `limits` from each sample. The part is a `share` of the whole.
+    /// As [`new`](Self::new), for a part of a mesh, which is a `share` of the whole.
     pub fn of_part(
         goal: &'a Goal,
         points: Points,
         mut mesh: MedialMesh,
-        fixed: Vec<bool>,
-        limits: Vec<f64>,
+        rest: Rest,
         share: f64,
     ) -> Result<Self, SimplifyError> {
+        let Rest { fixed, limits, still } = rest;
         clamp(&mut mesh, goal);
         let mut held = places(&mesh, share);
         let residuals = residuals(&mesh, goal, &points, &limits, &[], 0.0, &mut held)?;
         let pattern = Pattern::new(mesh.spheres.len(), &mesh.edges);
+        let guard = Guard::new(&mesh, still);
         let damping = FIRST_DAMPING;
-        Ok(Self { goal, points, mesh, residuals, held, fixed, limits, pattern, damping })
+        Ok(Self { goal, points, mesh, residuals, held, fixed, limits, guard, pattern, damping })
     }
 
     /// The largest error of a residual.
@@ -247,7 +259,7 @@ impl<'a> Descent<'a> {
             sphere.centre += share * Vec3::new(x, y, z);
             sphere.radius = (sphere.radius + share * r).max(LEAST_RADIUS);
         }
-        hold(&self.mesh, &mut trial, self.goal);
+        self.guard.hold(&self.mesh, &mut trial, self.goal);
         trial.check().is_ok().then_some((trial, expected))
     }
 }

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use medial::Vec3;
-use medial::complex::{MedialMesh, Primitive, Sphere};
+use medial::complex::{Crossings, MedialMesh, Primitive, Sphere, crossing_faces};
 use medial::simplifier::{RunContext, SimplifyError};
 
 use super::collapse::{self, Passed};
@@ -14,6 +14,7 @@ use super::descent::{Descent, LEAST_RADIUS};
 use super::goal::Goal;
 use super::patch::Patch;
 use super::rows::{Row, vertices};
+use super::sheets::corners as corners_of;
 
 /// Errors below this share of the largest are no reason to insert a sphere.
 const SHARE: f64 = 0.5;
@@ -43,6 +44,7 @@ pub(super) fn swapped<'a>(
     run: &RunContext,
 ) -> Result<Option<Descent<'a>>, SimplifyError> {
     let count = descent.mesh.spheres.len();
+    let crossing = crossing_faces(&descent.mesh).len();
     let Some(mut mesh) = with_inserted(descent, each, skipped) else { return Ok(None) };
     let patch = Patch { goal: descent.goal, points: &descent.points };
     let new: Vec<u32> = (count as u32..mesh.spheres.len() as u32).collect();
@@ -56,7 +58,8 @@ pub(super) fn swapped<'a>(
         patch.settle(&mut mesh, &merged, &COLLAPSED, run)?;
         trial = Descent::new(trial.goal, trial.points, mesh)?;
     }
-    Ok(Some(trial))
+    // Parts of a face that crosses another one count each.
+    Ok((crossing_faces(&trial.mesh).len() <= crossing).then_some(trial))
 }
 
 /// The mesh with up to `count` spheres more, at the largest errors but the `skipped` first, no two at one
@@ -88,15 +91,18 @@ fn with_inserted(descent: &Descent<'_>, count: usize, skipped: usize) -> Option<
 }
 
 /// A complex to which simplices are added.
-struct Edit {
+struct Edit<'a> {
+    /// The faces that were there first.
+    sheets: Crossings<'a>,
     spheres: Vec<Sphere>,
     edges: BTreeSet<[u32; 2]>,
     faces: BTreeSet<[u32; 3]>,
 }
 
-impl Edit {
-    fn new(mesh: &MedialMesh) -> Self {
+impl<'a> Edit<'a> {
+    fn new(mesh: &'a MedialMesh) -> Self {
         Self {
+            sheets: Crossings::new(&mesh.faces, |f| corners_of(mesh, mesh.faces[f as usize])),
             spheres: mesh.spheres.clone(),
             edges: mesh.edges.iter().copied().collect(),
             faces: mesh.faces.iter().copied().collect(),
@@ -137,6 +143,14 @@ impl Edit {
             let far = (0..3).min_by(|&i, &j| row.weights[i].total_cmp(&row.weights[j]));
             base.remove(far.unwrap_or(0));
         }
+        if let [a, b] = *base
+            && self.crosses([a, b], ball.centre)
+        {
+            // Over the corner alone that serves the place most.
+            let weight = |v: u32| corners.iter().zip(row.weights).find(|&(&w, _)| w == v);
+            let [x, y] = [a, b].map(|v| weight(v).map_or(0.0, |(_, weight)| weight));
+            base.retain(|&v| v == if x < y { b } else { a });
+        }
         let new = self.push(ball);
         for &v in &base {
             self.edges.insert([v, new]);
@@ -145,6 +159,13 @@ impl Edit {
             self.faces.insert([a.min(b), a.max(b), new]);
         }
         true
+    }
+
+    /// Whether a face of an edge and a new centre would cross another one.
+    fn crosses(&self, [a, b]: [u32; 2], centre: Vec3) -> bool {
+        let [p, q] = [a, b].map(|v| self.spheres[v as usize].centre);
+        let new = self.spheres.len() as u32;
+        !self.sheets.of([a, b, new], [p, q, centre]).is_empty()
     }
 
     fn push(&mut self, sphere: Sphere) -> u32 {

@@ -55,6 +55,7 @@ mod params;
 mod patch;
 mod rounds;
 mod rows;
+mod sheets;
 mod start;
 
 #[cfg(test)]
@@ -62,7 +63,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use medial::complex::MedialMesh;
+use medial::complex::{MedialMesh, crossing_faces};
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
@@ -188,6 +189,7 @@ impl Prepared {
     ) -> Result<MedialMesh, SimplifyError> {
         let Self { goal, params, run, .. } = self;
         let is_polish = start.spheres.len() <= count;
+        diagnostics.count("crossing_faces_of_the_start", crossing_faces(&start).len());
         let mut descent = Descent::new(goal, goal.points(count), start)?;
         if is_polish {
             if descent.mesh.spheres.len() < count {

@@ -7,9 +7,11 @@
 use medial::complex::{MedialMesh, MedialUnion, Sphere};
 use medial::simplifier::{RunContext, SimplifyError};
 
-use super::descent::{Descent, Objective};
+use super::descent::{Descent, Objective, Rest};
 use super::goal::{Goal, Points};
+use super::guard::Still;
 use super::rows::union_of;
+use super::sheets::corners;
 
 /// Edges from a place to the spheres that move with it.
 const RINGS: usize = 2;
@@ -43,8 +45,10 @@ impl Patch<'_> {
         };
         let (points, limits) = self.nearby(&union_of(&part.mesh)?, rest.as_ref());
         let share = part.mesh.spheres.len() as f64 / mesh.spheres.len() as f64;
+        let still = part.still(mesh, &moving);
         let Part { mesh: own, fixed, .. } = part;
-        let mut descent = Descent::of_part(self.goal, points, own, fixed, limits, share)?;
+        let around = Rest { fixed, limits, still };
+        let mut descent = Descent::of_part(self.goal, points, own, around, share)?;
         for &(power, steps) in stages {
             descent.run(Objective::power(power, descent.largest()), steps, run)?;
         }
@@ -139,6 +143,20 @@ impl Part {
         let own: Vec<Sphere> = spheres.iter().map(|&v| mesh.spheres[v as usize]).collect();
         let mesh = MedialMesh { spheres: own, edges, faces, contacts: None };
         Self { mesh, spheres, fixed }
+    }
+
+    /// The faces of the whole mesh without a moving corner, with its spheres numbered as in the part, and
+    /// those that are not in it after them.
+    fn still(&self, whole: &MedialMesh, moving: &[bool]) -> Still {
+        let own = self.spheres.len() as u32;
+        let mut place: Vec<u32> = (0..whole.spheres.len() as u32).map(|v| own + v).collect();
+        for (new, &v) in (0..).zip(&self.spheres) {
+            place[v as usize] = new;
+        }
+        let still = whole.faces.iter().filter(|face| !face.iter().any(|&v| moving[v as usize]));
+        let (faces, corners) =
+            still.map(|face| (face.map(|v| place[v as usize]), corners(whole, *face))).unzip();
+        Still { faces, corners }
     }
 }
 

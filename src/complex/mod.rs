@@ -3,6 +3,7 @@
 mod closure;
 pub mod collapse;
 mod contour;
+mod crossing;
 mod cubical;
 mod formats;
 mod incidence;
@@ -18,6 +19,7 @@ mod voronoi_facets;
 pub use contour::{
     ContourError, UnionSurface, union_surface, union_surface_while, union_surface_within,
 };
+pub use crossing::{Crossings, crossing_faces};
 pub use cubical::cubical_betti;
 pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
 pub use incidence::Incidence;

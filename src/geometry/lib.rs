@@ -6,6 +6,7 @@
 //! | [`DualComplex`], [`UnionBoundary`] | the alpha complex of balls, and the vertices of their union's boundary |
 //! | [`Poles`], [`PowerCrust`] | polar balls of a sample, and the surface between inner and outer balls |
 //! | [`Sphere`], [`Cone`], [`Slab`] | signed distances to a ball and to the hulls of two and of three |
+//! | [`TriangleTree`] | the triangles that cross another one, beyond what they share |
 //! | [`trees::PointTree`] | the nearest point, and the points within a distance |
 //! | [`trees`] | box trees for your own searches: best first, overlapping, four boxes at a time |
 //! | [`predicates`] | signs that no rounding can turn |
@@ -53,6 +54,7 @@ mod slab;
 mod sphere;
 mod tangent_planes;
 pub mod trees;
+mod triangles_meet;
 pub mod triangulation;
 pub mod union_boundary;
 
@@ -68,6 +70,7 @@ pub use separation::separation_angle;
 pub use slab::{Slab, SlabFace};
 pub use sphere::{HullFoot, Sphere};
 pub use tangent_planes::{ConeFrame, SlabPlanes};
+pub use triangles_meet::{TriangleTree, triangles_meet};
 pub use triangulation::{CellId, TriangulationError, VertexId};
 pub use union_boundary::{MergedVertices, UnionBoundary, UnionVertex};
 

@@ -1,25 +1,15 @@
 //! Pairs of faces that meet outside their common vertices and edges. Exact.
 //!
-//! Two triangles intersect if and only if an edge of one meets the other, both taken with their
-//! boundary. By the number of vertices they share:
-//!
-//! - none: each edge of one is tested against the other, unless one triangle lies strictly on one
-//!   side of the other's plane;
-//! - one: in each, the edge opposite to the shared vertex is tested against the other triangle. If
-//!   they meet in more than the vertex, they meet in a segment from there, which ends on one of these
-//!   two edges (or runs along an edge to its end, which lies on one of them);
-//! - two: they meet in more than the edge if and only if they lie in one plane on the same side.
-//!
-//! Vertices are shared if they have the same index. Faces of zero area are not tested; they are
-//! reported separately.
+//! Vertices are shared if they have the same index; see [`triangles_meet`]. Faces of zero area are not
+//! tested; they are reported separately.
 
 use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
 use crate::Vec3;
-use crate::geometry::predicates::{Point2, Sign, orient2d, orient3d, project, projection_axis};
-use crate::geometry::trees::{Bounds, Node, Plan, Tree};
+use crate::geometry::predicates::projection_axis;
+use crate::geometry::{TriangleTree, triangles_meet};
 
 /// The intersecting pairs of a mesh.
 #[derive(Debug, Default)]
@@ -56,8 +46,7 @@ pub(super) fn intersections(
         .into_par_iter()
         .map(|face| projection_axis(corners(face)).is_none())
         .collect();
-    let solid = (0..faces.len() as u32).filter(|&face| !flat[face as usize]);
-    let tree = BoxTree::new(solid.collect(), corners);
+    let tree = TriangleTree::new(0..faces.len() as u32, corners);
     let mut found = Intersections {
         complete: true,
         degenerate_faces: flat.iter().filter(|&&f| f).count(),
@@ -65,8 +54,8 @@ pub(super) fn intersections(
         ..Intersections::default()
     };
     let mut budget = 5_000_000 + 200 * faces.len();
-    for block in (0..tree.ids.len()).step_by(BLOCK) {
-        let end = (block + BLOCK).min(tree.ids.len());
+    for block in (0..tree.len()).step_by(BLOCK) {
+        let end = (block + BLOCK).min(tree.len());
         let partial: Vec<Partial> =
             (block..end).into_par_iter().map(|item| meets(&tree, item, faces, component)).collect();
         for part in partial {
@@ -78,30 +67,12 @@ pub(super) fn intersections(
         }
         found.components.sort_unstable();
         found.components.dedup();
-        if budget == 0 && end < tree.ids.len() {
+        if budget == 0 && end < tree.len() {
             found.complete = false;
             break;
         }
     }
     found
-}
-
-/// Faces with the boxes around them, in leaf order, so that a query reads memory in one direction.
-struct BoxTree {
-    tree: Tree,
-    ids: Vec<u32>,
-    triangles: Vec<[Vec3; 3]>,
-}
-
-impl BoxTree {
-    fn new(faces: Vec<u32>, corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
-        let boxes = faces.iter().map(|&face| (Bounds::of_points(corners(face)), 0.0));
-        let plan = Plan { max_leaf: 4, group: 4, padding: 0.0 };
-        let tree = Tree::build(&boxes.collect::<Vec<_>>(), plan);
-        let ids: Vec<u32> = tree.order().iter().map(|&item| faces[item as usize]).collect();
-        let triangles = ids.iter().map(|&face| corners(face)).collect();
-        Self { tree, ids, triangles }
-    }
 }
 
 /// The intersections of one face with faces of larger index.
@@ -113,21 +84,23 @@ struct Partial {
     components: Vec<[u32; 2]>,
 }
 
-fn meets(tree: &BoxTree, item: usize, faces: &[[u32; 3]], component: &[u32]) -> Partial {
-    let (face, triangle) = (tree.ids[item], tree.triangles[item]);
-    let own = Bounds::of_points(triangle);
+fn meets(tree: &TriangleTree, item: usize, faces: &[[u32; 3]], component: &[u32]) -> Partial {
+    let (face, triangle) = tree.at(item);
     let mut part = Partial { pairs: 0, tests: 0, first: None, complete: true, components: vec![] };
-    let mut look_at = |other_item: usize| {
-        let (other, other_triangle) = (tree.ids[other_item], tree.triangles[other_item]);
+    tree.overlapping(triangle, |other, other_triangle| {
         part.tests += 1;
         if part.tests > MAX_TESTS_PER_FACE {
             part.complete = false;
             return ControlFlow::Break(());
         }
-        // Each pair once, from the smaller index, and cheap tests before exact ones.
+        // Each pair once, from the smaller index.
         if other <= face
-            || !own.overlaps(&Bounds::of_points(other_triangle))
-            || !faces_meet(faces[face as usize], triangle, faces[other as usize], other_triangle)
+            || !triangles_meet(
+                faces[face as usize],
+                triangle,
+                faces[other as usize],
+                other_triangle,
+            )
         {
             return ControlFlow::Continue(());
         }
@@ -139,85 +112,8 @@ fn meets(tree: &BoxTree, item: usize, faces: &[[u32; 3]], component: &[u32]) -> 
             part.components.push(pair);
         }
         ControlFlow::Continue(())
-    };
-    let overlaps = |_: usize, node: &Node| node.bounds.overlaps(&own);
-    tree.tree.descend(overlaps, |places| places.into_iter().try_for_each(&mut look_at));
+    });
     part
-}
-
-/// Whether two faces of positive area share more than vertices and edges.
-fn faces_meet(f: [u32; 3], s: [Vec3; 3], g: [u32; 3], t: [Vec3; 3]) -> bool {
-    let shared = |i: usize| g.iter().position(|&v| v == f[i]);
-    let mut common = (0..3).filter_map(|i| shared(i).map(|j| (i, j)));
-    match (common.next(), common.next(), common.next()) {
-        (None, ..) => triangles_meet(s, t),
-        (Some((i, j)), None, _) => {
-            segment_meets(opposite(s, i), t) || segment_meets(opposite(t, j), s)
-        }
-        (Some((i, j)), Some((k, l)), None) => folded(s[i], s[k], s[3 - i - k], t[3 - j - l]),
-        _ => true,
-    }
-}
-
-fn opposite(t: [Vec3; 3], corner: usize) -> [Vec3; 2] {
-    [t[(corner + 1) % 3], t[(corner + 2) % 3]]
-}
-
-/// Whether the triangles `a, b, p` and `a, b, q` lie in one plane on the same side of `a, b`.
-fn folded(a: Vec3, b: Vec3, p: Vec3, q: Vec3) -> bool {
-    if !orient3d(a, b, p, q).is_zero() {
-        return false;
-    }
-    projection_axis([a, b, p]).is_some_and(|(axis, turn)| {
-        orient2d(project(a, axis), project(b, axis), project(q, axis)) == turn
-    })
-}
-
-fn triangles_meet(s: [Vec3; 3], t: [Vec3; 3]) -> bool {
-    let apart = |plane: [Vec3; 3], other: [Vec3; 3]| {
-        let [x, y, z] = other.map(|p| orient3d(plane[0], plane[1], plane[2], p));
-        !x.is_zero() && x == y && y == z
-    };
-    if apart(t, s) || apart(s, t) {
-        return false;
-    }
-    (0..3).any(|i| segment_meets(opposite(s, i), t) || segment_meets(opposite(t, i), s))
-}
-
-/// Whether a segment and a triangle of positive area meet, both with their ends.
-fn segment_meets([p, q]: [Vec3; 2], triangle: [Vec3; 3]) -> bool {
-    let [a, b, c] = triangle;
-    let (above, below) = (orient3d(a, b, c, p), orient3d(a, b, c, q));
-    if above.is_zero() && below.is_zero() {
-        return meets_in_plane([p, q], triangle);
-    }
-    if above == below {
-        return false;
-    }
-    // The line pq passes the triangle if it turns the same way around all three sides.
-    let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
-    !(turns.contains(&Sign::Positive) && turns.contains(&Sign::Negative))
-}
-
-/// Whether a segment in the plane of a triangle meets it.
-fn meets_in_plane([p, q]: [Vec3; 2], triangle: [Vec3; 3]) -> bool {
-    let Some((axis, turn)) = projection_axis(triangle) else { return false };
-    let flat = triangle.map(|v| project(v, axis));
-    let [p, q] = [p, q].map(|v| project(v, axis));
-    let contains =
-        |x: Point2| (0..3).all(|i| !orient2d(flat[i], flat[(i + 1) % 3], x).opposes(turn));
-    contains(p) || contains(q) || (0..3).any(|i| segments_meet(p, q, flat[i], flat[(i + 1) % 3]))
-}
-
-fn segments_meet(p: Point2, q: Point2, a: Point2, b: Point2) -> bool {
-    let (pa, pb) = (orient2d(p, q, a), orient2d(p, q, b));
-    let (ap, aq) = (orient2d(a, b, p), orient2d(a, b, q));
-    if [pa, pb, ap, aq].iter().all(|s| s.is_zero()) {
-        // On one line: their extents overlap in both coordinates.
-        return (0..2)
-            .all(|i| p[i].min(q[i]) <= a[i].max(b[i]) && a[i].min(b[i]) <= p[i].max(q[i]));
-    }
-    pa.value() * pb.value() <= 0 && ap.value() * aq.value() <= 0
 }
 
 #[cfg(test)]
