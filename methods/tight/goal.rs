@@ -16,6 +16,9 @@ use rand_pcg::Pcg64;
 /// Samples of the surface, below 500 spheres; twice as many from there on.
 const SAMPLES: usize = 10_000;
 
+/// There are at most this many times fewer vertices among the samples.
+const SHARE_OF_VERTICES: usize = 4;
+
 /// Makes the random numbers differ from those of the start and of the judge with the same seed.
 const STREAM: u64 = 0x7469_6768_7421_0a0b;
 
@@ -108,7 +111,7 @@ impl Goal {
         let vertices = surface.vertices.iter().zip(used).filter(|&(_, used)| used);
         let vertices: Vec<Vec3> = vertices.map(|(&point, _)| point).collect();
         // Of a finely meshed surface a share is enough: corners are sampled by the others, too.
-        let every = vertices.len().div_ceil(count);
+        let every = vertices.len().div_ceil(count / SHARE_OF_VERTICES);
         let vertices = vertices.into_iter().step_by(every.max(1));
         let vertices = vertices.map(|point| Sample { point, weight: ASIDE });
         let samples = spread.into_iter().map(|point| Sample { point, weight: 1.0 });

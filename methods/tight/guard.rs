@@ -10,6 +10,9 @@ use medial::complex::{Crossings, MedialMesh};
 use super::goal::Goal;
 use super::sheets::corners;
 
+/// Times that the step of a sphere is halved before it is taken back altogether.
+const HALVINGS: usize = 4;
+
 /// Faces that stay where they are, beside a mesh that moves. Vertices that are not of the mesh have larger
 /// numbers than those that are.
 #[derive(Clone, Debug, Default)]
@@ -20,18 +23,24 @@ pub(super) struct Still {
 
 /// What a mesh must not come to do while its spheres move.
 pub(super) struct Guard {
-    /// The faces of the mesh, and then those that stay.
-    faces: Vec<[u32; 3]>,
-    still: Vec<[Vec3; 3]>,
+    still: Crossings,
     /// Pairs that cross already.
-    known: BTreeSet<[u32; 2]>,
+    known: BTreeSet<Pair>,
+}
+
+/// A face of a mesh, and one that it crosses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Pair {
+    Moving([u32; 2]),
+    Still([u32; 2]),
 }
 
 impl Guard {
     pub fn new(mesh: &MedialMesh, still: Still) -> Self {
-        let faces = mesh.faces.iter().copied().chain(still.faces).collect();
-        let mut this = Self { faces, still: still.corners, known: BTreeSet::new() };
-        this.known = this.crossing(mesh).into_iter().collect();
+        let Still { faces, corners } = still;
+        let tree = Crossings::new(faces, |f| corners[f as usize]);
+        let mut this = Self { still: tree, known: BTreeSet::new() };
+        this.known = this.crossing(mesh, |_| true).into_iter().collect();
         this
     }
 
@@ -40,11 +49,20 @@ impl Guard {
     pub fn hold(&self, before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) {
         clamp(after, goal);
         // Taking one vertex back can fold another face of it. This ends: what is all taken back is as before.
+        let mut halvings = vec![0; before.spheres.len()];
+        // The faces that are looked at: all, and then those of what was taken back.
+        let mut changed = vec![true; before.spheres.len()];
         loop {
             let mut back: Vec<[u32; 3]> = before.faces.iter().copied().collect();
             back.retain(|&face| folds_over(corners(before, face), corners(after, face)));
-            let new = self.crossing(after).into_iter().filter(|pair| !self.known.contains(pair));
-            back.extend(new.flatten().map(|face| self.faces[face as usize]));
+            let new = self.crossing(after, |face| face.iter().any(|&v| changed[v as usize]));
+            let new = new.into_iter().filter(|pair| !self.known.contains(pair));
+            for pair in new {
+                match pair {
+                    Pair::Moving(faces) => back.extend(faces.map(|f| before.faces[f as usize])),
+                    Pair::Still([face, _]) => back.push(before.faces[face as usize]),
+                }
+            }
             let moved = |v: &u32| {
                 let of = |mesh: &MedialMesh| mesh.spheres.get(*v as usize).copied();
                 of(before) != of(after)
@@ -53,19 +71,35 @@ impl Guard {
             if back.is_empty() {
                 break;
             }
+            changed.fill(false);
             for v in back {
-                after.spheres[v as usize] = before.spheres[v as usize];
+                changed[v as usize] = true;
+                let (old, new) = (before.spheres[v as usize], &mut after.spheres[v as usize]);
+                let halvings = &mut halvings[v as usize];
+                *halvings += 1;
+                let half = old.lerp(*new, 0.5);
+                let is_inside = *halvings < HALVINGS && goal.clamped(&[half.centre])[0].is_none();
+                *new = if is_inside { half } else { old };
             }
         }
     }
 
-    fn crossing(&self, mesh: &MedialMesh) -> Vec<[u32; 2]> {
-        let own = mesh.faces.len();
-        let of = |face: u32| match (face as usize).checked_sub(own) {
-            Some(still) => self.still[still],
-            None => corners(mesh, self.faces[face as usize]),
-        };
-        Crossings::new(&self.faces, of).pairs()
+    /// The pairs with a face of the mesh for which `is_asked`.
+    fn crossing(
+        &self,
+        mesh: &MedialMesh,
+        is_asked: impl Fn(&[u32; 3]) -> bool + Sync,
+    ) -> Vec<Pair> {
+        let of = |face: u32| corners(mesh, mesh.faces[face as usize]);
+        let moving = Crossings::new(mesh.faces.clone(), of);
+        let moving = moving.pairs_with(|face| is_asked(&mesh.faces[face as usize]));
+        let moving = moving.into_iter().map(Pair::Moving);
+        let asked = (0..mesh.faces.len() as u32).filter(|&f| is_asked(&mesh.faces[f as usize]));
+        let still = asked.flat_map(|face| {
+            let others = self.still.of(mesh.faces[face as usize], of(face));
+            others.into_iter().map(move |other| Pair::Still([face, other]))
+        });
+        moving.chain(still).collect()
     }
 }
 

@@ -91,18 +91,20 @@ fn with_inserted(descent: &Descent<'_>, count: usize, skipped: usize) -> Option<
 }
 
 /// A complex to which simplices are added.
-struct Edit<'a> {
+struct Edit {
     /// The faces that were there first.
-    sheets: Crossings<'a>,
+    sheets: Crossings,
     spheres: Vec<Sphere>,
     edges: BTreeSet<[u32; 2]>,
     faces: BTreeSet<[u32; 3]>,
 }
 
-impl<'a> Edit<'a> {
-    fn new(mesh: &'a MedialMesh) -> Self {
+impl Edit {
+    fn new(mesh: &MedialMesh) -> Self {
         Self {
-            sheets: Crossings::new(&mesh.faces, |f| corners_of(mesh, mesh.faces[f as usize])),
+            sheets: Crossings::new(mesh.faces.clone(), |f| {
+                corners_of(mesh, mesh.faces[f as usize])
+            }),
             spheres: mesh.spheres.clone(),
             edges: mesh.edges.iter().copied().collect(),
             faces: mesh.faces.iter().copied().collect(),

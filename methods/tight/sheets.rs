@@ -15,7 +15,7 @@ type Face = [u32; 3];
 pub(super) struct Sheets<'a> {
     mesh: &'a MedialMesh,
     /// The faces as they were when the pass began.
-    first: Crossings<'a>,
+    first: Crossings,
     /// Pairs that cross, by the vertices that they have now.
     known: Vec<[Face; 2]>,
     /// Faces that collapses moved.
@@ -26,7 +26,7 @@ pub(super) struct Sheets<'a> {
 
 impl<'a> Sheets<'a> {
     pub fn new(mesh: &'a MedialMesh) -> Self {
-        let first = Crossings::new(&mesh.faces, |f| corners(mesh, mesh.faces[f as usize]));
+        let first = Crossings::new(mesh.faces.clone(), |f| corners(mesh, mesh.faces[f as usize]));
         let pairs = first.pairs().into_iter();
         let known = pairs.map(|pair| pair.map(|f| mesh.faces[f as usize])).collect();
         Self { mesh, first, known, moved: vec![], is_moved: vec![false; mesh.spheres.len()] }

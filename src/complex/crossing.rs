@@ -19,47 +19,67 @@ use crate::geometry::{TriangleTree, triangles_meet};
 /// If a face is out of range; see [`MedialMesh::check`].
 pub fn crossing_faces(mesh: &MedialMesh) -> Vec<[u32; 2]> {
     let corners = |face: u32| mesh.faces[face as usize].map(|v| mesh.spheres[v as usize].centre);
-    Crossings::new(&mesh.faces, corners).pairs()
+    Crossings::new(mesh.faces.clone(), corners).pairs()
 }
 
 /// Faces in a tree, for the pairs that cross.
 #[derive(Clone, Debug)]
-pub struct Crossings<'a> {
-    faces: &'a [[u32; 3]],
+pub struct Crossings {
+    faces: Vec<[u32; 3]>,
     tree: TriangleTree,
 }
 
-impl<'a> Crossings<'a> {
+impl Crossings {
     /// The faces of these vertices, with the corners `corners(face)`.
-    pub fn new(faces: &'a [[u32; 3]], corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
-        Self { faces, tree: TriangleTree::new(0..faces.len() as u32, corners) }
+    pub fn new(faces: Vec<[u32; 3]>, corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
+        let tree = TriangleTree::new(0..faces.len() as u32, corners);
+        Self { faces, tree }
     }
 
     /// The faces that cross one with these vertices and corners, ascending. It need not be one of them.
     pub fn of(&self, face: [u32; 3], corners: [Vec3; 3]) -> Vec<u32> {
+        self.among(face, corners, |_| true)
+    }
+
+    /// All pairs that cross, ascending.
+    pub fn pairs(&self) -> Vec<[u32; 2]> {
+        self.pairs_with(|_| true)
+    }
+
+    /// The pairs that cross and have a face for which `is_asked`, ascending.
+    pub fn pairs_with(&self, is_asked: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
+        let of = |place: usize| {
+            let (face, corners) = self.tree.at(place);
+            let others = if is_asked(face) {
+                // Each pair once, and no face with itself.
+                let is_later = |other: u32| other > face || (other < face && !is_asked(other));
+                self.among(self.faces[face as usize], corners, is_later)
+            } else {
+                vec![]
+            };
+            others.into_iter().map(move |other| [face.min(other), face.max(other)])
+        };
+        let mut pairs: Vec<[u32; 2]> =
+            (0..self.tree.len()).into_par_iter().flat_map_iter(of).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    fn among(
+        &self,
+        face: [u32; 3],
+        corners: [Vec3; 3],
+        is_asked: impl Fn(u32) -> bool,
+    ) -> Vec<u32> {
         let mut found = vec![];
         self.tree.overlapping(corners, |other, place| {
-            if triangles_meet(face, corners, self.faces[other as usize], place) {
+            if is_asked(other) && triangles_meet(face, corners, self.faces[other as usize], place) {
                 found.push(other);
             }
             ControlFlow::Continue(())
         });
         found.sort_unstable();
         found
-    }
-
-    /// All pairs that cross, ascending.
-    pub fn pairs(&self) -> Vec<[u32; 2]> {
-        let of = |place: usize| {
-            let (face, corners) = self.tree.at(place);
-            let others = self.of(self.faces[face as usize], corners);
-            // Each pair once; a face meets itself.
-            others.into_iter().filter(move |&other| other > face).map(move |other| [face, other])
-        };
-        let mut pairs: Vec<[u32; 2]> =
-            (0..self.tree.len()).into_par_iter().flat_map_iter(of).collect();
-        pairs.sort_unstable();
-        pairs
     }
 }
 
