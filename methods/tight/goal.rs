@@ -34,6 +34,9 @@ const POOL: usize = 60_000;
 /// Cells along the longest side of the grid in which interior points are laid out.
 const GRID: usize = 40;
 
+/// How far below the surface a clamped centre is, so that rounding does not leave it outside.
+const WITHIN: f64 = 1e-9;
+
 /// Times that a ball is shrunk at most; the share of its radius that may be occupied; its least radius.
 const SHRINKS: usize = 30;
 const EMPTY: f64 = 1e-3;
@@ -190,11 +193,15 @@ impl Goal {
         if self.inside.side(p) == Side::Inside { closest.distance } else { -closest.distance }
     }
 
-    /// A point of the surface closest to each centre that is outside of the solid.
+    /// A point next to the surface for each centre that is outside of the solid, the closest but for rounding.
     pub fn clamped(&self, centres: &[Vec3]) -> Vec<Option<Vec3>> {
         let outside = |side| side == Side::Outside;
         let sides = self.inside.sides(centres);
-        let clamp = |(&c, side)| outside(side).then(|| self.tree.closest(c).point);
+        let onto = |c| {
+            let closest = self.tree.closest(c);
+            closest.point - WITHIN * self.normal(closest.face)
+        };
+        let clamp = |(&c, side)| outside(side).then(|| onto(c));
         centres.iter().zip(sides).map(clamp).collect()
     }
 
