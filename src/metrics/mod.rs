@@ -37,5 +37,5 @@ pub use quality::triangle_quality;
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
 pub use surface_distance::{SurfaceDistances, surface_distances};
 pub use topology::topology_warning;
-pub use union_topology::union_betti;
+pub use union_topology::{cover_betti, union_betti};
 pub use volume::{VolumeOptions, enclosed_volume, volume_error};
