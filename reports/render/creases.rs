@@ -18,9 +18,14 @@ const MOST_AROUND: usize = 64;
 pub(super) struct Creases {
     /// At the three corners.
     pub(super) normals: Vec<[Vec3; 3]>,
-    /// Whether the side from corner `k` to `k + 1` is sharp, or has no or several faces beyond.
+    /// Whether the side from corner `k` to `k + 1` is sharp, or has no or several faces beyond, and is part of a long
+    /// crease.
     pub(super) sharp: Vec<[bool; 3]>,
 }
+
+/// Sharp edges that are connected are shown if they are longer together than this, as a share of the surface's diagonal:
+/// shorter ones are noise of a smooth surface, a drilled hole is longer.
+const SHORTEST: f64 = 0.06;
 
 /// Finds the creases of a surface. Cost linear in its size but for a sort of its sides.
 pub(super) fn creases(mesh: &TriMesh) -> Creases {
@@ -42,7 +47,9 @@ pub(super) fn creases(mesh: &TriMesh) -> Creases {
     };
     let normals = (0..mesh.faces.len()).into_par_iter();
     let normals = normals.map(|face| [0, 1, 2].map(|k| corner(face, k))).collect();
-    Creases { normals, sharp: sharp_sides(mesh, &flat, smooth) }
+    let mut sharp = sharp_sides(mesh, &flat, smooth);
+    drop_short(mesh, &mut sharp);
+    Creases { normals, sharp }
 }
 
 fn normal(mesh: &TriMesh, face: usize) -> Vec3 {
@@ -115,4 +122,41 @@ fn sharp_sides(mesh: &TriMesh, flat: &[Vec3], smooth: f64) -> Vec<[bool; 3]> {
         }
     }
     sharp
+}
+
+/// Drops the sharp sides that are connected to few others.
+fn drop_short(mesh: &TriMesh, sharp: &mut [[bool; 3]]) {
+    let sides: Vec<[usize; 4]> = sharp
+        .iter()
+        .enumerate()
+        .flat_map(|(face, sharp)| (0..3).filter(|&k| sharp[k]).map(move |k| [face, k]))
+        .map(|[face, k]| {
+            let corners = mesh.faces[face];
+            [face, k, corners[k] as usize, corners[(k + 1) % 3] as usize]
+        })
+        .collect();
+    let mut parent: Vec<usize> = (0..mesh.vertices.len()).collect();
+    for &[_, _, a, b] in &sides {
+        let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+        parent[a.max(b)] = a.min(b);
+    }
+    let mut lengths = vec![0.0; mesh.vertices.len()];
+    for &[_, _, a, b] in &sides {
+        // Either face of an edge has it among its sides.
+        let half = 0.5 * mesh.vertices[a].distance(mesh.vertices[b]);
+        lengths[root(&mut parent, a)] += half;
+    }
+    let diagonal = mesh.bounding_box().map_or(0.0, |(lo, hi)| lo.distance(hi));
+    for [face, k, a, _] in sides {
+        sharp[face][k] = lengths[root(&mut parent, a)] >= SHORTEST * diagonal;
+    }
+}
+
+/// The first vertex of a connected set; paths are halved on the way.
+fn root(parent: &mut [usize], mut vertex: usize) -> usize {
+    while parent[vertex] != vertex {
+        parent[vertex] = parent[parent[vertex]];
+        vertex = parent[vertex];
+    }
+    vertex
 }

@@ -82,7 +82,7 @@ impl Scale {
 }
 
 /// Plain colours: the surface, sheets, curves.
-const GREY: [u8; 3] = [0xC9, 0xCC, 0xD1];
+const GREY: [u8; 3] = [0xD6, 0xD9, 0xDD];
 const SHEET: [u8; 3] = [0x6F, 0xA8, 0xDC];
 const CURVE: [u8; 3] = [0xD5, 0x5E, 0x00];
 

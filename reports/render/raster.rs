@@ -44,6 +44,8 @@ pub(super) struct PixelLight {
     pub(super) covered: f32,
     /// Depth of what is not glass, in pixels; without meaning where nothing is covered.
     pub(super) depth: f32,
+    /// Depth of the farthest of it.
+    pub(super) farthest: f32,
 }
 
 /// A facet on the picture, its corners in clockwise order as seen there.
@@ -343,7 +345,7 @@ impl Band {
 
     /// The light of a pixel, by its row and column in the band.
     fn pixel(&self, row: usize, column: usize, lit: &Lit<'_>) -> PixelLight {
-        let mut sum = PixelLight::default();
+        let mut sum = PixelLight { farthest: f32::NEG_INFINITY, ..PixelLight::default() };
         for k in 0..SIDE * SIDE {
             let (y, x) = (row * SIDE + k / SIDE, column * SIDE + k % SIDE);
             let sample = y * self.columns + x;
@@ -357,7 +359,9 @@ impl Band {
             sum.solid = std::array::from_fn(|c| sum.solid[c] + through * light[c]);
             sum.solid_share += through;
             sum.covered += 1.0;
-            sum.depth += (lit.scale * lit.frame.depth(self.nearness[sample])) as f32;
+            let depth = (lit.scale * lit.frame.depth(self.nearness[sample])) as f32;
+            sum.depth += depth;
+            sum.farthest = sum.farthest.max(depth);
         }
         sum.mean()
     }
@@ -373,6 +377,7 @@ impl PixelLight {
             glass_share: self.glass_share / count,
             covered: self.covered / count,
             depth: if self.covered > 0.0 { self.depth / self.covered } else { 0.0 },
+            farthest: self.farthest,
         }
     }
 }

@@ -12,7 +12,7 @@ use super::raster::PixelLight;
 const LAMP: [f64; 3] = [-0.38, 0.48, 0.79];
 
 /// Share of light that comes from everywhere.
-const AMBIENT: f32 = 0.30;
+const AMBIENT: f32 = 0.34;
 
 /// Lines along sides, nearly black.
 pub(super) const LINE: Light = [0.006, 0.006, 0.008];
@@ -21,7 +21,7 @@ pub(super) const LINE: Light = [0.006, 0.006, 0.008];
 pub(super) const GLASS: Light = [0.17, 0.23, 0.32];
 
 /// How much a layer of glass covers where it faces the eye, and where it is seen from its side.
-const GLASS_OPACITY: [f32; 2] = [0.035, 0.55];
+const GLASS_OPACITY: [f32; 2] = [0.035, 0.75];
 
 /// The light from a place with this normal, of either direction and any length.
 pub(super) fn shade(frame: &Frame, normal: Vec3, colour: Light) -> Light {
@@ -49,7 +49,7 @@ const RINGS: usize = 3;
 const PAIRS: usize = 8;
 
 /// How dark crevices are, 0 to 1.
-const DEPTH_OF_SHADE: f32 = 0.75;
+const DEPTH_OF_SHADE: f32 = 0.8;
 
 /// Shares of light that crevices, and places behind near edges, are left with. By depth alone: a pixel is
 /// darkened where it lies behind the middle of opposite neighbours, so that a slanted plane is not.
@@ -79,14 +79,17 @@ pub(super) fn crevices(pixels: &[PixelLight], width: usize, height: usize) -> Ve
         }
         let (x, y) = ((index % width) as i64, (index / width) as i64);
         let hidden = |&(radius, [dx, dy]): &(f32, [i64; 2])| {
-            // Depth counts to the ring's radius only: a far edge must not be darker than a near one.
-            let above = |depth: Option<f32>| {
-                depth.map_or(0.0, |depth| ((here.depth - depth) / radius).clamp(-1.0, 1.0))
+            // Beside the background nothing is known of the other side.
+            let (Some(a), Some(b)) = (depth_at(x + dx, y + dy), depth_at(x - dx, y - dy)) else {
+                return 0.0;
             };
-            (above(depth_at(x + dx, y + dy)) + above(depth_at(x - dx, y - dy))).max(0.0)
+            // Of a pixel that shows two parts the farther one counts: the edge between them would shine.
+            // Depth counts to the ring's radius only: a far edge must not be darker than a near one.
+            let above = |depth: f32| ((here.farthest - depth) / radius).clamp(-1.0, 1.0);
+            (above(a) + above(b)).max(0.0)
         };
         let mean = offsets.iter().map(hidden).sum::<f32>() / offsets.len() as f32;
-        1.0 - DEPTH_OF_SHADE * (1.6 * mean).min(1.0)
+        1.0 - DEPTH_OF_SHADE * mean.min(1.0)
     };
     (0..pixels.len()).into_par_iter().map(share).collect()
 }
