@@ -105,7 +105,8 @@ impl Bar {
             // Signs hang out to the left, so that digits stand below each other.
             let digits = text.trim_start_matches('−');
             let sign = text_width(&text, size) - text_width(digits, size);
-            let room = if lo < 0.0 { text_width("−0", size) - text_width("0", size) } else { 0.0 };
+            let room =
+                if lo < 0.0 { text_width("−0", size) - text_width("0", size) } else { 0.0 };
             let at = (x + wide + length) as f64 + 0.5 * size + room - sign;
             letters.write(picture, [at, y as f64 + 0.5 + 0.5 * size], &text);
         }
@@ -113,7 +114,7 @@ impl Bar {
 }
 
 /// About this many ticks are drawn.
-const TICKS: f64 = 5.0;
+const TICKS: f64 = 6.0;
 
 /// Round values in a range, and what stands beside them; the value itself where the range has no extent.
 fn ticks(lo: f64, hi: f64) -> Vec<(f64, String)> {
@@ -140,7 +141,7 @@ fn with_minus(number: String) -> String {
 
 /// Decimals that show all digits of a step of 1, 2 or 5 times a power of ten.
 fn decimals(step: f64) -> usize {
-    (-step.log10() + 1e-9).ceil().clamp(0.0, 12.0) as usize
+    (-step.log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize
 }
 
 /// The least of 1, 2 and 5 times a power of ten that is not below a positive number.
@@ -156,9 +157,8 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_few() {
-        let words = |lo, hi| {
-            ticks(lo, hi).into_iter().map(|tick| tick.1).collect::<Vec<_>>().join(" ")
-        };
+        let words =
+            |lo, hi| ticks(lo, hi).into_iter().map(|tick| tick.1).collect::<Vec<_>>().join(" ");
         assert_eq!(words(0.13, 5.2), "1 2 3 4 5");
         assert_eq!(words(-2.0, 2.0), "−2 −1 0 1 2");
         assert_eq!(words(0.0, 0.05), "0.00 0.01 0.02 0.03 0.04 0.05");

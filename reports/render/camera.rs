@@ -232,8 +232,7 @@ impl Frame {
         let (lo, hi) = points.iter().fold((first, first), grown);
         let origin = 0.5 * (lo + hi);
         let radius = 0.5 * (hi - lo).length();
-        let distance =
-            camera.perspective.then(|| EYE_DISTANCE * radius.max(f64::MIN_POSITIVE));
+        let distance = camera.perspective.then(|| EYE_DISTANCE * radius.max(f64::MIN_POSITIVE));
         let (middle, half, zoom) = ([0.0; 2], [radius; 2], camera.zoom);
         let mut frame = Self { right, up, back, origin, distance, middle, half, zoom };
         frame.enclose(points);

@@ -37,11 +37,10 @@ pub(super) fn creases(mesh: &TriMesh) -> Creases {
         if around.len() > MOST_AROUND {
             return flat[face];
         }
-        let alike = around.iter().filter(|&&[other, _]| flat[face].dot(flat[other as usize]) > smooth);
+        let alike =
+            around.iter().filter(|&&[other, _]| flat[face].dot(flat[other as usize]) > smooth);
         let sum: Vec3 = alike
-            .map(|&[other, at]| {
-                angle(mesh, other as usize, at as usize) * flat[other as usize]
-            })
+            .map(|&[other, at]| angle(mesh, other as usize, at as usize) * flat[other as usize])
             .sum();
         sum.normalize_or(flat[face])
     };

@@ -17,7 +17,9 @@ pub enum RenderError {
     #[error("the camera looks from {0}, which is no direction: give three numbers, not all zero")]
     Direction(String),
     /// The camera has no upward direction.
-    #[error("{0} does not point upwards for this camera: take a direction across the line of sight")]
+    #[error(
+        "{0} does not point upwards for this camera: take a direction across the line of sight"
+    )]
     Up(String),
     /// The zoom is out of range.
     #[error("a zoom of {0}: ask for 0.05 to 50")]

@@ -158,7 +158,9 @@ impl Layer<'_> {
                 let paint = Paint::map(scale.map);
                 Ok(vec![Batch { facets, paint, lines: None, glass: false }])
             }
-            Self::Axis { mesh, colour } => Ok(vec![sheets(mesh, colour, canvas), curves(mesh, colour, canvas)]),
+            Self::Axis { mesh, colour } => {
+                Ok(vec![sheets(mesh, colour, canvas), curves(mesh, colour, canvas)])
+            }
         }
     }
 }
@@ -197,10 +199,16 @@ fn sheets(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> Batch {
             let used = edge(mesh, corners[k], corners[(k + 1) % 3]).map_or(0, |e| uses[e]);
             if used == 1 { 2 } else { 1 }
         });
-        Facet { corners: points, normals: [flat; 3], places: face_places(mesh, corners, colour), lines }
+        Facet {
+            corners: points,
+            normals: [flat; 3],
+            places: face_places(mesh, corners, colour),
+            lines,
+        }
     };
     let facets = mesh.faces.par_iter().map(facet).collect();
-    let fade = (median_length(mesh) * canvas.scale() - LINE_FADE[0]) / (LINE_FADE[1] - LINE_FADE[0]);
+    let fade =
+        (median_length(mesh) * canvas.scale() - LINE_FADE[0]) / (LINE_FADE[1] - LINE_FADE[0]);
     let lines = canvas.lines(SHEET_INK * fade.clamp(0.0, 1.0) as f32);
     Batch { facets, paint: paint(colour, SHEET), lines, glass: false }
 }

@@ -99,7 +99,8 @@ impl Lettering {
 fn distance(p: [f64; 2], [a, b]: &[[f64; 2]; 2]) -> f64 {
     let (u, v) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
     let square = u[0] * u[0] + u[1] * u[1];
-    let along = if square > 0.0 { ((u[0] * v[0] + u[1] * v[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
+    let along =
+        if square > 0.0 { ((u[0] * v[0] + u[1] * v[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
     (v[0] - along * u[0]).hypot(v[1] - along * u[1])
 }
 

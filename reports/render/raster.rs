@@ -12,8 +12,8 @@ use rayon::prelude::*;
 
 use super::camera::Frame;
 use super::colour::{Light, mix};
-use super::facets::{Batch, Facet};
-use super::shade::{LINE, glass_opacity, shade};
+use super::facets::{Batch, Facet, Lines};
+use super::shade::{LINE, Lamp, glass_opacity};
 
 /// Samples along a side of a pixel.
 pub(super) const SIDE: usize = 3;
@@ -78,7 +78,8 @@ impl Placed {
             at[k] = steps.map(|x| x as i64);
             (nearness[k], weights[k]) = (projected.nearness, projected.weight);
         }
-        let mut placed = Self { batch: ids[0], facet: ids[1], flipped: false, at, nearness, weights };
+        let mut placed =
+            Self { batch: ids[0], facet: ids[1], flipped: false, at, nearness, weights };
         let area = placed.area();
         if area < 0 {
             placed.flipped = true;
@@ -114,16 +115,16 @@ impl Placed {
         let sides = Sides::new(self);
         let (z0, zx, zy) = self.nearness_plane();
         let columns = self.samples(0, 0, columns);
-        let first = STEPS * columns.start as i64 + STEPS / 2;
+        let [first, _] = middle(0, columns.start);
         for row in self.samples(1, rows.start, rows.end) {
-            let y = STEPS * row as i64 + STEPS / 2;
+            let [_, y] = middle(row, 0);
             let mut w = sides.inclusive(first, y);
             let z_row = z0 + zy * (y - self.at[0][1]) as f64;
             let mut entered = false;
             for column in columns.clone() {
                 if (w[0] | w[1] | w[2]) >= 0 {
                     entered = true;
-                    let x = STEPS * column as i64 + STEPS / 2;
+                    let [x, _] = middle(0, column);
                     hit(row, column, z_row + zx * (x - self.at[0][0]) as f64);
                 } else if entered {
                     break;
@@ -183,32 +184,55 @@ impl Sides {
     }
 }
 
-/// Where a sample lies in its facet.
-struct Inside {
-    /// Weights of the corners as they are stored in the facet; their sum is 1.
-    weights: [f64; 3],
-    /// Distances from the sides as they are stored, in pixels.
-    to_sides: [f32; 3],
+/// What is asked of a facet again and again, at places on it in steps.
+struct Within<'a> {
+    placed: &'a Placed,
+    facet: &'a Facet,
+    sides: Sides,
 }
 
-impl Inside {
-    fn new(placed: &Placed, row: usize, column: usize) -> Self {
-        let sides = Sides::new(placed);
-        let middle = |k: usize| STEPS * k as i64 + STEPS / 2;
-        let w = sides.at(middle(column), middle(row)).map(|w| w as f64);
+impl<'a> Within<'a> {
+    fn new(placed: &'a Placed, batches: &'a [Batch]) -> Self {
+        let facet = &batches[placed.batch as usize].facets[placed.facet as usize];
+        Self { placed, facet, sides: Sides::new(placed) }
+    }
+
+    /// Weights of the corners as they are stored in the facet; their sum is 1.
+    fn weights(&self, [x, y]: [i64; 2]) -> [f64; 3] {
+        let w = self.sides.at(x, y);
         // The corner across side k is corner k + 2.
-        let mut weights: [f64; 3] = std::array::from_fn(|k| w[(k + 1) % 3] * placed.weights[k]);
+        let mut weights: [f64; 3] =
+            std::array::from_fn(|k| w[(k + 1) % 3] as f64 * self.placed.weights[k]);
         let sum: f64 = weights.iter().sum();
         weights = weights.map(|weight| weight / sum);
-        let length = |k: usize| (sides.along_x[k] as f64).hypot(sides.along_y[k] as f64);
-        let pixel = (STEPS * SIDE as i64) as f64;
-        let mut to_sides: [f32; 3] = std::array::from_fn(|k| (w[k] / (length(k) * pixel)) as f32);
-        if placed.flipped {
+        if self.placed.flipped {
             weights.swap(1, 2);
-            to_sides.swap(0, 2);
         }
-        Self { weights, to_sides }
+        weights
     }
+
+    /// How large the edge functions are where lines end, for sides as they are placed; negative without a line.
+    fn line_ends(&self, lines: Lines) -> [f64; 3] {
+        let half = f64::from(lines.half_width) * (STEPS * SIDE as i64) as f64;
+        std::array::from_fn(|k| {
+            let stored = if self.placed.flipped { 2 - k } else { k };
+            let (dx, dy) = (self.sides.along_y[k] as f64, self.sides.along_x[k] as f64);
+            match self.facet.lines[stored] {
+                0 => -1.0,
+                width => half * f64::from(width) * (dx * dx + dy * dy).sqrt(),
+            }
+        })
+    }
+
+    fn is_on_line(&self, ends: &[f64; 3], [x, y]: [i64; 2]) -> bool {
+        let w = self.sides.at(x, y);
+        (0..3).any(|k| (w[k] as f64) < ends[k])
+    }
+}
+
+/// The middle of a sample, in steps.
+fn middle(row: usize, column: usize) -> [i64; 2] {
+    [column, row].map(|k| STEPS * k as i64 + STEPS / 2)
 }
 
 /// Draws batches on a picture of this size: the light of every pixel, row by row.
@@ -309,9 +333,9 @@ impl Band {
         // After all else is in place: glass behind it does not show.
         for &id in list.iter().filter(|&&id| is_glass(id)) {
             let facet = &placed[id as usize];
-            self.lay_over(facet, &batches[facet.batch as usize]);
+            self.lay_over(facet, batches);
         }
-        let lit = Lit { batches, placed, frame, scale };
+        let lit = Lit { batches, placed, frame, scale, lamp: Lamp::new(frame) };
         let pixels = self.columns / SIDE;
         let of_rows = (0..self.rows.len() / SIDE)
             .flat_map(|row| (0..pixels).map(move |column| (row, column)));
@@ -329,15 +353,21 @@ impl Band {
         });
     }
 
-    fn lay_over(&mut self, placed: &Placed, batch: &Batch) {
+    fn lay_over(&mut self, placed: &Placed, batches: &[Batch]) {
         let (top, columns) = (self.rows.start, self.columns);
-        let facet = &batch.facets[placed.facet as usize];
+        let within = Within::new(placed, batches);
+        let lines = batches[placed.batch as usize].lines;
+        let lines = lines.filter(|_| within.facet.lines != [0; 3]);
+        let lines = lines.map(|lines| (lines.opacity, within.line_ends(lines)));
         placed.scan(self.rows.clone(), columns, |row, column, nearness| {
             let sample = (row - top) * columns + column;
             if nearness > self.nearness[sample] {
-                let inside = Inside::new(placed, row, column);
-                let facing = weighted(&inside, facet.places);
-                let line = line_share(batch, facet, &inside);
+                let at = middle(row, column);
+                let facing = weighted(&within.weights(at), within.facet.places);
+                let line = match &lines {
+                    Some((opacity, ends)) if within.is_on_line(ends, at) => *opacity,
+                    _ => 0.0,
+                };
                 self.through[sample] *= 1.0 - glass_opacity(facing).max(line);
             }
         });
@@ -346,24 +376,60 @@ impl Band {
     /// The light of a pixel, by its row and column in the band.
     fn pixel(&self, row: usize, column: usize, lit: &Lit<'_>) -> PixelLight {
         let mut sum = PixelLight { farthest: f32::NEG_INFINITY, ..PixelLight::default() };
+        let mut parts = [const { Part::EMPTY }; SIDE * SIDE];
         for k in 0..SIDE * SIDE {
             let (y, x) = (row * SIDE + k / SIDE, column * SIDE + k % SIDE);
             let sample = y * self.columns + x;
-            let through = self.through[sample];
-            sum.glass_share += 1.0 - through;
+            sum.glass_share += 1.0 - self.through[sample];
             let id = self.front[sample];
             if id == NONE {
                 continue;
             }
-            let light = lit.light(id, self.rows.start + y, x);
-            sum.solid = std::array::from_fn(|c| sum.solid[c] + through * light[c]);
-            sum.solid_share += through;
-            sum.covered += 1.0;
+            let at = middle(self.rows.start + y, x);
+            if let Some(part) = parts.iter_mut().find(|part| part.id == id || part.id == NONE) {
+                part.add(id, self.through[sample], at);
+            }
             let depth = (lit.scale * lit.frame.depth(self.nearness[sample])) as f32;
+            sum.covered += 1.0;
             sum.depth += depth;
             sum.farthest = sum.farthest.max(depth);
         }
+        for part in parts.iter().take_while(|part| part.id != NONE) {
+            let light = lit.light(part);
+            sum.solid = std::array::from_fn(|c| sum.solid[c] + part.through * light[c]);
+            sum.solid_share += part.through;
+        }
         sum.mean()
+    }
+}
+
+/// A facet's samples in a pixel. It is lit once, in their middle: only its outline and its lines need every sample.
+struct Part {
+    id: u32,
+    /// Light that glass lets through, as a sum.
+    through: f32,
+    count: usize,
+    places: [[i64; 2]; SIDE * SIDE],
+}
+
+impl Part {
+    const EMPTY: Self = Self { id: NONE, through: 0.0, count: 0, places: [[0; 2]; SIDE * SIDE] };
+
+    fn add(&mut self, id: u32, through: f32, at: [i64; 2]) {
+        self.id = id;
+        self.through += through;
+        self.places[self.count] = at;
+        self.count += 1;
+    }
+
+    fn places(&self) -> &[[i64; 2]] {
+        &self.places[..self.count]
+    }
+
+    /// Inside the facet, which is convex.
+    fn middle(&self) -> [i64; 2] {
+        let sum = |k: usize| self.places().iter().map(|at| at[k]).sum::<i64>();
+        [0, 1].map(|k| sum(k) / self.count as i64)
     }
 }
 
@@ -389,31 +455,24 @@ struct Lit<'a> {
     frame: &'a Frame,
     /// Pixels for a unit.
     scale: f64,
+    lamp: Lamp,
 }
 
 impl Lit<'_> {
-    fn light(&self, id: u32, row: usize, column: usize) -> Light {
-        let placed = &self.placed[id as usize];
-        let batch = &self.batches[placed.batch as usize];
-        let facet = &batch.facets[placed.facet as usize];
-        let inside = Inside::new(placed, row, column);
-        let w = inside.weights;
-        let normal =
-            w[0] * facet.normals[0] + w[1] * facet.normals[1] + w[2] * facet.normals[2];
-        let colour = batch.paint.at(weighted(&inside, facet.places));
-        let light = shade(self.frame, normal, colour);
-        mix(light, LINE, line_share(batch, facet, &inside))
+    fn light(&self, part: &Part) -> Light {
+        let placed = &self.placed[part.id as usize];
+        let within = Within::new(placed, self.batches);
+        let (batch, facet) = (&self.batches[placed.batch as usize], within.facet);
+        let w = within.weights(part.middle());
+        let normal = w[0] * facet.normals[0] + w[1] * facet.normals[1] + w[2] * facet.normals[2];
+        let light = self.lamp.shade(normal, batch.paint.at(weighted(&w, facet.places)));
+        let Some(lines) = batch.lines.filter(|_| facet.lines != [0; 3]) else { return light };
+        let ends = within.line_ends(lines);
+        let on_line = part.places().iter().filter(|at| within.is_on_line(&ends, **at)).count();
+        mix(light, LINE, lines.opacity * on_line as f32 / part.count as f32)
     }
 }
 
-fn weighted(inside: &Inside, values: [f32; 3]) -> f32 {
-    inside.weights.iter().zip(values).map(|(w, value)| *w as f32 * value).sum()
-}
-
-/// Share of ink at a place in a facet: that of its lines within their width, else none.
-fn line_share(batch: &Batch, facet: &Facet, inside: &Inside) -> f32 {
-    let Some(lines) = batch.lines else { return 0.0 };
-    let on_line =
-        (0..3).any(|k| inside.to_sides[k] < lines.half_width * f32::from(facet.lines[k]));
-    if on_line { lines.opacity } else { 0.0 }
+fn weighted(weights: &[f64; 3], values: [f32; 3]) -> f32 {
+    weights.iter().zip(values).map(|(w, value)| *w as f32 * value).sum()
 }

@@ -23,14 +23,29 @@ pub(super) const GLASS: Light = [0.17, 0.23, 0.32];
 /// How much a layer of glass covers where it faces the eye, and where it is seen from its side.
 const GLASS_OPACITY: [f32; 2] = [0.035, 0.75];
 
-/// The light from a place with this normal, of either direction and any length.
-pub(super) fn shade(frame: &Frame, normal: Vec3, colour: Light) -> Light {
-    let lamp = LAMP[0] * frame.right + LAMP[1] * frame.up + LAMP[2] * frame.back;
-    // Sheets have two sides: the one that is seen is lit.
-    let side = if normal.dot(frame.back) < 0.0 { -1.0 } else { 1.0 };
-    let toward_lamp = side * normal.dot(lamp) / (normal.length() * lamp.length());
-    let strength = AMBIENT + (1.0 - AMBIENT) * toward_lamp.max(0.0) as f32;
-    colour.map(|c| c * strength)
+/// The lamp before a shape.
+pub(super) struct Lamp {
+    /// Towards it, of length 1.
+    direction: Vec3,
+    back: Vec3,
+}
+
+impl Lamp {
+    pub(super) fn new(frame: &Frame) -> Self {
+        let direction = LAMP[0] * frame.right + LAMP[1] * frame.up + LAMP[2] * frame.back;
+        Self { direction: direction.normalize_or(frame.back), back: frame.back }
+    }
+
+    /// The light from a place with this normal, of either direction and any length.
+    pub(super) fn shade(&self, normal: Vec3, colour: Light) -> Light {
+        // Sheets have two sides: the one that is seen is lit.
+        let side = if normal.dot(self.back) < 0.0 { -1.0 } else { 1.0 };
+        // A face without area has no normal, and is lit from everywhere alone.
+        let length = normal.length().max(f64::MIN_POSITIVE);
+        let toward_lamp = side * normal.dot(self.direction) / length;
+        let strength = AMBIENT + (1.0 - AMBIENT) * toward_lamp.max(0.0) as f32;
+        colour.map(|c| c * strength)
+    }
 }
 
 /// How much glass covers, by how far it faces the eye: 0 from its side, 1 from its front. Only rims show, so
@@ -67,10 +82,12 @@ pub(super) fn crevices(pixels: &[PixelLight], width: usize, height: usize) -> Ve
             (radius, [(radius * cos).round() as i64, (radius * sin).round() as i64])
         })
         .collect();
+    // Not a number where nothing is: compact, since every pixel reads many.
+    let depths: Vec<f32> =
+        pixels.iter().map(|p| if p.covered > 0.0 { p.depth } else { f32::NAN }).collect();
     let depth_at = |x: i64, y: i64| {
         let inside = x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height;
-        let pixel = inside.then(|| &pixels[y as usize * width + x as usize])?;
-        (pixel.covered > 0.0).then_some(pixel.depth)
+        if inside { depths[y as usize * width + x as usize] } else { f32::NAN }
     };
     let share = |index: usize| {
         let here = &pixels[index];
@@ -79,10 +96,11 @@ pub(super) fn crevices(pixels: &[PixelLight], width: usize, height: usize) -> Ve
         }
         let (x, y) = ((index % width) as i64, (index / width) as i64);
         let hidden = |&(radius, [dx, dy]): &(f32, [i64; 2])| {
+            let (a, b) = (depth_at(x + dx, y + dy), depth_at(x - dx, y - dy));
             // Beside the background nothing is known of the other side.
-            let (Some(a), Some(b)) = (depth_at(x + dx, y + dy), depth_at(x - dx, y - dy)) else {
+            if a.is_nan() || b.is_nan() {
                 return 0.0;
-            };
+            }
             // Of a pixel that shows two parts the farther one counts: the edge between them would shine.
             // Depth counts to the ring's radius only: a far edge must not be darker than a near one.
             let above = |depth: f32| ((here.farthest - depth) / radius).clamp(-1.0, 1.0);

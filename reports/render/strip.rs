@@ -68,8 +68,8 @@ impl Errors<'_> {
         self.values.iter().copied().map(f64::abs).fold(0.0, f64::max)
     }
 
-    /// The end of a scale for several surfaces, in their unit: so that 99 % of the vertices of each are within it,
-    /// and round as a percentage of a diagonal.
+    /// The end of a scale for several surfaces, in their unit: 99 % of the vertices of the median one are within it,
+    /// so that a single bad one does not make all others look alike. Round as a percentage of a diagonal.
     pub fn common_scale(all: &[&Self], diagonal: f64) -> f64 {
         let spanned = |errors: &&Self| {
             let mut sizes: Vec<f64> = errors.values.iter().copied().map(f64::abs).collect();
@@ -79,8 +79,10 @@ impl Errors<'_> {
             let place = ((sizes.len() - 1) as f64 * SPANNED) as usize;
             *sizes.select_nth_unstable_by(place, f64::total_cmp).1
         };
-        let largest = all.iter().map(spanned).fold(0.0, f64::max) / diagonal;
-        let percent = if largest > 0.0 && largest.is_finite() { 100.0 * largest } else { 1.0 };
+        let mut ends: Vec<f64> = all.iter().map(spanned).collect();
+        ends.sort_by(f64::total_cmp);
+        let median = ends.get(ends.len().saturating_sub(1) / 2).map_or(0.0, |end| end / diagonal);
+        let percent = if median > 0.0 && median.is_finite() { 100.0 * median } else { 1.0 };
         round_up(percent) * diagonal / 100.0
     }
 
@@ -183,8 +185,7 @@ fn draw(rows: &[Row<'_>], strip: &Strip<'_>, frame: &Frame) -> Result<Picture, R
         return Err(RenderError::Size { width, height, most: super::MOST_PIXELS });
     }
     let mut picture = Picture::blank(whole[0], whole[1], strip.background);
-    let letters =
-        Lettering { size: letter, ink: strip.background.ink(), align: Align::Middle };
+    let letters = Lettering { size: letter, ink: strip.background.ink(), align: Align::Middle };
     for (index, row) in rows.iter().enumerate() {
         let top = index * (height + caption);
         for (k, cell) in row.cells.iter().enumerate() {

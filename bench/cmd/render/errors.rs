@@ -1,5 +1,7 @@
 //! Reconstructions and how far they are from the surface.
 
+use std::path::Path;
+
 use medial::complex::{ContourError, MedialMesh, union_surface};
 use medial::shape::Shape;
 use medial::surface::{SignedDistance, TriMesh};
@@ -24,15 +26,20 @@ impl Deviation {
 }
 
 /// Makes the reconstruction of a medial mesh in diagonals of the surface, and measures it.
-pub fn deviation(shape: &Shape, axis: &MedialMesh, tolerance: f64) -> Result<Deviation, Failure> {
+pub fn deviation(
+    shape: &Shape,
+    path: &Path,
+    axis: &MedialMesh,
+    tolerance: f64,
+) -> Result<Deviation, Failure> {
     let made = union_surface(axis, tolerance).map_err(|error| match error {
         ContourError::TooFine { tolerance, feasible, .. } => Failure::usage(format!(
-            "--tolerance {tolerance} is too fine; {feasible:.1e} is feasible"
+            "--tolerance {tolerance} is too fine for {}; {feasible:.1e} is feasible", path.display()
         )),
         ContourError::TooThin { feasible, .. } => Failure::usage(format!(
-            "--tolerance {tolerance}: no sphere is thick enough to show; {feasible:.1e} would show the largest"
+            "--tolerance {tolerance}: no sphere of {} is thick enough to show; {feasible:.1e} would show the largest", path.display()
         )),
-        other => Failure::input(other),
+        other => Failure::input(format!("{}: {other}", path.display())),
     })?;
     let tree = shape.surface_tree().map_err(Failure::input)?;
     let inside = shape.inside_test();

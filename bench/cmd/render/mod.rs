@@ -119,8 +119,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     line.at("making the reconstructions");
     let deviations = match asked.show {
         Show::Error | Show::Reconstruction => {
-            let of = |axis| errors::deviation(&read.shape, axis, arguments.tolerance);
-            read.axes.iter().map(of).collect::<Result<Vec<_>, _>>()?
+            let named = arguments.axes.iter().zip(&read.axes);
+            let of = |(path, axis): (&PathBuf, &MedialMesh)| {
+                errors::deviation(&read.shape, path, axis, arguments.tolerance)
+            };
+            named.map(of).collect::<Result<Vec<_>, _>>()?
         }
         Show::Surface | Show::Axis => vec![],
     };
@@ -170,9 +173,9 @@ impl Asked {
         let show = show(arguments)?;
         let positive = |option: &str, value: f64| match value > 0.0 && value <= 1.0 {
             true => Ok(()),
-            false => {
-                Err(Failure::usage(format!("--{option} {value}: ask for more than 0 and at most 1")))
-            }
+            false => Err(Failure::usage(format!(
+                "--{option} {value}: ask for more than 0 and at most 1"
+            ))),
         };
         arguments.max_error.map_or(Ok(()), |value| positive("max-error", value))?;
         positive("tolerance", arguments.tolerance)?;
@@ -190,7 +193,8 @@ impl Asked {
 
 /// What is drawn, as far as there are medial meshes for it.
 fn show(arguments: &Arguments) -> Result<Show, Failure> {
-    let word = |show: Show| show.to_possible_value().map_or_else(String::new, |v| v.get_name().into());
+    let word =
+        |show: Show| show.to_possible_value().map_or_else(String::new, |v| v.get_name().into());
     let show = match (arguments.show, arguments.axes.len()) {
         (None, 0) => Show::Surface,
         (None, _) => Show::Axis,
@@ -225,9 +229,8 @@ impl Read {
         let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
         let input = Input::load(&source)?;
         let mut warnings = input.report.warnings.clone();
-        let shape = input
-            .shape(ShapeOptions::default())
-            .map_err(|error| Failure::of(&source, error))?;
+        let shape =
+            input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
         let to_normal = *shape.normalisation();
         let mut axes = Vec::new();
         for path in &arguments.axes {

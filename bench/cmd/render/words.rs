@@ -25,9 +25,7 @@ pub fn camera(arguments: &Arguments, surface: &TriMesh) -> Result<Camera, Failur
     let camera = match (arguments.camera.as_deref().map(str::trim), up) {
         (None | Some("auto"), None) => Camera::fitting(surface),
         (None | Some("auto"), Some(up)) => Camera::around(up, 28.0, 20.0),
-        (Some(text), up) => {
-            from_words(text, up.unwrap_or_else(|| Camera::fitting_up(surface)))?
-        }
+        (Some(text), up) => from_words(text, up.unwrap_or_else(|| Camera::fitting_up(surface)))?,
     };
     Ok(Camera { zoom: arguments.zoom, perspective: arguments.perspective, ..camera })
 }
@@ -83,7 +81,9 @@ pub fn size(text: &str) -> Result<[usize; 2], Failure> {
     let sides = text.split_once(['x', 'X']).and_then(|(width, height)| {
         Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
     });
-    sides.ok_or_else(|| Failure::usage(format!("--size {text}: write WIDTHxHEIGHT in pixels, such as 800x600")))
+    sides.ok_or_else(|| {
+        Failure::usage(format!("--size {text}: write WIDTHxHEIGHT in pixels, such as 800x600"))
+    })
 }
 
 /// What is behind the picture.
