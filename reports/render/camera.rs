@@ -292,21 +292,10 @@ impl Frame {
         self.zoom * if scale.is_finite() { scale } else { 1.0 }
     }
 
-    /// A point on a picture of this size; `None` behind the eye, or too near to it.
-    pub(super) fn project(&self, point: Vec3, width: usize, height: usize) -> Option<Projected> {
-        let scale = self.scale(width, height);
-        let ([x, y], z) = self.on_plane(point);
-        let weight = match self.distance {
-            Some(distance) if z > 0.9 * distance => return None,
-            Some(distance) => distance / (distance - z),
-            None => 1.0,
-        };
-        let nearness = if self.distance.is_some() { weight } else { z };
-        let at = [
-            0.5 * width as f64 + scale * (x - self.middle[0]),
-            0.5 * height as f64 - scale * (y - self.middle[1]),
-        ];
-        Some(Projected { at, nearness, weight })
+    /// The way to a picture of this size.
+    pub(super) fn lens(&self, [width, height]: [usize; 2]) -> Lens<'_> {
+        let centre = [0.5 * width as f64, 0.5 * height as f64];
+        Lens { frame: self, scale: self.scale(width, height), centre }
     }
 
     /// Depth behind the middle of the shape, of a nearness, in units of the shape.
@@ -319,6 +308,35 @@ impl Frame {
         self.distance.map_or(self.back, |distance| {
             (self.origin + distance * self.back - point).normalize_or(self.back)
         })
+    }
+}
+
+/// A frame before a picture of a size.
+#[derive(Clone, Copy)]
+pub(super) struct Lens<'a> {
+    frame: &'a Frame,
+    /// Pixels for a unit.
+    scale: f64,
+    /// Middle of the picture, in pixels.
+    centre: [f64; 2],
+}
+
+impl Lens<'_> {
+    /// A point on the picture; `None` behind the eye, or too near to it.
+    pub(super) fn project(&self, point: Vec3) -> Option<Projected> {
+        let frame = self.frame;
+        let ([x, y], z) = frame.on_plane(point);
+        let weight = match frame.distance {
+            Some(distance) if z > 0.9 * distance => return None,
+            Some(distance) => distance / (distance - z),
+            None => 1.0,
+        };
+        let nearness = if frame.distance.is_some() { weight } else { z };
+        let at = [
+            self.centre[0] + self.scale * (x - frame.middle[0]),
+            self.centre[1] - self.scale * (y - frame.middle[1]),
+        ];
+        Some(Projected { at, nearness, weight })
     }
 }
 

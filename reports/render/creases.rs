@@ -1,7 +1,9 @@
 //! Normals of a surface that are smooth where the surface is, and its sharp edges.
 //!
 //! A corner takes the mean of the faces around its vertex that are within [`CREASE`] of its own face,
-//! weighted by their angles there: round parts look round, and edges of machine parts stay sharp.
+//! weighted by the sine of their angle there over the lengths of its sides, which is exact on a sphere (Max, "Weights for
+//! computing vertex normals from facet normals", J. Graphics Tools 4 (1999)). Round parts look round, and edges of machine
+//! parts stay sharp.
 
 use medial::Vec3;
 use medial::surface::TriMesh;
@@ -40,7 +42,7 @@ pub(super) fn creases(mesh: &TriMesh) -> Creases {
         let alike =
             around.iter().filter(|&&[other, _]| flat[face].dot(flat[other as usize]) > smooth);
         let sum: Vec3 = alike
-            .map(|&[other, at]| angle(mesh, other as usize, at as usize) * flat[other as usize])
+            .map(|&[other, at]| weight(mesh, other as usize, at as usize) * flat[other as usize])
             .sum();
         sum.normalize_or(flat[face])
     };
@@ -58,12 +60,14 @@ fn normal(mesh: &TriMesh, face: usize) -> Vec3 {
     u.cross(v).normalize_or_zero()
 }
 
-/// The angle of a face at a corner.
-fn angle(mesh: &TriMesh, face: usize, corner: usize) -> f64 {
+/// The weight of a face at a corner.
+fn weight(mesh: &TriMesh, face: usize, corner: usize) -> f64 {
     let points = mesh.triangle(face);
     let [a, b, c] = [0, 1, 2].map(|k| points[(corner + k) % 3]);
-    let (u, v) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
-    u.dot(v).clamp(-1.0, 1.0).acos()
+    let (u, v) = (b - a, c - a);
+    let lengths = u.length() * v.length();
+    let sine = u.cross(v).length() / lengths;
+    if sine.is_finite() { sine / lengths } else { 0.0 }
 }
 
 /// Faces around every vertex.

@@ -55,6 +55,16 @@ pub(super) struct Batch {
     pub(super) facets: Vec<Facet>,
     pub(super) paint: Paint,
     pub(super) lines: Option<Lines>,
-    /// Faint, with everything behind it visible.
-    pub(super) glass: bool,
+    pub(super) kind: Kind,
+}
+
+/// How a batch hides what is behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Wholly.
+    Solid,
+    /// Hardly.
+    Glass,
+    /// As glass, and seen only where nothing solid is, before or behind.
+    Ghost,
 }

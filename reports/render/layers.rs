@@ -9,7 +9,7 @@ use super::camera::Frame;
 use super::colour::{ColourMap, decode};
 use super::creases::creases;
 use super::error::RenderError;
-use super::facets::{Batch, Facet, Lines, Paint};
+use super::facets::{Batch, Facet, Kind, Lines, Paint};
 use super::round::{ball, tube};
 
 /// Something to draw. All layers of a scene are in the same unit.
@@ -19,6 +19,8 @@ pub enum Layer<'a> {
     Surface(&'a TriMesh),
     /// A closed surface as faint glass: its rims and its sharp edges, with what is inside visible.
     Glass(&'a TriMesh),
+    /// A closed surface as glass where nothing else is: what a reconstruction lacks.
+    Ghost(&'a TriMesh),
     /// A surface coloured by a value at each vertex.
     Values {
         /// The surface.
@@ -130,9 +132,10 @@ impl Layer<'_> {
     /// The points by which a camera is set up: those of surfaces, else the centres of spheres.
     pub(super) fn points(&self) -> Vec<Vec3> {
         match self {
-            Self::Surface(mesh) | Self::Glass(mesh) | Self::Values { mesh, .. } => {
-                mesh.vertices.clone()
-            }
+            Self::Surface(mesh)
+            | Self::Glass(mesh)
+            | Self::Ghost(mesh)
+            | Self::Values { mesh, .. } => mesh.vertices.clone(),
             Self::Axis { mesh, .. } => mesh.spheres.iter().map(|s| s.centre).collect(),
         }
     }
@@ -143,9 +146,15 @@ impl Layer<'_> {
             Self::Surface(mesh) => {
                 let lines = canvas.lines(SHARP_INK);
                 let facets = surface_facets(mesh, |_| [0.5; 3]);
-                Ok(vec![Batch { facets, paint: Paint::Plain(decode(GREY)), lines, glass: false }])
+                Ok(vec![Batch {
+                    facets,
+                    paint: Paint::Plain(decode(GREY)),
+                    lines,
+                    kind: Kind::Solid,
+                }])
             }
-            Self::Glass(mesh) => Ok(vec![glass(mesh, canvas)]),
+            Self::Glass(mesh) => Ok(vec![glass(mesh, Kind::Glass, canvas)]),
+            Self::Ghost(mesh) => Ok(vec![glass(mesh, Kind::Ghost, canvas)]),
             Self::Values { mesh, values, scale } => {
                 let (vertices, values_given) = (mesh.vertices.len(), values.len());
                 if vertices != values_given {
@@ -156,7 +165,7 @@ impl Layer<'_> {
                 };
                 let facets = surface_facets(mesh, places);
                 let paint = Paint::map(scale.map);
-                Ok(vec![Batch { facets, paint, lines: None, glass: false }])
+                Ok(vec![Batch { facets, paint, lines: None, kind: Kind::Solid }])
             }
             Self::Axis { mesh, colour } => {
                 Ok(vec![sheets(mesh, colour, canvas), curves(mesh, colour, canvas)])
@@ -177,7 +186,7 @@ fn surface_facets(mesh: &TriMesh, places: impl Fn(usize) -> [f32; 3] + Sync) -> 
     (0..mesh.faces.len()).into_par_iter().map(facet).collect()
 }
 
-fn glass(mesh: &TriMesh, canvas: &Canvas<'_>) -> Batch {
+fn glass(mesh: &TriMesh, kind: Kind, canvas: &Canvas<'_>) -> Batch {
     let mut facets = surface_facets(mesh, |_| [0.0; 3]);
     facets.par_iter_mut().for_each(|facet| {
         facet.places = std::array::from_fn(|k| {
@@ -185,7 +194,7 @@ fn glass(mesh: &TriMesh, canvas: &Canvas<'_>) -> Batch {
         });
     });
     let lines = canvas.lines(GLASS_INK);
-    Batch { facets, paint: Paint::Plain([0.0; 3]), lines, glass: true }
+    Batch { facets, paint: Paint::Plain([0.0; 3]), lines, kind }
 }
 
 /// Faces as flat facets with lines along their sides.
@@ -210,7 +219,7 @@ fn sheets(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> Batch {
     let fade =
         (median_length(mesh) * canvas.scale() - LINE_FADE[0]) / (LINE_FADE[1] - LINE_FADE[0]);
     let lines = canvas.lines(SHEET_INK * fade.clamp(0.0, 1.0) as f32);
-    Batch { facets, paint: paint(colour, SHEET), lines, glass: false }
+    Batch { facets, paint: paint(colour, SHEET), lines, kind: Kind::Solid }
 }
 
 /// Edges without a face as tubes, spheres without an edge as balls.
@@ -237,7 +246,7 @@ fn curves(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> Batch {
             (None, true) => {}
         }
     }
-    Batch { facets, paint: paint(colour, CURVE), lines: None, glass: false }
+    Batch { facets, paint: paint(colour, CURVE), lines: None, kind: Kind::Solid }
 }
 
 fn paint(colour: AxisColour, plain: [u8; 3]) -> Paint {

@@ -10,9 +10,9 @@
 
 use rayon::prelude::*;
 
-use super::camera::Frame;
+use super::camera::{Frame, Lens};
 use super::colour::{Light, mix};
-use super::facets::{Batch, Facet, Lines};
+use super::facets::{Batch, Facet, Kind, Lines};
 use super::shade::{LINE, Lamp, glass_opacity};
 
 /// Samples along a side of a pixel.
@@ -60,22 +60,20 @@ struct Placed {
 }
 
 impl Placed {
-    fn new(
-        frame: &Frame,
-        [width, height]: [usize; 2],
-        ids: [u32; 2],
-        facet: &Facet,
-    ) -> Option<Self> {
+    fn new(lens: &Lens<'_>, ids: [u32; 2], facet: &Facet) -> Option<Self> {
         let mut at = [[0; 2]; 3];
         let mut nearness = [0.0; 3];
         let mut weights = [0.0; 3];
         for k in 0..3 {
-            let projected = frame.project(facet.corners[k], width, height)?;
-            let steps = projected.at.map(|x| (x * (SIDE as i64 * STEPS) as f64).round());
-            if !steps.iter().all(|x| x.abs() < FARTHEST) {
-                return None;
+            let projected = lens.project(facet.corners[k])?;
+            for axis in 0..2 {
+                let steps = projected.at[axis] * (SIDE as i64 * STEPS) as f64;
+                if steps.is_nan() || steps.abs() >= FARTHEST {
+                    return None;
+                }
+                // Rounded without a call: what is cut off is positive.
+                at[k][axis] = (steps + FARTHEST + 0.5) as i64 - FARTHEST as i64;
             }
-            at[k] = steps.map(|x| x as i64);
             (nearness[k], weights[k]) = (projected.nearness, projected.weight);
         }
         let mut placed =
@@ -255,11 +253,13 @@ pub(super) fn rasterise(batches: &[Batch], frame: &Frame, size: [usize; 2]) -> V
 
 fn place(batches: &[Batch], frame: &Frame, size: [usize; 2]) -> Vec<Placed> {
     let mut all = Vec::new();
+    let lens = frame.lens(size);
     for (id, batch) in batches.iter().enumerate() {
         let facets = batch.facets.par_iter().enumerate();
-        all.par_extend(facets.filter_map(|(facet, shown)| {
-            Placed::new(frame, size, [id as u32, facet as u32], shown)
-        }));
+        all.par_extend(
+            facets
+                .filter_map(|(facet, shown)| Placed::new(&lens, [id as u32, facet as u32], shown)),
+        );
     }
     all
 }
@@ -326,7 +326,7 @@ impl Band {
         frame: &Frame,
         scale: f64,
     ) -> Vec<PixelLight> {
-        let is_glass = |id: u32| batches[placed[id as usize].batch as usize].glass;
+        let is_glass = |id: u32| batches[placed[id as usize].batch as usize].kind != Kind::Solid;
         for &id in list.iter().filter(|&&id| !is_glass(id)) {
             self.bring_forward(&placed[id as usize], id);
         }
@@ -356,12 +356,17 @@ impl Band {
     fn lay_over(&mut self, placed: &Placed, batches: &[Batch]) {
         let (top, columns) = (self.rows.start, self.columns);
         let within = Within::new(placed, batches);
-        let lines = batches[placed.batch as usize].lines;
-        let lines = lines.filter(|_| within.facet.lines != [0; 3]);
+        let batch = &batches[placed.batch as usize];
+        let only_alone = batch.kind == Kind::Ghost;
+        let lines = batch.lines.filter(|_| within.facet.lines != [0; 3]);
         let lines = lines.map(|lines| (lines.opacity, within.line_ends(lines)));
         placed.scan(self.rows.clone(), columns, |row, column, nearness| {
             let sample = (row - top) * columns + column;
-            if nearness > self.nearness[sample] {
+            let is_seen = match only_alone {
+                true => self.front[sample] == NONE,
+                false => nearness > self.nearness[sample],
+            };
+            if is_seen {
                 let at = middle(row, column);
                 let facing = weighted(&within.weights(at), within.facet.places);
                 let line = match &lines {

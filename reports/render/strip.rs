@@ -133,7 +133,7 @@ pub struct Strip<'a> {
 const MOST_PIXELS_OF_ALL: usize = 1 << 27;
 
 /// Medial meshes beside each other: one panel each, its caption below, and in a second row their
-/// reconstructions coloured by error, if any panel has one. Colours are on one scale along a row, which a bar at its
+/// reconstructions coloured by error, with what they lack as glass, if any panel has one. Colours are on one scale along a row, which a bar at its
 /// end shows.
 ///
 /// # Errors
@@ -159,7 +159,7 @@ pub fn strip(panels: &[Panel<'_>], strip: &Strip<'_>) -> Result<Picture, RenderE
         let cells = panels.iter().map(|panel| {
             let errors = panel.errors.as_ref()?;
             let layer = Layer::Values { mesh: errors.mesh, values: errors.values, scale };
-            Some((vec![layer], errors.caption.as_str()))
+            Some((vec![layer, Layer::Ghost(strip.surface)], errors.caption.as_str()))
         });
         let bar = Some(Errors::bar(&errors, end, strip.diagonal));
         rows.push(Row { cells: cells.collect(), bar });

@@ -146,6 +146,22 @@ fn sheets_curves_and_isolated_spheres_show_inside_glass() {
     assert_eq!(at(0.9, 0.9)[3], 0);
 }
 
+/// A ghost adds nothing to what is there, and shows where nothing is.
+#[test]
+fn a_ghost_is_what_is_missing() {
+    let (whole, part) = (square(1.0, 0.5), square(0.5, 0.0));
+    let frame = Frame::fit(&front(), &whole.vertices).expect("a frame");
+    let [with, without] = [true, false].map(|ghost| {
+        let mut layers = vec![Layer::Surface(&part)];
+        layers.extend(ghost.then_some(Layer::Ghost(&whole)));
+        let scene = Scene { layers, size: [100, 100], background: Background::Transparent };
+        scene.picture(&frame).expect("a picture")
+    });
+    assert_eq!(with.pixel(50, 50), without.pixel(50, 50));
+    assert_eq!(without.pixel(15, 15).map(|pixel| pixel[3]), Some(0));
+    assert!(with.pixel(15, 15).is_some_and(|pixel| (1..128).contains(&pixel[3])));
+}
+
 /// No seam shines through between facets, and none is drawn twice as glass.
 #[test]
 fn facets_neither_gape_nor_overlap() {

@@ -78,7 +78,8 @@ enum Show {
     Axis,
     /// The boundary of the union of the spheres, cones and slabs.
     Reconstruction,
-    /// The same, coloured by its distance to the surface: red outside, blue inside.
+    /// The same, coloured by its distance to the surface: red outside, blue inside;
+    /// what of the surface it lacks, as glass.
     Error,
 }
 
@@ -323,7 +324,7 @@ impl Work<'_> {
                 let end = end.unwrap_or_else(|| Errors::common_scale(&[&errors], 1.0));
                 let scale = Scale::errors(end);
                 let layer = Layer::Values { mesh: &made.mesh, values: &made.values, scale };
-                (vec![layer], Some(Errors::bar(&[&errors], end, 1.0)))
+                (vec![layer, Layer::Ghost(surface)], Some(Errors::bar(&[&errors], end, 1.0)))
             }
             _ => (vec![Layer::Surface(surface)], None),
         }
