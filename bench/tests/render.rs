@@ -30,7 +30,7 @@ fn every_kind_of_picture_is_written() {
         (&[&coarse, "--color", "plain", "--background", "transparent"], [160, 120]),
         (&[&coarse, "--show", "reconstruction", "--tolerance", "0.03"], [160, 120]),
         (&[&coarse, "--show", "error", "--tolerance", "0.03", "--max-error", "0.02"], [160, 120]),
-        (&[&coarse, &fine, "--show", "error", "--tolerance", "0.03"], [412, 282]),
+        (&[&coarse, &fine, "--show", "error", "--tolerance", "0.03"], [412, 280]),
     ];
     for (words, size) in cases {
         let (code, object) =

@@ -83,7 +83,8 @@ impl ColourMap {
         };
         let last = points.len() - 1;
         // A place that is not a number takes the low end.
-        let along = place.max(0.0).min(1.0) * last as f64;
+        let place = if place.is_nan() { 0.0 } else { place.clamp(0.0, 1.0) };
+        let along = place * last as f64;
         let below = (along as usize).min(last - 1);
         let share = along - below as f64;
         let (a, b) = (points[below], points[below + 1]);

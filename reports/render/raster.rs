@@ -381,26 +381,26 @@ impl Band {
     /// The light of a pixel, by its row and column in the band.
     fn pixel(&self, row: usize, column: usize, lit: &Lit<'_>) -> PixelLight {
         let mut sum = PixelLight { farthest: f32::NEG_INFINITY, ..PixelLight::default() };
-        let mut parts = [const { Part::EMPTY }; SIDE * SIDE];
+        let mut parts = [Part::NONE; SIDE * SIDE];
         for k in 0..SIDE * SIDE {
             let (y, x) = (row * SIDE + k / SIDE, column * SIDE + k % SIDE);
             let sample = y * self.columns + x;
-            sum.glass_share += 1.0 - self.through[sample];
-            let id = self.front[sample];
+            let (id, through) = (self.front[sample], self.through[sample]);
+            sum.glass_share += 1.0 - through;
             if id == NONE {
                 continue;
             }
-            let at = middle(self.rows.start + y, x);
             if let Some(part) = parts.iter_mut().find(|part| part.id == id || part.id == NONE) {
-                part.add(id, self.through[sample], at);
+                part.add(id, through, k);
             }
             let depth = (lit.scale * lit.frame.depth(self.nearness[sample])) as f32;
             sum.covered += 1.0;
             sum.depth += depth;
             sum.farthest = sum.farthest.max(depth);
         }
+        let corner = [column * SIDE, self.rows.start + row * SIDE];
         for part in parts.iter().take_while(|part| part.id != NONE) {
-            let light = lit.light(part);
+            let light = lit.light(part, corner);
             sum.solid = std::array::from_fn(|c| sum.solid[c] + part.through * light[c]);
             sum.solid_share += part.through;
         }
@@ -409,32 +409,39 @@ impl Band {
 }
 
 /// A facet's samples in a pixel. It is lit once, in their middle: only its outline and its lines need every sample.
+#[derive(Clone, Copy)]
 struct Part {
     id: u32,
     /// Light that glass lets through, as a sum.
     through: f32,
-    count: usize,
-    places: [[i64; 2]; SIDE * SIDE],
+    /// Which samples, a bit for each.
+    samples: u32,
 }
 
 impl Part {
-    const EMPTY: Self = Self { id: NONE, through: 0.0, count: 0, places: [[0; 2]; SIDE * SIDE] };
+    const NONE: Self = Self { id: NONE, through: 0.0, samples: 0 };
 
-    fn add(&mut self, id: u32, through: f32, at: [i64; 2]) {
+    fn add(&mut self, id: u32, through: f32, sample: usize) {
         self.id = id;
         self.through += through;
-        self.places[self.count] = at;
-        self.count += 1;
+        self.samples |= 1 << sample;
     }
 
-    fn places(&self) -> &[[i64; 2]] {
-        &self.places[..self.count]
+    fn count(&self) -> u32 {
+        self.samples.count_ones()
+    }
+
+    /// The middles of the samples, in steps, from the column and row of the pixel's first one.
+    fn places(&self, [column, row]: [usize; 2]) -> impl Iterator<Item = [i64; 2]> {
+        let samples = self.samples;
+        let taken = (0..SIDE * SIDE).filter(move |sample| samples >> sample & 1 == 1);
+        taken.map(move |sample| middle(row + sample / SIDE, column + sample % SIDE))
     }
 
     /// Inside the facet, which is convex.
-    fn middle(&self) -> [i64; 2] {
-        let sum = |k: usize| self.places().iter().map(|at| at[k]).sum::<i64>();
-        [0, 1].map(|k| sum(k) / self.count as i64)
+    fn middle(&self, corner: [usize; 2]) -> [i64; 2] {
+        let sum = self.places(corner).fold([0; 2], |sum, at| [sum[0] + at[0], sum[1] + at[1]]);
+        sum.map(|sum| sum / i64::from(self.count()))
     }
 }
 
@@ -464,17 +471,18 @@ struct Lit<'a> {
 }
 
 impl Lit<'_> {
-    fn light(&self, part: &Part) -> Light {
+    /// The light of a part of a pixel, which has its first sample at this column and row.
+    fn light(&self, part: &Part, corner: [usize; 2]) -> Light {
         let placed = &self.placed[part.id as usize];
         let within = Within::new(placed, self.batches);
         let (batch, facet) = (&self.batches[placed.batch as usize], within.facet);
-        let w = within.weights(part.middle());
+        let w = within.weights(part.middle(corner));
         let normal = w[0] * facet.normals[0] + w[1] * facet.normals[1] + w[2] * facet.normals[2];
         let light = self.lamp.shade(normal, batch.paint.at(weighted(&w, facet.places)));
         let Some(lines) = batch.lines.filter(|_| facet.lines != [0; 3]) else { return light };
         let ends = within.line_ends(lines);
-        let on_line = part.places().iter().filter(|at| within.is_on_line(&ends, **at)).count();
-        mix(light, LINE, lines.opacity * on_line as f32 / part.count as f32)
+        let on_line = part.places(corner).filter(|at| within.is_on_line(&ends, *at)).count();
+        mix(light, LINE, lines.opacity * on_line as f32 / part.count() as f32)
     }
 }
 
