@@ -7,10 +7,10 @@
 //!
 //! The same scene gives the same bytes with any number of threads.
 //!
-//! A rasteriser of our own, of some 1,500 lines, since no crate that is kept up does this: `euc` (0.5, 26 crates in
-//! its tree) fills triangles without anti-aliasing across threads, lines, glass or occlusion, which are the most of it;
-//! `tiny-skia` has no depth; the others need a GPU. `png` (eight crates) writes the files, and letters are strokes
-//! (`lettering`), so that no font file is needed.
+//! A rasteriser of our own, of some 2,000 lines without a dependency but `png` (eight crates) for the files: `euc` (0.5, 26
+//! crates in its tree) would fill the triangles, but lines, tubes, glass, crevices and lettering, which are most of these
+//! lines, would be ours still; `tiny-skia` has no depth; the others need a GPU. Letters are strokes (`lettering`), so that no
+//! font file is needed. 100,000 triangles on 800 by 600 pixels take about 0.2 s on one core.
 
 mod bar;
 mod camera;
@@ -22,6 +22,7 @@ mod glyphs;
 mod layers;
 mod lettering;
 mod picture;
+mod placed;
 mod raster;
 mod round;
 mod shade;
