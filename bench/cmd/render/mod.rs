@@ -299,6 +299,8 @@ impl Work<'_> {
     fn single(&self, frame: &Frame) -> Result<Picture, RenderError> {
         let (layers, bar) = self.layers();
         let [width, height] = self.asked.size;
+        // On a picture as small as an icon nothing would be left beside it.
+        let bar = bar.filter(|_| 2 * Bar::column(self.asked.size) <= width);
         let column = if bar.is_some() { Bar::column(self.asked.size) } else { 0 };
         let size = [width.saturating_sub(column), height];
         let background = self.asked.background;
