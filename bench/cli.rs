@@ -39,6 +39,8 @@ pub enum Verb {
     Evaluate(cmd::evaluate::Arguments),
     /// Make a surface from a medial mesh: the boundary of its union, or the power crust.
     Reconstruct(cmd::reconstruct::Arguments),
+    /// Draw a surface, its medial meshes, or their reconstructions by error, as PNG.
+    Render(cmd::render::Arguments),
     /// Triangulate an array of points: Delaunay, or regular with weights.
     Triangulate(cmd::triangulate::Arguments),
     /// Repair a surface: fill its holes, keep its largest part.
@@ -139,6 +141,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global, registry),
         Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
+        Verb::Render(arguments) => cmd::render::run(&arguments, global),
         Verb::Triangulate(arguments) => cmd::triangulate::run(&arguments, global),
         Verb::Repair(arguments) => cmd::repair::run(&arguments, global),
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),

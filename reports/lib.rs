@@ -12,6 +12,7 @@
 //! | `extras` | baselines, stability under noise, oracles: from files of their own |
 //! | `terminal` | the summary in plain text |
 //! | [`published`] | tables and figures of the papers as data, and ours beside them |
+//! | [`render`] | pictures of surfaces and medial meshes as PNG |
 //! | `page` | the self-contained `index.html` |
 //! | `write` | [`write_report`], all of it into one folder |
 
@@ -27,6 +28,7 @@ mod page;
 mod plots;
 pub mod published;
 mod record;
+pub mod render;
 mod summary;
 mod tables;
 mod terminal;

@@ -14,6 +14,7 @@ pub mod info;
 pub mod methods;
 pub mod paper;
 pub mod reconstruct;
+pub mod render;
 pub mod repair;
 pub mod report;
 pub mod run_item;

@@ -1,0 +1,106 @@
+//! `medial render` as its users meet it.
+
+use std::fs;
+use std::path::Path;
+
+mod command;
+use command::{json, run, text_path};
+
+/// Width and height in the header of a PNG file.
+fn size_of(path: &str) -> [u32; 2] {
+    let bytes = fs::read(path).expect("a file");
+    assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"), "{path}");
+    [16, 20].map(|k| u32::from_be_bytes(bytes[k..k + 4].try_into().expect("four bytes")))
+}
+
+#[test]
+fn every_kind_of_picture_is_written() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (mesh, coarse, fine) = ("builtin:torus", at("coarse.ma"), at("fine.ma"));
+    for (spheres, path) in [("20", &coarse), ("80", &fine)] {
+        assert_eq!(run(&["simplify", mesh, "-m", "qmat", "--spheres", spheres, "-o", path]).0, 0);
+    }
+    let out = at("x.png");
+    let cases: [(&[&str], [u32; 2]); 8] = [
+        (&[], [160, 120]),
+        (&["--camera", "top", "--up", "z", "--perspective", "--zoom", "1.5"], [160, 120]),
+        (&[&coarse], [160, 120]),
+        (&[&coarse, "--color", "stability", "--camera", "-1,0,0.5"], [160, 120]),
+        (&[&coarse, "--color", "plain", "--background", "transparent"], [160, 120]),
+        (&[&coarse, "--show", "reconstruction", "--tolerance", "0.03"], [160, 120]),
+        (&[&coarse, "--show", "error", "--tolerance", "0.03", "--max-error", "0.02"], [160, 120]),
+        (&[&coarse, &fine, "--show", "error", "--tolerance", "0.03"], [412, 280]),
+    ];
+    for (words, size) in cases {
+        let (code, object) =
+            json(&[&["render", mesh], words, &["-o", &out, "--size", "160x120"]].concat());
+        assert_eq!(code, 0, "{words:?}: {object}");
+        assert_eq!(size_of(&out), size, "{words:?}");
+        assert_eq!((&object["width"], &object["height"]), (&size[0].into(), &size[1].into()));
+        fs::remove_file(&out).expect("the picture");
+    }
+    let (code, _, stderr) =
+        run(&["render", mesh, &coarse, "-o", &out, "--size", "64x64", "--turntable", "3"]);
+    assert_eq!(code, 0, "{stderr}");
+    let turned: Vec<_> = (0..3).map(|k| fs::read(at(&format!("x-00{k}.png")))).collect();
+    assert!(turned.iter().all(Result::is_ok) && !Path::new(&out).exists());
+    assert_eq!(size_of(&at("x-002.png")), [64, 64]);
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (axis, mesh) = (at("x.ma"), "builtin:blob");
+    assert_eq!(run(&["simplify", mesh, "-m", "qmat", "--spheres", "50", "-o", &axis]).0, 0);
+    let written = ["1", "4"].map(|threads| {
+        let path = at(&format!("{threads}.png"));
+        let words = ["render", mesh, &axis, "--show", "error", "--tolerance", "0.03"];
+        let more = ["--size", "200x150", "--threads", threads, "-o", &path];
+        let (code, _, stderr) = run(&[&words[..], &more].concat());
+        assert_eq!(code, 0, "{stderr}");
+        fs::read(path).expect("written")
+    });
+    assert!(written[0] == written[1]);
+}
+
+#[test]
+fn wrong_words_are_named_and_nothing_is_written() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (out, axis, points) = (at("x.png"), at("ball.ma"), at("points.ma"));
+    fs::write(&axis, "1 0 0\nv 0 0 0 0.9\n").expect("written");
+    fs::write(&points, "2 1 0\nv 0 0 0 0\nv 0.5 0 0 0\ne 0 1\n").expect("written");
+    let cases: [(&[&str], i32, &str); 20] = [
+        (&["--size", "800"], 2, "--size 800"),
+        (&["--size", "8x8"], 2, "--size: a picture of 8 by 8"),
+        (&["--size", "90000x10"], 2, "--size: a picture of 90000 by 10"),
+        (&["--camera", "somewhere"], 2, "--camera somewhere"),
+        (&["--camera", "0,90"], 2, "--camera 0,90"),
+        (&["--camera", "0,0,0"], 2, "--camera: the camera looks from 0,0,0"),
+        (&["--camera", "0,1,0", "--up", "y"], 2, "--up: 0,1,0"),
+        (&["--up", "w"], 2, "--up w"),
+        (&["--zoom", "0"], 2, "--zoom: a zoom of 0"),
+        (&["--zoom", "nan"], 2, "--zoom: a zoom of NaN"),
+        (&["--background", "mauve"], 2, "--background mauve"),
+        (&["--turntable", "0"], 2, "--turntable 0"),
+        (&["--max-error", "0"], 2, "--max-error 0"),
+        (&["--tolerance", "2"], 2, "--tolerance 2"),
+        (&["--show", "error"], 2, "--show error: name a medial mesh"),
+        (&[&axis, &axis, "--show", "reconstruction"], 2, "--show reconstruction"),
+        (&[&axis, &axis, "--turntable", "4"], 2, "--turntable 4"),
+        (&[&axis, "--show", "error", "--tolerance", "1e-7"], 2, "is feasible"),
+        (&["no-such.ma"], 1, "no-such.ma"),
+        (&[&points, "--show", "error"], 1, "points.ma: all spheres have radius zero"),
+    ];
+    for (words, expected, part) in cases {
+        let (code, _, stderr) = run(&[&["render", "builtin:sphere:8", "-o", &out], words].concat());
+        assert!(code == expected && stderr.contains(part), "{words:?}: {code}, {stderr}");
+        assert!(!Path::new(&out).exists(), "{words:?} wrote a file");
+    }
+    let (code, _, stderr) = run(&["render", "builtin:sphere:8", "-o", &at("x.jpg")]);
+    assert!(code == 1 && stderr.contains("\"jpg\" is not one of .png"), "{stderr}");
+    let (code, _, stderr) = run(&["render", "builtin:sphere:8", "-o", &at("no/x.png")]);
+    assert!(code == 1 && stderr.contains("there is no folder"), "{stderr}");
+}

@@ -1,0 +1,205 @@
+//! The strip: several medial meshes of one shape beside each other, from one camera and with one scale.
+
+use medial::complex::MedialMesh;
+use medial::surface::TriMesh;
+
+use super::bar::{Bar, LINE, letter_size, round_up};
+use super::camera::{Camera, Frame};
+use super::error::RenderError;
+use super::layers::{AxisColour, Layer, Scale};
+use super::lettering::{Align, Lettering, fitted};
+use super::picture::{Background, Picture};
+use super::{Scene, check_size};
+
+/// What medial meshes are coloured by, before the scale is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColourBy {
+    /// The radii of the spheres.
+    #[default]
+    Radius,
+    /// The stability ratio of edges and faces.
+    Stability,
+    /// One colour for sheets, one for curves.
+    Plain,
+}
+
+impl ColourBy {
+    /// The colours for some medial meshes of a shape with this bounding-box diagonal, and the bar that explains them.
+    pub fn of(self, meshes: &[&MedialMesh], diagonal: f64) -> (AxisColour, Option<Bar>) {
+        let bar = |scale, times, title: &[&str]| Bar {
+            scale,
+            times,
+            title: title.iter().map(|line| (*line).to_owned()).collect(),
+            note: vec![],
+        };
+        match self {
+            Self::Plain => (AxisColour::Plain, None),
+            Self::Radius => {
+                let scale = Scale::radii(meshes.iter().copied());
+                let bar = bar(scale, 100.0 / diagonal, &["radius", "% of diagonal"]);
+                (AxisColour::Radius(scale), Some(bar))
+            }
+            Self::Stability => {
+                let scale = Scale { lo: 0.0, hi: 1.0, ..Scale::radii([]) };
+                let bar = bar(scale, 1.0, &["stability", "ratio"]);
+                (AxisColour::Stability(1.0 / diagonal), Some(bar))
+            }
+        }
+    }
+}
+
+/// A surface with its signed distances from another.
+#[derive(Clone, Debug)]
+pub struct Errors<'a> {
+    /// The surface.
+    pub mesh: &'a TriMesh,
+    /// For each vertex its distance, positive outside, in the unit of the mesh.
+    pub values: &'a [f64],
+    /// What stands below it.
+    pub caption: String,
+}
+
+/// Share of the values that a scale chosen from them spans; the rest has the colours of its ends.
+const SPANNED: f64 = 0.99;
+
+impl Errors<'_> {
+    /// The largest distance.
+    pub fn largest(&self) -> f64 {
+        self.values.iter().copied().map(f64::abs).fold(0.0, f64::max)
+    }
+
+    /// The end of a scale for several surfaces, in their unit: 99 % of the vertices of the median one are within it,
+    /// so that a single bad one does not make all others look alike. Round as a percentage of a diagonal.
+    pub fn common_scale(all: &[&Self], diagonal: f64) -> f64 {
+        let spanned = |errors: &&Self| {
+            let mut sizes: Vec<f64> = errors.values.iter().copied().map(f64::abs).collect();
+            if sizes.is_empty() {
+                return 0.0;
+            }
+            let place = ((sizes.len() - 1) as f64 * SPANNED) as usize;
+            *sizes.select_nth_unstable_by(place, f64::total_cmp).1
+        };
+        let mut ends: Vec<f64> = all.iter().map(spanned).collect();
+        ends.sort_by(f64::total_cmp);
+        let median = ends.get(ends.len().saturating_sub(1) / 2).map_or(0.0, |end| end / diagonal);
+        let percent = if median > 0.0 && median.is_finite() { 100.0 * median } else { 1.0 };
+        round_up(percent) * diagonal / 100.0
+    }
+
+    /// The bar of errors up to `end`, with the largest error where it is beyond.
+    pub fn bar(all: &[&Self], end: f64, diagonal: f64) -> Bar {
+        let largest = all.iter().map(|errors| errors.largest()).fold(0.0, f64::max);
+        let beyond = crate::text::significant(100.0 * largest / diagonal, 3);
+        Bar {
+            scale: Scale::errors(end),
+            times: 100.0 / diagonal,
+            title: vec!["error".into(), "% of diagonal".into()],
+            note: if largest > end { vec![format!("largest {beyond}")] } else { vec![] },
+        }
+    }
+}
+
+/// A medial mesh in a strip.
+#[derive(Clone, Debug)]
+pub struct Panel<'a> {
+    /// The medial mesh.
+    pub axis: &'a MedialMesh,
+    /// What stands below it.
+    pub caption: String,
+    /// Its reconstruction, for the second row.
+    pub errors: Option<Errors<'a>>,
+}
+
+/// What the panels of a strip have in common.
+#[derive(Clone, Debug)]
+pub struct Strip<'a> {
+    /// The surface that the medial meshes are of: drawn as glass around them, and what the camera is set up by.
+    pub surface: &'a TriMesh,
+    /// Bounding-box diagonal of the surface, of which bars show percentages.
+    pub diagonal: f64,
+    /// Where all panels are seen from.
+    pub camera: Camera,
+    /// Width and height of a panel, without its caption.
+    pub size: [usize; 2],
+    /// What is behind everything.
+    pub background: Background,
+    /// The colours of the medial meshes.
+    pub colour: ColourBy,
+    /// The end of the scale of errors, in the unit of the surface; chosen from the errors without one.
+    pub max_error: Option<f64>,
+}
+
+/// More pixels than this in one picture are taken for a slip.
+const MOST_PIXELS_OF_ALL: usize = 1 << 27;
+
+/// Medial meshes beside each other: one panel each, its caption below, and in a second row their
+/// reconstructions coloured by error, with what they lack as glass, if any panel has one. Colours are on one scale along a row, which a bar at its
+/// end shows.
+///
+/// # Errors
+/// When there is no panel, the camera cannot be set up, or the picture is too large.
+pub fn strip(panels: &[Panel<'_>], strip: &Strip<'_>) -> Result<Picture, RenderError> {
+    if panels.is_empty() {
+        return Err(RenderError::Empty);
+    }
+    check_size(strip.size)?;
+    let frame = Frame::fit(&strip.camera, &strip.surface.vertices)?;
+    let meshes: Vec<&MedialMesh> = panels.iter().map(|panel| panel.axis).collect();
+    let (colour, bar) = strip.colour.of(&meshes, strip.diagonal);
+    let axes = panels.iter().map(|panel| {
+        let axis = Layer::Axis { mesh: panel.axis, colour };
+        Some((vec![axis, Layer::Glass(strip.surface)], panel.caption.as_str()))
+    });
+    let mut rows = vec![Row { cells: axes.collect(), bar }];
+    let errors: Vec<&Errors<'_>> = panels.iter().filter_map(|p| p.errors.as_ref()).collect();
+    if !errors.is_empty() {
+        let end = strip.max_error;
+        let end = end.unwrap_or_else(|| Errors::common_scale(&errors, strip.diagonal));
+        let scale = Scale::errors(end);
+        let cells = panels.iter().map(|panel| {
+            let errors = panel.errors.as_ref()?;
+            let layer = Layer::Values { mesh: errors.mesh, values: errors.values, scale };
+            Some((vec![layer, Layer::Ghost(strip.surface)], errors.caption.as_str()))
+        });
+        let bar = Some(Errors::bar(&errors, end, strip.diagonal));
+        rows.push(Row { cells: cells.collect(), bar });
+    }
+    draw(&rows, strip, &frame)
+}
+
+/// A row of panels: what is drawn in each and stands below it, and the bar at the end.
+struct Row<'a> {
+    cells: Vec<Option<(Vec<Layer<'a>>, &'a str)>>,
+    bar: Option<Bar>,
+}
+
+fn draw(rows: &[Row<'_>], strip: &Strip<'_>, frame: &Frame) -> Result<Picture, RenderError> {
+    let [width, height] = strip.size;
+    let letter = letter_size(strip.size);
+    let caption = (LINE * letter * 1.3).ceil() as usize;
+    let column = if rows.iter().any(|row| row.bar.is_some()) { Bar::column(strip.size) } else { 0 };
+    let columns = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
+    let whole = [columns * width + column, rows.len() * (height + caption)];
+    if whole[0] * whole[1] > MOST_PIXELS_OF_ALL {
+        let [width, height] = whole;
+        return Err(RenderError::Size { width, height, most: super::MOST_PIXELS });
+    }
+    let mut picture = Picture::blank(whole[0], whole[1], strip.background);
+    let letters = Lettering { size: letter, ink: strip.background.ink(), align: Align::Middle };
+    for (index, row) in rows.iter().enumerate() {
+        let top = index * (height + caption);
+        for (k, cell) in row.cells.iter().enumerate() {
+            let Some((layers, words)) = cell else { continue };
+            let scene =
+                Scene { layers: layers.clone(), size: strip.size, background: strip.background };
+            picture.paste(&scene.picture(frame)?, k * width, top);
+            let words = fitted(words, letter, width as f64 - letter);
+            let at = [(k as f64 + 0.5) * width as f64, (top + height) as f64 + 1.3 * letter];
+            letters.write(&mut picture, at, &words);
+        }
+        if let Some(bar) = &row.bar {
+            bar.draw(&mut picture, [columns * width, top], height, letter, strip.background);
+        }
+    }
+    Ok(picture)
+}
