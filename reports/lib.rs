@@ -7,6 +7,7 @@
 //! | `comparison` | records arranged by mesh, method and level |
 //! | `metric` | the columns: name, unit, direction, definition |
 //! | `summary` | means over meshes at equal numbers of spheres |
+//! | `purpose` | which method for which purpose, method against method |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
 //! | `extras` | baselines, stability under noise, oracles: from files of their own |
@@ -27,6 +28,7 @@ mod native;
 mod page;
 mod plots;
 pub mod published;
+mod purpose;
 mod record;
 pub mod render;
 mod summary;

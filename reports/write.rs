@@ -12,7 +12,8 @@ use crate::header::Header;
 use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, Page};
-use crate::plots::{Plot, equal_error_plot, mean_plots, mesh_plots, native_plots};
+use crate::plots::{Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot};
+use crate::purpose::{error_profiles, purpose_table, wins_table};
 use crate::record::Record;
 use crate::summary::by_count;
 use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_markdown};
@@ -56,8 +57,18 @@ pub fn write_report(
     }
     files.write_tables("summary", "Summary", &summary_tables)?;
 
+    let purposes: Vec<Table> = (purpose_table(&comparison, &how).into_iter())
+        .chain(wins_table(&comparison, &how))
+        .collect();
+    if !purposes.is_empty() {
+        files.write_tables("overview-purpose", "Which one for me", &purposes)?;
+    }
+
     let mut overview_plots: Vec<Plot> =
         equal_error_plot(&comparison, &bounds)?.into_iter().collect();
+    if let Some((spheres, profiles)) = error_profiles(&comparison) {
+        overview_plots.extend(profile_plot(&comparison, spheres, &profiles)?);
+    }
     overview_plots.extend(mean_plots(&comparison, &summaries, &natives)?);
     let native_plots = native_plots(&comparison, &natives, &axis)?;
     for plot in overview_plots.iter().chain(&native_plots) {
@@ -93,6 +104,7 @@ pub fn write_report(
         header,
         comparison: &comparison,
         summaries: &summaries,
+        purposes: &purposes,
         overview_plots: &overview_plots,
         native_plots: &native_plots,
         meshes: &meshes,

@@ -24,6 +24,8 @@ pub(crate) struct Page<'a> {
     pub(crate) header: &'a Header,
     pub(crate) comparison: &'a Comparison<'a>,
     pub(crate) summaries: &'a [CountSummary],
+    /// Which method for which purpose, and method against method.
+    pub(crate) purposes: &'a [Table],
     pub(crate) overview_plots: &'a [Plot],
     /// One for each method with a scalar of its own.
     pub(crate) native_plots: &'a [Plot],

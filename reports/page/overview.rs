@@ -18,6 +18,9 @@ static SHOWN: [&Metric; 7] =
 /// A longer table is folded.
 const MANY_ROWS: usize = 48;
 
+/// A table of method against method with more rows is folded.
+const MANY_METHODS: usize = 14;
+
 /// Headlines, the matrix of means, the fewest spheres for an error, failures, and plots.
 pub(crate) fn section(page: &Page<'_>) -> String {
     let mut html = String::from("<section id=\"overview\">\n<h2>Overview</h2>\n");
@@ -27,6 +30,10 @@ pub(crate) fn section(page: &Page<'_>) -> String {
         .iter()
         .map(|line| format!("<li>{}</li>", escape_html(line)))
         .collect();
+    let mut purposes = page.purposes.iter();
+    if let Some(table) = purposes.next() {
+        html.push_str(&titled(table, false));
+    }
     if !lines.is_empty() {
         html.push_str(&format!("<ul class=\"headlines\">{}</ul>\n", lines.concat()));
     }
@@ -38,6 +45,9 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     }
     if !compared.is_empty() {
         html.push_str(&matrices(page, &compared));
+    }
+    for table in purposes {
+        html.push_str(&titled(table, table.rows.len() > MANY_METHODS));
     }
     html.push_str(&failures(page));
     for table in rest.iter().filter(is_shown) {

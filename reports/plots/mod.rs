@@ -337,6 +337,35 @@ pub(crate) fn equal_error_plot(
     Ok(figure.to_svg()?.map(|svg| Plot { stem, title, svg }))
 }
 
+/// The share of the meshes on which each series is within an error at one number of spheres: from the ascending
+/// errors and the number of meshes that it was asked for.
+pub(crate) fn profile_plot(
+    comparison: &Comparison<'_>,
+    spheres: usize,
+    profiles: &[(Vec<f64>, usize)],
+) -> Result<Option<Plot>, PlotError> {
+    let share = |number: usize, asked: usize| 100.0 * number as f64 / asked as f64;
+    let curve = |(series, (errors, asked)): (usize, &(Vec<f64>, usize))| {
+        // Up at each error.
+        let step =
+            |(k, &error): (usize, &f64)| [(error, share(k, *asked)), (error, share(k + 1, *asked))];
+        let points = errors.iter().enumerate().flat_map(step).collect();
+        let label = comparison.series[series].clone();
+        Curve { series, label, points, tags: vec![], dashed: false }
+    };
+    let level = crate::text::counted(spheres, "sphere", "spheres");
+    let title = format!("Meshes within an error at {level}");
+    let curves = profiles.iter().enumerate().map(curve).filter(|curve| !curve.points.is_empty());
+    let figure = Figure {
+        title: title.clone(),
+        x: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),
+        y: ("meshes (%)".to_owned(), Scale::Linear),
+        curves: curves.collect(),
+    };
+    let stem = "overview-profile".to_owned();
+    Ok(figure.to_svg()?.map(|svg| Plot { stem, title, svg }))
+}
+
 fn mean_curve(
     comparison: &Comparison<'_>,
     summaries: &[CountSummary],

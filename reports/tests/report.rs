@@ -245,3 +245,42 @@ fn nothing_measured_is_said() {
     assert_eq!(summary_text(&[]), "");
     assert!(summary_text(&records).contains("0/1"), "{}", summary_text(&records));
 }
+
+#[test]
+fn the_answers_name_the_lead_and_a_weak_method_changes_none_of_them() {
+    let records = comparison(&SHAPES[..4], &METHODS, &COUNTS);
+    let before = report_of(&records);
+    let name = "tables/overview-purpose.md";
+    let table = text(&before, name);
+    for question in ["lowest error at 100 spheres", "topology right everywhere", "best triangles"] {
+        assert!(table.contains(question), "{question}: {table}");
+    }
+    // A copy of the worst one, ten times worse on every mesh and at every level.
+    let mut with_weak = records.clone();
+    let weak = records.iter().filter(|record| record.simplify.method == "lambda").cloned();
+    with_weak.extend(weak.map(|mut record| {
+        record.simplify.method = "weak".to_owned();
+        let evaluation = record.evaluate.as_mut().unwrap();
+        evaluation.distances.hausdorff *= 10.0;
+        evaluation.distances.mean *= 10.0;
+        evaluation.quality.min_angle_mean = Some(1.0);
+        evaluation.betti = [1, 9, 9];
+        record.simplify.seconds.as_mut().unwrap().simplify *= 10.0;
+        record
+    }));
+    let after = report_of(&with_weak);
+    let rows = |files: &BTreeMap<String, Vec<u8>>, name: &str| -> Vec<String> {
+        let text = text(files, name).lines().filter(|line| line.starts_with('|'));
+        text.filter(|line| !line.contains("weak")).map(str::to_owned).collect()
+    };
+    let answers = |files: &BTreeMap<String, Vec<u8>>| -> Vec<String> {
+        // Its head and rule, and six questions.
+        rows(files, name).into_iter().take(8).collect()
+    };
+    assert!(answers(&before)[7].starts_with("| fastest"), "{table}");
+    assert_eq!(answers(&before), answers(&after));
+    // The columns of other methods stay; only one of its own is added.
+    for line in rows(&before, "tables/summary.md") {
+        assert!(rows(&after, "tables/summary.md").contains(&line), "{line}");
+    }
+}

@@ -1,0 +1,318 @@
+//! Which method for which purpose: the answer, by how much it leads, and on how many meshes.
+//!
+//! Each answer is the best of values that belong to one method alone, mesh by mesh: medians and means are over
+//! the meshes that the method was asked for, where one that it misses counts as infinitely bad. The lead is
+//! measured between the first and the second method alone, on the meshes that both have. So another method
+//! changes no number here unless it is itself the first or the second.
+
+use crate::comparison::{Comparison, Entry, reached};
+use crate::metric::{HAUSDORFF, MIN_ANGLE, Mean, TOTAL_SECONDS};
+use crate::tables::{Cell, Column, Row, Table};
+use crate::text::{counted, grouped, significant};
+
+/// Number of spheres that one level is compared at: of those that were asked the one nearest to it.
+const USUAL: f64 = 100.0;
+
+/// Error that the cost of a result is compared at, in % of the diagonal.
+const BOUND: f64 = 1.0;
+
+/// Values that differ by a smaller share are called equal: about what other samples change.
+const EQUAL: f64 = 0.01;
+
+/// One value for each mesh, infinite where there is none; `None` where the method was not asked.
+type Values = Vec<Option<f64>>;
+
+/// A question and the value that decides it; less is better.
+struct Question {
+    title: String,
+    /// The values of a series.
+    values: Vec<Values>,
+    /// A value as text, from many: median or mean.
+    text: fn(f64) -> String,
+    /// What is said of the best: `0.62 of the error`.
+    lead: fn(f64) -> String,
+}
+
+/// The table of answers; `None` where nothing can be compared.
+pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
+    let count = usual_level(comparison);
+    let mut rows = Vec::new();
+    if let Some((level, spheres)) = count {
+        let asked = |entry: &Entry<'_>| entry.level == level;
+        let at = |entry: &Entry<'_>| entry.comparable();
+        let spheres = counted(spheres, "sphere", "spheres");
+        rows.extend(answer(
+            comparison,
+            &Question {
+                title: format!("lowest error at {spheres}"),
+                values: errors_at(comparison, level),
+                text: |value| format!("{} %", significant(value, 3)),
+                lead: |ratio| format!("{} of its error", significant(ratio, 2)),
+            },
+        ));
+        rows.extend(right_everywhere(comparison, level, &spheres));
+        rows.extend(answer(
+            comparison,
+            &Question {
+                title: format!("best triangles at {spheres}"),
+                // The distance from the angles of an equilateral triangle.
+                values: values(comparison, asked, at, |entry| {
+                    Some(60.0 - MIN_ANGLE.of(entry.record)?)
+                }),
+                text: |value| format!("least angle {:.1}°", 60.0 - value),
+                lead: |ratio| format!("{} of its distance from 60°", significant(ratio, 2)),
+            },
+        ));
+    }
+    let within = |entry: &Entry<'_>| {
+        entry.measured() && HAUSDORFF.of(entry.record).is_some_and(|error| error <= BOUND)
+    };
+    let any = |_: &Entry<'_>| true;
+    let spheres = |entry: &Entry<'_>| reached(entry.record).map(|n| n as f64);
+    let numbers = |entry: &Entry<'_>| Some(entry.record.evaluate.as_ref()?.counts.numbers() as f64);
+    let bound = format!("within {BOUND} % error");
+    rows.extend(answer(
+        comparison,
+        &Question {
+            title: format!("fewest spheres {bound}"),
+            values: values(comparison, any, within, spheres),
+            text: |value| counted(value.round() as usize, "sphere", "spheres"),
+            lead: |ratio| format!("{} of its spheres", significant(ratio, 2)),
+        },
+    ));
+    rows.extend(answer(
+        comparison,
+        &Question {
+            title: format!("smallest file {bound}"),
+            values: values(comparison, any, within, numbers),
+            text: |value| format!("{} numbers", grouped(value.round() as u64)),
+            lead: |ratio| format!("{} of its numbers", significant(ratio, 2)),
+        },
+    ));
+    rows.extend(answer(
+        comparison,
+        &Question {
+            title: format!("fastest {bound}"),
+            values: values(comparison, any, within, |entry| TOTAL_SECONDS.of(entry.record)),
+            text: |value| format!("{} s", significant(value, 2)),
+            lead: |ratio| format!("{} of its time", significant(ratio, 2)),
+        },
+    ));
+    (!rows.is_empty()).then(|| Table {
+        caption: "Which one for me".to_owned(),
+        notes: vec![
+            how.to_owned(),
+            format!(
+                "Medians over the meshes that a method was asked for, where one without such a result counts as \
+                 infinitely bad; among the levels that were run. Ahead of: the next best method, the geometric mean \
+                 of the ratios on the meshes where both have a result, and on how many of them the first one is \
+                 better, equal within {:.0} %, worse.",
+                100.0 * EQUAL
+            ),
+        ],
+        columns: ["what matters", "method", "median", "on", "ahead of", "by", "better, equal, worse"]
+            .map(Column::text)
+            .into(),
+        rows,
+    })
+}
+
+/// The asked number of spheres that is nearest to [`USUAL`], of those that most methods reached.
+pub(crate) fn usual_level(comparison: &Comparison<'_>) -> Option<(usize, usize)> {
+    let reached = |level: usize| {
+        comparison.entries.iter().filter(|e| e.level == level && e.comparable()).count()
+    };
+    let far = |spheres: usize| (spheres.max(1) as f64 / USUAL).ln().abs();
+    let counts = comparison.counts().filter(|&(level, _)| reached(level) > 0);
+    counts.min_by(|a, b| far(a.1).total_cmp(&far(b.1)))
+}
+
+/// For each series and mesh the least value of the results that count, of those that were asked.
+fn values(
+    comparison: &Comparison<'_>,
+    is_asked: impl Fn(&Entry<'_>) -> bool,
+    counts: impl Fn(&Entry<'_>) -> bool,
+    value: impl Fn(&Entry<'_>) -> Option<f64>,
+) -> Vec<Values> {
+    let mut all = vec![vec![None; comparison.meshes.len()]; comparison.series.len()];
+    for entry in comparison.entries.iter().filter(|entry| is_asked(entry)) {
+        let place: &mut Option<f64> = &mut all[entry.series][entry.mesh];
+        let found = if counts(entry) { value(entry) } else { None };
+        *place = Some(place.unwrap_or(f64::INFINITY).min(found.unwrap_or(f64::INFINITY)));
+    }
+    all
+}
+
+/// The errors of the results at a count.
+fn errors_at(comparison: &Comparison<'_>, level: usize) -> Vec<Values> {
+    let asked = |entry: &Entry<'_>| entry.level == level;
+    values(
+        comparison,
+        asked,
+        |entry: &Entry<'_>| entry.comparable(),
+        |entry| HAUSDORFF.of(entry.record),
+    )
+}
+
+/// The upper median: at least half of the meshes are no worse. `None` where the median mesh has no result.
+fn median(values: &Values) -> Option<f64> {
+    let mut known: Vec<f64> = values.iter().flatten().copied().collect();
+    known.sort_by(f64::total_cmp);
+    known.get(known.len() / 2).copied().filter(|value| value.is_finite())
+}
+
+/// How one series stands beside another, on the meshes where both have a result.
+struct Lead {
+    /// Geometric mean of the ratios.
+    ratio: f64,
+    better: usize,
+    equal: usize,
+    worse: usize,
+}
+
+impl Lead {
+    fn of(first: &Values, second: &Values) -> Option<Self> {
+        let both = first.iter().zip(second).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
+        let both: Vec<(f64, f64)> = both.filter(|(a, b)| a.is_finite() && b.is_finite()).collect();
+        let ratios: Vec<f64> = both.iter().map(|(a, b)| a.max(1e-9) / b.max(1e-9)).collect();
+        let ratio = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
+        let equal = ratios.iter().filter(|ratio| ratio.ln().abs() <= EQUAL).count();
+        let better = ratios.iter().filter(|ratio| ratio.ln() < -EQUAL).count();
+        Some(Self { ratio, better, equal, worse: ratios.len() - equal - better })
+    }
+
+    fn counts(&self) -> String {
+        format!("{}, {}, {}", self.better, self.equal, self.worse)
+    }
+}
+
+/// The row of a question; `None` where no method has a median.
+fn answer(comparison: &Comparison<'_>, question: &Question) -> Option<Row> {
+    let medians = question.values.iter().enumerate();
+    let mut ranked: Vec<(f64, usize)> =
+        medians.filter_map(|(series, values)| Some((median(values)?, series))).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let &(value, first) = ranked.first()?;
+    let mut cells =
+        vec![Cell::new(question.title.as_str()), Cell { best: true, ..name(comparison, first) }];
+    cells.push(Cell::new((question.text)(value)));
+    cells.push(Cell::new(on_meshes(&question.values[first])));
+    let next = ranked.get(1).map(|&(_, second)| second);
+    cells.extend(lead_cells(comparison, next, |second| {
+        let lead = Lead::of(&question.values[first], &question.values[second])?;
+        Some([(question.lead)(lead.ratio), lead.counts()])
+    }));
+    Some(Row { cells, starts_group: false })
+}
+
+/// The row of the methods with the topology of the solid on every mesh, the one of the lowest error first.
+fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) -> Option<Row> {
+    let at = |entry: &Entry<'_>| entry.level == level && entry.comparable();
+    let is_right = |entry: &Entry<'_>| {
+        let evaluate = entry.record.evaluate.as_ref()?;
+        Some(evaluate.betti == evaluate.expected_betti?)
+    };
+    let errors = errors_at(comparison, level);
+    let right = |series: usize| {
+        let own = comparison.entries.iter().filter(|e| e.series == series && at(e));
+        let known: Vec<bool> = own.filter_map(is_right).collect();
+        let asked = errors[series].iter().flatten().count();
+        (known.iter().filter(|&&right| right).count(), asked)
+    };
+    let mut ranked: Vec<(f64, usize)> = (0..comparison.series.len())
+        .filter(|&series| matches!(right(series), (right, asked) if right == asked && asked > 0))
+        .filter_map(|series| Some((median(&errors[series])?, series)))
+        .collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let title = Cell::new(format!("topology right everywhere, lowest error at {spheres}"));
+    let Some(&(value, first)) = ranked.first() else {
+        let mut cells = vec![title, Cell::new("none")];
+        cells.extend([(); 5].map(|()| Cell::optional(None)));
+        return Some(Row { cells, starts_group: false });
+    };
+    let mut cells = vec![title, Cell { best: true, ..name(comparison, first) }];
+    cells.push(Cell::new(format!("{} %", significant(value, 3))));
+    cells.push(Cell::new(on_meshes(&errors[first])));
+    cells.extend(lead_cells(comparison, ranked.get(1).map(|&(_, second)| second), |second| {
+        let lead = Lead::of(&errors[first], &errors[second])?;
+        Some([format!("{} of its error", significant(lead.ratio, 2)), lead.counts()])
+    }));
+    Some(Row { cells, starts_group: false })
+}
+
+fn name(comparison: &Comparison<'_>, series: usize) -> Cell {
+    Cell::new(comparison.series[series].as_str())
+}
+
+/// On how many meshes there is a result, of those asked.
+fn on_meshes(values: &Values) -> String {
+    let known = values.iter().flatten();
+    let met = known.clone().filter(|value| value.is_finite()).count();
+    format!("{met} of {}", counted(known.count(), "mesh", "meshes"))
+}
+
+fn lead_cells(
+    comparison: &Comparison<'_>,
+    next: Option<usize>,
+    lead: impl Fn(usize) -> Option<[String; 2]>,
+) -> Vec<Cell> {
+    let next = next.and_then(|second| Some((second, lead(second)?)));
+    match next {
+        Some((second, [by, counts])) => {
+            vec![name(comparison, second), Cell::new(by), Cell::new(counts)]
+        }
+        None => vec![Cell::new("no other"), Cell::optional(None), Cell::optional(None)],
+    }
+}
+
+/// For each two methods, on how many meshes the one of the row has the lower error, an equal one, the higher one.
+pub(crate) fn wins_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
+    let (level, spheres) = usual_level(comparison)?;
+    let errors = errors_at(comparison, level);
+    let has = |values: &Values| values.iter().flatten().any(|value| value.is_finite());
+    let shown: Vec<usize> = (0..errors.len()).filter(|&series| has(&errors[series])).collect();
+    if shown.len() < 2 {
+        return None;
+    }
+    let mut columns = vec![Column::text("method")];
+    columns.extend(shown.iter().map(|&s| Column::text(comparison.series[s].as_str())));
+    let row = |&first: &usize| {
+        let mut cells = vec![name(comparison, first)];
+        cells.extend(shown.iter().map(|&second| {
+            let lead = (first != second).then(|| Lead::of(&errors[first], &errors[second]));
+            let lead = lead.flatten();
+            let best = lead.as_ref().is_some_and(|lead| lead.worse == 0 && lead.better > 0);
+            Cell { best, ..Cell::optional(lead.map(|lead| lead.counts())) }
+        }));
+        Row { cells, starts_group: false }
+    };
+    Some(Table {
+        caption: format!("Method against method at {}", counted(spheres, "sphere", "spheres")),
+        notes: vec![
+            how.to_owned(),
+            format!(
+                "On how many meshes the Hausdorff error of the row's method is lower than that of the column's, equal \
+                 within {:.0} %, higher; on the meshes where both reached the count. Bold: never higher.",
+                100.0 * EQUAL
+            ),
+        ],
+        rows: shown.iter().map(row).collect(),
+        columns,
+    })
+}
+
+/// For each series the errors on its meshes at the usual count, ascending, and the meshes it was asked for.
+pub(crate) fn error_profiles(
+    comparison: &Comparison<'_>,
+) -> Option<(usize, Vec<(Vec<f64>, usize)>)> {
+    let (level, spheres) = usual_level(comparison)?;
+    let errors = errors_at(comparison, level);
+    let profile = |values: &Values| {
+        let known = values.iter().flatten();
+        let asked = known.clone().count();
+        let mut finite: Vec<f64> = known.copied().filter(|value| value.is_finite()).collect();
+        finite.sort_by(f64::total_cmp);
+        (finite, asked)
+    };
+    Some((spheres, errors.iter().map(profile).collect()))
+}
