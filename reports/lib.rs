@@ -12,6 +12,7 @@
 //! | `plots` | figures as SVG |
 //! | `extras` | baselines, stability under noise, oracles: from files of their own |
 //! | `terminal` | the summary in plain text |
+//! | `pictures` | which results are shown beside each other |
 //! | [`published`] | tables and figures of the papers as data, and ours beside them |
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
 //! | `page` | the self-contained `index.html` |
@@ -26,6 +27,7 @@ mod journal;
 mod metric;
 mod native;
 mod page;
+mod pictures;
 mod plots;
 pub mod published;
 mod purpose;
@@ -43,6 +45,7 @@ pub use extras::{
 };
 pub use header::{Header, MethodNote, RunNote};
 pub use journal::{BadLine, Journal, JournalError, Journaled, read_records, write_records};
+pub use pictures::{PictureStrip, picture_strips};
 pub use record::{
     Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status,
     UnionTopology,

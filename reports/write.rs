@@ -4,6 +4,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+
 use crate::comparison::Comparison;
 use crate::equal_error::{by_bound, equal_error_table};
 use crate::error::ReportError;
@@ -12,6 +15,7 @@ use crate::header::Header;
 use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, Page};
+use crate::pictures::{PictureStrip, strips};
 use crate::plots::{Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot};
 use crate::purpose::{error_profiles, purpose_table, wins_table};
 use crate::record::Record;
@@ -82,11 +86,14 @@ pub fn write_report(
         }
     }
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
+    let pictures = strips(&comparison);
+    let mut room = PICTURES;
     let mut meshes = Vec::new();
     for (mesh, stem) in stems.into_iter().enumerate() {
         let part = MeshPart {
             table: mesh_table(&comparison, mesh, &how),
             plots: mesh_plots(&comparison, mesh, &stem)?,
+            picture: picture(dir, pictures.get(&mesh), &mut room),
             stem,
         };
         let name = format!("mesh-{}", part.stem);
@@ -114,6 +121,28 @@ pub fn write_report(
     };
     files.write("index.html", page.to_html().as_bytes())?;
     Ok(files.written)
+}
+
+/// Bytes of the pictures that are part of the page; further ones are linked.
+const PICTURES: usize = 8 << 20;
+
+/// The picture of a mesh's results, if it is in the folder: within the page, while there is room.
+fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<(String, String)> {
+    let strip = strip?;
+    let bytes = fs::read(dir.join(&strip.file)).ok()?;
+    let words = format!(
+        "{}: medial meshes at one number of spheres, coloured by radius, with the surface as glass; beside each \
+         its Hausdorff error in % of the diagonal",
+        strip.mesh
+    );
+    let address = match room.checked_sub(bytes.len()) {
+        Some(left) => {
+            *room = left;
+            format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes))
+        }
+        None => format!("./{}", strip.file),
+    };
+    Some((address, words))
 }
 
 /// Reads the header that [`write_report`] left in a folder, to rebuild its report.

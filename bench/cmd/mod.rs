@@ -13,6 +13,7 @@ pub mod hierarchy;
 pub mod info;
 pub mod methods;
 pub mod paper;
+mod pictures;
 pub mod reconstruct;
 pub mod render;
 pub mod repair;

@@ -8,10 +8,11 @@ use clap::Args;
 use medial_reports::{Header, Record, RunNote, read_header, read_records, write_report};
 use serde_json::json;
 
+use super::pictures;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
-use crate::run::{Provenance, RESULTS, Registry, Store, Study};
+use crate::run::{Provenance, RESULTS, Registry, Source, Store, Study};
 
 /// Name of the file with the study that was asked last.
 const STUDY: &str = "study.toml";
@@ -72,6 +73,8 @@ pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
     let header = header(dir, &records, registry, &warnings);
+    let mut warnings = warnings;
+    warnings.extend(pictures::draw(dir, &records, &sources(dir)));
     let files = write_report(dir, &records, &header).map_err(Failure::input)?;
     Ok(Rebuilt { records, files, warnings })
 }
@@ -98,8 +101,16 @@ pub fn refresh(
     if let Some(run) = header.runs.iter_mut().find(this) {
         run.date = run.date.take().or_else(|| Some(today()));
     }
+    let mut warnings = warnings;
+    warnings.extend(pictures::draw(dir, &records, &sources(dir)));
     let files = write_report(dir, &records, &header).map_err(Failure::input)?;
     Ok(Rebuilt { records, files, warnings })
+}
+
+/// The inputs of the study that was asked last; none where it cannot be read any more.
+fn sources(dir: &Path) -> Vec<Source> {
+    let study = Study::read(&dir.join(STUDY)).ok();
+    study.and_then(|study| study.sources().ok()).unwrap_or_default()
 }
 
 /// Writes the study that is asked, and may be that of a file, beside the results.

@@ -34,6 +34,13 @@ fn of_mesh(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
         escape_html(&brief.join(", "))
     );
     html.push_str(&initial(page, mesh));
+    if let Some((address, words)) = &part.picture {
+        html.push_str(&format!(
+            "<figure class=\"strip\"><img src=\"{address}\" alt=\"{words}\" loading=\"lazy\">\
+             <figcaption>{words}</figcaption></figure>\n",
+            words = escape_html(words)
+        ));
+    }
     if part.plots.is_empty() {
         html.push_str("<p class=\"notice bad\">Nothing was measured on this mesh.</p>\n");
     } else {

@@ -43,6 +43,8 @@ pub(crate) struct MeshPart {
     pub(crate) stem: String,
     pub(crate) table: Table,
     pub(crate) plots: Vec<Plot>,
+    /// The address of a picture of its results, and what it shows.
+    pub(crate) picture: Option<(String, String)>,
 }
 
 impl Page<'_> {

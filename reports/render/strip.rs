@@ -121,6 +121,8 @@ pub struct Strip<'a> {
     pub camera: Camera,
     /// Width and height of a panel, without its caption.
     pub size: [usize; 2],
+    /// Panels beside each other, before the next ones begin a line of their own below them.
+    pub across: usize,
     /// What is behind everything.
     pub background: Background,
     /// The colours of the medial meshes.
@@ -150,19 +152,29 @@ pub fn strip(panels: &[Panel<'_>], strip: &Strip<'_>) -> Result<Picture, RenderE
         let axis = Layer::Axis { mesh: panel.axis, colour };
         Some((vec![axis, Layer::Glass(strip.surface)], panel.caption.as_str()))
     });
-    let mut rows = vec![Row { cells: axes.collect(), bar }];
+    let mut axes = axes.peekable();
+    let mut rows = vec![];
+    while axes.peek().is_some() {
+        let cells = axes.by_ref().take(strip.across.max(1)).collect();
+        // One bar explains all lines.
+        let bar = bar.clone().filter(|_| rows.is_empty());
+        rows.push(Row { cells, bar });
+    }
     let errors: Vec<&Errors<'_>> = panels.iter().filter_map(|p| p.errors.as_ref()).collect();
     if !errors.is_empty() {
         let end = strip.max_error;
         let end = end.unwrap_or_else(|| Errors::common_scale(&errors, strip.diagonal));
         let scale = Scale::errors(end);
-        let cells = panels.iter().map(|panel| {
+        let mut cells = panels.iter().map(|panel| {
             let errors = panel.errors.as_ref()?;
             let layer = Layer::Values { mesh: errors.mesh, values: errors.values, scale };
             Some((vec![layer, Layer::Ghost(strip.surface)], errors.caption.as_str()))
         });
-        let bar = Some(Errors::bar(&errors, end, strip.diagonal));
-        rows.push(Row { cells: cells.collect(), bar });
+        let mut bar = Some(Errors::bar(&errors, end, strip.diagonal));
+        while cells.len() > 0 {
+            let line = cells.by_ref().take(strip.across.max(1)).collect();
+            rows.push(Row { cells: line, bar: bar.take() });
+        }
     }
     draw(&rows, strip, &frame)
 }

@@ -288,6 +288,7 @@ impl Work<'_> {
             diagonal: 1.0,
             camera: self.camera,
             size: self.asked.size,
+            across: usize::MAX,
             background: self.asked.background,
             colour: self.arguments.color.into(),
             max_error: self.arguments.max_error,

@@ -1,0 +1,70 @@
+//! The pictures of a report: for each mesh the results of all methods, from one camera.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use medial::complex::MedialMesh;
+use medial::write_atomically;
+use medial_reports::render::{Background, Camera, ColourBy, Panel, Strip, strip};
+use medial_reports::{PictureStrip, Record, picture_strips};
+
+use crate::run::{Input, Source};
+
+/// Pixels of a panel, and panels beside each other.
+const PANEL: [usize; 2] = [320, 260];
+const ACROSS: usize = 4;
+
+/// Draws the strips of some records into the folder of their report. What cannot be drawn, since an input is gone
+/// or changed, is left out, and the reason returned; a picture of an earlier run stays then.
+pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
+    let strips = picture_strips(records);
+    if strips.is_empty() {
+        return vec![];
+    }
+    let inputs: BTreeMap<String, Input> = (sources.iter())
+        .filter_map(|source| Input::load(source).ok())
+        .map(|input| (input.hash.clone(), input))
+        .collect();
+    let drawn = strips.iter().map(|wanted| {
+        let input = wanted.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
+        let input = input.ok_or("its surface is not at hand as it was measured")?;
+        picture(dir, wanted, input)
+    });
+    let failed = drawn.zip(&strips).filter_map(|(drawn, wanted)| {
+        let why: String = drawn.err()?;
+        Some(format!("no pictures of {}: {why}", wanted.mesh))
+    });
+    failed.collect()
+}
+
+fn picture(dir: &Path, wanted: &PictureStrip, input: &Input) -> Result<(), String> {
+    let mut axes: Vec<MedialMesh> = Vec::with_capacity(wanted.panels.len());
+    for (artifact, _) in &wanted.panels {
+        let path = dir.join(artifact);
+        let loaded = medial::complex::read(&path);
+        axes.push(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh);
+    }
+    let panels: Vec<Panel<'_>> = axes
+        .iter()
+        .zip(&wanted.panels)
+        .map(|(axis, (_, caption))| Panel { axis, caption: caption.clone(), errors: None })
+        .collect();
+    let (lo, hi) = input.mesh.bounding_box().unwrap_or_default();
+    let common = Strip {
+        surface: &input.mesh,
+        diagonal: lo.distance(hi),
+        camera: Camera::fitting(&input.mesh),
+        size: PANEL,
+        across: ACROSS,
+        background: Background::WHITE,
+        colour: ColourBy::Radius,
+        max_error: None,
+    };
+    let picture = strip(&panels, &common).map_err(|error| error.to_string())?;
+    let bytes = picture.to_png().map_err(|error| error.to_string())?;
+    let path = dir.join(&wanted.file);
+    let folder = path.parent().unwrap_or(dir);
+    let written = std::fs::create_dir_all(folder)
+        .and_then(|()| write_atomically(&path, |out| out.write_all(&bytes)));
+    written.map_err(|error| format!("{}: {error}", path.display()))
+}

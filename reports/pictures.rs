@@ -1,0 +1,62 @@
+//! Which results are shown beside each other as pictures.
+//!
+//! For each mesh one strip: the results of all methods at the number of spheres that the answers of
+//! [`purpose`](crate::purpose) are for. Drawing needs the surfaces and the medial meshes, which are not in the
+//! records: it is for the caller, with [`strip`](crate::render::strip).
+
+use std::collections::BTreeMap;
+
+use crate::comparison::{Comparison, reached};
+use crate::metric::HAUSDORFF;
+use crate::purpose::usual_level;
+use crate::record::Record;
+use crate::text::{counted, file_stems, significant};
+
+/// Folder of the pictures, beside the page.
+const FOLDER: &str = "pictures";
+
+/// A strip of pictures that a report shows if it finds it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PictureStrip {
+    /// Name of the mesh.
+    pub mesh: String,
+    /// Hash of the input file or of the generated surface, as the records have it.
+    pub mesh_hash: Option<String>,
+    /// Where the picture belongs, relative to the folder of the report.
+    pub file: String,
+    /// The medial meshes, by path relative to the folder of the report, and what is said of each.
+    pub panels: Vec<(String, String)>,
+}
+
+/// The strips that belong to some records, in the order of the meshes; those without a medial mesh are left out.
+pub fn picture_strips(records: &[Record]) -> Vec<PictureStrip> {
+    let comparison = Comparison::new(records);
+    strips(&comparison).into_values().collect()
+}
+
+/// The strips by mesh.
+pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStrip> {
+    let mut strips: BTreeMap<usize, PictureStrip> = BTreeMap::new();
+    let Some((level, _)) = usual_level(comparison) else { return strips };
+    let stems = file_stems(comparison.meshes.iter().map(String::as_str));
+    for entry in &comparison.entries {
+        let record = entry.record;
+        let shown = entry.level == level && entry.measured();
+        let Some(artifact) = record.artifact.clone().filter(|_| shown) else { continue };
+        let mut caption = comparison.series[entry.series].clone();
+        if let Some(spheres) = reached(record) {
+            caption.push_str(&format!(": {}", counted(spheres, "sphere", "spheres")));
+        }
+        if let Some(error) = HAUSDORFF.of(record) {
+            caption.push_str(&format!(", {} %", significant(error, 2)));
+        }
+        let strip = || PictureStrip {
+            mesh: comparison.meshes[entry.mesh].clone(),
+            mesh_hash: record.mesh_hash.clone(),
+            file: format!("{FOLDER}/mesh-{}.png", stems[entry.mesh]),
+            panels: vec![],
+        };
+        strips.entry(entry.mesh).or_insert_with(strip).panels.push((artifact, caption));
+    }
+    strips
+}
