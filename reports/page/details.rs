@@ -10,8 +10,8 @@ use medial::simplifier::Level;
 use serde_json::{Map, Value};
 
 use crate::comparison::Comparison;
+use crate::page::html;
 use crate::record::Record;
-use crate::text::printable;
 
 /// Keys whose values many records share.
 const SHARED: [&str; 9] = [
@@ -31,14 +31,14 @@ pub(crate) fn block(comparison: &Comparison<'_>) -> String {
     let mut shared = Shared::default();
     let lines: Vec<String> =
         comparison.entries.iter().map(|entry| line(entry.record, &mut shared)).collect();
-    let mut html = String::from("<script type=\"application/json\" id=\"records\">");
-    html.push_str(&harmless(&Value::Array(shared.values)));
+    let mut block = String::from("<script type=\"application/json\" id=\"records\">");
+    block.push_str(&html::json(&Value::Array(shared.values)));
     for line in lines {
-        html.push('\n');
-        html.push_str(&line);
+        block.push('\n');
+        block.push_str(&line);
     }
-    html.push_str("</script>\n");
-    html
+    block.push_str("</script>\n");
+    block
 }
 
 /// The distinct values of [`SHARED`], in the order in which they occur.
@@ -74,7 +74,7 @@ fn line(record: &Record, shared: &mut Shared) -> String {
         };
         kept.insert(key, value);
     }
-    harmless(&Value::Object(kept))
+    html::json(&Value::Object(kept))
 }
 
 /// A value without what says nothing: nulls, empty texts, lists and objects.
@@ -94,12 +94,6 @@ fn known(value: Value) -> Option<Value> {
     }
 }
 
-/// JSON that may stand in an element `script`: no text of a record can end the element or begin
-/// a comment, and no direction mark reorders what is shown.
-fn harmless(value: &Value) -> String {
-    printable(&value.to_string().replace('<', "\\u003c"))
-}
-
 /// The command that asks for the same result again.
 fn repeat_command(record: &Record) -> String {
     let simplify = &record.simplify;
@@ -117,7 +111,8 @@ fn repeat_command(record: &Record) -> String {
         Level::MaxError(value) => words.extend(["--max-error".to_owned(), value.to_string()]),
     }
     if let Some(conditions) = &record.conditions {
-        let defaults = [("--sampling", &conditions.sampling, "vertices"), ("--dual", &conditions.dual, "fan")];
+        let defaults =
+            [("--sampling", &conditions.sampling, "vertices"), ("--dual", &conditions.dual, "fan")];
         for (option, value, default) in defaults {
             if !value.is_empty() && value != default {
                 words.extend([option.to_owned(), value.clone()]);
@@ -197,7 +192,10 @@ mod tests {
         let mut of = record(Level::Published);
         of.reason = Some("</script><!--\u{202e}".to_owned());
         let line = line(&of, &mut Shared::default());
-        assert!(!line.contains('<') && !line.contains('\u{202e}') && !line.contains('\n'), "{line}");
+        assert!(
+            !line.contains('<') && !line.contains('\u{202e}') && !line.contains('\n'),
+            "{line}"
+        );
         let back: Value = serde_json::from_str(&line).unwrap();
         assert_eq!(back["reason"], "</script><!--\u{fffd}");
         assert!(back.get("evaluate").is_none());

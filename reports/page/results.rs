@@ -21,7 +21,9 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     html.push_str("<label>text <input type=\"search\" name=\"text\"></label>\n");
     html.push_str(&column_chooser());
     html.push_str("<button type=\"reset\">all</button> <output></output>\n</form>\n");
-    html.push_str("<div class=\"scroll tall\" tabindex=\"0\"><table class=\"sortable\">\n<thead><tr>");
+    html.push_str(
+        "<div class=\"scroll tall\" tabindex=\"0\"><table class=\"sortable\">\n<thead><tr>",
+    );
     html.push_str(&heads());
     html.push_str("</tr></thead>\n<tbody>\n");
     let mut best = None;
@@ -72,7 +74,8 @@ enum Shown {
 
 fn columns() -> Vec<Head> {
     use Shown::{Always, AtFirst, OnRequest};
-    let head = |key, title: &str, number, shown| Head { key, title: title.to_owned(), number, shown };
+    let head =
+        |key, title: &str, number, shown| Head { key, title: title.to_owned(), number, shown };
     let mut heads = vec![
         head("mesh", "mesh", false, Always),
         head("asked", "asked", true, Always),
