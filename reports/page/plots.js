@@ -170,16 +170,16 @@
       const middle = (top + bottom) / 2;
       words(plot.y.title, { x: 36, y: middle, "text-anchor": "middle", "font-size": 26, transform: `rotate(270, 36, ${middle})` });
       const clipped = draw("g", { "clip-path": `url(#${clip})`, fill: "none" }, overlay);
-      for (const line of fronts.flatMap((front) => [...front.querySelectorAll("polyline")])) {
-        const steps = [...line.points].map((at) => [at.x, at.y]);
-        draw("polyline", { points: pathOf(steps), stroke: ink, "stroke-width": 2 }, clipped);
-      }
       plot.curves.forEach((curve, index) => {
         const stroke = lines[index].querySelector("[stroke]")?.getAttribute("stroke");
         if (!stroke || hidden.has(curve.series)) return;
         const line = draw("polyline", { points: pathOf(curve.points), stroke, "stroke-width": 4 }, clipped);
         if (curve.dashed) line.setAttribute("stroke-dasharray", "14 10");
       });
+      for (const line of fronts.flatMap((front) => [...front.querySelectorAll("polyline")])) {
+        const joined = [...line.points].map((at) => [at.x, at.y]);
+        draw("polyline", { points: pathOf(joined), stroke: ink, "stroke-width": 2 }, clipped);
+      }
     };
     const reset = document.createElement("button");
     reset.type = "button";

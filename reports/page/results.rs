@@ -20,7 +20,7 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     html.push_str(&choice("status", &statuses));
     html.push_str("<label>text <input type=\"search\" name=\"text\"></label>\n");
     html.push_str(&column_chooser());
-    html.push_str("<button type=\"reset\">all</button> <output></output>\n</form>\n");
+    html.push_str("<button type=\"reset\">reset</button> <output></output>\n</form>\n");
     html.push_str(
         "<div class=\"scroll tall\" tabindex=\"0\"><table class=\"sortable\">\n<thead><tr>",
     );

@@ -112,12 +112,12 @@ impl Figure {
             .draw()
             .map_err(failed)?;
         end(area)?;
-        self.draw_front(&mut chart)?;
         let mut layout = Layout::default();
         for curve in &self.curves {
             draw_curve(&mut chart, curve)?;
             layout.curves.push(curve.points.iter().map(|p| chart.backend_coord(p)).collect());
         }
+        self.draw_front(&mut chart)?;
         let (across, down) = chart.plotting_area().get_pixel_range();
         layout.area = [across.start, down.start, across.end, down.end];
         self.draw_legend(&legend)?;
@@ -126,10 +126,10 @@ impl Figure {
     }
 
     fn has_front(&self) -> bool {
-        self.front && !front(&self.curves).is_empty()
+        self.front && front(&self.curves).len() > 1
     }
 
-    /// A thin line in steps through the points that no other one dominates, beneath the curves.
+    /// A thin line through the points that no other one dominates, over the curves.
     fn draw_front<B: DrawingBackend>(
         &self,
         chart: &mut ChartContext<'_, B, Cartesian2d<Axis, Axis>>,
@@ -137,17 +137,12 @@ impl Figure {
         if !self.has_front() {
             return Ok(());
         }
-        let mut steps: Vec<(f64, f64)> = Vec::new();
-        for (curve, point) in front(&self.curves) {
-            let next = self.curves[curve].points[point];
-            // What is not better than the last point until here is dominated by it.
-            steps.extend(steps.last().map(|last| (next.0, last.1)));
-            steps.push(next);
-        }
+        let points = front(&self.curves).into_iter();
+        let points = points.map(|(curve, point)| self.curves[curve].points[point]);
         let area = chart.plotting_area().strip_coord_spec();
         begin(&area, "front", None)?;
         let line = INK.stroke_width(RESOLUTION as u32);
-        chart.draw_series(LineSeries::new(steps, line)).map_err(PlotError::new)?;
+        chart.draw_series(LineSeries::new(points, line)).map_err(PlotError::new)?;
         end(&area)
     }
 
@@ -238,7 +233,7 @@ fn draw_curve<B: DrawingBackend>(
     for (index, tag) in &curve.tags {
         let Some(point) = curve.points.get(*index) else { continue };
         let (x, y) = pixel(point);
-        let text = font(10, colour).pos(Pos::new(HPos::Left, VPos::Bottom));
+        let text = font(10, INK).pos(Pos::new(HPos::Left, VPos::Bottom));
         area.draw(&Text::new(tag.clone(), (x + 7 * RESOLUTION, y - 4 * RESOLUTION), text))
             .map_err(PlotError::new)?;
     }
