@@ -257,6 +257,29 @@ fn check_details(browser: &mut Browser) {
     browser.until(&format!("{ROWS}.length === {all}"));
 }
 
+/// Head and first columns stay in sight, above the rows that scroll beneath them.
+fn check_sticky(browser: &mut Browser) {
+    for input in ["edges", "faces", "epsilon", "spheres_only", "below_30"] {
+        browser.value(&format!("document.querySelector('input[value={input}]').click()"));
+    }
+    browser.centre("document.querySelector('.scroll.tall')");
+    browser.value(
+        "{ const box = document.querySelector('.scroll.tall'); box.scrollLeft = 200; \
+         box.scrollTop = 300; }",
+    );
+    assert_eq!(browser.value("document.querySelector('.scroll.tall').scrollLeft > 0"), true);
+    for column in ["mesh", "asked", "method"] {
+        let in_front = format!(
+            "(() => {{ const head = document.querySelector('th[data-key={column}]'); \
+             const box = head.getBoundingClientRect(); \
+             return [0.1, 0.9].every(part => head.contains(document.elementFromPoint(\
+             box.x + box.width / 2, box.y + part * box.height))); }})()"
+        );
+        assert_eq!(browser.value(&in_front), true, "{column}");
+    }
+    browser.value("document.querySelector('.filters').reset()");
+}
+
 fn check_plots(browser: &mut Browser) {
     browser.value("window.plot = document.querySelector('svg.plot')");
     assert_eq!(browser.value("document.querySelector('.tip').hidden"), true);
@@ -303,6 +326,7 @@ fn the_page_answers_from_disk() {
     check_filters(&mut browser);
     check_address(&mut browser);
     check_details(&mut browser);
+    check_sticky(&mut browser);
     check_plots(&mut browser);
 
     let mut requests = 0;
