@@ -1,8 +1,10 @@
 //! Pieces of HTML that several sections use.
 
+use serde_json::Value;
+
 use crate::plots::{Plot, style};
 use crate::tables::Table;
-use crate::text::escape_html;
+use crate::text::{escape_html, printable};
 
 /// A table in a box that scrolls sideways where the page is narrow. Remarks may wrap.
 pub(crate) fn table(table: &Table) -> String {
@@ -39,12 +41,27 @@ pub(crate) fn plots<'a>(plots: impl IntoIterator<Item = &'a Plot>) -> String {
             escape_html(&plot.title)
         );
         html.push_str(&format!(
-            "<figure>{}</figure>\n",
-            plot.svg.replacen("<svg ", &label, 1).trim_end()
+            "<figure>{}{}</figure>\n",
+            plot.svg.replacen("<svg ", &label, 1).trim_end(),
+            points(plot)
         ));
     }
     html.push_str("</div>\n");
     html
+}
+
+/// The points of a plot for the script.
+fn points(plot: &Plot) -> String {
+    if plot.points.is_null() {
+        return String::new();
+    }
+    format!("<script type=\"application/json\">{}</script>", json(&plot.points))
+}
+
+/// JSON that may stand in an element `script`: no text can end the element or begin a comment,
+/// and no direction mark reorders what is shown.
+pub(crate) fn json(value: &Value) -> String {
+    printable(&value.to_string().replace('<', "\\u003c"))
 }
 
 /// The colour of a series in the plots, as a dot before its name.

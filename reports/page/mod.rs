@@ -1,8 +1,10 @@
 //! `index.html`: one page that holds everything and opens without a network.
 //!
 //! Plots are inline SVG, the style sheet and the script are our own. Without the script the page
-//! still shows everything; the script sorts and filters.
+//! still shows everything; the script sorts, filters, opens details, and answers questions about
+//! points of the plots.
 
+mod details;
 mod extras;
 mod html;
 mod meshes;
@@ -77,7 +79,9 @@ impl Page<'_> {
         html.push_str(&reference::files(self));
         html.push_str("</main>\n");
         html.push_str(&format!(
-            "<script>\n{}</script>\n</body>\n</html>\n",
+            "<script>\n\"use strict\";\n{}{}{}</script>\n</body>\n</html>\n",
+            include_str!("table.js"),
+            include_str!("plots.js"),
             include_str!("script.js")
         ));
         html

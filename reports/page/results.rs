@@ -1,8 +1,8 @@
 //! The table of all results: sortable, filterable, failures as rows.
 
 use crate::comparison::{Entry, level_label, reached};
-use crate::metric::COMPARED;
-use crate::page::{Page, html};
+use crate::metric::{BELOW_30, COMPARED, EPSILON, SPHERES_ONLY};
+use crate::page::{Page, details, html};
 use crate::tables::{Best, remark, topology_verdict, warnings};
 use crate::text::{betti, escape_html, grouped, megabytes};
 
@@ -18,11 +18,12 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     html.push_str(&choice("method", &comparison.series));
     html.push_str(&choice("asked", &levels));
     html.push_str(&choice("status", &statuses));
+    html.push_str("<label>text <input type=\"search\" name=\"text\"></label>\n");
+    html.push_str(&column_chooser());
+    html.push_str("<button type=\"reset\">reset</button> <output></output>\n</form>\n");
     html.push_str(
-        "<label>text <input type=\"search\" name=\"text\"></label>\n\
-         <button type=\"reset\">all</button> <output></output>\n</form>\n",
+        "<div class=\"scroll tall\" tabindex=\"0\"><table class=\"sortable\">\n<thead><tr>",
     );
-    html.push_str("<div class=\"scroll tall\"><table class=\"sortable\">\n<thead><tr>");
     html.push_str(&heads());
     html.push_str("</tr></thead>\n<tbody>\n");
     let mut best = None;
@@ -40,6 +41,7 @@ pub(crate) fn section(page: &Page<'_>) -> String {
          at this number of spheres, among results that reached it to within 2 %. \
          <code>results.csv</code> holds every number that was recorded.</p>\n</section>\n",
     );
+    html.push_str(&details::block(comparison));
     html
 }
 
@@ -53,26 +55,71 @@ fn choice(name: &str, values: &[String]) -> String {
     html
 }
 
-fn heads() -> String {
+/// A column of the table.
+struct Head {
+    /// Name in the address of the page.
+    key: &'static str,
+    title: String,
+    number: bool,
+    shown: Shown,
+}
+
+/// Whether a column is seen; without the script all are.
+#[derive(PartialEq)]
+enum Shown {
+    Always,
+    AtFirst,
+    OnRequest,
+}
+
+fn columns() -> Vec<Head> {
+    use Shown::{Always, AtFirst, OnRequest};
+    let head =
+        |key, title: &str, number, shown| Head { key, title: title.to_owned(), number, shown };
     let mut heads = vec![
-        ("mesh".to_owned(), false),
-        ("asked".to_owned(), true),
-        ("method".to_owned(), false),
-        ("status".to_owned(), false),
-        ("spheres".to_owned(), true),
-        ("edges".to_owned(), true),
-        ("faces".to_owned(), true),
+        head("mesh", "mesh", false, Always),
+        head("asked", "asked", true, Always),
+        head("method", "method", false, Always),
+        head("status", "status", false, AtFirst),
+        head("spheres", "spheres", true, AtFirst),
+        head("edges", "edges", true, OnRequest),
+        head("faces", "faces", true, OnRequest),
     ];
-    heads.extend(COMPARED.iter().map(|metric| (metric.heading(), true)));
-    heads.push(("memory (MB) ↓".to_owned(), true));
-    heads.extend(["Betti", "as solid", "remark"].map(|title| (title.to_owned(), false)));
+    heads.extend(COMPARED.iter().map(|metric| {
+        let rare = [&EPSILON, &SPHERES_ONLY, &BELOW_30].iter().any(|rare| rare.key == metric.key);
+        head(metric.key, &metric.heading(), true, if rare { OnRequest } else { AtFirst })
+    }));
+    heads.extend([
+        head("memory", "memory (MB) ↓", true, AtFirst),
+        head("betti", "Betti", false, AtFirst),
+        head("topology", "as solid", false, AtFirst),
+        head("remark", "remark", false, AtFirst),
+    ]);
     heads
-        .iter()
-        .map(|(title, number)| {
-            let class = if *number { " class=\"num\"" } else { "" };
-            format!("<th scope=\"col\"{class}>{}</th>", escape_html(title))
-        })
-        .collect()
+}
+
+/// Check boxes for the columns that may be left out.
+fn column_chooser() -> String {
+    let mut html = String::from("<details class=\"columns\"><summary>columns</summary><div>\n");
+    for head in columns().iter().filter(|head| head.shown != Shown::Always) {
+        html.push_str(&format!(
+            "<label><input type=\"checkbox\" name=\"column\" value=\"{}\"{}> {}</label>\n",
+            head.key,
+            if head.shown == Shown::AtFirst { " checked" } else { "" },
+            escape_html(&head.title)
+        ));
+    }
+    html.push_str("</div></details>\n");
+    html
+}
+
+fn heads() -> String {
+    let cell = |head: &Head| {
+        let class = if head.number { " class=\"num\"" } else { "" };
+        let title = escape_html(&head.title);
+        format!("<th scope=\"col\" data-key=\"{}\"{class}>{title}</th>", head.key)
+    };
+    columns().iter().map(cell).collect()
 }
 
 /// A cell with the number that it sorts by; without one it sorts last.

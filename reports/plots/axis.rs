@@ -64,6 +64,16 @@ impl Axis {
         if placed.is_finite() { placed.clamp(0.0, 1.0) } else { 0.0 }
     }
 
+    /// Title, scale and ends as laid out, for the script of the page.
+    pub(crate) fn describe(&self) -> serde_json::Value {
+        let scale = match self.scale {
+            Scale::Linear => "linear",
+            Scale::Log => "log",
+            Scale::LogOfOneMore => "log1",
+        };
+        serde_json::json!({"title": self.title, "scale": scale, "ends": [self.ends.0, self.ends.1]})
+    }
+
     /// The text at a tick.
     pub(crate) fn label(value: f64) -> String {
         let rounded: f64 = significant(value, 3).parse().unwrap_or(value);

@@ -2,6 +2,7 @@
 
 use super::axis::Scale;
 use super::figure::{Curve, Figure};
+use super::points::Origin;
 use super::{BASELINE, KINDS, Plot, PlotError, mean_curve, mesh_curves};
 use crate::comparison::Comparison;
 use crate::metric::{HAUSDORFF, Metric};
@@ -35,6 +36,9 @@ pub(crate) fn against_numbers(
     curves.push(Curve {
         series: BASELINE,
         label: baseline.to_owned(),
+        name: baseline.to_owned(),
+        of: mesh.map_or("mean", |mesh| comparison.meshes[mesh].as_str()).to_owned(),
+        origins: vec![Origin { n: mesh.map(|_| 1), ..Origin::default() }; points.len()],
         points,
         tags: vec![],
         dashed: true,
@@ -49,9 +53,15 @@ pub(crate) fn against_numbers(
     let what = if name == "mean" { "Mean" } else { "Hausdorff" };
     let title = format!("{of}: {what} error against stored numbers");
     let x = ("stored numbers (floats)".to_owned(), Scale::Log);
-    let figure = Figure { title: title.clone(), x, y: (kind.axis_title(), Scale::Log), curves };
+    let figure = Figure {
+        title: title.clone(),
+        x,
+        y: (kind.axis_title(), Scale::Log),
+        curves,
+        front: false,
+    };
     let svg = figure.to_svg()?;
-    Ok(svg.map(|svg| Plot { stem: format!("{stem}-numbers-{name}"), title, svg }))
+    Ok(svg.map(|drawing| Plot::new(format!("{stem}-numbers-{name}"), title, drawing)))
 }
 
 /// One line of a figure about noise: series, label, and points.
@@ -65,14 +75,23 @@ pub(crate) fn against_noise(
     spikes: bool,
     curves: Vec<NoiseCurve>,
 ) -> Result<Option<Plot>, PlotError> {
-    let curve =
-        |(series, label, points)| Curve { series, label, points, tags: vec![], dashed: false };
+    let curve = |(series, label, points): NoiseCurve| Curve {
+        series,
+        name: label.clone(),
+        label,
+        of: "mean".to_owned(),
+        points,
+        origins: vec![],
+        tags: vec![],
+        dashed: false,
+    };
     let scale = if spikes { Scale::LogOfOneMore } else { Scale::Log };
     let figure = Figure {
         title: title.clone(),
         x: ("noise (% of diagonal)".to_owned(), Scale::Linear),
         y: (y.to_owned(), scale),
         curves: curves.into_iter().map(curve).collect(),
+        front: false,
     };
-    Ok(figure.to_svg()?.map(|svg| Plot { stem, title, svg }))
+    Ok(figure.to_svg()?.map(|drawing| Plot::new(stem, title, drawing)))
 }

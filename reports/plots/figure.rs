@@ -9,6 +9,9 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use crate::plots::PlotError;
 use crate::plots::axis::{Axis, Scale};
 use crate::plots::palette::{GRID, INK, Marker, PAPER, style};
+use crate::plots::points::{
+    Drawing, Layout, Origin, describe, front, group_begin, group_end, with_groups,
+};
 use crate::text::{printable, shortened};
 
 /// The backend draws at whole pixels: everything is drawn at twice its size and shown at half.
@@ -20,12 +23,17 @@ const LEGEND_ROW: i32 = 21 * RESOLUTION;
 /// One method's points.
 pub(crate) struct Curve {
     pub(crate) series: usize,
+    /// Text of its row in the legend; none where it is empty.
     pub(crate) label: String,
+    /// Name of the method, and what its points are of: a mesh, or a mean.
+    pub(crate) name: String,
+    pub(crate) of: String,
     /// In the order in which they are joined.
     pub(crate) points: Vec<(f64, f64)>,
+    /// One for each point, as far as it is known.
+    pub(crate) origins: Vec<Origin>,
     /// Texts beside some points: index and text.
     pub(crate) tags: Vec<(usize, String)>,
-    /// Dashed, and without a row of its own in the legend where the label is empty.
     pub(crate) dashed: bool,
 }
 
@@ -35,7 +43,11 @@ pub(crate) struct Figure {
     pub(crate) x: (String, Scale),
     pub(crate) y: (String, Scale),
     pub(crate) curves: Vec<Curve>,
+    /// Whether a line joins the points that no other one dominates.
+    pub(crate) front: bool,
 }
+
+const FRONT: &str = "not dominated";
 
 /// Text of a size, in the viewer's sans-serif font.
 pub(crate) fn font(size: i32, colour: RGBColor) -> TextStyle<'static> {
@@ -45,16 +57,20 @@ pub(crate) fn font(size: i32, colour: RGBColor) -> TextStyle<'static> {
 
 impl Figure {
     /// The figure as SVG; `None` where there is no point to draw.
-    pub(crate) fn to_svg(&self) -> Result<Option<String>, PlotError> {
+    pub(crate) fn to_svg(&self) -> Result<Option<Drawing>, PlotError> {
         let points = || self.curves.iter().flat_map(|curve| curve.points.iter().copied());
         let x = Axis::fit(self.x.0.as_str(), self.x.1, points().map(|point| point.0));
         let y = Axis::fit(self.y.0.as_str(), self.y.1, points().map(|point| point.1));
         let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
-        let legend = self.named().count() as i32 * LEGEND_ROW + 60 * RESOLUTION;
+        let rows = self.named().count() + usize::from(self.has_front());
+        let legend = rows as i32 * LEGEND_ROW + 60 * RESOLUTION;
         let size = (WIDTH as u32, HEIGHT.max(legend) as u32);
         let mut svg = String::new();
-        self.draw(&x, &y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())?;
-        Ok(Some(at_half_size(&svg, size)))
+        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        let layout = self.draw(&x, &y, &area)?;
+        drop(area);
+        let points = describe(self, &x, &y, &layout);
+        Ok(Some(Drawing { svg: with_groups(&at_half_size(&svg, size)), points }))
     }
 
     fn draw<B: DrawingBackend>(
@@ -62,7 +78,7 @@ impl Figure {
         x: &Axis,
         y: &Axis,
         area: &DrawingArea<B, Shift>,
-    ) -> Result<(), PlotError> {
+    ) -> Result<Layout, PlotError> {
         let failed = PlotError::new;
         area.fill(&PAPER).map_err(failed)?;
         let title = font(15, INK).pos(Pos::new(HPos::Left, VPos::Center));
@@ -80,6 +96,7 @@ impl Figure {
             .y_label_area_size(58 * RESOLUTION)
             .build_cartesian_2d(x.clone(), y.clone())
             .map_err(failed)?;
+        begin(area, "axes", None)?;
         chart
             .configure_mesh()
             .bold_line_style(GRID.stroke_width(RESOLUTION as u32))
@@ -94,11 +111,39 @@ impl Figure {
             .y_desc(&y.title)
             .draw()
             .map_err(failed)?;
+        end(area)?;
+        let mut layout = Layout::default();
         for curve in &self.curves {
             draw_curve(&mut chart, curve)?;
+            layout.curves.push(curve.points.iter().map(|p| chart.backend_coord(p)).collect());
         }
+        self.draw_front(&mut chart)?;
+        let (across, down) = chart.plotting_area().get_pixel_range();
+        layout.area = [across.start, down.start, across.end, down.end];
         self.draw_legend(&legend)?;
-        area.present().map_err(failed)
+        area.present().map_err(failed)?;
+        Ok(layout)
+    }
+
+    fn has_front(&self) -> bool {
+        self.front && front(&self.curves).len() > 1
+    }
+
+    /// A thin line through the points that no other one dominates, over the curves.
+    fn draw_front<B: DrawingBackend>(
+        &self,
+        chart: &mut ChartContext<'_, B, Cartesian2d<Axis, Axis>>,
+    ) -> Result<(), PlotError> {
+        if !self.has_front() {
+            return Ok(());
+        }
+        let points = front(&self.curves).into_iter();
+        let points = points.map(|(curve, point)| self.curves[curve].points[point]);
+        let area = chart.plotting_area().strip_coord_spec();
+        begin(&area, "front", None)?;
+        let line = INK.stroke_width(RESOLUTION as u32);
+        chart.draw_series(LineSeries::new(points, line)).map_err(PlotError::new)?;
+        end(&area)
     }
 
     /// The curves that the legend names.
@@ -108,8 +153,9 @@ impl Figure {
 
     /// Wide enough for the longest label, as far as its width can be told without a font.
     fn legend_width(&self) -> i32 {
+        let front = if self.has_front() { FRONT.len() } else { 0 };
         let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
-        RESOLUTION * (44 + 7 * longest.unwrap_or(0) as i32).clamp(90, 230)
+        RESOLUTION * (44 + 7 * longest.unwrap_or(0).max(front) as i32).clamp(90, 230)
     }
 
     fn draw_legend<B: DrawingBackend>(
@@ -119,6 +165,7 @@ impl Figure {
         for (row, curve) in self.named().enumerate() {
             let y = 18 * RESOLUTION + row as i32 * LEGEND_ROW;
             let (colour, marker) = style(curve.series);
+            begin(area, "legend", Some(curve.series))?;
             let dashes: &[(i32, i32)] = if curve.dashed { &[(0, 5), (19, 24)] } else { &[(0, 24)] };
             for (from, to) in dashes {
                 let line = vec![(from * RESOLUTION, y), (to * RESOLUTION, y)];
@@ -131,6 +178,15 @@ impl Figure {
             let text = font(12, INK).pos(Pos::new(HPos::Left, VPos::Center));
             area.draw(&Text::new(legend_text(curve), (31 * RESOLUTION, y), text))
                 .map_err(PlotError::new)?;
+            end(area)?;
+        }
+        if self.has_front() {
+            let y = 18 * RESOLUTION + self.named().count() as i32 * LEGEND_ROW;
+            let line = vec![(0, y), (24 * RESOLUTION, y)];
+            area.draw(&PathElement::new(line, INK.stroke_width(RESOLUTION as u32)))
+                .map_err(PlotError::new)?;
+            let text = font(12, INK).pos(Pos::new(HPos::Left, VPos::Center));
+            area.draw(&Text::new(FRONT, (31 * RESOLUTION, y), text)).map_err(PlotError::new)?;
         }
         Ok(())
     }
@@ -146,6 +202,8 @@ fn draw_curve<B: DrawingBackend>(
 ) -> Result<(), PlotError> {
     let (colour, marker) = style(curve.series);
     let line = colour.stroke_width(2 * RESOLUTION as u32);
+    let area = chart.plotting_area().strip_coord_spec();
+    begin(&area, "line", Some(curve.series))?;
     let points = curve.points.iter().copied();
     if curve.dashed {
         let dashes = DashedLineSeries::new(points, 7 * RESOLUTION, 5 * RESOLUTION, line);
@@ -153,25 +211,47 @@ fn draw_curve<B: DrawingBackend>(
     } else {
         chart.draw_series(LineSeries::new(points, line)).map_err(PlotError::new)?;
     }
-    let area = chart.plotting_area().strip_coord_spec();
+    end(&area)?;
     let origin = area.get_base_pixel();
     let pixel = |point: &(f64, f64)| {
         let (x, y) = chart.backend_coord(point);
         (x - origin.0, y - origin.1)
     };
+    begin(&area, "marks", Some(curve.series))?;
     for point in &curve.points {
+        begin(&area, "mark", None)?;
         for shape in shapes::<B>(marker, pixel(point), colour) {
             area.draw(&shape).map_err(PlotError::new)?;
         }
+        end(&area)?;
     }
+    end(&area)?;
+    if curve.tags.is_empty() {
+        return Ok(());
+    }
+    begin(&area, "tags", Some(curve.series))?;
     for (index, tag) in &curve.tags {
         let Some(point) = curve.points.get(*index) else { continue };
         let (x, y) = pixel(point);
-        let text = font(10, colour).pos(Pos::new(HPos::Left, VPos::Bottom));
+        let text = font(10, INK).pos(Pos::new(HPos::Left, VPos::Bottom));
         area.draw(&Text::new(tag.clone(), (x + 7 * RESOLUTION, y - 4 * RESOLUTION), text))
             .map_err(PlotError::new)?;
     }
-    Ok(())
+    end(&area)
+}
+
+/// Begins a group of what is drawn next.
+fn begin<B: DrawingBackend>(
+    area: &DrawingArea<B, Shift>,
+    class: &str,
+    series: Option<usize>,
+) -> Result<(), PlotError> {
+    area.draw(&Text::new(group_begin(class, series), (0, 0), font(1, INK))).map_err(PlotError::new)
+}
+
+/// Ends the group that began last.
+fn end<B: DrawingBackend>(area: &DrawingArea<B, Shift>) -> Result<(), PlotError> {
+    area.draw(&Text::new(group_end(), (0, 0), font(1, INK))).map_err(PlotError::new)
 }
 
 /// A marker as lines and polygons around a pixel.

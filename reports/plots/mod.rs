@@ -5,6 +5,7 @@ mod bars;
 mod extras;
 mod figure;
 mod palette;
+mod points;
 
 use std::fmt::Display;
 
@@ -19,6 +20,7 @@ use crate::summary::{CountSummary, SeriesSummary};
 use self::axis::Scale;
 use self::bars::Bars;
 use self::figure::{Curve, Figure};
+use self::points::{Drawing, Origin};
 
 pub(crate) use self::extras::{NoiseCurve, against_noise, against_numbers};
 pub(crate) use self::palette::{BASELINE, style};
@@ -41,6 +43,14 @@ pub(crate) struct Plot {
     /// What it shows, for those who cannot see it.
     pub(crate) title: String,
     pub(crate) svg: String,
+    /// Its points for the script of the page; null where it has none.
+    pub(crate) points: serde_json::Value,
+}
+
+impl Plot {
+    fn new(stem: String, title: String, drawing: Drawing) -> Self {
+        Self { stem, title, svg: drawing.svg, points: drawing.points }
+    }
 }
 
 /// What stands on the axes of a family of figures.
@@ -103,7 +113,9 @@ impl Kind {
         let spheres = || ("spheres".to_owned(), Scale::Log);
         let x =
             if self.against_time { (TOTAL_SECONDS.axis_title(), Scale::Log) } else { spheres() };
-        Figure { title, x, y: (self.axis_title(), self.scale), curves }
+        // Fewer spheres, less time, a smaller error: all of them are better where they are less.
+        let front = matches!(self.name, "hausdorff" | "mean" | "time");
+        Figure { title, x, y: (self.axis_title(), self.scale), curves, front }
     }
 
     fn axis_title(&self) -> String {
@@ -123,7 +135,7 @@ impl Kind {
         curves: Vec<Curve>,
     ) -> Result<Option<Plot>, PlotError> {
         let svg = self.figure(title.clone(), curves).to_svg()?;
-        Ok(svg.map(|svg| Plot { stem, title, svg }))
+        Ok(svg.map(|drawing| Plot::new(stem, title, drawing)))
     }
 }
 
@@ -169,6 +181,9 @@ fn mesh_curve<'e>(
     entries: impl Iterator<Item = &'e Entry<'e>>,
     kind: &Kind,
 ) -> Curve {
+    let mut entries = entries.peekable();
+    let mesh = entries.peek().map(|entry| comparison.meshes[entry.mesh].clone());
+    let mesh = mesh.unwrap_or_default();
     let point = |entry: &Entry<'_>| {
         let spheres = reached(entry.record)?;
         let x = if kind.against_time { TOTAL_SECONDS.of(entry.record)? } else { spheres as f64 };
@@ -181,6 +196,9 @@ fn mesh_curve<'e>(
     Curve {
         series,
         label: comparison.series[series].clone(),
+        name: comparison.series[series].clone(),
+        of: mesh,
+        origins: points.iter().map(|point| Origin::of_result(point.0)).collect(),
         points: points.into_iter().map(|point| point.1).collect(),
         tags,
         dashed: false,
@@ -240,12 +258,25 @@ fn own_levels(
         Curve {
             series: native.series,
             label: if is_named { String::new() } else { format!("{label} (own levels)") },
+            name: format!("{label} (own levels)"),
+            of: "mean".to_owned(),
             points: native.points.iter().map(|point| (point.spheres, error(point))).collect(),
+            origins: own_origins(comparison, native, native.points.iter()),
             tags: vec![],
             dashed: true,
         }
     };
     natives.iter().map(curve).collect()
+}
+
+/// Where means at levels of their own come from.
+fn own_origins<'p>(
+    comparison: &Comparison<'_>,
+    native: &NativeCurve,
+    points: impl Iterator<Item = &'p NativePoint>,
+) -> Vec<Origin> {
+    let whole = native.over == comparison.meshes.len();
+    points.map(|point| Origin::of_mean(native.over, point.spheres, whole)).collect()
 }
 
 /// One figure for each method with a scalar of its own: what it does to the error, on its own axis.
@@ -272,13 +303,17 @@ pub(crate) fn native_plots(
         let axis = axis(comparison.methods[native.series]);
         let title = format!("{label}: Hausdorff error against its own level");
         let spheres = native.points.iter().filter(|point| at(point).is_some());
+        let origins = own_origins(comparison, native, spheres.clone());
         let spheres: Vec<f64> = spheres.map(|point| point.spheres).collect();
         let tags = apart(&points, scale).into_iter();
         let tags = tags.map(|k| (k, crate::text::grouped(spheres[k].round() as u64)));
         let curve = Curve {
             series: native.series,
             label: format!("spheres, over {}", crate::text::counted(native.over, "mesh", "meshes")),
+            name: label.clone(),
+            of: "mean".to_owned(),
             points,
+            origins,
             tags: tags.collect(),
             dashed: true,
         };
@@ -287,9 +322,10 @@ pub(crate) fn native_plots(
             x: (axis.unwrap_or_else(|| "own level".to_owned()), scale),
             y: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),
             curves: vec![curve],
+            front: false,
         };
         let stem = format!("overview-level-{}", stems[native.series]);
-        plots.extend(figure.to_svg()?.map(|svg| Plot { stem, title, svg }));
+        plots.extend(figure.to_svg()?.map(|drawing| Plot::new(stem, title, drawing)));
     }
     Ok(plots)
 }
@@ -320,8 +356,23 @@ pub(crate) fn equal_error_plot(
             Some((bound.percent, row.spheres?))
         };
         let points = bounds.iter().filter_map(point).collect();
-        let label = comparison.series[series].clone();
-        Curve { series, label, points, tags: vec![], dashed: false }
+        let known = |bound: &BoundSummary| {
+            let row =
+                bound.rows.iter().find(|row| row.series == series && row.spheres.is_some())?;
+            Some(Origin { n: Some(row.asked), ..Origin::default() })
+        };
+        let origins = bounds.iter().filter_map(known).collect();
+        let (label, of) = (comparison.series[series].clone(), "median".to_owned());
+        Curve {
+            series,
+            name: label.clone(),
+            label,
+            of,
+            points,
+            origins,
+            tags: vec![],
+            dashed: false,
+        }
     };
     let title = "Equal error: median of the fewest spheres, searched for".to_owned();
     let figure = Figure {
@@ -332,9 +383,10 @@ pub(crate) fn equal_error_plot(
             .map(curve)
             .filter(|curve| !curve.points.is_empty())
             .collect(),
+        front: false,
     };
     let stem = "overview-equal-error".to_owned();
-    Ok(figure.to_svg()?.map(|svg| Plot { stem, title, svg }))
+    Ok(figure.to_svg()?.map(|drawing| Plot::new(stem, title, drawing)))
 }
 
 /// The share of the meshes on which each series is within an error at one number of spheres: from the ascending
@@ -372,13 +424,14 @@ fn mean_curve(
     series: usize,
     kind: &Kind,
 ) -> Curve {
-    let means: Vec<(usize, (f64, f64))> = summaries
+    let means: Vec<(usize, (f64, f64), Origin)> = summaries
         .iter()
         .filter_map(|summary| {
             let row = summary.rows.iter().find(|row| row.series == series)?;
             let x =
                 if kind.against_time { row.mean(&TOTAL_SECONDS)? } else { summary.count as f64 };
-            Some((summary.count, (x, row.mean(kind.y)?)))
+            let origin = Origin::of_mean(row.over, summary.count as f64, summary.is_whole(row));
+            Some((summary.count, (x, row.mean(kind.y)?), origin))
         })
         .collect();
     let tags = if kind.against_time { ends(means.iter().map(|mean| mean.0)) } else { Vec::new() };
@@ -391,7 +444,10 @@ fn mean_curve(
     Curve {
         series,
         label: label.unwrap_or_else(|| comparison.series[series].clone()),
-        points: means.into_iter().map(|mean| mean.1).collect(),
+        name: comparison.series[series].clone(),
+        of: "mean".to_owned(),
+        points: means.iter().map(|mean| mean.1).collect(),
+        origins: means.iter().map(|mean| mean.2).collect(),
         tags,
         dashed: false,
     }
@@ -415,5 +471,6 @@ fn stage_bars(
     let level = level_label(Level::Spheres(summary.count));
     let title = format!("Seconds by stage, to {level} spheres");
     let svg = Bars { title: title.clone(), rows }.to_svg()?;
-    Ok(svg.map(|svg| Plot { stem: "overview-stages".to_owned(), title, svg }))
+    let points = serde_json::Value::Null;
+    Ok(svg.map(|svg| Plot { stem: "overview-stages".to_owned(), title, svg, points }))
 }

@@ -220,6 +220,27 @@ fn names_from_files_stay_text() {
 }
 
 #[test]
+fn a_spreadsheet_finds_no_formula_in_the_csv() {
+    let record = ok("=HYPERLINK(0)", "qmat", 100, 0, 0);
+    let mut refused = failed("@bear", "qmat", 100, Status::Refused, "-1 faces");
+    refused.command = "+medial".to_owned();
+    let files = report_of(&[record.clone(), refused]);
+    let mut reader = csv::Reader::from_reader(&files["results.csv"][..]);
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    let begins = |cell: &&str| cell.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    for cell in rows.iter().flat_map(csv::StringRecord::iter).filter(begins) {
+        assert!(cell.parse::<f64>().is_ok(), "{cell}");
+    }
+    let cells: Vec<&str> = rows.iter().flat_map(csv::StringRecord::iter).collect();
+    for expected in ["'=HYPERLINK(0)", "'@bear", "'-1 faces", "'+medial"] {
+        assert!(cells.contains(&expected), "{expected}");
+    }
+    // Numbers, the negative ones too, stay numbers.
+    assert!(cells.contains(&record.evaluate.unwrap().distances.hausdorff.to_string().as_str()));
+    assert!(cells.contains(&"-2"), "the Euler characteristic");
+}
+
+#[test]
 fn numbers_of_an_earlier_report_do_not_stay() {
     let folder = tempfile::tempdir().unwrap();
     let write = |records: &[Record]| write_report(folder.path(), records, &header(&METHODS));
