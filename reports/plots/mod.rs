@@ -401,9 +401,11 @@ pub(crate) fn profile_plot(
         // Up at each error.
         let step =
             |(k, &error): (usize, &f64)| [(error, share(k, *asked)), (error, share(k + 1, *asked))];
-        let points = errors.iter().enumerate().flat_map(step).collect();
+        let points: Vec<(f64, f64)> = errors.iter().enumerate().flat_map(step).collect();
+        let origins = vec![Origin { n: Some(*asked), ..Origin::default() }; points.len()];
         let label = comparison.series[series].clone();
-        Curve { series, label, points, tags: vec![], dashed: false }
+        let (name, of) = (label.clone(), "share".to_owned());
+        Curve { series, label, name, of, points, origins, tags: vec![], dashed: false }
     };
     let level = crate::text::counted(spheres, "sphere", "spheres");
     let title = format!("Meshes within an error at {level}");
@@ -413,9 +415,10 @@ pub(crate) fn profile_plot(
         x: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),
         y: ("meshes (%)".to_owned(), Scale::Linear),
         curves: curves.collect(),
+        front: false,
     };
     let stem = "overview-profile".to_owned();
-    Ok(figure.to_svg()?.map(|svg| Plot { stem, title, svg }))
+    Ok(figure.to_svg()?.map(|drawing| Plot::new(stem, title, drawing)))
 }
 
 fn mean_curve(

@@ -196,6 +196,7 @@ fn a_strip_has_a_panel_for_each_and_a_bar() {
         diagonal: 2.0,
         camera: front(),
         size: [160, 120],
+        across: 2,
         background: Background::WHITE,
         colour: ColourBy::Radius,
         max_error: None,
@@ -204,6 +205,9 @@ fn a_strip_has_a_panel_for_each_and_a_bar() {
     let two = strip(&[panel(Some(errors)), panel(None)], &common).expect("a strip");
     assert_eq!(one.width(), 2 * 160 + Bar::column(common.size));
     assert_eq!((two.width(), two.height()), (one.width(), 2 * one.height()));
+    // A third one begins a line of its own.
+    let three = strip(&[panel(None), panel(None), panel(None)], &common).expect("a strip");
+    assert_eq!((three.width(), three.height()), (one.width(), 2 * one.height()));
     // Alike but for the place: panels of one mesh are one picture.
     let column = |x: usize| (0..120).filter_map(|y| one.pixel(x, y)).collect::<Vec<_>>();
     assert!((0..160).all(|x| column(x) == column(160 + x)));
