@@ -301,18 +301,23 @@ pub(crate) fn wins_table(comparison: &Comparison<'_>, how: &str) -> Option<Table
     })
 }
 
-/// For each series the errors on its meshes at the usual count, ascending, and the meshes it was asked for.
-pub(crate) fn error_profiles(
-    comparison: &Comparison<'_>,
-) -> Option<(usize, Vec<(Vec<f64>, usize)>)> {
+/// The errors of one series on its meshes at one number of spheres.
+pub(crate) struct Profile {
+    /// Errors, ascending.
+    pub(crate) errors: Vec<f64>,
+    /// Meshes that it was asked for.
+    pub(crate) asked: usize,
+}
+
+/// The number of spheres that the answers are for, and a profile for each series.
+pub(crate) fn error_profiles(comparison: &Comparison<'_>) -> Option<(usize, Vec<Profile>)> {
     let (level, spheres) = usual_level(comparison)?;
-    let errors = errors_at(comparison, level);
     let profile = |values: &Values| {
         let known = values.iter().flatten();
         let asked = known.clone().count();
-        let mut finite: Vec<f64> = known.copied().filter(|value| value.is_finite()).collect();
-        finite.sort_by(f64::total_cmp);
-        (finite, asked)
+        let mut errors: Vec<f64> = known.copied().filter(|value| value.is_finite()).collect();
+        errors.sort_by(f64::total_cmp);
+        Profile { errors, asked }
     };
-    Some((spheres, errors.iter().map(profile).collect()))
+    Some((spheres, errors_at(comparison, level).iter().map(profile).collect()))
 }

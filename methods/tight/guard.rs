@@ -53,7 +53,7 @@ impl Guard {
         // The faces that are looked at: all, and then those of what was taken back.
         let mut changed = vec![true; before.spheres.len()];
         loop {
-            let mut back: Vec<[u32; 3]> = before.faces.iter().copied().collect();
+            let mut back = before.faces.clone();
             back.retain(|&face| folds_over(corners(before, face), corners(after, face)));
             let new = self.crossing(after, |face| face.iter().any(|&v| changed[v as usize]));
             let new = new.into_iter().filter(|pair| !self.known.contains(pair));

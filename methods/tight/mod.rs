@@ -12,7 +12,7 @@
 //!    ball protrudes; at interior points how far they are from being held.
 //! 3. *Descent* (`descent.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
 //!    with a sparse Cholesky factorisation (`normal.rs`). A step that would take a centre out of the
-//!    solid, or fold a face over, is taken back there (`guard.rs`).
+//!    solid, fold a face over or make one cross another is taken back there (`guard.rs`).
 //! 4. *Collapse* (`collapse.rs`): passes of the cheapest edges, priced by the samples that their stars
 //!    serve; a few steps of 3 after each pass, at the power 4.
 //! 5. *Swap* (`insert.rs`): spheres are inserted where the error is largest, and as many edges collapsed
@@ -33,7 +33,8 @@
 //!   of the start. Those of the union are not looked at.
 //! - The error is measured at samples and by ascent from them; it is not certified. `lambda` weighs the
 //!   mean against the maximum.
-//! - Faces that cross without being neighbours are not avoided.
+//! - No collapse, insertion or step makes two faces cross that did not (`sheets.rs`, `guard.rs`); those that cross at
+//!   the start may go on.
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   says how much.
 //! - The level of its own is a bound of the two-sided error, a fraction of the diagonal, and is held by a

@@ -15,6 +15,7 @@ use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::equal_error::BoundSummary;
 use crate::metric::{BELOW_30, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
 use crate::native::{NativeCurve, NativePoint};
+use crate::purpose::Profile;
 use crate::summary::{CountSummary, SeriesSummary};
 
 use self::axis::Scale;
@@ -389,15 +390,15 @@ pub(crate) fn equal_error_plot(
     Ok(figure.to_svg()?.map(|drawing| Plot::new(stem, title, drawing)))
 }
 
-/// The share of the meshes on which each series is within an error at one number of spheres: from the ascending
-/// errors and the number of meshes that it was asked for.
+/// The share of the meshes on which each series is within an error at one number of spheres, of the
+/// meshes that it was asked for.
 pub(crate) fn profile_plot(
     comparison: &Comparison<'_>,
     spheres: usize,
-    profiles: &[(Vec<f64>, usize)],
+    profiles: &[Profile],
 ) -> Result<Option<Plot>, PlotError> {
     let share = |number: usize, asked: usize| 100.0 * number as f64 / asked as f64;
-    let curve = |(series, (errors, asked)): (usize, &(Vec<f64>, usize))| {
+    let curve = |(series, Profile { errors, asked }): (usize, &Profile)| {
         // Up at each error.
         let step =
             |(k, &error): (usize, &f64)| [(error, share(k, *asked)), (error, share(k + 1, *asked))];
