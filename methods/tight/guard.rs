@@ -64,7 +64,8 @@ impl Guard {
                 }
             }
             let moved = |v: &u32| {
-                let of = |mesh: &MedialMesh| mesh.spheres.get(*v as usize).copied();
+                // Radii play no part in either.
+                let of = |mesh: &MedialMesh| mesh.spheres.get(*v as usize).map(|s| s.centre);
                 of(before) != of(after)
             };
             let back: BTreeSet<u32> = back.into_iter().flatten().filter(moved).collect();

@@ -134,7 +134,7 @@ impl Start {
 /// Joins components by edges inside the solid until `parts` are left, the smallest one to what is closest to it.
 /// Where the solid is thinner than the samples are apart, its medial mesh can fall into pieces. Returns how many
 /// edges were added.
-fn joined(mesh: &mut MedialMesh, shape: &Shape, parts: u64) -> usize {
+pub(super) fn joined(mesh: &mut MedialMesh, shape: &Shape, parts: u64) -> usize {
     let mut sets = DisjointSets::singletons(mesh.spheres.len());
     mesh.edges.iter().for_each(|&[a, b]| {
         sets.join(a, b);

@@ -1,5 +1,6 @@
 use medial::Vec3;
-use medial::complex::{MedialMesh, Primitive, betti};
+use medial::complex::collapse::CollapseComplex;
+use medial::complex::{MedialMesh, Primitive, Sphere, betti, crossing_faces};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Params, RunContext, SimplifyError};
 use rand::{RngExt, SeedableRng};
@@ -7,10 +8,13 @@ use rand_pcg::Pcg64;
 
 use super::descent::{Descent, Objective};
 use super::goal::Goal;
+use super::guard::{Guard, Still};
 use super::insert::swapped;
 use super::normal::{Normal, Pattern};
 use super::patch::Patch;
 use super::rows::{Row, vertices};
+use super::sheets::Sheets;
+use super::start::joined;
 
 fn shape(id: &str, resolution: u32) -> Shape {
     let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);
@@ -269,4 +273,112 @@ fn what_serves_a_sample_is_among_its_primitives() {
             assert!((v as usize) < descent.mesh.spheres.len());
         }
     }
+}
+
+/// Two triangles in parallel planes, and a step that pushes a corner of one through the other.
+fn two_sheets() -> (MedialMesh, MedialMesh) {
+    let at = |x: f64, y: f64, z: f64| Sphere::new(Vec3::new(x, y, z), 0.01);
+    let low = [at(-0.1, -0.1, 0.0), at(0.1, -0.1, 0.0), at(0.0, 0.1, 0.0)];
+    let high = [at(-0.02, 0.0, 0.03), at(0.02, 0.0, 0.03), at(0.0, 0.02, 0.03)];
+    let spheres = low.into_iter().chain(high).collect();
+    let before = MedialMesh::from_simplices(spheres, vec![], vec![[0, 1, 2], [3, 4, 5]]).unwrap();
+    let mut after = before.clone();
+    after.spheres[3].centre.z = -0.04;
+    after.spheres[0].radius = 0.02;
+    (before, after)
+}
+
+#[test]
+fn a_step_that_makes_faces_cross_is_shortened_and_others_are_not() {
+    let shape = shape("box", 4);
+    let goal = Goal::new(&shape, 0).unwrap();
+    let centre = |mesh: &MedialMesh| {
+        let (lo, hi) = shape.mesh().bounding_box().unwrap();
+        mesh.transformed(1.0, |p| p + 0.5 * (lo + hi))
+    };
+    let (before, after) = two_sheets();
+    let (before, mut after) = (centre(&before), centre(&after));
+    assert_eq!(crossing_faces(&after).len(), 1);
+    let wanted = after.clone();
+    Guard::new(&before, Still::default()).hold(&before, &mut after, &goal);
+    assert!(crossing_faces(&after).is_empty());
+    assert_eq!(after.spheres[0], wanted.spheres[0], "what has no part in it moves as it wanted");
+    let [from, to] = [&before, &after].map(|mesh| mesh.spheres[3].centre.z);
+    assert!(to < from, "shortened, not refused: {from} to {to}");
+
+    // What crosses already may go on.
+    let mut further = wanted.clone();
+    further.spheres[4].centre.z -= 0.01;
+    let asked = further.clone();
+    Guard::new(&wanted, Still::default()).hold(&wanted, &mut further, &goal);
+    assert_eq!(further.spheres, asked.spheres);
+
+    // The same where the other face is one that stays.
+    let part = before.induced(&[false, false, false, true, true, true]);
+    let corners = [0, 1, 2].map(|v: usize| before.spheres[v].centre);
+    let still = Still { faces: vec![[10, 11, 12]], corners: vec![corners] };
+    let mut moved = part.clone();
+    moved.spheres[0] = wanted.spheres[3];
+    Guard::new(&part, still).hold(&part, &mut moved, &goal);
+    let whole = MedialMesh {
+        spheres: before.spheres[..3].iter().chain(&moved.spheres).copied().collect(),
+        ..before.clone()
+    };
+    assert!(crossing_faces(&whole).is_empty());
+}
+
+#[test]
+fn collapses_that_make_faces_cross_are_seen_and_images_of_crossings_are_not_new() {
+    // A fan of two faces over an edge, and a face in the way of one of its ends.
+    let at = |x: f64, y: f64, z: f64| Sphere::new(Vec3::new(x, y, z), 0.01);
+    let spheres = vec![
+        at(0.0, 0.0, 0.0),
+        at(1.0, 0.0, 0.0),
+        at(0.5, 1.0, 0.0),
+        at(0.5, -1.0, 0.0),
+        at(0.25, 0.4, 0.2),
+        at(0.25, 0.4, 0.6),
+        at(0.25, 0.6, 0.4),
+    ];
+    let faces = vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [4, 5, 6]];
+    let mesh = MedialMesh::from_simplices(spheres, vec![], faces).unwrap();
+    let sheets = Sheets::new(&mesh);
+    let complex = CollapseComplex::from_mesh(&mesh);
+    let flat = at(0.5, 0.0, 0.0);
+    assert!(!sheets.would_cross(&complex, [0, 1], flat));
+    // Lifted, the face to 2 and 3 passes through the one above.
+    let lifted = at(0.0, 0.0, 0.8);
+    assert!(sheets.would_cross(&complex, [0, 1], lifted));
+    // If the two cross before, it is nothing new.
+    let mut crossing = mesh.clone();
+    crossing.spheres[0] = lifted;
+    assert!(!crossing_faces(&crossing).is_empty());
+    let complex = CollapseComplex::from_mesh(&crossing);
+    assert!(!Sheets::new(&crossing).would_cross(&complex, [0, 1], lifted));
+}
+
+#[test]
+fn the_result_has_no_more_crossing_faces_than_the_start_and_says_how_many_that_has() {
+    let shape = shape("bracket", 6);
+    let tight = crate::find("tight").unwrap();
+    let mut levels = tight.prepare(&shape, &quick(), &RunContext::default()).unwrap();
+    let found = levels.at(Level::Spheres(30)).unwrap();
+    let counts = &found.diagnostics.counts;
+    let at_start = counts.iter().find(|(name, _)| name == "crossing_faces_of_the_start");
+    assert!(crossing_faces(&found.mesh).len() as u64 <= at_start.unwrap().1);
+}
+
+#[test]
+fn pieces_of_one_solid_are_joined_inside_it() {
+    let shape = shape("box", 4);
+    let (lo, hi) = shape.mesh().bounding_box().unwrap();
+    let at = |t: f64| Sphere::new(lo.lerp(hi, t), 0.02);
+    let spheres = vec![at(0.4), at(0.45), at(0.5), at(0.6)];
+    let mut mesh = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![]).unwrap();
+    assert_eq!(joined(&mut mesh, &shape, 1), 2);
+    assert_eq!(mesh.edges, vec![[0, 1], [1, 2], [2, 3]]);
+    assert_eq!(joined(&mut mesh, &shape, 1), 0);
+    // A sphere outside is not joined to it.
+    mesh.spheres.push(Sphere::new(hi + Vec3::splat(0.5), 0.1));
+    assert_eq!(joined(&mut mesh, &shape, 1), 0);
 }
