@@ -16,6 +16,9 @@ const USUAL: f64 = 100.0;
 /// Error that the cost of a result is compared at, in % of the diagonal.
 const BOUND: f64 = 1.0;
 
+/// Triangles of a result with a larger error are no merit, in % of the diagonal.
+const USABLE: f64 = 2.0;
+
 /// Values that differ by a smaller share are called equal: about what other samples change.
 const EQUAL: f64 = 0.01;
 
@@ -39,7 +42,10 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
     let mut rows = Vec::new();
     if let Some((level, spheres)) = count {
         let asked = |entry: &Entry<'_>| entry.level == level;
-        let at = |entry: &Entry<'_>| entry.comparable();
+        let usable = |entry: &Entry<'_>| {
+            let error = HAUSDORFF.of(entry.record);
+            entry.comparable() && error.is_some_and(|error| error <= USABLE)
+        };
         let spheres = counted(spheres, "sphere", "spheres");
         rows.extend(answer(
             comparison,
@@ -54,9 +60,9 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         rows.extend(answer(
             comparison,
             &Question {
-                title: format!("best triangles at {spheres}"),
+                title: format!("best triangles at {spheres}, of errors up to {USABLE} %"),
                 // The distance from the angles of an equilateral triangle.
-                values: values(comparison, asked, at, |entry| {
+                values: values(comparison, asked, usable, |entry| {
                     Some(60.0 - MIN_ANGLE.of(entry.record)?)
                 }),
                 text: |value| format!("least angle {:.1}°", 60.0 - value),
