@@ -38,72 +38,11 @@ struct Question {
 
 /// The table of answers; `None` where nothing can be compared.
 pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
-    let count = usual_level(comparison);
-    let mut rows = Vec::new();
-    if let Some((level, spheres)) = count {
-        let asked = |entry: &Entry<'_>| entry.level == level;
-        let usable = |entry: &Entry<'_>| {
-            let error = HAUSDORFF.of(entry.record);
-            entry.comparable() && error.is_some_and(|error| error <= USABLE)
-        };
-        let spheres = counted(spheres, "sphere", "spheres");
-        rows.extend(answer(
-            comparison,
-            &Question {
-                title: format!("lowest error at {spheres}"),
-                values: errors_at(comparison, level),
-                text: |value| format!("{} %", significant(value, 3)),
-                lead: |ratio| format!("{} of its error", significant(ratio, 2)),
-            },
-        ));
-        rows.extend(right_everywhere(comparison, level, &spheres));
-        rows.extend(answer(
-            comparison,
-            &Question {
-                title: format!("best triangles at {spheres}, of errors up to {USABLE} %"),
-                // The distance from the angles of an equilateral triangle.
-                values: values(comparison, asked, usable, |entry| {
-                    Some(60.0 - MIN_ANGLE.of(entry.record)?)
-                }),
-                text: |value| format!("least angle {:.1}°", 60.0 - value),
-                lead: |ratio| format!("{} of its distance from 60°", significant(ratio, 2)),
-            },
-        ));
-    }
-    let within = |entry: &Entry<'_>| {
-        entry.measured() && HAUSDORFF.of(entry.record).is_some_and(|error| error <= BOUND)
-    };
-    let any = |_: &Entry<'_>| true;
-    let spheres = |entry: &Entry<'_>| reached(entry.record).map(|n| n as f64);
-    let numbers = |entry: &Entry<'_>| Some(entry.record.evaluate.as_ref()?.counts.numbers() as f64);
-    let bound = format!("within {BOUND} % error");
-    rows.extend(answer(
-        comparison,
-        &Question {
-            title: format!("fewest spheres {bound}"),
-            values: values(comparison, any, within, spheres),
-            text: |value| counted(value.round() as usize, "sphere", "spheres"),
-            lead: |ratio| format!("{} of its spheres", significant(ratio, 2)),
-        },
-    ));
-    rows.extend(answer(
-        comparison,
-        &Question {
-            title: format!("smallest file {bound}"),
-            values: values(comparison, any, within, numbers),
-            text: |value| format!("{} numbers", grouped(value.round() as u64)),
-            lead: |ratio| format!("{} of its numbers", significant(ratio, 2)),
-        },
-    ));
-    rows.extend(answer(
-        comparison,
-        &Question {
-            title: format!("fastest {bound}"),
-            values: values(comparison, any, within, |entry| TOTAL_SECONDS.of(entry.record)),
-            text: |value| format!("{} s", significant(value, 2)),
-            lead: |ratio| format!("{} of its time", significant(ratio, 2)),
-        },
-    ));
+    let mut rows = usual_level(comparison)
+        .map_or_else(Vec::new, |(level, spheres)| at_count(comparison, level, spheres));
+    rows.extend(within_bound(comparison));
+    let titles =
+        ["what matters", "method", "median", "on", "ahead of", "by", "better, equal, worse"];
     (!rows.is_empty()).then(|| Table {
         caption: "Which one for me".to_owned(),
         notes: vec![
@@ -116,11 +55,68 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
                 100.0 * EQUAL
             ),
         ],
-        columns: ["what matters", "method", "median", "on", "ahead of", "by", "better, equal, worse"]
-            .map(Column::text)
-            .into(),
+        columns: titles.map(Column::text).into(),
         rows,
     })
+}
+
+/// The answers at one number of spheres.
+fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Row> {
+    let spheres = counted(spheres, "sphere", "spheres");
+    let error = Question {
+        title: format!("lowest error at {spheres}"),
+        values: errors_at(comparison, level),
+        text: |value| format!("{} %", significant(value, 3)),
+        lead: |ratio| format!("{} of its error", significant(ratio, 2)),
+    };
+    let asked = |entry: &Entry<'_>| entry.level == level;
+    let usable = |entry: &Entry<'_>| {
+        entry.comparable() && HAUSDORFF.of(entry.record).is_some_and(|error| error <= USABLE)
+    };
+    // The distance from the angles of an equilateral triangle.
+    let missing = |entry: &Entry<'_>| Some(60.0 - MIN_ANGLE.of(entry.record)?);
+    let triangles = Question {
+        title: format!("best triangles at {spheres}, of errors up to {USABLE} %"),
+        values: values(comparison, asked, usable, missing),
+        text: |value| format!("least angle {:.1}°", 60.0 - value),
+        lead: |ratio| format!("{} of its distance from 60°", significant(ratio, 2)),
+    };
+    let mut rows: Vec<Row> = answer(comparison, &error).into_iter().collect();
+    rows.extend(right_everywhere(comparison, level, &spheres));
+    rows.extend(answer(comparison, &triangles));
+    rows
+}
+
+/// What an error of at most [`BOUND`] costs.
+fn within_bound(comparison: &Comparison<'_>) -> Vec<Row> {
+    let within = |entry: &Entry<'_>| {
+        entry.measured() && HAUSDORFF.of(entry.record).is_some_and(|error| error <= BOUND)
+    };
+    let least = |value: &dyn Fn(&Entry<'_>) -> Option<f64>| {
+        values(comparison, |_: &Entry<'_>| true, within, value)
+    };
+    let bound = format!("within {BOUND} % error");
+    let questions = [
+        Question {
+            title: format!("fewest spheres {bound}"),
+            values: least(&|entry| Some(reached(entry.record)? as f64)),
+            text: |value| counted(value.round() as usize, "sphere", "spheres"),
+            lead: |ratio| format!("{} of its spheres", significant(ratio, 2)),
+        },
+        Question {
+            title: format!("smallest file {bound}"),
+            values: least(&|entry| Some(entry.record.evaluate.as_ref()?.counts.numbers() as f64)),
+            text: |value| format!("{} numbers", grouped(value.round() as u64)),
+            lead: |ratio| format!("{} of its numbers", significant(ratio, 2)),
+        },
+        Question {
+            title: format!("fastest {bound}"),
+            values: least(&|entry| TOTAL_SECONDS.of(entry.record)),
+            text: |value| format!("{} s", significant(value, 2)),
+            lead: |ratio| format!("{} of its time", significant(ratio, 2)),
+        },
+    ];
+    questions.iter().filter_map(|question| answer(comparison, question)).collect()
 }
 
 /// The asked number of spheres that is nearest to [`USUAL`], of those that most methods reached.
