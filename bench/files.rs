@@ -11,19 +11,25 @@ use crate::exit::Failure;
 /// spheres the whole surface is less than a rounding error.
 const LARGEST_SPHERE: f64 = 1e12;
 
+/// How far from the middle of its surface a medial mesh reaches, in diagonals, if it is no slip.
+const SMALLEST: f64 = 0.01;
+const LARGEST: f64 = 5.0;
+
 /// Reads a medial mesh that was made for a shape, in input units.
 ///
 /// # Errors
 /// When it cannot be read, has no sphere, or cannot belong to the shape.
 pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<LoadedMa, Failure> {
-    let loaded = complex::read(path).map_err(Failure::input)?;
+    let mut loaded = complex::read(path).map_err(Failure::input)?;
     if loaded.mesh.spheres.is_empty() {
         return Err(Failure::input(format!("{}: no sphere", path.display())));
     }
     let to_normal = shape.normalisation();
+    let mut reach = 0.0_f64;
     for (id, sphere) in loaded.mesh.spheres.iter().enumerate() {
         let centre = to_normal.forward(sphere.centre);
         let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
+        reach = reach.max(size);
         // An overflow gives a size that is infinite or not a number.
         if size.is_nan() || size > LARGEST_SPHERE {
             return Err(Failure::input(format!(
@@ -32,6 +38,14 @@ pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<LoadedMa, Failure> 
                 path.display()
             )));
         }
+    }
+    // The middle of the surface is the origin.
+    if !(SMALLEST..=LARGEST).contains(&reach) {
+        loaded.warnings.push(format!(
+            "{}: it reaches {:.2e} diagonals of the surface from the middle of that: is it in the same units?",
+            path.display(),
+            reach
+        ));
     }
     Ok(loaded)
 }

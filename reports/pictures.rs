@@ -6,6 +6,8 @@
 
 use std::collections::BTreeMap;
 
+use medial::geometry::hash::splitmix;
+
 use crate::comparison::{Comparison, reached};
 use crate::metric::HAUSDORFF;
 use crate::purpose::usual_level;
@@ -13,7 +15,7 @@ use crate::record::Record;
 use crate::text::{counted, file_stems, significant};
 
 /// Folder of the pictures, beside the page.
-const FOLDER: &str = "pictures";
+pub(crate) const FOLDER: &str = "pictures";
 
 /// A strip of pictures that a report shows if it finds it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,6 +34,17 @@ pub struct PictureStrip {
 pub fn picture_strips(records: &[Record]) -> Vec<PictureStrip> {
     let comparison = Comparison::new(records);
     strips(&comparison).into_values().collect()
+}
+
+impl PictureStrip {
+    /// A name that another choice of results, or other errors beside them, does not have: a picture of an earlier
+    /// run is never shown beside the numbers of a later one.
+    fn name(&mut self, stem: &str) {
+        let bytes = self.panels.iter().flat_map(|(artifact, caption)| [artifact, caption]);
+        let bytes = bytes.flat_map(|text| text.bytes().chain([0]));
+        let hash = bytes.fold(0, |hash, byte| splitmix(hash ^ u64::from(byte)));
+        self.file = format!("{FOLDER}/mesh-{stem}-{:08x}.png", hash >> 32);
+    }
 }
 
 /// The strips by mesh.
@@ -53,10 +66,13 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
         let strip = || PictureStrip {
             mesh: comparison.meshes[entry.mesh].clone(),
             mesh_hash: record.mesh_hash.clone(),
-            file: format!("{FOLDER}/mesh-{}.png", stems[entry.mesh]),
+            file: String::new(),
             panels: vec![],
         };
         strips.entry(entry.mesh).or_insert_with(strip).panels.push((artifact, caption));
+    }
+    for (&mesh, strip) in &mut strips {
+        strip.name(&stems[mesh]);
     }
     strips
 }

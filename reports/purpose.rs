@@ -119,7 +119,7 @@ fn within_bound(comparison: &Comparison<'_>) -> Vec<Row> {
     questions.iter().filter_map(|question| answer(comparison, question)).collect()
 }
 
-/// The asked number of spheres that is nearest to [`USUAL`], of those that most methods reached.
+/// The asked number of spheres that is nearest to [`USUAL`], of those that any method reached.
 pub(crate) fn usual_level(comparison: &Comparison<'_>) -> Option<(usize, usize)> {
     let reached = |level: usize| {
         comparison.entries.iter().filter(|e| e.level == level && e.comparable()).count()

@@ -15,7 +15,7 @@ use crate::header::Header;
 use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, Page};
-use crate::pictures::{PictureStrip, strips};
+use crate::pictures::{FOLDER, PictureStrip, strips};
 use crate::plots::{Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot};
 use crate::purpose::{error_profiles, purpose_table, wins_table};
 use crate::record::Record;
@@ -106,7 +106,8 @@ pub fn write_report(
     let header_json =
         serde_json::to_vec_pretty(header).map_err(|error| ReportError::header(&error))?;
     files.write("header.json", &header_json)?;
-    files.remove_stale()?;
+    let shown = pictures.values().map(|strip| dir.join(&strip.file)).collect();
+    files.remove_stale(shown)?;
     let page = Page {
         header,
         comparison: &comparison,
@@ -196,8 +197,11 @@ impl Files<'_> {
     }
 
     /// Removes what an earlier report left under the names that only a report gives.
-    fn remove_stale(&self) -> Result<(), ReportError> {
-        for (folder, extensions) in [("tables", &["md", "tex"][..]), ("plots", &["svg"][..])] {
+    /// The pictures that are `shown` stay.
+    fn remove_stale(&self, shown: Vec<PathBuf>) -> Result<(), ReportError> {
+        let ours: [(&str, &[&str]); 3] =
+            [("tables", &["md", "tex"]), ("plots", &["svg"]), (FOLDER, &["png"])];
+        for (folder, extensions) in ours {
             let folder = self.dir.join(folder);
             let failed = |source| ReportError::Io { path: folder.clone(), source };
             let entries = match fs::read_dir(&folder) {
@@ -211,7 +215,7 @@ impl Files<'_> {
                     && path
                         .extension()
                         .is_some_and(|extension| extensions.iter().any(|&ours| extension == ours));
-                if ours && !self.written.contains(&path) {
+                if ours && !self.written.contains(&path) && !shown.contains(&path) {
                     fs::remove_file(&path).map_err(failed)?;
                 }
             }

@@ -131,8 +131,9 @@ pub fn run(
         Err(PlanError::Run(RunError::Interrupted)) => return Ok(interrupt_message(&left, tally)),
         ended => ended?,
     }
-    let Rebuilt { records, files, .. } =
+    let Rebuilt { records, files, undrawn, .. } =
         report::refresh(&arguments.out, registry, &provenance, tally.run)?;
+    undrawn.iter().for_each(|why| note(global, why));
     finish(&of_items(records, &items), tally, &arguments.out, &files, global)
 }
 

@@ -15,9 +15,11 @@ const PANEL: [usize; 2] = [320, 260];
 const ACROSS: usize = 4;
 
 /// Draws the strips of some records into the folder of their report. What cannot be drawn, since an input is gone
-/// or changed, is left out, and the reason returned; a picture of an earlier run stays then.
+/// or changed, is left out, and the reason returned. What stands there already is not drawn again: its name tells what
+/// it shows.
 pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
-    let strips = picture_strips(records);
+    let mut strips = picture_strips(records);
+    strips.retain(|strip| !dir.join(&strip.file).exists());
     if strips.is_empty() {
         return vec![];
     }

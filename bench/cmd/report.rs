@@ -35,7 +35,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         true => Some(Store::open(&arguments.dir, RESULTS, "medial report")?),
         false => None,
     };
-    let Rebuilt { records, files, warnings } = rebuild(&arguments.dir, registry)?;
+    let Rebuilt { records, files, mut warnings, undrawn } = rebuild(&arguments.dir, registry)?;
+    warnings.extend(undrawn);
     drop(held);
     if global.json {
         print_json(&json!({ "records": records.len(), "files": files }), &warnings);
@@ -57,6 +58,8 @@ pub struct Rebuilt {
     pub files: Vec<PathBuf>,
     /// Lines that hold no record.
     pub warnings: Vec<String>,
+    /// Meshes whose results have no picture, and why.
+    pub undrawn: Vec<String>,
 }
 
 /// Rebuilds the report of a folder from its files.
@@ -73,10 +76,9 @@ pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
     let header = header(dir, &records, registry, &warnings);
-    let mut warnings = warnings;
-    warnings.extend(pictures::draw(dir, &records, &sources(dir)));
+    let undrawn = pictures::draw(dir, &records, &sources(dir));
     let files = write_report(dir, &records, &header).map_err(Failure::input)?;
-    Ok(Rebuilt { records, files, warnings })
+    Ok(Rebuilt { records, files, warnings, undrawn })
 }
 
 /// After a run of `compare`: notes the run where it has `added` records, and rebuilds the report where
@@ -92,7 +94,7 @@ pub fn refresh(
 ) -> Result<Rebuilt, Failure> {
     let (records, warnings) = records(dir)?;
     if added == 0 && dir.join("index.html").exists() {
-        return Ok(Rebuilt { records, files: vec![], warnings });
+        return Ok(Rebuilt { records, files: vec![], warnings, undrawn: vec![] });
     }
     let mut header = header(dir, &records, registry, &warnings);
     let this = |run: &&mut RunNote| {
@@ -101,10 +103,9 @@ pub fn refresh(
     if let Some(run) = header.runs.iter_mut().find(this) {
         run.date = run.date.take().or_else(|| Some(today()));
     }
-    let mut warnings = warnings;
-    warnings.extend(pictures::draw(dir, &records, &sources(dir)));
+    let undrawn = pictures::draw(dir, &records, &sources(dir));
     let files = write_report(dir, &records, &header).map_err(Failure::input)?;
-    Ok(Rebuilt { records, files, warnings })
+    Ok(Rebuilt { records, files, warnings, undrawn })
 }
 
 /// The inputs of the study that was asked last; none where it cannot be read any more.

@@ -1,5 +1,5 @@
-//! The limits of a step: centres that leave the solid, faces that fold over and faces that come to cross are
-//! taken back.
+//! The limits of a step: where a centre would leave the solid it stays at the surface, and where a face would fold
+//! over or come to cross another one the step is shortened.
 
 use std::collections::BTreeSet;
 
@@ -45,7 +45,7 @@ impl Guard {
     }
 
     /// Brings a step within its limits: centres outside are clamped, and the corners of faces that would fold
-    /// over, or come to cross another one, stay where they were.
+    /// over, or come to cross another one, go half the way, a quarter, or stay where they were.
     pub fn hold(&self, before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) {
         clamp(after, goal);
         // Taking one vertex back can fold another face of it. This ends: what is all taken back is as before.

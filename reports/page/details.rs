@@ -2,12 +2,12 @@
 //!
 //! The records stand as JSON in a block of their own: one line for each row of the results, in
 //! their order, so that the script reads only the line that is asked for. What many records share
-//! stands once, in the first line, and the records hold its index.
+//! stands once, in the first line with the keys it stands for, and the records hold its index.
 
 use std::collections::HashMap;
 
 use medial::simplifier::Level;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use crate::comparison::Comparison;
 use crate::page::html;
@@ -32,7 +32,7 @@ pub(crate) fn block(comparison: &Comparison<'_>) -> String {
     let lines: Vec<String> =
         comparison.entries.iter().map(|entry| line(entry.record, &mut shared)).collect();
     let mut block = String::from("<script type=\"application/json\" id=\"records\">");
-    block.push_str(&html::json(&Value::Array(shared.values)));
+    block.push_str(&html::json(&json!({ "keys": SHARED, "values": shared.values })));
     for line in lines {
         block.push('\n');
         block.push_str(&line);

@@ -204,15 +204,12 @@
   }
 
   // Details. Line 0 of the records holds what they share, the others one record each.
-  const SHARED = [
-    "binary_hash", "command", "conditions", "initial", "machine", "mesh_hash", "repeat", "seeds",
-    "version",
-  ];
   const lines = cached(() => document.getElementById("records").textContent.split("\n"));
   const shared = cached(() => JSON.parse(lines()[0]));
   const recordOf = (index) => {
     const record = JSON.parse(lines()[index + 1]);
-    for (const key of SHARED) if (key in record) record[key] = shared()[record[key]];
+    const { keys, values } = shared();
+    for (const key of keys) if (key in record) record[key] = values[record[key]];
     return record;
   };
   const isObject = (value) => typeof value === "object" && value !== null;
