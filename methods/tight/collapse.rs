@@ -26,6 +26,9 @@ const POWER: i32 = 8;
 /// Weight of a point of a primitive that protrudes. Each stands for several samples.
 const PROTRUDING: f64 = 50.0;
 
+/// What one ball protrudes counts from this share on.
+const NEGLIGIBLE: f64 = 1e-4;
+
 /// Share of the trace that pulls a minimiser towards the midpoint of its edge.
 const PULL: f64 = 1e-3;
 
@@ -101,7 +104,7 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
         }
         let mut around = complex.neighbours(a).iter().chain(complex.neighbours(b));
         if around.any(|&v| merged[v as usize])
-            && Ring::new(&complex, [a, b]).protrusion(sphere, descent.goal, dearest) > dearest
+            && Ring::new(&complex, [a, b]).protrusion(sphere, descent.goal, dearest, dearest) > dearest
         {
             continue;
         }
@@ -274,7 +277,8 @@ impl<'a> Stars<'a> {
             if change > so_far {
                 break;
             }
-            let price = change + ring.protrusion(sphere, goal, so_far - change);
+            let scale = energy.min(so_far - change);
+            let price = change + ring.protrusion(sphere, goal, scale, so_far - change);
             let is_better = price < so_far || (best.is_none() && price <= limit);
             if is_better && !sheets.would_cross(complex, ends, sphere) {
                 best = Some(Priced { ends, sphere, price });
@@ -394,30 +398,35 @@ impl Ring {
     }
 
     /// What protrudes of the merged sphere, its edges and faces, at a few points of each; given up beyond
-    /// `limit`.
-    fn protrusion(&self, sphere: Sphere, goal: &Goal, limit: f64) -> f64 {
+    /// `limit`. Balls that add less than the share [`NEGLIGIBLE`] of `scale` are not looked for: eighth powers make
+    /// these most.
+    fn protrusion(&self, sphere: Sphere, goal: &Goal, scale: f64, limit: f64) -> f64 {
         let mut balls = vec![sphere];
         for &n in &self.neighbours {
-            let parts = (sphere.centre.distance(n.centre) / SPACING).ceil().clamp(2.0, 12.0);
+            let parts = (sphere.centre.distance(n.centre) / SPACING).round().clamp(1.0, 12.0);
             balls.extend((1..parts as u32).map(|k| sphere.lerp(n, f64::from(k) / parts)));
         }
         for &[p, q] in &self.sides {
             let longest =
                 (sphere.centre - p.centre).length().max((sphere.centre - q.centre).length());
-            let rows = (longest / SPACING).ceil().clamp(2.0, 10.0);
+            let rows = (longest / SPACING).round().clamp(1.0, 10.0);
             let width = p.centre.distance(q.centre);
             // Rows parallel to the side that the merged sphere does not touch.
             for k in 1..rows as u32 {
                 let t = f64::from(k) / rows;
                 let (from, to) = (sphere.lerp(p, t), sphere.lerp(q, t));
-                let parts = (t * width / SPACING).ceil().clamp(2.0, 10.0);
+                let parts = (t * width / SPACING).round().clamp(1.0, 10.0);
                 balls.extend((1..parts as u32).map(|l| from.lerp(to, f64::from(l) / parts)));
             }
         }
-        let (mut sum, mut near) = (0.0, None);
+        let small = (NEGLIGIBLE * scale.max(0.0) / PROTRUDING).powf(1.0 / f64::from(POWER));
+        let (mut sum, mut known) = (0.0, None);
         for ball in balls {
-            let depth = goal.depth_near(ball.centre, &mut near);
-            sum += PROTRUDING * (ball.radius - depth).max(0.0).powi(POWER);
+            let enough = ball.radius - small;
+            let Some(depth) = goal.depth_of_moved(ball.centre, enough, 0.0, &mut known) else {
+                continue;
+            };
+            sum += PROTRUDING * (ball.radius - depth.value).max(0.0).powi(POWER);
             if sum > limit {
                 return f64::INFINITY;
             }

@@ -73,7 +73,8 @@ pub(super) struct Depth {
     pub gradient: Vec3,
 }
 
-/// The depth of a point, and the face that is closest to it.
+/// What is known of the depth of a point: the depth and the closest face, or that it is at least so deep, and
+/// a face near to it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
     point: Vec3,
@@ -168,10 +169,17 @@ impl Goal {
     ///
     /// Depths are 1-Lipschitz, so a place that moved less than its depth is on the same side, and one
     /// that is deeper than `enough` all the same needs no query: `None`.
-    pub fn depth_of_moved(&self, p: Vec3, enough: f64, known: &mut Option<Known>) -> Option<Depth> {
-        let mut side = None;
+    /// Where a query is needed it looks farther than `enough` by `margin` times the way, to spare the next one.
+    pub fn depth_of_moved(
+        &self,
+        p: Vec3,
+        enough: f64,
+        margin: f64,
+        known: &mut Option<Known>,
+    ) -> Option<Depth> {
+        let (mut side, mut moved) = (None, 0.0);
         if let Some(known) = known {
-            let moved = p.distance(known.point);
+            moved = p.distance(known.point);
             if known.depth - moved >= enough {
                 return None;
             }
@@ -179,18 +187,21 @@ impl Goal {
                 side = Some(if known.depth > 0.0 { Side::Inside } else { Side::Outside });
             }
         }
-        let closest = self.tree.closest_from(p, known.map(|known| known.face));
         let side = side.unwrap_or_else(|| self.inside.side(p));
+        let face = known.map(|known| known.face);
+        // Inside only faces within `enough` matter.
+        let beyond = enough + margin * moved;
+        let closest = match side {
+            Side::Inside if beyond > 0.0 => self.tree.closest_within_from(p, beyond, face),
+            _ => Some(self.tree.closest_from(p, face)),
+        };
+        let Some(closest) = closest else {
+            *known = Some(Known { point: p, depth: beyond, face: face.unwrap_or(0) });
+            return None;
+        };
         let depth = self.signed(p, &closest, side);
         *known = Some(Known { point: p, depth: depth.value, face: closest.face });
         (depth.value < enough).then_some(depth)
-    }
-
-    /// The depth of a point. The face that is closest to it begins the search for the next one nearby.
-    pub fn depth_near(&self, p: Vec3, near: &mut Option<u32>) -> f64 {
-        let closest = self.tree.closest_from(p, *near);
-        *near = Some(closest.face);
-        if self.inside.side(p) == Side::Inside { closest.distance } else { -closest.distance }
     }
 
     /// A point next to the surface for each centre that is outside of the solid, the closest but for rounding.

@@ -22,7 +22,7 @@ use super::descent::{Descent, Objective};
 use super::goal::{ASIDE, Goal, Interior, Points, Sample, refused};
 use super::insert::swapped;
 use super::params::TightParams;
-use super::rows::{uncovered, union_of};
+use super::rows::{held_from, uncovered, union_of};
 
 /// Powers and steps before the first round.
 const WARM: [(f64, usize); 2] = [(4.0, 9), (8.0, 14)];
@@ -211,7 +211,9 @@ impl Witnesses<'_> {
         let Self { goal, search, .. } = self;
         let peaks = search.of(mesh).map_err(refused)?;
         let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
-        let signed = union_of(mesh)?.signed_batch(&pool);
+        let enough = |i: usize| Some(held_from(goal.pool[i].depth));
+        let nearest = union_of(mesh)?.deepest_batch_near(&pool, &[], enough);
+        let signed: Vec<f64> = nearest.iter().map(|nearest| nearest.signed).collect();
         // The union's boundary at a distance `sigma` from a point that it does not hold is as deep as that
         // point, less `sigma`. This finds pockets that samples of the boundary miss.
         let pockets = goal.pool.iter().zip(&signed).filter(|&(_, &signed)| signed > 0.0);

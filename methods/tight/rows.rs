@@ -24,6 +24,10 @@ const PROTRUDING: f64 = 0.3;
 /// Points of the medial mesh at which balls are watched for protruding: about half as many as there are samples.
 const HELD: usize = 6_000;
 
+/// How much farther than needed the depth of a ball is looked for, in ways that it moved last: the next steps are
+/// mostly no longer.
+const FARTHER: f64 = 2.0;
+
 /// Golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
@@ -67,6 +71,12 @@ pub(super) fn uncovered(depth: f64, signed: f64) -> f64 {
     (2.0 * signed + depth.min(DEEP)).max(0.0)
 }
 
+/// The signed distance from which on an interior point is not uncovered.
+#[inline]
+pub(super) fn held_from(depth: f64) -> f64 {
+    -0.5 * depth.min(DEEP)
+}
+
 /// The vertices of a simplex, and how many they are.
 pub(super) fn vertices(mesh: &MedialMesh, primitive: Primitive) -> ([u32; 3], usize) {
     match primitive {
@@ -91,8 +101,8 @@ fn interpolated(mesh: &MedialMesh, held: &Held) -> Sphere {
     Sphere::new(centre, radius)
 }
 
-/// About so many points of the medial mesh, but at least one for each simplex: all spheres, the rest spread
-/// evenly over edges and faces.
+/// About so many points of the medial mesh, but all spheres: the rest spread evenly over edges and faces, so
+/// that not each small one has a point.
 fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
     let centre = |v: u32| mesh.spheres[v as usize].centre;
     let length = |e: &[u32; 2]| centre(e[0]).distance(centre(e[1]));
@@ -109,8 +119,14 @@ fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
     let mut all: Vec<Held> = (0..mesh.spheres.len() as u32)
         .map(|v| Held { primitive: Primitive::Sphere(v), weights: [1.0, 0.0, 0.0], known: None })
         .collect();
-    let points =
-        |size: f64| if size.is_finite() { (size.ceil() as usize).clamp(1, 1000) } else { 1 };
+    // What a simplex is too small for is left to the next one.
+    let mut left = 0.5;
+    let mut points = |size: f64| {
+        left += if size.is_finite() { size } else { 0.0 };
+        let whole = left.floor();
+        left -= whole;
+        (whole as usize).min(1000)
+    };
     for (e, edge) in (0..).zip(&mesh.edges) {
         let n = points(length(edge) / h);
         let at = |k: usize| {
@@ -157,7 +173,10 @@ pub(super) fn residuals(
     let union = union_of(mesh)?;
     let surface = points.samples.iter().map(|sample| sample.point);
     let places: Vec<Vec3> = surface.chain(points.interior.iter().map(|x| x.point)).collect();
-    let nearest = union.deepest_batch_near(&places, near);
+    let count = points.samples.len();
+    // What holds an interior point deeply enough holds it: no deeper primitive is looked for.
+    let enough = |i: usize| i.checked_sub(count).map(|i| held_from(points.interior[i].depth));
+    let nearest = union.deepest_batch_near(&places, near, enough);
     let hulls = Hulls::new(mesh);
     let limit = |i: usize| limits.get(i).copied().unwrap_or(f64::INFINITY);
     let row = |i: usize, point: Vec3, found: &NearestPrimitive, slope: f64| {
@@ -169,7 +188,6 @@ pub(super) fn residuals(
         let (weights, direction) = hulls.derivative(mesh, point, primitive);
         (found.signed, (weights, direction.map(|d| slope * d)), primitive)
     };
-    let count = points.samples.len();
     let mut rows = Vec::with_capacity(nearest.len());
     for (i, (sample, found)) in points.samples.iter().zip(&nearest).enumerate() {
         let (error, (weights, direction), primitive) = row(i, sample.point, found, 1.0);
@@ -205,7 +223,7 @@ pub(super) fn residuals(
     let protruding = held.par_iter_mut().map(|held| {
         let ball = interpolated(mesh, held);
         let enough = ball.radius - tolerance;
-        let depth = goal.depth_of_moved(ball.centre, enough, &mut held.known)?;
+        let depth = goal.depth_of_moved(ball.centre, enough, FARTHER, &mut held.known)?;
         let [x, y, z] = depth.gradient.to_array();
         let Held { primitive, weights, .. } = *held;
         Some(Row {

@@ -282,20 +282,23 @@ impl MedialUnion {
 
     /// [`deepest`](Self::deepest) for many points, in their order, in parallel. Each search begins with the
     /// primitive that `near` names for the point, or, where it names none, with the one that was found last:
-    /// fast if these are near.
+    /// fast if these are near. Where `enough` has a distance for the point, any primitive that is no farther
+    /// away is an answer.
     pub fn deepest_batch_near(
         &self,
         points: &[Vec3],
         near: &[NearestPrimitive],
+        enough: impl Fn(usize) -> Option<f64> + Sync,
     ) -> Vec<NearestPrimitive> {
         let places = self.parts.places();
         let runs = points.par_chunks(RUN).enumerate();
         let runs = runs.flat_map_iter(|(run, points)| {
             let mut last = 0;
-            let places = &places;
+            let (places, enough) = (&places, &enough);
             points.iter().zip(RUN * run..).map(move |(&p, i)| {
                 let named = near.get(i).and_then(|near| places.of(near.primitive));
-                let (nearest, place) = self.parts.nearest::<Signed>(p, named.unwrap_or(last));
+                let (start, enough) = (named.unwrap_or(last), enough(i).unwrap_or(f64::NEG_INFINITY));
+                let (nearest, place) = self.parts.nearest_or::<Signed>(p, start, enough);
                 last = place;
                 nearest
             })

@@ -27,8 +27,20 @@ impl Parts {
     /// The nearest primitive by a reading of the distance, and its place. Begins with the one at
     /// `start`.
     pub fn nearest<R: Reading>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
-        let mut search = Nearest::<R>::from(self, p, start);
-        self.search(&mut search);
+        self.nearest_or::<R>(p, start, f64::NEG_INFINITY)
+    }
+
+    /// As [`nearest`](Self::nearest), or the first one that is met whose distance is at most `enough`.
+    pub fn nearest_or<R: Reading>(
+        &self,
+        p: Vec3,
+        start: usize,
+        enough: f64,
+    ) -> (NearestPrimitive, usize) {
+        let mut search = Nearest::<R>::from(self, p, start, enough);
+        if search.limit > f64::NEG_INFINITY {
+            self.search(&mut search);
+        }
         search.answer()
     }
 
@@ -169,6 +181,8 @@ pub(super) struct Nearest<'a, R> {
     place: usize,
     signed: f64,
     value: f64,
+    /// A distance that ends the search.
+    enough: f64,
     limit: f64,
     reading: PhantomData<R>,
 }
@@ -176,10 +190,11 @@ pub(super) struct Nearest<'a, R> {
 impl<'a, R: Reading> Nearest<'a, R> {
     /// Begins with the primitive at a place.
     #[inline]
-    pub fn from(parts: &'a Parts, p: Vec3, place: usize) -> Self {
+    pub fn from(parts: &'a Parts, p: Vec3, place: usize, enough: f64) -> Self {
         let signed = parts.shape(place).signed(p);
         let (value, limit) = (R::value(signed), f64::INFINITY);
-        let mut search = Self { parts, p, place, signed, value, limit, reading: PhantomData };
+        let reading = PhantomData;
+        let mut search = Self { parts, p, place, signed, value, enough, limit, reading };
         search.tighten();
         search
     }
@@ -191,10 +206,14 @@ impl<'a, R: Reading> Nearest<'a, R> {
         (NearestPrimitive { signed: self.signed, primitive }, self.place)
     }
 
-    /// Sets the limit above the best value by more than both can be rounded.
+    /// Sets the limit above the best value by more than both can be rounded; below everything if that value is enough.
     #[inline]
     fn tighten(&mut self) {
-        self.limit = self.value + self.value.abs() * ROUNDING + self.parts.slack();
+        self.limit = if self.value <= self.enough {
+            f64::NEG_INFINITY
+        } else {
+            self.value + self.value.abs() * ROUNDING + self.parts.slack()
+        };
     }
 }
 

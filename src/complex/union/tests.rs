@@ -127,10 +127,18 @@ fn what_was_near_does_not_change_the_answers() {
         mesh.spheres.iter_mut().for_each(|m| m.centre += 0.01 * vector(&mut rng));
         let union = MedialUnion::new(&mesh).unwrap();
         let fresh = union.deepest_batch(&points);
-        assert_eq!(union.deepest_batch_near(&points, &before), fresh, "{kind}");
-        assert_eq!(union.deepest_batch_near(&points, &[]), fresh, "{kind}");
+        let all = |_| None;
+        assert_eq!(union.deepest_batch_near(&points, &before, all), fresh, "{kind}");
+        assert_eq!(union.deepest_batch_near(&points, &[], all), fresh, "{kind}");
         let far = NearestPrimitive { signed: 0.0, primitive: Primitive::Face(u32::MAX) };
-        assert_eq!(union.deepest_batch_near(&points, &[far]), fresh, "{kind}");
+        assert_eq!(union.deepest_batch_near(&points, &[far], all), fresh, "{kind}");
+        // What is enough is found where there is any, and everything else is as before.
+        let enough = |i: usize| (i % 2 == 0).then_some(-0.05);
+        let found = union.deepest_batch_near(&points, &before, enough);
+        for (i, (found, fresh)) in found.iter().zip(&fresh).enumerate() {
+            let is_enough = enough(i).is_some_and(|enough| fresh.signed <= enough);
+            assert!(if is_enough { found.signed <= -0.05 } else { found == fresh }, "{kind}, {i}");
+        }
     }
 }
 

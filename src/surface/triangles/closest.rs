@@ -189,10 +189,23 @@ impl TriangleBvh {
 
     /// The closest point to `p` that is not farther away than `bound`, if there is one.
     pub fn closest_within(&self, p: Vec3, bound: f64) -> Option<Closest> {
+        self.closest_within_from(p, bound, None)
+    }
+
+    /// The closest point to `p` that is not farther away than `bound`, if there is one. A face `start` near to it
+    /// speeds up the search; the answer does not depend on it.
+    ///
+    /// # Panics
+    /// If `start` is not a face.
+    pub fn closest_within_from(&self, p: Vec3, bound: f64, start: Option<u32>) -> Option<Closest> {
         if bound.is_nan() || bound < 0.0 {
             return None;
         }
-        let found = self.nearest(Nearest::within(self, p, bound));
+        let mut search = Nearest::within(self, p, bound);
+        if let Some(face) = start {
+            search.measure(self.places[face as usize] as usize);
+        }
+        let found = self.nearest(search);
         (found.place != NONE).then(|| self.describe(p, found.place, found.squared))
     }
 
