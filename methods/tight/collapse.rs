@@ -104,7 +104,8 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
         }
         let mut around = complex.neighbours(a).iter().chain(complex.neighbours(b));
         if around.any(|&v| merged[v as usize])
-            && Ring::new(&complex, [a, b]).protrusion(sphere, descent.goal, dearest, dearest) > dearest
+            && Ring::new(&complex, [a, b]).protrusion(sphere, descent.goal, dearest, dearest)
+                > dearest
         {
             continue;
         }

@@ -297,7 +297,8 @@ impl MedialUnion {
             let (places, enough) = (&places, &enough);
             points.iter().zip(RUN * run..).map(move |(&p, i)| {
                 let named = near.get(i).and_then(|near| places.of(near.primitive));
-                let (start, enough) = (named.unwrap_or(last), enough(i).unwrap_or(f64::NEG_INFINITY));
+                let (start, enough) =
+                    (named.unwrap_or(last), enough(i).unwrap_or(f64::NEG_INFINITY));
                 let (nearest, place) = self.parts.nearest_or::<Signed>(p, start, enough);
                 last = place;
                 nearest
