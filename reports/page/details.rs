@@ -1,6 +1,6 @@
 //! Everything that is known of an item, for the row that the script opens below its row.
 //!
-//! The records stand as JSON in a block of their own: one line for each row of the results, in
+//! The records stand as compressed JSON in a block of their own: one line for each row of the results, in
 //! their order, so that the script reads only the line that is asked for. What many records share
 //! stands once, in the first line with the keys it stands for, and the records hold its index.
 
@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 
 use crate::comparison::Comparison;
 use crate::page::html;
+use crate::page::packed::packed;
 use crate::record::Record;
 
 /// Keys whose values many records share.
@@ -31,14 +32,12 @@ pub(crate) fn block(comparison: &Comparison<'_>) -> String {
     let mut shared = Shared::default();
     let lines: Vec<String> =
         comparison.entries.iter().map(|entry| line(entry.record, &mut shared)).collect();
-    let mut block = String::from("<script type=\"application/json\" id=\"records\">");
-    block.push_str(&html::json(&json!({ "keys": SHARED, "values": shared.values })));
+    let mut block = html::json(&json!({ "keys": SHARED, "values": shared.values }));
     for line in lines {
         block.push('\n');
         block.push_str(&line);
     }
-    block.push_str("</script>\n");
-    block
+    packed(Some("records"), &block)
 }
 
 /// The distinct values of [`SHARED`], in the order in which they occur.

@@ -1,7 +1,11 @@
 //! One foldable section for each mesh: its topology, its plots, its table.
 
+use crate::page::packed::packed;
 use crate::page::{MeshPart, Page, html};
 use crate::text::{betti, counted, escape_html, grouped};
+
+/// Meshes whose sections stand in the document; the script unpacks further ones when they are opened.
+const INLINE: usize = 12;
 
 /// The sections of all meshes; the first one is open.
 pub(crate) fn section(page: &Page<'_>) -> String {
@@ -27,13 +31,20 @@ fn of_mesh(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
         brief.push(format!("{missing} without a result"));
     }
     let stem = escape_html(&part.stem);
-    let mut html = format!(
-        "<details class=\"mesh\" id=\"mesh-{stem}\"{}><summary>{} <small>{}</small></summary>\n",
+    let inside = inside(page, mesh, part);
+    format!(
+        "<details class=\"mesh\" id=\"mesh-{stem}\"{}><summary>{} <small>{}</small></summary>\n{}</details>\n",
         if mesh == 0 { " open" } else { "" },
         escape_html(&comparison.meshes[mesh]),
-        escape_html(&brief.join(", "))
-    );
-    html.push_str(&initial(page, mesh));
+        escape_html(&brief.join(", ")),
+        if mesh < INLINE { inside } else { packed(None, &inside) }
+    )
+}
+
+/// What a section shows when it is open.
+fn inside(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
+    let stem = escape_html(&part.stem);
+    let mut html = initial(page, mesh);
     if let Some((address, words)) = &part.picture {
         html.push_str(&format!(
             "<figure class=\"strip\"><img src=\"{address}\" alt=\"{words}\" loading=\"lazy\">\
@@ -51,7 +62,7 @@ fn of_mesh(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
     html.push_str(&html::table(&part.table));
     html.push_str(&format!(
         "<p class=\"note\">This table as <a href=\"./tables/mesh-{stem}.md\">Markdown</a> and \
-         <a href=\"./tables/mesh-{stem}.tex\">LaTeX</a>.</p>\n</details>\n"
+         <a href=\"./tables/mesh-{stem}.tex\">LaTeX</a>.</p>\n"
     ));
     html
 }

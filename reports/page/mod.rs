@@ -1,14 +1,16 @@
 //! `index.html`: one page that holds everything and opens without a network.
 //!
 //! Plots are inline SVG, the style sheet and the script are our own. Without the script the page
-//! still shows everything; the script sorts, filters, opens details, and answers questions about
-//! points of the plots.
+//! still shows everything but what stands in it compressed: rows and meshes beyond the first ones,
+//! which the files beside it hold as well. The script sorts, filters, opens details, and answers
+//! questions about points of the plots.
 
 mod details;
 mod extras;
 mod html;
 mod meshes;
 mod overview;
+mod packed;
 mod reference;
 mod results;
 
@@ -79,7 +81,8 @@ impl Page<'_> {
         html.push_str(&reference::files(self));
         html.push_str("</main>\n");
         html.push_str(&format!(
-            "<script>\n\"use strict\";\n{}{}{}</script>\n</body>\n</html>\n",
+            "<script>\n\"use strict\";\n{}{}{}{}</script>\n</body>\n</html>\n",
+            include_str!("packed.js"),
             include_str!("table.js"),
             include_str!("plots.js"),
             include_str!("script.js")

@@ -296,10 +296,10 @@
     };
   };
 
-  for (const figure of document.querySelectorAll(".plots figure")) {
+  const prepare = (figure) => {
     const data = figure.querySelector("script");
     const svg = figure.querySelector("svg");
-    if (!data || !svg) continue;
+    if (!data || !svg) return;
     svg.setAttribute("role", "group");
     svg.setAttribute("aria-description", "Arrow keys go from point to point, Escape shows the whole plot.");
     svg.setAttribute("tabindex", "0");
@@ -339,6 +339,8 @@
       else return;
       event.preventDefault();
     });
-  }
+  };
+  page.enlivenPlots = (root) => root.querySelectorAll(".plots figure").forEach(prepare);
+  page.enlivenPlots(document);
   window.addEventListener("scroll", () => (tip.hidden = true), { passive: true, capture: true });
 })();

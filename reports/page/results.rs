@@ -1,7 +1,12 @@
 //! The table of all results: sortable, filterable, failures as rows.
+//!
+//! Only the first rows stand in the document: a table of ten thousand takes seconds to lay out.
+
+use serde_json::{Value, json};
 
 use crate::comparison::{Entry, level_label, reached};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, SPHERES_ONLY};
+use crate::page::packed::packed;
 use crate::page::{Page, details, html};
 use crate::tables::{Best, remark, topology_verdict, warnings};
 use crate::text::{betti, escape_html, grouped, megabytes};
@@ -26,15 +31,19 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     );
     html.push_str(&heads());
     html.push_str("</tr></thead>\n<tbody>\n");
-    let mut best = None;
-    for entry in &comparison.entries {
-        let best = match &mut best {
-            Some((mesh, best)) if *mesh == entry.mesh => best,
-            slot => &mut slot.insert((entry.mesh, Best::of_mesh(comparison, entry.mesh))).1,
-        };
-        html.push_str(&row(page, entry, best));
-    }
+    let mut rows = rows(page);
+    let rest = rows.split_off(rows.len().min(INLINE));
+    rows.iter().for_each(|row| html.push_str(&row.html));
     html.push_str("</tbody>\n</table></div>\n");
+    if !rest.is_empty() {
+        html.push_str(&packed_rows(&rest));
+        html.push_str(&format!(
+            "<noscript><p class=\"note\">These are the first {} of {} rows: <code>results.csv</code> \
+             holds all.</p></noscript>\n",
+            rows.len(),
+            grouped(comparison.entries.len() as u64)
+        ));
+    }
     html.push_str(
         "<p class=\"note\">Lengths in % of the bounding-box diagonal of the input; seconds of wall \
          clock, shared substrates included. Arrows: which way is better. Bold: best for this mesh \
@@ -43,6 +52,54 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     );
     html.push_str(&details::block(comparison));
     html
+}
+
+/// Rows that stand in the document; the script takes further ones from a block of their own.
+const INLINE: usize = 250;
+
+/// The rows of all entries, in their order.
+fn rows(page: &Page<'_>) -> Vec<Row> {
+    let comparison = page.comparison;
+    let mut best = None;
+    let row = |entry: &Entry<'_>| {
+        let best = match &mut best {
+            Some((mesh, best)) if *mesh == entry.mesh => best,
+            slot => &mut slot.insert((entry.mesh, Best::of_mesh(comparison, entry.mesh))).1,
+        };
+        row(page, entry, best)
+    };
+    comparison.entries.iter().map(row).collect()
+}
+
+/// Rows for the script: what filters ask for, what columns sort by, and the element.
+fn packed_rows(rows: &[Row]) -> String {
+    let rows: Vec<Value> =
+        rows.iter().map(|row| json!([row.facets, row.values, row.html])).collect();
+    packed(Some("rows"), &Value::Array(rows).to_string())
+}
+
+/// A row of the table.
+struct Row {
+    html: String,
+    /// Mesh, method, level, status, as the filters have them.
+    facets: [String; 4],
+    /// For each column what it sorts by: a number, none, or a text.
+    values: Vec<Value>,
+}
+
+impl Row {
+    /// Adds a cell with the number that it sorts by; without one it sorts last.
+    fn number(&mut self, value: Option<f64>, text: &str) {
+        let sort = value.map_or(String::new(), |value| format!(" data-v=\"{value}\""));
+        self.html.push_str(&format!("<td class=\"num\"{sort}>{text}</td>"));
+        self.values.push(json!(value));
+    }
+
+    /// Adds a cell that sorts by a text.
+    fn text(&mut self, class: &str, value: &str, html: &str) {
+        self.html.push_str(&format!("<td{class}>{html}</td>"));
+        self.values.push(value.into());
+    }
 }
 
 /// A drop-down list for one column.
@@ -122,41 +179,33 @@ fn heads() -> String {
     columns().iter().map(cell).collect()
 }
 
-/// A cell with the number that it sorts by; without one it sorts last.
-fn number(value: Option<f64>, text: &str) -> String {
-    let sort = value.map_or(String::new(), |value| format!(" data-v=\"{value}\""));
-    format!("<td class=\"num\"{sort}>{text}</td>")
-}
-
-fn row(page: &Page<'_>, entry: &Entry<'_>, best: &Best) -> String {
+fn row(page: &Page<'_>, entry: &Entry<'_>, best: &Best) -> Row {
     let comparison = page.comparison;
     let record = entry.record;
     let simplify = &record.simplify;
-    let level = level_label(simplify.level);
-    let mesh = escape_html(&comparison.meshes[entry.mesh]);
-    let series = &comparison.series[entry.series];
-    let mut html = format!(
-        "<tr data-mesh=\"{mesh}\" data-method=\"{}\" data-asked=\"{}\" data-status=\"{}\">\
+    let (mesh, series) = (&comparison.meshes[entry.mesh], &comparison.series[entry.series]);
+    let (level, status) = (level_label(simplify.level), record.status.to_string());
+    let html = format!(
+        "<tr data-mesh=\"{mesh}\" data-method=\"{}\" data-asked=\"{}\" data-status=\"{status}\">\
          <th scope=\"row\"><a href=\"#mesh-{}\">{mesh}</a></th>",
         escape_html(series),
         escape_html(&level),
-        record.status,
         escape_html(&page.meshes[entry.mesh].stem),
+        mesh = escape_html(mesh),
     );
+    let facets = [mesh.clone(), series.clone(), level.clone(), status.clone()];
+    let mut row = Row { html, facets, values: vec![mesh.as_str().into()] };
     let asked = match simplify.level {
         medial::simplifier::Level::Spheres(count) => Some(count as f64),
         _ => None,
     };
-    html.push_str(&number(asked, &escape_html(&level)));
-    html.push_str(&format!(
-        "<td>{}</td><td><span class=\"status {}\">{}</span></td>",
-        html::series(entry.series, series),
-        record.status.key(),
-        record.status
-    ));
+    row.number(asked, &escape_html(&level));
+    row.text("", series, &html::series(entry.series, series));
+    let label = format!("<span class=\"status {}\">{status}</span>", record.status.key());
+    row.text("", &status, &label);
     for count in [reached(record), simplify.edges, simplify.faces] {
         let text = count.map_or("–".to_owned(), |count| grouped(count as u64));
-        html.push_str(&number(count.map(|count| count as f64), &text));
+        row.number(count.map(|count| count as f64), &text);
     }
     for metric in COMPARED {
         let value = metric.of(record);
@@ -167,14 +216,17 @@ fn row(page: &Page<'_>, entry: &Entry<'_>, best: &Best) -> String {
             Some(value) => metric.format(value),
             None => "–".to_owned(),
         };
-        html.push_str(&number(value, &text));
+        row.number(value, &text);
     }
     let memory = simplify.peak_bytes.map_or("–".to_owned(), megabytes);
-    html.push_str(&number(simplify.peak_bytes.map(|bytes| bytes as f64), &memory));
+    row.number(simplify.peak_bytes.map(|bytes| bytes as f64), &memory);
     let numbers = record.evaluate.as_ref().map_or("–".to_owned(), |e| betti(e.betti));
-    html.push_str(&format!("<td>{numbers}</td><td>{}</td>", topology_verdict(entry)));
-    html.push_str(&format!("<td class=\"wrap\">{}</td></tr>\n", remarks(entry)));
-    html
+    row.text("", &numbers, &numbers);
+    let verdict = topology_verdict(entry);
+    row.text("", &verdict, &verdict);
+    row.text(" class=\"wrap\"", &remark(entry), &remarks(entry));
+    row.html.push_str("</tr>\n");
+    row
 }
 
 /// The remark, the number of warnings, and the way to the medial mesh.

@@ -9,6 +9,19 @@
       if (wanted !== undefined) for (const mesh of meshes) mesh.open = wanted === "open";
     });
   }
+  // A section that stands in the page compressed is filled when it is first opened.
+  const fill = async (mesh) => {
+    const packed = mesh.querySelector(":scope > script.packed");
+    if (!packed) return;
+    packed.remove();
+    mesh.insertAdjacentHTML("beforeend", await page.unpack(packed));
+    page.enlivenPlots(mesh);
+  };
+  for (const mesh of meshes) {
+    mesh.addEventListener("toggle", () => {
+      if (mesh.open) fill(mesh);
+    });
+  }
   const openTarget = () => {
     let id = location.hash.slice(1);
     try {

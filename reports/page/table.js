@@ -1,6 +1,6 @@
 // The table of all results. Only the rows near those in sight stand in the document: laying out a
 // table costs far more than choosing and ordering its rows.
-(() => {
+(async () => {
   const table = document.querySelector("table.sortable");
   const form = document.querySelector("form.filters");
   if (!table || !form) return;
@@ -9,8 +9,24 @@
   const box = table.parentElement;
   const body = table.tBodies[0];
   const heads = [...table.tHead.rows[0].cells];
-  const rows = [...body.querySelectorAll("tr")];
-  const numbers = new Map(rows.map((row, index) => [row, index]));
+  // Rows of the document have an element; those that come packed have what filters and columns ask for, and get
+  // their element when they come into sight.
+  const packed = document.getElementById("rows");
+  const rows = [...body.querySelectorAll("tr")].map((element) => ({ element }));
+  if (packed) {
+    for (const [facets, values, html] of JSON.parse(await page.unpack(packed))) rows.push({ facets, values, html });
+  }
+  const numbers = new Map();
+  const parser = document.createElement("template");
+  const elementOf = (index) => {
+    const row = rows[index];
+    if (!row.element) {
+      parser.innerHTML = row.html;
+      row.element = parser.content.firstElementChild;
+    }
+    numbers.set(row.element, index);
+    return row.element;
+  };
   const output = form.querySelector("output");
   const boxes = [...form.querySelectorAll("input[name=column]")];
   const make = (tag, className, text) => {
@@ -28,16 +44,20 @@
       return known.get(key);
     };
   };
-  const facet = cached((name) => rows.map((row) => row.getAttribute(`data-${name}`)));
-  const texts = cached(() => rows.map((row) => row.textContent.toLowerCase()));
+  const facet = cached((name) => {
+    const place = FACETS.indexOf(name);
+    return rows.map((row) => (row.facets ? row.facets[place] : row.element.dataset[name]));
+  });
+  const textOf = (row) => (row.html ? row.html.replace(/<[^>]*>/g, "") : row.element.textContent);
+  const texts = cached(() => rows.map((row) => textOf(row).toLowerCase()));
   const collator = new Intl.Collator("en", { numeric: true });
   // Numbers to sort by; NaN where there is none. Texts count by their rank.
   const keys = cached((column) => {
-    const cells = rows.map((row) => row.children[column]);
+    const cell = (row) => row.element.children[column];
     if (heads[column].classList.contains("num")) {
-      return cells.map((cell) => parseFloat(cell.dataset.v));
+      return rows.map((row) => (row.values ? (row.values[column] ?? NaN) : parseFloat(cell(row).dataset.v)));
     }
-    const words = cells.map((cell) => cell.textContent);
+    const words = rows.map((row) => (row.values ? row.values[column] : cell(row).textContent));
     const ranks = new Map();
     for (const word of [...new Set(words)].sort(collator.compare)) ranks.set(word, ranks.size);
     return words.map((word) => ranks.get(word));
@@ -89,7 +109,7 @@
     const end = Math.min(matched.length, attached + count);
     for (; attached < end; attached += 1) {
       const index = matched[attached];
-      const row = rows[index];
+      const row = elementOf(index);
       const head = row.firstElementChild;
       if (head.firstElementChild.localName !== "button") {
         const button = make("button", "more");
@@ -204,11 +224,11 @@
   }
 
   // Details. Line 0 of the records holds what they share, the others one record each.
-  const lines = cached(() => document.getElementById("records").textContent.split("\n"));
-  const shared = cached(() => JSON.parse(lines()[0]));
-  const recordOf = (index) => {
-    const record = JSON.parse(lines()[index + 1]);
-    const { keys, values } = shared();
+  const lines = cached(async () => (await page.unpack(document.getElementById("records"))).split("\n"));
+  const recordOf = async (index) => {
+    const all = await lines();
+    const { keys, values } = JSON.parse(all[0]);
+    const record = JSON.parse(all[index + 1]);
     for (const key of keys) if (key in record) record[key] = values[record[key]];
     return record;
   };
@@ -253,8 +273,8 @@
     if (!list.childElementCount) list.remove();
     if (section.childElementCount === 1) section.remove();
   };
-  const detailOf = (index) => {
-    const { repeat, simplify, evaluate, initial, ...item } = recordOf(index);
+  const detailOf = async (index) => {
+    const { repeat, simplify, evaluate, initial, ...item } = await recordOf(index);
     const row = make("tr", "detail");
     const cell = row.appendChild(make("td"));
     cell.colSpan = heads.length;
@@ -270,20 +290,22 @@
     all.append(make("p", "note", "As recorded: lengths as fractions of the diagonal; seconds; bytes."));
     return row;
   };
-  body.addEventListener("click", (event) => {
+  body.addEventListener("click", async (event) => {
     const button = event.target.closest("button.more");
     if (!button) return;
     const row = button.closest("tr");
     const index = numbers.get(row);
-    const isOpen = opened.has(index);
-    if (isOpen) {
+    if (opened.has(index)) {
       opened.get(index).remove();
       opened.delete(index);
     } else {
-      opened.set(index, detailOf(index));
-      row.after(opened.get(index));
+      const detail = await detailOf(index);
+      // Pressed twice meanwhile.
+      if (opened.has(index)) return;
+      opened.set(index, detail);
+      if (row.isConnected) row.after(detail);
     }
-    button.setAttribute("aria-expanded", String(!isOpen));
+    button.setAttribute("aria-expanded", String(opened.has(index)));
   });
 
   // The columns that stay in sight lie side by side, however wide their texts make them.

@@ -242,6 +242,16 @@ fn check_address(browser: &mut Browser) {
     browser.value("document.getElementById('mesh-ant').open = false");
 }
 
+/// A mesh beyond the first ones is unpacked when it is opened, with plots that answer.
+fn check_packed(browser: &mut Browser) {
+    let last = format!("document.querySelectorAll('details.mesh')[{}]", SHAPES.len() - 1);
+    assert_eq!(browser.value(&format!("{last}.querySelector('table') === null")), true);
+    browser.value(&format!("{last}.open = true"));
+    browser.until(&format!("{last}.querySelector('svg.plot[tabindex]') !== null"));
+    assert_eq!(browser.value(&format!("{last}.querySelectorAll('table').length")), 1);
+    browser.value(&format!("{last}.open = false"));
+}
+
 fn check_details(browser: &mut Browser) {
     browser.value("document.querySelector('button.more').focus()");
     browser.key("Enter", 13);
@@ -325,6 +335,7 @@ fn the_page_answers_from_disk() {
     browser.open(&format!("file://{}/index.html", folder.path().display()));
     check_filters(&mut browser);
     check_address(&mut browser);
+    check_packed(&mut browser);
     check_details(&mut browser);
     check_sticky(&mut browser);
     check_plots(&mut browser);
