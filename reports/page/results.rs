@@ -223,7 +223,7 @@ fn row(page: &Page<'_>, entry: &Entry<'_>, best: &Best) -> Row {
     let numbers = record.evaluate.as_ref().map_or("–".to_owned(), |e| betti(e.betti));
     row.text("", &numbers, &numbers);
     let verdict = topology_verdict(entry);
-    row.text("", &verdict, &verdict);
+    row.text("", verdict, verdict);
     row.text(" class=\"wrap\"", &remark(entry), &remarks(entry));
     row.html.push_str("</tr>\n");
     row
