@@ -37,6 +37,7 @@ mod summary;
 mod tables;
 mod terminal;
 mod text;
+mod view3d;
 mod write;
 
 pub use error::ReportError;
@@ -52,6 +53,7 @@ pub use record::{
 };
 pub use terminal::summary_text;
 pub use text::{file_stem, printable};
+pub use view3d::View3d;
 pub use write::{read_header, write_report};
 
 #[cfg(doctest)]

@@ -1,7 +1,7 @@
 //! Which results are shown beside each other as pictures.
 //!
 //! For each mesh one strip: the results of all methods at the number of spheres that the answers of
-//! [`purpose`](crate::purpose) are for. Drawing needs the surfaces and the medial meshes, which are not in the
+//! [`purpose`](crate::purpose) are for, and a 3D view of the same. Drawing needs the surfaces and the medial meshes, which are not in the
 //! records: it is for the caller, with [`strip`](crate::render::strip).
 
 use std::collections::BTreeMap;
@@ -14,8 +14,9 @@ use crate::purpose::usual_level;
 use crate::record::Record;
 use crate::text::{counted, file_stems, significant};
 
-/// Folder of the pictures, beside the page.
+/// Folders of the pictures and of the 3D views, beside the page.
 pub(crate) const FOLDER: &str = "pictures";
+pub(crate) const VIEWS: &str = "views";
 
 /// A strip of pictures that a report shows if it finds it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,6 +27,8 @@ pub struct PictureStrip {
     pub mesh_hash: Option<String>,
     /// Where the picture belongs, relative to the folder of the report.
     pub file: String,
+    /// The name of the 3D view of the same results.
+    pub view: String,
     /// The medial meshes, by path relative to the folder of the report, and what is said of each.
     pub panels: Vec<(String, String)>,
 }
@@ -43,7 +46,13 @@ impl PictureStrip {
         let bytes = self.panels.iter().flat_map(|(artifact, caption)| [artifact, caption]);
         let bytes = bytes.flat_map(|text| text.bytes().chain([0]));
         let hash = bytes.fold(0, |hash, byte| splitmix(hash ^ u64::from(byte)));
-        self.file = format!("{FOLDER}/mesh-{stem}-{:08x}.png", hash >> 32);
+        self.view = format!("mesh-{stem}-{:08x}", hash >> 32);
+        self.file = format!("{FOLDER}/{}.png", self.view);
+    }
+
+    /// Where the 3D view belongs, relative to the folder of the report.
+    pub fn view_file(&self) -> String {
+        format!("{VIEWS}/{}.js", self.view)
     }
 }
 
@@ -67,6 +76,7 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
             mesh: comparison.meshes[entry.mesh].clone(),
             mesh_hash: record.mesh_hash.clone(),
             file: String::new(),
+            view: String::new(),
             panels: vec![],
         };
         strips.entry(entry.mesh).or_insert_with(strip).panels.push((artifact, caption));

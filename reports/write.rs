@@ -14,14 +14,15 @@ use crate::extras::extras;
 use crate::header::Header;
 use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
-use crate::page::{MeshPart, Page};
-use crate::pictures::{FOLDER, PictureStrip, strips};
+use crate::page::{MeshPart, MeshView, Page};
+use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
 use crate::plots::{Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot};
 use crate::purpose::{error_profiles, purpose_table, wins_table};
 use crate::record::Record;
 use crate::summary::by_count;
 use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_markdown};
 use crate::text::file_stems;
+use crate::view3d::text_of;
 
 /// Writes the report of some records into a folder, which is created where it is missing:
 /// `results.csv`, `tables/*.md`, `tables/*.tex`, `plots/*.svg`, `header.json` and `index.html`.
@@ -87,13 +88,14 @@ pub fn write_report(
     }
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     let pictures = strips(&comparison);
-    let mut room = PICTURES;
+    let (mut room, mut room_3d) = (PICTURES, VIEWS_INSIDE);
     let mut meshes = Vec::new();
     for (mesh, stem) in stems.into_iter().enumerate() {
         let part = MeshPart {
             table: mesh_table(&comparison, mesh, &how),
             plots: mesh_plots(&comparison, mesh, &stem)?,
             picture: picture(dir, pictures.get(&mesh), &mut room),
+            view: view(dir, pictures.get(&mesh), &mut room_3d),
             stem,
         };
         let name = format!("mesh-{}", part.stem);
@@ -106,7 +108,8 @@ pub fn write_report(
     let header_json =
         serde_json::to_vec_pretty(header).map_err(|error| ReportError::header(&error))?;
     files.write("header.json", &header_json)?;
-    let shown = pictures.values().map(|strip| dir.join(&strip.file)).collect();
+    let shown = pictures.values().flat_map(|strip| [strip.file.clone(), strip.view_file()]);
+    let shown = shown.map(|file| dir.join(file)).collect();
     files.remove_stale(shown)?;
     let page = Page {
         header,
@@ -125,7 +128,10 @@ pub fn write_report(
 }
 
 /// Bytes of the pictures that are part of the page; further ones are linked.
-const PICTURES: usize = 8 << 20;
+const PICTURES: usize = 6 << 20;
+
+/// Characters of the 3D views that are part of the page; further ones are read when they are opened.
+const VIEWS_INSIDE: usize = 3 << 20;
 
 /// The picture of a mesh's results, if it is in the folder: within the page, while there is room.
 fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<(String, String)> {
@@ -144,6 +150,17 @@ fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option
         None => format!("./{}", strip.file),
     };
     Some((address, words))
+}
+
+/// The 3D view of a mesh's results, if it is in the folder: within the page, while there is room.
+fn view(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<MeshView> {
+    let strip = strip?;
+    let file = strip.view_file();
+    let script = fs::read_to_string(dir.join(&file)).ok()?;
+    let text = text_of(&script)?;
+    let left = room.checked_sub(text.len());
+    *room = left.unwrap_or(*room);
+    Some(MeshView { name: strip.view.clone(), file, text: left.map(|_| text.to_owned()) })
 }
 
 /// Reads the header that [`write_report`] left in a folder, to rebuild its report.
@@ -197,10 +214,10 @@ impl Files<'_> {
     }
 
     /// Removes what an earlier report left under the names that only a report gives.
-    /// The pictures that are `shown` stay.
+    /// The pictures and views that are `shown` stay.
     fn remove_stale(&self, shown: Vec<PathBuf>) -> Result<(), ReportError> {
-        let ours: [(&str, &[&str]); 3] =
-            [("tables", &["md", "tex"]), ("plots", &["svg"]), (FOLDER, &["png"])];
+        let ours: [(&str, &[&str]); 4] =
+            [("tables", &["md", "tex"]), ("plots", &["svg"]), (FOLDER, &["png"]), (VIEWS, &["js"])];
         for (folder, extensions) in ours {
             let folder = self.dir.join(folder);
             let failed = |source| ReportError::Io { path: folder.clone(), source };

@@ -1,4 +1,4 @@
-//! The pictures of a report: for each mesh the results of all methods, from one camera.
+//! The pictures of a report: for each mesh the results of all methods, from one camera and in three dimensions.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use medial::complex::MedialMesh;
 use medial::write_atomically;
 use medial_reports::render::{Background, Camera, ColourBy, Panel, Strip, strip};
-use medial_reports::{PictureStrip, Record, picture_strips};
+use medial_reports::{PictureStrip, Record, View3d, picture_strips};
 
 use crate::run::{Input, Source};
 
@@ -19,7 +19,8 @@ const ACROSS: usize = 4;
 /// it shows.
 pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
     let mut strips = picture_strips(records);
-    strips.retain(|strip| !dir.join(&strip.file).exists());
+    let is_there = |file: &str| dir.join(file).exists();
+    strips.retain(|strip| !is_there(&strip.file) || !is_there(&strip.view_file()));
     if strips.is_empty() {
         return vec![];
     }
@@ -30,7 +31,9 @@ pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
     let drawn = strips.iter().map(|wanted| {
         let input = wanted.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
         let input = input.ok_or("its surface is not at hand as it was measured")?;
-        picture(dir, wanted, input)
+        let axes = axes(dir, wanted)?;
+        picture(dir, wanted, input, &axes)?;
+        view(dir, wanted, input, &axes)
     });
     let failed = drawn.zip(&strips).filter_map(|(drawn, wanted)| {
         let why: String = drawn.err()?;
@@ -39,13 +42,22 @@ pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
     failed.collect()
 }
 
-fn picture(dir: &Path, wanted: &PictureStrip, input: &Input) -> Result<(), String> {
-    let mut axes: Vec<MedialMesh> = Vec::with_capacity(wanted.panels.len());
-    for (artifact, _) in &wanted.panels {
+/// The medial meshes of the panels.
+fn axes(dir: &Path, wanted: &PictureStrip) -> Result<Vec<MedialMesh>, String> {
+    let read = |(artifact, _): &(String, String)| {
         let path = dir.join(artifact);
         let loaded = medial::complex::read(&path);
-        axes.push(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh);
-    }
+        Ok(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh)
+    };
+    wanted.panels.iter().map(read).collect()
+}
+
+fn picture(
+    dir: &Path,
+    wanted: &PictureStrip,
+    input: &Input,
+    axes: &[MedialMesh],
+) -> Result<(), String> {
     let panels: Vec<Panel<'_>> = axes
         .iter()
         .zip(&wanted.panels)
@@ -64,9 +76,24 @@ fn picture(dir: &Path, wanted: &PictureStrip, input: &Input) -> Result<(), Strin
     };
     let picture = strip(&panels, &common).map_err(|error| error.to_string())?;
     let bytes = picture.to_png().map_err(|error| error.to_string())?;
-    let path = dir.join(&wanted.file);
-    let folder = path.parent().unwrap_or(dir);
+    write(&dir.join(&wanted.file), &bytes)
+}
+
+fn view(
+    dir: &Path,
+    wanted: &PictureStrip,
+    input: &Input,
+    axes: &[MedialMesh],
+) -> Result<(), String> {
+    let results = wanted.panels.iter().zip(axes);
+    let results = results.map(|((_, caption), axis)| (caption.clone(), axis)).collect();
+    let script = View3d { surface: &input.mesh, results }.script(&wanted.view)?;
+    write(&dir.join(wanted.view_file()), script.as_bytes())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    let folder = path.parent().unwrap_or(path);
     let written = std::fs::create_dir_all(folder)
-        .and_then(|()| write_atomically(&path, |out| out.write_all(&bytes)));
+        .and_then(|()| write_atomically(path, |out| out.write_all(bytes)));
     written.map_err(|error| format!("{}: {error}", path.display()))
 }

@@ -1,7 +1,7 @@
 //! One foldable section for each mesh: its topology, its plots, its table.
 
 use crate::page::packed::packed;
-use crate::page::{MeshPart, Page, html};
+use crate::page::{MeshPart, MeshView, Page, html};
 use crate::text::{betti, counted, escape_html, grouped};
 
 /// Meshes whose sections stand in the document; the script unpacks further ones when they are opened.
@@ -52,6 +52,7 @@ fn inside(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
             words = escape_html(words)
         ));
     }
+    html.push_str(&part.view.as_ref().map_or(String::new(), view));
     if part.plots.is_empty() {
         html.push_str("<p class=\"notice bad\">Nothing was measured on this mesh.</p>\n");
     } else {
@@ -65,6 +66,22 @@ fn inside(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
          <a href=\"./tables/mesh-{stem}.tex\">LaTeX</a>.</p>\n"
     ));
     html
+}
+
+/// Where the script puts a 3D view.
+fn view(view: &MeshView) -> String {
+    let place = format!(
+        "<div class=\"view3d\" data-view=\"{}\" data-src=\"./{}\"></div>\n",
+        escape_html(&view.name),
+        escape_html(&view.file)
+    );
+    let text = view.text.as_ref().map_or(String::new(), |text| {
+        format!(
+            "<script type=\"text/plain\" class=\"view\" id=\"view-{}\">{text}</script>\n",
+            escape_html(&view.name)
+        )
+    });
+    place + &text
 }
 
 /// The initial medial mesh beside the solid.

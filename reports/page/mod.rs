@@ -49,6 +49,16 @@ pub(crate) struct MeshPart {
     pub(crate) plots: Vec<Plot>,
     /// The address of a picture of its results, and what it shows.
     pub(crate) picture: Option<(String, String)>,
+    pub(crate) view: Option<MeshView>,
+}
+
+/// A 3D view of a mesh's results.
+pub(crate) struct MeshView {
+    pub(crate) name: String,
+    /// Its file, relative to the page.
+    pub(crate) file: String,
+    /// Its text, where the page itself holds it.
+    pub(crate) text: Option<String>,
 }
 
 impl Page<'_> {
@@ -80,11 +90,18 @@ impl Page<'_> {
         html.push_str(reference::definitions().as_str());
         html.push_str(&reference::files(self));
         html.push_str("</main>\n");
+        if self.meshes.iter().any(|mesh| mesh.view.is_some()) {
+            html.push_str(&packed::packed(
+                Some("three"),
+                include_str!("vendor/three.module.min.js"),
+            ));
+        }
         html.push_str(&format!(
-            "<script>\n\"use strict\";\n{}{}{}{}</script>\n</body>\n</html>\n",
+            "<script>\n\"use strict\";\n{}{}{}{}{}</script>\n</body>\n</html>\n",
             include_str!("packed.js"),
             include_str!("table.js"),
             include_str!("plots.js"),
+            include_str!("view3d.js"),
             include_str!("script.js")
         ));
         html

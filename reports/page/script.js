@@ -16,6 +16,7 @@
     packed.remove();
     mesh.insertAdjacentHTML("beforeend", await page.unpack(packed));
     page.enlivenPlots(mesh);
+    page.enlivenViews(mesh);
   };
   for (const mesh of meshes) {
     mesh.addEventListener("toggle", () => {

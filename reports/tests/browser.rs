@@ -11,7 +11,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use common::{SHAPES, comparison, header};
-use medial_reports::write_report;
+use medial::Vec3;
+use medial::complex::{MedialMesh, Sphere};
+use medial::surface::TriMesh;
+use medial_reports::{Record, View3d, picture_strips, write_report};
 use serde_json::{Value, json};
 
 const BROWSER: &str = "chromium";
@@ -44,6 +47,8 @@ impl Browser {
         let redirected = "exec \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>/dev/null";
         let mut child = Command::new("sh")
             .args(["-c", redirected, "sh", BROWSER, "--headless", "--no-sandbox", "--disable-gpu"])
+            // WebGL without a graphics card.
+            .args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
             .args(["--remote-debugging-pipe", "--no-first-run", "--disable-extensions"])
             .args(["--window-size=1400,1000", "--disable-background-networking"])
             // No way out: a proxy where nothing listens.
@@ -325,12 +330,79 @@ fn check_plots(browser: &mut Browser) {
     assert_eq!(browser.value(is_whole), true);
 }
 
+/// A cube, and the medial mesh of a smaller one in it.
+fn write_views(folder: &Path, records: &[Record]) {
+    let corner = |k: u32| Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+    let square = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    let sides =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let vertices = (0..8).map(corner).collect();
+    let surface = TriMesh { vertices, faces: sides.into_iter().flat_map(square).collect() };
+    let ball = |x, y, r| Sphere::new(Vec3::new(x, y, 0.5), r);
+    let spheres = vec![ball(0.3, 0.3, 0.3), ball(0.7, 0.3, 0.25), ball(0.7, 0.7, 0.2)];
+    let axis = MedialMesh::from_simplices(spheres, vec![], vec![[0, 1, 2]]).unwrap();
+    std::fs::create_dir(folder.join("views")).unwrap();
+    for strip in picture_strips(records) {
+        let results = strip.panels.iter().map(|(_, caption)| (caption.clone(), &axis)).collect();
+        let script = View3d { surface: &surface, results }.script(&strip.view).unwrap();
+        std::fs::write(folder.join(strip.view_file()), script).unwrap();
+    }
+}
+
+/// How many pixels of a 3D view are drawn, and a sum that tells two pictures apart.
+const DRAWN: &str = "window.drawn = (canvas) => { \
+    const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d'); \
+    copy.drawImage(canvas, 0, 0); \
+    const pixels = copy.getImageData(0, 0, canvas.width, canvas.height).data; \
+    let count = 0, sum = 0; \
+    for (let k = 0; k < pixels.length; k += 4) if (pixels[k + 3]) { \
+        count += 1; sum = (sum * 31 + k + pixels[k] + pixels[k + 1]) % 1000003; } \
+    return { count, sum }; }";
+
+/// Both sides show something, move together, and are gone when they are closed.
+fn check_views(browser: &mut Browser) {
+    browser.value(DRAWN);
+    let canvases = "[...document.querySelectorAll('.side canvas')]";
+    let all_drawn =
+        format!("{canvases}.length === 2 && {canvases}.every(c => drawn(c).count > 5000)");
+    browser.value("document.querySelectorAll('.view3d > button')[0].click()");
+    browser.until(&all_drawn);
+    for kind in ["union", "errors", "surface", "axis"] {
+        browser.value(&format!(
+            "window.before = {canvases}.map(c => drawn(c).sum); \
+             for (const side of document.querySelectorAll('.side')) {{ \
+             const select = side.querySelectorAll('select')[1]; select.value = '{kind}'; \
+             select.dispatchEvent(new Event('change')); }}"
+        ));
+        browser.until(&format!("{canvases}.every((c, k) => drawn(c).sum !== before[k])"));
+        assert_eq!(browser.value(&all_drawn), true, "{kind}");
+    }
+    browser.value(&format!("before = {canvases}.map(c => drawn(c).sum); {canvases}[1].focus()"));
+    browser.key("ArrowRight", 39);
+    browser.until(&format!("{canvases}.every((c, k) => drawn(c).sum !== before[k])"));
+    // The same results on both sides, seen alike.
+    let sums = browser.value(&format!("{canvases}.map(c => drawn(c).sum)"));
+    assert_eq!(sums[0], sums[1]);
+
+    // Another one, from its file, takes the place of the first.
+    browser.value("document.querySelectorAll('script.view')[1].remove()");
+    browser.value("document.querySelectorAll('details.mesh')[1].open = true");
+    browser.value("document.querySelectorAll('.view3d > button')[1].click()");
+    let second = "document.querySelectorAll('.view3d')[1].querySelectorAll('canvas').length === 2";
+    browser.until(second);
+    browser.until(&all_drawn);
+    browser.value("document.querySelectorAll('.view3d > button')[1].click()");
+    assert_eq!(browser.value(&format!("{canvases}.length")), 0);
+    browser.value("document.querySelectorAll('details.mesh')[1].open = false");
+}
+
 #[test]
 fn the_page_answers_from_disk() {
     let folder = tempfile::tempdir().unwrap();
     let profile = tempfile::tempdir().unwrap();
     let Some(mut browser) = Browser::start(profile.path()) else { return };
     let records = comparison(&SHAPES, &METHODS, &COUNTS);
+    write_views(folder.path(), &records);
     write_report(folder.path(), &records, &header(&METHODS)).unwrap();
     browser.open(&format!("file://{}/index.html", folder.path().display()));
     check_filters(&mut browser);
@@ -339,6 +411,7 @@ fn the_page_answers_from_disk() {
     check_details(&mut browser);
     check_sticky(&mut browser);
     check_plots(&mut browser);
+    check_views(&mut browser);
 
     let mut requests = 0;
     for event in &browser.events {
@@ -346,6 +419,10 @@ fn the_page_answers_from_disk() {
         match event["method"].as_str().unwrap_or_default() {
             "Network.requestWillBeSent" => {
                 let url = params["request"]["url"].as_str().unwrap();
+                // Scripts that the page makes of its own text.
+                if url.starts_with("blob:") {
+                    continue;
+                }
                 assert!(url.starts_with("file:"), "{url}");
                 requests += 1;
             }
@@ -355,5 +432,5 @@ fn the_page_answers_from_disk() {
             _ => {}
         }
     }
-    assert_eq!(requests, 1, "the page and nothing else");
+    assert_eq!(requests, 2, "the page and the view that it does not hold");
 }

@@ -133,7 +133,7 @@ fn what_was_near_does_not_change_the_answers() {
         let far = NearestPrimitive { signed: 0.0, primitive: Primitive::Face(u32::MAX) };
         assert_eq!(union.deepest_batch_near(&points, &[far], all), fresh, "{kind}");
         // What is enough is found where there is any, and everything else is as before.
-        let enough = |i: usize| (i % 2 == 0).then_some(-0.05);
+        let enough = |i: usize| i.is_multiple_of(2).then_some(-0.05);
         let found = union.deepest_batch_near(&points, &before, enough);
         for (i, (found, fresh)) in found.iter().zip(&fresh).enumerate() {
             let is_enough = enough(i).is_some_and(|enough| fresh.signed <= enough);

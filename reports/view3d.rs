@@ -1,0 +1,333 @@
+//! What the page shows in three dimensions: a surface and the medial meshes of its results.
+//!
+//! A view is a script file of one call, so that a page that was opened from a disk can load it:
+//! browsers let it load scripts from there, and nothing else. Its text is gzip in Base64 of
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 4 | length of the head, little-endian as all that follows |
+//! | head | JSON, [`Head`]; filled up with spaces to a multiple of four |
+//! | `u32` | faces of the surface, three vertices each, as differences from the number before |
+//! | for each result | spheres, four `f32` each; edges, two `u32` each; faces, three `u32` each |
+//! | `u16` | vertices of the surface, in steps from the lowest corner |
+//! | for each result | one byte for each vertex: its signed error, 128 for none |
+//!
+//! Coarse surfaces are refined without changing their shape, because errors are told at vertices; very
+//! fine ones are coarsened.
+
+use std::collections::HashMap;
+use std::io::Write;
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use medial::Vec3;
+use medial::complex::{MedialMesh, MedialUnion};
+use medial::surface::TriMesh;
+use serde::Serialize;
+
+use crate::render::{Camera, ColourMap, Errors, Scale};
+
+/// A surface is refined up to edges of this share of its diagonal, as long as it has at most so many
+/// vertices.
+const EDGE: f64 = 1.0 / 50.0;
+const REFINED: usize = 20_000;
+
+/// A surface with more vertices is coarsened, to cells of this share of its diagonal.
+const MOST: usize = 60_000;
+const CELL: f64 = 1.0 / 250.0;
+
+/// Colours of a table.
+const COLOURS: usize = 64;
+
+/// A surface with the medial meshes of some results, in its unit.
+pub struct View3d<'a> {
+    /// The surface.
+    pub surface: &'a TriMesh,
+    /// Medial meshes, and what is said of each.
+    pub results: Vec<(String, &'a MedialMesh)>,
+}
+
+/// What the arrays mean.
+#[derive(Serialize)]
+struct Head {
+    direction: [f64; 3],
+    up: [f64; 3],
+    /// Vertices and faces of the surface.
+    surface: [usize; 2],
+    low: [f64; 3],
+    /// Length of a step, and of the diagonal of the surface.
+    step: f64,
+    diagonal: f64,
+    /// Error at the ends of the colours, in % of the diagonal.
+    largest_error: f64,
+    /// Radii at the ends of the colours.
+    radii: [f64; 2],
+    colours: [Vec<[u8; 3]>; 2],
+    results: Vec<ResultHead>,
+}
+
+#[derive(Serialize)]
+struct ResultHead {
+    label: String,
+    /// Spheres, edges, faces.
+    counts: [usize; 3],
+}
+
+impl View3d<'_> {
+    /// The file of a view with a name.
+    ///
+    /// # Errors
+    /// When a medial mesh is empty or not valid.
+    pub fn script(&self, name: &str) -> Result<String, String> {
+        let surface = match self.surface.vertices.len() {
+            0..MOST => refined(self.surface),
+            _ => coarsened(self.surface),
+        };
+        let (low, high) = surface.bounding_box().unwrap_or_default();
+        let diagonal = low.distance(high);
+        let step = (high - low).max_element() / f64::from(u16::MAX);
+        let errors = self.errors(&surface)?;
+        let all: Vec<Errors<'_>> = (errors.iter())
+            .map(|values| Errors { mesh: &surface, values, caption: String::new() })
+            .collect();
+        let end = Errors::common_scale(&all.iter().collect::<Vec<_>>(), diagonal);
+        let camera = Camera::fitting(self.surface);
+        let radii = Scale::radii(self.results.iter().map(|(_, axis)| *axis));
+        let table = |map: ColourMap| {
+            let place = |k: usize| k as f64 / (COLOURS - 1) as f64;
+            (0..COLOURS).map(|k| map.at(place(k))).collect()
+        };
+        let head = Head {
+            direction: camera.direction.to_array(),
+            up: camera.up.to_array(),
+            surface: [surface.vertices.len(), surface.faces.len()],
+            low: low.to_array(),
+            step,
+            diagonal,
+            largest_error: 100.0 * end / diagonal,
+            radii: [radii.lo, radii.hi],
+            colours: [table(ColourMap::Viridis), table(ColourMap::Diverging)],
+            results: self.results.iter().map(|(label, axis)| result_head(label, axis)).collect(),
+        };
+        let head = serde_json::to_vec(&head).map_err(|error| error.to_string())?;
+        let mut bytes = framed(head);
+        self.arrays(&surface, (low, step), &mut bytes);
+        for values in &errors {
+            bytes.extend(values.iter().map(|error| byte_of(error / end)));
+        }
+        Ok(script(name, &bytes))
+    }
+
+    /// For each result how far its union reaches beyond each vertex, negative where it falls short.
+    fn errors(&self, surface: &TriMesh) -> Result<Vec<Vec<f64>>, String> {
+        let of = |(label, axis): &(String, &MedialMesh)| {
+            let union = MedialUnion::new(axis).map_err(|error| format!("{label}: {error}"))?;
+            let signed = union.signed_batch(&surface.vertices);
+            Ok(signed.into_iter().map(|signed| -signed).collect())
+        };
+        self.results.iter().map(of).collect()
+    }
+
+    /// Everything but the errors.
+    fn arrays(&self, surface: &TriMesh, (low, step): (Vec3, f64), bytes: &mut Vec<u8>) {
+        let mut last = 0_u32;
+        for &vertex in surface.faces.iter().flatten() {
+            // Small differences pack well.
+            bytes.extend(vertex.wrapping_sub(last).to_le_bytes());
+            last = vertex;
+        }
+        for (_, axis) in &self.results {
+            for sphere in &axis.spheres {
+                let [x, y, z] = sphere.centre.to_array();
+                let numbers = [x, y, z, sphere.radius].map(|number| (number as f32).to_le_bytes());
+                bytes.extend(numbers.as_flattened());
+            }
+            let vertices = axis.edges.as_flattened().iter().chain(axis.faces.as_flattened());
+            bytes.extend(vertices.flat_map(|vertex| vertex.to_le_bytes()));
+        }
+        for &vertex in &surface.vertices {
+            let steps = ((vertex - low) / step.max(f64::MIN_POSITIVE)).round().to_array();
+            bytes.extend(steps.map(|steps| (steps as u16).to_le_bytes()).as_flattened());
+        }
+    }
+}
+
+fn result_head(label: &str, axis: &MedialMesh) -> ResultHead {
+    let counts = [axis.spheres.len(), axis.edges.len(), axis.faces.len()];
+    ResultHead { label: label.to_owned(), counts }
+}
+
+/// A head with its length, such that what follows begins at a multiple of four.
+fn framed(mut head: Vec<u8>) -> Vec<u8> {
+    head.resize(head.len().next_multiple_of(4), b' ');
+    let mut bytes = (head.len() as u32).to_le_bytes().to_vec();
+    bytes.append(&mut head);
+    bytes
+}
+
+/// An error as a byte: 128 for none, 1 and 255 for the ends and all beyond.
+fn byte_of(share: f64) -> u8 {
+    (128.0 + 127.0 * share.clamp(-1.0, 1.0)).round() as u8
+}
+
+fn script(name: &str, bytes: &[u8]) -> String {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    // A vector takes all that is written.
+    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish()).unwrap_or_default();
+    let text = BASE64_STANDARD.encode(packed);
+    format!("{START}{}{MIDDLE}{text}{END}", serde_json::Value::from(name))
+}
+
+const START: &str = "medialView(";
+const MIDDLE: &str = ",\"";
+const END: &str = "\");\n";
+
+/// The text of a view within its file.
+pub(crate) fn text_of(script: &str) -> Option<&str> {
+    let inner = script.strip_prefix(START)?.strip_suffix(END)?;
+    Some(inner.rsplit_once(MIDDLE)?.1)
+}
+
+/// The same surface with shorter edges: long ones are halved as long as there is room.
+fn refined(mesh: &TriMesh) -> TriMesh {
+    let (low, high) = mesh.bounding_box().unwrap_or_default();
+    let longest = EDGE * low.distance(high);
+    let mut mesh = mesh.clone();
+    while mesh.vertices.len() < REFINED {
+        let before = mesh.vertices.len();
+        mesh = halved(&mesh, longest);
+        if mesh.vertices.len() == before {
+            break;
+        }
+    }
+    mesh
+}
+
+/// The mesh with all edges halved that are longer than `longest`. An edge is halved in both its faces, so nothing
+/// comes apart.
+fn halved(mesh: &TriMesh, longest: f64) -> TriMesh {
+    let mut vertices = mesh.vertices.clone();
+    let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
+    let mut middle = |a: u32, b: u32| {
+        let [p, q] = [a, b].map(|v| mesh.vertices[v as usize]);
+        (p.distance(q) > longest).then(|| {
+            *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                vertices.push(p.midpoint(q));
+                vertices.len() as u32 - 1
+            })
+        })
+    };
+    let mut faces = Vec::with_capacity(mesh.faces.len());
+    for &[a, b, c] in &mesh.faces {
+        match [middle(a, b), middle(b, c), middle(c, a)] {
+            [None, None, None] => faces.push([a, b, c]),
+            [Some(x), None, None] => faces.extend([[a, x, c], [x, b, c]]),
+            [None, Some(x), None] => faces.extend([[b, x, a], [x, c, a]]),
+            [None, None, Some(x)] => faces.extend([[c, x, b], [x, a, b]]),
+            [Some(x), Some(y), None] => faces.extend([[x, b, y], [a, x, y], [a, y, c]]),
+            [None, Some(x), Some(y)] => faces.extend([[x, c, y], [b, x, y], [b, y, a]]),
+            [Some(y), None, Some(x)] => faces.extend([[x, a, y], [c, x, y], [c, y, b]]),
+            [Some(x), Some(y), Some(z)] => {
+                faces.extend([[a, x, z], [x, b, y], [z, y, c], [x, y, z]]);
+            }
+        }
+    }
+    TriMesh { vertices, faces }
+}
+
+/// The surface with one vertex for each cell of a grid, the first one in it.
+fn coarsened(mesh: &TriMesh) -> TriMesh {
+    let (low, high) = mesh.bounding_box().unwrap_or_default();
+    let cell = (CELL * low.distance(high)).max(f64::MIN_POSITIVE);
+    let mut vertices = vec![];
+    let mut cells: HashMap<[i64; 3], u32> = HashMap::new();
+    let places: Vec<u32> = (mesh.vertices.iter())
+        .map(|&vertex| {
+            let key = ((vertex - low) / cell).floor().to_array().map(|x| x as i64);
+            *cells.entry(key).or_insert_with(|| {
+                vertices.push(vertex);
+                vertices.len() as u32 - 1
+            })
+        })
+        .collect();
+    let faces = mesh.faces.iter().map(|face| face.map(|v| places[v as usize]));
+    let faces = faces.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+    TriMesh { vertices, faces }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use medial::complex::Sphere;
+
+    fn tetrahedron() -> TriMesh {
+        let vertices = vec![Vec3::ZERO, Vec3::X, 0.01 * Vec3::Y, 0.5 * Vec3::Z];
+        TriMesh { vertices, faces: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] }
+    }
+
+    fn area(mesh: &TriMesh) -> f64 {
+        (0..mesh.faces.len())
+            .map(|f| {
+                let [a, b, c] = mesh.triangle(f);
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .sum()
+    }
+
+    #[test]
+    fn halving_keeps_the_surface_closed_and_its_area() {
+        let coarse = tetrahedron();
+        let fine = refined(&coarse);
+        assert!(fine.vertices.len() > 100);
+        assert!((area(&fine) - area(&coarse)).abs() < 1e-12);
+        let mut sides: Vec<[u32; 2]> =
+            fine.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+        sides.sort_unstable();
+        assert!(sides.iter().all(|&[a, b]| sides.binary_search(&[b, a]).is_ok()));
+        let longest = sides.iter().map(|side| {
+            let [p, q] = side.map(|v| fine.vertices[v as usize]);
+            p.distance(q)
+        });
+        assert!(longest.fold(0.0, f64::max) <= EDGE * 1.2);
+    }
+
+    #[test]
+    fn a_fine_surface_is_coarsened_at_its_own_vertices() {
+        let fine = refined(&tetrahedron());
+        let coarse = coarsened(&fine);
+        assert!(coarse.vertices.len() < fine.vertices.len());
+        assert!(coarse.vertices.iter().all(|vertex| fine.vertices.contains(vertex)));
+        assert!((area(&coarse) - area(&fine)).abs() < 0.02);
+    }
+
+    #[test]
+    fn errors_are_told_by_bytes() {
+        let ends = [-2.0, -1.0, 0.0, 0.5, 1.0, 9.0].map(byte_of);
+        assert_eq!(ends, [1, 1, 128, 192, 255, 255]);
+    }
+
+    #[test]
+    fn a_view_is_a_script_with_all_arrays() {
+        let surface = tetrahedron();
+        let spheres = vec![Sphere::new(Vec3::ZERO, 0.1), Sphere::new(Vec3::X, 0.2)];
+        let axis = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![]).unwrap();
+        let view = View3d { surface: &surface, results: vec![("a \"b\"".into(), &axis)] };
+        let script = view.script("mesh-x").unwrap();
+        assert_eq!(script, view.script("mesh-x").unwrap());
+        let packed = BASE64_STANDARD.decode(text_of(&script).unwrap()).unwrap();
+        let mut bytes = vec![];
+        std::io::Read::read_to_end(
+            &mut flate2::read::GzDecoder::new(packed.as_slice()),
+            &mut bytes,
+        )
+        .unwrap();
+        let length = u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize;
+        assert_eq!(length % 4, 0);
+        let head: serde_json::Value = serde_json::from_slice(&bytes[4..4 + length]).unwrap();
+        let [vertices, faces] = [0, 1].map(|k| head["surface"][k].as_u64().unwrap() as usize);
+        assert_eq!(head["results"][0]["counts"], serde_json::json!([2, 1, 0]));
+        assert_eq!(bytes.len(), 4 + length + 12 * faces + 2 * 16 + 8 + 6 * vertices + vertices);
+    }
+}
