@@ -41,12 +41,13 @@ const CELL: f64 = 1.0 / 250.0;
 /// Colours of a table.
 const COLOURS: usize = 64;
 
-/// A surface with the medial meshes of some results, in its unit.
+/// A surface with the medial meshes of some results, in its unit, and their errors.
 pub struct View3d<'a> {
-    /// The surface.
-    pub surface: &'a TriMesh,
-    /// Medial meshes, and what is said of each.
-    pub results: Vec<(String, &'a MedialMesh)>,
+    camera: Camera,
+    /// Refined or coarsened.
+    surface: TriMesh,
+    results: Vec<(String, &'a MedialMesh)>,
+    errors: Vec<Vec<f64>>,
 }
 
 /// What the arrays mean.
@@ -75,25 +76,44 @@ struct ResultHead {
     counts: [usize; 3],
 }
 
-impl View3d<'_> {
-    /// The file of a view with a name.
+impl<'a> View3d<'a> {
+    /// A view of a surface with medial meshes, and what is said of each.
     ///
     /// # Errors
     /// When a medial mesh is empty or not valid.
-    pub fn script(&self, name: &str) -> Result<String, String> {
-        let surface = match self.surface.vertices.len() {
-            0..MOST => refined(self.surface),
-            _ => coarsened(self.surface),
+    pub fn new(surface: &TriMesh, results: Vec<(String, &'a MedialMesh)>) -> Result<Self, String> {
+        let camera = Camera::fitting(surface);
+        let surface = match surface.vertices.len() {
+            0..MOST => refined(surface),
+            _ => coarsened(surface),
         };
+        let beyond = |(label, axis): &(String, &MedialMesh)| {
+            let union = MedialUnion::new(axis).map_err(|error| format!("{label}: {error}"))?;
+            let signed = union.signed_batch(&surface.vertices);
+            Ok(signed.into_iter().map(|signed| -signed).collect())
+        };
+        let errors = results.iter().map(beyond).collect::<Result<_, String>>()?;
+        Ok(Self { camera, surface, results, errors })
+    }
+
+    /// For each result how far its union reaches beyond the surface, at the vertices; negative where it falls
+    /// short.
+    pub fn errors(&self) -> Vec<Errors<'_>> {
+        let surface = &self.surface;
+        let values = self.errors.iter();
+        values.map(|values| Errors { mesh: surface, values, caption: String::new() }).collect()
+    }
+
+    /// The file of the view with a name.
+    ///
+    /// # Errors
+    /// When a number cannot be written.
+    pub fn script(&self, name: &str) -> Result<String, String> {
+        let Self { camera, surface, errors, .. } = self;
         let (low, high) = surface.bounding_box().unwrap_or_default();
         let diagonal = low.distance(high);
         let step = (high - low).max_element() / f64::from(u16::MAX);
-        let errors = self.errors(&surface)?;
-        let all: Vec<Errors<'_>> = (errors.iter())
-            .map(|values| Errors { mesh: &surface, values, caption: String::new() })
-            .collect();
-        let end = Errors::common_scale(&all.iter().collect::<Vec<_>>(), diagonal);
-        let camera = Camera::fitting(self.surface);
+        let end = Errors::common_scale(&self.errors().iter().collect::<Vec<_>>(), diagonal);
         let radii = Scale::radii(self.results.iter().map(|(_, axis)| *axis));
         let table = |map: ColourMap| {
             let place = |k: usize| k as f64 / (COLOURS - 1) as f64;
@@ -113,21 +133,11 @@ impl View3d<'_> {
         };
         let head = serde_json::to_vec(&head).map_err(|error| error.to_string())?;
         let mut bytes = framed(head);
-        self.arrays(&surface, (low, step), &mut bytes);
-        for values in &errors {
+        self.arrays(surface, (low, step), &mut bytes);
+        for values in errors {
             bytes.extend(values.iter().map(|error| byte_of(error / end)));
         }
         Ok(script(name, &bytes))
-    }
-
-    /// For each result how far its union reaches beyond each vertex, negative where it falls short.
-    fn errors(&self, surface: &TriMesh) -> Result<Vec<Vec<f64>>, String> {
-        let of = |(label, axis): &(String, &MedialMesh)| {
-            let union = MedialUnion::new(axis).map_err(|error| format!("{label}: {error}"))?;
-            let signed = union.signed_batch(&surface.vertices);
-            Ok(signed.into_iter().map(|signed| -signed).collect())
-        };
-        self.results.iter().map(of).collect()
     }
 
     /// Everything but the errors.
@@ -313,7 +323,9 @@ mod tests {
         let surface = tetrahedron();
         let spheres = vec![Sphere::new(Vec3::ZERO, 0.1), Sphere::new(Vec3::X, 0.2)];
         let axis = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![]).unwrap();
-        let view = View3d { surface: &surface, results: vec![("a \"b\"".into(), &axis)] };
+        let view = View3d::new(&surface, vec![("a \"b\"".into(), &axis)]).unwrap();
+        let [errors] = view.errors().try_into().unwrap();
+        assert!((errors.values[0] - 0.1).abs() < 1e-12 && (errors.values[1] - 0.2).abs() < 1e-12);
         let script = view.script("mesh-x").unwrap();
         assert_eq!(script, view.script("mesh-x").unwrap());
         let packed = BASE64_STANDARD.decode(text_of(&script).unwrap()).unwrap();

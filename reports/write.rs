@@ -138,8 +138,9 @@ fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option
     let strip = strip?;
     let bytes = fs::read(dir.join(&strip.file)).ok()?;
     let words = format!(
-        "{}: medial meshes at one number of spheres, coloured by radius, with the surface as glass; beside each \
-         its Hausdorff error in % of the diagonal",
+        "{}: medial meshes at one number of spheres, coloured by radius, with the surface as glass; their Hausdorff \
+         errors in % of the diagonal. Below them the surface: red where the reconstruction reaches beyond it, blue where \
+         it falls short",
         strip.mesh
     );
     let address = match room.checked_sub(bytes.len()) {

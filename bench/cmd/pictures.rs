@@ -5,7 +5,7 @@ use std::path::Path;
 
 use medial::complex::MedialMesh;
 use medial::write_atomically;
-use medial_reports::render::{Background, Camera, ColourBy, Panel, Strip, strip};
+use medial_reports::render::{Background, Camera, ColourBy, Errors, Panel, Strip, strip};
 use medial_reports::{PictureStrip, Record, View3d, picture_strips};
 
 use crate::run::{Input, Source};
@@ -32,8 +32,10 @@ pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
         let input = wanted.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
         let input = input.ok_or("its surface is not at hand as it was measured")?;
         let axes = axes(dir, wanted)?;
-        picture(dir, wanted, input, &axes)?;
-        view(dir, wanted, input, &axes)
+        let captions = wanted.panels.iter().map(|(_, caption)| caption.clone());
+        let view = View3d::new(&input.mesh, captions.zip(&axes).collect())?;
+        write(&dir.join(&wanted.file), &picture(wanted, input, &axes, &view)?)?;
+        write(&dir.join(wanted.view_file()), view.script(&wanted.view)?.as_bytes())
     });
     let failed = drawn.zip(&strips).filter_map(|(drawn, wanted)| {
         let why: String = drawn.err()?;
@@ -52,16 +54,21 @@ fn axes(dir: &Path, wanted: &PictureStrip) -> Result<Vec<MedialMesh>, String> {
     wanted.panels.iter().map(read).collect()
 }
 
+/// The strip as PNG: medial meshes, and below them the surface with the errors of each.
 fn picture(
-    dir: &Path,
     wanted: &PictureStrip,
     input: &Input,
     axes: &[MedialMesh],
-) -> Result<(), String> {
+    view: &View3d<'_>,
+) -> Result<Vec<u8>, String> {
     let panels: Vec<Panel<'_>> = axes
         .iter()
         .zip(&wanted.panels)
-        .map(|(axis, (_, caption))| Panel { axis, caption: caption.clone(), errors: None })
+        .zip(view.errors())
+        .map(|((axis, (_, caption)), errors)| {
+            let errors = Some(Errors { caption: caption.clone(), ..errors });
+            Panel { axis, caption: caption.clone(), errors }
+        })
         .collect();
     let (lo, hi) = input.mesh.bounding_box().unwrap_or_default();
     let common = Strip {
@@ -75,20 +82,7 @@ fn picture(
         max_error: None,
     };
     let picture = strip(&panels, &common).map_err(|error| error.to_string())?;
-    let bytes = picture.to_png().map_err(|error| error.to_string())?;
-    write(&dir.join(&wanted.file), &bytes)
-}
-
-fn view(
-    dir: &Path,
-    wanted: &PictureStrip,
-    input: &Input,
-    axes: &[MedialMesh],
-) -> Result<(), String> {
-    let results = wanted.panels.iter().zip(axes);
-    let results = results.map(|((_, caption), axis)| (caption.clone(), axis)).collect();
-    let script = View3d { surface: &input.mesh, results }.script(&wanted.view)?;
-    write(&dir.join(wanted.view_file()), script.as_bytes())
+    picture.to_png().map_err(|error| error.to_string())
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {

@@ -344,7 +344,7 @@ fn write_views(folder: &Path, records: &[Record]) {
     std::fs::create_dir(folder.join("views")).unwrap();
     for strip in picture_strips(records) {
         let results = strip.panels.iter().map(|(_, caption)| (caption.clone(), &axis)).collect();
-        let script = View3d { surface: &surface, results }.script(&strip.view).unwrap();
+        let script = View3d::new(&surface, results).unwrap().script(&strip.view).unwrap();
         std::fs::write(folder.join(strip.view_file()), script).unwrap();
     }
 }
