@@ -127,11 +127,11 @@ pub fn write_report(
     Ok(files.written)
 }
 
-/// Bytes of the pictures that are part of the page; further ones are linked.
-const PICTURES: usize = 6 << 20;
+/// Bytes of the pictures that are part of the page; further ones are linked. In Base64 they take a third more.
+const PICTURES: usize = 3 << 20;
 
 /// Characters of the 3D views that are part of the page; further ones are read when they are opened.
-const VIEWS_INSIDE: usize = 3 << 20;
+const VIEWS_INSIDE: usize = 2 << 20;
 
 /// The picture of a mesh's results, if it is in the folder: within the page, while there is room.
 fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<(String, String)> {
