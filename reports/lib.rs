@@ -8,6 +8,7 @@
 //! | `metric` | the columns: name, unit, direction, definition |
 //! | `summary` | means over meshes at equal numbers of spheres |
 //! | `purpose` | which method for which purpose, method against method |
+//! | `scaling` | how time and memory grow with the input |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
 //! | `extras` | baselines, stability under noise, oracles: from files of their own |
@@ -33,6 +34,7 @@ pub mod published;
 mod purpose;
 mod record;
 pub mod render;
+mod scaling;
 mod summary;
 mod tables;
 mod terminal;

@@ -16,9 +16,12 @@ use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, Page};
 use crate::pictures::{FOLDER, PictureStrip, strips};
-use crate::plots::{Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot};
+use crate::plots::{
+    Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot, scaling_plots,
+};
 use crate::purpose::{error_profiles, purpose_table, wins_table};
 use crate::record::Record;
+use crate::scaling::{scaling, scaling_table};
 use crate::summary::by_count;
 use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_markdown};
 use crate::text::file_stems;
@@ -68,12 +71,22 @@ pub fn write_report(
         files.write_tables("overview-purpose", "Which one for me", &purposes)?;
     }
 
+    let scaling = scaling(&comparison);
+    let scaling_table = scaling.as_ref().map(|scaling| scaling_table(&comparison, scaling, &how));
+    if let Some(table) = &scaling_table {
+        let title = "Time and memory against input size";
+        files.write_tables("overview-scaling", title, std::slice::from_ref(table))?;
+    }
+
     let mut overview_plots: Vec<Plot> =
         equal_error_plot(&comparison, &bounds)?.into_iter().collect();
     if let Some((spheres, profiles)) = error_profiles(&comparison) {
         overview_plots.extend(profile_plot(&comparison, spheres, &profiles)?);
     }
     overview_plots.extend(mean_plots(&comparison, &summaries, &natives)?);
+    if let Some(scaling) = &scaling {
+        overview_plots.extend(scaling_plots(&comparison, scaling)?);
+    }
     let native_plots = native_plots(&comparison, &natives, &axis)?;
     for plot in overview_plots.iter().chain(&native_plots) {
         files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
@@ -113,6 +126,7 @@ pub fn write_report(
         comparison: &comparison,
         summaries: &summaries,
         purposes: &purposes,
+        scaling: scaling_table.as_ref(),
         overview_plots: &overview_plots,
         native_plots: &native_plots,
         meshes: &meshes,

@@ -28,6 +28,8 @@ pub(crate) struct Page<'a> {
     pub(crate) summaries: &'a [CountSummary],
     /// Which method for which purpose, and method against method.
     pub(crate) purposes: &'a [Table],
+    /// How time and memory grow with the input.
+    pub(crate) scaling: Option<&'a Table>,
     pub(crate) overview_plots: &'a [Plot],
     /// One for each method with a scalar of its own.
     pub(crate) native_plots: &'a [Plot],

@@ -53,6 +53,9 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     for table in rest.iter().filter(is_shown) {
         html.push_str(&titled(table, table.rows.len() > MANY_ROWS));
     }
+    if let Some(table) = page.scaling {
+        html.push_str(&titled(table, table.rows.len() > MANY_ROWS));
+    }
     if !page.overview_plots.is_empty() {
         html.push_str("<h3>Plots over all meshes</h3>\n");
         html.push_str(&html::plots(page.overview_plots));
