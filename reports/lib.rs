@@ -13,6 +13,7 @@
 //! | `plots` | figures as SVG |
 //! | `extras` | baselines, stability under noise, oracles: from files of their own |
 //! | `terminal` | the summary in plain text |
+//! | `papers` | BibTeX and the text on the methods, for papers |
 //! | `pictures` | which results are shown beside each other |
 //! | [`published`] | tables and figures of the papers as data, and ours beside them |
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
@@ -28,6 +29,7 @@ mod journal;
 mod metric;
 mod native;
 mod page;
+mod papers;
 mod pictures;
 mod plots;
 pub mod published;

@@ -15,6 +15,7 @@ use crate::header::Header;
 use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, Page};
+use crate::papers::{BIBTEX, LATEX, TEXT, papers};
 use crate::pictures::{FOLDER, PictureStrip, strips};
 use crate::plots::{
     Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot, scaling_plots,
@@ -27,8 +28,8 @@ use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_mark
 use crate::text::file_stems;
 
 /// Writes the report of some records into a folder, which is created where it is missing:
-/// `results.csv`, `tables/*.md`, `tables/*.tex`, `plots/*.svg`, `header.json` and `index.html`.
-/// Returns the paths that were written, `index.html` last.
+/// `results.csv`, `tables/*.md`, `tables/*.tex`, `tables/methods.*`, `plots/*.svg`, `header.json` and
+/// `index.html`. Returns the paths that were written, `index.html` last.
 ///
 /// What stands in the folder in [`BASELINES`](crate::BASELINES), [`STABILITY`](crate::STABILITY) and
 /// [`ORACLES`](crate::ORACLES) is shown beside the comparison; these files are read, never written.
@@ -116,6 +117,13 @@ pub fn write_report(
         }
         meshes.push(part);
     }
+    let papers = papers(header, &comparison);
+    if let Some(papers) = &papers {
+        let texts = [(BIBTEX, &papers.bibtex), (TEXT, &papers.text), (LATEX, &papers.latex)];
+        for (name, text) in texts {
+            files.write(name, text.as_bytes())?;
+        }
+    }
     let header_json =
         serde_json::to_vec_pretty(header).map_err(|error| ReportError::header(&error))?;
     files.write("header.json", &header_json)?;
@@ -133,6 +141,7 @@ pub fn write_report(
         summary_tables: &summary_tables,
         has_equal_error: !bounds.is_empty(),
         extras: &extras,
+        papers: papers.as_ref(),
     };
     files.write("index.html", page.to_html().as_bytes())?;
     Ok(files.written)

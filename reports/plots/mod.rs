@@ -25,6 +25,7 @@ use self::figure::{Curve, Figure};
 use self::points::{Drawing, Origin};
 
 pub(crate) use self::extras::{NoiseCurve, against_noise, against_numbers};
+pub(crate) use self::figure::FONTS;
 pub(crate) use self::palette::{BASELINE, style};
 pub(crate) use self::scaling::scaling_plots;
 
