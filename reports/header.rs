@@ -54,6 +54,9 @@ pub struct MethodNote {
     pub citation: String,
     /// One sentence on what the method does.
     pub summary: String,
+    /// One sentence on where the method is at home; empty where it does not say.
+    #[serde(default)]
+    pub home: String,
     /// What the published level means.
     pub published: String,
     /// Name and unit of the method's own level, where it has one.
@@ -68,6 +71,7 @@ impl From<&MethodInfo> for MethodNote {
             title: info.title.to_string(),
             citation: info.citation.to_string(),
             summary: info.summary.to_string(),
+            home: info.home.to_string(),
             published: info.published.to_string(),
             native: info.native.as_ref().map(|native| format!("{} ({})", native.name, native.unit)),
         }

@@ -8,10 +8,12 @@
 //! | `metric` | the columns: name, unit, direction, definition |
 //! | `summary` | means over meshes at equal numbers of spheres |
 //! | `purpose` | which method for which purpose, method against method |
+//! | `scaling` | how time and memory grow with the input |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
 //! | `extras` | baselines, stability under noise, oracles: from files of their own |
 //! | `terminal` | the summary in plain text |
+//! | `papers` | BibTeX and the text on the methods, for papers |
 //! | `pictures` | which results are shown beside each other |
 //! | [`published`] | tables and figures of the papers as data, and ours beside them |
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
@@ -27,12 +29,14 @@ mod journal;
 mod metric;
 mod native;
 mod page;
+mod papers;
 mod pictures;
 mod plots;
 pub mod published;
 mod purpose;
 mod record;
 pub mod render;
+mod scaling;
 mod summary;
 mod tables;
 mod terminal;

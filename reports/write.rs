@@ -15,18 +15,22 @@ use crate::header::Header;
 use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, MeshView, Page};
+use crate::papers::{BIBTEX, LATEX, TEXT, papers};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
-use crate::plots::{Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot};
+use crate::plots::{
+    Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot, scaling_plots,
+};
 use crate::purpose::{error_profiles, purpose_table, wins_table};
 use crate::record::Record;
+use crate::scaling::{scaling, scaling_table};
 use crate::summary::by_count;
 use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_markdown};
 use crate::text::file_stems;
 use crate::view3d::text_of;
 
 /// Writes the report of some records into a folder, which is created where it is missing:
-/// `results.csv`, `tables/*.md`, `tables/*.tex`, `plots/*.svg`, `header.json` and `index.html`.
-/// Returns the paths that were written, `index.html` last.
+/// `results.csv`, `tables/*.md`, `tables/*.tex`, `tables/methods.*`, `plots/*.svg`, `header.json` and
+/// `index.html`. Returns the paths that were written, `index.html` last.
 ///
 /// What stands in the folder in [`BASELINES`](crate::BASELINES), [`STABILITY`](crate::STABILITY) and
 /// [`ORACLES`](crate::ORACLES) is shown beside the comparison; these files are read, never written.
@@ -69,12 +73,22 @@ pub fn write_report(
         files.write_tables("overview-purpose", "Which one for me", &purposes)?;
     }
 
+    let scaling = scaling(&comparison);
+    let scaling_table = scaling.as_ref().map(|scaling| scaling_table(&comparison, scaling, &how));
+    if let Some(table) = &scaling_table {
+        let title = "Time and memory against input size";
+        files.write_tables("overview-scaling", title, std::slice::from_ref(table))?;
+    }
+
     let mut overview_plots: Vec<Plot> =
         equal_error_plot(&comparison, &bounds)?.into_iter().collect();
     if let Some((spheres, profiles)) = error_profiles(&comparison) {
         overview_plots.extend(profile_plot(&comparison, spheres, &profiles)?);
     }
     overview_plots.extend(mean_plots(&comparison, &summaries, &natives)?);
+    if let Some(scaling) = &scaling {
+        overview_plots.extend(scaling_plots(&comparison, scaling)?);
+    }
     let native_plots = native_plots(&comparison, &natives, &axis)?;
     for plot in overview_plots.iter().chain(&native_plots) {
         files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
@@ -105,6 +119,13 @@ pub fn write_report(
         }
         meshes.push(part);
     }
+    let papers = papers(header, &comparison);
+    if let Some(papers) = &papers {
+        let texts = [(BIBTEX, &papers.bibtex), (TEXT, &papers.text), (LATEX, &papers.latex)];
+        for (name, text) in texts {
+            files.write(name, text.as_bytes())?;
+        }
+    }
     let header_json =
         serde_json::to_vec_pretty(header).map_err(|error| ReportError::header(&error))?;
     files.write("header.json", &header_json)?;
@@ -116,12 +137,14 @@ pub fn write_report(
         comparison: &comparison,
         summaries: &summaries,
         purposes: &purposes,
+        scaling: scaling_table.as_ref(),
         overview_plots: &overview_plots,
         native_plots: &native_plots,
         meshes: &meshes,
         summary_tables: &summary_tables,
         has_equal_error: !bounds.is_empty(),
         extras: &extras,
+        papers: papers.as_ref(),
     };
     files.write("index.html", page.to_html().as_bytes())?;
     Ok(files.written)

@@ -59,6 +59,9 @@ fn unknown_method(registry: &Registry, id: &str) -> Failure {
 fn describe(info: &MethodInfo) {
     print_line(&format!("{}: {}", info.id, info.title));
     print_line(&format!("  {}", info.summary));
+    if !info.home.is_empty() {
+        print_line(&format!("  at home: {}", info.home));
+    }
     print_line(&format!("  source: {}", info.citation));
     match &info.native {
         Some(native) => {

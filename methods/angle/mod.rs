@@ -183,6 +183,11 @@ pub fn method() -> Method<AngleParams> {
              of a simplified medial axis, JCISE 3(4), doi:10.1115/1.1631582",
         )
         .summary("Keeps the spheres whose contact points subtend the largest angles.")
+        .home(
+            "Dense samples, when the axis is to stay where it is and only its spikes go, on \
+             small and large parts alike; not for few spheres, and the topology may break (the \
+             variant homotopy keeps it).",
+        )
         .native(NativeLevel::larger_is_coarser("theta", "degrees of separation angle"))
         .filter(Level::Published)
         .sweep(&[20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0])

@@ -129,6 +129,10 @@ pub fn method() -> Method<AofSettings> {
             "Keeps the voxels into which the gradient of the distance flows, coarse to fine, \
              straight from the surface.",
         )
+        .home(
+            "Straight from the surface, where its samples give too poor a start: the lattice is \
+             as fine as is asked; for thousands of spheres rather than hundreds.",
+        )
         .native(NativeLevel::larger_is_coarser("alpha", "degrees of object angle"))
         // The published lattice takes far longer: the one of the other levels will do.
         .filter(Level::Native(30.0))

@@ -182,6 +182,11 @@ pub fn method() -> Method<DeyZhaoParams> {
             "Keeps the Voronoi facets whose Delaunay edge is steep to the surface, or long beside \
              the samples' spacing.",
         )
+        .home(
+            "Dense samples, when one pair of constants is to do for every shape and every \
+             density; with denser samples it converges to the medial axis, but it promises no \
+             topology, and is not for few spheres.",
+        )
         .native(NativeLevel::larger_is_coarser(
             "strength",
             "multiple of the paper's two thresholds",

@@ -111,6 +111,11 @@ pub fn method() -> Method<LambdaParams> {
              doi:10.1016/j.gmod.2005.01.002",
         )
         .summary("Keeps the spheres whose contact points need the largest enclosing balls.")
+        .home(
+            "Dense samples, when whatever is small in absolute size is to go, with a proof that \
+             what stays is stable; not where thin parts must stay beside thick ones, and not for \
+             few spheres.",
+        )
         .native(NativeLevel::larger_is_coarser("lambda", "fraction of the bounding-box diagonal"))
         .filter(Level::Published)
         .sweep(&[0.0025, 0.005, 0.01, 0.02])

@@ -87,6 +87,10 @@ pub fn method() -> Method<NoParams> {
             "Collapses each edge into its larger sphere, in the order of the scales at which that \
              absorbs the smaller one: the scale axis as a hierarchy.",
         )
+        .home(
+            "Every level from one run, nested and without a parameter, with spheres of the start \
+             alone; loops may close, and with few spheres the error is large.",
+        )
         .native(NativeLevel::larger_is_coarser("s", "factor by which all balls grow, at least 1"))
         .sweep(&[1.1, 1.5, 2.0, 4.0, 8.0, 16.0])
         .published(

@@ -102,6 +102,10 @@ pub fn method() -> Method<QmatParams> {
             "Collapses the edges of the medial mesh by slab quadric error and stability ratio, \
              each merged sphere placed where its error is least.",
         )
+        .home(
+            "A small number of spheres in about a second: spikes go first, and each merged \
+             sphere is placed anew.",
+        )
         .published(
             "100 spheres, the topology kept from 200 spheres on: the paper leaves the count to the \
              user, its Table II compares at 100",

@@ -80,6 +80,11 @@ pub fn method() -> Method<SatParams> {
             "Grows all polar balls by a factor, takes the medial axis of their union, and shrinks \
              its balls back.",
         )
+        .home(
+            "Features that are small beside what is around them, when they are to go and equally \
+             small ones elsewhere to stay; gaps may fill, spheres are new ones, and it is not \
+             for few spheres.",
+        )
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
         .filter(Level::Published)
         .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0])

@@ -147,6 +147,11 @@ pub fn method() -> Method<TamHeidrichParams> {
             "Cuts the axis of the polar balls into its sheets and removes small ones from the \
              outside in, loops and components kept.",
         )
+        .home(
+            "Whole features of little volume, when they are to go and loops to stay, and a \
+             surface is to be rebuilt by the power crust; it does not reach small numbers of \
+             spheres.",
+        )
         .native(NativeLevel::larger_is_coarser("t_v", "per cent of the solid's volume"))
         .filter(Level::Published)
         .sweep(&[0.01, 0.1, 0.5, 1.0, 5.0])

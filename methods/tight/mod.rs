@@ -118,6 +118,10 @@ pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
             "Collapses and inserts spheres in the order of the two-sided error at samples, and moves all \
              of them together to lessen its maximum.",
         )
+        .home(
+            "The least two-sided error with few spheres, the topology of its start kept, where \
+             seconds to a minute for each number of spheres do not matter.",
+        )
         .published("nothing is published: 100 spheres")
         .native(NativeLevel::larger_is_coarser("bound", "fraction of the diagonal"))
         .on_request()

@@ -11,12 +11,14 @@ mod html;
 mod meshes;
 mod overview;
 mod packed;
+mod papers;
 mod reference;
 mod results;
 
 use crate::comparison::Comparison;
 use crate::extras::Extra;
 use crate::header::{Header, RunNote};
+use crate::papers::Papers;
 use crate::plots::Plot;
 use crate::record::Machine;
 use crate::summary::CountSummary;
@@ -30,6 +32,8 @@ pub(crate) struct Page<'a> {
     pub(crate) summaries: &'a [CountSummary],
     /// Which method for which purpose, and method against method.
     pub(crate) purposes: &'a [Table],
+    /// How time and memory grow with the input.
+    pub(crate) scaling: Option<&'a Table>,
     pub(crate) overview_plots: &'a [Plot],
     /// One for each method with a scalar of its own.
     pub(crate) native_plots: &'a [Plot],
@@ -39,6 +43,8 @@ pub(crate) struct Page<'a> {
     /// Whether the first of them is that of equal errors.
     pub(crate) has_equal_error: bool,
     pub(crate) extras: &'a [Extra],
+    /// What a paper takes over.
+    pub(crate) papers: Option<&'a Papers>,
 }
 
 /// What the page shows of one mesh.
@@ -88,6 +94,7 @@ impl Page<'_> {
         html.push_str(&reference::warnings(self));
         html.push_str(&reference::methods(self.header, self.comparison));
         html.push_str(reference::definitions().as_str());
+        html.push_str(&papers::section(self));
         html.push_str(&reference::files(self));
         html.push_str("</main>\n");
         if self.meshes.iter().any(|mesh| mesh.view.is_some()) {
@@ -97,11 +104,12 @@ impl Page<'_> {
             ));
         }
         html.push_str(&format!(
-            "<script>\n\"use strict\";\n{}{}{}{}{}</script>\n</body>\n</html>\n",
+            "<script>\n\"use strict\";\n{}{}{}{}{}{}</script>\n</body>\n</html>\n",
             include_str!("packed.js"),
             include_str!("table.js"),
             include_str!("plots.js"),
             include_str!("view3d.js"),
+            include_str!("papers.js"),
             include_str!("script.js")
         ));
         html
@@ -147,9 +155,11 @@ impl Page<'_> {
         if !comparison.entries.is_empty() {
             html.push_str("<a href=\"#results\">Results</a><a href=\"#meshes\">Meshes</a>");
         }
-        html.push_str(
-            "<a href=\"#definitions\">Definitions</a><a href=\"#files\">Files</a></nav>\n",
-        );
+        html.push_str("<a href=\"#definitions\">Definitions</a>");
+        if self.papers.is_some() {
+            html.push_str("<a href=\"#papers\">For papers</a>");
+        }
+        html.push_str("<a href=\"#files\">Files</a></nav>\n");
         html.push_str("</header>\n");
         html
     }

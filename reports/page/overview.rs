@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::metric::{
     BELOW_30, EPSILON, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS,
 };
-use crate::page::{Page, html};
+use crate::page::{Page, html, reference};
 use crate::record::Status;
 use crate::summary::{CountSummary, SeriesSummary, best, headlines};
 use crate::tables::Table;
@@ -34,6 +34,7 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     if let Some(table) = purposes.next() {
         html.push_str(&titled(table, false));
     }
+    html.push_str(&homes(page));
     if !lines.is_empty() {
         html.push_str(&format!("<ul class=\"headlines\">{}</ul>\n", lines.concat()));
     }
@@ -53,6 +54,9 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     for table in rest.iter().filter(is_shown) {
         html.push_str(&titled(table, table.rows.len() > MANY_ROWS));
     }
+    if let Some(table) = page.scaling {
+        html.push_str(&titled(table, table.rows.len() > MANY_ROWS));
+    }
     if !page.overview_plots.is_empty() {
         html.push_str("<h3>Plots over all meshes</h3>\n");
         html.push_str(&html::plots(page.overview_plots));
@@ -64,6 +68,24 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     }
     html.push_str("</section>\n");
     html
+}
+
+/// What each method is for, as far as the methods say it.
+fn homes(page: &Page<'_>) -> String {
+    let notes = reference::ran(page.header, page.comparison).filter(|note| !note.home.is_empty());
+    let items: Vec<String> = notes
+        .map(|note| {
+            let (id, home) = (escape_html(&note.id), escape_html(&note.home));
+            format!("<dt>{id}</dt><dd>{home}</dd>\n")
+        })
+        .collect();
+    if items.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<details><summary>What each method is for</summary>\n<dl>\n{}</dl>\n</details>\n",
+        items.concat()
+    )
 }
 
 /// A table with its caption and its notes but the first, which the page's head already tells.

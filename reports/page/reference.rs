@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::comparison::{Comparison, level_label};
-use crate::header::Header;
+use crate::header::{Header, MethodNote};
 use crate::metric::COMPARED;
 use crate::page::{Page, html};
 use crate::tables::warnings as warnings_of;
@@ -49,13 +49,24 @@ pub(crate) fn warnings(page: &Page<'_>) -> String {
     html
 }
 
+/// The notes of the methods that were run.
+pub(crate) fn ran<'a>(
+    header: &'a Header,
+    comparison: &'a Comparison<'_>,
+) -> impl Iterator<Item = &'a MethodNote> {
+    header.methods.iter().filter(|note| comparison.methods.contains(&note.id.as_str()))
+}
+
 /// Names and citations of the methods that were run, as far as the runner passed them in.
 pub(crate) fn methods(header: &Header, comparison: &Comparison<'_>) -> String {
-    let run = header.methods.iter().filter(|note| comparison.methods.contains(&note.id.as_str()));
-    let items: Vec<String> = run
+    let items: Vec<String> = ran(header, comparison)
         .map(|note| {
+            let home = match note.home.as_str() {
+                "" => String::new(),
+                home => format!(" At home: {}", escape_html(home)),
+            };
             format!(
-                "<dt>{}: {}</dt><dd>{} Published level: {}. <cite>{}</cite></dd>\n",
+                "<dt>{}: {}</dt><dd>{}{home} Published level: {}. <cite>{}</cite></dd>\n",
                 escape_html(&note.id),
                 escape_html(&note.title),
                 escape_html(&note.summary),
@@ -136,11 +147,21 @@ pub(crate) fn files(page: &Page<'_>) -> String {
             escape_html(path)
         )
     };
+    let papers = match page.papers {
+        Some(_) => format!(
+            "<li>{}, {}, {}: the text on the methods and their BibTeX</li>\n",
+            link(crate::papers::TEXT),
+            link(crate::papers::LATEX),
+            link(crate::papers::BIBTEX)
+        ),
+        None => String::new(),
+    };
     format!(
         "<section id=\"files\">\n<h2>Files</h2>\n<ul>\n\
          <li>{}: the records, one JSON object on each line</li>\n\
          <li>{}: every number of every record, one row for each</li>\n\
          <li>{}, {}: means over meshes; <code>tables/mesh-…</code> for each of {}</li>\n\
+         {papers}\
          <li><code>plots/</code>: {} as SVG</li>\n</ul>\n</section>\n",
         link("results.jsonl"),
         link("results.csv"),

@@ -40,6 +40,7 @@ pub(crate) fn against_numbers(
         of: mesh.map_or("mean", |mesh| comparison.meshes[mesh].as_str()).to_owned(),
         origins: vec![Origin { n: mesh.map(|_| 1), ..Origin::default() }; points.len()],
         points,
+        line: None,
         tags: vec![],
         dashed: true,
     });
@@ -82,6 +83,7 @@ pub(crate) fn against_noise(
         of: "mean".to_owned(),
         points,
         origins: vec![],
+        line: None,
         tags: vec![],
         dashed: false,
     };

@@ -32,6 +32,8 @@ pub(crate) struct Curve {
     pub(crate) points: Vec<(f64, f64)>,
     /// One for each point, as far as it is known.
     pub(crate) origins: Vec<Origin>,
+    /// What is drawn instead of a line through the points, such as a fit.
+    pub(crate) line: Option<Vec<(f64, f64)>>,
     /// Texts beside some points: index and text.
     pub(crate) tags: Vec<(usize, String)>,
     pub(crate) dashed: bool,
@@ -49,10 +51,13 @@ pub(crate) struct Figure {
 
 const FRONT: &str = "not dominated";
 
-/// Text of a size, in the viewer's sans-serif font.
+/// The fonts that the texts of all figures name, the first one that is there.
+pub(crate) const FONTS: &str = "Helvetica, Arial, sans-serif";
+
+/// Text of a size, in the font of all figures.
 pub(crate) fn font(size: i32, colour: RGBColor) -> TextStyle<'static> {
     // The backend divides sizes by 1.24.
-    ("sans-serif", f64::from(size * RESOLUTION) * 1.24).into_font().color(&colour)
+    (FONTS, f64::from(size * RESOLUTION) * 1.24).into_font().color(&colour)
 }
 
 impl Figure {
@@ -204,7 +209,7 @@ fn draw_curve<B: DrawingBackend>(
     let line = colour.stroke_width(2 * RESOLUTION as u32);
     let area = chart.plotting_area().strip_coord_spec();
     begin(&area, "line", Some(curve.series))?;
-    let points = curve.points.iter().copied();
+    let points = curve.line.as_ref().unwrap_or(&curve.points).iter().copied();
     if curve.dashed {
         let dashes = DashedLineSeries::new(points, 7 * RESOLUTION, 5 * RESOLUTION, line);
         chart.draw_series(dashes).map_err(PlotError::new)?;

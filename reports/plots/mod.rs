@@ -6,6 +6,7 @@ mod extras;
 mod figure;
 mod palette;
 mod points;
+mod scaling;
 
 use std::fmt::Display;
 
@@ -24,7 +25,9 @@ use self::figure::{Curve, Figure};
 use self::points::{Drawing, Origin};
 
 pub(crate) use self::extras::{NoiseCurve, against_noise, against_numbers};
+pub(crate) use self::figure::FONTS;
 pub(crate) use self::palette::{BASELINE, style};
+pub(crate) use self::scaling::scaling_plots;
 
 /// Why a plot could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -201,6 +204,7 @@ fn mesh_curve<'e>(
         of: mesh,
         origins: points.iter().map(|point| Origin::of_result(point.0)).collect(),
         points: points.into_iter().map(|point| point.1).collect(),
+        line: None,
         tags,
         dashed: false,
     }
@@ -263,6 +267,7 @@ fn own_levels(
             of: "mean".to_owned(),
             points: native.points.iter().map(|point| (point.spheres, error(point))).collect(),
             origins: own_origins(comparison, native, native.points.iter()),
+            line: None,
             tags: vec![],
             dashed: true,
         }
@@ -315,6 +320,7 @@ pub(crate) fn native_plots(
             of: "mean".to_owned(),
             points,
             origins,
+            line: None,
             tags: tags.collect(),
             dashed: true,
         };
@@ -371,6 +377,7 @@ pub(crate) fn equal_error_plot(
             of,
             points,
             origins,
+            line: None,
             tags: vec![],
             dashed: false,
         }
@@ -406,7 +413,7 @@ pub(crate) fn profile_plot(
         let origins = vec![Origin { n: Some(*asked), ..Origin::default() }; points.len()];
         let label = comparison.series[series].clone();
         let (name, of) = (label.clone(), "share".to_owned());
-        Curve { series, label, name, of, points, origins, tags: vec![], dashed: false }
+        Curve { series, label, name, of, points, origins, line: None, tags: vec![], dashed: false }
     };
     let level = crate::text::counted(spheres, "sphere", "spheres");
     let title = format!("Meshes within an error at {level}");
@@ -452,6 +459,7 @@ fn mean_curve(
         of: "mean".to_owned(),
         points: means.iter().map(|mean| mean.1).collect(),
         origins: means.iter().map(|mean| mean.2).collect(),
+        line: None,
         tags,
         dashed: false,
     }

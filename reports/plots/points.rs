@@ -172,6 +172,7 @@ mod tests {
             of: "mean".to_owned(),
             points: points.to_vec(),
             origins: vec![origin; points.len()],
+            line: None,
             tags: vec![],
             dashed: false,
         }

@@ -17,6 +17,7 @@ type Text = Cow<'static, str>;
 /// let info = MethodInfo::new("shrink", "Shrinking balls")
 ///     .citation("Who, when, where, DOI")
 ///     .summary("Keeps the balls that shrink least.")
+///     .home("Dense samples; not for few spheres.")
 ///     .native(NativeLevel::larger_is_coarser("t", "fraction of the diagonal"))
 ///     .sweep(&[0.01, 0.02, 0.05])
 ///     .param(ParamInfo::new("rounds", 3, "rounds", "how often all balls shrink"));
@@ -32,6 +33,8 @@ pub struct MethodInfo {
     pub citation: Text,
     /// One sentence on what the method does.
     pub summary: Text,
+    /// One sentence on where the method is at home, and where not; empty where it does not say.
+    pub home: Text,
     /// The method's own level, where it has a scalar one.
     pub native: Option<NativeLevel>,
     /// Native levels of a default comparison, from fine to coarse, in the unit of
@@ -68,6 +71,11 @@ impl MethodInfo {
     /// With [`MethodInfo::summary`].
     pub fn summary(self, summary: impl Into<Text>) -> Self {
         Self { summary: summary.into(), ..self }
+    }
+
+    /// With [`MethodInfo::home`].
+    pub fn home(self, home: impl Into<Text>) -> Self {
+        Self { home: home.into(), ..self }
     }
 
     /// With [`MethodInfo::native`].

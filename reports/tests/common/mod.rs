@@ -201,6 +201,7 @@ pub fn header(methods: &[&str]) -> Header {
         title: format!("Method {id}"),
         citation: "A. Author, 2015, Title, Journal, doi:10.1145/0000000".to_owned(),
         summary: "Collapses edges by a quadric error.".to_owned(),
+        home: format!("Few spheres; {id} is made up."),
         published: "a count of 1,000 spheres".to_owned(),
         native: Some("theta (degrees)".to_owned()),
     };
