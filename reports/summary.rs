@@ -47,8 +47,8 @@ pub(crate) struct SeriesSummary {
     pub(crate) failed: usize,
     /// Meshes for which it does not do this.
     pub(crate) unsupported: usize,
-    /// Means of [`COMPARED`], in that order.
-    pub(crate) means: [Option<f64>; COMPARED.len()],
+    /// Means of [`COMPARED`], in that order, and the number of meshes that each is over.
+    pub(crate) means: [Option<(f64, usize)>; COMPARED.len()],
     /// Hausdorff error in relation to the reference's.
     pub(crate) ratio: Option<Ratio>,
     /// Arithmetic means of substrate, prepare and simplify seconds.
@@ -70,6 +70,15 @@ pub(crate) struct Ratio {
 impl SeriesSummary {
     /// The mean of one of [`COMPARED`].
     pub(crate) fn mean(&self, metric: &Metric) -> Option<f64> {
+        self.mean_over(metric).map(|(mean, _)| mean)
+    }
+
+    /// Meshes that the mean of a metric is over: where a result has no triangle, say, there is no angle.
+    pub(crate) fn over(&self, metric: &Metric) -> usize {
+        self.mean_over(metric).map_or(0, |(_, over)| over)
+    }
+
+    fn mean_over(&self, metric: &Metric) -> Option<(f64, usize)> {
         let index = COMPARED.iter().position(|other| other.key == metric.key)?;
         self.means[index]
     }
@@ -79,6 +88,11 @@ impl CountSummary {
     /// Whether a row's means are over all meshes, and so read beside others of that kind.
     pub(crate) fn is_whole(&self, row: &SeriesSummary) -> bool {
         row.over == self.meshes && row.over > 0
+    }
+
+    /// Whether a row's mean of a metric is over all meshes.
+    pub(crate) fn is_whole_of(&self, row: &SeriesSummary, metric: &Metric) -> bool {
+        row.over(metric) == self.meshes && self.meshes > 0
     }
 }
 
@@ -130,6 +144,21 @@ impl OwnSet {
         }
     }
 
+    /// The meshes of the set on which a metric is known at each level that has means: so that the curve of a
+    /// metric does not change its meshes either.
+    fn known(
+        &self,
+        comparison: &Comparison<'_>,
+        series: usize,
+        metric: &Metric,
+    ) -> BTreeSet<usize> {
+        let own = comparison.entries.iter().filter(|entry| entry.series == series);
+        let own = own.filter(|entry| self.levels.contains(&entry.level));
+        let unknown: BTreeSet<usize> =
+            own.filter(|entry| metric.of(entry.record).is_none()).map(|entry| entry.mesh).collect();
+        &self.meshes - &unknown
+    }
+
     /// The set of a series for its counts.
     fn at_counts(comparison: &Comparison<'_>, series: usize) -> Self {
         let counts: BTreeSet<usize> = comparison.counts().map(|(level, _)| level).collect();
@@ -161,7 +190,8 @@ fn at_count(
         let kept = entries.iter().copied().filter(|entry| {
             set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
         });
-        let mut row = summarise(*series, entries, &kept.collect::<Vec<_>>());
+        let known = |metric: &Metric| set.known(comparison, *series, metric);
+        let mut row = summarise(*series, entries, &kept.collect::<Vec<_>>(), &known);
         row.ratio = ratio(entries, &yardstick);
         row
     };
@@ -183,7 +213,12 @@ fn ratio(entries: &[&Entry<'_>], reference: &[&Entry<'_>]) -> Option<Ratio> {
 }
 
 /// The row of one series from all its entries and those that are averaged.
-fn summarise(series: usize, entries: &[&Entry<'_>], kept: &[&Entry<'_>]) -> SeriesSummary {
+fn summarise(
+    series: usize,
+    entries: &[&Entry<'_>],
+    kept: &[&Entry<'_>],
+    known: &dyn Fn(&Metric) -> BTreeSet<usize>,
+) -> SeriesSummary {
     let number = |of: &dyn Fn(&Entry<'_>) -> bool| entries.iter().filter(|entry| of(entry)).count();
     let reached: Vec<&Entry<'_>> =
         entries.iter().copied().filter(|entry| entry.comparable()).collect();
@@ -198,10 +233,12 @@ fn summarise(series: usize, entries: &[&Entry<'_>], kept: &[&Entry<'_>]) -> Seri
         failed,
         unsupported,
         means: COMPARED.map(|metric| {
-            let values: Vec<f64> =
-                kept.iter().filter_map(|entry| metric.of(entry.record)).collect();
-            // A mean over fewer meshes than the others' would not compare.
-            if values.len() == kept.len() { metric.mean.of(&values) } else { None }
+            let known = known(metric);
+            let values = kept.iter().filter(|entry| known.contains(&entry.mesh));
+            let values: Vec<f64> = values.filter_map(|entry| metric.of(entry.record)).collect();
+            // A mean over less than half of the meshes tells of others than those that were asked for.
+            let enough = 2 * values.len() >= entries.len();
+            metric.mean.of(&values).filter(|_| enough).map(|mean| (mean, values.len()))
         }),
         ratio: None,
         stages: mean_stages(kept),
@@ -232,7 +269,7 @@ pub(crate) fn topology(entries: &[&Entry<'_>]) -> (usize, usize) {
 
 /// The best mean among those over all meshes, where there are at least two.
 pub(crate) fn best(summary: &CountSummary, metric: &Metric) -> Option<f64> {
-    let whole = summary.rows.iter().filter(|row| summary.is_whole(row));
+    let whole = summary.rows.iter().filter(|row| summary.is_whole_of(row, metric));
     let means: Vec<f64> = whole.filter_map(|row| row.mean(metric)).collect();
     (means.len() > 1).then(|| means.into_iter().reduce(|a, b| pick(metric, a, b))).flatten()
 }
@@ -356,7 +393,7 @@ mod tests {
                 failed: 0,
                 unsupported: 0,
                 means: COMPARED
-                    .map(|metric| if metric.key == HAUSDORFF.key { error } else { None }),
+                    .map(|metric| error.filter(|_| metric.key == HAUSDORFF.key).map(|e| (e, 1))),
                 ratio: None,
                 stages: None,
                 topology: (0, 0),

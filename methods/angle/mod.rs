@@ -178,9 +178,11 @@ fn scale(published: f64) -> Scale {
 pub fn method() -> Method<AngleParams> {
     let info = MethodInfo::new("angle", "Angle filter")
         .citation(
-            "Attali, Montanvert 1996, Modeling noise for a better simplification of skeletons, \
-             ICIP, doi:10.1109/ICIP.1996.560357; Foskey, Lin, Manocha 2003, Efficient computation \
-             of a simplified medial axis, JCISE 3(4), doi:10.1115/1.1631582",
+            "Dominique Attali, Annick Montanvert 1996. Modeling noise for a better simplification of \
+             skeletons. IEEE International Conference on Image Processing. \
+             https://doi.org/10.1109/ICIP.1996.560357; Mark Foskey, Ming C. Lin, Dinesh Manocha 2003. \
+             Efficient computation of a simplified medial axis. Journal of Computing and Information \
+             Science in Engineering 3(4). https://doi.org/10.1115/1.1631582",
         )
         .summary("Keeps the spheres whose contact points subtend the largest angles.")
         .home(

@@ -175,8 +175,8 @@ impl DeyZhaoParams {
 pub fn method() -> Method<DeyZhaoParams> {
     let info = MethodInfo::new("dey-zhao", "Dey-Zhao Voronoi subcomplex")
         .citation(
-            "Dey, Zhao 2002, Approximate medial axis as a Voronoi subcomplex, ACM Solid Modeling, \
-             doi:10.1145/566282.566333",
+            "Tamal K. Dey, Wulue Zhao 2002. Approximate medial axis as a Voronoi subcomplex. ACM \
+             Symposium on Solid Modeling and Applications. https://doi.org/10.1145/566282.566333",
         )
         .summary(
             "Keeps the Voronoi facets whose Delaunay edge is steep to the surface, or long beside \

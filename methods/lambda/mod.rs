@@ -107,8 +107,8 @@ fn scale(mesh: &MedialMesh) -> Scale {
 pub fn method() -> Method<LambdaParams> {
     let info = MethodInfo::new("lambda", "Lambda-medial axis")
         .citation(
-            "Chazal, Lieutier 2005, The lambda-medial axis, Graphical Models 67(4), \
-             doi:10.1016/j.gmod.2005.01.002",
+            "Frederic Chazal, Andre Lieutier 2005. The lambda-medial axis. Graphical Models 67(4). \
+             https://doi.org/10.1016/j.gmod.2005.01.002",
         )
         .summary("Keeps the spheres whose contact points need the largest enclosing balls.")
         .home(

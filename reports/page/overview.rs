@@ -181,8 +181,8 @@ fn matrix_cell(summary: &CountSummary, series: usize, metric: &Metric) -> String
         return "<td class=\"num\">–</td>".to_owned();
     };
     let text = metric.format_mean(mean);
-    if !summary.is_whole(row) {
-        return format!("<td class=\"num\">({text}; <small>{}</small>)</td>", row.over);
+    if !summary.is_whole_of(row, metric) {
+        return format!("<td class=\"num\">({text}; <small>{}</small>)</td>", row.over(metric));
     }
     let shade = (100.0 * goodness(summary, metric, mean)).round();
     let text = match best(summary, metric) {
@@ -198,7 +198,7 @@ fn goodness(summary: &CountSummary, metric: &Metric, mean: f64) -> f64 {
         crate::metric::Mean::Geometric { floor } => value.max(floor).ln(),
         crate::metric::Mean::Arithmetic => value,
     };
-    let compared = summary.rows.iter().filter(|row| summary.is_whole(row));
+    let compared = summary.rows.iter().filter(|row| summary.is_whole_of(row, metric));
     let laid: Vec<f64> = compared.filter_map(|row| row.mean(metric)).map(lay).collect();
     let low = laid.iter().copied().fold(f64::INFINITY, f64::min);
     let high = laid.iter().copied().fold(f64::NEG_INFINITY, f64::max);

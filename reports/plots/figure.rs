@@ -118,8 +118,9 @@ impl Figure {
             .map_err(failed)?;
         end(area)?;
         let mut layout = Layout::default();
+        let mut taken = Taken::default();
         for curve in &self.curves {
-            draw_curve(&mut chart, curve)?;
+            draw_curve(&mut chart, curve, &mut taken)?;
             layout.curves.push(curve.points.iter().map(|p| chart.backend_coord(p)).collect());
         }
         self.draw_front(&mut chart)?;
@@ -204,6 +205,7 @@ fn legend_text(curve: &Curve) -> String {
 fn draw_curve<B: DrawingBackend>(
     chart: &mut ChartContext<'_, B, Cartesian2d<Axis, Axis>>,
     curve: &Curve,
+    taken: &mut Taken,
 ) -> Result<(), PlotError> {
     let (colour, marker) = style(curve.series);
     let line = colour.stroke_width(2 * RESOLUTION as u32);
@@ -237,12 +239,41 @@ fn draw_curve<B: DrawingBackend>(
     begin(&area, "tags", Some(curve.series))?;
     for (index, tag) in &curve.tags {
         let Some(point) = curve.points.get(*index) else { continue };
-        let (x, y) = pixel(point);
+        let Some(at) = taken.place(pixel(point), tag) else { continue };
         let text = font(10, INK).pos(Pos::new(HPos::Left, VPos::Bottom));
-        area.draw(&Text::new(tag.clone(), (x + 7 * RESOLUTION, y - 4 * RESOLUTION), text))
-            .map_err(PlotError::new)?;
+        area.draw(&Text::new(tag.clone(), at, text)).map_err(PlotError::new)?;
     }
     end(&area)
+}
+
+/// Where tags stand, so that no two lie upon each other.
+#[derive(Default)]
+struct Taken(Vec<[i32; 4]>);
+
+impl Taken {
+    /// A place beside a pixel, lower left: to the right above or below, or to the left; `None` if all are taken. What
+    /// is not written the pointer still tells.
+    fn place(&mut self, (x, y): (i32, i32), tag: &str) -> Option<(i32, i32)> {
+        let (width, height) = (RESOLUTION * 6 * tag.chars().count() as i32, RESOLUTION * 12);
+        let aside = 7 * RESOLUTION;
+        let [above, below] = [y - 4 * RESOLUTION, y + 4 * RESOLUTION + height];
+        let places = [
+            (x + aside, above),
+            (x + aside, below),
+            (x - aside - width, above),
+            (x - aside - width, below),
+        ];
+        places.into_iter().find(|&(left, bottom)| {
+            let own = [left, bottom - height, left + width, bottom];
+            let is_free = self.0.iter().all(|other| {
+                own[2] <= other[0] || other[2] <= own[0] || own[3] <= other[1] || other[3] <= own[1]
+            });
+            if is_free {
+                self.0.push(own);
+            }
+            is_free
+        })
+    }
 }
 
 /// Begins a group of what is drawn next.

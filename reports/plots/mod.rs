@@ -441,15 +441,16 @@ fn mean_curve(
             let row = summary.rows.iter().find(|row| row.series == series)?;
             let x =
                 if kind.against_time { row.mean(&TOTAL_SECONDS)? } else { summary.count as f64 };
-            let origin = Origin::of_mean(row.over, summary.count as f64, summary.is_whole(row));
+            let whole = summary.is_whole_of(row, kind.y);
+            let origin = Origin::of_mean(row.over(kind.y), summary.count as f64, whole);
             Some((summary.count, (x, row.mean(kind.y)?), origin))
         })
         .collect();
     let tags = if kind.against_time { ends(means.iter().map(|mean| mean.0)) } else { Vec::new() };
     // The set is the same at each count that has a mean.
     let row_of = |summary: &'_ CountSummary| {
-        let row = summary.rows.iter().find(|row| row.series == series && row.over > 0)?;
-        Some(label_over(&comparison.series[series], summary, row))
+        let row = summary.rows.iter().find(|row| row.series == series && row.over(kind.y) > 0)?;
+        Some(label_over(&comparison.series[series], summary, row.over(kind.y)))
     };
     let label = summaries.iter().find_map(row_of);
     Curve {
@@ -466,10 +467,10 @@ fn mean_curve(
 }
 
 /// The label of a curve of means, with the number of meshes where these are not all.
-fn label_over(label: &str, summary: &CountSummary, row: &SeriesSummary) -> String {
-    match summary.is_whole(row) {
+fn label_over(label: &str, summary: &CountSummary, over: usize) -> String {
+    match over == summary.meshes {
         true => label.to_owned(),
-        false => format!("{label} ({} of {})", row.over, summary.meshes),
+        false => format!("{label} ({over} of {})", summary.meshes),
     }
 }
 
@@ -477,7 +478,7 @@ fn stage_bars(
     comparison: &Comparison<'_>,
     summary: &CountSummary,
 ) -> Result<Option<Plot>, PlotError> {
-    let label = |row: &SeriesSummary| label_over(&comparison.series[row.series], summary, row);
+    let label = |row: &SeriesSummary| label_over(&comparison.series[row.series], summary, row.over);
     let rows = summary.rows.iter().filter(|row| row.over > 0);
     let rows: Vec<_> = rows.filter_map(|row| Some((label(row), row.stages?))).collect();
     let level = level_label(Level::Spheres(summary.count));

@@ -41,7 +41,8 @@ fn means_table(comparison: &Comparison<'_>, summaries: &[CountSummary], how: &st
             "Geometric means of errors and total time, arithmetic means of angles, shares, spikes \
              and stages. Each method is averaged over one set of meshes of its own for all counts: \
              those on which it reached every count that it reached on enough of them. Means over \
-             all meshes read beside each other; in parentheses are those over fewer. Across \
+             all meshes read beside each other; in parentheses are those over fewer, with their number \
+             where some of the set have no such value, as an angle where there is no triangle. Across \
              different sets, compare the ratio: the geometric mean of the Hausdorff errors in \
              relation to the named method's, on the meshes where both reached the count."
                 .to_owned(),
@@ -66,10 +67,16 @@ fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummar
     ];
     cells.extend(COMPARED.iter().map(|metric| {
         let Some(mean) = row.mean(metric) else { return Cell::optional(None) };
-        let text = metric.format_mean(mean);
+        let (text, over) = (metric.format_mean(mean), row.over(metric));
+        let is_whole = summary.is_whole_of(row, metric);
         let best =
             is_whole && best(summary, metric).is_some_and(|best| metric.format_mean(best) == text);
-        Cell { text: framed(text), best }
+        let text = match is_whole {
+            true => text,
+            false if over == row.over => format!("({text})"),
+            false => format!("({text}; {over})"),
+        };
+        Cell { text, best }
     }));
     match row.stages {
         Some(stages) => {

@@ -167,6 +167,30 @@ fn a_curve_is_over_one_set_of_meshes() {
     assert!(rows[0].contains("| 2 of 3 |") && rows[1].contains("| 2 of 3 |"), "{rows:?}");
 }
 
+/// A result without a triangle has no angle: the mean angle is over the others, and says how many.
+#[test]
+fn what_some_results_do_not_have_is_averaged_over_the_others() {
+    let mut records = vec![];
+    for (shape, mesh) in SHAPES[..4].iter().enumerate() {
+        for count in [500, 100] {
+            records.push(ok(mesh, "qmat", count, shape, 0));
+        }
+    }
+    // At one count alone: the mesh counts at neither, so that both means are over the same meshes.
+    records[7].evaluate.as_mut().unwrap().quality.min_angle_mean = None;
+    let means = |records: &[Record]| -> Vec<bool> {
+        let rows = summary_rows(records, "qmat").into_iter();
+        let rows = rows.filter(|row| row.contains("| 4 of 4 |"));
+        rows.map(|row| row.contains("; 3) |")).collect()
+    };
+    assert_eq!(means(&records), [true, true]);
+    let few = |record: &mut Record| {
+        record.evaluate.as_mut().unwrap().quality.min_angle_mean = None;
+    };
+    records[1..6].iter_mut().for_each(few);
+    assert_eq!(means(&records), [false, false], "less than half of the meshes");
+}
+
 #[test]
 fn bounds_and_own_levels_have_tables_of_their_own() {
     use medial::simplifier::Level;
