@@ -47,9 +47,11 @@ fn inside(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
     let mut html = initial(page, mesh);
     if let Some((address, words)) = &part.picture {
         html.push_str(&format!(
-            "<figure class=\"strip\"><img src=\"{address}\" alt=\"{words}\" loading=\"lazy\">\
+            "<figure class=\"strip\"><img src=\"{address}\" alt=\"{words}\"{loading}>\
              <figcaption>{words}</figcaption></figure>\n",
-            words = escape_html(words)
+            words = escape_html(words),
+            // What the page holds is there at once, on paper too.
+            loading = if address.starts_with("data:") { "" } else { " loading=\"lazy\"" },
         ));
     }
     html.push_str(&part.view.as_ref().map_or(String::new(), view));

@@ -189,7 +189,7 @@ impl Page<'_> {
             ));
         }
         if let Some(study) = &self.header.study {
-            let study = escape_html(study);
+            let study = study.lines().map(escape_html).collect::<Vec<_>>().join("\n");
             html.push_str(&format!(
                 "<details><summary>The study that was asked last</summary>\
                  <pre class=\"command\"><code>{study}</code></pre></details>\n"

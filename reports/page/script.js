@@ -40,5 +40,6 @@
   openTarget();
   window.addEventListener("beforeprint", () => {
     for (const details of document.querySelectorAll("details")) details.open = true;
+    for (const image of document.images) image.loading = "eager";
   });
 })();
