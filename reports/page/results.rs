@@ -229,12 +229,11 @@ fn row(page: &Page<'_>, entry: &Entry<'_>, best: &Best) -> Row {
     row
 }
 
-/// The remark, the number of warnings, and the way to the medial mesh.
+/// The way to the medial mesh, the number of warnings, and the remark, of which the first lines are in sight.
 fn remarks(entry: &Entry<'_>) -> String {
     let mut parts = Vec::new();
-    let remark = remark(entry);
-    if !remark.is_empty() {
-        parts.push(escape_html(&remark));
+    if let Some(artifact) = entry.record.artifact.as_deref().and_then(html::local_link) {
+        parts.push(format!("<a href=\"{artifact}\">.ma</a>"));
     }
     let warnings = warnings(entry.record);
     if !warnings.is_empty() {
@@ -244,8 +243,10 @@ fn remarks(entry: &Entry<'_>) -> String {
             crate::text::counted(warnings.len(), "warning", "warnings")
         ));
     }
-    if let Some(artifact) = entry.record.artifact.as_deref().and_then(html::local_link) {
-        parts.push(format!("<a href=\"{artifact}\">.ma</a>"));
-    }
-    parts.join("; ")
+    let remark = escape_html(&remark(entry));
+    let brief = match remark.is_empty() {
+        true => String::new(),
+        false => format!("<div class=\"brief\" title=\"{remark}\">{remark}</div>"),
+    };
+    parts.join(", ") + &brief
 }
