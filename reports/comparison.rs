@@ -180,10 +180,13 @@ impl<'a> Comparison<'a> {
         };
         let mut cautions = Vec::new();
         if self.superseded > 0 {
-            cautions.push(format!(
-                "{} earlier records of the same items were replaced by later ones.",
-                self.superseded
-            ));
+            let replaced = match self.superseded {
+                1 => "An earlier record was replaced by a later one of the same item.".to_owned(),
+                many => {
+                    format!("{many} earlier records were replaced by later ones of the same items.")
+                }
+            };
+            cautions.push(replaced);
         }
         let binaries = distinct(|record| &record.binary_hash);
         if binaries > 1 {

@@ -161,7 +161,7 @@ fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option
     let strip = strip?;
     let bytes = fs::read(dir.join(&strip.file)).ok()?;
     let words = format!(
-        "{}: medial meshes at one number of spheres, coloured by radius, with the surface as glass; their Hausdorff \
+        "{}: medial meshes, asked for one number of spheres, coloured by radius, with the surface as glass; their Hausdorff \
          errors in % of the diagonal. Below them the surface: red where the reconstruction reaches beyond it, blue where \
          it falls short",
         strip.mesh

@@ -153,7 +153,9 @@ impl Page<'_> {
             html.push_str(&format!("<a href=\"#{}\">{}</a>", extra.stem, extra.title));
         }
         if !comparison.entries.is_empty() {
-            html.push_str("<a href=\"#results\">Results</a><a href=\"#meshes\">Meshes</a>");
+            html.push_str(
+                "<a href=\"#results\">Results</a><a href=\"#meshes\">Meshes, pictures</a>",
+            );
         }
         html.push_str("<a href=\"#definitions\">Definitions</a>");
         if self.papers.is_some() {

@@ -34,6 +34,7 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     if let Some(table) = purposes.next() {
         html.push_str(&titled(table, false));
     }
+    html.push_str(&way_to_pictures(page));
     html.push_str(&homes(page));
     if !lines.is_empty() {
         html.push_str(&format!("<ul class=\"headlines\">{}</ul>\n", lines.concat()));
@@ -85,6 +86,17 @@ fn homes(page: &Page<'_>) -> String {
     format!(
         "<details><summary>What each method is for</summary>\n<dl>\n{}</dl>\n</details>\n",
         items.concat()
+    )
+}
+
+/// Where the first picture is: it stands below all tables.
+fn way_to_pictures(page: &Page<'_>) -> String {
+    let Some(first) = page.meshes.iter().find(|mesh| mesh.picture.is_some()) else {
+        return String::new();
+    };
+    format!(
+        "<p>What the results look like: <a href=\"#mesh-{}\">pictures and 3D views</a> of each mesh.</p>\n",
+        escape_html(&first.stem)
     )
 }
 
