@@ -16,17 +16,13 @@
 //! fine ones are coarsened.
 
 use std::collections::HashMap;
-use std::io::Write;
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
-use flate2::Compression;
-use flate2::write::GzEncoder;
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion};
 use medial::surface::TriMesh;
 use serde::Serialize;
 
+use crate::page::packed::pack;
 use crate::render::{Camera, ColourMap, Errors, Scale};
 
 /// A surface is refined up to edges of this share of its diagonal, as long as it has at most so many
@@ -183,21 +179,20 @@ fn byte_of(share: f64) -> u8 {
 }
 
 fn script(name: &str, bytes: &[u8]) -> String {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    // A vector takes all that is written.
-    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish()).unwrap_or_default();
-    let text = BASE64_STANDARD.encode(packed);
-    format!("{START}{}{MIDDLE}{text}{END}", serde_json::Value::from(name))
+    format!("{START}{}{MIDDLE}{}{END}", serde_json::Value::from(name), pack(bytes))
 }
 
 const START: &str = "medialView(";
 const MIDDLE: &str = ",\"";
 const END: &str = "\");\n";
 
-/// The text of a view within its file.
+/// The text of a view within its file; `None` where that was changed to something that is no Base64: it would become
+/// part of the page.
 pub(crate) fn text_of(script: &str) -> Option<&str> {
     let inner = script.strip_prefix(START)?.strip_suffix(END)?;
-    Some(inner.rsplit_once(MIDDLE)?.1)
+    let text = inner.rsplit_once(MIDDLE)?.1;
+    let is_base64 = |byte: u8| byte.is_ascii_alphanumeric() || b"+/=".contains(&byte);
+    text.bytes().all(is_base64).then_some(text)
 }
 
 /// The same surface with shorter edges: long ones are halved as long as there is room.
@@ -270,6 +265,8 @@ fn coarsened(mesh: &TriMesh) -> TriMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use base64::Engine;
+    use base64::prelude::BASE64_STANDARD;
     use medial::complex::Sphere;
 
     fn tetrahedron() -> TriMesh {
@@ -329,6 +326,7 @@ mod tests {
         let script = view.script("mesh-x").unwrap();
         assert_eq!(script, view.script("mesh-x").unwrap());
         let packed = BASE64_STANDARD.decode(text_of(&script).unwrap()).unwrap();
+        assert_eq!(text_of(&script.replace(END, "</script>\");\n")), None);
         let mut bytes = vec![];
         std::io::Read::read_to_end(
             &mut flate2::read::GzDecoder::new(packed.as_slice()),

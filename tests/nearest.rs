@@ -85,6 +85,9 @@ fn closest_points_match_brute_force() {
         assert_eq!(bvh.closest_from(p, Some(k as u32 % 400)), closest);
         assert_eq!(bvh.closest_within(p, closest.distance), Some(closest));
         assert_eq!(bvh.closest_within(p, closest.distance * 0.999 - 1e-12), None);
+        let last = Some(bvh.face_count() as u32 - 1);
+        assert_eq!(bvh.closest_within_from(p, closest.distance, last), Some(closest));
+        assert_eq!(bvh.closest_within_from(p, closest.distance * 0.999 - 1e-12, last), None);
         assert!(bvh.any_within(p, closest.distance));
         assert!(!bvh.any_within(p, closest.distance * 0.999 - 1e-12));
     }

@@ -161,7 +161,7 @@ pub fn method() -> Method<HemParams> {
         )
         .home(
             "Few spheres for a given error where speed matters less: usually fewer than Q-MAT \
-             needs, at some fifteen to twenty times its seconds.",
+             needs, at many times its seconds.",
         )
         .native(NativeLevel::larger_is_coarser("epsilon", "fraction of the diagonal"))
         .sweep(&[0.01, 0.02, 0.04, 0.08])

@@ -10,7 +10,7 @@ mod extras;
 mod html;
 mod meshes;
 mod overview;
-mod packed;
+pub(crate) mod packed;
 mod papers;
 mod reference;
 mod results;

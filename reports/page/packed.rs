@@ -7,14 +7,18 @@ use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-/// An element that holds a text as gzip in Base64. A browser reads over it in no time.
-pub(crate) fn packed(id: Option<&str>, text: &str) -> String {
+/// Bytes as gzip in Base64.
+pub(crate) fn pack(bytes: &[u8]) -> String {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     // A vector takes all that is written.
-    let bytes = encoder.write_all(text.as_bytes()).and_then(|()| encoder.finish());
-    let bytes = bytes.unwrap_or_default();
+    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());
+    BASE64_STANDARD.encode(packed.unwrap_or_default())
+}
+
+/// An element that holds a text packed. A browser reads over it in no time.
+pub(crate) fn packed(id: Option<&str>, text: &str) -> String {
     let id = id.map_or(String::new(), |id| format!(" id=\"{id}\""));
-    let text = BASE64_STANDARD.encode(bytes);
+    let text = pack(text.as_bytes());
     format!("<script type=\"text/plain\" class=\"packed\"{id}>{text}</script>\n")
 }
 

@@ -3,7 +3,10 @@
 // A view is made when it is opened and disposed of when it is closed or another one is opened: browsers keep few
 // contexts. Its numbers stand in the page, or in a script file beside it, which also a page from a disk may load.
 (() => {
-  const SEGMENTS = 24;
+  // Sides of a tube, and how finely spheres are cut: of so many that a page can hold them.
+  const SIDES = [3, 24];
+  const ALL_SIDES = 150000;
+  const MANY_BALLS = 1000;
   const make = (tag, className, text) => {
     const element = document.createElement(tag);
     if (className) element.className = className;
@@ -143,8 +146,8 @@
       return new T.Mesh(geometry, material);
     };
     const balls = (result, sizeOf) => {
-      const ball = new T.IcosahedronGeometry(1, 3);
       const count = result.spheres.length / 4;
+      const ball = new T.IcosahedronGeometry(1, count < MANY_BALLS ? 4 : 1);
       const mesh = new T.InstancedMesh(ball, new T.MeshLambertMaterial(), count);
       const place = new T.Matrix4();
       for (let v = 0; v < count; v += 1) {
@@ -157,16 +160,18 @@
       return mesh;
     };
     // A tube from one circle to another; circles of two spheres touch the cone around both.
-    const tube = (soup, a, b, [radiusA, radiusB], lean, colours) => {
+    const sidesOf = (result) =>
+      Math.min(SIDES[1], Math.max(SIDES[0], Math.floor((2 * ALL_SIDES) / (1 + result.edges.length))));
+    const tube = (soup, sides, a, b, [radiusA, radiusB], lean, colours) => {
       const axis = unit(subtract(b, a));
       const across = unit(cross(axis, Math.abs(axis[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
       const third = cross(axis, across);
-      const around = Array.from({ length: SEGMENTS + 1 }, (_, k) => {
-        const angle = (2 * Math.PI * k) / SEGMENTS;
+      const around = Array.from({ length: sides + 1 }, (_, k) => {
+        const angle = (2 * Math.PI * k) / sides;
         return along(scaled(across, Math.cos(angle)), third, Math.sin(angle));
       });
       const straight = Math.sqrt(1 - lean * lean);
-      for (let k = 0; k < SEGMENTS; k += 1) {
+      for (let k = 0; k < sides; k += 1) {
         const [u, v] = [around[k], around[k + 1]];
         const normal = (w) => along(scaled(w, straight), axis, lean);
         const [p, q] = [[along(a, u, radiusA), along(a, v, radiusA)], [along(b, u, radiusB), along(b, v, radiusB)]];
@@ -179,9 +184,10 @@
     const axis = (result) => {
       const soup = new Soup();
       const thin = 0.0016 * view.diagonal;
+      const sides = sidesOf(result);
       for (const edge of simplices(result.edges, 2)) {
         const [a, b] = edge.map((v) => sphereOf(result, v));
-        tube(soup, a.centre, b.centre, [thin, thin], 0, [a, b].map((s) => scaled(byRadius(s.radius), 0.4)));
+        tube(soup, sides, a.centre, b.centre, [thin, thin], 0, [a, b].map((s) => scaled(byRadius(s.radius), 0.4)));
       }
       for (const face of simplices(result.faces, 3)) {
         const corners = face.map((v) => sphereOf(result, v));
@@ -194,6 +200,7 @@
     // The union: what primitives hide of each other, the depth buffer hides.
     const union = (result) => {
       const soup = new Soup();
+      const sides = sidesOf(result);
       for (const edge of simplices(result.edges, 2)) {
         const [a, b] = edge.map((v) => sphereOf(result, v));
         const between = subtract(b.centre, a.centre);
@@ -202,7 +209,7 @@
         const straight = Math.sqrt(1 - lean * lean);
         const direction = unit(between);
         const [p, q] = [a, b].map((s) => along(s.centre, direction, s.radius * lean));
-        tube(soup, p, q, [a.radius * straight, b.radius * straight], lean, [a, b].map((s) => byRadius(s.radius)));
+        tube(soup, sides, p, q, [a.radius * straight, b.radius * straight], lean, [a, b].map((s) => byRadius(s.radius)));
       }
       for (const face of simplices(result.faces, 3)) {
         const [a, b, c] = face.map((v) => sphereOf(result, v));
