@@ -4,6 +4,11 @@
 //! the meshes that the method was asked for, where one that it misses counts as infinitely bad. The lead is
 //! measured between the first and the second method alone, on the meshes that both have. So another method
 //! changes no number here unless it is itself the first or the second.
+//!
+//! A method that does it cheaply on half of the meshes and one that does it on nearly all are answers to two
+//! questions, so both are named where they differ.
+
+use std::cmp::Ordering;
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::{HAUSDORFF, MIN_ANGLE, Mean, TOTAL_SECONDS};
@@ -48,10 +53,12 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         notes: vec![
             how.to_owned(),
             format!(
-                "Medians over the meshes that a method was asked for, where one without such a result counts as \
-                 infinitely bad; among the levels that were run. Ahead of: the next best method, the geometric mean \
-                 of the ratios on the meshes where both have a result, and on how many of them the first one is \
-                 better, equal within {:.0} %, worse.",
+                "Medians: half of the meshes that a method was asked for, or more, have no worse value, where one \
+                 without such a result counts as infinitely bad; among the levels that were run. The method of the \
+                 best median is named, and where that is another the best one of those with a result on the most \
+                 meshes. Ahead of: the next best method, the geometric mean of the ratios on the meshes \
+                 where both have a result, and on how many of them the first one is better, equal within {:.0} %, \
+                 worse.",
                 100.0 * EQUAL
             ),
         ],
@@ -63,12 +70,7 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
 /// The answers at one number of spheres.
 fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Row> {
     let spheres = counted(spheres, "sphere", "spheres");
-    let error = Question {
-        title: format!("lowest error at {spheres}"),
-        values: errors_at(comparison, level),
-        text: |value| format!("{} %", significant(value, 3)),
-        lead: |ratio| format!("{} of its error", significant(ratio, 2)),
-    };
+    let error = error_question(errors_at(comparison, level), format!("lowest error at {spheres}"));
     let asked = |entry: &Entry<'_>| entry.level == level;
     let usable = |entry: &Entry<'_>| {
         entry.comparable() && HAUSDORFF.of(entry.record).is_some_and(|error| error <= USABLE)
@@ -81,10 +83,19 @@ fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Ro
         text: |value| format!("least angle {:.1}°", 60.0 - value),
         lead: |ratio| format!("{} of its distance from 60°", significant(ratio, 2)),
     };
-    let mut rows: Vec<Row> = answer(comparison, &error).into_iter().collect();
-    rows.extend(right_everywhere(comparison, level, &spheres));
-    rows.extend(answer(comparison, &triangles));
+    let mut rows: Vec<Row> = answers(comparison, &error);
+    rows.push(right_everywhere(comparison, level, &spheres));
+    rows.extend(answers(comparison, &triangles));
     rows
+}
+
+fn error_question(values: Vec<Values>, title: String) -> Question {
+    Question {
+        title,
+        values,
+        text: |value| format!("{} %", significant(value, 3)),
+        lead: |ratio| format!("{} of its error", significant(ratio, 2)),
+    }
 }
 
 /// What an error of at most [`BOUND`] costs.
@@ -116,7 +127,7 @@ fn within_bound(comparison: &Comparison<'_>) -> Vec<Row> {
             lead: |ratio| format!("{} of its time", significant(ratio, 2)),
         },
     ];
-    questions.iter().filter_map(|question| answer(comparison, question)).collect()
+    questions.iter().flat_map(|question| answers(comparison, question)).collect()
 }
 
 /// The asked number of spheres that is nearest to [`USUAL`], of those that any method reached.
@@ -156,11 +167,45 @@ fn errors_at(comparison: &Comparison<'_>, level: usize) -> Vec<Values> {
     )
 }
 
-/// The upper median: at least half of the meshes are no worse. `None` where the median mesh has no result.
-fn median(values: &Values) -> Option<f64> {
-    let mut known: Vec<f64> = values.iter().flatten().copied().collect();
-    known.sort_by(f64::total_cmp);
-    known.get(known.len() / 2).copied().filter(|value| value.is_finite())
+/// What a series is ranked by.
+struct Rank {
+    series: usize,
+    /// The lower median: at least half of the meshes are no worse. `None` where the median mesh has no result.
+    median: Option<f64>,
+    /// Meshes without a result, of those asked.
+    missed: usize,
+    /// Mean of the logarithms of the results, for equal medians.
+    mean: f64,
+}
+
+impl Rank {
+    fn of(series: usize, values: &Values) -> Self {
+        let mut known: Vec<f64> = values.iter().flatten().copied().collect();
+        known.sort_by(f64::total_cmp);
+        let middle = known.get(known.len().saturating_sub(1) / 2).copied();
+        let results: Vec<f64> = known.iter().copied().filter(|value| value.is_finite()).collect();
+        let logarithms = results.iter().map(|value| value.max(1e-9).ln());
+        Self {
+            series,
+            median: middle.filter(|value| value.is_finite()),
+            missed: known.len() - results.len(),
+            mean: logarithms.sum::<f64>() / results.len().max(1) as f64,
+        }
+    }
+}
+
+/// The best median first.
+fn by_median(a: &Rank, b: &Rank) -> Ordering {
+    let medians = a.median.unwrap_or(f64::INFINITY).total_cmp(&b.median.unwrap_or(f64::INFINITY));
+    medians
+        .then(a.missed.cmp(&b.missed))
+        .then(a.mean.total_cmp(&b.mean))
+        .then(a.series.cmp(&b.series))
+}
+
+/// The one with a result on the most meshes first.
+fn by_meshes(a: &Rank, b: &Rank) -> Ordering {
+    a.missed.cmp(&b.missed).then_with(|| by_median(a, b))
 }
 
 /// How one series stands beside another, on the meshes where both have a result.
@@ -188,27 +233,39 @@ impl Lead {
     }
 }
 
-/// The row of a question; `None` where no method has a median.
-fn answer(comparison: &Comparison<'_>, question: &Question) -> Option<Row> {
-    let medians = question.values.iter().enumerate();
-    let mut ranked: Vec<(f64, usize)> =
-        medians.filter_map(|(series, values)| Some((median(values)?, series))).collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let &(value, first) = ranked.first()?;
-    let mut cells =
-        vec![Cell::new(question.title.as_str()), Cell { best: true, ..name(comparison, first) }];
-    cells.push(Cell::new((question.text)(value)));
+/// The rows of a question: the best median, and where that is another the best on the most meshes. None where no
+/// method has a median.
+fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Row> {
+    let values = question.values.iter().enumerate();
+    let mut ranks: Vec<Rank> = values.map(|(series, values)| Rank::of(series, values)).collect();
+    ranks.retain(|rank| rank.median.is_some());
+    ranks.sort_by(by_median);
+    let Some(first) = ranks.first().map(|rank| rank.series) else { return vec![] };
+    let mut rows = vec![answer(comparison, question, question.title.clone(), &ranks)];
+    ranks.sort_by(by_meshes);
+    if ranks[0].series != first {
+        let title = format!("{}, on the most meshes", question.title);
+        rows.push(answer(comparison, question, title, &ranks));
+    }
+    rows
+}
+
+/// The row of the first of the ranked methods.
+fn answer(comparison: &Comparison<'_>, question: &Question, title: String, ranks: &[Rank]) -> Row {
+    let first = ranks[0].series;
+    let mut cells = vec![Cell::new(title), Cell { best: true, ..name(comparison, first) }];
+    cells.push(Cell::optional(ranks[0].median.map(question.text)));
     cells.push(Cell::new(on_meshes(&question.values[first])));
-    let next = ranked.get(1).map(|&(_, second)| second);
+    let next = ranks.get(1).map(|rank| rank.series);
     cells.extend(lead_cells(comparison, next, |second| {
         let lead = Lead::of(&question.values[first], &question.values[second])?;
         Some([(question.lead)(lead.ratio), lead.counts()])
     }));
-    Some(Row { cells, starts_group: false })
+    Row { cells, starts_group: false }
 }
 
 /// The row of the methods with the topology of the solid on every mesh, the one of the lowest error first.
-fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) -> Option<Row> {
+fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) -> Row {
     let at = |entry: &Entry<'_>| entry.level == level && entry.comparable();
     let is_right = |entry: &Entry<'_>| {
         let evaluate = entry.record.evaluate.as_ref()?;
@@ -221,25 +278,19 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
         let asked = errors[series].iter().flatten().count();
         (known.iter().filter(|&&right| right).count(), asked)
     };
-    let mut ranked: Vec<(f64, usize)> = (0..comparison.series.len())
+    let mut ranks: Vec<Rank> = (0..comparison.series.len())
         .filter(|&series| matches!(right(series), (right, asked) if right == asked && asked > 0))
-        .filter_map(|series| Some((median(&errors[series])?, series)))
+        .map(|series| Rank::of(series, &errors[series]))
+        .filter(|rank| rank.median.is_some())
         .collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let title = Cell::new(format!("topology right everywhere, lowest error at {spheres}"));
-    let Some(&(value, first)) = ranked.first() else {
-        let mut cells = vec![title, Cell::new("none")];
+    ranks.sort_by(by_median);
+    let title = format!("topology right everywhere, lowest error at {spheres}");
+    if ranks.is_empty() {
+        let mut cells = vec![Cell::new(title), Cell::new("none")];
         cells.extend([(); 5].map(|()| Cell::optional(None)));
-        return Some(Row { cells, starts_group: false });
-    };
-    let mut cells = vec![title, Cell { best: true, ..name(comparison, first) }];
-    cells.push(Cell::new(format!("{} %", significant(value, 3))));
-    cells.push(Cell::new(on_meshes(&errors[first])));
-    cells.extend(lead_cells(comparison, ranked.get(1).map(|&(_, second)| second), |second| {
-        let lead = Lead::of(&errors[first], &errors[second])?;
-        Some([format!("{} of its error", significant(lead.ratio, 2)), lead.counts()])
-    }));
-    Some(Row { cells, starts_group: false })
+        return Row { cells, starts_group: false };
+    }
+    answer(comparison, &error_question(errors, title.clone()), title, &ranks)
 }
 
 fn name(comparison: &Comparison<'_>, series: usize) -> Cell {

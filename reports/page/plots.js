@@ -1,6 +1,7 @@
 // Plots that answer: values under the pointer or at the keyboard's point, series to hide, an area
 // to enlarge. The drawing is the one in the file; the script only moves and hides its parts.
 (() => {
+  const MOST_ENLARGED = 200;
   const SVG = "http://www.w3.org/2000/svg";
   const draw = (tag, attributes, parent) => {
     const element = document.createElementNS(SVG, tag);
@@ -14,6 +15,8 @@
   document.body.append(tip);
   const format = (value) => Number(value.toPrecision(4)).toLocaleString("en", { maximumSignificantDigits: 4 });
 
+  // Of an axis, with a gap: ticks closer than their labels are too many.
+  const WIDTH_OF_LETTER = 0.018;
   // Round numbers within a range of an axis, as few as stay readable.
   const ticksOf = (scale, low, high) => {
     const step = (least) => {
@@ -29,7 +32,12 @@
         const values = decades.flatMap((decade) => digits.map((digit) => digit * decade));
         if (low <= 0) values.unshift(0);
         const within = values.filter((value) => value >= low && value <= high);
-        if (within.length <= 8 || digits.length === 1) return within;
+        const share = (value) => (lay(scale, value) - lay(scale, low)) / (lay(scale, high) - lay(scale, low));
+        const close = within.some((value, k) => {
+          const letters = value.toLocaleString("en").length;
+          return k > 0 && share(value) - share(within[k - 1]) < WIDTH_OF_LETTER * letters;
+        });
+        if ((within.length <= 8 && !close) || digits.length === 1) return within;
       }
     }
     const by = step((high - low) / 5);
@@ -181,21 +189,46 @@
         draw("polyline", { points: pathOf(joined), stroke: ink, "stroke-width": 2 }, clipped);
       }
     };
-    const reset = document.createElement("button");
-    reset.type = "button";
-    reset.className = "whole";
-    reset.textContent = "whole plot";
-    reset.hidden = true;
-    figure.append(reset);
     const showWhole = () => {
       if (view === whole) return;
       view = whole;
       redraw();
     };
-    reset.addEventListener("click", () => {
+    // Nearer or farther, about the chosen point, which stays chosen.
+    const zoom = (factor) => {
+      const point = current;
+      const about = point ? point.at : [(view[0] + view[2]) / 2, (view[1] + view[3]) / 2];
+      const along = (k, low, high) => {
+        const size = Math.min(high - low, (view[k + 2] - view[k]) / factor);
+        if (size === high - low) return [low, high];
+        const start = Math.min(high - size, Math.max(low, about[k] - size / 2));
+        return [start, start + size];
+      };
+      const [[x0, x1], [y0, y1]] = [along(0, left, right), along(1, top, bottom)];
+      if (x1 - x0 < (right - left) / MOST_ENLARGED) return;
+      view = x1 - x0 < right - left || y1 - y0 < bottom - top ? [x0, y0, x1, y1] : whole;
+      redraw();
+      if (point) tell(point);
+    };
+    // For fingers, and for whoever does not know the keys.
+    const button = (text, name, act) => {
+      const element = document.createElement("button");
+      element.type = "button";
+      element.textContent = text;
+      element.setAttribute("aria-label", name);
+      element.addEventListener("click", act);
+      return element;
+    };
+    const reset = button("whole", "whole plot", () => {
       showWhole();
       svg.focus();
     });
+    reset.className = "whole";
+    reset.hidden = true;
+    const tools = document.createElement("div");
+    tools.className = "tools";
+    tools.append(reset, button("−", "show more", () => zoom(0.5)), button("+", "enlarge", () => zoom(2)));
+    figure.append(tools);
 
     // Pointer: values, and an area dragged with the mouse. Touch scrolls the page as ever.
     const local = (event) => {
@@ -286,6 +319,10 @@
       } else if (event.target === svg && event.key.startsWith("Arrow")) {
         event.preventDefault();
         step(event.key);
+      } else if (event.target === svg && "+=-0".includes(event.key) && !event.ctrlKey && !event.metaKey) {
+        event.preventDefault();
+        if (event.key === "0") showWhole();
+        else zoom(event.key === "-" ? 0.5 : 2);
       }
     });
 
@@ -301,7 +338,7 @@
     const svg = figure.querySelector("svg");
     if (!data || !svg) return;
     svg.setAttribute("role", "group");
-    svg.setAttribute("aria-description", "Arrow keys go from point to point, Escape shows the whole plot.");
+    svg.setAttribute("aria-description", "Arrow keys go from point to point, plus and minus enlarge, Escape shows the whole plot.");
     svg.setAttribute("tabindex", "0");
     // Most plots of a page are never touched.
     let toggle = null;

@@ -6,6 +6,9 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 
 use crate::text::{grouped, significant};
 
+/// Width of a letter beneath an axis, with its share of the gap to the next label; of the axis' length.
+const WIDTH_OF_LETTER: f64 = 0.018;
+
 /// How values are laid out along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scale {
@@ -148,10 +151,15 @@ fn round_numbers(scale: Scale, low: f64, high: f64) -> Vec<f64> {
         }
         values
     };
+    let lay = |value| lay_out(scale, value);
+    let collide = |pair: &[f64]| {
+        let gap = (lay(pair[1]) - lay(pair[0])) / (lay(high) - lay(low));
+        gap < WIDTH_OF_LETTER * Axis::label(pair[1]).len() as f64
+    };
     let mut sparsest = Vec::new();
     for pattern in patterns {
         sparsest = within(pattern);
-        if sparsest.len() <= 8 {
+        if sparsest.len() <= 8 && !sparsest.windows(2).any(collide) {
             return sparsest;
         }
     }
@@ -186,6 +194,8 @@ mod tests {
             labels(Scale::Log, &[0.4, 1.9]),
             ["0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1", "2"]
         );
+        // 50,000 and 60,000 would touch.
+        assert_eq!(labels(Scale::Log, &[9000.0, 60000.0]), ["10,000", "20,000", "50,000"]);
         assert_eq!(labels(Scale::Linear, &[3.0, 48.0]), ["0", "20", "40"]);
         assert_eq!(labels(Scale::LogOfOneMore, &[0.0]), ["0", "1", "2", "3"]);
     }

@@ -328,6 +328,18 @@ fn check_plots(browser: &mut Browser) {
     assert_eq!(browser.text(drawn), "none");
     browser.key("Escape", 27);
     assert_eq!(browser.value(is_whole), true);
+
+    browser.value("plot.focus()");
+    browser.key("+", 187);
+    assert_eq!(browser.value(is_whole), false);
+    browser.key("-", 189);
+    assert_eq!(browser.value(is_whole), true);
+    let larger = browser.centre("plot.closest('figure').querySelector('[aria-label=enlarge]')");
+    browser.mouse("mousePressed", larger);
+    browser.mouse("mouseReleased", larger);
+    assert_eq!(browser.value(is_whole), false);
+    browser.value("plot.closest('figure').querySelector('.whole').click()");
+    assert_eq!(browser.value(is_whole), true);
 }
 
 /// A cube, and the medial mesh of a smaller one in it.

@@ -319,10 +319,11 @@ fn the_answers_name_the_lead_and_a_weak_method_changes_none_of_them() {
         text.filter(|line| !line.contains("weak")).map(str::to_owned).collect()
     };
     let answers = |files: &BTreeMap<String, Vec<u8>>| -> Vec<String> {
-        // Its head and rule, and five questions: no triangles here are of a small error.
-        rows(files, name).into_iter().take(7).collect()
+        // The table of method against method, in the same file, has other columns.
+        let all = rows(files, name).into_iter();
+        all.filter(|line| line.matches('|').count() == 8).collect()
     };
-    assert!(answers(&before)[6].starts_with("| fastest"), "{table}");
+    assert!(answers(&before).len() == 8, "{table}");
     assert_eq!(answers(&before), answers(&after));
     // The columns of other methods stay; only one of its own is added.
     for line in rows(&before, "tables/summary.md") {
