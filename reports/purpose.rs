@@ -53,8 +53,9 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         notes: vec![
             how.to_owned(),
             format!(
-                "Medians: half of the meshes that a method was asked for, or more, have no worse value, where one \
-                 without such a result counts as infinitely bad; among the levels that were run. The method of the \
+                "Medians over the meshes that a method was asked for, of an even number the geometric mean of the \
+                 middle two; one without such a result counts as infinitely bad, and half of them must have one. \
+                 Among the levels that were run. The method of the \
                  best median is named, and where that is another the best one of those with a result on the most \
                  meshes. Ahead of: the next best method, the geometric mean of the ratios on the meshes \
                  where both have a result, and on how many of them the first one is better, equal within {:.0} %, \
@@ -170,7 +171,8 @@ fn errors_at(comparison: &Comparison<'_>, level: usize) -> Vec<Values> {
 /// What a series is ranked by.
 struct Rank {
     series: usize,
-    /// The lower median: at least half of the meshes are no worse. `None` where the median mesh has no result.
+    /// Of an even number the geometric mean of the middle two, or the lower one where the upper has no result: at
+    /// least half of the meshes have one. `None` where fewer have.
     median: Option<f64>,
     /// Meshes without a result, of those asked.
     missed: usize,
@@ -182,12 +184,17 @@ impl Rank {
     fn of(series: usize, values: &Values) -> Self {
         let mut known: Vec<f64> = values.iter().flatten().copied().collect();
         known.sort_by(f64::total_cmp);
-        let middle = known.get(known.len().saturating_sub(1) / 2).copied();
+        let middle =
+            [known.len().saturating_sub(1) / 2, known.len() / 2].map(|k| known.get(k).copied());
+        let median = match middle {
+            [Some(low), Some(high)] if high.is_finite() && low != high => Some((low * high).sqrt()),
+            [low, _] => low.filter(|value| value.is_finite()),
+        };
         let results: Vec<f64> = known.iter().copied().filter(|value| value.is_finite()).collect();
         let logarithms = results.iter().map(|value| value.max(1e-9).ln());
         Self {
             series,
-            median: middle.filter(|value| value.is_finite()),
+            median,
             missed: known.len() - results.len(),
             mean: logarithms.sum::<f64>() / results.len().max(1) as f64,
         }

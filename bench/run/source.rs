@@ -218,6 +218,14 @@ fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
 }
 
 /// The shape that may have been meant by an id that none has.
+/// Where the name of a file that is not there is that of a built-in shape.
+fn meant_shape(path: &Path) -> String {
+    let is_shape = |id: &&str| medial_datasets::catalogue().iter().any(|shape| shape.id == *id);
+    let name = path.file_name().and_then(|name| name.to_str());
+    let id = name.filter(is_shape);
+    id.map_or(String::new(), |id| format!("; the built-in shape is `builtin:{id}`"))
+}
+
 fn meant(id: &str) -> String {
     let ids: Vec<_> = medial_datasets::catalogue().into_iter().map(|shape| shape.id).collect();
     did_you_mean(id, ids)
@@ -233,7 +241,7 @@ fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// The file cannot be read.
-    #[error("{}: {error}", path.display())]
+    #[error("{}: {error}{}", path.display(), meant_shape(path))]
     Read {
         /// The file.
         path: PathBuf,
