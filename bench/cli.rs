@@ -59,6 +59,8 @@ pub enum Verb {
     Baseline(cmd::baseline::Arguments),
     /// Run methods on noisy surfaces, and measure against the clean ones.
     Stability(cmd::stability::Arguments),
+    /// Say what became worse between two sets of results, or two builds that it runs in turn.
+    Diff(cmd::diff::Arguments),
     /// Rebuild the report of a folder of results.
     Report(cmd::report::Arguments),
     /// Say what this machine lacks for oracles and baselines.
@@ -151,6 +153,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Paper(arguments) => cmd::paper::run(&arguments, global, registry),
         Verb::Baseline(arguments) => cmd::baseline::run(&arguments, global, registry),
         Verb::Stability(arguments) => cmd::stability::run(&arguments, global, registry),
+        Verb::Diff(arguments) => cmd::diff::run(&arguments, global, registry),
         Verb::Report(arguments) => cmd::report::run(&arguments, global, registry),
         Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
         Verb::Completions(arguments) => cmd::completions::run(&arguments, &mut command()),

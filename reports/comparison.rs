@@ -82,6 +82,11 @@ pub(crate) fn level_label(level: Level) -> String {
     }
 }
 
+/// The row of a record: the name that it was given, or method and parameters.
+pub(crate) fn row_name(record: &Record) -> String {
+    SeriesKey::of(record).name()
+}
+
 /// Sphere counts from many to few, error bounds from large to small, published, native levels
 /// ascending.
 fn compare_levels(a: Level, b: Level) -> Ordering {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `record` | [`Record`], one line of `results.jsonl` |
 //! | `journal` | reading and appending those lines |
+//! | [`diff`] | an older and a newer set of records: what became worse |
 //! | `comparison` | records arranged by mesh, method and level |
 //! | `metric` | the columns: name, unit, direction, definition |
 //! | `summary` | means over meshes at equal numbers of spheres |
@@ -21,6 +22,7 @@
 //! | `write` | [`write_report`], all of it into one folder |
 
 mod comparison;
+pub mod diff;
 mod equal_error;
 mod error;
 mod extras;

@@ -7,6 +7,7 @@ pub mod compare;
 pub mod completions;
 pub mod convert;
 pub mod datasets;
+pub mod diff;
 pub mod doctor;
 pub mod evaluate;
 pub mod hierarchy;

@@ -13,7 +13,9 @@
 //! | `protocol`, `serve`, `worker` | processes and their messages |
 //! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
 //! | `store` | the folder of results |
+//! | `alternate` | two builds that take turns |
 
+mod alternate;
 mod answer;
 mod bounds;
 mod ending;
@@ -39,6 +41,7 @@ mod supervise;
 mod verdict;
 mod worker;
 
+pub use alternate::{Build, BuildError, Contender, missing_in_either, run_alternately};
 pub use answer::{Fault, LevelRun, Times, answer};
 pub use item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
 pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_npy_header};

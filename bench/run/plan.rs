@@ -95,7 +95,7 @@ pub fn run_items(
 }
 
 /// The records, with their seconds replaced by those of the median repetition.
-fn finished(mut kept: Vec<Kept>) -> Vec<Kept> {
+pub(super) fn finished(mut kept: Vec<Kept>) -> Vec<Kept> {
     for Kept { record, .. } in &mut kept {
         if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
             record.simplify.seconds = Some(seconds);

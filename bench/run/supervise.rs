@@ -2,7 +2,7 @@
 //! worker can end into records, so that one broken method never stops the rest.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -40,6 +40,8 @@ impl From<Interrupted> for RunError {
 
 /// Runs items one after another, in a worker that it replaces when an item has broken it.
 pub struct Supervisor<'a> {
+    /// The program whose workers are used, where it is not the running one.
+    program: Option<PathBuf>,
     plugins: Vec<PathBuf>,
     provenance: Provenance,
     /// Folder for results as `.ma`.
@@ -76,6 +78,7 @@ impl<'a> Supervisor<'a> {
     ) -> Self {
         crate::process_tree::adopt_strays();
         Self {
+            program: None,
             plugins: plugins.to_vec(),
             provenance: provenance.clone(),
             axes,
@@ -84,6 +87,16 @@ impl<'a> Supervisor<'a> {
             input: None,
             lost: None,
         }
+    }
+
+    /// The same with workers of another build of the program.
+    pub fn of_program(self, program: &Path) -> Self {
+        Self { program: Some(program.to_owned()), ..self }
+    }
+
+    /// Lets the worker go: the next item gets a new process.
+    pub fn renew(&mut self) {
+        self.worker = None;
     }
 
     /// Runs an item: a record for each level, in the order of the levels.
@@ -304,7 +317,12 @@ impl<'a> Supervisor<'a> {
     /// The worker that is there, where it fits the request, or a new one.
     fn worker_for(&mut self, request: &Request) -> Result<Worker, RunError> {
         let (threads, limits) = request.terms();
-        let options = WorkerOptions { threads, bytes: limits.bytes, plugins: self.plugins.clone() };
+        let options = WorkerOptions {
+            program: self.program.clone(),
+            threads,
+            bytes: limits.bytes,
+            plugins: self.plugins.clone(),
+        };
         match self.worker.take() {
             Some(worker) if worker.options == options => Ok(worker),
             _ => Worker::start(options).map_err(RunError::Start),

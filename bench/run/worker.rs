@@ -22,6 +22,8 @@ const LAST_WORDS: usize = 16 << 10;
 /// How a worker is started. Another item can use it only if its options are the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WorkerOptions {
+    /// The program; the running one unless given.
+    pub program: Option<PathBuf>,
     /// Threads of its pool.
     pub threads: usize,
     /// Limit of memory, in bytes.
@@ -59,7 +61,8 @@ impl Worker {
     /// # Errors
     /// When the process cannot be started.
     pub fn start(options: WorkerOptions) -> io::Result<Self> {
-        let mut command = Command::new(program()?);
+        let own = || options.program.clone().map_or_else(program, Ok);
+        let mut command = Command::new(own()?);
         command.arg("worker").arg("--threads").arg(options.threads.to_string());
         command.arg("--bytes").arg(options.bytes.to_string());
         for file in &options.plugins {

@@ -1,0 +1,169 @@
+//! `medial diff OLD NEW`: what became worse from one set of results to another.
+//!
+//! With `--run` the two are builds of this program, which run a study in turn first.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use medial::write_atomically;
+use medial_reports::diff::{Diff, DiffOptions, Meaning};
+use medial_reports::{Record, read_records};
+
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::interrupt;
+use crate::output::{note, print_error, print_json, print_raw};
+use crate::run::{
+    AXES, Build, Contender, Here, PlanError, Progress, Provenance, RESULTS, Registry, RunError,
+    Store, Study, Supervisor, missing_in_either, run_alternately,
+};
+
+/// The folders of the two sides of `--run`.
+const SIDES: [&str; 2] = ["old", "new"];
+
+/// Arguments of `diff`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The older results: a folder, or its `results.jsonl`; with `--run` the older program.
+    old: PathBuf,
+    /// The newer ones.
+    new: PathBuf,
+    /// Take two builds of this program, and run the study with both alternately.
+    #[arg(long, requires = "study")]
+    run: bool,
+    /// The study that both run.
+    #[arg(long, value_name = "FILE", requires = "run")]
+    study: Option<PathBuf>,
+    /// Folder of both results, and of the difference. What is there already is not run again.
+    #[arg(long, value_name = "DIR", default_value = "medial-diff", requires = "run")]
+    out: PathBuf,
+    /// Repetitions of each item.
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "run")]
+    repeat: usize,
+    /// From which on a larger error is a regression, as a fraction.
+    #[arg(long, value_name = "FRACTION", default_value_t = DiffOptions::default().error)]
+    error: f64,
+    /// From which on more memory is a regression, as a fraction.
+    #[arg(long, value_name = "FRACTION", default_value_t = DiffOptions::default().memory)]
+    memory: f64,
+    /// From which on more CPU seconds of a method are a regression, as a fraction.
+    #[arg(long, value_name = "FRACTION", default_value_t = DiffOptions::default().seconds)]
+    seconds: f64,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the records of a side cannot be read, or with `--run` a program is no build of this one, the study is wrong, or
+/// results cannot be kept.
+pub fn run(
+    arguments: &Arguments,
+    global: &Global,
+    registry: &mut Registry,
+) -> Result<Exit, Failure> {
+    for (name, value) in
+        [("error", arguments.error), ("memory", arguments.memory), ("seconds", arguments.seconds)]
+    {
+        if !(value >= 0.0 && value.is_finite()) {
+            let message = format!("--{name} {value}: a fraction from 0 on, such as 0.05");
+            return Err(Failure::usage(message));
+        }
+    }
+    let folders = match arguments.run {
+        true => match alternate(arguments, global, registry)? {
+            Some(folders) => folders,
+            None => return Ok(Exit::Interrupted),
+        },
+        false => [arguments.old.clone(), arguments.new.clone()],
+    };
+    let [old, new] = [records(&folders[0], global)?, records(&folders[1], global)?];
+    let names = [&arguments.old, &arguments.new].map(|path| path.display().to_string());
+    let options = DiffOptions {
+        error: arguments.error,
+        memory: arguments.memory,
+        seconds: arguments.seconds,
+        alternating: arguments.run,
+    };
+    let diff = Diff::new(names, &old, &new, options);
+    let markdown = diff.to_markdown();
+    if arguments.run {
+        let json = serde_json::to_string_pretty(&diff).map_err(Failure::input)?;
+        write(&arguments.out.join("diff.md"), &markdown)?;
+        write(&arguments.out.join("diff.json"), &json)?;
+    }
+    if global.json {
+        print_json(&diff, &[]);
+    } else {
+        print_raw(&markdown);
+    }
+    Ok(match diff.count(Meaning::Regression) {
+        _ if diff.compared == 0 => Exit::NothingMeasured,
+        0 => Exit::Done,
+        _ => Exit::Regression,
+    })
+}
+
+/// The records of a folder or of a file.
+fn records(path: &Path, global: &Global) -> Result<Vec<Record>, Failure> {
+    let file = if path.is_dir() { path.join(RESULTS) } else { path.to_owned() };
+    let journaled = read_records(&file).map_err(Failure::input)?;
+    if let Some(bad) = journaled.bad_lines.first() {
+        let count = journaled.bad_lines.len();
+        note(global, &format!("{}: {count} unreadable lines; {bad}", file.display()));
+    }
+    if journaled.records.is_empty() {
+        return Err(Failure::input(format!("{}: no record", file.display())));
+    }
+    Ok(journaled.records)
+}
+
+/// Runs the study with both builds; the folders of their results, or nothing where the user interrupted.
+fn alternate(
+    arguments: &Arguments,
+    global: &Global,
+    registry: &mut Registry,
+) -> Result<Option<[PathBuf; 2]>, Failure> {
+    let path = arguments.study.as_ref().expect("required by --run");
+    let mut study = Study::read(path)?;
+    study.repeat = arguments.repeat;
+    // The CPU seconds of several threads that wait for each other vary too much.
+    study.threads = global.threads.or(study.threads).or(Some(1));
+    study.plugins.extend(global.plugins.iter().cloned());
+    for file in &study.plugins {
+        registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
+    }
+    let builds = [Build::of(&arguments.old), Build::of(&arguments.new)];
+    let [old, new] = builds.map(|build| build.map_err(Failure::input));
+    let here = Provenance::here();
+    let items = study.items(registry, &Here::of(&here))?;
+    let interrupted = interrupt::listen();
+    let contender = |build: Build, side: &str| -> Result<Contender<'_>, Failure> {
+        let folder = arguments.out.join(side);
+        let store = Store::open(&folder, RESULTS, &here.command)?;
+        store.remarks.iter().for_each(|remark| note(global, remark));
+        let axes = Some(folder.join(AXES));
+        let supervisor = Supervisor::new(registry.files(), &build.provenance, axes, interrupted);
+        let supervisor = supervisor.of_program(&build.program);
+        Ok(Contender { build, supervisor, store })
+    };
+    let mut contenders = [contender(old?, SIDES[0])?, contender(new?, SIDES[1])?];
+    let left = missing_in_either(&items, &contenders);
+    let mut progress = Progress::new(global.progress(), left.len());
+    let ended = run_alternately(&left, &mut contenders, &mut progress);
+    drop(progress);
+    match ended {
+        Err(PlanError::Run(RunError::Interrupted)) => {
+            print_error(
+                "interrupted: what was finished is kept; the same command goes on from there",
+            );
+            return Ok(None);
+        }
+        ended => ended?,
+    }
+    Ok(Some(SIDES.map(|side| arguments.out.join(side))))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let written = write_atomically(path, |out| out.write_all(text.as_bytes()));
+    written.map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}

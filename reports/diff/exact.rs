@@ -1,0 +1,173 @@
+//! Changes of what the same input always gives: any difference is one of the program, and needs no statistics.
+
+use std::collections::BTreeMap;
+
+use medial::simplifier::Level;
+use serde_json::{Map, Value};
+
+use super::pairs::Pair;
+use super::{Change, DiffOptions, Meaning};
+use crate::record::{Record, Status};
+
+/// Quantities of which less is better: errors, by their keys in `evaluate`.
+const ERRORS: [&str; 15] = [
+    "hausdorff",
+    "epsilon",
+    "epsilon_union",
+    "reverse",
+    "mean",
+    "rms",
+    "p95",
+    "p99",
+    "reverse_mean",
+    "spheres_only",
+    "certified.lower",
+    "certified.upper",
+    "volume_error",
+    "protrusion",
+    "centres_outside",
+];
+
+/// Errors below this share of the diagonal are rounding.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// More memory than this is needed before a share of it counts, in bytes.
+const LEAST_MEMORY: f64 = 1e6;
+
+/// The changes from one record to the other. Time linear in the length of the records.
+pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
+    let mut changes = memory(pair, options).into_iter().collect();
+    if alike(pair.old, pair.new) {
+        return changes;
+    }
+    let (old, mut new) = (facts(pair.old), facts(pair.new));
+    for (what, old) in old {
+        let new = new.remove(&what).unwrap_or(Value::Null);
+        if old != new {
+            changes.push(change(pair, what, old, new, options));
+        }
+    }
+    let appeared = new.into_iter().filter(|(_, value)| !value.is_null());
+    changes.extend(appeared.map(|(what, new)| change(pair, what, Value::Null, new, options)));
+    changes
+}
+
+/// Whether nothing deterministic differs: most pairs, told without taking them apart.
+fn alike(old: &Record, new: &Record) -> bool {
+    let (a, b) = (&old.simplify, &new.simplify);
+    (old.status, &old.evaluate, old.initial, &old.result_hash, old.union)
+        == (new.status, &new.evaluate, new.initial, &new.result_hash, new.union)
+        && (a.reached, a.native_level, a.spheres, a.edges, a.faces)
+            == (b.reached, b.native_level, b.spheres, b.edges, b.faces)
+        && (&a.diagnostics, &a.warnings) == (&b.diagnostics, &b.warnings)
+}
+
+fn change(pair: &Pair<'_>, what: String, old: Value, new: Value, options: &DiffOptions) -> Change {
+    let relative = match (old.as_f64(), new.as_f64()) {
+        (Some(old), Some(new)) if old != 0.0 => Some((new - old) / old.abs()),
+        _ => None,
+    };
+    let meaning = meaning(pair, &what, [&old, &new], options);
+    Change { item: pair.item.clone(), what, old, new, relative, meaning }
+}
+
+/// What a change of a quantity means.
+fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffOptions) -> Meaning {
+    let key = what.strip_prefix("evaluate.").unwrap_or(what);
+    let demanded = |record: &Record| record.evaluate.as_ref().and_then(|e| e.expected_betti);
+    let is_right = |record: &Record, betti: &Value| {
+        demanded(record).is_some_and(|demanded| *betti == Value::from(demanded.to_vec()))
+    };
+    let is_bounded = matches!(pair.old.simplify.level, Level::MaxError(_));
+    match key {
+        "status" => of_truth(pair.old.status == Status::Ok, pair.new.status == Status::Ok),
+        "betti" | "union.betti" => of_truth(is_right(pair.old, old), is_right(pair.new, new)),
+        // Of an error bound the number of spheres is the answer.
+        "simplify.spheres" if is_bounded => of_size(old, new, 0.0, 0.5),
+        key if ERRORS.contains(&key) => of_size(old, new, options.error, NEGLIGIBLE),
+        _ => Meaning::Changed,
+    }
+}
+
+fn of_truth(before: bool, now: bool) -> Meaning {
+    match (before, now) {
+        (true, false) => Meaning::Regression,
+        (false, true) => Meaning::Improvement,
+        _ => Meaning::Changed,
+    }
+}
+
+/// Of a quantity of which less is better: larger changes than a share of the older value, and than `least`.
+fn of_size(old: &Value, new: &Value, share: f64, least: f64) -> Meaning {
+    let (Some(old), Some(new)) = (old.as_f64(), new.as_f64()) else { return Meaning::Changed };
+    let enough = (share * old.abs()).max(least);
+    match new - old {
+        more if more > enough => Meaning::Regression,
+        more if more < -enough => Meaning::Improvement,
+        _ => Meaning::Changed,
+    }
+}
+
+/// A change of the peak of memory beyond its threshold. With several threads it is not quite the same each time, so
+/// smaller ones are not listed.
+fn memory(pair: &Pair<'_>, options: &DiffOptions) -> Option<Change> {
+    let [old, new] = [pair.old, pair.new].map(|record| record.simplify.peak_bytes);
+    let (old, new) = (Value::from(old?), Value::from(new?));
+    let enough = options.memory.max(LEAST_MEMORY / old.as_f64()?.max(1.0));
+    let meaning = of_size(&old, &new, enough, 0.0);
+    let relative = Some(new.as_f64()? / old.as_f64()?.max(1.0) - 1.0);
+    let what = "simplify.peak_bytes".to_owned();
+    (meaning != Meaning::Changed).then(|| Change {
+        item: pair.item.clone(),
+        what,
+        old,
+        new,
+        relative,
+        meaning,
+    })
+}
+
+/// Every deterministic number of a record, by its key.
+fn facts(record: &Record) -> BTreeMap<String, Value> {
+    let mut facts = BTreeMap::new();
+    let plain = |value: serde_json::Result<Value>| value.unwrap_or(Value::Null);
+    let simplify = &record.simplify;
+    let whole = [
+        ("status", plain(serde_json::to_value(record.status))),
+        ("result_hash", plain(serde_json::to_value(&record.result_hash))),
+        ("simplify.reached", plain(serde_json::to_value(simplify.reached))),
+        ("simplify.native_level", plain(serde_json::to_value(simplify.native_level))),
+        ("simplify.spheres", plain(serde_json::to_value(simplify.spheres))),
+        ("simplify.edges", plain(serde_json::to_value(simplify.edges))),
+        ("simplify.faces", plain(serde_json::to_value(simplify.faces))),
+        ("simplify.warnings", plain(serde_json::to_value(&simplify.warnings))),
+        ("simplify.diagnostics", plain(serde_json::to_value(&simplify.diagnostics))),
+        ("evaluate", plain(serde_json::to_value(&record.evaluate))),
+        ("initial", plain(serde_json::to_value(record.initial))),
+        ("union", plain(serde_json::to_value(record.union))),
+    ];
+    for (key, value) in whole {
+        take_apart(key, value, &mut facts);
+    }
+    facts
+}
+
+/// Objects by their keys, lists of objects by their places; other lists are one value.
+fn take_apart(key: &str, value: Value, facts: &mut BTreeMap<String, Value>) {
+    let fields = |map: Map<String, Value>, facts: &mut BTreeMap<String, Value>| {
+        for (field, value) in map {
+            take_apart(&format!("{key}.{field}"), value, facts);
+        }
+    };
+    match value {
+        Value::Object(map) => fields(map, facts),
+        Value::Array(list) if list.iter().any(Value::is_object) => {
+            for (place, value) in list.into_iter().enumerate() {
+                take_apart(&format!("{key}.{place}"), value, facts);
+            }
+        }
+        value => {
+            facts.insert(key.to_owned(), value);
+        }
+    }
+}

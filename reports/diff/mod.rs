@@ -1,0 +1,183 @@
+//! Two sets of records of one study, an older and a newer one: what became worse, better, or merely different.
+//!
+//! 1. **Pairs** (`pairs`): records of one mesh, row, level and seed, measured under the same settings. What has no
+//!    partner, or one that cannot be compared, is named with the reason.
+//! 2. **What is deterministic** (`exact`): results, errors, counts, topology. Compared exactly; every change is listed,
+//!    and called a regression where it is for the worse by more than its threshold.
+//! 3. **Seconds** (`timing`): the same work takes other seconds each time. A slowdown is called a regression only if
+//!    it is larger than a threshold, its bootstrap interval excludes none at all, and the repetitions agree.
+
+mod exact;
+mod pairs;
+mod text;
+mod timing;
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::record::Record;
+
+use pairs::Pairs;
+
+pub use timing::Timing;
+
+/// From which on a change for the worse is a regression, all as fractions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DiffOptions {
+    /// Errors.
+    pub error: f64,
+    /// Peak of memory.
+    pub memory: f64,
+    /// CPU seconds of a method over all meshes; twice as much on a single mesh, and twice by the clock on the wall,
+    /// which other programs disturb.
+    pub seconds: f64,
+    /// Whether repetition `k` of both sides ran right after each other, so that they are compared in pairs.
+    pub alternating: bool,
+}
+
+impl Default for DiffOptions {
+    fn default() -> Self {
+        Self { error: 0.005, memory: 0.05, seconds: 0.05, alternating: false }
+    }
+}
+
+/// What a change means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Meaning {
+    /// For the worse, beyond the threshold.
+    Regression,
+    /// For the better, beyond the threshold.
+    Improvement,
+    /// Neither.
+    Changed,
+}
+
+/// One of the two sets of records.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Side {
+    /// What it is called, such as its folder.
+    pub name: String,
+    /// Records that count.
+    pub records: usize,
+    /// Versions of the program.
+    pub versions: BTreeSet<String>,
+    /// SHA-256 of the programs.
+    pub builds: BTreeSet<String>,
+    /// Machines.
+    pub machines: BTreeSet<String>,
+}
+
+/// A result by its names in tables.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct ItemName {
+    /// The mesh.
+    pub mesh: String,
+    /// The method with its parameters, or the name that it was given.
+    pub method: String,
+    /// What was asked.
+    pub level: String,
+}
+
+/// One quantity that is not as it was.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// The result.
+    #[serde(flatten)]
+    pub item: ItemName,
+    /// The quantity, by its key in the record.
+    pub what: String,
+    /// Its older value.
+    pub old: Value,
+    /// Its newer value.
+    pub new: Value,
+    /// The change as a fraction of the older value, for numbers.
+    pub relative: Option<f64>,
+    /// What that means.
+    pub meaning: Meaning,
+}
+
+/// Two records that cannot be compared.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Unlike {
+    /// The result.
+    #[serde(flatten)]
+    pub item: ItemName,
+    /// Why not.
+    pub why: String,
+}
+
+/// The difference of two sets of records.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diff {
+    /// The older and the newer one.
+    pub sides: [Side; 2],
+    /// The thresholds.
+    pub options: DiffOptions,
+    /// Pairs that were compared.
+    pub compared: usize,
+    /// Results that only the older one has.
+    pub missing: Vec<ItemName>,
+    /// Results that only the newer one has.
+    pub added: Vec<ItemName>,
+    /// Results that both have, under other conditions.
+    pub unlike: Vec<Unlike>,
+    /// Changes of what is deterministic, and of memory beyond its threshold; those for the worse first.
+    pub changes: Vec<Change>,
+    /// Seconds.
+    pub timings: Vec<Timing>,
+    /// Why some or all seconds were not compared.
+    pub untimed: Vec<String>,
+}
+
+impl Diff {
+    /// Compares an older and a newer set of records, named as given. Of several records of one result the last one
+    /// counts. The same records give the same difference.
+    pub fn new(names: [String; 2], old: &[Record], new: &[Record], options: DiffOptions) -> Self {
+        let Pairs { both, missing, added, unlike } = Pairs::new(old, new);
+        let mut changes: Vec<Change> =
+            both.iter().flat_map(|pair| exact::changes(pair, &options)).collect();
+        // Stable: within one meaning the order of the pairs remains.
+        changes.sort_by_key(|change| change.meaning);
+        let (timings, untimed) = timing::timings(&both, &options);
+        let [first, second] = names;
+        Self {
+            sides: [side(first, old), side(second, new)],
+            options,
+            compared: both.len(),
+            missing,
+            added,
+            unlike,
+            changes,
+            timings,
+            untimed,
+        }
+    }
+
+    /// How many changes and timings have a meaning.
+    pub fn count(&self, meaning: Meaning) -> usize {
+        let changes = self.changes.iter().filter(|change| change.meaning == meaning).count();
+        let timings = self.timings.iter().filter(|timing| timing.meaning == Some(meaning)).count();
+        changes + timings
+    }
+
+    /// The difference as Markdown, for a pull request.
+    pub fn to_markdown(&self) -> String {
+        text::markdown(self)
+    }
+}
+
+fn side(name: String, records: &[Record]) -> Side {
+    let all = |of: fn(&Record) -> String| -> BTreeSet<String> {
+        records.iter().map(of).filter(|text| !text.is_empty()).collect()
+    };
+    Side {
+        name,
+        records: records.len(),
+        versions: all(|record| record.version.clone()),
+        builds: all(|record| record.binary_hash.clone()),
+        machines: all(|record| record.machine.to_string()),
+    }
+}

@@ -1,0 +1,188 @@
+//! A difference as Markdown: the verdict first, then what it rests on.
+
+use serde_json::Value;
+
+use super::{Change, Diff, ItemName, Meaning, Timing, Unlike};
+use crate::tables::{Cell, Column, Row, Table, escape_markdown, to_markdown};
+use crate::text::{counted, significant};
+
+/// Rows of a table of changes; the JSON has all.
+const MOST_ROWS: usize = 40;
+
+/// Names of missing results in a sentence.
+const MOST_NAMES: usize = 5;
+
+pub(super) fn markdown(diff: &Diff) -> String {
+    let mut text = format!("# {}\n\n{}\n\n", heading(diff), sides(diff));
+    for (meaning, caption) in [
+        (Meaning::Regression, "Worse"),
+        (Meaning::Improvement, "Better"),
+        (Meaning::Changed, "Changed otherwise"),
+    ] {
+        let changes: Vec<&Change> =
+            diff.changes.iter().filter(|change| change.meaning == meaning).collect();
+        if !changes.is_empty() {
+            text.push_str(&to_markdown(&change_table(caption, &changes)));
+            text.push('\n');
+        }
+    }
+    if !diff.timings.is_empty() {
+        text.push_str(&to_markdown(&timing_table(diff)));
+        text.push('\n');
+    }
+    for why in &diff.untimed {
+        text.push_str(&format!("Not compared: {}.\n\n", escape_markdown(why)));
+    }
+    for (names, what) in [(&diff.missing, "only in the older"), (&diff.added, "only in the newer")]
+    {
+        if !names.is_empty() {
+            text.push_str(&format!("{}: {}.\n\n", results(names.len(), what), listed(names)));
+        }
+    }
+    text + &unlike(&diff.unlike)
+}
+
+fn heading(diff: &Diff) -> String {
+    let [worse, better, changed] = [Meaning::Regression, Meaning::Improvement, Meaning::Changed]
+        .map(|meaning| diff.count(meaning));
+    let verdict = match worse {
+        0 if diff.compared == 0 => "Nothing could be compared".to_owned(),
+        0 => "No regression".to_owned(),
+        worse => counted(worse, "regression", "regressions"),
+    };
+    let compared = counted(diff.compared, "result", "results");
+    let better = counted(better, "improvement", "improvements");
+    format!(
+        "{verdict}; {better}, {}, among {compared}",
+        counted(changed, "other change", "other changes")
+    )
+}
+
+/// What is compared with what.
+fn sides(diff: &Diff) -> String {
+    let lines = diff.sides.iter().zip(["old", "new"]).map(|(side, which)| {
+        let all = |set: &std::collections::BTreeSet<String>, length: usize| {
+            let short = set.iter().map(|text| text.chars().take(length).collect::<String>());
+            short.collect::<Vec<_>>().join(", ")
+        };
+        let name = escape_markdown(&side.name);
+        let machines = escape_markdown(&all(&side.machines, usize::MAX));
+        let (versions, builds) = (all(&side.versions, usize::MAX), all(&side.builds, 12));
+        format!(
+            "- {which}: {name}, version {}, build {builds}, on {machines}",
+            escape_markdown(&versions)
+        )
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+fn change_table(caption: &str, changes: &[&Change]) -> Table {
+    let titles = ["mesh", "method", "level", "what", "old", "new", "change"];
+    let row = |change: &&Change| {
+        let ItemName { mesh, method, level } = &change.item;
+        let relative = change.relative.map(|share| format!("{:+.2} %", 100.0 * share));
+        let texts = [mesh, method, level, &change.what].map(|text| Cell::new(text.as_str()));
+        let values = [&change.old, &change.new].map(|value| Cell::new(shown(value)));
+        let cells = texts.into_iter().chain(values).chain([Cell::optional(relative)]).collect();
+        Row { cells, starts_group: false }
+    };
+    let left = changes.len().saturating_sub(MOST_ROWS);
+    let notes = if left > 0 { vec![format!("{left} more are in the JSON.")] } else { vec![] };
+    Table {
+        caption: format!("{caption}: {}", counted(changes.len(), "change", "changes")),
+        notes,
+        columns: titles.map(Column::text).into(),
+        rows: changes.iter().take(MOST_ROWS).map(row).collect(),
+    }
+}
+
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Null => "none".to_owned(),
+        Value::String(text) => text.chars().take(16).collect(),
+        Value::Number(number) if number.is_f64() => significant(number.as_f64().unwrap_or(0.0), 6),
+        other => other.to_string().chars().take(48).collect(),
+    }
+}
+
+fn timing_table(diff: &Diff) -> Table {
+    let titles = [
+        "method",
+        "mesh",
+        "clock",
+        "results × repetitions",
+        "new ÷ old",
+        "99 % interval",
+        "agree",
+        "",
+    ];
+    let row = |timing: &Timing| {
+        let Timing { method, mesh, clock, results, repetitions, ratio, interval, .. } = timing;
+        let [low, high] = interval;
+        let meaning = match timing.meaning {
+            Some(Meaning::Regression) => "slower",
+            Some(Meaning::Improvement) => "faster",
+            _ => "",
+        };
+        let texts = [
+            method.clone(),
+            mesh.clone().unwrap_or_else(|| "all".to_owned()),
+            (*clock).to_owned(),
+            format!("{results} × {repetitions}"),
+            format!("{ratio:.3}"),
+            format!("{low:.3} to {high:.3}"),
+            format!("{:.0} %", 100.0 * timing.agreement),
+        ];
+        let mut cells: Vec<Cell> = texts.into_iter().map(Cell::new).collect();
+        cells.push(Cell { best: true, ..Cell::new(meaning) });
+        cells.last_mut().into_iter().for_each(|cell| cell.best = !cell.text.is_empty());
+        Row { cells, starts_group: false }
+    };
+    let options = &diff.options;
+    let together = match options.alternating {
+        true => "Both builds ran alternately.",
+        false => {
+            "The two did not run alternately: a machine that was busier on one of the two occasions looks like a \
+             slower program (`medial diff --run` runs both in turn)."
+        }
+    };
+    let note = format!(
+        "The methods' own seconds, without shared substrates. Slower or faster: by more than {:.0} % ({:.0} % on a single \
+         mesh, twice by the wall clock), with an interval that excludes 1, and nine of ten repetitions on that side. {together}",
+        100.0 * options.seconds,
+        200.0 * options.seconds
+    );
+    Table {
+        caption: "Seconds".to_owned(),
+        notes: vec![note],
+        columns: titles.map(Column::text).into(),
+        rows: diff.timings.iter().map(row).collect(),
+    }
+}
+
+fn results(count: usize, what: &str) -> String {
+    format!("{} {what}", counted(count, "result", "results"))
+}
+
+fn listed(names: &[ItemName]) -> String {
+    let name = |item: &ItemName| format!("{} / {} / {}", item.mesh, item.method, item.level);
+    let mut all: Vec<String> = names.iter().take(MOST_NAMES).map(name).collect();
+    if names.len() > MOST_NAMES {
+        all.push(format!("and {} more", names.len() - MOST_NAMES));
+    }
+    escape_markdown(&all.join(", "))
+}
+
+/// Why results cannot be compared, each reason once.
+fn unlike(unlike: &[Unlike]) -> String {
+    let mut reasons: Vec<&str> = unlike.iter().map(|unlike| unlike.why.as_str()).collect();
+    reasons.sort_unstable();
+    reasons.dedup();
+    let line = |why: &&str| {
+        let names: Vec<ItemName> =
+            unlike.iter().filter(|u| u.why == *why).map(|u| u.item.clone()).collect();
+        let count = results(names.len(), "not compared");
+        format!("{count} ({}): {}.\n\n", escape_markdown(why), listed(&names))
+    };
+    reasons.iter().map(line).collect()
+}
