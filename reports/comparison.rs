@@ -149,7 +149,9 @@ impl<'a> Comparison<'a> {
 
     /// The entries of one mesh, by level and series.
     pub(crate) fn of_mesh(&self, mesh: usize) -> impl Iterator<Item = &Entry<'a>> {
-        self.entries.iter().filter(move |entry| entry.mesh == mesh)
+        // They are sorted by mesh.
+        let begin = self.entries.partition_point(|entry| entry.mesh < mesh);
+        self.entries[begin..].iter().take_while(move |entry| entry.mesh == mesh)
     }
 
     /// The sphere counts that were asked, with their level indices, from many to few.

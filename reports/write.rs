@@ -101,13 +101,14 @@ pub fn write_report(
         }
     }
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
+    let has_plots = stems.len() <= MOST_PLOTTED;
     let pictures = strips(&comparison);
     let (mut room, mut room_3d) = (PICTURES, VIEWS_INSIDE);
     let mut meshes = Vec::new();
     for (mesh, stem) in stems.into_iter().enumerate() {
         let part = MeshPart {
             table: mesh_table(&comparison, mesh, &how),
-            plots: mesh_plots(&comparison, mesh, &stem)?,
+            plots: if has_plots { mesh_plots(&comparison, mesh, &stem)? } else { vec![] },
             picture: picture(dir, pictures.get(&mesh), &mut room),
             view: view(dir, pictures.get(&mesh), &mut room_3d),
             stem,
@@ -149,6 +150,9 @@ pub fn write_report(
     files.write("index.html", page.to_html().as_bytes())?;
     Ok(files.written)
 }
+
+/// Of more meshes none has plots of its own: they would be thousands of files that nobody opens.
+pub(crate) const MOST_PLOTTED: usize = 100;
 
 /// Bytes of the pictures that are part of the page; further ones are linked. In Base64 they take a third more.
 const PICTURES: usize = 3 << 20;

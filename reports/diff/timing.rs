@@ -6,7 +6,9 @@
 //! 1. its mean is beyond the threshold,
 //! 2. the percentile bootstrap interval of the mean excludes no change at all (B. Efron, R. J. Tibshirani: *An
 //!    Introduction to the Bootstrap*, 1993, chapter 13), and
-//! 3. nine of ten repetitions agree that it is slower.
+//! 3. nine of ten repetitions agree that it is slower, and
+//! 4. the fastest repetitions of both sides differ by more than the threshold, too: another program on the machine
+//!    delays some repetitions, hardly ever all.
 //!
 //! With builds that ran alternately, repetition `k` of one is compared with repetition `k` of the other: whatever
 //! slowed the machine in that moment slowed both. Otherwise both sides are resampled by themselves, and a machine that
@@ -167,19 +169,24 @@ fn median(record: &Record, clock: Clock, part: Part) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
-impl Group<'_, '_> {
+impl<'a> Group<'_, 'a> {
+    /// The pairs that take long enough on both sides.
+    fn long(&self, clock: Clock) -> Vec<&Pair<'a>> {
+        let shortest = |pair: &Pair<'_>| {
+            let sides = [pair.old, pair.new].map(|record| median(record, clock, self.part));
+            sides[0].min(sides[1])
+        };
+        let long = self.pairs.iter().filter(|pair| shortest(pair) >= LEAST_SECONDS);
+        long.copied().collect()
+    }
+
     /// The row by one clock; `None` where all times are too short.
     fn timing(
         &self,
         &(name, clock, factor): &(&'static str, Clock, f64),
         options: &DiffOptions,
     ) -> Option<Timing> {
-        let long = |pair: &&&Pair<'_>| {
-            let shorter =
-                median(pair.old, clock, self.part).min(median(pair.new, clock, self.part));
-            shorter >= LEAST_SECONDS
-        };
-        let pairs: Vec<&Pair<'_>> = self.pairs.iter().filter(long).copied().collect();
+        let pairs = self.long(clock);
         let repetitions = pairs.iter().map(|pair| repetitions(pair)).min()?;
         let sides = pairs.iter().map(|pair| [pair.old, pair.new]);
         let [old, new] = [0, 1].map(|side| {
@@ -189,12 +196,14 @@ impl Group<'_, '_> {
         let Shift { mean, interval, agreement } = Shift::new(&old, &new, options.alternating);
         let alone = if self.mesh.is_some() { 2.0 } else { 1.0 };
         let threshold = (alone * factor * options.seconds).ln_1p();
-        let certain = agreement >= AGREEMENT;
-        let meaning = match mean {
-            m if m > threshold && interval[0] > 0.0 && certain => Some(Meaning::Regression),
-            m if m < -threshold && interval[1] < 0.0 && certain => Some(Meaning::Improvement),
-            _ => None,
-        };
+        let fastest = self.fastest_shift(&pairs, clock);
+        // The smaller of the two shifts, where they have one sign.
+        let least = if mean * fastest > 0.0 { mean.abs().min(fastest.abs()) } else { 0.0 };
+        let is_certain = agreement >= AGREEMENT && interval[0] * interval[1] > 0.0;
+        let meaning = (least > threshold && is_certain).then_some(match mean > 0.0 {
+            true => Meaning::Regression,
+            false => Meaning::Improvement,
+        });
         Some(Timing {
             method: self.method.clone(),
             mesh: self.mesh.clone(),
@@ -206,6 +215,16 @@ impl Group<'_, '_> {
             agreement,
             meaning,
         })
+    }
+
+    /// The mean logarithm of new over old seconds, of the fastest repetitions alone.
+    fn fastest_shift(&self, pairs: &[&Pair<'_>], clock: Clock) -> f64 {
+        let fastest = |record: &Record| {
+            let seconds = record.repetitions.iter().map(|r| (self.part)(&clock(r)));
+            seconds.fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE).ln()
+        };
+        let shifts = pairs.iter().map(|pair| fastest(pair.new) - fastest(pair.old));
+        shifts.sum::<f64>() / pairs.len().max(1) as f64
     }
 
     /// Of the seconds of repetition `k`, over some records.

@@ -3,6 +3,7 @@
 use crate::page::packed::packed;
 use crate::page::{MeshPart, MeshView, Page, html};
 use crate::text::{betti, counted, escape_html, grouped};
+use crate::write::MOST_PLOTTED;
 
 /// Meshes whose sections stand in the document; the script unpacks further ones when they are opened.
 const INLINE: usize = 12;
@@ -55,7 +56,11 @@ fn inside(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
         ));
     }
     html.push_str(&part.view.as_ref().map_or(String::new(), view));
-    if part.plots.is_empty() {
+    if page.meshes.len() > MOST_PLOTTED {
+        html.push_str(&format!(
+            "<p class=\"note\">Of more than {MOST_PLOTTED} meshes none has plots of its own.</p>\n"
+        ));
+    } else if part.plots.is_empty() {
         html.push_str("<p class=\"notice bad\">Nothing was measured on this mesh.</p>\n");
     } else {
         html.push_str(&html::plots(&part.plots));

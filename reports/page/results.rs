@@ -15,6 +15,14 @@ use crate::text::{betti, escape_html, grouped, megabytes};
 pub(crate) fn section(page: &Page<'_>) -> String {
     let comparison = page.comparison;
     let mut html = String::from("<section id=\"results\">\n<h2>Results</h2>\n");
+    if comparison.entries.len() > MOST {
+        html.push_str(&format!(
+            "<p>{} results are too many for a table on a page: <code>results.csv</code> holds every number that was \
+             recorded, and each mesh has a table of its own below.</p>\n</section>\n",
+            grouped(comparison.entries.len() as u64)
+        ));
+        return html;
+    }
     let levels: Vec<String> = comparison.levels.iter().map(|&level| level_label(level)).collect();
     let statuses: Vec<String> =
         comparison.statuses().iter().map(|(status, _)| status.to_string()).collect();
@@ -53,6 +61,9 @@ pub(crate) fn section(page: &Page<'_>) -> String {
     html.push_str(&details::block(comparison));
     html
 }
+
+/// Of more results the page has no table: it would take a browser's memory and minutes.
+const MOST: usize = 20_000;
 
 /// Rows that stand in the document; the script takes further ones from a block of their own.
 const INLINE: usize = 250;

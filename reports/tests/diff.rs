@@ -1,0 +1,158 @@
+//! The difference of two sets of records: what is alarmed, what is listed, and what is left alone.
+
+#[allow(dead_code)] // Headers are for pages.
+mod common;
+
+use medial_reports::diff::{Diff, DiffOptions, Meaning};
+use medial_reports::{Record, Repetition, Stages};
+
+use common::{SHAPES, comparison};
+
+const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
+
+fn diff(old: &[Record], new: &[Record]) -> Diff {
+    let options = DiffOptions { alternating: true, ..DiffOptions::default() };
+    Diff::new(["before".into(), "after".into()], old, new, options)
+}
+
+/// A number from -1 to 1 that looks random.
+fn jitter(seed: usize) -> f64 {
+    let mixed = medial::geometry::hash::splitmix(seed as u64);
+    (mixed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// Records with ten repetitions, each with a noise of some share of its seconds, on a machine whose load in the moment
+/// of a repetition slows all by up to a half.
+fn timed(seed: usize, noise: f64, factor: impl Fn(&Record) -> f64) -> Vec<Record> {
+    let mut records = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
+    for (place, record) in records.iter_mut().enumerate() {
+        let Some(stages) = record.simplify.seconds else { continue };
+        let factor = factor(record);
+        let lap = |k: usize| {
+            let load = 1.25 + 0.25 * jitter(k);
+            let random = 1.0 + noise * jitter((seed * 1000 + place) * 10 + k + 77);
+            let all = load * random * factor;
+            let stages = Stages::new(
+                load * random * stages.substrate,
+                all * stages.prepare,
+                all * stages.simplify,
+            );
+            Repetition { seconds: stages, cpu_seconds: stages }
+        };
+        record.repetitions = (0..10).map(lap).collect();
+    }
+    records
+}
+
+#[test]
+fn equal_records_are_silent_and_noise_is_no_regression() {
+    for seed in 0..20 {
+        let diff = diff(&timed(seed, 0.1, |_| 1.0), &timed(seed + 100, 0.1, |_| 1.0));
+        assert_eq!(diff.count(Meaning::Regression), 0, "seed {seed}: {}", diff.to_markdown());
+        assert_eq!((diff.count(Meaning::Improvement), diff.changes.len()), (0, 0), "seed {seed}");
+        assert!(diff.compared > 20 && diff.missing.is_empty() && diff.untimed.is_empty());
+        assert!(diff.to_markdown().starts_with("# No regression"));
+    }
+}
+
+#[test]
+fn a_slower_method_is_named_alone() {
+    let slower = |record: &Record| if record.simplify.method == "angle" { 1.15 } else { 1.0 };
+    for seed in 0..20 {
+        let diff = diff(&timed(seed, 0.1, |_| 1.0), &timed(seed + 100, 0.1, slower));
+        let told = diff.timings.iter().filter(|timing| timing.meaning.is_some());
+        let told: Vec<_> = told.map(|t| (t.method.as_str(), t.meaning)).collect();
+        assert!(told.contains(&("angle", Some(Meaning::Regression))), "seed {seed}: {told:?}");
+        assert!(told.iter().all(|(method, _)| *method == "angle"), "seed {seed}: {told:?}");
+    }
+    let faster = diff(&timed(1, 0.1, slower), &timed(2, 0.1, |_| 1.0));
+    assert_eq!(faster.count(Meaning::Regression), 0);
+    assert!(faster.count(Meaning::Improvement) > 0);
+}
+
+#[test]
+fn a_slower_mesh_is_named_where_the_method_on_the_whole_is_not() {
+    let slower = |record: &Record| {
+        let is_it = record.simplify.method == "qmat" && record.mesh == SHAPES[2];
+        if is_it { 1.18 } else { 1.0 }
+    };
+    let diff = diff(&timed(1, 0.02, |_| 1.0), &timed(2, 0.02, slower));
+    let told: Vec<_> = (diff.timings.iter())
+        .filter(|timing| timing.meaning.is_some() && timing.clock == "cpu")
+        .map(|timing| (timing.method.as_str(), timing.mesh.as_deref()))
+        .collect();
+    assert_eq!(told, [("qmat", Some(SHAPES[2]))]);
+}
+
+#[test]
+fn exact_quantities_alarm_at_once_and_by_name() {
+    let old = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
+    let changed = |change: &dyn Fn(&mut Record)| {
+        let mut new = old.clone();
+        let one = new.iter_mut().rfind(|r| r.status.is_ok() && r.simplify.method == "qmat");
+        change(one.unwrap());
+        let diff = diff(&old, &new);
+        let told = diff.changes.iter().map(|c| (c.what.clone(), c.item.method.clone(), c.meaning));
+        told.collect::<Vec<_>>()
+    };
+    let one = |what: &str, meaning| vec![(what.to_owned(), "qmat".to_owned(), meaning)];
+    let error = changed(&|record| {
+        record.evaluate.as_mut().unwrap().distances.hausdorff *= 1.01;
+    });
+    assert_eq!(error, one("evaluate.hausdorff", Meaning::Regression));
+    let error = changed(&|record| {
+        record.evaluate.as_mut().unwrap().distances.mean *= 0.99;
+    });
+    assert_eq!(error, one("evaluate.mean", Meaning::Improvement));
+    // Below the threshold, but no less listed.
+    let error = changed(&|record| {
+        record.evaluate.as_mut().unwrap().distances.hausdorff *= 1.0 + 1e-12;
+    });
+    assert_eq!(error, one("evaluate.hausdorff", Meaning::Changed));
+    let betti = changed(&|record| record.evaluate.as_mut().unwrap().betti[1] += 1);
+    assert_eq!(betti, one("evaluate.betti", Meaning::Regression));
+    let memory = changed(&|record| {
+        let bytes = record.simplify.peak_bytes.as_mut().unwrap();
+        *bytes += *bytes / 10;
+    });
+    assert_eq!(memory, one("simplify.peak_bytes", Meaning::Regression));
+    let count = changed(&|record| {
+        *record.simplify.diagnostics.values_mut().next().unwrap() += 1;
+    });
+    assert_eq!(count[0].2, Meaning::Changed);
+    let hash = changed(&|record| record.result_hash = Some("12ab".into()));
+    assert_eq!(hash, one("result_hash", Meaning::Changed));
+}
+
+#[test]
+fn what_cannot_be_compared_is_named_with_the_reason() {
+    let old = timed(1, 0.0, |_| 1.0);
+    let mut new = old.clone();
+    new.iter_mut().for_each(|record| record.machine.cpu = "another".into());
+    let told = diff(&old, &new);
+    assert!(told.timings.is_empty() && told.untimed[0].contains("different machines"));
+    assert!(told.compared > 20);
+
+    let mut new = old.clone();
+    new.iter_mut().for_each(|record| record.simplify.threads = Some(8));
+    let told = diff(&old, &new);
+    assert_eq!((told.compared, told.unlike.len()), (0, old.len()));
+    assert_eq!(told.unlike[0].why, "threads 8, 1 before");
+    assert!(told.to_markdown().starts_with("# Nothing could be compared"));
+
+    let mut known = old.clone();
+    known[0].mesh_hash = Some("00".repeat(32));
+    let mut new = known.clone();
+    new[0].mesh_hash = Some("ff".repeat(32));
+    let why = &diff(&known, &new).unlike[0].why;
+    assert_eq!(why, "the mesh has other content: ffffffffffff, 000000000000 before");
+
+    let once = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
+    let told = diff(&once, &once);
+    assert!(told.untimed[0].contains("fewer than 5 repetitions"), "{:?}", told.untimed);
+
+    let told = diff(&old, &old[1..]);
+    assert_eq!((told.missing.len(), told.count(Meaning::Regression)), (1, 0));
+    assert!(told.to_markdown().contains("only in the older"));
+    assert_eq!(diff(&old[1..], &old).added.len(), 1);
+}
