@@ -297,6 +297,8 @@ struct SeriesKey<'a> {
     dual: &'a str,
     samples: usize,
     threads: Option<usize>,
+    /// The archive that it came in, where it was made elsewhere.
+    archive: Option<&'a str>,
 }
 
 impl<'a> SeriesKey<'a> {
@@ -320,6 +322,7 @@ impl<'a> SeriesKey<'a> {
             dual: conditions.map_or("", |c| &c.dual),
             samples: conditions.map_or(0, |c| c.samples),
             threads: simplify.threads,
+            archive: record.origin.as_ref().map(|origin| origin.archive.as_str()),
         }
     }
 
@@ -347,10 +350,12 @@ fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
 
 impl SeriesKey<'_> {
     fn name(&self) -> String {
-        match self.variant {
+        let name = match self.variant {
             Some(variant) => variant.to_owned(),
             None => self.method_and_params(),
-        }
+        };
+        // Its seconds are of another machine, and it is another's word.
+        if self.archive.is_some() { name + " (submitted)" } else { name }
     }
 
     fn method_and_params(&self) -> String {
@@ -358,7 +363,7 @@ impl SeriesKey<'_> {
     }
 
     /// What tells rows of one name apart, in words.
-    fn conditions(&self) -> [String; 8] {
+    fn conditions(&self) -> [String; 9] {
         let short = |hash: &str| -> String { hash.chars().take(8).collect() };
         [
             self.method_and_params(),
@@ -369,6 +374,7 @@ impl SeriesKey<'_> {
             self.threads.map_or_else(String::new, |threads| format!("{threads} threads")),
             format!("build {}", short(self.build)),
             format!("plug-in {}", short(self.plugin.unwrap_or("none"))),
+            format!("archive {}", short(self.archive.unwrap_or("none"))),
         ]
     }
 }

@@ -54,8 +54,8 @@ pub use header::{Header, MethodNote, RunNote};
 pub use journal::{BadLine, Journal, JournalError, Journaled, read_records, write_records};
 pub use pictures::{PictureStrip, picture_strips};
 pub use record::{
-    Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status,
-    UnionTopology,
+    Conditions, Initial, Machine, Origin, OwnSeconds, Record, Repetition, Simplify, Stages, Status,
+    Trust, UnionTopology,
 };
 pub use terminal::summary_text;
 pub use text::{file_stem, printable};

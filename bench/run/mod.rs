@@ -14,6 +14,7 @@
 //! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
 //! | `store` | the folder of results |
 //! | `alternate` | two builds that take turns |
+//! | `parcel` | results from another machine |
 
 mod alternate;
 mod answer;
@@ -22,6 +23,7 @@ mod ending;
 mod item;
 mod npy;
 mod npy_header;
+mod parcel;
 mod plan;
 mod progress;
 mod protocol;
@@ -46,6 +48,7 @@ pub use answer::{Fault, LevelRun, Times, answer};
 pub use item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
 pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_npy_header};
 pub use npy_header::HeaderError;
+pub use parcel::{Opened, Packed, ParcelError, Rejudged, Surfaces, open, pack, rejudge};
 pub use plan::{PlanError, Tally, count, missing, run_items};
 pub use progress::{Progress, Verbosity};
 pub use protocol::CheckItem;
@@ -60,6 +63,6 @@ pub use similar::did_you_mean;
 pub use source::{Input, InputError, Source};
 pub use stage_line::StageLine;
 pub use store::{AXES, Failures, RESULTS, Store, StoreError};
-pub use study::{Here, MOST_REPEATS, Study, StudyError, StudyMethod, no_such_method};
+pub use study::{Here, MOST_REPEATS, Study, StudyError, StudyMethod, VOLUME_DEPTH, no_such_method};
 pub use supervise::{RunError, Supervisor};
 pub use verdict::{Verdict, judge};

@@ -69,6 +69,7 @@ pub fn failure_record(item: &Item, level: Level, fault: &Fault, provenance: &Pro
         binary_hash: item.binary.clone(),
         command: provenance.command.clone(),
         version: provenance.version.clone(),
+        origin: None,
         artifact: None,
     }
 }

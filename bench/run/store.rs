@@ -156,6 +156,11 @@ impl Store {
         Ok(())
     }
 
+    /// Whether there is a record with a key.
+    pub fn has(&self, key: &str) -> bool {
+        self.known.contains_key(key)
+    }
+
     /// The levels of an item that have to be run: levels without a record, levels that were ended by a
     /// limit that is larger now, and failed levels if failures are to be retried.
     pub fn missing(&self, item: &Item, failures: Failures) -> Vec<Level> {

@@ -66,7 +66,7 @@ pub(crate) fn remark(entry: &Entry<'_>) -> String {
     {
         return "another number of spheres: not compared".to_owned();
     }
-    String::new()
+    record.origin.as_ref().map_or_else(String::new, |origin| origin.trust.to_string())
 }
 
 /// The table of one mesh. `how` tells the command line and version that made it.

@@ -43,7 +43,7 @@ pub const MOST_REPEATS: usize = 10_000;
 /// measures hundreds of results.
 const SAMPLES: usize = 10_000;
 /// Depth of the volume difference in a comparison, likewise.
-const VOLUME_DEPTH: u32 = 5;
+pub const VOLUME_DEPTH: u32 = 5;
 
 /// The matrix of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -175,6 +175,7 @@ pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
         binary_hash: "3f9c0d".to_owned(),
         command: "medial compare --spheres 1000,500,200,100".to_owned(),
         version: "0.1.0".to_owned(),
+        origin: None,
         artifact: None,
     }
 }
