@@ -13,6 +13,7 @@
 //! | `protocol`, `serve`, `worker` | processes and their messages |
 //! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
 //! | `store` | the folder of results |
+//! | `planned` | items as files, for many processes on many hosts |
 
 mod answer;
 mod bounds;
@@ -21,6 +22,7 @@ mod item;
 mod npy;
 mod npy_header;
 mod plan;
+mod planned;
 mod progress;
 mod protocol;
 mod provenance;
@@ -43,7 +45,11 @@ pub use answer::{Fault, LevelRun, Times, answer};
 pub use item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
 pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_npy_header};
 pub use npy_header::HeaderError;
-pub use plan::{PlanError, Tally, count, missing, run_items};
+pub use plan::{PlanError, Tally, count, missing, refused_params, run_items};
+pub use planned::{
+    Division, GatherError, Gathered, Plan, Planned, PlannedError, done_file, gather, keep_done,
+    not_done, read_done, write_plan,
+};
 pub use progress::{Progress, Verbosity};
 pub use protocol::CheckItem;
 pub use provenance::{Provenance, hex, hex_digest, peak_bytes, shell_line};
