@@ -12,7 +12,7 @@ use crate::interrupt;
 use crate::output::{counted, print_json, print_line};
 use crate::run::{
     Division, Failures, Here, Item, Provenance, RESULTS, Registry, Store, Study, Supervisor,
-    missing, refused_params, shell_line, write_plan,
+    check_travels, missing, refused_params, shell_line, write_plan,
 };
 
 /// Arguments of `plan`.
@@ -47,6 +47,7 @@ pub fn run(
     let mut study = Study::read(&arguments.study)?;
     study.threads = global.threads.or(study.threads);
     study.plugins.extend(global.plugins.iter().cloned());
+    check_travels(&study)?;
     let provenance = Provenance::here();
     let mut items = study.items(registry, &Here::of(&provenance))?;
     if let Some(dir) = &arguments.without {

@@ -47,8 +47,8 @@ pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_np
 pub use npy_header::HeaderError;
 pub use plan::{PlanError, Tally, count, missing, refused_params, run_items};
 pub use planned::{
-    Division, GatherError, Gathered, Plan, Planned, PlannedError, done_file, gather, keep_done,
-    not_done, read_done, write_plan,
+    Division, GatherError, Gathered, Plan, Planned, PlannedError, check_travels, done_file, gather,
+    keep_done, not_done, read_done, write_plan,
 };
 pub use progress::{Progress, Verbosity};
 pub use protocol::CheckItem;

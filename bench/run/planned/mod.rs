@@ -35,7 +35,7 @@ use super::{Item, Provenance, Source, hex_digest};
 
 pub use done::{done_file, keep_done, read_done};
 pub use gather::{GatherError, Gathered, gather, not_done};
-pub use write::{Division, write_plan};
+pub use write::{Division, check_travels, write_plan};
 
 /// Name of the file that makes a folder a planned one.
 pub const PLAN: &str = "plan.json";

@@ -23,6 +23,21 @@ pub enum Division {
     ByLevel,
 }
 
+/// Refuses a study with parts that cannot be carried to another machine.
+///
+/// # Errors
+/// [`PlannedError::Study`], which names them.
+pub fn check_travels(study: &Study) -> Result<(), PlannedError> {
+    if let Some(plugin) = study.plugins.first() {
+        return Err(PlannedError::Study(format!(
+            "{}: a plan takes no plug-ins, since what their programs need cannot be carried along; run those methods \
+             with `medial compare`",
+            plugin.display()
+        )));
+    }
+    Ok(())
+}
+
 /// Writes a planned folder: inputs, study and items, and `plan.json` last, so that a folder with one is complete. The
 /// same study into the same folder again changes nothing.
 ///
@@ -35,13 +50,7 @@ pub fn write_plan(
     division: Division,
     provenance: &Provenance,
 ) -> Result<Planned, PlannedError> {
-    if let Some(plugin) = study.plugins.first() {
-        return Err(PlannedError::Study(format!(
-            "{}: a plan takes no plug-ins, since what their programs need cannot be carried along; run those methods \
-             with `medial compare`",
-            plugin.display()
-        )));
-    }
+    check_travels(study)?;
     fs::create_dir_all(dir.join(MESHES)).map_err(io_error(dir))?;
     let places = places(items);
     let path = dir.join(ITEMS);
