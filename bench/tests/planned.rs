@@ -28,8 +28,8 @@ fn json(arguments: &[&str]) -> (i32, Value) {
 /// A study of one file, under two names, and one built-in shape, with two methods at two counts.
 fn study(dir: &Path) -> PathBuf {
     for name in ["ball.off", "same.OFF"] {
-        let words =
-            ["datasets", "make", "sphere", "--resolution", "8", "-o", text(&dir.join(name))];
+        let path = dir.join(name);
+        let words = ["datasets", "make", "sphere", "--resolution", "8", "-o", text(&path)];
         let written = run(MEDIAL, &words);
         assert_eq!(code(&written), 0, "{}", stderr(&written));
     }
@@ -153,7 +153,8 @@ fn gathering_again_gives_the_same_bytes_and_names_what_is_missing() {
 
     // What a store has need not be planned again.
     let file = dir.path().join("study.toml");
-    let words = ["plan", text(&file), "-o", text(&dir.path().join("rest")), "--without"];
+    let rest = dir.path().join("rest");
+    let words = ["plan", text(&file), "-o", text(&rest), "--without"];
     let (_, rest) = json(&[&words[..], &[text(&store)]].concat());
     assert_eq!(rest["items"], 0, "{rest}");
 }
@@ -284,6 +285,7 @@ fn jobs_are_written_for_what_is_missing() {
         let time = script.lines().find_map(|line| line.strip_prefix("#SBATCH --time="));
         time.expect("a limit").parse().expect("minutes")
     };
-    let like = ["--like", text(&dir.path().join("store"))];
+    let store = dir.path().join("store");
+    let like = ["--like", text(&store)];
     assert!(minutes(&like) < minutes(&[]), "{} {}", minutes(&like), minutes(&[]));
 }
