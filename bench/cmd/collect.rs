@@ -36,17 +36,18 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let mut store = Store::open(out, RESULTS, "medial collect")?;
     store.remarks.iter().for_each(|remark| note(global, remark));
     let gathered = gather(&planned, &mut store)?;
-    let any = gathered.added > 0 || gathered.complete > 0;
     if gathered.added > 0 && *out != arguments.dir {
         let study = Study::read(&arguments.dir.join(report::STUDY))?;
         report::write_study(out, &study, None)?;
     }
-    let mut page = None;
-    if !arguments.no_report && any {
+    let page = out.join("index.html");
+    let any = gathered.added > 0 || gathered.complete > 0;
+    // A page of the same records stands: adding one had removed it.
+    if !arguments.no_report && any && !page.exists() {
         let rebuilt = report::refresh(out, registry, &provenance, gathered.added)?;
         rebuilt.undrawn.iter().for_each(|why| note(global, why));
-        page = Some(out.join("index.html"));
     }
+    let page = page.exists().then_some(page);
     drop(store);
     tell(&planned, &gathered, out, page.as_deref(), global);
     Ok(if gathered.missing == 0 { Exit::Done } else { Exit::SomeFailed })

@@ -181,3 +181,62 @@ fn most<'s>(seen: impl Iterator<Item = (&'s Seen, f64)>) -> (f64, f64) {
         (f64::max(seconds, seen.seconds * factor), f64::max(bytes, seen.bytes * factor))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn item(mesh: &str, levels: serde_json::Value) -> Item {
+        let item = serde_json::json!({
+            "scene": {
+                "mesh": mesh, "source": { "file": "nowhere.off" }, "hash": mesh, "sampling": "vertices", "dual": "fan",
+                "measure": { "samples": 100, "volume_depth": 5, "seed": 0 },
+            },
+            "method": { "id": "qmat", "params": {} },
+            "levels": levels, "seed": 0, "repeat": 1, "threads": 1,
+            "limits": { "seconds": 300.0, "bytes": 8_000_000_000_u64 }, "binary": "",
+        });
+        serde_json::from_value(item).unwrap()
+    }
+
+    fn seen(mesh: &str, size: f64, seconds: f64) -> Seen {
+        let (mesh, size) = (mesh.to_owned(), Some(size));
+        Seen { hash: Some(mesh.clone()), mesh, size, seconds, bytes: 1e9 }
+    }
+
+    fn earlier() -> Earlier {
+        let seen = vec![seen("small", 1000.0, 1.0), seen("large", 8000.0, 10.0)];
+        let sizes = [("small", 1000.0), ("large", 8000.0), ("huge", 32_000.0)];
+        Earlier {
+            seen: [("qmat".to_owned(), seen)].into(),
+            sizes: sizes.map(|(mesh, size)| (mesh.to_owned(), size)).into(),
+            others: vec![],
+        }
+    }
+
+    #[test]
+    fn the_same_mesh_counts_and_else_one_of_nearest_size() {
+        let two = || serde_json::json!([{ "spheres": 50 }, { "spheres": 20 }]);
+        let seconds = |mesh: &str| earlier().need(0, &item(mesh, two()), Path::new(".")).seconds;
+        assert_eq!(seconds("small"), START + TIME_MARGIN * 2.0);
+        assert_eq!(seconds("large"), START + TIME_MARGIN * 20.0);
+        // Four times as large: eight times as long, which the limits allow.
+        assert!((seconds("huge") - (START + TIME_MARGIN * 160.0)).abs() < 1e-6);
+        let need = earlier().need(0, &item("small", two()), Path::new("."));
+        assert_eq!(need.bytes, PROGRAM + MEMORY_MARGIN * 1e9);
+    }
+
+    #[test]
+    fn what_is_not_known_or_was_ended_gets_all_that_is_allowed() {
+        let one = serde_json::json!([{ "spheres": 50 }, { "max_error": 0.01 }]);
+        let unknown = item("unknown", one.clone());
+        let most = Need::at_most(0, &unknown);
+        assert_eq!((most.seconds, most.bytes), (START + 4.0 * 300.0, 8e9 + PROGRAM));
+        assert_eq!(earlier().need(0, &unknown, Path::new(".")), most);
+        assert_eq!(Earlier::default().need(0, &unknown, Path::new(".")), most);
+        let mut ended = earlier();
+        ended.seen.get_mut("qmat").unwrap().push(seen("small", 1000.0, f64::INFINITY));
+        let need = ended.need(0, &item("small", one), Path::new("."));
+        assert_eq!(need.seconds, most.seconds);
+    }
+}
