@@ -155,7 +155,7 @@ fn write_items(
             block.push(b'\n');
             plan.items += 1;
             plan.levels += part.levels.len();
-            if plan.items % BLOCK == 0 {
+            if plan.items.is_multiple_of(BLOCK) {
                 write_block(out, &mut block, &mut offset, plan)?;
             }
         }
