@@ -4,8 +4,8 @@
     scripts/scale.py ITEMS [MEDIAL] [FOLDER]
 
 1. A study of ITEMS / 10 small meshes, ten methods, ten counts; `plan`, and `plan --split` for ten times as many items.
-2. A record for each level of the first plan, made from a real one: the done files of all items but the last.
-3. `collect`, twice; `submit --dry-run`, which looks for what is missing.
+2. A record for each level, made from a real one: the done files of all items of both plans but the last.
+3. Of both `collect`, twice; `submit --dry-run`, which looks for what is missing.
 
 Prints wall-clock seconds, the largest resident size and the sizes of the files. Needs Python 3 and nothing else.
 """
@@ -97,20 +97,22 @@ def main():
     by_level = measured("plan --split", "plan", str(study), "-o", str(split), "--split")
     print(f"  {by_level['items']} items; items.jsonl {size(split / 'items.jsonl'):.0f} MB, "
           f"plan.json {size(split / 'plan.json'):.2f} MB")
-    measured("run-item of the split plan", "run-item", str(split), "--number", str(by_level["items"] - 1))
+    measured("run-item (split)", "run-item", str(split), "--number", str(by_level["items"] - 2))
     measured("submit, all missing (split)", "submit", str(split), "--engine", "slurm", "--dry-run")
     measured("run-item, first", "run-item", str(plan), "--number", "0")
     template = next((plan / "done").rglob("*.jsonl")).read_text().splitlines()[0]
     measured("run-item, found", "run-item", str(plan), "--number", "0")
-    make_done(plan, template)
-    print(f"  done: {size(plan / 'done'):.0f} MB")
-    collect = ["collect", str(plan), "--no-report"]
-    first = measured("collect", *collect, codes=(3,))
-    assert (first["missing"], first["added"]) == (1, planned["levels"] - len(COUNTS)), first
-    again = measured("collect again", *collect, codes=(3,))
-    assert (again["missing"], again["added"]) == (1, 0), again
-    measured("submit, one missing", "submit", str(plan), "--engine", "slurm", "--dry-run")
-    print(f"  results.jsonl {size(plan / 'results.jsonl'):.0f} MB; in {folder}")
+    for what, levels in [(plan, len(COUNTS)), (split, 1)]:
+        make_done(what, template)
+        print(f"  {what.name}: done {size(what / 'done'):.0f} MB")
+        collect = ["collect", str(what), "--no-report"]
+        first = measured("collect", *collect, codes=(3,))
+        assert (first["missing"], first["added"]) == (1, planned["levels"] - levels), first
+        again = measured("collect again", *collect, codes=(3,))
+        assert (again["missing"], again["added"]) == (1, 0), again
+        measured("submit, one missing", "submit", str(what), "--engine", "slurm", "--dry-run")
+        print(f"  results.jsonl {size(what / 'results.jsonl'):.0f} MB")
+    print(f"in {folder}")
 
 
 main()
