@@ -65,8 +65,14 @@ pub enum Verb {
     Report(cmd::report::Arguments),
     /// Say what this machine lacks for oracles and baselines.
     Doctor(cmd::doctor::Arguments),
-    /// Run one item of a comparison, and print its records.
+    /// Write the items of a study into a folder, for many processes on any number of hosts.
+    Plan(cmd::plan::Arguments),
+    /// Run one item of a comparison, and print its records; or items of a planned folder.
     RunItem(cmd::run_item::Arguments),
+    /// Gather what was run of a planned folder into a folder of results.
+    Collect(cmd::collect::Arguments),
+    /// Give what is missing of a planned folder to a batch engine.
+    Submit(cmd::submit::Arguments),
     /// Print shell completions.
     Completions(cmd::completions::Arguments),
     /// Serve items on standard input: what `compare` starts.
@@ -158,6 +164,9 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
         Verb::Completions(arguments) => cmd::completions::run(&arguments, &mut command()),
         Verb::RunItem(arguments) => cmd::run_item::run(&arguments, global, registry),
+        Verb::Plan(arguments) => cmd::plan::run(&arguments, global, registry),
+        Verb::Collect(arguments) => cmd::collect::run(&arguments, global, registry),
+        Verb::Submit(arguments) => cmd::submit::run(&arguments, global),
         Verb::Worker(arguments) => cmd::worker::run(&arguments, registry),
     }
 }

@@ -1,6 +1,6 @@
 //! `medial compare [MESH ...]`: the main job. Methods x meshes x levels, measured and reported.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -14,7 +14,7 @@ use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::run::{
     AXES, Here, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
-    Study, StudyMethod, Supervisor, Tally, count, missing, run_items,
+    Study, StudyMethod, Supervisor, Tally, count, missing, refused_params, run_items,
 };
 
 /// Arguments of `compare`.
@@ -111,7 +111,9 @@ pub fn run(
         true => (items.clone(), Tally::default()),
         false => missing(&items, &store, arguments.retry_failed.into()),
     };
-    check_params(&left, &mut supervisor)?;
+    if let Some(why) = refused_params(&left, &mut supervisor)? {
+        return Err(Failure::usage(why));
+    }
     // No result is touched before this line.
     if arguments.fresh {
         store.clear(RESULTS)?;
@@ -225,20 +227,6 @@ fn named<'s>(
         return Err(Failure::usage(format!("{option}: `{id}` is not among the methods that run")));
     }
     Ok(rows)
-}
-
-/// Finds wrong parameters before anything is run, by preparing on the smallest of shapes.
-fn check_params(items: &[Item], supervisor: &mut Supervisor<'_>) -> Result<(), Failure> {
-    let mut seen = HashSet::new();
-    for item in items.iter().filter(|item| !item.method.params.0.is_empty()) {
-        let method = serde_json::to_string(&item.method).map_err(Failure::usage)?;
-        if seen.insert(method)
-            && let Some(why) = supervisor.refused_params(item)?
-        {
-            return Err(Failure::usage(format!("{}: {why}", item.method.id)));
-        }
-    }
-    Ok(())
 }
 
 fn interrupt_message(left: &[Item], tally: Tally) -> Exit {

@@ -15,7 +15,7 @@ use crate::output::{print_json, print_line};
 use crate::run::{Provenance, RESULTS, Registry, Source, Store, Study};
 
 /// Name of the file with the study that was asked last.
-const STUDY: &str = "study.toml";
+pub const STUDY: &str = "study.toml";
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]

@@ -14,6 +14,7 @@
 //! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
 //! | `store` | the folder of results |
 //! | `alternate` | two builds that take turns |
+//! | `planned` | items as files, for many processes on many hosts |
 //! | `parcel` | results from another machine |
 
 mod alternate;
@@ -25,6 +26,7 @@ mod npy;
 mod npy_header;
 mod parcel;
 mod plan;
+mod planned;
 mod progress;
 mod protocol;
 mod provenance;
@@ -49,7 +51,11 @@ pub use item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
 pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_npy_header};
 pub use npy_header::HeaderError;
 pub use parcel::{Opened, Packed, ParcelError, Rejudged, Surfaces, open, pack, rejudge};
-pub use plan::{PlanError, Tally, count, missing, run_items};
+pub use plan::{PlanError, Tally, count, missing, refused_params, run_items};
+pub use planned::{
+    Division, GatherError, Gathered, Plan, Planned, PlannedError, check_travels, done_file, gather,
+    keep_done, not_done, read_done, write_plan,
+};
 pub use progress::{Progress, Verbosity};
 pub use protocol::CheckItem;
 pub use provenance::{Provenance, hex, hex_digest, peak_bytes, shell_line};

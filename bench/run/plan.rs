@@ -5,7 +5,7 @@ use medial_reports::{Record, Status};
 use super::record::{Kept, median};
 use super::store::{Failures, Store, StoreError};
 use super::supervise::{RunError, Supervisor, merge};
-use super::{Item, Progress};
+use super::{Item, MethodSpec, Progress};
 
 /// The counts of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,6 +42,26 @@ pub fn missing(items: &[Item], store: &Store, failures: Failures) -> (Vec<Item>,
         }
     }
     (left, tally)
+}
+
+/// Why a method does not take its parameters, found before anything is run, by preparing on the smallest of shapes.
+///
+/// # Errors
+/// When the user interrupts, or no worker can be started.
+pub fn refused_params(
+    items: &[Item],
+    supervisor: &mut Supervisor<'_>,
+) -> Result<Option<String>, RunError> {
+    let mut seen: Vec<&MethodSpec> = Vec::new();
+    for item in items.iter().filter(|item| !item.method.params.0.is_empty()) {
+        if !seen.contains(&&item.method) {
+            seen.push(&item.method);
+            if let Some(why) = supervisor.refused_params(item)? {
+                return Ok(Some(format!("{}: {why}", item.method.id)));
+            }
+        }
+    }
+    Ok(None)
 }
 
 /// Runs items and passes their records to `keep`, as soon as each item is done. With repetitions, the

@@ -15,7 +15,7 @@ use super::hex_digest;
 use super::similar::did_you_mean;
 
 /// Where a mesh comes from.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
     /// A surface file.

@@ -6,14 +6,16 @@
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Read, Seek, Write};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
+use std::time::Duration;
 
 use medial::simplifier::Level;
-use medial_reports::{Journal, JournalError, Status, read_records};
+use medial_reports::{Journal, JournalError, Record, Status, read_records};
 use serde::{Deserialize, Serialize};
 
 use super::Item;
+use super::planned::PLAN;
 
 /// Name of the append-only list of records of a comparison.
 pub const RESULTS: &str = "results.jsonl";
@@ -21,6 +23,8 @@ pub const RESULTS: &str = "results.jsonl";
 pub const AXES: &str = "axes";
 /// Name of the file that names the process that holds a store.
 const LOCK: &str = ".lock";
+/// No file is written for longer than this, whatever the clocks of two hosts differ by.
+const ABANDONED: Duration = Duration::from_secs(24 * 3600);
 
 /// A folder of results that this process may add to.
 pub struct Store {
@@ -121,7 +125,9 @@ impl Store {
                 path.display()
             ));
         }
-        remove_temporaries(dir);
+        // In a planned folder other processes write without a lock: only what is old is nobody's.
+        let age = if dir.join(PLAN).exists() { ABANDONED } else { Duration::ZERO };
+        remove_temporaries(dir, age);
         let known = read_known(&path).map_err(failed(&path))?;
         let journal = Journal::open(&path)?;
         Ok(Self {
@@ -182,6 +188,29 @@ impl Store {
         Ok(self.journal.append_lines(lines)?)
     }
 
+    /// Whether a record that another process made of this item says more than what is here: there is none of its key,
+    /// or one that has to be run again, or a failure where it is none.
+    pub fn wants(&self, item: &Item, record: &Record) -> bool {
+        let Some(known) = self.known.get(&record.key) else { return true };
+        let new = Known::of(record);
+        let incomplete = |known: &Known| known.is_incomplete(item, Failures::Kept);
+        (incomplete(known) && !incomplete(&new))
+            || (known.status.is_failure() && !new.status.is_failure())
+    }
+
+    /// Adds records that other processes made, and knows them from then on.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn take(&mut self, records: &[Record]) -> Result<(), StoreError> {
+        if records.is_empty() {
+            return Ok(());
+        }
+        self.keep(records)?;
+        self.known.extend(records.iter().map(|record| (record.key.clone(), Known::of(record))));
+        Ok(())
+    }
+
     /// Removes the page, which no longer matches the records.
     fn withdraw_page(&mut self) -> Result<(), StoreError> {
         if !self.page_withdrawn {
@@ -210,6 +239,16 @@ impl From<bool> for Failures {
 }
 
 impl Known {
+    fn of(record: &Record) -> Self {
+        let limits = record.conditions.as_ref();
+        Self {
+            status: record.status,
+            repetitions: record.repetitions.len(),
+            seconds_limit: limits.map_or(0.0, |limits| limits.seconds_limit),
+            bytes_limit: limits.map_or(0, |limits| limits.bytes_limit),
+        }
+    }
+
     fn is_incomplete(&self, item: &Item, failures: Failures) -> bool {
         match self.status {
             Status::TimedOut if item.limits.seconds > self.seconds_limit => true,
@@ -251,41 +290,64 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
 
 /// Cuts off an incomplete last line; returns whether there was one.
 fn cut_torn_line(path: &Path) -> io::Result<bool> {
-    let bytes = match fs::read(path) {
+    let mut file = match OpenOptions::new().read(true).append(true).open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
-        bytes => bytes?,
+        file => file?,
     };
-    let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
-    if whole == bytes.len() {
+    let (whole, torn) = last_line(&mut file)?;
+    if torn.is_empty() {
         return Ok(false);
     }
     // A complete record that only lacks its line break is kept.
-    let file = OpenOptions::new().append(true).open(path)?;
-    if serde_json::from_slice::<serde::de::IgnoredAny>(&bytes[whole..]).is_ok() {
-        (&file).write_all(b"\n")?;
+    if serde_json::from_slice::<serde::de::IgnoredAny>(&torn).is_ok() {
+        file.write_all(b"\n")?;
         return Ok(false);
     }
-    file.set_len(whole as u64)?;
+    file.set_len(whole)?;
     Ok(true)
+}
+
+/// What stands behind the last line break, and where it begins. Read from the end: of millions of records nobody wants
+/// to wait for the first.
+fn last_line(file: &mut File) -> io::Result<(u64, Vec<u8>)> {
+    const STEP: u64 = 1 << 16;
+    let length = file.metadata()?.len();
+    let (mut begin, mut tail) = (length, Vec::new());
+    while begin > 0 {
+        let from = begin.saturating_sub(STEP);
+        let mut piece = vec![0; (begin - from) as usize];
+        file.seek(SeekFrom::Start(from))?;
+        file.read_exact(&mut piece)?;
+        piece.extend(tail);
+        (begin, tail) = (from, piece);
+        if let Some(end) = tail.iter().rposition(|&byte| byte == b'\n') {
+            return Ok((begin + end as u64 + 1, tail.split_off(end + 1)));
+        }
+    }
+    Ok((0, tail))
 }
 
 /// The state of each key, from its last line.
 fn read_known(path: &Path) -> io::Result<HashMap<String, Known>> {
-    let bytes = match fs::read(path) {
+    let mut file = match File::open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(HashMap::new()),
-        bytes => bytes?,
+        file => BufReader::new(file?),
     };
     let mut known = HashMap::new();
-    for line in bytes.split(|&byte| byte == b'\n') {
-        let Some(stub) = stub(line) else { continue };
-        let limits = stub.conditions;
-        let (seconds_limit, bytes_limit) =
-            limits.map_or((0.0, 0), |limits| (limits.seconds_limit, limits.bytes_limit));
-        let repetitions = stub.repetitions.len();
-        known.insert(
-            stub.key,
-            Known { status: stub.status, repetitions, seconds_limit, bytes_limit },
-        );
+    let mut line = Vec::new();
+    // Line by line: millions of records need not fit into memory for their states.
+    while file.read_until(b'\n', &mut line)? > 0 {
+        if let Some(stub) = stub(line.trim_ascii_end()) {
+            let limits = stub.conditions;
+            let (seconds_limit, bytes_limit) =
+                limits.map_or((0.0, 0), |limits| (limits.seconds_limit, limits.bytes_limit));
+            let repetitions = stub.repetitions.len();
+            known.insert(
+                stub.key,
+                Known { status: stub.status, repetitions, seconds_limit, bytes_limit },
+            );
+        }
+        line.clear();
     }
     Ok(known)
 }
@@ -317,8 +379,8 @@ fn remove_artifacts(dir: &Path, journal: &Path) {
 }
 
 /// Removes temporary files that this program left behind, only in the folders that it writes to. The
-/// lock is held, so none is in use.
-fn remove_temporaries(dir: &Path) {
+/// lock is held, so none of this age is in use.
+fn remove_temporaries(dir: &Path, age: Duration) {
     let mut folders = vec![dir.to_owned(), dir.join("tables"), dir.join("plots")];
     for results in [AXES, "stability"] {
         let meshes = fs::read_dir(dir.join(results)).into_iter().flatten().flatten();
@@ -329,7 +391,9 @@ fn remove_temporaries(dir: &Path) {
     for entry in entries {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if name.starts_with(".medial-") && name.ends_with(".tmp") {
+        let written = || entry.metadata().and_then(|file| file.modified()).ok()?.elapsed().ok();
+        let old = || age.is_zero() || written().is_some_and(|since| since >= age);
+        if name.starts_with(".medial-") && name.ends_with(".tmp") && old() {
             let _ = fs::remove_file(entry.path());
         }
     }

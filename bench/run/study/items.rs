@@ -1,5 +1,6 @@
 //! From a study to its items.
 
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use medial::simplifier::Level;
@@ -93,15 +94,11 @@ impl Study {
                 return Err(StudyError::Value(message));
             }
         }
-        let mut distinct: Vec<Source> = Vec::with_capacity(sources.len());
-        for source in sources {
-            source.check()?;
-            // The same mesh twice would be one row with twice the weight.
-            if !distinct.contains(&source) {
-                distinct.push(source);
-            }
-        }
-        Ok(distinct)
+        sources.iter().try_for_each(Source::check)?;
+        // The same mesh twice would be one row with twice the weight.
+        let mut seen = HashSet::new();
+        sources.retain(|source| seen.insert(source.clone()));
+        Ok(sources)
     }
 
     /// All items, mesh by mesh.
@@ -215,21 +212,23 @@ fn hash_of(path: &Path) -> Result<String, StudyError> {
 /// A name for each source, unlike every other even as the stem of a file: the file's stem, where
 /// that is not enough its name with the extension, then with its folder, then a number.
 fn unique_names(sources: &[Source]) -> Vec<String> {
-    let key = |name: &String| medial_reports::file_stem(name).to_ascii_lowercase();
+    let key = |name: &str| medial_reports::file_stem(name).to_ascii_lowercase();
     let mut names: Vec<String> = sources.iter().map(Source::name).collect();
     for depth in 1..=2 {
-        let keys: Vec<String> = names.iter().map(key).collect();
+        let mut count: HashMap<String, usize> = HashMap::new();
+        names.iter().for_each(|name| *count.entry(key(name)).or_default() += 1);
         for (name, source) in names.iter_mut().zip(sources) {
-            if keys.iter().filter(|&other| *other == key(name)).count() > 1 {
+            if count[&key(name)] > 1 {
                 *name = source.long_name(depth);
             }
         }
     }
-    for index in 0..names.len() {
-        let base = names[index].clone();
+    let mut taken = HashSet::new();
+    for name in &mut names {
+        let base = name.clone();
         let mut number = 2;
-        while names[..index].iter().any(|other| key(other) == key(&names[index])) {
-            names[index] = format!("{base}-{number}");
+        while !taken.insert(key(name)) {
+            *name = format!("{base}-{number}");
             number += 1;
         }
     }

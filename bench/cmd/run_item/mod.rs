@@ -1,7 +1,10 @@
-//! `medial run-item ITEM.json`: one item, and its records, one a line.
+//! `medial run-item ITEM.json`: one item, and its records, one a line. `medial run-item DIR --number N`: an item of a
+//! planned folder, into that folder.
 //!
 //! With `--out` the records are kept in a folder of results, and those that are there already are
 //! printed without running anything: calling it again does no harm.
+
+mod planned;
 
 use std::fs;
 use std::path::PathBuf;
@@ -21,11 +24,14 @@ use crate::run::{
 /// Arguments of `run-item`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The item, as JSON.
+    /// The item, as JSON, or a planned folder.
     item: PathBuf,
     /// Folder of results, for the records and the medial meshes.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Items of the planned folder, by their numbers from 0: `7`, `7,9`, `0-99`. What was run before is not run again.
+    #[arg(long, value_name = "N", value_delimiter = ',', conflicts_with = "out")]
+    number: Vec<planned::Numbers>,
 }
 
 /// Runs the verb.
@@ -33,7 +39,14 @@ pub struct Arguments {
 /// # Errors
 /// When the item cannot be read, was planned by another build, or the records cannot be kept.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
+    if !arguments.number.is_empty() {
+        return planned::run(&arguments.item, &arguments.number, global, registry);
+    }
     let failed = |error: String| Failure::input(format!("{}: {error}", arguments.item.display()));
+    if arguments.item.is_dir() {
+        let message = "a folder; say which items of it, as in --number 0".to_owned();
+        return Err(Failure::usage(format!("{}: {message}", arguments.item.display())));
+    }
     let text = fs::read_to_string(&arguments.item).map_err(|error| failed(error.to_string()))?;
     let item: Item = serde_json::from_str(&text).map_err(|error| failed(error.to_string()))?;
     let provenance = Provenance::here();
