@@ -69,10 +69,12 @@ pub enum Verb {
     Plan(cmd::plan::Arguments),
     /// Run one item of a comparison, and print its records; or items of a planned folder.
     RunItem(cmd::run_item::Arguments),
-    /// Gather what was run of a planned folder into a folder of results.
+    /// Gather what was run of a planned folder, or results that others submit.
     Collect(cmd::collect::Arguments),
     /// Give what is missing of a planned folder to a batch engine.
     Submit(cmd::submit::Arguments),
+    /// Pack a folder of results into an archive, for others to collect.
+    SubmitResults(cmd::submit_results::Arguments),
     /// Print shell completions.
     Completions(cmd::completions::Arguments),
     /// Serve items on standard input: what `compare` starts.
@@ -167,6 +169,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Plan(arguments) => cmd::plan::run(&arguments, global, registry),
         Verb::Collect(arguments) => cmd::collect::run(&arguments, global, registry),
         Verb::Submit(arguments) => cmd::submit::run(&arguments, global),
+        Verb::SubmitResults(arguments) => cmd::submit_results::run(&arguments, global),
         Verb::Worker(arguments) => cmd::worker::run(&arguments, registry),
     }
 }

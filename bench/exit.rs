@@ -3,7 +3,8 @@
 use std::process::ExitCode;
 
 use crate::run::{
-    GatherError, InputError, PlanError, PlannedError, RunError, Source, StoreError, StudyError,
+    GatherError, InputError, ParcelError, PlanError, PlannedError, RunError, Source, StoreError,
+    StudyError,
 };
 
 /// Exit codes of the command.
@@ -91,6 +92,12 @@ impl From<PlanError> for Failure {
             PlanError::Run(error) => error.into(),
             PlanError::Store(error) => error.into(),
         }
+    }
+}
+
+impl From<ParcelError> for Failure {
+    fn from(error: ParcelError) -> Self {
+        Self::input(error)
     }
 }
 

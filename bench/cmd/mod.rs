@@ -25,6 +25,7 @@ pub mod run_item;
 pub mod simplify;
 pub mod stability;
 pub mod submit;
+pub mod submit_results;
 pub mod triangulate;
 pub mod voxels;
 pub mod worker;

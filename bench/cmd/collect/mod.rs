@@ -1,12 +1,15 @@
-//! `medial collect DIR`: what was run of a planned folder becomes a folder of results, with its report.
+//! `medial collect DIR`: what was run of a planned folder becomes a folder of results, with its report. An archive that
+//! somebody else packed is taken in likewise.
+
+mod submitted;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
 
-use super::report;
 use crate::args::Global;
+use crate::cmd::report;
 use crate::exit::{Exit, Failure};
 use crate::output::{counted, note, print_json, print_line};
 use crate::run::{Gathered, Planned, Provenance, RESULTS, Registry, Store, Study, gather};
@@ -14,7 +17,7 @@ use crate::run::{Gathered, Planned, Provenance, RESULTS, Registry, Store, Study,
 /// Arguments of `collect`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The planned folder.
+    /// The planned folder, or an archive that `medial submit-results` made.
     dir: PathBuf,
     /// Folder of the results; what it has already stays [default: the planned folder itself].
     #[arg(long, value_name = "STORE")]
@@ -22,6 +25,12 @@ pub struct Arguments {
     /// Leave out tables, plots and page; `medial report` makes them.
     #[arg(long)]
     no_report: bool,
+    /// Of an archive: the share of its medial meshes that is measured again.
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0)]
+    rejudge: f64,
+    /// Of an archive: surfaces for that, beside the built-in shapes.
+    #[arg(long, value_name = "FILES", num_args = 1..)]
+    meshes: Vec<PathBuf>,
 }
 
 /// Runs the verb. It can be run as often as wanted, also while items are still run.
@@ -29,6 +38,9 @@ pub struct Arguments {
 /// # Errors
 /// When the folder is none of a plan or was changed, or the results cannot be written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
+    if arguments.dir.is_file() {
+        return submitted::run(arguments, global, registry);
+    }
     let planned = Planned::open(&arguments.dir)?;
     let out = arguments.out.as_ref().unwrap_or(&arguments.dir);
     // The command of the plan made the records, not this one.
