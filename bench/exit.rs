@@ -15,6 +15,8 @@ pub enum Exit {
     Usage = 2,
     /// Some runs failed or are unsupported, the rest are reported.
     SomeFailed = 3,
+    /// Something became worse.
+    Regression = 4,
     /// Nothing was measured.
     NothingMeasured = 5,
     /// The user interrupted: what shells give for a program ended from the keyboard.

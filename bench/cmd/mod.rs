@@ -10,6 +10,7 @@ pub mod datasets;
 pub mod doctor;
 pub mod evaluate;
 pub mod hierarchy;
+pub mod history;
 pub mod info;
 pub mod methods;
 pub mod paper;

@@ -38,7 +38,9 @@ pub enum HistoryError {
     #[error("date {0:?}: a date is YYYY-MM-DD")]
     Date(String),
     /// The records are of more than one machine, or of more than one study.
-    #[error("{mesh}, {row}: {what} differs from that of the other records: a night is one study on one machine")]
+    #[error(
+        "{mesh}, {row}: {what} differs from that of the other records: a night is one study on one machine"
+    )]
     Mixed {
         /// Mesh of the record.
         mesh: String,

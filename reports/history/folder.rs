@@ -31,7 +31,9 @@ impl History {
                 Err(error) => history.damaged.push(error),
             }
         }
-        history.nights.sort_by(|a, b| (&a.date, a.turn, &a.commit).cmp(&(&b.date, b.turn, &b.commit)));
+        history
+            .nights
+            .sort_by(|a, b| (&a.date, a.turn, &a.commit).cmp(&(&b.date, b.turn, &b.commit)));
         Ok(history)
     }
 
@@ -54,7 +56,8 @@ impl History {
         let others = if folder.exists() { Self::read(folder)?.nights } else { Vec::new() };
         let turns = others.iter().filter(|other| other.date == night.date).map(|other| other.turn);
         night.turn = turns.max().unwrap_or(0) + 1;
-        replace_file(&path, night.to_text().as_bytes()).map_err(|source| io_error(&path, source))?;
+        replace_file(&path, night.to_text().as_bytes())
+            .map_err(|source| io_error(&path, source))?;
         Ok((path, true))
     }
 }

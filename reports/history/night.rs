@@ -272,7 +272,8 @@ fn machine(machine: &Machine) -> String {
 
 fn conditions(record: &Record) -> String {
     let given = record.conditions.clone().unwrap_or_default();
-    let seeds: Vec<String> = record.seeds.iter().map(|(what, seed)| format!("{what} {seed}")).collect();
+    let seeds: Vec<String> =
+        record.seeds.iter().map(|(what, seed)| format!("{what} {seed}")).collect();
     let threads = record.simplify.threads.map_or(NONE.to_owned(), |threads| threads.to_string());
     printable(&format!(
         "sampling {}; dual {}; samples {}; seeds {}; threads {threads}",
@@ -394,7 +395,11 @@ impl<'a> Reader<'a> {
         Ok((SeriesName { mesh, row, level }, figures))
     }
 
-    fn number<T: std::str::FromStr>(&self, what: &str, text: &str) -> Result<Option<T>, HistoryError> {
+    fn number<T: std::str::FromStr>(
+        &self,
+        what: &str,
+        text: &str,
+    ) -> Result<Option<T>, HistoryError> {
         // A number that is not finite parses as one.
         let finite = text.bytes().all(|byte| b"0123456789.e-+".contains(&byte));
         match text {

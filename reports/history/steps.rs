@@ -4,9 +4,9 @@
 //! binary segmentation, Biometrika 110(1), 2023, doi:10.1093/biomet/asac052), with steps of our own:
 //!
 //! 1. Logarithms, so that a step is a ratio and noise does not grow with the value.
-//! 2. Spikes are clipped against the local median: a night on a loaded machine is no step. The window is as short
+//! 2. Spikes are replaced by the local median: a night on a loaded machine is no step. The window is as short
 //!    as can be with the nights that a step must last still its majority, and keeps its length at the ends: a step is
-//!    clipped as long as it has not lasted, and no longer.
+//!    taken for a spike as long as it has not lasted, and no longer.
 //! 3. Noise: from the differences of neighbouring nights, where steps hardly count.
 //! 4. In each of a fixed set of intervals of all lengths: the split that lessens the squares most. A short interval finds a
 //!    short episode, such as a regression that was mended after two weeks, which no split of the whole shows.
@@ -20,15 +20,11 @@
 
 use super::student;
 
-/// Robust standard deviations at which a value is clipped. The median of a short window lies near its
+/// Robust standard deviations at which a value is a spike. The median of a short window lies near its
 /// own value, so these are smaller than those of the noise by a fifth.
 const CLIPPED_AT: f64 = 4.0;
 
-/// Where more values than this share stand out, they are no spikes but the noise itself: a memory that
-/// goes back and forth between two values, say.
-const SPIKES: f64 = 0.05;
-
-/// In a short sequence so many values may stand out: two loaded nights, or a step that has not lasted yet.
+/// In a short sequence so many values may be spikes: two loaded nights, or a step that has not lasted yet.
 const FEW_SPIKES: f64 = 4.0;
 
 /// Noise is taken to be at least this, as a logarithm: figures have four digits, and clocks drift.
@@ -45,11 +41,15 @@ pub struct StepOptions {
     pub least_size: f64,
     /// Number of series that are looked through together.
     pub series: usize,
+    /// The largest share of values that may be spikes. Where more stand out they are the noise itself, and nothing is
+    /// clipped. 0 for figures that no other program disturbs: a memory that is now 100 MB and now 120 has no
+    /// spikes, it is noisy.
+    pub spikes: f64,
 }
 
 impl Default for StepOptions {
     fn default() -> Self {
-        Self { level: 0.01, least_nights: 4, least_size: 0.05, series: 1 }
+        Self { level: 0.01, least_nights: 4, least_size: 0.05, series: 1, spikes: 0.1 }
     }
 }
 
@@ -74,7 +74,7 @@ pub fn steps(values: &[f64], options: &StepOptions) -> Vec<Step> {
     }
     // A clock that showed nothing: the shortest time that is told apart from it.
     let logarithms: Vec<f64> = values.iter().map(|value| value.max(1e-9).ln()).collect();
-    let search = Search::new(&clipped(&logarithms, least), options);
+    let search = Search::new(&without_spikes(&logarithms, least, options.spikes), options);
     let mut found = search.candidates();
     loop {
         search.refine(&mut found);
@@ -87,27 +87,32 @@ pub fn steps(values: &[f64], options: &StepOptions) -> Vec<Step> {
     search.told(&found)
 }
 
-/// Values with spikes clipped against the median of a window in which `majority` nights are one.
-fn clipped(values: &[f64], majority: usize) -> Vec<f64> {
+/// Values with spikes replaced by the median of a window in which `majority` nights are one.
+fn without_spikes(values: &[f64], majority: usize, spikes: f64) -> Vec<f64> {
     let width = (2 * majority - 1).min(values.len());
     let start = |k: usize| k.saturating_sub(majority - 1).min(values.len() - width);
     let around = |k: usize| median(&values[start(k)..start(k) + width]);
     let medians: Vec<f64> = (0..values.len()).map(around).collect();
     let residuals: Vec<f64> = values.iter().zip(&medians).map(|(v, m)| v - m).collect();
-    let limit = CLIPPED_AT * spread(&residuals);
-    residuals.iter().zip(&medians).map(|(r, m)| m + r.clamp(-limit, limit)).collect()
+    let limit = CLIPPED_AT * spread(&residuals, spikes);
+    // What stands out tells nothing of the method: beside a step, even a clipped value would move it.
+    let kept = |(value, median): (&f64, &f64)| {
+        if (value - median).abs() <= limit { *value } else { *median }
+    };
+    values.iter().zip(&medians).map(kept).collect()
 }
 
-/// Standard deviation of residuals about 0, of which few may stand out.
-fn spread(residuals: &[f64]) -> f64 {
+/// Standard deviation of residuals about 0, of which few may stand out; else so much that none does.
+fn spread(residuals: &[f64], spikes: f64) -> f64 {
     let sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
     // The median size of a normal deviate is 0.6745 standard deviations.
     let robust = (median(&sizes) / 0.6745).max(LEAST_NOISE);
     let out = sizes.iter().filter(|&&size| size > CLIPPED_AT * robust).count();
-    if out as f64 <= (SPIKES * sizes.len() as f64).max(FEW_SPIKES) {
+    let few = if spikes > 0.0 { FEW_SPIKES } else { 0.0 };
+    if out as f64 <= (spikes * sizes.len() as f64).max(few) {
         return robust;
     }
-    (sizes.iter().map(|size| size * size).sum::<f64>() / sizes.len() as f64).sqrt().max(robust)
+    sizes.into_iter().fold(robust, f64::max)
 }
 
 /// The median; of an even number the mean of the middle two.
@@ -167,7 +172,7 @@ impl Search {
         Self {
             sums: running(&|v| v),
             squares: running(&|v| v * v),
-            noise: noise(values),
+            noise: noise(values, options.spikes),
             intervals,
             critical: student::beyond(level, freedom),
             usual: student::beyond(0.05, freedom),
@@ -276,9 +281,9 @@ impl Search {
 }
 
 /// Standard deviation of one night, from the differences of neighbours, which have twice the variance.
-fn noise(values: &[f64]) -> f64 {
+fn noise(values: &[f64], spikes: f64) -> f64 {
     let differences: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let limit = CLIPPED_AT * spread(&differences);
+    let limit = CLIPPED_AT * spread(&differences, spikes);
     let squares = differences.iter().map(|d| d.clamp(-limit, limit).powi(2)).sum::<f64>();
     (squares / (2.0 * differences.len().max(1) as f64)).sqrt().max(LEAST_NOISE)
 }
