@@ -2,11 +2,12 @@
 //! distances to a union of medial primitives, also of one whose balls nearly coincide.
 
 mod bumpy_torus;
+mod plan;
 
 use std::f64::consts::{PI, TAU};
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion};
 use medial::geometry::Sphere;
@@ -49,7 +50,7 @@ fn closest_point(criterion: &mut Criterion) {
         .collect();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     let mut group = criterion.benchmark_group("closest_point");
-    group.sample_size(10).throughput(Throughput::Elements(points.len() as u64));
+    group.throughput(Throughput::Elements(points.len() as u64));
     let name = |what| BenchmarkId::new(what, mesh.faces.len());
     group.bench_function(name("batch, one thread"), |b| {
         b.iter(|| one.install(|| bvh.closest_batch(black_box(&points))));
@@ -59,7 +60,7 @@ fn closest_point(criterion: &mut Criterion) {
     });
     group.finish();
     let mut group = criterion.benchmark_group("closest_point");
-    group.sample_size(10).throughput(Throughput::Elements(mesh.faces.len() as u64));
+    group.throughput(Throughput::Elements(mesh.faces.len() as u64));
     group.bench_function("build", |b| b.iter(|| TriangleBvh::new(black_box(&mesh))));
     group.finish();
 }
@@ -90,7 +91,7 @@ fn sidedness(criterion: &mut Criterion) {
         .collect();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     let mut group = criterion.benchmark_group("sidedness, one thread");
-    group.sample_size(10).throughput(Throughput::Elements(points.len() as u64));
+    group.throughput(Throughput::Elements(points.len() as u64));
     group.bench_function("inside test", |b| {
         b.iter(|| one.install(|| inside.sides(black_box(&points))));
     });
@@ -121,7 +122,7 @@ fn union_distance(criterion: &mut Criterion) {
         })
         .collect();
     let mut group = criterion.benchmark_group("union_distance");
-    group.sample_size(10).throughput(Throughput::Elements(points.len() as u64));
+    group.throughput(Throughput::Elements(points.len() as u64));
     group.bench_function("signed", |b| b.iter(|| union.signed_batch(black_box(&points))));
     group.bench_function("unsigned nearest", |b| {
         b.iter(|| union.unsigned_nearest_batch(black_box(&points)));
@@ -138,5 +139,14 @@ fn union_distance(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, closest_point, sidedness, union_distance);
-criterion_main!(benches);
+criterion_group! {
+    name = benches;
+    config = plan::criterion();
+    targets = closest_point, sidedness, union_distance
+}
+
+fn main() {
+    plan::announce(&[]);
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}
