@@ -7,11 +7,12 @@ use crate::text::{counted, escape_html, grouped, significant};
 
 /// The look of the sparklines; the rest is that of the report.
 const STYLE: &str = "
-td.spark { padding: .1rem .6rem; }
+td.spark { padding: .1rem .4rem; }
 svg.spark { display: block; }
 svg.spark path { fill: none; }
 svg.spark .line { stroke: var(--link); stroke-width: 1.3; }
 svg.spark .up { stroke: var(--bad); stroke-width: 2; }
+svg.spark .shared { stroke: var(--dim); stroke-dasharray: 1 3; }
 svg.spark .down { stroke: rgb(var(--good)); stroke-width: 2; stroke-dasharray: 3 2; }
 .worse { color: var(--bad); font-weight: 600; }
 .series td, .series th { vertical-align: middle; }
@@ -133,7 +134,7 @@ impl Findings<'_> {
     fn series_html(&self) -> String {
         let mut html = String::from(
             "<h2 id=\"series\">All series, the worst first</h2>\n<p>Each line has the nights of one series on one machine \
-             from left to right, on a logarithmic scale of its own; the solid mark is a step up, the dashed one a step \
+             from left to right, on a logarithmic scale of its own; the solid mark is a step up, the dotted one a step that most series made, the dashed one a step \
              down. Worst is what lost most beside its own best.</p>\n<div class=\"scroll\"><table class=\"series\">\n\
              <thead><tr><th scope=\"col\">Series</th><th scope=\"col\" class=\"num\">Nights</th>\
              <th scope=\"col\" class=\"num\">CPU seconds</th><th scope=\"col\">over the nights</th>\
@@ -177,26 +178,26 @@ impl Findings<'_> {
         for (quantity, now) in Quantity::ALL.into_iter().zip([seconds, memory]) {
             let noisy = |figures: &Figures| quantity.of(figures);
             let steps = self.steps_of(index, quantity);
-            let marks = steps.iter().map(|step| (step.night, step.is_worse(), step.step.ratio));
+            let marks = steps.iter().map(|step| (step.night, step.step.ratio, step.shared));
             html.push_str(&self.cells(index, &noisy, now, &marks.collect::<Vec<_>>()));
         }
         let error = last.hausdorff.map(|error| format!("{} %", significant(100.0 * error, 3)));
         let changes = self.changes.iter().filter(|change| change.track == index);
         let marks = changes.filter_map(|change| {
             let ratio = change.differences.iter().find(|d| d.what == "hausdorff")?.ratio?;
-            Some((change.night, ratio > 1.0, ratio))
+            Some((change.night, ratio, false))
         });
         html.push_str(&self.cells(index, &|f| f.hausdorff, error, &marks.collect::<Vec<_>>()));
         html + "</tr>\n"
     }
 
-    /// A figure as it is now, and its line with marks: night, whether it went up, ratio.
+    /// A figure as it is now, and its line with marks: night, ratio, whether most series did the same.
     fn cells(
         &self,
         index: usize,
         of: &dyn Fn(&Figures) -> Option<f64>,
         now: Option<String>,
-        marks: &[(usize, bool, f64)],
+        marks: &[(usize, f64, bool)],
     ) -> String {
         let known: Vec<(usize, f64)> = self.tracks[index]
             .nights
@@ -206,13 +207,14 @@ impl Findings<'_> {
         let values: Vec<f64> = known.iter().map(|(_, value)| *value).collect();
         let placed: Vec<Mark> = marks
             .iter()
-            .filter_map(|&(night, up, _)| {
-                Some(Mark { at: known.iter().position(|(other, _)| *other == night)?, up })
+            .filter_map(|&(night, ratio, shared)| {
+                let at = known.iter().position(|(other, _)| *other == night)?;
+                Some(Mark { at, up: ratio > 1.0, shared })
             })
             .collect();
         let told = marks
             .iter()
-            .map(|&(night, _, ratio)| format!("{} {}", self.nights[night].date, percent(ratio)));
+            .map(|&(night, ratio, _)| format!("{} {}", self.nights[night].date, percent(ratio)));
         let title = match marks.len() {
             0 => "no step".to_owned(),
             _ => told.collect::<Vec<_>>().join("; "),

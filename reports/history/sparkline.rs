@@ -4,7 +4,7 @@ use super::steps::median;
 use crate::text::escape_html;
 
 /// Width and height in pixels. One unit of the drawing is a pixel, so that whole numbers are fine enough.
-const SIZE: (usize, usize) = (240, 36);
+const SIZE: (usize, usize) = (190, 36);
 
 /// The range drawn is at least this, as a logarithm: noise of a thousandth is no mountain range.
 const LEAST_RANGE: f64 = 0.1;
@@ -18,6 +18,8 @@ pub(super) struct Mark {
     pub(super) at: usize,
     /// Whether the value went up there.
     pub(super) up: bool,
+    /// Whether most series did the same.
+    pub(super) shared: bool,
 }
 
 /// Positive values from left to right on a logarithmic scale, cut off where single values stand far out.
@@ -32,8 +34,12 @@ pub(super) fn sparkline(values: &[f64], marks: &[Mark], title: &str) -> String {
         0 | 1 => width / 2,
         n => 1 + index * (width - 2) / (n - 1),
     };
-    for Mark { at, up } in marks {
-        let class = if *up { "up" } else { "down" };
+    for Mark { at, up, shared } in marks {
+        let class = match (shared, up) {
+            (true, _) => "shared",
+            (false, true) => "up",
+            (false, false) => "down",
+        };
         svg.push_str(&format!("<path class=\"{class}\" d=\"M{} 0v{height}\"/>", x(*at)));
     }
     svg.push_str(&format!("<path class=\"line\" d=\"{}\"/></svg>", path(values, &x)));
@@ -98,7 +104,7 @@ mod tests {
     #[test]
     fn flat_lines_are_short_and_long_ones_fit() {
         let flat = sparkline(&[2.0; 400], &[], "seconds");
-        assert!(flat.contains("d=\"M1 18h238\""), "{flat}");
+        assert!(flat.contains("d=\"M1 18h188\""), "{flat}");
         let wild: Vec<f64> = (0..2000).map(|k| 1.0 + 0.3 * f64::from(k % 7)).collect();
         assert!(sparkline(&wild, &[], "").len() < 2500);
         assert!(sparkline(&[], &[], "").contains("d=\"\""));
@@ -107,9 +113,13 @@ mod tests {
 
     #[test]
     fn a_rise_goes_up() {
-        let svg = sparkline(&[1.0, 1.0, 4.0, 4.0], &[Mark { at: 2, up: true }], "<seconds>");
+        let svg = sparkline(
+            &[1.0, 1.0, 4.0, 4.0],
+            &[Mark { at: 2, up: true, shared: false }],
+            "<seconds>",
+        );
         // Up is less in SVG.
-        assert!(svg.contains("class=\"up\"") && svg.contains("l79-27"), "{svg}");
+        assert!(svg.contains("class=\"up\"") && svg.contains("l63-28"), "{svg}");
         assert!(svg.contains("&lt;seconds&gt;"), "{svg}");
     }
 }
