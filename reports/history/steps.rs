@@ -10,8 +10,8 @@
 //! 3. Noise: from the differences of neighbouring nights, where steps hardly count.
 //! 4. In each of a fixed set of intervals of all lengths: the split that lessens the squares most. A short interval finds a
 //!    short episode, such as a regression that was mended after two weeks, which no split of the whole shows.
-//! 5. A t test: the noise is the larger one of 3 and of what is left within the interval's two sides, so that a drift is no
-//!    step. The level is divided by the number of all splits of all intervals, and by the number of series.
+//! 5. A t test: the noise is the larger one of 3 and of what is left within the interval's two sides. It is taken as independent from
+//!    night to night: noise that remembers gives false steps. The level is divided by the number of all splits of all intervals, and by the number of series.
 //! 6. From the clearest split on: each is taken unless its interval holds one taken before.
 //! 7. Each step is moved to where the squares between its neighbours are least; steps that are no longer
 //!    significant there, or smaller than the least size, are dropped.
