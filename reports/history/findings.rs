@@ -381,11 +381,13 @@ fn moved(track: &Track<'_>, night: usize) -> Option<f64> {
     enough.then(|| median(&values(after)) - median(&values(before)))
 }
 
+/// A series, its group, and the content of its mesh.
+type TrackKey<'a> = (&'a SeriesName, usize, Option<&'a String>);
+
 /// Groups by their first night, and tracks by series and group.
 fn tracks(nights: &[Night]) -> (Vec<Group>, Vec<Track<'_>>) {
     let mut groups: Vec<Group> = Vec::new();
-    let mut tracks: BTreeMap<(&SeriesName, usize, Option<&String>), Vec<(usize, &Figures)>> =
-        BTreeMap::new();
+    let mut tracks: BTreeMap<TrackKey<'_>, Vec<(usize, &Figures)>> = BTreeMap::new();
     for (index, night) in nights.iter().enumerate() {
         let same =
             |group: &Group| group.machine == night.machine && group.conditions == night.conditions;
