@@ -298,7 +298,7 @@ fn exact_figures_change_at_once() {
 fn machines_that_take_turns_are_not_compared() {
     let folder = folder();
     let other = |night: usize, record: &mut Record, seconds: &mut f64| {
-        if night % 3 == 0 {
+        if night.is_multiple_of(3) {
             record.machine.cpu = "Another".to_owned();
             record.result_hash = Some("a".repeat(64));
             *seconds *= 2.0;
