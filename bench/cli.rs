@@ -63,6 +63,8 @@ pub enum Verb {
     Diff(cmd::diff::Arguments),
     /// Rebuild the report of a folder of results.
     Report(cmd::report::Arguments),
+    /// Keep the results of each night, and find the nights and commits of steps.
+    History(cmd::history::Arguments),
     /// Say what this machine lacks for oracles and baselines.
     Doctor(cmd::doctor::Arguments),
     /// Write the items of a study into a folder, for many processes on any number of hosts.
@@ -163,6 +165,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Stability(arguments) => cmd::stability::run(&arguments, global, registry),
         Verb::Diff(arguments) => cmd::diff::run(&arguments, global, registry),
         Verb::Report(arguments) => cmd::report::run(&arguments, global, registry),
+        Verb::History(arguments) => cmd::history::run(&arguments, global),
         Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
         Verb::Completions(arguments) => cmd::completions::run(&arguments, &mut command()),
         Verb::RunItem(arguments) => cmd::run_item::run(&arguments, global, registry),

@@ -13,6 +13,7 @@
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
 //! | `extras` | baselines, stability under noise, oracles: from files of their own |
+//! | [`history`] | one file for each night, steps over many nights |
 //! | `terminal` | the summary in plain text |
 //! | `papers` | BibTeX and the text on the methods, for papers |
 //! | `pictures` | which results are shown beside each other |
@@ -27,6 +28,7 @@ mod equal_error;
 mod error;
 mod extras;
 mod header;
+pub mod history;
 mod journal;
 mod metric;
 mod native;

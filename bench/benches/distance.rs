@@ -2,11 +2,12 @@
 //! distances to a union of medial primitives, also of one whose balls nearly coincide.
 
 mod bumpy_torus;
+mod plan;
 
 use std::f64::consts::{PI, TAU};
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion};
 use medial::geometry::Sphere;
@@ -41,7 +42,7 @@ fn closest_point(criterion: &mut Criterion) {
     let mesh = bumpy_torus::mesh(224, 224);
     let bvh = TriangleBvh::new(&mesh).expect("the torus has faces");
     let mut rng = Pcg64::seed_from_u64(1);
-    let points: Vec<Vec3> = (0..100_000)
+    let points: Vec<Vec3> = (0..20_000)
         .map(|_| {
             let [u, v] = [(); 2].map(|()| rng.random::<f64>() * TAU);
             bumpy_torus::point(u, v, rng.random::<f64>().sqrt())
@@ -49,7 +50,7 @@ fn closest_point(criterion: &mut Criterion) {
         .collect();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     let mut group = criterion.benchmark_group("closest_point");
-    group.sample_size(10).throughput(Throughput::Elements(points.len() as u64));
+    group.throughput(Throughput::Elements(points.len() as u64));
     let name = |what| BenchmarkId::new(what, mesh.faces.len());
     group.bench_function(name("batch, one thread"), |b| {
         b.iter(|| one.install(|| bvh.closest_batch(black_box(&points))));
@@ -59,7 +60,7 @@ fn closest_point(criterion: &mut Criterion) {
     });
     group.finish();
     let mut group = criterion.benchmark_group("closest_point");
-    group.sample_size(10).throughput(Throughput::Elements(mesh.faces.len() as u64));
+    group.throughput(Throughput::Elements(mesh.faces.len() as u64));
     group.bench_function("build", |b| b.iter(|| TriangleBvh::new(black_box(&mesh))));
     group.finish();
 }
@@ -85,12 +86,12 @@ fn sidedness(criterion: &mut Criterion) {
     let boundary = GeneralisedWinding::new(&holed);
     let mut rng = Pcg64::seed_from_u64(4);
     let half = Vec3::new(1.4, 1.4, 0.4);
-    let points: Vec<Vec3> = (0..100_000)
+    let points: Vec<Vec3> = (0..20_000)
         .map(|_| half * (2.0 * Vec3::new(rng.random(), rng.random(), rng.random()) - 1.0))
         .collect();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     let mut group = criterion.benchmark_group("sidedness, one thread");
-    group.sample_size(10).throughput(Throughput::Elements(points.len() as u64));
+    group.throughput(Throughput::Elements(points.len() as u64));
     group.bench_function("inside test", |b| {
         b.iter(|| one.install(|| inside.sides(black_box(&points))));
     });
@@ -105,7 +106,7 @@ fn sidedness(criterion: &mut Criterion) {
     for tolerance in [0.1, WindingTree::TOLERANCE] {
         let tree = expansions.clone().with_tolerance(tolerance);
         group.bench_function(BenchmarkId::new("winding number, expansions", tolerance), |b| {
-            b.iter(|| one.install(|| tree.winding_number_batch(black_box(&points[..10_000]))));
+            b.iter(|| one.install(|| tree.winding_number_batch(black_box(&points[..2_000]))));
         });
     }
     group.finish();
@@ -114,20 +115,20 @@ fn sidedness(criterion: &mut Criterion) {
 fn union_distance(criterion: &mut Criterion) {
     let union = MedialUnion::new(&sheet()).expect("the strip has spheres");
     let mut rng = Pcg64::seed_from_u64(2);
-    let points: Vec<Vec3> = (0..1_000_000)
+    let points: Vec<Vec3> = (0..200_000)
         .map(|_| {
             let [u, v] = [rng.random::<f64>() * TAU, (rng.random::<f64>() * 2.0 - 1.0) * PI];
             bumpy_torus::point(u, v, 1.0)
         })
         .collect();
     let mut group = criterion.benchmark_group("union_distance");
-    group.sample_size(10).throughput(Throughput::Elements(points.len() as u64));
+    group.throughput(Throughput::Elements(points.len() as u64));
     group.bench_function("signed", |b| b.iter(|| union.signed_batch(black_box(&points))));
     group.bench_function("unsigned nearest", |b| {
         b.iter(|| union.unsigned_nearest_batch(black_box(&points)));
     });
     let cloud = MedialUnion::new(&cloud()).expect("the cloud has spheres");
-    let around: Vec<Vec3> = points[..100_000].iter().map(|p| 0.2999 * p.normalize()).collect();
+    let around: Vec<Vec3> = points[..20_000].iter().map(|p| 0.2999 * p.normalize()).collect();
     group.throughput(Throughput::Elements(around.len() as u64));
     group.bench_function("signed, coincident", |b| {
         b.iter(|| cloud.signed_batch(black_box(&around)));
@@ -138,5 +139,14 @@ fn union_distance(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, closest_point, sidedness, union_distance);
-criterion_main!(benches);
+criterion_group! {
+    name = benches;
+    config = plan::criterion();
+    targets = closest_point, sidedness, union_distance
+}
+
+fn main() {
+    plan::announce(&[]);
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}

@@ -1,44 +1,108 @@
-//! Every registered method on one built-in shape: preparation, and one level from it.
+//! Every registered method on two built-in shapes at three sizes: preparation and one level from it, without the substrates that
+//! methods share. The initial medial mesh, which is one of these, by itself; and what a hierarchy is asked for.
 //!
-//! A new method appears here by being registered.
+//! A new method appears here by being registered. `tight` takes seconds for each result: it runs at the smallest size
+//! alone, with fewer samples and rounds than its own.
+
+mod plan;
 
 use std::hint::black_box;
 
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, criterion_group};
 use medial::complex::collapse::Hierarchy;
-use medial::shape::ShapeOptions;
-use medial::simplifier::{Level, Params, RunContext};
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, MedialSimplifier, Params, RunContext};
 use medial_bench::run::{Input, Source};
 
 /// Spheres that each method is asked for.
 const SPHERES: usize = 100;
 
-fn methods(criterion: &mut Criterion) {
-    let source = Source::BuiltIn { id: "blob".into(), resolution: None };
+/// Shapes and their resolutions: one smooth and round, one of flat sheets with sharp edges, whose samples are degenerate.
+const SIZES: [(&str, u32); 6] =
+    [("blob", 30), ("blob", 40), ("blob", 50), ("box", 12), ("box", 18), ("box", 25)];
+
+/// The smallest size, for `tight`.
+const SMALLEST: (&str, u32) = ("box", 8);
+
+/// Seconds beyond those that each benchmark has, by parts of names: ten runs and those before them.
+const SLOW: [(&str, f64); 6] = [
+    ("tight/", 55.0),
+    ("hem/blob", 12.0),
+    ("hem/box", 5.0),
+    ("aof/", 5.0),
+    ("sat/", 2.0),
+    ("tam-heidrich/", 1.0),
+];
+
+/// A built-in shape, with its name and its number of vertices as a benchmark's.
+fn built_in((id, resolution): (&str, u32)) -> (String, Input) {
+    let source = Source::BuiltIn { id: id.into(), resolution: Some(resolution) };
     let input = Input::load(&source).expect("a built-in shape");
+    let shape = input.shape(ShapeOptions::default()).expect("an extent");
+    (format!("{id}, {} vertices", shape.mesh().vertices.len()), input)
+}
+
+fn shape(input: &Input) -> Shape {
     let shape = input.shape(ShapeOptions::default()).expect("an extent");
     // Substrates are shared and timed by themselves.
     shape.initial().expect("an initial medial mesh");
-    let run = RunContext::default();
+    shape
+}
+
+fn methods(criterion: &mut Criterion) {
+    let shapes = SIZES.map(built_in).map(|(name, input)| (name, shape(&input)));
     for method in medial_methods::registry() {
-        let prepare = || method.prepare(&shape, &Params::none(), &run).expect("prepared");
-        let mut group = criterion.benchmark_group(&*method.info().id);
-        group.bench_function("prepare", |b| b.iter_with_large_drop(|| black_box(prepare())));
-        group.bench_function(format!("to {SPHERES} spheres"), |b| {
-            let level = Level::Spheres(SPHERES);
-            b.iter_batched(prepare, |mut s| black_box(s.at(level)), BatchSize::LargeInput);
-        });
-        group.finish();
+        for (name, shape) in &shapes {
+            one(criterion, &*method, name, shape, &Params::none());
+        }
     }
 }
 
-fn substrates(criterion: &mut Criterion) {
-    let source = Source::BuiltIn { id: "blob".into(), resolution: None };
-    let input = Input::load(&source).expect("a built-in shape");
-    criterion.bench_function("initial medial mesh", |b| {
-        let shape = || input.shape(ShapeOptions::default()).expect("an extent");
-        b.iter_batched(shape, |shape| black_box(shape.initial()).is_ok(), BatchSize::LargeInput);
+/// A method on a shape: preparation and one level.
+fn one(
+    criterion: &mut Criterion,
+    method: &dyn MedialSimplifier,
+    name: &str,
+    shape: &Shape,
+    params: &Params,
+) {
+    let run = RunContext::default();
+    let mut group = criterion.benchmark_group(&*method.info().id);
+    // As many runs for each sample as for the next: slow methods run once for each.
+    group.sampling_mode(SamplingMode::Flat);
+    group.bench_function(name, |b| {
+        b.iter_with_large_drop(|| {
+            let mut levels = method.prepare(shape, params, &run).expect("prepared");
+            black_box(levels.at(Level::Spheres(SPHERES)).expect("a result"))
+        });
     });
+    group.finish();
+}
+
+fn tight(criterion: &mut Criterion) {
+    let (name, input) = built_in(SMALLEST);
+    let shape = shape(&input);
+    let mut params = Params::none();
+    for (key, value) in [("rounds", "1"), ("start", "300"), ("samples", "3000")] {
+        params.set(key, value);
+    }
+    let method = medial_methods::find("tight").expect("registered");
+    one(criterion, &*method, &name, &shape, &params);
+}
+
+fn substrates(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("initial medial mesh");
+    for (name, input) in SIZES.map(built_in) {
+        group.bench_function(BenchmarkId::from_parameter(name), |b| {
+            let shape = || input.shape(ShapeOptions::default()).expect("an extent");
+            b.iter_batched(
+                shape,
+                |shape| black_box(shape.initial()).is_ok(),
+                BatchSize::LargeInput,
+            );
+        });
+    }
+    group.finish();
 }
 
 /// What a hierarchy is asked for: the way between two stages, simplex by simplex, one stage as a
@@ -86,5 +150,14 @@ fn hierarchy(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, substrates, methods, hierarchy);
-criterion_main!(benches);
+criterion_group! {
+    name = benches;
+    config = plan::criterion();
+    targets = substrates, methods, hierarchy, tight
+}
+
+fn main() {
+    plan::announce(&SLOW);
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}

@@ -2,9 +2,11 @@
 
 #![allow(missing_docs)]
 
+mod plan;
+
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
 use medial::Vec3;
 use medial::complex::UnionAxis;
 use medial::geometry::delaunay::Delaunay;
@@ -65,7 +67,6 @@ fn predicates(c: &mut Criterion) {
 
 fn triangulations(c: &mut Criterion) {
     let mut group = c.benchmark_group("delaunay");
-    group.sample_size(10);
     let sets = [
         ("cube", cube(20_000)),
         ("surface", surface(20_000)),
@@ -79,7 +80,6 @@ fn triangulations(c: &mut Criterion) {
     }
     group.finish();
     let mut group = c.benchmark_group("regular");
-    group.sample_size(10);
     let points = cube(20_000);
     let mut rng = Pcg64::seed_from_u64(3);
     let weights: Vec<f64> = points.iter().map(|_| 1e-3 * rng.random::<f64>()).collect();
@@ -96,7 +96,6 @@ fn unions(c: &mut Criterion) {
     let samples = surface(20_000);
     let delaunay = Delaunay::new(&samples).expect("spans space");
     let mut group = c.benchmark_group("poles");
-    group.sample_size(20);
     group.throughput(Throughput::Elements(samples.len() as u64));
     group.bench_function("surface", |b| b.iter(|| Poles::new(&delaunay).balls().len()));
     group.finish();
@@ -125,7 +124,6 @@ fn unions(c: &mut Criterion) {
         let complex = DualComplex::new(&regular);
         for part in ["dual complex", "union boundary", "union axis"] {
             let mut group = c.benchmark_group(part);
-            group.sample_size(20);
             group.throughput(Throughput::Elements(balls.len() as u64));
             group.bench_function(*name, |b| match part {
                 "dual complex" => b.iter(|| DualComplex::new(&regular).contains(CellId(0))),
@@ -138,5 +136,14 @@ fn unions(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, predicates, triangulations, unions);
-criterion_main!(benches);
+criterion_group! {
+    name = benches;
+    config = plan::criterion();
+    targets = predicates, triangulations, unions
+}
+
+fn main() {
+    plan::announce(&[("union axis", 1.0)]);
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}

@@ -12,6 +12,7 @@ pub mod diff;
 pub mod doctor;
 pub mod evaluate;
 pub mod hierarchy;
+pub mod history;
 pub mod info;
 pub mod methods;
 pub mod paper;

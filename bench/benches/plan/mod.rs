@@ -1,0 +1,56 @@
+//! How long each benchmark is measured, and what a run says in advance about how long it takes.
+
+use std::env;
+use std::io::Write;
+use std::process::Command;
+use std::time::Duration;
+
+use criterion::Criterion;
+
+/// Runs before the measuring begins.
+const WARM_UP: Duration = Duration::from_millis(300);
+/// Aimed at; what needs longer for the least number of samples takes it.
+const MEASURED: Duration = Duration::from_millis(1700);
+/// Samples of each benchmark.
+const SAMPLES: usize = 10;
+/// Resamples of the statistics: with so few samples more of them tell nothing.
+const RESAMPLES: usize = 10_000;
+
+/// The configuration of all benchmarks.
+pub fn criterion() -> Criterion {
+    Criterion::default()
+        .warm_up_time(WARM_UP)
+        .measurement_time(MEASURED)
+        .sample_size(SAMPLES)
+        .nresamples(RESAMPLES)
+}
+
+/// Says how many benchmarks the words of the command line select, and about how long they take. `slow` says for parts of
+/// names how many seconds more each takes whose runs are longer than the samples have time.
+pub fn announce(slow: &[(&str, f64)]) {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let has = |word: &str| arguments.iter().any(|argument| argument == word);
+    // `cargo test --benches` and `--list` measure nothing.
+    if !has("--bench") || ["--list", "--test", "--help"].iter().any(|word| has(word)) {
+        return;
+    }
+    // Counted by the program itself, so that it holds for any filter and for whatever was registered.
+    let Ok(program) = env::current_exe() else { return };
+    let Ok(listed) = Command::new(program).args(&arguments).arg("--list").output() else { return };
+    let listed = String::from_utf8_lossy(&listed.stdout);
+    let names: Vec<&str> =
+        listed.lines().filter_map(|line| line.strip_suffix(": benchmark")).collect();
+    let each = (WARM_UP + MEASURED).as_secs_f64();
+    let longer = |name: &&str| -> f64 {
+        slow.iter().find(|(part, _)| name.contains(part)).map_or(0.0, |(_, seconds)| *seconds)
+    };
+    let more: f64 = names.iter().map(longer).sum();
+    let seconds = names.len() as f64 * each + more;
+    let quick = if has("--quick") { "; with --quick much less" } else { "" };
+    let _ = writeln!(
+        std::io::stderr(),
+        "{} benchmarks of {each} s each, and {more:.0} s for slow ones: about {:.1} minutes{quick}",
+        names.len(),
+        seconds / 60.0
+    );
+}
