@@ -7,11 +7,13 @@
 //! 2. Spikes are replaced by the local median: a night on a loaded machine is no step. The window is as short
 //!    as can be with the nights that a step must last still its majority, and keeps its length at the ends: a step is
 //!    taken for a spike as long as it has not lasted, and no longer.
-//! 3. Noise: from the differences of neighbouring nights, where steps hardly count.
+//! 3. Noise: from the differences of neighbouring nights, where steps hardly count. If differences over two nights are
+//!    larger than that, a night remembers the one before, and a mean over many tells less: with a correlation r from night
+//!    to night its variance is (1 + r) / (1 - r) times that of independent nights.
 //! 4. In each of a fixed set of intervals of all lengths: the split that lessens the squares most. A short interval finds a
 //!    short episode, such as a regression that was mended after two weeks, which no split of the whole shows.
-//! 5. A t test: the noise is the larger one of 3 and of what is left within the interval's two sides. It is taken as independent from
-//!    night to night: noise that remembers gives false steps. The level is divided by the number of all splits of all intervals, and by the number of series.
+//! 5. A t test: the noise is the larger one of 3 and of what is left within the interval's two sides, for its memory enlarged. The level
+//!    is divided by the number of all splits of all intervals, and by the number of series.
 //! 6. From the clearest split on: each is taken unless its interval holds one taken before.
 //! 7. Each step is moved to where the squares between its neighbours are least; steps that are no longer
 //!    significant there, or smaller than the least size, are dropped.
@@ -29,6 +31,9 @@ const FEW_SPIKES: f64 = 4.0;
 
 /// Noise is taken to be at least this, as a logarithm: figures have four digits, and clocks drift.
 const LEAST_NOISE: f64 = 0.002;
+
+/// A larger correlation of neighbouring nights is not believed: a drift has one, and is no noise.
+const MOST_REMEMBERED: f64 = 0.9;
 
 /// What counts as a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,6 +139,8 @@ struct Search {
     squares: Vec<f64>,
     /// Standard deviation of one night.
     noise: f64,
+    /// Factor on the standard error of means, for what nights remember.
+    memory: f64,
     intervals: Vec<(usize, usize)>,
     /// The t value that a step must reach.
     critical: f64,
@@ -169,10 +176,13 @@ impl Search {
         let splits: usize = intervals.iter().map(|(a, b)| b - a + 1 - 2 * least_nights).sum();
         let level = options.level / (splits.max(1) * options.series.max(1)) as f64;
         let freedom = values.len() - 2;
+        let kept = remembered(values, options.spikes);
         Self {
             sums: running(&|v| v),
             squares: running(&|v| v * v),
-            noise: noise(values, options.spikes),
+            // Neighbours that are alike differ less than the noise is large.
+            noise: noise(values, options.spikes) / (1.0 - kept).sqrt(),
+            memory: ((1.0 + kept) / (1.0 - kept)).sqrt(),
             intervals,
             critical: student::beyond(level, freedom),
             usual: student::beyond(0.05, freedom),
@@ -200,7 +210,7 @@ impl Search {
         let within = self.deviation(from, at) + self.deviation(at, to);
         let variance = within / (to - from).saturating_sub(2).max(1) as f64;
         let noise = self.noise.max(variance.sqrt());
-        noise * (1.0 / (at - from) as f64 + 1.0 / (to - at) as f64).sqrt()
+        self.memory * noise * (1.0 / (at - from) as f64 + 1.0 / (to - at) as f64).sqrt()
     }
 
     /// The split of an interval that lessens the squares most; the first of equals.
@@ -282,10 +292,24 @@ impl Search {
 
 /// Standard deviation of one night, from the differences of neighbours, which have twice the variance.
 fn noise(values: &[f64], spikes: f64) -> f64 {
-    let differences: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    (mean_square(values, 1, spikes) / 2.0).sqrt().max(LEAST_NOISE)
+}
+
+/// The correlation of neighbouring nights. With a correlation r, differences over two nights have 1 + r times the mean
+/// square of those over one. Where that is not clear it counts as none: it is less than what it is taken from varies by.
+fn remembered(values: &[f64], spikes: f64) -> f64 {
+    let [one, two] = [1, 2].map(|lag| mean_square(values, lag, spikes));
+    let ratio = two / one.max(LEAST_NOISE * LEAST_NOISE);
+    (ratio - 1.0 - 1.0 / (values.len() as f64).sqrt()).clamp(0.0, MOST_REMEMBERED)
+}
+
+/// The mean square of differences over so many nights, those that stand out cut.
+fn mean_square(values: &[f64], lag: usize, spikes: f64) -> f64 {
+    let pairs = values.iter().zip(values.iter().skip(lag));
+    let differences: Vec<f64> = pairs.map(|(before, after)| after - before).collect();
     let limit = CLIPPED_AT * spread(&differences, spikes);
     let squares = differences.iter().map(|d| d.clamp(-limit, limit).powi(2)).sum::<f64>();
-    (squares / (2.0 * differences.len().max(1) as f64)).sqrt().max(LEAST_NOISE)
+    squares / differences.len().max(1) as f64
 }
 
 /// Intervals of lengths n, n / sqrt 2, n / 2, ... down to `shortest`, each length spread evenly so that

@@ -35,19 +35,39 @@ fn place(seed: u64) -> usize {
     20 + (seed as usize * 37) % 360
 }
 
-/// With this noise even the best estimate that knows size and noise is two nights or more off in one history of fifty (20,000
-/// simulated), so some twenty seeds have such a one, as 0 to 19 do; these have not. `sweep` counts them.
+/// Each is found, once, and its night within one in nine of ten: with so much noise the squares are sometimes least two
+/// nights off or more. `sweep` counts them.
 #[test]
 fn a_step_of_a_tenth_is_found_at_its_night() {
-    for seed in 100..120 {
+    let mut near = 0;
+    for seed in 0..100 {
         let at = place(seed);
         let found = steps(&history(seed, NIGHTS, 0.03, stepped(at, 0.1)), &options());
         assert_eq!(found.len(), 1, "seed {seed}: {found:?}");
         let step = found[0];
-        assert!(step.at.abs_diff(at) <= 1, "seed {seed}: at {} in place of {at}", step.at);
+        near += usize::from(step.at.abs_diff(at) <= 1);
+        assert!(step.at.abs_diff(at) <= 5, "seed {seed}: at {} in place of {at}", step.at);
         assert!(step.low < step.ratio && step.ratio < step.high, "{step:?}");
-        assert!((step.ratio - 1.1).abs() < 0.035, "seed {seed}: {step:?}");
+        assert!((step.ratio - 1.1).abs() < 0.04, "seed {seed}: {step:?}");
     }
+    assert!(near >= 90, "{near} of 100");
+}
+
+/// Half of a night's noise is still there on the next: false steps remain, but few.
+#[test]
+fn nights_that_remember_give_few_false_steps() {
+    let false_step = |seed: &u64| !steps(&correlated(*seed, 0.03), &options()).is_empty();
+    let count = (0..100).filter(false_step).count();
+    assert!(count <= 10, "{count} of 100");
+}
+
+/// Noise with a correlation of a half from night to night.
+fn correlated(seed: u64, noise: f64) -> Vec<f64> {
+    let mut values = history(30_000 + seed, NIGHTS, noise * 0.75_f64.sqrt(), |_| 1.0);
+    for k in 1..values.len() {
+        values[k] *= (values[k - 1] / 0.25).sqrt();
+    }
+    values
 }
 
 #[test]
@@ -190,14 +210,7 @@ fn sweep() {
         };
         let alarms = (0..2000).filter(|seed| !quiet(seed)).count();
         lines.push(format!("noise {noise}, no step: {alarms} of 2000 histories with an alarm"));
-        // Nights that remember half of the night before: what the test does not allow for.
-        let drifting = |seed: &u64| {
-            let mut values = history(30_000 + seed, NIGHTS, noise * 0.75_f64.sqrt(), |_| 1.0);
-            for k in 1..values.len() {
-                values[k] *= (values[k - 1] / 0.25).sqrt();
-            }
-            !steps(&values, &options()).is_empty()
-        };
+        let drifting = |seed: &u64| !steps(&correlated(*seed, noise), &options()).is_empty();
         let alarms = (0..200).filter(drifting).count();
         lines.push(format!("noise {noise}, correlated by a half, no step: {alarms} of 200 alarm"));
         let ever = |seed: &u64| {
