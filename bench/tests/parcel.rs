@@ -23,6 +23,9 @@ fn medial(arguments: &[&str]) -> (i32, String) {
     (code(&output), String::from_utf8_lossy(&output.stdout).into_owned() + &stderr(&output))
 }
 
+/// The files of an archive, by name.
+type Files = Vec<(String, Vec<u8>)>;
+
 /// A folder of results of two methods, and its archive.
 fn packed(folder: &Path) -> std::path::PathBuf {
     let (results, archive) = (folder.join("results"), folder.join("results.tar.gz"));
@@ -43,7 +46,7 @@ fn packed(folder: &Path) -> std::path::PathBuf {
 }
 
 /// The files of an archive.
-fn files(archive: &Path) -> Vec<(String, Vec<u8>)> {
+fn files(archive: &Path) -> Files {
     let mut archive = Archive::new(GzDecoder::new(fs::File::open(archive).unwrap()));
     let read = |entry: std::io::Result<tar::Entry<'_, _>>| {
         let mut entry = entry.unwrap();
@@ -67,7 +70,7 @@ fn header(size: u64, name: &str) -> Header {
 }
 
 /// Writes an archive, with a manifest that fits the other files.
-fn write(archive: &Path, mut files: Vec<(String, Vec<u8>)>) {
+fn write(archive: &Path, mut files: Files) {
     let mut manifest: serde_json::Value = serde_json::from_slice(&files[0].1).unwrap();
     for (name, bytes) in &files[1..] {
         use sha2::Digest;
@@ -120,7 +123,7 @@ fn changed_numbers_and_medial_meshes_are_found() {
     let folder = tempfile::tempdir().unwrap();
     let whole = files(&packed(folder.path()));
     let changed = folder.path().join("changed.tar.gz");
-    let refused = |change: &dyn Fn(&mut Vec<(String, Vec<u8>)>), why: &str| {
+    let refused = |change: &dyn Fn(&mut Files), why: &str| {
         let mut files = whole.clone();
         change(&mut files);
         write(&changed, files);
@@ -133,7 +136,7 @@ fn changed_numbers_and_medial_meshes_are_found() {
         assert!(!out.join("results.jsonl").exists(), "{why}");
     };
     let in_first_record = |key: &'static str, value: serde_json::Value| {
-        move |files: &mut Vec<(String, Vec<u8>)>| {
+        move |files: &mut Files| {
             let all = String::from_utf8(files[1].1.clone()).unwrap();
             let mut lines: Vec<String> = all.lines().map(str::to_owned).collect();
             let mut record: serde_json::Value = serde_json::from_str(&lines[0]).unwrap();

@@ -1,9 +1,9 @@
 //! `medial submit DIR --engine slurm`: what is missing of a planned folder becomes jobs of a batch engine.
 //!
-//! 1. What every missing item will need: [`Earlier::need`], from records of an earlier run or from the limits.
-//! 2. Items of like needs become a class, a class an array of tasks: [`classes`].
-//! 3. A script and a list of items for each class, and one script that collects: [`script`].
-//! 4. The engine gets them: [`slurm`].
+//! 1. What every missing item will need: `Earlier::need`, from records of an earlier run or from the limits.
+//! 2. Items of like needs become a class, a class an array of tasks: `classes`.
+//! 3. A script and a list of items for each class, and one script that collects: `script`.
+//! 4. The engine gets them: `slurm`.
 //!
 //! Each submission has a folder of its own, `slurm/NUMBER`, with everything that it ran by.
 

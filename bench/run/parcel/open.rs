@@ -159,8 +159,8 @@ fn store(entry: &mut impl Read, path: &Path, size: u64) -> io::Result<String> {
 
 /// A file that is told and not there, or there and not told, or another.
 fn differing(told: &BTreeMap<String, String>, found: &BTreeMap<String, String>) -> Option<String> {
-    let names = told.keys().chain(found.keys());
-    names.cloned().find(|name| told.get(name) != found.get(name))
+    let mut names = told.keys().chain(found.keys());
+    names.find(|&name| told.get(name) != found.get(name)).cloned()
 }
 
 /// The records: each with a key of its own, each medial mesh with its record.

@@ -238,8 +238,8 @@ fn differing(key: &str, told: &Value, found: &Value, tolerance: f64) -> Option<S
             let is_count = key.starts_with("spikes") || key.starts_with("quality");
             let tolerance = if is_count { tolerance.max(COUNTS) } else { tolerance };
             let least = if is_count && told.is_u64() { 1.0 } else { NEGLIGIBLE };
-            // Whatever is no number differs.
-            !((a - b).abs() <= (tolerance * b.abs()).max(least))
+            let off = (a - b).abs();
+            off.is_nan() || off > (tolerance * b.abs()).max(least)
         }
         (a, b) => a != b,
     };
