@@ -61,10 +61,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Whether a file holds a medial mesh: `.ma`, or `.ply` whose vertices have a radius.
+/// Whether a file holds a medial mesh: `.ma` and lists of spheres, or `.ply` whose vertices have a radius.
 fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
-        "ma" => Ok(true),
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
         "ply" => ply_has_radius(path),
         _ => Ok(false),
     }

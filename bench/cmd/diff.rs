@@ -148,7 +148,8 @@ fn alternate(
     };
     let mut contenders = [contender(old?, SIDES[0])?, contender(new?, SIDES[1])?];
     let left = missing_in_either(&items, &contenders);
-    let mut progress = Progress::new(global.progress(), left.len());
+    let turns = left.iter().map(|item| item.repeat).sum();
+    let mut progress = Progress::new(global.progress(), turns);
     let ended = run_alternately(&left, &mut contenders, &mut progress);
     drop(progress);
     match ended {

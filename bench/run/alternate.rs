@@ -154,6 +154,7 @@ fn repeat(
                 merge(&mut records, turn, again);
             }
         }
+        progress.done();
     }
     Ok(())
 }

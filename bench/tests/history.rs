@@ -32,7 +32,7 @@ fn a_night_is_added_once_and_shown() {
     let (code, object) = json(&with(COMMIT));
     assert_eq!((code, &object["new"], &object["series"]), (0, &true.into(), &2.into()), "{object}");
     let file = fs::read_to_string(object["file"].as_str().expect("a path")).expect("a file");
-    assert!(file.contains("torus\tqmat\t100 spheres\tok\t"), "{file}");
+    assert!(file.contains("torus-16\tqmat\t100 spheres\tok\t"), "{file}");
     let (code, object) = json(&with(COMMIT));
     assert_eq!((code, &object["new"]), (0, &false.into()));
     let (code, _, stderr) = run(&with("HEAD"));

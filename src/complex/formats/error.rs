@@ -77,6 +77,26 @@ pub enum MaErrorKind {
     /// A line starts with a word that the format does not have.
     #[error("expected a line that starts with v, e or f, found {0:?}")]
     Record(String),
+    /// A line of a list of spheres is none.
+    #[error("a list of spheres alone has lines `v x y z r`, found {0:?}")]
+    NoSphere(String),
+    /// A list of points without radii.
+    #[error("a list of points without radii (`3 n`), no medial mesh")]
+    NoRadii,
+    /// A second file was appended.
+    #[error(
+        "all that the header announces stands above: another medial mesh begins here, written behind the first; keep \
+         the one that is meant"
+    )]
+    Appended,
+    /// What follows the last record is no list of parts.
+    #[error(
+        "expected the parts of the structure behind the last record: a number of them, and for each `id type m` with m indices"
+    )]
+    Trailer,
+    /// Every radius is 0.
+    #[error("every radius is 0: a surface or a set of points, no medial mesh")]
+    Points,
     /// A line ends too early.
     #[error("the {field} is missing")]
     Missing {
@@ -106,7 +126,10 @@ pub enum MaErrorKind {
 
 impl MaErrorKind {
     pub(super) fn unreadable(extension: &str) -> Self {
-        Self::Extension { extension: extension.to_owned(), known: ".ma, .ply" }
+        Self::Extension {
+            extension: extension.to_owned(),
+            known: ".ma, .ma_dup, .sph, .txt, .xyzr, .ply",
+        }
     }
 
     pub(super) fn unwritable(extension: &str) -> Self {

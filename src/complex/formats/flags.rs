@@ -32,6 +32,8 @@ pub(super) struct Flags {
     records: [[usize; MAX_WORDS + 1]; 3],
     /// For each kind, which records are marked as deleted.
     deleted: [Vec<bool>; 3],
+    /// Spheres and edges of which the writer did not know whether they are deleted: kept.
+    unknown: usize,
     /// Faces with three words under a header of three counts, and what the words say if they are
     /// flags: `None` where they can only be a colour.
     doubtful: Vec<(usize, Option<bool>)>,
@@ -87,7 +89,10 @@ impl Flags {
             (_, &[kind_of_feature, deleted, ..]) if words.len() <= MAX_WORDS => {
                 integer(kind_of_feature)?;
                 words.get(2).map_or(Ok(0.0), |copies| integer(copies))?;
-                integer(deleted)? != 0.0
+                // MATFP writes -1 where it does not know.
+                let deleted = integer(deleted)?;
+                self.unknown += usize::from(deleted < 0.0);
+                deleted > 0.0
             }
             _ => return Err(not_flags(&words)),
         };
@@ -131,6 +136,10 @@ impl Flags {
     }
 
     fn warn(&self, warnings: &mut Vec<String>) {
+        if self.unknown > 0 {
+            let many = self.unknown;
+            warnings.push(format!("{many} marks of deletion are negative, for unknown: kept"));
+        }
         let mut say = |kind: usize, words: usize, read: &str| {
             let many = self.records[kind][words];
             if many > 0 {

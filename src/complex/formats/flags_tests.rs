@@ -111,3 +111,64 @@ fn a_doubt_is_a_warning() {
     let loaded = load("2 0 0\nv 0 0 0 1 2 1 1\nv 1 0 0 1 2 0 1\n");
     assert_eq!((loaded.mesh.spheres.len(), loaded.warnings.len()), (1, 1));
 }
+
+/// The spheres of a list, read from a text.
+fn listed(text: &str) -> Vec<f64> {
+    let loaded = parse_ma(text, "list").unwrap_or_else(|error| panic!("{text:?}: {error}"));
+    assert_eq!((loaded.mesh.edges.len(), loaded.mesh.faces.len()), (0, 0));
+    assert!(loaded.notes.iter().any(|note| note.contains("list of spheres")), "{:?}", loaded.notes);
+    loaded.mesh.spheres.iter().map(|sphere| sphere.radius).collect()
+}
+
+#[test]
+fn lists_of_spheres_alone_are_read() {
+    // Coverage Axis, Point2Skeleton, MATTopo's .sph with and without flags, MATFP with what it calls deleted.
+    assert_eq!(listed("v 0 0 0 1\nv 1 0 0 2\n"), [1.0, 2.0]);
+    assert_eq!(listed("2\n0 0 0 1\n1 0 0 2\n"), [1.0, 2.0]);
+    assert_eq!(listed("4 2\n0 0 0 1\n1 0 0 2\n"), [1.0, 2.0]);
+    assert_eq!(listed("4 3\n0 0 0 1 2 0 1\n1 0 0 2 2 1 1\n2 0 0 3 2 0 1\n"), [1.0, 3.0]);
+    assert_eq!(listed("4\nv 0 0 0 1 2 0 0 \nv 1 0 0 2 2 3 0 \nv 1 0 0 3 2 -1 0 \n"), [1.0, 3.0]);
+    for (text, why) in [
+        ("v 0 0 0 1\ne 0 0\n", "line 2: a list of spheres alone"),
+        ("2\n0 0 0 1\n", "announces 2 spheres"),
+        ("1\n0 0 0 1\n1 0 0 1\n", "announces 1 spheres"),
+        ("3 2\n0 0 0\n1 0 0\n", "without radii"),
+        ("99999999999\n0 0 0 1\n", "bytes long"),
+    ] {
+        let error = parse_ma(text, "list").unwrap_err().to_string();
+        assert!(error.contains(why), "{text:?}: {error}");
+    }
+}
+
+#[test]
+fn normals_and_structures_are_counted_and_not_used() {
+    let triangle = "3 3 1\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\ne 0 1\ne 0 2\ne 1 2\nf 0 1 2\n";
+    let plain = parse_ma(triangle, "triangle").unwrap();
+    let normals = triangle.replace("e 0 1\n", "n 0 0 1\nn 0 0 1\ne 0 1\n");
+    let loaded = parse_ma(&normals, "triangle").unwrap();
+    assert_eq!((loaded.mesh, &*loaded.notes[0]), (plain.mesh.clone(), "2 normals were not used"));
+    // A sheet of the face, a seam of two edges over two lines, a junction.
+    let parts = format!("{triangle}3\n0 0 1\n0\n1 1 2 0\n1\n2 3 1 2\n");
+    let loaded = parse_ma(&parts, "triangle").unwrap();
+    assert_eq!(loaded.mesh, plain.mesh);
+    assert_eq!(loaded.notes, ["3 parts of the structure were not used"]);
+    for broken in
+        ["1\n0 0 1\n1\n", "1\n0 4 1\n0\n", "2\n0 0 1\n0\n", "1\n0 0 1\n0 7\n", "1\n0 0 9999\n"]
+    {
+        let error = parse_ma(format!("{triangle}{broken}"), "triangle").unwrap_err().to_string();
+        assert!(error.contains("line 9: expected the parts"), "{broken:?}: {error}");
+    }
+    let twice = format!("{triangle}{triangle}");
+    let error = parse_ma(twice, "triangle").unwrap_err().to_string();
+    assert!(error.contains("line 9: ") && error.contains("another medial mesh begins"), "{error}");
+}
+
+#[test]
+fn a_surface_in_the_clothes_of_a_medial_mesh_is_named() {
+    let text = "4 0 1\nv 0 0 0 0\nv 1 0 0 0\nv 0 1 0 0\nv 0 0 1 0\nf 0 2 1\n";
+    let error = parse_ma(text, "surface.ma").unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "surface.ma: every radius is 0: a surface or a set of points, no medial mesh"
+    );
+}

@@ -10,11 +10,16 @@
 //! Tools of the field add types of features and marks of deletion at the end of a line, and a
 //! fourth count with lines `t a b c d` of tetrahedra: `flags.rs` says which. What is marked as
 //! deleted is dropped, with whatever uses it, and counted.
+//!
+//! Lists of spheres alone are read, too, by their first line: `n` or nothing before lines `v x y z r` (MATFP, Coverage
+//! Axis), `n` or `4 n` before lines `x y z r` (Point2Skeleton, MATTopo's `.sph`). So are lines `n x y z` of normals
+//! (SEG-MAT) and a trailer of parts (MATStruct), which are counted and not used.
 
 use std::io::{self, Write};
 
 use super::canonical::{canonical, note};
 use super::flags::{EDGE, FACE, Flags, SPHERE};
+use super::layout::{Header, Layout, header};
 use super::scan::{Line, lines, shortened};
 use super::{LoadedMa, MaError, MaErrorKind};
 use crate::complex::{MedialMesh, Sphere};
@@ -50,7 +55,14 @@ pub fn parse_ma(text: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError>
         kind: MaErrorKind::Malformed("the file is empty; expected a line `nV nE nF`".into()),
     })?;
     let mut records = Records::announced(&header, bytes.len())?;
-    for line in rest {
+    if records.layout == Layout::Bare {
+        records.take(&header)?;
+    }
+    while let Some(line) = rest.next() {
+        if records.are_complete() && line.words().rest().count() == 1 {
+            records.parts = parts(&line, &mut rest, &records)?;
+            break;
+        }
         records.take(&line)?;
     }
     records.finish(name)
@@ -59,33 +71,43 @@ pub fn parse_ma(text: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError>
 /// The records read so far, and the numbers still to come.
 struct Records {
     announced: [u64; 3],
+    layout: Layout,
     spheres: Vec<Sphere>,
     edges: Vec<[u32; 2]>,
     faces: Vec<[u32; 3]>,
     tetrahedra: usize,
+    normals: usize,
+    /// Parts of a trailer.
+    parts: usize,
     flags: Flags,
     /// The first record of a kind beyond those announced.
     excess: [Option<MaError>; 3],
 }
 
+/// A few spheres of radius 0 are a medial mesh of little use; so many are the vertices of a surface.
+const FEWEST_OF_A_SURFACE: usize = 4;
+
 pub(super) const KINDS: [&str; 3] = ["spheres", "edges", "faces"];
 
 impl Records {
-    fn announced(header: &Line<'_>, bytes: usize) -> Result<Self, MaError> {
-        let (announced, four_counts) = counts(header)?;
+    fn announced(line: &Line<'_>, bytes: usize) -> Result<Self, MaError> {
+        let Header { announced, layout, four_counts } = header(line)?;
         for (what, &announced) in KINDS.into_iter().zip(&announced) {
             let room = bytes / SHORTEST_RECORD;
             if announced > room as u64 || announced > u64::from(u32::MAX) {
                 let kind = MaErrorKind::Announced { what, announced, bytes };
-                return Err(header.error(kind));
+                return Err(line.error(kind));
             }
         }
         Ok(Self {
             announced,
+            layout,
             spheres: Vec::with_capacity(announced[0] as usize),
             edges: Vec::with_capacity(announced[1] as usize),
             faces: Vec::with_capacity(announced[2] as usize),
             tetrahedra: 0,
+            normals: 0,
+            parts: 0,
             flags: Flags::of(four_counts),
             excess: [const { None }; 3],
         })
@@ -94,6 +116,21 @@ impl Records {
     fn take(&mut self, line: &Line<'_>) -> Result<(), MaError> {
         let spheres = self.announced[SPHERE];
         let mut words = line.words();
+        if self.layout != Layout::Complex {
+            if self.layout == Layout::Bare || line.text().starts_with('v') {
+                let word = words.next_word().unwrap_or_default();
+                if word != "v" {
+                    return Err(line.error(MaErrorKind::NoSphere(shortened(word))));
+                }
+            }
+            self.spheres.push(words.sphere()?);
+            self.flags.take(SPHERE, words.rest()).map_err(|kind| line.error(kind))?;
+            let found = self.spheres.len();
+            if self.layout != Layout::Bare && found as u64 > spheres {
+                return Err(line.error(count_error(SPHERE, spheres, found)));
+            }
+            return Ok(());
+        }
         let (kind, found) = match words.next_word() {
             Some("v") => {
                 self.spheres.push(words.sphere()?);
@@ -112,6 +149,13 @@ impl Records {
                 self.tetrahedra += 1;
                 return Ok(());
             }
+            Some("n") => {
+                self.normals += 1;
+                return Ok(());
+            }
+            Some(word) if self.are_complete() && word.parse::<u64>().is_ok() => {
+                return Err(line.error(MaErrorKind::Appended));
+            }
             other => {
                 let found = shortened(other.unwrap_or_default());
                 return Err(line.error(MaErrorKind::Record(found)));
@@ -128,9 +172,20 @@ impl Records {
         Ok(())
     }
 
+    /// Whether all that the header announces has been read.
+    fn are_complete(&self) -> bool {
+        let found = [self.spheres.len(), self.edges.len(), self.faces.len()];
+        self.layout == Layout::Complex && found.map(|count| count as u64) == self.announced
+    }
+
     fn finish(mut self, name: &str) -> Result<LoadedMa, MaError> {
         let mut notes = Vec::new();
         self.check_counts(name, &mut notes)?;
+        let all_are_points = self.spheres.iter().all(|sphere| sphere.radius == 0.0);
+        if self.spheres.len() >= FEWEST_OF_A_SURFACE && all_are_points {
+            let file = name.to_owned();
+            return Err(MaError { file, line: None, kind: MaErrorKind::Points });
+        }
         let mut warnings = Vec::new();
         self.flags.settle(&mut warnings);
         if self.flags.flagged() > 0 {
@@ -138,6 +193,8 @@ impl Records {
             notes.push(format!("{lines} lines carry flags; marks of deletion were obeyed"));
         }
         note(&mut notes, self.tetrahedra, "tetrahedron", "tetrahedra", "not used");
+        note(&mut notes, self.normals, "normal", "normals", "not used");
+        note(&mut notes, self.parts, "part of the structure", "parts of the structure", "not used");
         let kept = self.drop_deleted(&mut notes);
         let loaded = canonical(self.spheres, self.edges, self.faces, notes);
         Ok(LoadedMa { warnings, kept, ..loaded })
@@ -145,12 +202,25 @@ impl Records {
 
     fn check_counts(&mut self, name: &str, notes: &mut Vec<String>) -> Result<(), MaError> {
         let found = [self.spheres.len(), self.edges.len(), self.faces.len()];
+        if self.layout == Layout::Bare {
+            notes.push("a list of spheres without edges and faces".to_owned());
+            return Ok(());
+        }
+        if self.layout == Layout::Counted {
+            // MATFP leaves out spheres that it has announced.
+            let left = self.announced[SPHERE] - found[SPHERE] as u64;
+            notes.push("a list of spheres without edges and faces".to_owned());
+            if left > 0 && self.flags.flagged() > 0 {
+                notes.push(format!("the header announces {left} spheres more than the file holds"));
+                return Ok(());
+            }
+        }
         for kind in [SPHERE, EDGE, FACE] {
             let announced = self.announced[kind];
             if found[kind] as u64 == announced {
                 continue;
             }
-            if kind != SPHERE && self.flags.counts_may_lie() {
+            if kind != SPHERE && (self.flags.counts_may_lie() || self.normals > 0) {
                 let (what, found) = (KINDS[kind], found[kind]);
                 notes.push(format!(
                     "the header announces {announced} {what}, the file holds {found}: taken as \
@@ -208,18 +278,37 @@ fn drop_simplices<const N: usize>(
     note(notes, all - simplices.len(), one, many, "dropped: on a deleted sphere");
 }
 
-/// The counts of the header, and whether there is a fourth one, of tetrahedra.
-fn counts(header: &Line<'_>) -> Result<([u64; 3], bool), MaError> {
-    let words: Vec<Option<u64>> = header.words().rest().map(|word| word.parse().ok()).collect();
-    match *words.as_slice() {
-        [Some(spheres), Some(edges), Some(faces)] => Ok(([spheres, edges, faces], false)),
-        [Some(spheres), Some(edges), Some(faces), Some(_)] => Ok(([spheres, edges, faces], true)),
-        _ => {
-            let found = shortened(header.text());
-            let why = format!("expected three counts `nV nE nF` first, found {found:?}");
-            Err(header.error(MaErrorKind::Malformed(why)))
+/// The number of parts of a trailer: each `id type m` with the indices of `m` records, of faces for type 0, edges for 1 and
+/// 2, spheres for 3. Line breaks mean nothing in it.
+fn parts<'a>(
+    first: &Line<'_>,
+    rest: &mut impl Iterator<Item = Line<'a>>,
+    records: &Records,
+) -> Result<usize, MaError> {
+    let broken = |line: &Line<'_>| line.error(MaErrorKind::Trailer);
+    let number = |line: &Line<'_>, word: &str| word.parse::<u64>().map_err(|_| broken(line));
+    let count = number(first, first.text())?;
+    let mut words: Vec<u64> = Vec::new();
+    for line in rest {
+        for word in line.words().rest() {
+            words.push(number(&line, word)?);
         }
     }
+    let mut words = words.into_iter();
+    for _ in 0..count {
+        let (Some(_), Some(kind), Some(members)) = (words.next(), words.next(), words.next())
+        else {
+            return Err(broken(first));
+        };
+        let of = [FACE, EDGE, EDGE, SPHERE].get(kind as usize).ok_or_else(|| broken(first))?;
+        for _ in 0..members {
+            if words.next().is_none_or(|index| index >= records.announced[*of]) {
+                return Err(broken(first));
+            }
+        }
+    }
+    // Each part took three words at least, so the count fits.
+    if words.next().is_some() { Err(broken(first)) } else { Ok(count as usize) }
 }
 
 fn count_error(kind: usize, announced: u64, found: usize) -> MaErrorKind {

@@ -2,7 +2,8 @@
 //!
 //! | extension | read | written | holds |
 //! |---|---|---|---|
-//! | `.ma` | yes | yes | spheres, edges, faces: the interchange format of the field |
+//! | `.ma` | yes | yes | spheres, edges, faces: the interchange format of the field, in all its dialects |
+//! | `.ma_dup`, `.sph`, `.txt`, `.xyzr` | yes | no | the same, and lists of spheres alone |
 //! | `.ply` | ASCII | ASCII | the same, with a vertex property `radius`, for viewers |
 //! | `.obj` | no | yes | centres, edges (`l`) and faces (`f`), without radii, for viewers |
 //!
@@ -12,6 +13,7 @@
 mod canonical;
 mod error;
 mod flags;
+mod layout;
 mod ma;
 mod obj;
 mod ply;
@@ -51,7 +53,7 @@ impl LoadedMa {
     }
 }
 
-/// Reads a medial mesh from a `.ma` or an ASCII `.ply` file, told apart by the extension.
+/// Reads a medial mesh from a `.ma` file, a list of spheres or an ASCII `.ply` file, told apart by the extension.
 ///
 /// # Errors
 /// When the file cannot be read, has another extension, or does not hold a medial mesh; the error
@@ -59,7 +61,7 @@ impl LoadedMa {
 pub fn read(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
     let path = path.as_ref();
     match extension(path).as_str() {
-        "ma" => read_ma(path),
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => read_ma(path),
         "ply" => parse_ply(load(path)?, &path.display().to_string()),
         other => Err(MaError::of_file(path, MaErrorKind::unreadable(other))),
     }

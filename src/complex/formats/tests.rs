@@ -135,7 +135,7 @@ fn errors_name_the_line_and_the_reason() {
     for (text, expected) in [
         ("", "x.ma: the file is empty"),
         ("# only\n", "x.ma: the file is empty"),
-        ("4 5\n", "line 1: expected three counts"),
+        ("7 5\n", "line 1: expected three counts"),
         ("OFF\n", "line 1: expected three counts"),
         ("-1 0 0\n", "line 1: expected three counts"),
         ("4000000000 0 0\nv 0 0 0 1\n", "line 1: the header announces 4000000000 spheres"),
@@ -156,7 +156,7 @@ fn errors_name_the_line_and_the_reason() {
         assert!(message(text).contains(expected), "{text:?} gives {:?}", message(text));
     }
     assert!(read_ma("/nonexistent/x.ma").unwrap_err().to_string().starts_with("/nonexistent/x.ma"));
-    assert!(read("x.off").unwrap_err().to_string().contains("is not one of .ma, .ply"));
+    assert!(read("x.off").unwrap_err().to_string().contains("is not one of .ma, .ma_dup"));
 }
 
 #[test]
