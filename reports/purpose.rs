@@ -47,7 +47,7 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         .map_or_else(Vec::new, |(level, spheres)| at_count(comparison, level, spheres));
     rows.extend(within_bound(comparison));
     let titles =
-        ["what matters", "method", "median", "on", "ahead of", "by", "better, equal, worse"];
+        ["what matters", "method", "median", "on", "next", "beside it", "better, equal, worse"];
     (!rows.is_empty()).then(|| Table {
         caption: "Which one for me".to_owned(),
         notes: vec![
@@ -57,7 +57,7 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
                  middle two; one without such a result counts as infinitely bad, and half of them must have one. \
                  Among the levels that were run. The method of the \
                  best median is named, and where that is another the best one of those with a result on the most \
-                 meshes. Ahead of: the next best method, the geometric mean of the ratios on the meshes \
+                 meshes. Beside the next one: the geometric mean of the ratios on the meshes \
                  where both have a result, and on how many of them the first one is better, equal within {:.0} %, \
                  worse.",
                 100.0 * EQUAL

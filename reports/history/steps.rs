@@ -35,6 +35,9 @@ const LEAST_NOISE: f64 = 0.002;
 /// A larger correlation of neighbouring nights is not believed: a drift has one, and is no noise.
 const MOST_REMEMBERED: f64 = 0.9;
 
+/// In fewer nights a step alone looks like a correlation.
+const FEWEST_REMEMBERED: usize = 60;
+
 /// What counts as a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepOptions {
@@ -298,6 +301,9 @@ fn noise(values: &[f64], spikes: f64) -> f64 {
 /// The correlation of neighbouring nights. With a correlation r, differences over two nights have 1 + r times the mean
 /// square of those over one. Where that is not clear it counts as none: it is less than what it is taken from varies by.
 fn remembered(values: &[f64], spikes: f64) -> f64 {
+    if values.len() < FEWEST_REMEMBERED {
+        return 0.0;
+    }
     let [one, two] = [1, 2].map(|lag| mean_square(values, lag, spikes));
     let ratio = two / one.max(LEAST_NOISE * LEAST_NOISE);
     (ratio - 1.0 - 1.0 / (values.len() as f64).sqrt()).clamp(0.0, MOST_REMEMBERED)

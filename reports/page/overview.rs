@@ -94,10 +94,19 @@ fn way_to_pictures(page: &Page<'_>) -> String {
     let Some(first) = page.meshes.iter().find(|mesh| mesh.picture.is_some()) else {
         return String::new();
     };
-    format!(
+    let way = format!(
         "<p>What the results look like: <a href=\"#mesh-{}\">pictures and 3D views</a> of each mesh.</p>\n",
         escape_html(&first.stem)
-    )
+    );
+    // Linked or held by the page: the second copy of a held one is small beside all.
+    let picture = first.picture.as_ref().map_or(String::new(), |(address, words)| {
+        let words = escape_html(words);
+        format!(
+            "<figure class=\"strip\"><a href=\"#mesh-{}\"><img src=\"{address}\" alt=\"{words}\"></a></figure>\n",
+            escape_html(&first.stem)
+        )
+    });
+    way + &picture
 }
 
 /// A table with its caption and its notes but the first, which the page's head already tells.
