@@ -6,10 +6,7 @@ use medial::complex::{self, LoadedMa};
 use medial::shape::Shape;
 
 use crate::exit::Failure;
-
-/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it: next to its
-/// spheres the whole surface is less than a rounding error.
-const LARGEST_SPHERE: f64 = 1e12;
+use crate::run::reach;
 
 /// How far from the middle of its surface a medial mesh reaches, in diagonals, if it is no slip.
 const SMALLEST: f64 = 0.01;
@@ -24,21 +21,8 @@ pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<LoadedMa, Failure> 
     if loaded.mesh.spheres.is_empty() {
         return Err(Failure::input(format!("{}: no sphere", path.display())));
     }
-    let to_normal = shape.normalisation();
-    let mut reach = 0.0_f64;
-    for (id, sphere) in loaded.mesh.spheres.iter().enumerate() {
-        let centre = to_normal.forward(sphere.centre);
-        let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
-        reach = reach.max(size);
-        // An overflow gives a size that is infinite or not a number.
-        if size.is_nan() || size > LARGEST_SPHERE {
-            return Err(Failure::input(format!(
-                "{}: sphere {id} reaches {size:.1e} diagonals of the surface away from it: the \
-                 medial mesh is in other units, or of another surface",
-                path.display()
-            )));
-        }
-    }
+    let reach = reach(&loaded.mesh, shape)
+        .map_err(|why| Failure::input(format!("{}: {why}", path.display())))?;
     // The middle of the surface is the origin.
     if !(SMALLEST..=LARGEST).contains(&reach) {
         loaded.warnings.push(format!(

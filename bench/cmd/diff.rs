@@ -2,6 +2,7 @@
 //!
 //! With `--run` the two are builds of this program, which run a study in turn first.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -69,14 +70,13 @@ pub fn run(
             return Err(Failure::usage(message));
         }
     }
-    let folders = match arguments.run {
+    let [old, new] = match arguments.run {
         true => match alternate(arguments, global, registry)? {
-            Some(folders) => folders,
+            Some(sides) => sides,
             None => return Ok(Exit::Interrupted),
         },
-        false => [arguments.old.clone(), arguments.new.clone()],
+        false => [records(&arguments.old, global)?, records(&arguments.new, global)?],
     };
-    let [old, new] = [records(&folders[0], global)?, records(&folders[1], global)?];
     let names = [&arguments.old, &arguments.new].map(|path| path.display().to_string());
     let options = DiffOptions {
         error: arguments.error,
@@ -117,18 +117,17 @@ fn records(path: &Path, global: &Global) -> Result<Vec<Record>, Failure> {
     Ok(journaled.records)
 }
 
-/// Runs the study with both builds; the folders of their results, or nothing where the user interrupted.
+/// Runs the study with both builds; the records of both, or nothing where the user interrupted.
 fn alternate(
     arguments: &Arguments,
     global: &Global,
     registry: &mut Registry,
-) -> Result<Option<[PathBuf; 2]>, Failure> {
+) -> Result<Option<[Vec<Record>; 2]>, Failure> {
     let path = arguments.study.as_ref().expect("required by --run");
     let mut study = Study::read(path)?;
     study.repeat = arguments.repeat;
     // The CPU seconds of several threads that wait for each other vary too much.
     study.threads = global.threads.or(study.threads).or(Some(1));
-    study.plugins.extend(global.plugins.iter().cloned());
     for file in &study.plugins {
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
@@ -161,7 +160,14 @@ fn alternate(
         }
         ended => ended?,
     }
-    Ok(Some(SIDES.map(|side| arguments.out.join(side))))
+    // Other studies and other builds may have left theirs in the folder.
+    let asked = |contender: &Contender<'_>| -> Result<Vec<Record>, Failure> {
+        let keys = items.iter().flat_map(|item| contender.build.own(item).keys());
+        let keys: HashSet<String> = keys.collect();
+        let all = records(contender.store.dir(), global)?;
+        Ok(all.into_iter().filter(|record| keys.contains(&record.key)).collect())
+    };
+    Ok(Some([asked(&contenders[0])?, asked(&contenders[1])?]))
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {

@@ -70,7 +70,7 @@ impl Build {
     }
 
     /// An item as this build has to run it.
-    fn own(&self, item: &Item) -> Item {
+    pub fn own(&self, item: &Item) -> Item {
         Item { binary: self.provenance.binary_hash.clone(), ..item.clone() }
     }
 }

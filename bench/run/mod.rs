@@ -71,4 +71,4 @@ pub use stage_line::StageLine;
 pub use store::{AXES, Failures, RESULTS, Store, StoreError};
 pub use study::{Here, MOST_REPEATS, Study, StudyError, StudyMethod, VOLUME_DEPTH, no_such_method};
 pub use supervise::{RunError, Supervisor};
-pub use verdict::{Verdict, judge};
+pub use verdict::{Verdict, judge, reach};

@@ -4,11 +4,38 @@ use std::time::Instant;
 
 use medial::complex::MedialMesh;
 use medial::metrics::{Evaluation, MetricError, union_betti};
+use medial::shape::Shape;
 use medial_reports::UnionTopology;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::{LevelRun, Scene, hex};
+
+/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it: next to its
+/// spheres the whole surface is less than a rounding error.
+const LARGEST_SPHERE: f64 = 1e12;
+
+/// How far a medial mesh in the unit of a shape's input reaches from the middle of the surface, in diagonals.
+///
+/// # Errors
+/// In words, which sphere is too far away to be measured.
+pub fn reach(mesh: &MedialMesh, shape: &Shape) -> Result<f64, String> {
+    let to_normal = shape.normalisation();
+    let mut reach = 0.0_f64;
+    for (id, sphere) in mesh.spheres.iter().enumerate() {
+        let centre = to_normal.forward(sphere.centre);
+        let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
+        reach = reach.max(size);
+        // An overflow gives a size that is infinite or not a number.
+        if size.is_nan() || size > LARGEST_SPHERE {
+            return Err(format!(
+                "sphere {id} reaches {size:.1e} diagonals of the surface away from it: the medial mesh is in other \
+                 units, or of another surface"
+            ));
+        }
+    }
+    Ok(reach)
+}
 
 /// The measurements of one result.
 #[derive(Clone)]

@@ -134,8 +134,7 @@ fn timing_table(diff: &Diff) -> Table {
             format!("{:.0} %", 100.0 * timing.agreement),
         ];
         let mut cells: Vec<Cell> = texts.into_iter().map(Cell::new).collect();
-        cells.push(Cell { best: true, ..Cell::new(meaning) });
-        cells.last_mut().into_iter().for_each(|cell| cell.best = !cell.text.is_empty());
+        cells.push(Cell { best: timing.meaning.is_some(), ..Cell::new(meaning) });
         Row { cells, starts_group: false }
     };
     let options = &diff.options;

@@ -33,7 +33,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     };
     let scratch = tempfile::tempdir().map_err(Failure::input)?;
     let opened = open(&arguments.dir, scratch.path())?;
-    let surfaces = Surfaces::new(opened.study.as_deref(), &arguments.meshes);
+    let surfaces = Surfaces::new(&opened, &arguments.meshes)?;
     let rejudged = rejudge(&opened, &surfaces, share);
     if !rejudged.wrong.is_empty() {
         return Err(refusal(&arguments.dir, &rejudged));

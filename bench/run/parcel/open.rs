@@ -20,8 +20,8 @@ use crate::run::hex;
 /// The most bytes of all files together, unpacked.
 const MOST_BYTES: u64 = 8 << 30;
 
-/// The most bytes of one medial mesh, and of the manifest.
-const MOST_BYTES_OF_ONE: u64 = 512 << 20;
+/// The most bytes of one file: records and medial meshes are read as a whole.
+const MOST_BYTES_OF_ONE: u64 = 1 << 30;
 
 /// An archive, unpacked and found whole.
 #[derive(Debug)]
@@ -104,7 +104,7 @@ fn unpack(file: File, folder: &Path) -> Result<BTreeMap<String, String>, Problem
                 "its first file is not the manifest, but {name}"
             )));
         }
-        let most = if name == RECORDS { left } else { left.min(MOST_BYTES_OF_ONE) };
+        let most = left.min(MOST_BYTES_OF_ONE);
         if size > most {
             let why = format!("{name} would have {size} bytes, more than {most} are not taken");
             return Err(Problem::Refused(why));

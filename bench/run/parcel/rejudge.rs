@@ -4,7 +4,7 @@
 //! can: for every record the counts, and for a share of them all errors and the topology, by the judge and the
 //! seed of the record.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 use medial::complex::MedialMesh;
@@ -15,7 +15,7 @@ use medial_reports::{Record, Status};
 use serde_json::Value;
 
 use super::Opened;
-use crate::run::{Input, Source, Study, VOLUME_DEPTH};
+use crate::run::{Input, InputError, Source, Study, VOLUME_DEPTH, reach};
 
 /// What a result may differ from what this machine measures, as a fraction: the medial mesh went through a file in
 /// another unit and back.
@@ -35,17 +35,32 @@ const COUNTS: f64 = 0.01;
 pub struct Surfaces(BTreeMap<String, Source>);
 
 impl Surfaces {
-    /// The built-in shapes of a study, and files.
-    pub fn new(study: Option<&str>, files: &[PathBuf]) -> Self {
-        let named = study.and_then(|text| toml::from_str::<Study>(text).ok());
-        let named = named.map_or_else(Vec::new, |study| study.meshes);
+    /// The built-in shapes that the records of an archive are of, at the resolutions of its study, and files.
+    ///
+    /// # Errors
+    /// When a file cannot be read.
+    pub fn new(opened: &Opened, files: &[PathBuf]) -> Result<Self, InputError> {
+        let study = opened.study.as_deref().and_then(|text| toml::from_str::<Study>(text).ok());
+        let named = study.map_or_else(Vec::new, |study| study.meshes);
         // A path in a stranger's study is none of ours.
         let is_shape = |path: &&PathBuf| path.to_string_lossy().starts_with("builtin:");
         let shapes = named.iter().filter(is_shape).filter_map(|path| Source::parse(path).ok());
-        let files = files.iter().cloned().map(Source::File);
-        let all = shapes.chain(Source::built_ins()).chain(files);
-        let hashed = all.filter_map(|source| Some((Input::load(&source).ok()?.hash, source)));
-        Self(hashed.collect())
+        let meshes: HashSet<&str> = opened.records.iter().map(|r| r.mesh.as_str()).collect();
+        // Only what has results is made, however long the study is.
+        let has_results = |shape: &Source| {
+            meshes.contains(&*shape.name()) || meshes.contains(&*shape.to_string())
+        };
+        let mut surfaces = BTreeMap::new();
+        for shape in shapes.chain(Source::built_ins()).filter(has_results) {
+            if let Ok(input) = Input::load(&shape) {
+                surfaces.insert(input.hash, shape);
+            }
+        }
+        for file in files {
+            let file = Source::File(file.clone());
+            surfaces.insert(Input::load(&file)?.hash, file);
+        }
+        Ok(Self(surfaces))
     }
 }
 
@@ -53,7 +68,7 @@ impl Surfaces {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rejudged {
     /// Keys of the records that were measured again, and found right.
-    pub right: Vec<String>,
+    pub right: BTreeSet<String>,
     /// What was found wrong.
     pub wrong: Vec<String>,
     /// Meshes whose surface is not here, and the number of their records.
@@ -161,7 +176,9 @@ fn of_surface(
             (None, _) => Some("its result was never measured".to_owned()),
         };
         match compared {
-            None => rejudged.right.push(record.key.clone()),
+            None => {
+                rejudged.right.insert(record.key.clone());
+            }
             Some(why) => rejudged.wrong.push(format!("{}: {why}", name(record))),
         }
     }
@@ -195,6 +212,7 @@ fn judge_for<'j>(
 }
 
 fn evaluated(judge: &Judge, shape: &Shape, mesh: &MedialMesh) -> Result<Evaluation, String> {
+    reach(mesh, shape)?;
     let to_normal = shape.normalisation();
     let normal = mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
     judge.evaluate(&normal).map_err(|error| error.to_string())

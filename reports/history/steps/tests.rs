@@ -48,7 +48,7 @@ fn a_step_of_a_tenth_is_found_at_its_night() {
         near += usize::from(step.at.abs_diff(at) <= 1);
         assert!(step.at.abs_diff(at) <= 5, "seed {seed}: at {} in place of {at}", step.at);
         assert!(step.low < step.ratio && step.ratio < step.high, "{step:?}");
-        assert!((step.ratio - 1.1).abs() < 0.04, "seed {seed}: {step:?}");
+        assert!((step.ratio - 1.1).abs() < 0.035, "seed {seed}: {step:?}");
     }
     assert!(near >= 90, "{near} of 100");
 }
