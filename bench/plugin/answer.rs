@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitStatus;
 
-use medial::complex::{self, MedialMesh};
+use medial::complex::{self, MedialMesh, Radii, ReadOptions};
 use medial::shape::Shape;
 use medial::simplifier::{Level, Simplified, SimplifyError};
 
@@ -120,8 +120,11 @@ fn read(task: &Task<'_>) -> Result<(MedialMesh, Vec<String>), SimplifyError> {
         let message = format!("the file at {{output}} has {bytes} bytes, {LARGEST_OUTPUT} at most");
         return Err(invalid(message));
     }
-    let loaded = complex::read_ma(task.output).map_err(|error| {
-        // The name of the file is a temporary one and says nothing.
+    let bytes = fs::read(task.output)
+        .map_err(|error| invalid(format!("the file at {{output}}: {error}")))?;
+    let strict = ReadOptions { radii: Radii::NotNegative, ..ReadOptions::default() };
+    let loaded = complex::parse_ma_with(bytes, "", strict).map_err(|error| {
+        // The file's name is a temporary one and says nothing.
         let line = error.line.map_or_else(String::new, |line| format!(", line {line}"));
         invalid(format!("the file at {{output}}{line}: {}", error.kind))
     })?;

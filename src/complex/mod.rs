@@ -21,7 +21,10 @@ pub use contour::{
 };
 pub use crossing::{Crossings, crossing_faces};
 pub use cubical::cubical_betti;
-pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
+pub use formats::{
+    Annotations, LoadedMa, MaError, MaErrorKind, Part, PartKind, Radii, ReadOptions, parse_ma,
+    parse_ma_with, parse_obj, parse_ply, parse_ply_with, read, read_ma, read_with, write,
+};
 pub use incidence::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};
 pub use stability::{ZERO_LENGTH, stability_ratio};

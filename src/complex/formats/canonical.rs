@@ -1,18 +1,31 @@
 //! From the simplices of a file to the canonical form, with a note on every repair.
 
-use super::LoadedMa;
+use super::error::MaErrorKind;
+use super::{Annotations, LoadedMa, Radii};
 use crate::complex::{MedialMesh, Sphere};
+
+/// A few spheres of radius 0 are a medial mesh of little use; so many are the vertices of a surface.
+const FEWEST_OF_A_SURFACE: usize = 4;
 
 /// Brings the simplices of a file to canonical form: indices ascend, lists are sorted, every
 /// simplex stands once, every side of a face is an edge. The set of points covered stays the same.
 ///
-/// Precondition: indices are below the number of spheres, and spheres are valid.
+/// Precondition: indices are below the number of spheres, and numbers are finite.
+///
+/// # Errors
+/// When radii are needed and all are 0.
 pub(super) fn canonical(
-    spheres: Vec<Sphere>,
+    mut spheres: Vec<Sphere>,
     mut edges: Vec<[u32; 2]>,
     mut faces: Vec<[u32; 3]>,
+    radii: Radii,
     mut notes: Vec<String>,
-) -> LoadedMa {
+) -> Result<LoadedMa, MaErrorKind> {
+    let all_are_points = spheres.iter().all(|sphere| sphere.radius == 0.0);
+    if radii != Radii::NotNeeded && spheres.len() >= FEWEST_OF_A_SURFACE && all_are_points {
+        return Err(MaErrorKind::Points);
+    }
+    let warnings = without_signs(&mut spheres, radii);
     note_disorder(&edges, "edge", &mut notes);
     note_disorder(&faces, "face", &mut notes);
     for edge in &mut edges {
@@ -30,7 +43,22 @@ pub(super) fn canonical(
     add_missing_edges(&mut edges, &faces, &mut notes);
     let mesh = MedialMesh { spheres, edges, faces, contacts: None };
     debug_assert_eq!(mesh.check(), Ok(()));
-    LoadedMa { mesh, notes, warnings: Vec::new(), kept: None }
+    Ok(LoadedMa { mesh, notes, warnings, kept: None, annotations: Annotations::default() })
+}
+
+/// Takes the absolute values of negative radii, which some tools write for spheres outside of a surface.
+fn without_signs(spheres: &mut [Sphere], radii: Radii) -> Vec<String> {
+    let mut negative = 0;
+    for sphere in spheres {
+        negative += usize::from(sphere.radius < 0.0);
+        sphere.radius = sphere.radius.abs();
+    }
+    match negative {
+        _ if radii == Radii::NotNeeded => Vec::new(),
+        0 => Vec::new(),
+        1 => vec!["1 radius is negative: its absolute value was taken".to_owned()],
+        _ => vec![format!("{negative} radii are negative: their absolute values were taken")],
+    }
 }
 
 /// Whether a list is in canonical order matters to nobody but those who compare files.

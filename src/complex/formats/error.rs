@@ -27,8 +27,13 @@ impl fmt::Display for MaError {
 }
 
 impl MaError {
+    /// A reason that belongs to no line of the file `name`.
+    pub(super) fn of(name: &str, kind: MaErrorKind) -> Self {
+        Self { file: name.to_owned(), line: None, kind }
+    }
+
     pub(super) fn of_file(path: &Path, kind: MaErrorKind) -> Self {
-        Self { file: path.display().to_string(), line: None, kind }
+        Self::of(&path.display().to_string(), kind)
     }
 }
 
@@ -80,15 +85,23 @@ pub enum MaErrorKind {
     /// A line of a list of spheres is none.
     #[error("a list of spheres alone has lines `v x y z r`, found {0:?}")]
     NoSphere(String),
-    /// A list of points without radii.
-    #[error("a list of points without radii (`3 n`), no medial mesh")]
+    /// Points without radii.
+    #[error("points without radii: `--radii surface` takes their distances to a surface")]
     NoRadii,
     /// A second file was appended.
     #[error(
-        "all that the header announces stands above: another medial mesh begins here, written behind the first; keep \
-         the one that is meant"
+        "all that the header announces stands above: another medial mesh begins here, written behind the first; \
+         `--block 1`, `--block 2` ... say which is meant"
     )]
     Appended,
+    /// There are not so many medial meshes in the file.
+    #[error("there is no block {wanted}: the file holds {blocks}, counted from 1")]
+    Block {
+        /// The block that was asked for.
+        wanted: usize,
+        /// Number of medial meshes in the file.
+        blocks: usize,
+    },
     /// What follows the last record is no list of parts.
     #[error(
         "expected the parts of the structure behind the last record: a number of them, and for each `id type m` with m indices"
@@ -111,7 +124,7 @@ pub enum MaErrorKind {
         /// What stands there.
         text: String,
     },
-    /// A radius is negative.
+    /// A radius is negative, where none may be.
     #[error("the radius {0} is negative")]
     NegativeRadius(f64),
     /// A word is not the index of a sphere.
@@ -128,7 +141,7 @@ impl MaErrorKind {
     pub(super) fn unreadable(extension: &str) -> Self {
         Self::Extension {
             extension: extension.to_owned(),
-            known: ".ma, .ma_dup, .sph, .txt, .xyzr, .ply",
+            known: ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj",
         }
     }
 

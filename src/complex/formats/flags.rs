@@ -10,10 +10,11 @@
 //!
 //! So MATFP writes two words for a sphere and one for an edge, which is its *type*; MATTopo's
 //! `.ma_dup`, whose header has four counts, writes three everywhere. Three words behind a face are
-//! a colour in other files. Types mean different things in different tools and are not kept.
+//! a colour in other files. Types and importances are kept as they are, since they mean different things in different
+//! tools.
 
 use super::error::MaErrorKind;
-use super::ma::KINDS;
+use super::records::KINDS;
 use super::scan::shortened;
 
 pub(super) const SPHERE: usize = 0;
@@ -32,6 +33,8 @@ pub(super) struct Flags {
     records: [[usize; MAX_WORDS + 1]; 3],
     /// For each kind, which records are marked as deleted.
     deleted: [Vec<bool>; 3],
+    /// For each kind, the type or the importance of each record that has one.
+    values: [Vec<Option<f64>>; 3],
     /// Spheres and edges of which the writer did not know whether they are deleted: kept.
     unknown: usize,
     /// Faces with three words under a header of three counts, and what the words say if they are
@@ -57,6 +60,7 @@ impl Flags {
         words: impl Iterator<Item = &'a str>,
     ) -> Result<(), MaErrorKind> {
         let words: Vec<&str> = words.take(MAX_WORDS + 1).collect();
+        let mut value = None;
         let deleted = match (kind, words.as_slice()) {
             (_, []) => false,
             (FACE, [word]) => zero_or_one(word).ok_or_else(|| {
@@ -68,12 +72,14 @@ impl Flags {
                 MaErrorKind::Malformed(why)
             })?,
             (FACE, [importance, deleted]) => {
-                number(importance)?;
+                value = Some(number(importance)?);
                 integer(deleted)? != 0.0
             }
             (FACE, &[first, deleted, copies]) => {
                 let said = number(first).and_then(|_| integer(deleted)).ok();
                 let said = said.filter(|_| integer(copies).is_ok());
+                // Of a colour it means nothing; `settle` takes it back.
+                value = said.and(number(first).ok());
                 if self.four_counts {
                     said.ok_or_else(|| not_flags(&words))? != 0.0
                 } else {
@@ -83,11 +89,11 @@ impl Flags {
                 }
             }
             (_, [kind_of_feature]) => {
-                integer(kind_of_feature)?;
+                value = Some(integer(kind_of_feature)?);
                 false
             }
             (_, &[kind_of_feature, deleted, ..]) if words.len() <= MAX_WORDS => {
-                integer(kind_of_feature)?;
+                value = Some(integer(kind_of_feature)?);
                 words.get(2).map_or(Ok(0.0), |copies| integer(copies))?;
                 // MATFP writes -1 where it does not know.
                 let deleted = integer(deleted)?;
@@ -98,6 +104,7 @@ impl Flags {
         };
         self.records[kind][words.len()] += 1;
         self.deleted[kind].push(deleted);
+        self.values[kind].push(value);
         Ok(())
     }
 
@@ -128,7 +135,12 @@ impl Flags {
             for &(face, said) in &self.doubtful {
                 self.deleted[FACE][face] = said == Some(true);
             }
-        } else if flagged_spheres {
+            return;
+        }
+        for &(face, _) in &self.doubtful {
+            self.values[FACE][face] = None;
+        }
+        if flagged_spheres {
             warnings.push(format!(
                 "three words behind {many} faces: read as a colour, though spheres have flags"
             ));
@@ -161,6 +173,11 @@ impl Flags {
         self.records.iter().flat_map(|records| &records[1..]).sum()
     }
 
+    /// The types of spheres or edges, the importances of faces, for each record.
+    pub(super) fn values(&self, kind: usize) -> &[Option<f64>] {
+        &self.values[kind]
+    }
+
     /// The records of a kind that are marked as deleted.
     pub(super) fn deleted(&self, kind: usize) -> &[bool] {
         &self.deleted[kind]
@@ -174,7 +191,7 @@ fn number(word: &str) -> Result<f64, MaErrorKind> {
 
 fn integer(word: &str) -> Result<f64, MaErrorKind> {
     let value = number(word)?;
-    if value.fract() != 0.0 {
+    if value.fract() != 0.0 || value.abs() > f64::from(i32::MAX) {
         return Err(MaErrorKind::Malformed(format!("the flag {word} is not a whole number")));
     }
     Ok(value)

@@ -53,13 +53,13 @@ fn a_fourth_count_brings_tetrahedra_and_numbers_of_copies() {
     let loaded = load(
         "5 5 2 1\nv 0 0 0 1 2 0 1\nv 1 0 0 1 2 0 1\nv 0 1 0 1 2 0 1\nv 50 50 50 3 2 1 1\n\
          v 1 1 0 1 4 0 1\ne 0 1 0 0 1\ne 0 2 2 0 1\ne 1 2 1 0 1\ne 1 4 0 0 1\ne 3 4 0 1 1\n\
-         f 0 1 2 0.5 0 1\nf 1 2 3 0.1 1 1\nt 0 1 2 4 1 1\n",
+         f 0 1 2 0.5 0 1\nf 1 2 3 0.1 1 1\nt 0 1 2 4 0 1\n",
     );
     assert_eq!(
         (loaded.mesh.spheres.len(), loaded.mesh.edges.len(), loaded.mesh.faces.len()),
         (4, 4, 1)
     );
-    assert!(loaded.notes.contains(&"1 tetrahedron was not used".to_owned()));
+    assert!(loaded.notes.contains(&"1 tetrahedron was kept as data".to_owned()));
     assert_eq!(loaded.warnings, Vec::<String>::new());
 }
 
@@ -141,7 +141,7 @@ fn lists_of_spheres_alone_are_read() {
 }
 
 #[test]
-fn normals_and_structures_are_counted_and_not_used() {
+fn normals_and_structures_change_no_simplex() {
     let triangle = "3 3 1\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\ne 0 1\ne 0 2\ne 1 2\nf 0 1 2\n";
     let plain = parse_ma(triangle, "triangle").unwrap();
     let normals = triangle.replace("e 0 1\n", "n 0 0 1\nn 0 0 1\ne 0 1\n");
@@ -151,7 +151,7 @@ fn normals_and_structures_are_counted_and_not_used() {
     let parts = format!("{triangle}3\n0 0 1\n0\n1 1 2 0\n1\n2 3 1 2\n");
     let loaded = parse_ma(&parts, "triangle").unwrap();
     assert_eq!(loaded.mesh, plain.mesh);
-    assert_eq!(loaded.notes, ["3 parts of the structure were not used"]);
+    assert_eq!(loaded.notes, ["3 parts of the structure were kept as data"]);
     for broken in
         ["1\n0 0 1\n1\n", "1\n0 4 1\n0\n", "2\n0 0 1\n0\n", "1\n0 0 1\n0 7\n", "1\n0 0 9999\n"]
     {

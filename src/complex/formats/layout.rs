@@ -1,6 +1,7 @@
 //! The first line of a `.ma` file: what it announces, and how the lines below it look.
 
 use super::error::{MaError, MaErrorKind};
+use super::options::Radii;
 use super::scan::{Line, shortened};
 
 /// How the lines of a file look.
@@ -10,6 +11,8 @@ pub(super) enum Layout {
     Complex,
     /// A number of spheres alone, with a letter or without.
     Counted,
+    /// A number of points alone, `x y z`.
+    Points,
     /// Spheres alone, without a number: the first line is one.
     Bare,
 }
@@ -24,25 +27,33 @@ pub(super) struct Header {
 }
 
 /// Reads the first line.
-pub(super) fn header(line: &Line<'_>) -> Result<Header, MaError> {
+pub(super) fn header(line: &Line<'_>, radii: Radii) -> Result<Header, MaError> {
+    let list = |n, layout| Header { announced: [n, 0, 0], layout, four_counts: false };
     if line.words().next_word() == Some("v") {
-        return Ok(Header { announced: [0; 3], layout: Layout::Bare, four_counts: false });
+        return Ok(list(0, Layout::Bare));
+    }
+    if let Some((announced, four_counts)) = counts(line) {
+        return Ok(Header { announced, layout: Layout::Complex, four_counts });
     }
     let words: Vec<Option<u64>> = line.words().rest().map(|word| word.parse().ok()).collect();
-    let complex =
-        |counts, four_counts| Header { announced: counts, layout: Layout::Complex, four_counts };
-    let counted = |n| Header { announced: [n, 0, 0], layout: Layout::Counted, four_counts: false };
     match *words.as_slice() {
-        [Some(spheres), Some(edges), Some(faces)] => Ok(complex([spheres, edges, faces], false)),
-        [Some(spheres), Some(edges), Some(faces), Some(_)] => {
-            Ok(complex([spheres, edges, faces], true))
-        }
-        [Some(spheres)] | [Some(4), Some(spheres)] => Ok(counted(spheres)),
+        [Some(spheres)] | [Some(4), Some(spheres)] => Ok(list(spheres, Layout::Counted)),
+        [Some(3), Some(points)] if radii == Radii::NotNeeded => Ok(list(points, Layout::Points)),
         [Some(3), Some(_)] => Err(line.error(MaErrorKind::NoRadii)),
         _ => {
             let found = shortened(line.text());
             let why = format!("expected three counts `nV nE nF` first, found {found:?}");
             Err(line.error(MaErrorKind::Malformed(why)))
         }
+    }
+}
+
+/// The three counts of a line that is the header of a complex, and whether there is a fourth.
+pub(super) fn counts(line: &Line<'_>) -> Option<([u64; 3], bool)> {
+    let words = line.words().rest().map(|word| word.parse().ok());
+    match *words.collect::<Option<Vec<u64>>>()?.as_slice() {
+        [spheres, edges, faces] => Some(([spheres, edges, faces], false)),
+        [spheres, edges, faces, _] => Some(([spheres, edges, faces], true)),
+        _ => None,
     }
 }

@@ -5,27 +5,34 @@
 //! | `.ma` | yes | yes | spheres, edges, faces: the interchange format of the field, in all its dialects |
 //! | `.ma_dup`, `.sph`, `.txt`, `.xyzr` | yes | no | the same, and lists of spheres alone |
 //! | `.ply` | ASCII | ASCII | the same, with a vertex property `radius`, for viewers |
-//! | `.obj` | no | yes | centres, edges (`l`) and faces (`f`), without radii, for viewers |
+//! | `.obj` | yes | yes | centres, edges (`l`) and faces (`f`); read with radii as fourth numbers (`v x y z r`), written without, for viewers |
 //!
 //! Coordinates are read and written in the unit of the file; normalisation is up to the caller. Numbers
 //! are written with 17 significant digits, so that they are read back bit for bit.
 
+mod annotations;
 mod canonical;
 mod error;
 mod flags;
 mod layout;
 mod ma;
 mod obj;
+mod options;
 mod ply;
+mod records;
 mod scan;
+mod trailer;
 
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
+pub use annotations::{Annotations, Part, PartKind};
 pub use error::{MaError, MaErrorKind};
-pub use ma::parse_ma;
-pub use ply::parse_ply;
+pub use ma::{parse_ma, parse_ma_with};
+pub use obj::parse_obj;
+pub use options::{Radii, ReadOptions};
+pub use ply::{parse_ply, parse_ply_with};
 
 use super::MedialMesh;
 use crate::atomic::write_atomically;
@@ -42,6 +49,8 @@ pub struct LoadedMa {
     pub warnings: Vec<String>,
     /// Where deleted spheres were dropped: for each sphere left, its index in the file.
     pub kept: Option<Vec<u32>>,
+    /// Types and structure, where the file has them.
+    pub annotations: Annotations,
 }
 
 impl LoadedMa {
@@ -53,16 +62,27 @@ impl LoadedMa {
     }
 }
 
-/// Reads a medial mesh from a `.ma` file, a list of spheres or an ASCII `.ply` file, told apart by the extension.
+/// Reads a medial mesh from a `.ma` file, a list of spheres, an ASCII `.ply` file or an `.obj` file with radii, told apart
+/// by the extension.
 ///
 /// # Errors
 /// When the file cannot be read, has another extension, or does not hold a medial mesh; the error
 /// names the file and the line.
 pub fn read(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
+    read_with(path, ReadOptions::default())
+}
+
+/// [`read`] for files that are not what their header says, hold several medial meshes, or no radii.
+///
+/// # Errors
+/// As [`read`], but for what the options allow.
+pub fn read_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<LoadedMa, MaError> {
     let path = path.as_ref();
+    let name = path.display().to_string();
     match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => read_ma(path),
-        "ply" => parse_ply(load(path)?, &path.display().to_string()),
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => parse_ma_with(load(path)?, &name, options),
+        "ply" => parse_ply_with(load(path)?, &name, options),
+        "obj" => parse_obj(load(path)?, &name, options),
         other => Err(MaError::of_file(path, MaErrorKind::unreadable(other))),
     }
 }
@@ -105,6 +125,8 @@ fn load(path: &Path) -> Result<Vec<u8>, MaError> {
     fs::read(path).map_err(|error| MaError::of_file(path, error.into()))
 }
 
+#[cfg(test)]
+mod dialects_tests;
 #[cfg(test)]
 mod flags_tests;
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::canonical::canonical;
 use super::scan::{Line, lines, shortened};
-use super::{LoadedMa, MaError, MaErrorKind};
+use super::{LoadedMa, MaError, MaErrorKind, Radii, ReadOptions};
 use crate::Vec3;
 use crate::complex::{MedialMesh, Sphere};
 
@@ -34,22 +34,33 @@ pub(super) fn write_to(out: &mut dyn Write, mesh: &MedialMesh) -> io::Result<()>
 /// Reads a medial mesh from the text of an ASCII PLY file; `name` stands for the file in errors.
 ///
 /// Elements may come in any order and carry further scalar properties. Vertices need `x`, `y`,
-/// `z` and `radius`, edges `vertex1` and `vertex2`, faces one list of three indices.
+/// `z` and `radius` (or `r`), edges `vertex1` and `vertex2`, faces one list of three indices.
 ///
 /// # Errors
 /// As for [`parse_ma`](super::parse_ma), and when the file is binary.
 pub fn parse_ply(text: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError> {
+    parse_ply_with(text, name, ReadOptions::default())
+}
+
+/// [`parse_ply`] for files without radii, too.
+///
+/// # Errors
+/// As [`parse_ply`], but for what the options allow.
+pub fn parse_ply_with(
+    text: impl AsRef<[u8]>,
+    name: &str,
+    options: ReadOptions,
+) -> Result<LoadedMa, MaError> {
     let bytes = text.as_ref();
     let mut rest = lines(bytes, name);
-    let elements = header(&mut rest, bytes.len(), name)?;
+    let elements = header(&mut rest, bytes.len(), name, options.radii)?;
     let spheres_announced = elements.iter().find(|e| e.kind == Kind::Vertex).map_or(0, |e| e.count);
     let (mut spheres, mut edges, mut faces) = (Vec::new(), Vec::new(), Vec::new());
     for element in &elements {
         for found in 0..element.count {
             let line = rest.next().ok_or_else(|| {
                 let (what, announced) = (element.kind.plural(), element.count);
-                let kind = MaErrorKind::Count { what, announced, found };
-                MaError { file: name.to_owned(), line: None, kind }
+                MaError::of(name, MaErrorKind::Count { what, announced, found })
             })?;
             match element.kind {
                 Kind::Vertex => spheres.push(element.sphere(&line)?),
@@ -59,7 +70,11 @@ pub fn parse_ply(text: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError
             }
         }
     }
-    Ok(canonical(spheres, edges, faces, Vec::new()))
+    canonical(spheres, edges, faces, options.radii, Vec::new()).map_err(|kind| MaError {
+        file: name.to_owned(),
+        line: None,
+        kind,
+    })
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -92,6 +107,7 @@ fn header<'a>(
     rest: &mut impl Iterator<Item = Line<'a>>,
     bytes: usize,
     name: &str,
+    radii: Radii,
 ) -> Result<Vec<Element>, MaError> {
     let bad = |line: &Line<'_>, why: &str| line.error(MaErrorKind::Malformed(why.to_owned()));
     let mut elements: Vec<Element> = Vec::new();
@@ -109,8 +125,11 @@ fn header<'a>(
             (["property", "list", _, _, name], Some(e)) if e.kind == Kind::Face => {
                 e.properties.push((*name).to_owned());
             }
+            (["property", _, "r"], Some(e)) if e.kind == Kind::Vertex => {
+                e.properties.push("radius".to_owned());
+            }
             (["property", _, name], Some(e)) => e.properties.push((*name).to_owned()),
-            (["end_header"], _) => return checked(elements, &line),
+            (["end_header"], _) => return checked(elements, &line, radii),
             _ => {
                 let text = shortened(line.text());
                 return Err(bad(&line, &format!("header line {text:?} is not understood")));
@@ -118,7 +137,7 @@ fn header<'a>(
         }
     }
     let why = if magic { "the header has no end" } else { "not a PLY file" };
-    Err(MaError { file: name.to_owned(), line: None, kind: MaErrorKind::Malformed(why.into()) })
+    Err(MaError::of(name, MaErrorKind::Malformed(why.into())))
 }
 
 fn element(line: &Line<'_>, kind: &str, count: &str, bytes: usize) -> Result<Element, MaError> {
@@ -139,9 +158,10 @@ fn element(line: &Line<'_>, kind: &str, count: &str, bytes: usize) -> Result<Ele
 }
 
 /// The elements, once each has the properties that it needs.
-fn checked(elements: Vec<Element>, line: &Line<'_>) -> Result<Vec<Element>, MaError> {
+fn checked(elements: Vec<Element>, line: &Line<'_>, radii: Radii) -> Result<Vec<Element>, MaError> {
     for element in &elements {
         let needed: &[&str] = match element.kind {
+            Kind::Vertex if radii == Radii::NotNeeded => &["x", "y", "z"],
             Kind::Vertex => &["x", "y", "z", "radius"],
             Kind::Edge => &["vertex1", "vertex2"],
             Kind::Face if element.properties.len() != 1 => {
@@ -152,7 +172,12 @@ fn checked(elements: Vec<Element>, line: &Line<'_>) -> Result<Vec<Element>, MaEr
         };
         if let Some(name) = needed.iter().find(|name| element.column(name).is_none()) {
             let what = element.kind.plural();
-            let why = format!("{what} have no property {name}: not a medial mesh");
+            let help = if *name == "radius" {
+                " (`--radii surface` takes distances to a surface)"
+            } else {
+                ""
+            };
+            let why = format!("{what} have no property {name}: not a medial mesh{help}");
             return Err(line.error(MaErrorKind::Malformed(why)));
         }
     }
@@ -175,7 +200,7 @@ impl Element {
             }
         }
         let [x, y, z, radius] = values;
-        words.checked(Sphere::new(Vec3::new(x, y, z), radius))
+        Ok(Sphere::new(Vec3::new(x, y, z), radius))
     }
 
     fn edge(&self, line: &Line<'_>, spheres: u64) -> Result<[u32; 2], MaError> {

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{MaError, MaErrorKind};
+use super::{MaError, MaErrorKind, Radii};
 use crate::Vec3;
 use crate::complex::Sphere;
 
@@ -63,19 +63,24 @@ impl<'a> Words<'a> {
         }
     }
 
-    pub(super) fn sphere(&mut self) -> Result<Sphere, MaError> {
+    pub(super) fn point(&mut self) -> Result<Vec3, MaError> {
         let x = self.number("x coordinate")?;
         let y = self.number("y coordinate")?;
         let z = self.number("z coordinate")?;
-        let radius = self.number("radius")?;
-        self.checked(Sphere::new(Vec3::new(x, y, z), radius))
+        Ok(Vec3::new(x, y, z))
     }
 
-    pub(super) fn checked(&self, sphere: Sphere) -> Result<Sphere, MaError> {
-        if sphere.radius < 0.0 {
-            return Err(self.line.error(MaErrorKind::NegativeRadius(sphere.radius)));
+    /// Centre and radius, which may be negative; radius 0 where none stands and none is needed.
+    pub(super) fn sphere(&mut self, radii: Radii) -> Result<Sphere, MaError> {
+        let centre = self.point()?;
+        if radii == Radii::NotNeeded && self.rest.clone().next().is_none() {
+            return Ok(Sphere::new(centre, 0.0));
         }
-        Ok(sphere)
+        let radius = self.number("radius")?;
+        if radii == Radii::NotNegative && radius < 0.0 {
+            return Err(self.line.error(MaErrorKind::NegativeRadius(radius)));
+        }
+        Ok(Sphere::new(centre, radius))
     }
 
     /// `N` indices below `spheres`.
