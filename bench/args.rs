@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use medial::complex::{Radii, ReadOptions};
 use medial::metrics::JudgeOptions;
 use medial::shape::ShapeOptions;
 use medial::simplifier::Params;
@@ -102,6 +103,59 @@ impl MeasureArguments {
         study.samples = judge_options(self, defaults, 0)?.samples;
         Ok(())
     }
+}
+
+/// How a file of a medial mesh is read that is not what its header says.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ReadArguments {
+    /// Take the lines of a medial mesh as they are where its header announces another number of them.
+    #[arg(long)]
+    pub lenient: bool,
+    /// Which medial mesh is meant of a file to which several were appended, from 1.
+    #[arg(long, value_name = "K")]
+    pub block: Option<usize>,
+}
+
+impl ReadArguments {
+    /// The options of the reader.
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions { lenient: self.lenient, block: self.block, radii: Radii::Needed }
+    }
+}
+
+/// How a medial mesh from a file is brought to its surface.
+#[derive(Clone, Debug, Default, Args)]
+pub struct AxisArguments {
+    /// How the file is read.
+    #[command(flatten)]
+    pub read: ReadArguments,
+    /// Where radii come from: `surface` takes the distance of each centre to the surface, for files without radii
+    /// or with other numbers in their place.
+    #[arg(long, value_enum, default_value_t)]
+    pub radii: RadiiFrom,
+    /// The units of the medial mesh: those of the surface, or whatever scale and shift fit it best, which are said.
+    #[arg(long, value_enum, default_value_t)]
+    pub fit: FitBy,
+}
+
+/// Where radii come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum RadiiFrom {
+    /// From the file.
+    #[default]
+    File,
+    /// From the surface.
+    Surface,
+}
+
+/// How units are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum FitBy {
+    /// The file is in the units of the surface.
+    #[default]
+    None,
+    /// By the uniform scale and the shift under which spheres and surface fit.
+    Similarity,
 }
 
 /// A mesh argument: a file, or `builtin:ID[:RESOLUTION]`.

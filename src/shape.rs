@@ -20,6 +20,7 @@ mod growing;
 mod inner_balls;
 mod power_crust;
 mod refined;
+mod similarity;
 mod substrate;
 mod substrates;
 
@@ -28,6 +29,7 @@ pub use error::ShapeError;
 pub use inner_balls::InnerBalls;
 pub use power_crust::PolarBalls;
 pub use refined::{BOUND, ENOUGH, MOST_TIMES, ROUNDS, Refined, Refinement};
+pub use similarity::{Fit, FitSource, Similarity};
 pub use substrate::{Cost, Substrate};
 
 use substrate::{Cache, Use};

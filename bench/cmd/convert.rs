@@ -8,21 +8,23 @@ use clap::Args;
 use medial::{complex, surface};
 use serde_json::json;
 
-use crate::args::Global;
+use crate::args::{Global, ReadArguments};
 use crate::exit::{Exit, Failure};
 use crate::files::extension;
 use crate::output::{print_json, print_line};
 
-/// No header of a PLY file is longer, in bytes.
+/// What a file holds is told by its first bytes; no header of a PLY file is longer than so many.
 const HEADER_LIMIT: u64 = 1 << 20;
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma, or .ply with a radius).
+    /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma and its dialects, .ply or .obj with radii).
     from: PathBuf,
     /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj).
     to: PathBuf,
+    #[command(flatten)]
+    read: ReadArguments,
 }
 
 /// Runs the verb. Surfaces are repaired on the way, and every repair is told.
@@ -31,7 +33,8 @@ pub struct Arguments {
 /// When the input is refused, the pair of formats makes no sense, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (notes, vertices, faces) = if is_medial(&arguments.from)? {
-        let loaded = complex::read(&arguments.from).map_err(Failure::input)?;
+        let loaded = complex::read_with(&arguments.from, arguments.read.options())
+            .map_err(Failure::input)?;
         complex::write(&arguments.to, &loaded.mesh).map_err(Failure::input)?;
         let (mesh, notes) = loaded.with_remarks();
         (notes, mesh.spheres.len(), mesh.faces.len())
@@ -61,27 +64,36 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Whether a file holds a medial mesh: `.ma` and lists of spheres, or `.ply` whose vertices have a radius.
+/// Whether a file holds a medial mesh: `.ma` and lists of spheres, `.ply` whose vertices have a radius, `.obj` whose vertices
+/// have a fourth number.
 fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
         "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
-        "ply" => ply_has_radius(path),
+        "ply" => any_line(path, |words| match words {
+            [b"end_header"] => Some(false),
+            [b"property", _, b"radius" | b"r"] => Some(true),
+            _ => None,
+        }),
+        "obj" => any_line(path, |words| match words {
+            [b"v", coordinates @ ..] => Some(coordinates.len() == 4),
+            _ => None,
+        }),
         _ => Ok(false),
     }
 }
 
-fn ply_has_radius(path: &Path) -> Result<bool, Failure> {
+/// What the first line says that says anything.
+fn any_line(path: &Path, says: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool, Failure> {
     let fail = |error| Failure::input(format!("{}: {error}", path.display()));
     let mut reader = BufReader::new(File::open(path).map_err(fail)?).take(HEADER_LIMIT);
     let mut line = Vec::new();
     while reader.read_until(b'\n', &mut line).map_err(fail)? > 0 {
         let words: Vec<&[u8]> =
             line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
-        match words.as_slice() {
-            [b"end_header"] => break,
-            [b"property", _, b"radius"] => return Ok(true),
-            _ => line.clear(),
+        if let Some(said) = says(&words) {
+            return Ok(said);
         }
+        line.clear();
     }
     Ok(false)
 }

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use medial::complex::LoadedMa;
 use medial::metrics::{Certificate, Evaluation, JudgeOptions, MetricError, Witness, WitnessSide};
-use medial::shape::ShapeOptions;
+use medial::shape::{Fit, ShapeOptions};
+use serde::Serialize;
 
-use crate::args::{Global, MeasureArguments, MeshArgument, judge_options};
+use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument, judge_options};
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
 use crate::output::{counted, note, percent, print_json, print_line};
@@ -18,8 +19,10 @@ use crate::run::{Input, Source, StageLine};
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
     mesh: MeshArgument,
-    /// Medial mesh (.ma, or .ply with radii), in the units of the surface.
+    /// Medial mesh (.ma and its dialects, .ply or .obj with radii), in the units of the surface unless `--fit` finds others.
     axis: PathBuf,
+    #[command(flatten)]
+    fitting: AxisArguments,
     /// Seed of the samples.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -42,7 +45,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let input = Input::load(&source)?;
     let shape =
         input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
-    let LoadedMa { mesh, notes, mut warnings, .. } = medial_mesh_for(&arguments.axis, &shape)?;
+    let (loaded, fit) = medial_mesh_for(&arguments.axis, &shape, &arguments.fitting)?;
+    let LoadedMa { mesh, notes, mut warnings, .. } = loaded;
     line.at("preparing the surface");
     let judge =
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
@@ -72,7 +76,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     warnings.extend(input.report.warnings);
     if global.json {
-        print_json(&evaluation, &warnings);
+        print_json(&Evaluated { evaluation: &evaluation, fit }, &warnings);
     } else {
         print_evaluation(&evaluation);
         for warning in evaluation.warnings.iter().chain(&warnings) {
@@ -80,6 +84,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         }
     }
     Ok(Exit::Done)
+}
+
+/// An evaluation and the change of units that it was made after.
+#[derive(Serialize)]
+struct Evaluated<'a> {
+    #[serde(flatten)]
+    evaluation: &'a Evaluation,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fit: Option<Fit>,
 }
 
 /// Prints the main numbers, lengths in percent of the diagonal.

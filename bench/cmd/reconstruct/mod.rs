@@ -6,12 +6,14 @@ mod union;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use medial::complex::{self, MedialMesh};
+use medial::complex::{self, LoadedMa, MedialMesh};
 use medial::shape::{Cost, Shape};
 use medial::surface::{self, SurfaceReport, TriMesh};
 use serde_json::{Map, Value, json};
 
-use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
+use crate::args::{
+    AxisArguments, FitBy, Global, MeshArgument, RadiiFrom, SubstrateArguments, shape_options,
+};
 use crate::exit::{Exit, Failure};
 use crate::files::{SURFACES, check_extension, check_folder, medial_mesh_for};
 use crate::output::{counted, percent, print_json, print_line};
@@ -40,6 +42,8 @@ pub struct Arguments {
     /// 0.01 that shows the union's topology, with all faces within 0.005].
     #[arg(long, value_name = "FRACTION")]
     tolerance: Option<f64>,
+    #[command(flatten)]
+    fitting: AxisArguments,
     #[command(flatten)]
     substrate: SubstrateArguments,
 }
@@ -252,8 +256,8 @@ fn read(arguments: &Arguments) -> Result<Read, Failure> {
     };
     let axis = match (&arguments.axis, &shape) {
         (None, _) => None,
-        (Some(path), Some(shape)) => Some(medial_mesh_for(path, shape)?),
-        (Some(path), None) => Some(complex::read(path).map_err(Failure::input)?),
+        (Some(path), Some(shape)) => Some(medial_mesh_for(path, shape, &arguments.fitting)?.0),
+        (Some(path), None) => Some(without_surface(path, &arguments.fitting)?),
     };
     let axis = axis.map(|loaded| {
         let (mesh, notes) = loaded.with_remarks();
@@ -261,6 +265,18 @@ fn read(arguments: &Arguments) -> Result<Read, Failure> {
         mesh
     });
     Ok((shape, axis, warnings))
+}
+
+/// A medial mesh, where there is no surface to take units and radii from.
+fn without_surface(path: &Path, fitting: &AxisArguments) -> Result<LoadedMa, Failure> {
+    for (is_asked, option) in
+        [(fitting.fit != FitBy::None, "--fit"), (fitting.radii != RadiiFrom::File, "--radii")]
+    {
+        if is_asked {
+            return Err(Failure::usage(format!("{option} needs the surface: name it with --mesh")));
+        }
+    }
+    complex::read_with(path, fitting.read.options()).map_err(Failure::input)
 }
 
 fn face_centres(mesh: &TriMesh) -> Vec<medial::Vec3> {

@@ -16,7 +16,7 @@ use medial_reports::render::{
 use serde_json::json;
 
 use self::errors::Deviation;
-use crate::args::{Global, MeshArgument};
+use crate::args::{AxisArguments, Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_extension, check_folder, medial_mesh_for};
 use crate::output::{counted, percent, print_json, print_line};
@@ -67,6 +67,8 @@ pub struct Arguments {
     /// How far a reconstruction may be from the boundary of the union, as a fraction of the diagonal.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.01)]
     tolerance: f64,
+    #[command(flatten)]
+    fitting: AxisArguments,
 }
 
 /// What is drawn.
@@ -235,7 +237,7 @@ impl Read {
         let to_normal = *shape.normalisation();
         let mut axes = Vec::new();
         for path in &arguments.axes {
-            let (mesh, notes) = medial_mesh_for(path, &shape)?.with_remarks();
+            let (mesh, notes) = medial_mesh_for(path, &shape, &arguments.fitting)?.0.with_remarks();
             warnings.extend(notes);
             axes.push(mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)));
         }

@@ -20,7 +20,8 @@ use super::hierarchy::{self, Loaded, Origin};
 use super::methods::method;
 use super::voxels;
 use crate::args::{
-    Global, MeasureArguments, MeshArgument, SubstrateArguments, params, shape_options,
+    AxisArguments, Global, MeasureArguments, MeshArgument, SubstrateArguments, params,
+    shape_options,
 };
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
@@ -61,6 +62,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     hierarchy: Option<PathBuf>,
     #[command(flatten)]
+    fitting: AxisArguments,
+    #[command(flatten)]
     outputs: Outputs,
     #[command(flatten)]
     substrate: SubstrateArguments,
@@ -85,7 +88,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
     let mut warnings = input.report.warnings.clone();
     if let Some(path) = &arguments.initial {
-        let (initial, notes) = medial_mesh_for(path, &shape)?.with_remarks();
+        let (initial, notes) = medial_mesh_for(path, &shape, &arguments.fitting)?.0.with_remarks();
         warnings.extend(notes);
         shape = shape.with_initial(&initial);
     }

@@ -207,11 +207,11 @@ impl Records {
     ) -> Result<(), MaError> {
         let found = self.found();
         let spheres = found[SPHERE] as u64;
-        if let Some((largest, mut error)) = self.largest.take() {
-            if u64::from(largest) >= spheres {
-                error.kind = MaErrorKind::Index { text: largest.to_string(), spheres };
-                return Err(error);
-            }
+        if let Some((largest, mut error)) = self.largest.take()
+            && u64::from(largest) >= spheres
+        {
+            error.kind = MaErrorKind::Index { text: largest.to_string(), spheres };
+            return Err(error);
         }
         if self.layout != Layout::Complex {
             notes.push("a list of spheres without edges and faces".to_owned());

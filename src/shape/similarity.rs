@@ -1,0 +1,432 @@
+//! Whether a medial mesh from a file is in the units of its surface, and which change of units brings it there.
+//!
+//! No format of medial meshes stores units. MATFP writes its results in a cube from 0 to 10, VMAS in one from 0 to 1,
+//! Q-MAT in the units of the input. The *misfit* tells them apart: how much the radius of a sphere differs from the
+//! distance of its centre to the surface, as the median over the spheres, so that the few spheres that a coarse
+//! simplification has inflated do not matter.
+//!
+//! A similarity `p -> scale p + shift` is sought in three ways, and the best is kept: known conventions of tools, the
+//! bounding boxes, and from there the least mean of `|D(c) - r|` over scale and shift, `D` the signed distance, by
+//! Gauss-Newton steps on iteratively reweighted squares. A convention that fits nearly as well as the optimum is
+//! preferred: it is exact, the optimum follows the errors of the medial mesh.
+
+use std::fmt;
+use std::sync::Arc;
+
+use glam::{DMat4, DVec4};
+use rayon::prelude::*;
+
+use super::{Shape, ShapeError};
+use crate::Vec3;
+use crate::complex::{MedialMesh, Sphere};
+use crate::surface::{InsideTest, Normalisation, Side, TriangleBvh};
+
+/// A change of units: every length times `scale`, then a shift.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Similarity {
+    /// The factor of all lengths; positive.
+    pub scale: f64,
+    /// What is added to the scaled coordinates.
+    pub shift: Vec3,
+}
+
+impl Similarity {
+    /// No change.
+    pub const IDENTITY: Self = Self { scale: 1.0, shift: Vec3::ZERO };
+
+    /// The point, changed.
+    pub fn point(&self, p: Vec3) -> Vec3 {
+        p * self.scale + self.shift
+    }
+
+    /// The medial mesh, changed.
+    pub fn mesh(&self, mesh: &MedialMesh) -> MedialMesh {
+        mesh.transformed(self.scale, |p| self.point(p))
+    }
+
+    fn sphere(&self, sphere: &Sphere) -> Sphere {
+        Sphere::new(self.point(sphere.centre), sphere.radius * self.scale)
+    }
+
+    /// This one, then another.
+    fn then(&self, next: &Self) -> Self {
+        Self { scale: self.scale * next.scale, shift: next.point(self.shift) }
+    }
+}
+
+impl fmt::Display for Similarity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Vec3 { x, y, z } = self.shift;
+        write!(f, "lengths times {:.6}, then a shift by ({x:.6}, {y:.6}, {z:.6})", self.scale)
+    }
+}
+
+/// Where a similarity comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FitSource {
+    /// The file is in the units of its surface.
+    Units,
+    /// A cube from 0 to 10, as by MATFP.
+    ToTen,
+    /// A cube from 0 to 1, as by VMAS.
+    ToOne,
+    /// A cube from -1 to 1 around the middle.
+    Around,
+    /// Nothing known: bounding boxes, or the least misfit.
+    Fitted,
+}
+
+impl fmt::Display for FitSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Units => "the units of the surface",
+            Self::ToTen => "out of a cube from 0 to 10, as MATFP writes",
+            Self::ToOne => "out of a cube from 0 to 1, as VMAS writes",
+            Self::Around => "out of a cube from -1 to 1",
+            Self::Fitted => "by least misfit",
+        })
+    }
+}
+
+/// A similarity that brings a medial mesh to its surface.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Fit {
+    /// From the units of the file to those of the surface.
+    pub similarity: Similarity,
+    /// What the similarity is.
+    pub source: FitSource,
+    /// Median of `|D(c) - r|` over the spheres as they stand in the file, as a fraction of the surface's diagonal; not told for
+    /// points without radii.
+    pub misfit_before: Option<f64>,
+    /// The same after the similarity.
+    pub misfit: Option<f64>,
+}
+
+/// Not more spheres than these are looked at, evenly taken from the list.
+const SPHERES: usize = 4000;
+
+/// Steps of the optimisation; far fewer are needed where there is an optimum to be found.
+const STEPS: usize = 60;
+
+/// How much worse than the optimum a convention may fit to be preferred, as a factor or as a mean of `|D(c) - r|`: the optimum has four
+/// parameters to follow the errors of the medial mesh.
+const PREFERENCE: f64 = 2.0;
+const CLOSE: f64 = 0.005;
+
+/// The share of centres that must lie in the solid for units to be believed of points without radii.
+const INSIDE: f64 = 0.95;
+
+impl Shape {
+    /// How badly a medial mesh in the shape's input units fits: the median over the spheres of `|D(c) - r|`, where `D` is the
+    /// distance of the centre to the surface, negative outside; a fraction of the diagonal. `None` without a sphere.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn misfit(&self, mesh: &MedialMesh) -> Result<Option<f64>, ShapeError> {
+        let surface = Surface::of(self)?;
+        Ok(median(&surface.residuals(&surface.spheres(mesh), &Similarity::IDENTITY)))
+    }
+
+    /// The similarity that brings a medial mesh with radii from unknown units to the shape's input units. Cost: some
+    /// thousand distances to the surface for each of at most 60 steps.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn fit(&self, mesh: &MedialMesh) -> Result<Fit, ShapeError> {
+        let surface = Surface::of(self)?;
+        let spheres = surface.spheres(mesh);
+        let misfit = |s: &Similarity| median(&surface.residuals(&spheres, s)).unwrap_or(0.0);
+        let quality = |s: &Similarity| surface.mean(&spheres, s);
+        let known = surface.conventions();
+        let boxes = (FitSource::Fitted, surface.by_boxes(&spheres));
+        let candidates =
+            known.into_iter().chain([boxes]).map(|(source, s)| (quality(&s), source, s));
+        let mut candidates: Vec<(f64, FitSource, Similarity)> = candidates.collect();
+        let start = candidates.iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("the first one").2;
+        let optimum = surface.optimised(&spheres, start);
+        candidates.pop();
+        let least = quality(&optimum);
+        let enough = f64::max(PREFERENCE * least, CLOSE / optimum.scale);
+        let (_, source, normal) = candidates
+            .into_iter()
+            .filter(|(of_known, ..)| *of_known <= enough)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or((least, FitSource::Fitted, optimum));
+        let (before, misfit) = (misfit(&Similarity::IDENTITY), misfit(&normal));
+        let similarity = surface.in_input_units(&normal);
+        Ok(Fit { similarity, source, misfit_before: Some(before), misfit: Some(misfit) })
+    }
+
+    /// The similarity for points without radii: that convention of a tool which brings nearly all of them into the solid, the
+    /// largest if there are several. `None` if none does.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn fit_of_points(&self, mesh: &MedialMesh) -> Result<Option<Fit>, ShapeError> {
+        let surface = Surface::of(self)?;
+        let points = surface.spheres(mesh);
+        let inside = |s: &Similarity| {
+            let centres: Vec<Vec3> = points.iter().map(|p| s.point(p.centre)).collect();
+            let sides = surface.inside.sides(&centres);
+            let count = sides.iter().filter(|side| **side != Side::Outside).count();
+            count as f64 >= INSIDE * points.len() as f64
+        };
+        let fitting = surface.conventions().into_iter().filter(|(_, s)| inside(s));
+        // The first of equals: the units of the surface, if they will do.
+        let best =
+            fitting.reduce(|best, other| if other.1.scale > best.1.scale { other } else { best });
+        Ok(best.map(|(source, normal)| {
+            let similarity = surface.in_input_units(&normal);
+            Fit { similarity, source, misfit_before: None, misfit: None }
+        }))
+    }
+
+    /// Distances of points in input units to the surface, whichever side they are on, in input units.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn distances(&self, points: &[Vec3]) -> Result<Vec<f64>, ShapeError> {
+        let (tree, units) = (self.view().surface_tree()?, *self.normalisation());
+        let normal: Vec<Vec3> = points.iter().map(|&p| units.forward(p)).collect();
+        Ok(tree.distance_batch(&normal).into_iter().map(|d| d * units.diagonal).collect())
+    }
+}
+
+/// A surface in normalised coordinates, in which similarities are sought.
+struct Surface {
+    tree: Arc<TriangleBvh>,
+    inside: Arc<InsideTest>,
+    units: Normalisation,
+    lower: Vec3,
+    upper: Vec3,
+}
+
+impl Surface {
+    fn of(shape: &Shape) -> Result<Self, ShapeError> {
+        // Nobody's use: it is no part of a method.
+        let view = shape.view();
+        let (lower, upper) = shape.mesh().bounding_box().unwrap_or_default();
+        let (tree, inside) = (view.surface_tree()?, view.inside_test());
+        Ok(Self { tree, inside, units: *shape.normalisation(), lower, upper })
+    }
+
+    /// Spheres of a file, evenly taken, in normalised coordinates as if the file were in input units.
+    fn spheres(&self, mesh: &MedialMesh) -> Vec<Sphere> {
+        let every = mesh.spheres.len().div_ceil(SPHERES).max(1);
+        let normal =
+            |s: &Sphere| Sphere::new(self.units.forward(s.centre), s.radius / self.units.diagonal);
+        mesh.spheres.iter().step_by(every).map(normal).collect()
+    }
+
+    /// The units of the surface first, then the conventions of tools.
+    fn conventions(&self) -> [(FitSource, Similarity); 4] {
+        let side = (self.upper - self.lower).max_element();
+        let middle = (self.upper + self.lower) / 2.0;
+        // From coordinates in which the longest side has `length` and the point `from` of the surface is the origin.
+        let out_of = |length: f64, from: Vec3| {
+            let to_file = Similarity { scale: self.units.diagonal, shift: self.units.origin };
+            to_file.then(&Similarity { scale: side / length, shift: from })
+        };
+        [
+            (FitSource::Units, Similarity::IDENTITY),
+            (FitSource::ToTen, out_of(10.0, self.lower)),
+            (FitSource::ToOne, out_of(1.0, self.lower)),
+            (FitSource::Around, out_of(2.0, middle)),
+        ]
+    }
+
+    /// From the box around the spheres to the box around the surface.
+    fn by_boxes(&self, spheres: &[Sphere]) -> Similarity {
+        let ends = spheres.iter().flat_map(|s| [s.centre - s.radius, s.centre + s.radius]);
+        let (lower, upper) = ends
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {
+                (lower.min(p), upper.max(p))
+            });
+        let scale = (self.upper - self.lower).max_element() / (upper - lower).max_element();
+        if !(scale.is_finite() && scale > 0.0) {
+            return Similarity::IDENTITY;
+        }
+        Similarity { scale, shift: (self.upper + self.lower) / 2.0 - (upper + lower) / 2.0 * scale }
+    }
+
+    /// `D(c) - r` of every sphere, after a similarity.
+    fn residuals(&self, spheres: &[Sphere], similarity: &Similarity) -> Vec<f64> {
+        spheres.par_iter().map(|s| self.residual(&similarity.sphere(s)).0).collect()
+    }
+
+    /// The mean of `|D(c) - r|` in the unit of the file: in that of the surface, what is shrunk to a point of it would fit.
+    fn mean(&self, spheres: &[Sphere], similarity: &Similarity) -> f64 {
+        let sum: f64 = self.residuals(spheres, similarity).iter().map(|e| e.abs()).sum();
+        sum / spheres.len().max(1) as f64 / similarity.scale
+    }
+
+    /// `D(c) - r` and the gradient of `D` at `c`.
+    fn residual(&self, sphere: &Sphere) -> (f64, Vec3) {
+        let closest = self.tree.closest(sphere.centre);
+        let sign = if self.inside.side(sphere.centre) == Side::Outside { -1.0 } else { 1.0 };
+        let away = (sphere.centre - closest.point).normalize_or_zero();
+        (sign * closest.distance - sphere.radius, sign * away)
+    }
+
+    /// The least mean of `|D(c) - r|` near a similarity.
+    fn optimised(&self, spheres: &[Sphere], start: Similarity) -> Similarity {
+        let (mut best, mut least) = (start, self.mean(spheres, &start));
+        for _ in 0..STEPS {
+            let Some(step) = self.step(spheres, &best) else { break };
+            // The mean is not smooth: half the step, and half of that, may be better than the whole.
+            let tried = (0..8).map(|k| best.moved(step * 0.5_f64.powi(k)));
+            let better = tried
+                .filter(|s| s.scale > 0.0)
+                .map(|s| (self.mean(spheres, &s), s))
+                .find(|(e, _)| *e < least);
+            let Some((error, similarity)) = better else { break };
+            let gain = least - error;
+            (best, least) = (similarity, error);
+            if gain <= 1e-9 * least {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The Gauss-Newton step of shift and scale for squares that are weighted to stand for absolute values.
+    fn step(&self, spheres: &[Sphere], at: &Similarity) -> Option<DVec4> {
+        let rows: Vec<(f64, DVec4)> = spheres
+            .par_iter()
+            .map(|sphere| {
+                let (residual, gradient) = self.residual(&at.sphere(sphere));
+                (residual, gradient.extend(gradient.dot(sphere.centre) - sphere.radius))
+            })
+            .collect();
+        // The floor keeps spheres that fit already from holding all others back.
+        let floor =
+            1e-3 * rows.iter().map(|(e, _)| e.abs()).sum::<f64>() / rows.len().max(1) as f64;
+        let (mut hessian, mut gradient) = (DMat4::ZERO, DVec4::ZERO);
+        // In order, so that the sum is the same for any number of threads.
+        for (residual, row) in &rows {
+            let weight = 1.0 / residual.abs().max(floor).max(f64::MIN_POSITIVE);
+            let weighted = *row * weight;
+            hessian += DMat4::from_cols(
+                weighted * row.x,
+                weighted * row.y,
+                weighted * row.z,
+                weighted * row.w,
+            );
+            gradient += weighted * *residual;
+        }
+        let trace = (0..4).map(|i| hessian.col(i)[i]).sum::<f64>();
+        let damped = hessian + DMat4::IDENTITY * (1e-12 * trace);
+        let step = -(damped.inverse() * gradient);
+        step.is_finite().then_some(step)
+    }
+
+    /// A similarity of normalised coordinates as one of input units.
+    fn in_input_units(&self, normal: &Similarity) -> Similarity {
+        let Normalisation { origin, diagonal } = self.units;
+        Similarity {
+            scale: normal.scale,
+            shift: origin + normal.shift * diagonal - origin * normal.scale,
+        }
+    }
+}
+
+impl Similarity {
+    fn moved(&self, step: DVec4) -> Self {
+        Self { scale: self.scale + step.w, shift: self.shift + step.truncate() }
+    }
+}
+
+/// The middle one of the absolute values, or the mean of the two in the middle.
+fn median(values: &[f64]) -> Option<f64> {
+    let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    let middle = sizes.len() / 2;
+    match sizes.len() % 2 {
+        _ if sizes.is_empty() => None,
+        1 => Some(sizes[middle]),
+        _ => Some((sizes[middle - 1] + sizes[middle]) / 2.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::ShapeOptions;
+    use crate::surface::{TriMesh, validate};
+
+    /// A block of 3 by 2 by 1 somewhere, and its initial medial mesh.
+    fn block() -> (Shape, MedialMesh) {
+        let corner = |i: u32| {
+            let bit = |k: u32| f64::from(i >> k & 1);
+            Vec3::new(5.0 + 3.0 * bit(0), -4.0 + 2.0 * bit(1), 1.0 + bit(2))
+        };
+        let quads =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let mesh = TriMesh { vertices: (0..8).map(corner).collect(), faces };
+        let report = validate(&mesh).unwrap();
+        let sampling = "uniform:4000".parse().unwrap();
+        let options = ShapeOptions { sampling, ..ShapeOptions::default() };
+        let shape = Shape::new("block", &mesh, report, options).unwrap();
+        let normal = *shape.normalisation();
+        let initial = shape.initial().unwrap();
+        let axis = initial.transformed(normal.diagonal, |p| normal.backward(p));
+        (shape, axis)
+    }
+
+    #[test]
+    fn units_of_the_surface_are_left_alone() {
+        let (shape, axis) = block();
+        let fit = shape.fit(&axis).unwrap();
+        assert_eq!((fit.source, fit.similarity), (FitSource::Units, Similarity::IDENTITY));
+        assert_eq!(shape.misfit(&axis).unwrap(), fit.misfit);
+        assert!(fit.misfit.unwrap() < 0.005, "{fit:?}");
+        assert_eq!(shape.misfit(&MedialMesh::default()).unwrap(), None);
+    }
+
+    #[test]
+    fn cubes_of_tools_are_recognised() {
+        let (shape, axis) = block();
+        let lower = Vec3::new(5.0, -4.0, 1.0);
+        for (source, length, from) in [
+            (FitSource::ToTen, 10.0, lower),
+            (FitSource::ToOne, 1.0, lower),
+            (FitSource::Around, 2.0, lower + Vec3::new(1.5, 1.0, 0.5)),
+        ] {
+            let written = axis.transformed(length / 3.0, |p| (p - from) * (length / 3.0));
+            for points in [false, true] {
+                let fit = match points {
+                    false => shape.fit(&written).unwrap(),
+                    true => shape.fit_of_points(&written).unwrap().expect("a fit"),
+                };
+                assert_eq!(fit.source, source);
+                let back = fit.similarity.mesh(&written);
+                for (found, sphere) in back.spheres.iter().zip(&axis.spheres) {
+                    assert!(
+                        (found.centre - sphere.centre).length() < 1e-12,
+                        "{found:?} {sphere:?}"
+                    );
+                    assert!((found.radius - sphere.radius).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn any_similarity_is_found() {
+        let (shape, axis) = block();
+        let written = axis.transformed(0.037, |p| p * 0.037 + Vec3::new(11.0, 7.0, -3.0));
+        let fit = shape.fit(&written).unwrap();
+        assert_eq!(fit.source, FitSource::Fitted);
+        assert!((fit.similarity.scale * 0.037 - 1.0).abs() < 0.01, "{fit:?}");
+        assert!(fit.misfit.unwrap() < 0.005 && fit.misfit_before.unwrap() > 0.5, "{fit:?}");
+        // What belongs to another surface is not made to fit.
+        let mut other = axis.clone();
+        for (id, sphere) in other.spheres.iter_mut().enumerate() {
+            sphere.radius = 0.1 + (id * 7919 % 100) as f64 / 50.0;
+        }
+        assert!(shape.fit(&other).unwrap().misfit.unwrap() > 0.03);
+        assert_eq!(shape.fit_of_points(&other.transformed(100.0, |p| p * 100.0)).unwrap(), None);
+    }
+}
