@@ -156,6 +156,8 @@ pub enum FitBy {
     None,
     /// By the uniform scale and the shift under which spheres and surface fit.
     Similarity,
+    /// The same, if the file does not fit as it is and does so then.
+    Auto,
 }
 
 /// A mesh argument: a file, or `builtin:ID[:RESOLUTION]`.

@@ -37,6 +37,8 @@ pub enum Verb {
     Simplify(cmd::simplify::Arguments),
     /// Measure a medial mesh from anywhere against a surface.
     Evaluate(cmd::evaluate::Arguments),
+    /// Say what published medial meshes hold, against their surfaces, in one table.
+    Verify(cmd::verify::Arguments),
     /// Make a surface from a medial mesh: the boundary of its union, or the power crust.
     Reconstruct(cmd::reconstruct::Arguments),
     /// Draw a surface, its medial meshes, or their reconstructions by error, as PNG.
@@ -152,6 +154,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Axis(arguments) => cmd::axis::run(&arguments, global),
         Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global, registry),
         Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
+        Verb::Verify(arguments) => cmd::verify::run(&arguments, global),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Render(arguments) => cmd::render::run(&arguments, global),
         Verb::Triangulate(arguments) => cmd::triangulate::run(&arguments, global),

@@ -1,6 +1,8 @@
 //! Medial meshes that a user names, and outputs that are checked before the work for them is done.
 
 use std::fmt::Display;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use medial::complex::{self, LoadedMa, MedialMesh, Radii, ReadOptions};
@@ -50,7 +52,10 @@ pub fn medial_mesh_for(
     let fit = match (arguments.fit, from_surface) {
         (FitBy::None, _) => None,
         (FitBy::Similarity, false) => Some(shape.fit(&loaded.mesh).map_err(|error| named(&error))?),
-        (FitBy::Similarity, true) => {
+        (FitBy::Auto, false) => {
+            fit_if_needed(&loaded.mesh, shape).map_err(|error| named(&error))?
+        }
+        (FitBy::Similarity | FitBy::Auto, true) => {
             let fit = shape.fit_of_points(&loaded.mesh).map_err(|error| named(&error))?;
             Some(fit.ok_or_else(|| named(&"without radii only the cubes that tools write are tried, and none of them fits the surface"))?)
         }
@@ -67,6 +72,15 @@ pub fn medial_mesh_for(
         loaded.warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", path.display())));
     }
     Ok((loaded, fit))
+}
+
+/// A change of units, where one is needed and found.
+fn fit_if_needed(mesh: &MedialMesh, shape: &Shape) -> Result<Option<Fit>, ShapeError> {
+    let fits = |misfit: Option<f64>| misfit.is_some_and(|misfit| misfit <= DOUBTFUL);
+    if fits(shape.misfit(mesh)?) {
+        return Ok(None);
+    }
+    Ok(Some(shape.fit(mesh)?).filter(|fit| fits(fit.misfit)))
 }
 
 /// A change of units, in words.
@@ -144,6 +158,46 @@ fn doubts(
     Ok((misfit > WRONG).then(|| {
         format!("{differ}: of another surface, or no radii (`--radii surface` takes the distances)")
     }))
+}
+
+/// What a file holds is told by its first bytes; no header of a PLY file is longer than so many.
+const HEADER_LIMIT: u64 = 1 << 20;
+
+/// Whether a file holds a medial mesh: `.ma` and lists of spheres, `.ply` whose vertices have a radius, `.obj` whose vertices
+/// have a fourth number.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn is_medial(path: &Path) -> Result<bool, Failure> {
+    match extension(path).as_str() {
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
+        "ply" => any_line(path, |words| match words {
+            [b"end_header"] => Some(false),
+            [b"property", _, b"radius" | b"r"] => Some(true),
+            _ => None,
+        }),
+        "obj" => any_line(path, |words| match words {
+            [b"v", coordinates @ ..] => Some(coordinates.len() == 4),
+            _ => None,
+        }),
+        _ => Ok(false),
+    }
+}
+
+/// What the first line says that says anything.
+fn any_line(path: &Path, says: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool, Failure> {
+    let fail = |error| Failure::input(format!("{}: {error}", path.display()));
+    let mut reader = BufReader::new(File::open(path).map_err(fail)?).take(HEADER_LIMIT);
+    let mut line = Vec::new();
+    while reader.read_until(b'\n', &mut line).map_err(fail)? > 0 {
+        let words: Vec<&[u8]> =
+            line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
+        if let Some(said) = says(&words) {
+            return Ok(said);
+        }
+        line.clear();
+    }
+    Ok(false)
 }
 
 /// Refuses an output that could not be written anyway, before the work for it is done.

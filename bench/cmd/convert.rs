@@ -1,8 +1,6 @@
 //! `medial convert A B`: between surface formats, or between medial mesh formats.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use medial::{complex, surface};
@@ -10,11 +8,8 @@ use serde_json::json;
 
 use crate::args::{Global, ReadArguments};
 use crate::exit::{Exit, Failure};
-use crate::files::extension;
+use crate::files::{extension, is_medial};
 use crate::output::{print_json, print_line};
-
-/// What a file holds is told by its first bytes; no header of a PLY file is longer than so many.
-const HEADER_LIMIT: u64 = 1 << 20;
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
@@ -62,38 +57,4 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         }
     }
     Ok(Exit::Done)
-}
-
-/// Whether a file holds a medial mesh: `.ma` and lists of spheres, `.ply` whose vertices have a radius, `.obj` whose vertices
-/// have a fourth number.
-fn is_medial(path: &Path) -> Result<bool, Failure> {
-    match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
-        "ply" => any_line(path, |words| match words {
-            [b"end_header"] => Some(false),
-            [b"property", _, b"radius" | b"r"] => Some(true),
-            _ => None,
-        }),
-        "obj" => any_line(path, |words| match words {
-            [b"v", coordinates @ ..] => Some(coordinates.len() == 4),
-            _ => None,
-        }),
-        _ => Ok(false),
-    }
-}
-
-/// What the first line says that says anything.
-fn any_line(path: &Path, says: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool, Failure> {
-    let fail = |error| Failure::input(format!("{}: {error}", path.display()));
-    let mut reader = BufReader::new(File::open(path).map_err(fail)?).take(HEADER_LIMIT);
-    let mut line = Vec::new();
-    while reader.read_until(b'\n', &mut line).map_err(fail)? > 0 {
-        let words: Vec<&[u8]> =
-            line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
-        if let Some(said) = says(&words) {
-            return Ok(said);
-        }
-        line.clear();
-    }
-    Ok(false)
 }

@@ -28,5 +28,6 @@ pub mod stability;
 pub mod submit;
 pub mod submit_results;
 pub mod triangulate;
+pub mod verify;
 pub mod voxels;
 pub mod worker;

@@ -29,6 +29,8 @@ const MAX_WORDS: usize = 3;
 pub(super) struct Flags {
     /// Whether the header has a fourth count, that of tetrahedra.
     four_counts: bool,
+    /// Whether the file is a list of spheres alone, behind which three words are usual.
+    is_list: bool,
     /// Number of records by kind and by number of words behind their values.
     records: [[usize; MAX_WORDS + 1]; 3],
     /// For each kind, which records are marked as deleted.
@@ -43,9 +45,9 @@ pub(super) struct Flags {
 }
 
 impl Flags {
-    /// No records yet, under a header with a fourth count or without.
-    pub(super) fn of(four_counts: bool) -> Self {
-        Self { four_counts, ..Self::default() }
+    /// No records yet, under a header with a fourth count or without, of a list of spheres or not.
+    pub(super) fn of(four_counts: bool, is_list: bool) -> Self {
+        Self { four_counts, is_list, ..Self::default() }
     }
 
     /// Whether lines of tetrahedra may follow.
@@ -161,7 +163,7 @@ impl Flags {
         };
         say(SPHERE, 1, "a type, though a mark of deletion usually follows it");
         say(FACE, 2, "importance and deleted");
-        if !self.four_counts {
+        if !self.four_counts && !self.is_list {
             let read = "type, deleted and copies, though the header has three counts";
             say(SPHERE, 3, read);
             say(EDGE, 3, read);

@@ -61,7 +61,7 @@ impl Records {
             faces: Vec::with_capacity(faces),
             tetrahedra: Vec::new(),
             normals: 0,
-            flags: Flags::of(four_counts),
+            flags: Flags::of(four_counts, layout != Layout::Complex),
             excess: [const { None }; 3],
             largest: None,
             parts: Vec::new(),
