@@ -21,7 +21,10 @@ pub use contour::{
 };
 pub use crossing::{Crossings, crossing_faces};
 pub use cubical::cubical_betti;
-pub use formats::{LoadedMa, MaError, MaErrorKind, parse_ma, parse_ply, read, read_ma, write};
+pub use formats::{
+    LoadedMa, Look, MaError, MaErrorKind, SphereValues, VtpError, glb_has_radii, parse_glb,
+    parse_ma, parse_ply, parse_vtp, read, read_ma, single_precision_loss, write, write_with,
+};
 pub use incidence::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};
 pub use stability::{ZERO_LENGTH, stability_ratio};
