@@ -61,7 +61,10 @@ fn a_solid_comes_with_z_up() {
     assert_eq!(part.points, [Vec3::ZERO, Vec3::X, Vec3::Z, -Vec3::Y]);
     assert_eq!(part.triangles, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
     for point in [Vec3::new(1.0, -2.0, 3.0), Vec3::new(-0.0, 0.0, 1e-300)] {
-        assert_eq!(z_up(y_up(point)).to_array().map(f64::to_bits), point.to_array().map(f64::to_bits));
+        assert_eq!(
+            z_up(y_up(point)).to_array().map(f64::to_bits),
+            point.to_array().map(f64::to_bits)
+        );
     }
 }
 
@@ -106,9 +109,12 @@ fn strips_fans_lines_and_loops_are_taken_apart() {
 #[test]
 fn quantised_and_interleaved_numbers_are_read() {
     // 16-bit numbers of the indices as normalised coordinates, 2 bytes between vertices.
-    let mut scene = with("/accessors/0", json!({
-        "bufferView": 1, "componentType": 5122, "normalized": true, "count": 3, "type": "VEC3",
-    }));
+    let mut scene = with(
+        "/accessors/0",
+        json!({
+            "bufferView": 1, "componentType": 5122, "normalized": true, "count": 3, "type": "VEC3",
+        }),
+    );
     scene["bufferViews"][1]["byteStride"] = 8.into();
     scene["meshes"][0]["primitives"][0] = json!({ "attributes": { "POSITION": 0 } });
     scene["extensionsRequired"] = json!(["KHR_mesh_quantization", "KHR_materials_unlit"]);
@@ -126,32 +132,104 @@ fn errors_name_the_element() {
         ("/scene", json!(7), "the file names scene 7, but there are 1"),
         ("/scenes/0/nodes", json!([3]), "the scene names node 3, but there are 1"),
         ("/nodes/0/mesh", json!(1), "node 0 names mesh 1, but there are 1"),
-        ("/nodes/0/children", json!([0]), "node 0 is reached twice; the nodes of a scene have to form trees"),
+        (
+            "/nodes/0/children",
+            json!([0]),
+            "node 0 is reached twice; the nodes of a scene have to form trees",
+        ),
         ("/nodes/0/children", json!([9]), "node 0 names node 9, but there are 1"),
-        ("/scenes/0/nodes", json!([0, 0]), "node 0 is reached twice; the nodes of a scene have to form trees"),
-        ("/meshes/0/primitives/0/indices", json!(9), "a primitive names accessor 9, but there are 2"),
+        (
+            "/scenes/0/nodes",
+            json!([0, 0]),
+            "node 0 is reached twice; the nodes of a scene have to form trees",
+        ),
+        (
+            "/meshes/0/primitives/0/indices",
+            json!(9),
+            "a primitive names accessor 9, but there are 2",
+        ),
         ("/meshes/0/primitives/0/mode", json!(7), "mesh 0, primitive 0: there is no mode 7"),
         ("/meshes/0/primitives/0/attributes", json!({}), "mesh 0, primitive 0: it has no POSITION"),
-        ("/meshes/0/primitives", draco, "the file needs the extension \"KHR_draco_mesh_compression\", which is not read; export it without compression"),
-        ("/extensionsRequired", json!(["EXT_meshopt_compression"]), "the file needs the extension \"EXT_meshopt_compression\", which is not read; export it without compression"),
+        (
+            "/meshes/0/primitives",
+            draco,
+            "the file needs the extension \"KHR_draco_mesh_compression\", which is not read; export it without compression",
+        ),
+        (
+            "/extensionsRequired",
+            json!(["EXT_meshopt_compression"]),
+            "the file needs the extension \"EXT_meshopt_compression\", which is not read; export it without compression",
+        ),
         ("/accessors/0/count", json!(5), "accessor 0 needs 60 bytes, but bufferView 0 has 48"),
-        ("/accessors/0/count", json!(4294967295_u64), "accessor 0 needs 51539607540 bytes, but bufferView 0 has 48"),
-        ("/accessors/0/count", json!(u64::MAX), "accessor 0 needs 18446744073709551615 bytes, but bufferView 0 has 48"),
-        ("/accessors/0/byteOffset", json!(u64::MAX), "accessor 0 needs 18446744073709551615 bytes, but bufferView 0 has 48"),
-        ("/accessors/0/type", json!("VEC2"), "mesh 0, primitive 0, POSITION: it has 2 numbers for each vertex instead of 3"),
-        ("/accessors/0/type", json!("MAT4"), "accessor 0: its type is not SCALAR, VEC2, VEC3 or VEC4"),
+        (
+            "/accessors/0/count",
+            json!(4294967295_u64),
+            "accessor 0 needs 51539607540 bytes, but bufferView 0 has 48",
+        ),
+        (
+            "/accessors/0/count",
+            json!(u64::MAX),
+            "accessor 0 needs 18446744073709551615 bytes, but bufferView 0 has 48",
+        ),
+        (
+            "/accessors/0/byteOffset",
+            json!(u64::MAX),
+            "accessor 0 needs 18446744073709551615 bytes, but bufferView 0 has 48",
+        ),
+        (
+            "/accessors/0/type",
+            json!("VEC2"),
+            "mesh 0, primitive 0, POSITION: it has 2 numbers for each vertex instead of 3",
+        ),
+        (
+            "/accessors/0/type",
+            json!("MAT4"),
+            "accessor 0: its type is not SCALAR, VEC2, VEC3 or VEC4",
+        ),
         ("/accessors/0/componentType", json!(5124), "accessor 0: no component type 5124"),
-        ("/accessors/0/sparse", json!({ "count": 1 }), "accessor 0: it is sparse, which is not read; export it as a plain array"),
+        (
+            "/accessors/0/sparse",
+            json!({ "count": 1 }),
+            "accessor 0: it is sparse, which is not read; export it as a plain array",
+        ),
         ("/accessors/0/bufferView", Value::Null, "accessor 0: it has no bytes (no bufferView)"),
-        ("/accessors/1/componentType", json!(5122), "mesh 0, primitive 0, indices: its indices are not unsigned whole numbers"),
+        (
+            "/accessors/1/componentType",
+            json!(5122),
+            "mesh 0, primitive 0, indices: its indices are not unsigned whole numbers",
+        ),
         ("/accessors/1/count", json!(11), "mesh 0, primitive 0: 11 corners are no whole triangles"),
-        ("/accessors/0/count", json!(3), "mesh 0, primitive 0, indices names vertex 3, but there are 3"),
-        ("/bufferViews/0/byteStride", json!(4), "accessor 0: its elements of 12 bytes overlap: the stride is 4"),
-        ("/bufferViews/0/byteLength", json!(73), "bufferView 0 needs 73 bytes, but buffer 0 has 72"),
-        ("/bufferViews/0/byteOffset", json!(u64::MAX), "bufferView 0 needs 18446744073709551615 bytes, but buffer 0 has 72"),
+        (
+            "/accessors/0/count",
+            json!(3),
+            "mesh 0, primitive 0, indices names vertex 3, but there are 3",
+        ),
+        (
+            "/bufferViews/0/byteStride",
+            json!(4),
+            "accessor 0: its elements of 12 bytes overlap: the stride is 4",
+        ),
+        (
+            "/bufferViews/0/byteLength",
+            json!(73),
+            "bufferView 0 needs 73 bytes, but buffer 0 has 72",
+        ),
+        (
+            "/bufferViews/0/byteOffset",
+            json!(u64::MAX),
+            "bufferView 0 needs 18446744073709551615 bytes, but buffer 0 has 72",
+        ),
         ("/bufferViews/0/buffer", json!(1), "bufferView 0 names buffer 1, but there are 1"),
-        ("/buffers/0/byteLength", json!(4294967295_u64), "buffer 0 needs 4294967295 bytes, but the binary chunk has 72"),
-        ("/buffers/0/uri", json!("x.bin"), "buffer 0: its bytes are not in this file; export everything into one .glb"),
+        (
+            "/buffers/0/byteLength",
+            json!(4294967295_u64),
+            "buffer 0 needs 4294967295 bytes, but the binary chunk has 72",
+        ),
+        (
+            "/buffers/0/uri",
+            json!("x.bin"),
+            "buffer 0: its bytes are not in this file; export everything into one .glb",
+        ),
     ] {
         assert_eq!(message(&with(pointer, value)), expected);
     }
@@ -165,7 +243,10 @@ fn a_container_that_lies_is_refused() {
     assert_eq!(fail(b"{\"asset\":{}}"), GlbError::Magic);
     assert_eq!(fail(b"glTF"), GlbError::Version(0));
     let holds = good.len();
-    assert_eq!(fail(&good[..holds - 4]), GlbError::Length { announced: holds as u32, holds: holds - 4 });
+    assert_eq!(
+        fail(&good[..holds - 4]),
+        GlbError::Length { announced: holds as u32, holds: holds - 4 }
+    );
     let altered = |at: usize, word: u32| {
         let mut bytes = good.clone();
         bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
@@ -173,7 +254,10 @@ fn a_container_that_lies_is_refused() {
     };
     assert_eq!(altered(4, 1), GlbError::Version(1));
     assert_eq!(altered(8, u32::MAX), GlbError::Length { announced: u32::MAX, holds });
-    assert_eq!(altered(12, u32::MAX), GlbError::Chunk { chunk: 0, announced: u32::MAX, left: holds - 20 });
+    assert_eq!(
+        altered(12, u32::MAX),
+        GlbError::Chunk { chunk: 0, announced: u32::MAX, left: holds - 20 }
+    );
     assert_eq!(altered(16, 0), GlbError::NoJson);
     // A chunk of another kind is not the binary one.
     let json = u32::from_le_bytes([good[12], good[13], good[14], good[15]]) as usize;
@@ -186,7 +270,10 @@ fn a_number_that_is_none_is_told_by_its_vertex() {
     bytes[16..20].copy_from_slice(&f32::NAN.to_le_bytes());
     let file = pack(&scene().to_string(), &bytes).unwrap();
     let fault = inspect_bytes(&file, Format::Glb).unwrap_err().fault;
-    assert!(matches!(fault, Fault::Coordinate { vertex: 1, value, .. } if value.is_nan()), "{fault}");
+    assert!(
+        matches!(fault, Fault::Coordinate { vertex: 1, value, .. } if value.is_nan()),
+        "{fault}"
+    );
     let points = with("/meshes/0/primitives/0/mode", json!(0));
     let fault = inspect_bytes(&self::file(&points), Format::Glb).unwrap_err().fault;
     assert_eq!(fault, Fault::NoFaces { vertices: 4 });
@@ -201,7 +288,8 @@ fn meshes_that_are_repeated_too_often_are_refused() {
     scene["scenes"][0]["nodes"] = (0..1000).collect();
     assert!(message(&scene).starts_with("the scene repeats its meshes to"), "{}", message(&scene));
     // A chain as deep as it is long needs no deep stack.
-    let nodes: Vec<Value> = (1..100_000).map(|k| json!({ "children": [k] })).chain([json!({ "mesh": 0 })]).collect();
+    let nodes: Vec<Value> =
+        (1..100_000).map(|k| json!({ "children": [k] })).chain([json!({ "mesh": 0 })]).collect();
     assert_eq!(parts(&file(&with("/nodes", nodes.into()))).unwrap().parts.len(), 1);
 }
 

@@ -58,7 +58,8 @@ fn what_cannot_be_written_is_refused_by_name() {
     assert_eq!(fail(&MedialMesh::default()), empty);
     let mut large = mesh();
     large.spheres[2].radius = 1e39;
-    let expected = "sphere 2: 1e39 is beyond single precision, the only one of glTF; write .ma or .vtp";
+    let expected =
+        "sphere 2: 1e39 is beyond single precision, the only one of glTF; write .ma or .vtp";
     assert_eq!(fail(&large), expected);
     let bytes = (42 * 32 + 80 * 12) * 2_000_000_u64;
     let many = MedialMesh { spheres: vec![mesh().spheres[0]; 2_000_000], ..MedialMesh::default() };
@@ -82,11 +83,16 @@ fn radii_that_cannot_be_are_refused() {
     assert!(parse_glb(replaced("\"_RADIUS\"", "\"_RADIUZ\""), "x").is_ok());
     let mut bad = file.clone();
     let minus = (-0.25_f32).to_le_bytes();
-    let at = file.windows(8).position(|w| w[..4] == 0.5_f32.to_le_bytes() && w[4..] == 0.25_f32.to_le_bytes());
+    let at = file
+        .windows(8)
+        .position(|w| w[..4] == 0.5_f32.to_le_bytes() && w[4..] == 0.25_f32.to_le_bytes());
     let at = at.expect("the radii stand together") + 4;
     bad[at..at + 4].copy_from_slice(&minus);
     let error = parse_glb(&bad, "x.glb").unwrap_err().to_string();
-    assert_eq!(error, "x.glb: the medial mesh is not valid: sphere 1 is not valid: centre [1, 0, 0], radius -0.25");
+    assert_eq!(
+        error,
+        "x.glb: the medial mesh is not valid: sphere 1 is not valid: centre [1, 0, 0], radius -0.25"
+    );
     bad[at..at + 4].copy_from_slice(&f32::INFINITY.to_le_bytes());
     assert!(parse_glb(&bad, "x").is_err());
 }

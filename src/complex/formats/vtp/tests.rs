@@ -83,8 +83,7 @@ const PIECES: &str = r#"<VTKFile type="PolyData" version="0.1"><PolyData>
 fn polylines_strips_and_pieces_are_taken_apart() {
     let loaded = parse_vtp(PIECES, "x.vtp").unwrap();
     assert_eq!(loaded.mesh.faces, [[1, 2, 3], [2, 3, 4], [5, 6, 7]]);
-    let edges =
-        [[0, 1], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4], [5, 6], [5, 7], [6, 7]];
+    let edges = [[0, 1], [1, 2], [1, 3], [2, 3], [2, 4], [3, 4], [5, 6], [5, 7], [6, 7]];
     assert_eq!(loaded.mesh.edges, edges);
     assert_eq!(loaded.mesh.spheres[7].radius, 3.0);
 }
@@ -92,22 +91,78 @@ fn polylines_strips_and_pieces_are_taken_apart() {
 #[test]
 fn errors_name_the_array_or_the_cell() {
     for (from, to, expected) in [
-        ("PolyData\" v", "ImageData\" v", "x.vtp: the file is not VTK PolyData but \"ImageData\"; ParaView saves what it shows as PolyData (.vtp)"),
-        ("Name=\"r\"", "Name=\"size\"", "x.vtp: its points have no array `radius` (nor `r`): not a medial mesh"),
+        (
+            "PolyData\" v",
+            "ImageData\" v",
+            "x.vtp: the file is not VTK PolyData but \"ImageData\"; ParaView saves what it shows as PolyData (.vtp)",
+        ),
+        (
+            "Name=\"r\"",
+            "Name=\"size\"",
+            "x.vtp: its points have no array `radius` (nor `r`): not a medial mesh",
+        ),
         (">1 1 1 1 1<", ">1 1 1 1<", "x.vtp: the array PointData/r: 4 numbers instead of 5"),
-        (">1 1 1 1 1<", ">1 1 -1 1 1<", "x.vtp: the medial mesh is not valid: sphere 2 is not valid: centre [2, 0, 0], radius -1"),
-        (">1 1 1 1 1<", ">1 1 nan 1 1<", "x.vtp: the medial mesh is not valid: sphere 2 is not valid: centre [2, 0, 0], radius NaN"),
+        (
+            ">1 1 1 1 1<",
+            ">1 1 -1 1 1<",
+            "x.vtp: the medial mesh is not valid: sphere 2 is not valid: centre [2, 0, 0], radius -1",
+        ),
+        (
+            ">1 1 1 1 1<",
+            ">1 1 nan 1 1<",
+            "x.vtp: the medial mesh is not valid: sphere 2 is not valid: centre [2, 0, 0], radius NaN",
+        ),
         (">0 1 2<", ">0 1 5<", "x.vtp: Lines/connectivity names the point 5 of 5"),
-        (">0 1 2<", ">0 1 -2<", "x.vtp: the array Lines/connectivity: \"-2\" is no number of type UInt8"),
-        ("Int64\" Name=\"c", "Float64\" Name=\"c", "x.vtp: the array Polys/connectivity: its numbers are not whole"),
-        ("NumberOfPoints=\"5\"", "NumberOfPoints=\"4294967295\"", "x.vtp: the array PointData/r: 5 numbers instead of 4294967295"),
-        ("NumberOfPoints=\"5\"", "NumberOfPoints=\"42949672960\"", "x.vtp: 42949672960 points are more than 32-bit indices can name"),
-        ("NumberOfPoints=\"5\"", "NumberOfPoints=\"many\"", "x.vtp: Piece: the attribute NumberOfPoints is many, expected a number"),
-        ("NumberOfPolys=\"1\"", "NumberOfPolys=\"2\"", "x.vtp: the array Polys/offsets: 1 numbers instead of 2"),
-        (">2 1 0</DataArray><DataArray type=\"Int64\" Name=\"offsets\">3<", ">2 1</DataArray><DataArray type=\"Int64\" Name=\"offsets\">2<", "x.vtp: polygon 0 has 2 corners; a medial mesh has triangles (ParaView's filter Triangulate makes some)"),
-        ("0.1\">", "0.1\" compressor=\"vtkLZ4DataCompressor\">", "x.vtp: arrays compressed by vtkLZ4DataCompressor are not read; save with zlib compression or none"),
-        ("format=\"ascii\">1", "format=\"appended\" offset=\"3\">1", "x.vtp: there is no element AppendedData"),
-        ("</Piece></PolyData>", "</Piece>", "x.vtp: byte 959: not XML: ill-formed document: expected `</PolyData>`, but `</VTKFile>` was found"),
+        (
+            ">0 1 2<",
+            ">0 1 -2<",
+            "x.vtp: the array Lines/connectivity: \"-2\" is no number of type UInt8",
+        ),
+        (
+            "Int64\" Name=\"c",
+            "Float64\" Name=\"c",
+            "x.vtp: the array Polys/connectivity: its numbers are not whole",
+        ),
+        (
+            "NumberOfPoints=\"5\"",
+            "NumberOfPoints=\"4294967295\"",
+            "x.vtp: the array PointData/r: 5 numbers instead of 4294967295",
+        ),
+        (
+            "NumberOfPoints=\"5\"",
+            "NumberOfPoints=\"42949672960\"",
+            "x.vtp: 42949672960 points are more than 32-bit indices can name",
+        ),
+        (
+            "NumberOfPoints=\"5\"",
+            "NumberOfPoints=\"many\"",
+            "x.vtp: Piece: the attribute NumberOfPoints is many, expected a number",
+        ),
+        (
+            "NumberOfPolys=\"1\"",
+            "NumberOfPolys=\"2\"",
+            "x.vtp: the array Polys/offsets: 1 numbers instead of 2",
+        ),
+        (
+            ">2 1 0</DataArray><DataArray type=\"Int64\" Name=\"offsets\">3<",
+            ">2 1</DataArray><DataArray type=\"Int64\" Name=\"offsets\">2<",
+            "x.vtp: polygon 0 has 2 corners; a medial mesh has triangles (ParaView's filter Triangulate makes some)",
+        ),
+        (
+            "0.1\">",
+            "0.1\" compressor=\"vtkLZ4DataCompressor\">",
+            "x.vtp: arrays compressed by vtkLZ4DataCompressor are not read; save with zlib compression or none",
+        ),
+        (
+            "format=\"ascii\">1",
+            "format=\"appended\" offset=\"3\">1",
+            "x.vtp: there is no element AppendedData",
+        ),
+        (
+            "</Piece></PolyData>",
+            "</Piece>",
+            "x.vtp: byte 959: not XML: ill-formed document: expected `</PolyData>`, but `</VTKFile>` was found",
+        ),
     ] {
         assert!(PIECES.contains(from), "{from}");
         assert_eq!(message(PIECES.replacen(from, to, 1)), expected);
@@ -123,7 +178,10 @@ fn lies_about_lengths_are_refused_before_memory_is_reserved() {
     let radii = "MAAAAAAAAAAAAAAAAADgPw";
     assert!(text.contains(radii));
     let error = message(text.replacen(radii, "/////////38AAAAAAADgPw", 1));
-    assert_eq!(error, "x.vtp: the array PointData/radius should have 48 bytes, it has 9223372036854775807");
+    assert_eq!(
+        error,
+        "x.vtp: the array PointData/radius should have 48 bytes, it has 9223372036854775807"
+    );
     let error = message(text.replacen("NumberOfPoints=\"6\"", "NumberOfPoints=\"4294967295\"", 1));
     assert_eq!(error, "x.vtp: the array PointData/radius should have 34359738360 bytes, it has 48");
     // A bomb: 10^9 points of which all bytes are zero.
