@@ -40,9 +40,12 @@ pub fn medial_mesh_for(path: &Path, shape: &Shape) -> Result<LoadedMa, Failure> 
 /// When the extension is none of a medial mesh, or the folder does not exist.
 pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
     let Some(path) = output else { return Ok(()) };
-    check_extension(path, &["ma", "ply", "obj"])?;
+    check_extension(path, &MEDIAL_MESHES)?;
     check_folder(path)
 }
+
+/// Extensions of medial meshes that are written.
+const MEDIAL_MESHES: [&str; 5] = ["ma", "ply", "obj", "vtp", "glb"];
 
 /// Extensions of surfaces that are written.
 pub const SURFACES: [&str; 3] = ["ply", "off", "obj"];

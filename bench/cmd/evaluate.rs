@@ -8,6 +8,7 @@ use medial::metrics::{Certificate, Evaluation, JudgeOptions, MetricError, Witnes
 use medial::shape::ShapeOptions;
 
 use crate::args::{Global, MeasureArguments, MeshArgument, judge_options};
+use crate::cmd::compat::CompatArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
 use crate::output::{counted, note, percent, print_json, print_line};
@@ -16,9 +17,9 @@ use crate::run::{Input, Source, StageLine};
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
     mesh: MeshArgument,
-    /// Medial mesh (.ma, or .ply with radii), in the units of the surface.
+    /// Medial mesh (.ma, .vtp, or .ply or .glb with radii), in the units of the surface.
     axis: PathBuf,
     /// Seed of the samples.
     #[arg(long, default_value_t = 0)]
@@ -28,6 +29,8 @@ pub struct Arguments {
     certify: Option<f64>,
     #[command(flatten)]
     measure: MeasureArguments,
+    #[command(flatten)]
+    compat: CompatArguments,
 }
 
 /// Runs the verb.
@@ -43,6 +46,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let shape =
         input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
     let LoadedMa { mesh, notes, mut warnings, .. } = medial_mesh_for(&arguments.axis, &shape)?;
+    let Arguments { seed, measure, .. } = arguments;
+    let compat = arguments.compat.measure(&input, &mesh, measure.samples, *seed)?;
     line.at("preparing the surface");
     let judge =
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
@@ -72,9 +77,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     warnings.extend(input.report.warnings);
     if global.json {
-        print_json(&evaluation, &warnings);
+        print_json(&compat.beside(&evaluation), &warnings);
     } else {
         print_evaluation(&evaluation);
+        compat.print();
         for warning in evaluation.warnings.iter().chain(&warnings) {
             print_line(&format!("  warning: {warning}"));
         }

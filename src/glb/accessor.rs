@@ -171,7 +171,7 @@ fn view_bytes<'a>(
         let (at, needed) = ("buffer 0".to_owned(), buffer.byte_length);
         return Err(GlbError::Range { at, needed, of, has });
     }
-    let end = view.byte_offset.checked_add(view.byte_length).unwrap_or(u64::MAX);
+    let end = view.byte_offset.saturating_add(view.byte_length);
     if end > buffer.byte_length {
         let (of, has) = ("buffer 0".to_owned(), buffer.byte_length);
         return Err(GlbError::Range { at: at(), needed: end, of, has });

@@ -1,7 +1,7 @@
 //! Quality of triangles and of structure, as MATStruct measures it.
 //!
-//! N. Wang, B. Wang, W. Wang, X. Guo, "Computing Medial Axis Transform with Feature Preservation via Restricted Power
-//! Diagram" and its successors; the definitions are those of MATStruct's `src/eval/mesh_eval.cpp`.
+//! N. Wang et al., "MATStruct: High-Quality Medial Mesh Computation via Structure-aware Variational Optimization",
+//! SIGGRAPH Asia 2025, <https://arxiv.org/abs/2510.10751>; the definitions are those of its `src/eval/mesh_eval.cpp`.
 //!
 //! - *Triangle quality*: `Q = 6 / sqrt(3) A / (h s)`, with the area `A`, the longest edge `h` and half the perimeter `s`; 1
 //!   for an equilateral triangle. The mean over all faces, not weighted.

@@ -1,7 +1,7 @@
 //! CD and HD of reconstructions and of skeletons, as Point2Skeleton measures them.
 //!
 //! C. Lin, C. Li, Y. Liu, N. Chen, Y.-K. Choi, W. Wang, "Point2Skeleton: Learning Skeletal Representations from Point
-//! Clouds", CVPR 2021, <https://doi.org/10.1109/CVPR46437.2021.00427>; the sums are those of the authors' `DistFunc.py`, the division by
+//! Clouds", CVPR 2021, <https://arxiv.org/abs/2012.00230>; the sums are those of the authors' `DistFunc.py`, the division by
 //! the counts is the first author's reply to a question about it.
 //!
 //! 1. The skeleton is sampled to `M` spheres: on faces as many as `A / (A + E)` of them, on edges without a face the rest,

@@ -1,5 +1,7 @@
 //! `medial convert A B`: between surface formats, or between medial mesh formats.
 
+mod look;
+
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -8,6 +10,7 @@ use clap::Args;
 use medial::{complex, surface};
 use serde_json::json;
 
+use self::look::LookArguments;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files::extension;
@@ -19,10 +22,13 @@ const HEADER_LIMIT: u64 = 1 << 20;
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma, or .ply with a radius).
+    /// Surface (OFF, OBJ, PLY, STL, GLB) or medial mesh (.ma, .vtp, .ply with a radius, .glb with `_RADIUS`).
     from: PathBuf,
-    /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj).
+    /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers).
+    /// `.glb` has single precision, and its y is up: z here, as Blender shows it.
     to: PathBuf,
+    #[command(flatten)]
+    look: LookArguments,
 }
 
 /// Runs the verb. Surfaces are repaired on the way, and every repair is told.
@@ -31,11 +37,18 @@ pub struct Arguments {
 /// When the input is refused, the pair of formats makes no sense, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (notes, vertices, faces) = if is_medial(&arguments.from)? {
-        let loaded = complex::read(&arguments.from).map_err(Failure::input)?;
-        complex::write(&arguments.to, &loaded.mesh).map_err(Failure::input)?;
-        let (mesh, notes) = loaded.with_remarks();
+        arguments.look.check(&arguments.to)?;
+        let (loaded, look) = arguments.look.read(&arguments.from)?;
+        complex::write_with(&arguments.to, &loaded.mesh, &look).map_err(Failure::input)?;
+        let (mesh, mut notes) = loaded.with_remarks();
+        notes.extend(look::loss(&arguments.to, &mesh));
         (notes, mesh.spheres.len(), mesh.faces.len())
-    } else if extension(&arguments.to) == "ma" {
+    } else if arguments.look.is_asked() {
+        let from = arguments.from.display();
+        return Err(Failure::usage(format!(
+            "{from} is a surface: only medial meshes have colours"
+        )));
+    } else if ["ma", "vtp", "glb"].contains(&extension(&arguments.to).as_str()) {
         return Err(Failure::usage(format!(
             "a surface is not a medial mesh: `medial axis {} -o {}` computes one",
             arguments.from.display(),
@@ -61,10 +74,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Whether a file holds a medial mesh: `.ma` and lists of spheres, or `.ply` whose vertices have a radius.
+/// Whether a file holds a medial mesh: `.ma`, lists of spheres and `.vtp`, or `.ply` and `.glb` whose vertices have a radius.
 fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" | "vtp" => Ok(true),
+        "glb" => complex::glb_has_radii(path).map_err(Failure::input),
         "ply" => ply_has_radius(path),
         _ => Ok(false),
     }
