@@ -163,14 +163,15 @@ fn doubts(
 /// What a file holds is told by its first bytes; no header of a PLY file is longer than so many.
 const HEADER_LIMIT: u64 = 1 << 20;
 
-/// Whether a file holds a medial mesh: `.ma` and lists of spheres, `.ply` whose vertices have a radius, `.obj` whose vertices
-/// have a fourth number.
+/// Whether a file holds a medial mesh: `.ma`, lists of spheres and `.vtp`, `.ply` and `.glb` whose vertices have a radius,
+/// `.obj` whose vertices have a fourth number.
 ///
 /// # Errors
 /// When it cannot be read.
 pub fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" | "vtp" => Ok(true),
+        "glb" => complex::glb_has_radii(path).map_err(Failure::input),
         "ply" => any_line(path, |words| match words {
             [b"end_header"] => Some(false),
             [b"property", _, b"radius" | b"r"] => Some(true),
@@ -206,9 +207,12 @@ fn any_line(path: &Path, says: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool
 /// When the extension is none of a medial mesh, or the folder does not exist.
 pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
     let Some(path) = output else { return Ok(()) };
-    check_extension(path, &["ma", "ply", "obj"])?;
+    check_extension(path, &MEDIAL_MESHES)?;
     check_folder(path)
 }
+
+/// Extensions of medial meshes that are written.
+const MEDIAL_MESHES: [&str; 5] = ["ma", "ply", "obj", "vtp", "glb"];
 
 /// Extensions of surfaces that are written.
 pub const SURFACES: [&str; 3] = ["ply", "off", "obj"];

@@ -35,8 +35,10 @@
 //! ```
 
 mod atomic;
+mod colour;
 pub mod complex;
 mod diagnostics;
+mod glb;
 pub mod heap;
 pub mod metrics;
 pub mod shape;
@@ -45,6 +47,8 @@ mod sum;
 pub mod surface;
 
 pub use atomic::{remove_temporaries, write_atomically};
+pub use colour::{ColourMap, decode_srgb};
+pub use glb::GlbError;
 
 pub use geometry::Vec3;
 /// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a crate of its own.

@@ -18,9 +18,9 @@ use crate::run::{Input, Source, StageLine, peak_bytes};
 /// Arguments of `axis`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
     mesh: MeshArgument,
-    /// The medial mesh (.ma, .ply, .obj), in the units of the surface.
+    /// The medial mesh (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
     #[arg(short, long)]
     output: Option<PathBuf>,
     #[command(flatten)]

@@ -9,6 +9,7 @@ use medial::shape::{Fit, ShapeOptions};
 use serde::Serialize;
 
 use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument, judge_options};
+use crate::cmd::compat::CompatArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
 use crate::output::{counted, note, percent, print_json, print_line};
@@ -17,9 +18,10 @@ use crate::run::{Input, Source, StageLine};
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
     mesh: MeshArgument,
-    /// Medial mesh (.ma and its dialects, .ply or .obj with radii), in the units of the surface unless `--fit` finds others.
+    /// Medial mesh (.ma and its dialects, .vtp, or .ply, .obj or .glb with radii), in the units of the surface unless
+    /// `--fit` finds others.
     axis: PathBuf,
     #[command(flatten)]
     fitting: AxisArguments,
@@ -31,6 +33,8 @@ pub struct Arguments {
     certify: Option<f64>,
     #[command(flatten)]
     measure: MeasureArguments,
+    #[command(flatten)]
+    compat: CompatArguments,
 }
 
 /// Runs the verb.
@@ -47,6 +51,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
     let (loaded, fit) = medial_mesh_for(&arguments.axis, &shape, &arguments.fitting)?;
     let LoadedMa { mesh, notes, mut warnings, .. } = loaded;
+    let Arguments { seed, measure, .. } = arguments;
+    let compat = arguments.compat.measure(&input, &mesh, measure.samples, *seed)?;
     line.at("preparing the surface");
     let judge =
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
@@ -76,9 +82,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     warnings.extend(input.report.warnings);
     if global.json {
-        print_json(&Evaluated { evaluation: &evaluation, fit }, &warnings);
+        print_json(&compat.beside(&Evaluated { evaluation: &evaluation, fit }), &warnings);
     } else {
         print_evaluation(&evaluation);
+        compat.print();
         for warning in evaluation.warnings.iter().chain(&warnings) {
             print_line(&format!("  warning: {warning}"));
         }

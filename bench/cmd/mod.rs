@@ -5,6 +5,7 @@ pub mod baseline;
 pub mod check;
 pub mod collect;
 pub mod compare;
+mod compat;
 pub mod completions;
 pub mod convert;
 pub mod datasets;

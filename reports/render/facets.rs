@@ -2,7 +2,7 @@
 
 use medial::Vec3;
 
-use super::colour::{ColourMap, Light};
+use super::colour::{ColourMap, Light, table};
 
 /// A triangle with what varies along it.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +26,7 @@ pub(super) enum Paint {
 
 impl Paint {
     pub(super) fn map(map: ColourMap) -> Self {
-        Self::Map(map.table())
+        Self::Map(table(map))
     }
 
     pub(super) fn at(&self, place: f32) -> Light {

@@ -5,6 +5,7 @@
 mod ascent;
 mod axis_distance;
 mod certificate;
+pub mod compat;
 mod counts;
 mod envelope;
 mod evaluation;

@@ -16,7 +16,7 @@ use crate::atomic::write_atomically;
 /// A file of that name is replaced, but only by a complete one.
 ///
 /// # Errors
-/// When the extension is unknown or `.stl` (single precision would move vertices), or the file
+/// When the extension is unknown or `.stl` or `.glb` (single precision would move vertices), or the file
 /// cannot be written.
 ///
 /// ```no_run
@@ -31,15 +31,15 @@ pub fn write(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), SurfaceError>
 }
 
 fn replace(path: &Path, mesh: &TriMesh, format: Format) -> Result<(), Fault> {
-    if format == Format::Stl {
-        let why = "STL holds single precision only; write .off, .obj or .ply";
-        return Err(Fault::Unsupported(why.into()));
+    if matches!(format, Format::Stl | Format::Glb) {
+        let why = format!("{format} holds single precision only; write .off, .obj or .ply");
+        return Err(Fault::Unsupported(why));
     }
     write_atomically(path, |out| write_to(out, mesh, format))
         .map_err(|error| Fault::Io(format!("cannot be written: {error}")))
 }
 
-/// The text of a mesh in a format other than STL.
+/// The text of a mesh in a format of text.
 fn write_to(out: &mut dyn Write, mesh: &TriMesh, format: Format) -> io::Result<()> {
     let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
     let (vertex_word, face_word, base) = match format {
@@ -54,7 +54,7 @@ fn write_to(out: &mut dyn Write, mesh: &TriMesh, format: Format) -> io::Result<(
             writeln!(out, "element face {faces}")?;
             writeln!(out, "property list uchar uint vertex_indices\nend_header")?;
         }
-        Format::Obj | Format::Stl => {}
+        Format::Obj | Format::Stl | Format::Glb => {}
     }
     for v in &mesh.vertices {
         writeln!(out, "{vertex_word}{:?} {:?} {:?}", v.x, v.y, v.z)?;

@@ -20,7 +20,7 @@ use crate::files::{SURFACES, check_extension, check_folder, check_output};
 /// Files to write.
 #[derive(Debug, Args)]
 pub struct Outputs {
-    /// The result (.ma, .ply, .obj), in the units of the surface.
+    /// The result (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Write all levels into a file, for `--hierarchy`; for methods that have them.

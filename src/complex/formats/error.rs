@@ -4,7 +4,9 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 
+use super::vtp::VtpError;
 use crate::complex::ComplexError;
+use crate::glb::GlbError;
 
 /// Why a file could not be read or written as a medial mesh: the file, the line, the reason.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +51,22 @@ pub enum MaErrorKind {
     Extension {
         /// The file's extension, in lower case.
         extension: String,
+        /// The extensions that would do.
+        known: &'static str,
+    },
+    /// A VTK PolyData file that cannot be read.
+    #[error(transparent)]
+    Vtp(#[from] VtpError),
+    /// A binary glTF file that cannot be read or written.
+    #[error(transparent)]
+    Glb(#[from] GlbError),
+    /// The format holds no such thing.
+    #[error("{extension:?} files hold no {what}; write {known}")]
+    NoRoom {
+        /// The file's extension.
+        extension: String,
+        /// `"values"` or `"spheres as bodies"`.
+        what: &'static str,
         /// The extensions that would do.
         known: &'static str,
     },
@@ -141,11 +159,11 @@ impl MaErrorKind {
     pub(super) fn unreadable(extension: &str) -> Self {
         Self::Extension {
             extension: extension.to_owned(),
-            known: ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj",
+            known: ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj, .vtp, .glb",
         }
     }
 
     pub(super) fn unwritable(extension: &str) -> Self {
-        Self::Extension { extension: extension.to_owned(), known: ".ma, .ply, .obj" }
+        Self::Extension { extension: extension.to_owned(), known: ".ma, .ply, .obj, .vtp, .glb" }
     }
 }

@@ -6,15 +6,21 @@
 //! | `.ma_dup`, `.sph`, `.txt`, `.xyzr` | yes | no | the same, and lists of spheres alone |
 //! | `.ply` | ASCII | ASCII | the same, with a vertex property `radius`, for viewers |
 //! | `.obj` | yes | yes | centres, edges (`l`) and faces (`f`); read with radii as fourth numbers (`v x y z r`), written without, for viewers |
+//! | `.vtp` | yes | base64 | the same as `.ma` and a value at each sphere, for ParaView |
+//! | `.glb` | yes | yes | the same in single precision, coloured, and the spheres as bodies where asked, for Blender and browsers |
 //!
 //! Coordinates are read and written in the unit of the file; normalisation is up to the caller. Numbers
-//! are written with 17 significant digits, so that they are read back bit for bit.
+//! are written with 17 significant digits or as they are in memory, so that they are read back bit for bit; but for `.glb`,
+//! which has single precision.
 
 mod annotations;
 mod canonical;
 mod error;
 mod flags;
+mod glb;
 mod layout;
+mod lone;
+mod look;
 mod ma;
 mod obj;
 mod options;
@@ -22,20 +28,24 @@ mod ply;
 mod records;
 mod scan;
 mod trailer;
+mod vtp;
 
 use std::fs;
-use std::io::{self, Write};
 use std::path::Path;
 
 pub use annotations::{Annotations, Part, PartKind};
 pub use error::{MaError, MaErrorKind};
+pub use glb::{parse_glb, single_precision_loss};
+pub use look::{Look, SphereValues};
 pub use ma::{parse_ma, parse_ma_with};
 pub use obj::parse_obj;
 pub use options::{Radii, ReadOptions};
 pub use ply::{parse_ply, parse_ply_with};
+pub use vtp::{VtpError, parse_vtp};
 
 use super::MedialMesh;
 use crate::atomic::write_atomically;
+use crate::glb::has_radii;
 
 /// A medial mesh from a file, in canonical form, and what had to be done to bring it there.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +72,8 @@ impl LoadedMa {
     }
 }
 
-/// Reads a medial mesh from a `.ma` file, a list of spheres, an ASCII `.ply` file or an `.obj` file with radii, told apart
+/// Reads a medial mesh from a `.ma` file, a list of spheres, an ASCII `.ply` file, an `.obj` or `.glb` file with radii or a
+/// `.vtp` file, told apart
 /// by the extension.
 ///
 /// # Errors
@@ -83,6 +94,8 @@ pub fn read_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<LoadedM
         "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => parse_ma_with(load(path)?, &name, options),
         "ply" => parse_ply_with(load(path)?, &name, options),
         "obj" => parse_obj(load(path)?, &name, options),
+        "vtp" => parse_vtp(load(path)?, &name),
+        "glb" => parse_glb(load(path)?, &name),
         other => Err(MaError::of_file(path, MaErrorKind::unreadable(other))),
     }
 }
@@ -96,7 +109,7 @@ pub fn read_ma(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
     parse_ma(load(path)?, &path.display().to_string())
 }
 
-/// Writes a medial mesh as `.ma`, `.ply` or `.obj`, told apart by the extension.
+/// Writes a medial mesh as `.ma`, `.ply`, `.obj`, `.vtp` or `.glb`, told apart by the extension.
 ///
 /// The file appears under its name only when it is complete: it is written beside the target
 /// and renamed. Contact points are not part of any of these formats.
@@ -104,17 +117,73 @@ pub fn read_ma(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
 /// # Errors
 /// When the extension is another one, the mesh is not in canonical form, or writing fails.
 pub fn write(path: impl AsRef<Path>, mesh: &MedialMesh) -> Result<(), MaError> {
+    write_with(path, mesh, &Look::default())
+}
+
+/// [`write()`] with values at the spheres, for the formats of viewers that hold them.
+///
+/// ```no_run
+/// use medial::complex::{Look, SphereValues, read, write_with};
+///
+/// let mesh = read("bunny.ma")?.mesh;
+/// let values = Some(SphereValues::stability(&mesh, 1.0));
+/// write_with("bunny.glb", &mesh, &Look { values, balls: true })?;
+/// # Ok::<(), medial::complex::MaError>(())
+/// ```
+///
+/// # Errors
+/// As [`write()`]; when the format has no room for what is to be shown; and `.glb` for a mesh without spheres, numbers beyond
+/// single precision, or more than 4 GB.
+///
+/// # Panics
+/// If the values are not one for each sphere.
+pub fn write_with(path: impl AsRef<Path>, mesh: &MedialMesh, look: &Look) -> Result<(), MaError> {
     let path = path.as_ref();
-    let write_to: fn(&mut dyn Write, &MedialMesh) -> io::Result<()> = match extension(path).as_str()
-    {
-        "ma" => ma::write_to,
-        "ply" => ply::write_to,
-        "obj" => obj::write_to,
-        other => return Err(MaError::of_file(path, MaErrorKind::unwritable(other))),
+    let fail = |kind| MaError::of_file(path, kind);
+    let extension = extension(path);
+    if let Some(SphereValues { values, .. }) = &look.values {
+        assert_eq!(values.len(), mesh.spheres.len(), "a value for each sphere");
+    }
+    if !WRITTEN.contains(&extension.as_str()) {
+        return Err(fail(MaErrorKind::unwritable(&extension)));
+    }
+    has_room(&extension, look).map_err(fail)?;
+    mesh.check().map_err(|error| fail(error.into()))?;
+    let written = match extension.as_str() {
+        "ma" => write_atomically(path, |out| ma::write_to(out, mesh)),
+        "ply" => write_atomically(path, |out| ply::write_to(out, mesh)),
+        "obj" => write_atomically(path, |out| obj::write_to(out, mesh)),
+        "vtp" => write_atomically(path, |out| vtp::write_to(out, mesh, look)),
+        _ => {
+            let bytes = glb::file(mesh, look).map_err(|error| fail(error.into()))?;
+            write_atomically(path, |out| out.write_all(&bytes))
+        }
     };
-    mesh.check().map_err(|error| MaError::of_file(path, error.into()))?;
-    write_atomically(path, |out| write_to(out, mesh))
-        .map_err(|error| MaError::of_file(path, error.into()))
+    written.map_err(|error| fail(error.into()))
+}
+
+/// Whether a `.glb` file holds a medial mesh rather than a surface.
+///
+/// # Errors
+/// When the file cannot be read, or is no binary glTF file.
+pub fn glb_has_radii(path: impl AsRef<Path>) -> Result<bool, MaError> {
+    let path = path.as_ref();
+    has_radii(&load(path)?).map_err(|error| MaError::of_file(path, error.into()))
+}
+
+/// Extensions that [`write()`] knows; the last is the arm for all others there.
+const WRITTEN: [&str; 5] = ["ma", "ply", "obj", "vtp", "glb"];
+
+fn has_room(extension: &str, look: &Look) -> Result<(), MaErrorKind> {
+    let refused =
+        |what, known| Err(MaErrorKind::NoRoom { extension: extension.to_owned(), what, known });
+    match extension {
+        "glb" => Ok(()),
+        _ if look.balls => refused("spheres as bodies", ".glb"),
+        "vtp" => Ok(()),
+        _ if look.values.is_some() => refused("values", ".vtp or .glb"),
+        _ => Ok(()),
+    }
 }
 
 fn extension(path: &Path) -> String {

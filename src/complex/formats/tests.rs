@@ -1,5 +1,5 @@
 use std::path::PathBuf;
-use std::{env, fs, process};
+use std::{env, fs, io, process};
 
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};

@@ -1,11 +1,14 @@
 //! `medial convert A B`: between surface formats, or between medial mesh formats.
 
+mod look;
+
 use std::path::PathBuf;
 
 use clap::Args;
 use medial::{complex, surface};
 use serde_json::json;
 
+use self::look::LookArguments;
 use crate::args::{Global, ReadArguments};
 use crate::exit::{Exit, Failure};
 use crate::files::{extension, is_medial};
@@ -14,12 +17,16 @@ use crate::output::{print_json, print_line};
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma and its dialects, .ply or .obj with radii).
+    /// Surface (OFF, OBJ, PLY, STL, GLB) or medial mesh (.ma and its dialects, .vtp, .ply or .obj with radii, .glb with
+    /// `_RADIUS`).
     from: PathBuf,
-    /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj).
+    /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers).
+    /// `.glb` has single precision, and its y is up: z here, as Blender shows it.
     to: PathBuf,
     #[command(flatten)]
     read: ReadArguments,
+    #[command(flatten)]
+    look: LookArguments,
 }
 
 /// Runs the verb. Surfaces are repaired on the way, and every repair is told.
@@ -28,12 +35,18 @@ pub struct Arguments {
 /// When the input is refused, the pair of formats makes no sense, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (notes, vertices, faces) = if is_medial(&arguments.from)? {
-        let loaded = complex::read_with(&arguments.from, arguments.read.options())
-            .map_err(Failure::input)?;
-        complex::write(&arguments.to, &loaded.mesh).map_err(Failure::input)?;
-        let (mesh, notes) = loaded.with_remarks();
+        arguments.look.check(&arguments.to)?;
+        let (loaded, look) = arguments.look.read(&arguments.from, &arguments.read)?;
+        complex::write_with(&arguments.to, &loaded.mesh, &look).map_err(Failure::input)?;
+        let (mesh, mut notes) = loaded.with_remarks();
+        notes.extend(look::loss(&arguments.to, &mesh));
         (notes, mesh.spheres.len(), mesh.faces.len())
-    } else if extension(&arguments.to) == "ma" {
+    } else if arguments.look.is_asked() {
+        let from = arguments.from.display();
+        return Err(Failure::usage(format!(
+            "{from} is a surface: only medial meshes have colours"
+        )));
+    } else if ["ma", "vtp", "glb"].contains(&extension(&arguments.to).as_str()) {
         return Err(Failure::usage(format!(
             "a surface is not a medial mesh: `medial axis {} -o {}` computes one",
             arguments.from.display(),

@@ -1,0 +1,212 @@
+"""Our .vtp and .glb files in other people's readers, and theirs in ours. Needs vtk and trimesh; see readers.sh.
+
+    readers.py make FOLDER                  files written by VTK and by trimesh, of the mesh in FOLDER/x.ma
+    readers.py check MESH.ma FILE ...       what VTK (.vtp) and trimesh (.glb) read, against the text of MESH.ma
+    readers.py solid FOLDER                 solids written by trimesh, with what a reader of surfaces should find
+
+Prints a line for each comparison; exit code 1 when one differs.
+"""
+
+import json
+import sys
+
+import numpy as np
+import trimesh
+import vtk
+from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+
+failed = False
+
+
+def say(what, agrees):
+    global failed
+    failed |= not agrees
+    print(f"{'same' if agrees else 'DIFFERENT'}: {what}", flush=True)
+
+
+def read_ma(file):
+    spheres, edges, faces = [], [], []
+    for line in open(file):
+        word, *rest = line.split() or [""]
+        if word == "v":
+            spheres.append([float(x) for x in rest[:4]])
+        elif word == "e":
+            edges.append([int(x) for x in rest[:2]])
+        elif word == "f":
+            faces.append([int(x) for x in rest[:3]])
+    return np.array(spheres).reshape(-1, 4), edges, faces
+
+
+def lone_edges(edges, faces):
+    sides = {tuple(sorted((f[i], f[j]))) for f in faces for i, j in ((0, 1), (0, 2), (1, 2))}
+    return [tuple(e) for e in edges if tuple(e) not in sides]
+
+
+def cells_of(array):
+    ends = vtk_to_numpy(array.GetOffsetsArray())
+    members = vtk_to_numpy(array.GetConnectivityArray())
+    return [tuple(int(v) for v in members[a:b]) for a, b in zip(ends[:-1], ends[1:])]
+
+
+def check_vtp(file, spheres, edges, faces):
+    reader = vtk.vtkXMLPolyDataReader()
+    reader.SetFileName(file)
+    reader.Update()
+    data = reader.GetOutput()
+    points = vtk_to_numpy(data.GetPoints().GetData())
+    radii = vtk_to_numpy(data.GetPointData().GetArray("radius"))
+    say(f"{file}: {len(points)} centres, bit for bit", points.dtype == float and np.array_equal(points, spheres[:, :3]))
+    say(f"{file}: radii, bit for bit", np.array_equal(radii, spheres[:, 3]))
+    lone = lone_edges(edges, faces)
+    say(f"{file}: {len(lone)} edges without a face", sorted(cells_of(data.GetLines())) == sorted(lone))
+    say(f"{file}: {len(faces)} faces", sorted(cells_of(data.GetPolys())) == sorted(tuple(f) for f in faces))
+    single = set(range(len(spheres))) - {v for e in edges for v in e}
+    say(f"{file}: {len(single)} spheres without an edge", {v for (v,) in cells_of(data.GetVerts())} == single)
+    names = [data.GetPointData().GetArrayName(k) for k in range(data.GetPointData().GetNumberOfArrays())]
+    active = data.GetPointData().GetScalars()
+    say(f"{file}: arrays {names}, coloured by {active.GetName()}", active.GetName() == names[-1])
+
+
+VIRIDIS = ["453781", "3D4E8A", "32668E", "287D8E", "1F958B", "29AF7F", "5CC863", "A8DB34", "FDE725"]
+
+
+def viridis(place):
+    table = np.array([[int(c[k : k + 2], 16) for k in (0, 2, 4)] for c in VIRIDIS]) / 255
+    at = np.linspace(0, 1, len(table))
+    srgb = np.stack([np.interp(place, at, table[:, k]) for k in range(3)], axis=1)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def check_glb(file, spheres, edges, faces):
+    scene = trimesh.load_scene(file)
+    meshes = [g for g in scene.geometry.values() if isinstance(g, trimesh.Trimesh)]
+    sheets = [m for m in meshes if "_RADIUS" in m.vertex_attributes]
+    lone = lone_edges(edges, faces)
+    centres = np.stack((spheres[:, 0], spheres[:, 2], -spheres[:, 1]), axis=1).astype(np.float32)
+    if faces:
+        (sheet,) = sheets
+        say(f"{file}: {len(centres)} centres in single precision, z up", np.array_equal(sheet.vertices.astype(np.float32), centres))
+        radii = np.asarray(sheet.vertex_attributes["_RADIUS"]).ravel()
+        say(f"{file}: radii in single precision", np.array_equal(radii, spheres[:, 3].astype(np.float32)))
+        theirs = sorted(tuple(sorted(int(v) for v in f)) for f in sheet.faces)
+        say(f"{file}: {len(faces)} faces", theirs == sorted(tuple(f) for f in faces))
+        normals = np.asarray(sheet.vertex_normals)
+        say(f"{file}: normals of unit length", np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 1e-6)
+        used = np.unique(sheet.faces)
+        flat = np.zeros((len(centres), 3))
+        corner = sheet.vertices[sheet.faces]
+        area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        largest = np.zeros(len(centres))
+        size = np.linalg.norm(area, axis=1)
+        for k in np.argsort(size):
+            for v in sheet.faces[k]:
+                flat[v], largest[v] = area[k] / max(size[k], 1e-300), size[k]
+        on_side = np.einsum("ij,ij->i", flat[used], normals[used])
+        say(f"{file}: normals on the side of the largest face", bool((on_side[largest[used] > 1e-12] > -1e-4).all()))
+        colours = np.asarray(sheet.visual.vertex_colors, float)
+        extras = sheet.metadata
+        say(f"{file}: extras {extras.get('colour_by')}, {extras.get('colour_low')} to {extras.get('colour_high')}",
+            "colour_low" in extras and "unit" in extras)
+        if extras.get("colour_by") == "radius":
+            low, high = extras["colour_low"], extras["colour_high"]
+            place = (spheres[:, 3] - low) / (high - low) if high > low else np.full(len(spheres), 0.5)
+            off = np.abs(colours[:, :3] / 255 - viridis(place)).max()
+            say(f"{file}: colours, linear, within {off:.4f}", off <= 1 / 255)
+        elif extras.get("colour_by") == "stability":
+            theirs = np.asarray(sheet.vertex_attributes["_STABILITY"]).ravel()
+            off = np.abs(colours[:, :3] / 255 - viridis(theirs)).max()
+            say(f"{file}: colours of the stability, within {off:.4f}", off <= 1 / 255)
+    paths = [g for g in scene.geometry.values() if isinstance(g, trimesh.path.Path3D)]
+    drawn = sum(len(np.atleast_1d(e.points)) - 1 for p in paths for e in p.entities)
+    say(f"{file}: {len(lone)} edges without a face", drawn == len(lone))
+    balls = [m for name, m in scene.geometry.items() if isinstance(m, trimesh.Trimesh) and m not in sheets]
+    for body in balls:
+        count = len(body.faces) // 80
+        say(f"{file}: {count} spheres as bodies, outward", count == len(spheres) and body.volume > 0)
+        middle = body.vertices.reshape(count, 42, 3)
+        off = np.abs(np.linalg.norm(middle - centres[:, None], axis=2) - spheres[:, 3][:, None]).max()
+        say(f"{file}: their vertices on the spheres, within {off:.1e}", off < 1e-5 * np.abs(centres).max())
+
+
+def make_vtp(folder, spheres, edges, faces):
+    points = vtk.vtkPoints()
+    points.SetDataTypeToDouble()
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(spheres[:, :3]), deep=True))
+    data = vtk.vtkPolyData()
+    data.SetPoints(points)
+    lines, polygons = vtk.vtkCellArray(), vtk.vtkCellArray()
+    for e in lone_edges(edges, faces):
+        lines.InsertNextCell(2, e)
+    for f in faces:
+        polygons.InsertNextCell(3, f)
+    data.SetLines(lines)
+    data.SetPolys(polygons)
+    radii = numpy_to_vtk(np.ascontiguousarray(spheres[:, 3]), deep=True)
+    radii.SetName("radius")
+    data.GetPointData().AddArray(radii)
+    writer = vtk.vtkXMLPolyDataWriter()
+    writer.SetInputData(data)
+    for name, mode, zipped, encoded, wide, swapped in (
+        ("default", None, True, True, False, False),
+        ("ascii", vtk.vtkXMLWriter.Ascii, False, True, False, False),
+        ("binary", vtk.vtkXMLWriter.Binary, False, True, False, False),
+        ("binary-zlib", vtk.vtkXMLWriter.Binary, True, True, True, False),
+        ("appended", vtk.vtkXMLWriter.Appended, False, True, True, False),
+        ("raw", vtk.vtkXMLWriter.Appended, False, False, True, False),
+        ("raw-zlib", vtk.vtkXMLWriter.Appended, True, False, False, True),
+    ):
+        writer.SetFileName(f"{folder}/vtk-{name}.vtp")
+        if mode is not None:
+            writer.SetDataMode(mode)
+            writer.SetCompressorTypeToZLib() if zipped else writer.SetCompressorTypeToNone()
+            writer.SetEncodeAppendedData(encoded)
+            writer.SetHeaderTypeToUInt64() if wide else writer.SetHeaderTypeToUInt32()
+            writer.SetByteOrderToBigEndian() if swapped else writer.SetByteOrderToLittleEndian()
+        assert writer.Write() == 1, name
+
+
+def make_glb(folder, spheres, faces):
+    points = np.stack((spheres[:, 0], spheres[:, 2], -spheres[:, 1]), axis=1)
+    mesh = trimesh.Trimesh(points, faces, process=False)
+    mesh.vertex_attributes["_RADIUS"] = spheres[:, 3].astype(np.float32)
+    scene = trimesh.Scene()
+    # Half as large, and put right by its node.
+    mesh.vertices *= 0.5
+    mesh.vertex_attributes["_RADIUS"] *= np.float32(0.5)
+    scene.add_geometry(mesh, transform=np.diag([2.0, 2.0, 2.0, 1.0]))
+    scene.export(f"{folder}/trimesh.glb")
+
+
+def make_solids(folder):
+    scene = trimesh.Scene()
+    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3], [0, 0, 0])
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
+    mirror[0, 3] = 5
+    box = trimesh.creation.box((1, 2, 3))
+    scene.add_geometry(box, transform=turn)
+    scene.add_geometry(trimesh.creation.icosphere(2, 0.5), transform=mirror)
+    scene.add_geometry(trimesh.creation.icosphere(1, 0.25), transform=trimesh.transformations.translation_matrix([0, 9, 0]))
+    scene.export(f"{folder}/solids.glb")
+    whole = scene.to_geometry()
+    low, high = whole.bounds
+    expected = {"volume": abs(whole.volume), "area": whole.area, "faces": len(whole.faces),
+                "low": [low[0], -high[2], low[1]], "high": [high[0], -low[2], high[1]]}
+    json.dump(expected, open(f"{folder}/solids.json", "w"))
+
+
+verb, *arguments = sys.argv[1:]
+if verb == "make":
+    (folder,) = arguments
+    read = read_ma(f"{folder}/x.ma")
+    make_vtp(folder, *read)
+    if read[2]:
+        make_glb(folder, read[0], read[2])
+elif verb == "solid":
+    make_solids(arguments[0])
+elif verb == "check":
+    read = read_ma(arguments[0])
+    for file in arguments[1:]:
+        (check_vtp if file.endswith(".vtp") else check_glb)(file, *read)
+else:
+    sys.exit(__doc__)
+sys.exit(failed)
