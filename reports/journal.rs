@@ -114,6 +114,11 @@ impl std::fmt::Display for BadLine {
 pub fn read_records(path: &Path) -> Result<Journaled, JournalError> {
     let bytes =
         fs::read(path).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
+    Ok(parse_records(&bytes))
+}
+
+/// [`read_records`] of bytes.
+pub fn parse_records(bytes: &[u8]) -> Journaled {
     let mut journaled = Journaled::default();
     for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
         if line.trim_ascii().is_empty() {
@@ -128,7 +133,7 @@ pub fn read_records(path: &Path) -> Result<Journaled, JournalError> {
             }),
         }
     }
-    Ok(journaled)
+    journaled
 }
 
 /// Writes a whole `results.jsonl` under a temporary name and renames it.

@@ -53,7 +53,9 @@ pub use extras::{
     AxisShift, BASELINES, Baseline, NoiseRecord, ORACLES, STABILITY, read_lines, write_lines,
 };
 pub use header::{Header, MethodNote, RunNote};
-pub use journal::{BadLine, Journal, JournalError, Journaled, read_records, write_records};
+pub use journal::{
+    BadLine, Journal, JournalError, Journaled, parse_records, read_records, write_records,
+};
 pub use pictures::{PictureStrip, picture_strips};
 pub use record::{
     Conditions, Initial, Machine, Origin, OwnSeconds, Record, Repetition, Simplify, Stages, Status,

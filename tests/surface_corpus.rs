@@ -2,28 +2,9 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::path::Path;
 
 use medial::surface::{self, Fault, Repair};
-
-/// The rows of a table with quoted fields, by column name.
-fn table(path: &Path) -> Vec<HashMap<String, String>> {
-    let text = fs::read_to_string(path).unwrap();
-    let mut lines = text.lines().map(|line| {
-        let mut fields = vec![String::new()];
-        let mut quoted = false;
-        for c in line.chars() {
-            match c {
-                '"' => quoted = !quoted,
-                ',' if !quoted => fields.push(String::new()),
-                c => fields.last_mut().unwrap().push(c),
-            }
-        }
-        fields
-    });
-    let names = lines.next().unwrap();
-    lines.map(|fields| names.iter().cloned().zip(fields).collect()).collect()
-}
+use medial_test_support::table;
 
 #[test]
 fn good_meshes_are_what_the_manifest_says() {

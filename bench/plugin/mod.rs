@@ -43,11 +43,20 @@ pub use report::OwnSeconds;
 pub fn load(path: &Path, taken: &[&str]) -> Result<Vec<External>, PluginError> {
     let refuse =
         |error| PluginError { file: path.to_owned(), line: None, fault: PluginFault::Io(error) };
-    let text = fs::read_to_string(path).map_err(refuse)?;
+    parse(path, &fs::read_to_string(path).map_err(refuse)?, taken)
+}
+
+/// [`load`] of a text; `path` is where its relative paths start.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(path: &Path, text: &str, taken: &[&str]) -> Result<Vec<External>, PluginError> {
+    let refuse =
+        |error| PluginError { file: path.to_owned(), line: None, fault: PluginFault::Io(error) };
     // Absolute, since programs run in this folder, whatever folder we are in by then.
     let absolute = std::path::absolute(path).map_err(refuse)?;
     let folder = absolute.parent().unwrap_or(Path::new("/"));
-    let declarations = declaration::read(path, &text, folder, taken)?;
+    let declarations = declaration::read(path, text, folder, taken)?;
     declarations
         .into_iter()
         .map(|declared| External::new(declared, folder).map_err(refuse))

@@ -48,7 +48,9 @@ mod worker;
 pub use alternate::{Build, BuildError, Contender, missing_in_either, run_alternately};
 pub use answer::{Fault, LevelRun, Times, answer};
 pub use item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
-pub use npy::{Matrix, NpyError, NpyErrorKind, read_matrix, write_cells, write_npy_header};
+pub use npy::{
+    Matrix, NpyError, NpyErrorKind, parse_matrix, read_matrix, write_cells, write_npy_header,
+};
 pub use npy_header::HeaderError;
 pub use parcel::{Opened, Packed, ParcelError, Rejudged, Surfaces, open, pack, rejudge};
 pub use plan::{PlanError, Tally, count, missing, refused_params, run_items};

@@ -122,7 +122,11 @@ pub fn read_matrix(path: &Path) -> Result<Matrix, NpyError> {
     parse_matrix(BufReader::with_capacity(BLOCK, file)).map_err(named)
 }
 
-fn parse_matrix(mut input: impl Read) -> Result<Matrix, NpyErrorKind> {
+/// [`read_matrix`] of bytes from anywhere.
+///
+/// # Errors
+/// As [`read_matrix`], without the file's name.
+pub fn parse_matrix(mut input: impl Read) -> Result<Matrix, NpyErrorKind> {
     let Header { element, fortran_order, shape } = read_header(&mut input)?;
     let [rows, columns] = shape[..] else { return Err(NpyErrorKind::Dimensions(shape)) };
     let announced = rows.checked_mul(columns).and_then(|n| n.checked_mul(element.size() as u64));

@@ -5,6 +5,8 @@
 //! `$MEDIAL_SKIPPED`, if that is set, which `.ci/run` prints at its end. With `MEDIAL_REQUIRE_MESHES=1`
 //! a missing mesh is a failure.
 
+use std::collections::HashMap;
+use std::fs;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -47,6 +49,41 @@ pub fn surfaces() -> Vec<PathBuf> {
     files.retain(|file| file.extension().is_some_and(|e| e == "off" || e == "obj"));
     files.sort_unstable();
     files
+}
+
+/// The folder of shared medial meshes, beside that of the surfaces; `None` with a notice where it is missing.
+///
+/// # Panics
+/// If it is missing and required.
+pub fn medial_meshes() -> Option<PathBuf> {
+    let folder = folder().with_file_name("ma");
+    if folder.join("MANIFEST.csv").exists() {
+        return Some(folder);
+    }
+    missing(&folder);
+    None
+}
+
+/// The rows of a table with quoted fields, by column name.
+///
+/// # Panics
+/// If the file cannot be read.
+pub fn table(path: &Path) -> Vec<HashMap<String, String>> {
+    let text = fs::read_to_string(path).expect("a table");
+    let mut lines = text.lines().map(|line| {
+        let mut fields = vec![String::new()];
+        let mut quoted = false;
+        for c in line.chars() {
+            match c {
+                '"' => quoted = !quoted,
+                ',' if !quoted => fields.push(String::new()),
+                c => fields.last_mut().expect("at least one").push(c),
+            }
+        }
+        fields
+    });
+    let names = lines.next().expect("a header");
+    lines.map(|fields| names.iter().cloned().zip(fields).collect()).collect()
 }
 
 /// Whether there is a Python with NumPy; a notice where there is none.

@@ -1,0 +1,180 @@
+//! Readers: whatever the bytes, a typed error or what the reader promises.
+
+use std::path::Path;
+
+use medial::complex::collapse::Hierarchy;
+use medial::complex::{self, LoadedMa, Radii, ReadOptions};
+use medial::surface::{self, Format};
+use medial_bench::plugin;
+use medial_bench::run::{Study, parse_matrix};
+use medial_reports::parse_records;
+
+/// Larger meshes are not put to checks that take longer than reading.
+const SMALL: usize = 2000;
+
+fn surface(bytes: &[u8], format: Format) {
+    let Ok(loaded) = surface::read_bytes(bytes, format) else { return };
+    // What reading guarantees is what checking demands.
+    let checked = surface::validate(&loaded.mesh).expect("a surface that was read is valid");
+    assert_eq!(checked.faces, loaded.mesh.faces.len());
+}
+
+pub(crate) fn off(bytes: &[u8]) {
+    surface(bytes, Format::Off);
+}
+
+pub(crate) fn obj(bytes: &[u8]) {
+    surface(bytes, Format::Obj);
+}
+
+pub(crate) fn ply(bytes: &[u8]) {
+    surface(bytes, Format::Ply);
+}
+
+pub(crate) fn stl(bytes: &[u8]) {
+    surface(bytes, Format::Stl);
+}
+
+pub(crate) fn glb(bytes: &[u8]) {
+    surface(bytes, Format::Glb);
+    if let Ok(loaded) = complex::parse_glb(bytes, "x.glb") {
+        medial(&loaded);
+    }
+}
+
+pub(crate) fn vtp(bytes: &[u8]) {
+    if let Ok(loaded) = complex::parse_vtp(bytes, "x.vtp") {
+        medial(&loaded);
+    }
+}
+
+fn medial(loaded: &LoadedMa) {
+    let mesh = &loaded.mesh;
+    assert_eq!(mesh.check(), Ok(()));
+    let annotations = &loaded.annotations;
+    for (values, elements) in [
+        (annotations.sphere_types.len(), mesh.spheres.len()),
+        (annotations.edge_types.len(), mesh.edges.len()),
+        (annotations.importance.len(), mesh.faces.len()),
+    ] {
+        assert!(values == 0 || values == elements);
+    }
+    if mesh.spheres.len() + mesh.faces.len() < SMALL {
+        let [b0, b1, b2] = complex::betti(mesh).map(|number| number as i64);
+        assert_eq!(b0 - b1 + b2, complex::euler(mesh));
+    }
+}
+
+fn ma_with(bytes: &[u8], options: ReadOptions) {
+    if let Ok(loaded) = complex::parse_ma_with(bytes, "x.ma", options) {
+        medial(&loaded);
+    }
+}
+
+pub(crate) fn ma(bytes: &[u8]) {
+    ma_with(bytes, ReadOptions::default());
+}
+
+pub(crate) fn ma_lenient(bytes: &[u8]) {
+    ma_with(bytes, ReadOptions { lenient: true, block: Some(2), radii: Radii::Needed });
+    ma_with(bytes, ReadOptions { lenient: true, block: None, radii: Radii::NotNegative });
+}
+
+pub(crate) fn ma_points(bytes: &[u8]) {
+    ma_with(bytes, ReadOptions { lenient: false, block: None, radii: Radii::NotNeeded });
+}
+
+pub(crate) fn medial_ply(bytes: &[u8]) {
+    for radii in [Radii::Needed, Radii::NotNeeded] {
+        let options = ReadOptions { radii, ..ReadOptions::default() };
+        if let Ok(loaded) = complex::parse_ply_with(bytes, "x.ply", options) {
+            medial(&loaded);
+        }
+    }
+}
+
+pub(crate) fn medial_obj(bytes: &[u8]) {
+    for radii in [Radii::Needed, Radii::NotNeeded] {
+        let options = ReadOptions { radii, ..ReadOptions::default() };
+        if let Ok(loaded) = complex::parse_obj(bytes, "x.obj", options) {
+            medial(&loaded);
+        }
+    }
+}
+
+pub(crate) fn npy(bytes: &[u8]) {
+    let Ok(matrix) = parse_matrix(bytes) else { return };
+    let sum: f64 = (0..matrix.rows().min(SMALL))
+        .flat_map(|row| (0..matrix.columns().min(SMALL)).map(move |column| (row, column)))
+        .map(|(row, column)| matrix.at(row, column))
+        .sum();
+    std::hint::black_box(sum);
+}
+
+pub(crate) fn hierarchy(bytes: &[u8]) {
+    parsed_hierarchy(bytes);
+    // No mutation hits a checksum by chance: what is behind them is reached with right ones.
+    if let Some(bytes) = with_checksums(bytes) {
+        parsed_hierarchy(&bytes);
+    }
+}
+
+/// A file of a hierarchy as far as its header goes, with checksums that are right.
+fn with_checksums(bytes: &[u8]) -> Option<Vec<u8>> {
+    let (header, mut rest) = bytes.split_at_checked(32)?;
+    let counts = header[12..].chunks_exact(4);
+    let counts = counts.map(|count| u32::from_le_bytes([count[0], count[1], count[2], count[3]]));
+    let mut written = Vec::new();
+    let mut part = |content: &[u8]| {
+        written.extend_from_slice(content);
+        written.extend_from_slice(&crc32fast::hash(content).to_le_bytes());
+    };
+    part(header);
+    // Behind each part stand the four bytes of its checksum: label, spheres, edges, faces, steps.
+    for (count, size) in counts.zip([1, 32, 8, 12, 16]) {
+        rest = rest.get(4..)?;
+        let content;
+        (content, rest) = rest.split_at_checked(count as usize * size)?;
+        part(content);
+    }
+    Some(written)
+}
+
+fn parsed_hierarchy(bytes: &[u8]) {
+    let Ok((hierarchy, label)) = Hierarchy::parse(bytes, "x.mah") else { return };
+    for stage in [0, hierarchy.last_stage() / 2, hierarchy.last_stage()] {
+        assert_eq!(hierarchy.stage(stage).to_mesh().check(), Ok(()));
+    }
+    let mut written = Vec::new();
+    hierarchy.write_to(&mut written, &label).expect("what was read can be written");
+    assert_eq!(written, bytes);
+}
+
+pub(crate) fn study(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let Ok(study) = toml::from_str::<Study>(text) else { return };
+    if study.check().is_err() {
+        return;
+    }
+    // Numbers that TOML has no form for are told; all else comes back.
+    if let Ok(written) = study.to_text(None) {
+        let again: Study = toml::from_str(&written).expect("what was written can be read");
+        assert_eq!(again.to_text(None).ok(), Some(written));
+    }
+}
+
+pub(crate) fn plugins(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    // In a folder that is not there, so that no program of this machine is meant.
+    let _ = plugin::parse(Path::new("/nowhere/plugins.toml"), text, &["qmat"]);
+}
+
+pub(crate) fn records(bytes: &[u8]) {
+    let read = parse_records(bytes);
+    for record in &read.records {
+        let line = serde_json::to_string(record).expect("a record is JSON");
+        let again = parse_records(line.as_bytes());
+        assert_eq!((again.records.len(), again.bad_lines.len()), (1, 0), "{line}");
+        assert_eq!(serde_json::to_string(&again.records[0]).ok(), Some(line));
+    }
+}
