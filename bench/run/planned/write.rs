@@ -9,7 +9,7 @@ use medial::write_atomically;
 use sha2::{Digest, Sha256};
 
 use super::{BLOCK, Block, FORMAT, ITEMS, MESHES, PLAN, Plan, Planned, PlannedError, io_error};
-use crate::run::{Item, Provenance, Source, Study, hex, hex_digest};
+use crate::run::{Item, Provenance, Study, hex, hex_digest};
 
 /// Name of the study beside its items.
 const STUDY: &str = "study.toml";
@@ -99,12 +99,10 @@ type Places = BTreeMap<PathBuf, PathBuf>;
 
 fn places(items: &[Item]) -> Places {
     let place = |item: &Item| {
-        let (Source::File(path), Some(hash)) = (&item.scene.source, &item.scene.hash) else {
-            return None;
-        };
+        let (path, hash) = (item.scene.source.path()?, item.scene.hash.as_ref()?);
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let name = extension.map_or(hash.clone(), |extension| format!("{hash}.{extension}"));
-        Some((path.clone(), Path::new(MESHES).join(name)))
+        Some((path.to_owned(), Path::new(MESHES).join(name)))
     };
     items.iter().filter_map(place).collect()
 }
@@ -112,7 +110,7 @@ fn places(items: &[Item]) -> Places {
 fn copy_meshes(dir: &Path, items: &[Item], places: &Places) -> Result<(), PlannedError> {
     let mut copied = BTreeSet::new();
     for item in items {
-        if let (Source::File(path), Some(hash)) = (&item.scene.source, &item.scene.hash)
+        if let (Some(path), Some(hash)) = (item.scene.source.path(), &item.scene.hash)
             && copied.insert(path)
         {
             copy_mesh(path, hash, &dir.join(&places[path]))?;
@@ -146,9 +144,9 @@ fn write_items(
     let (mut block, mut offset) = (Vec::new(), 0);
     for item in items {
         let mut item = item.clone();
-        if let Source::File(path) = &item.scene.source {
+        if let Some(path) = item.scene.source.path() {
             let place = places.get(path).ok_or(io::ErrorKind::NotFound)?;
-            item.scene.source = Source::File(place.clone());
+            item.scene.source = item.scene.source.moved(place.clone());
         }
         for part in parts(item, division) {
             serde_json::to_writer(&mut block, &part)?;
