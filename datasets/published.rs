@@ -215,14 +215,17 @@ impl Package {
 }
 
 impl Published {
-    /// The name of its file here: with the extension of its format.
-    pub fn file_name(&self) -> String {
+    /// The extension of its format.
+    pub fn extension(&self) -> String {
         let path = self.path.strip_suffix(".gz").unwrap_or(&self.path);
         let extension = path.rsplit_once('.').map_or("", |(_, extension)| extension);
-        let extension = extension.to_ascii_lowercase();
         // A module's arrays are written as OFF.
-        let extension = if extension == "js" { "off" } else { &extension };
-        format!("{}.{extension}", self.name)
+        if extension == "js" { "off".to_owned() } else { extension.to_ascii_lowercase() }
+    }
+
+    /// The name of its file here.
+    pub fn file_name(&self) -> String {
+        format!("{}.{}", self.name, self.extension())
     }
 }
 

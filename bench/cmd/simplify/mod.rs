@@ -33,7 +33,7 @@ use outputs::Outputs;
 /// Arguments of `simplify`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// Id of the method; `medial methods` lists them.
     #[arg(long, short, value_name = "ID")]

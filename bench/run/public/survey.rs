@@ -37,6 +37,7 @@ pub fn survey(catalogue: &Path, files: &Path, clients: Clients<'_>) -> Result<Su
         names: names.collect(),
         meshes: Vec::new(),
         hashes: BTreeSet::new(),
+        surfaces: BTreeMap::new(),
         left_out: Vec::new(),
     };
     for package in &old.packages {
@@ -66,6 +67,8 @@ struct Surveyor<'a> {
     names: BTreeMap<&'a str, &'a str>,
     meshes: Vec<Published>,
     hashes: BTreeSet<String>,
+    /// Names of the meshes by their surfaces: the same one twice would have twice the weight in a set.
+    surfaces: BTreeMap<String, String>,
     left_out: Vec<String>,
 }
 
@@ -102,17 +105,29 @@ impl Surveyor<'_> {
             self.left_out.push(format!("{package}: {}: points without faces", mesh.path));
             return Ok(());
         }
+        if let Some(other) = mesh.surface.as_ref().and_then(|surface| self.surfaces.get(surface)) {
+            let line = format!("{package}: {}: the same surface as {other}", mesh.path);
+            self.left_out.push(line);
+            return Ok(());
+        }
         mesh.name = match self.names.get(mesh.sha256.as_str()) {
             Some(&name) => name.to_owned(),
             None => self.new_name(package, &mesh.path),
         };
+        if let Some(surface) = &mesh.surface {
+            self.surfaces.insert(surface.clone(), mesh.name.clone());
+        }
         self.meshes.push(mesh);
         Ok(())
     }
 
     /// A name that nothing else has: the stem of the file, with the tag of the package where it must be.
     fn new_name(&self, package: &Package, path: &str) -> String {
-        let stem = stem(path);
+        let stem = match stem(path).as_str() {
+            // It tells less than the package.
+            "index" => package.name.clone(),
+            stem => stem.to_owned(),
+        };
         let tag = package.tag.as_deref().unwrap_or(&package.name);
         let is_free = |name: &String| {
             let is_shape = medial_datasets::find(name).is_some();
@@ -132,11 +147,6 @@ fn stem(path: &str) -> String {
     let file = path.rsplit(['/', '!']).next().unwrap_or(path);
     let file = file.strip_suffix(".gz").unwrap_or(file);
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_ascii_lowercase();
-    // `index.js` tells less than its package.
-    let stem = match stem.as_str() {
-        "index" => "mesh",
-        stem => stem,
-    };
     let plain = |c: char| if c.is_ascii_alphanumeric() || "._".contains(c) { c } else { '-' };
     stem.chars().map(plain).collect::<String>().trim_matches(['-', '.', '_']).to_owned()
 }
@@ -144,8 +154,7 @@ fn stem(path: &str) -> String {
 /// Says what a mesh is, as reading it does; `false` for points without faces.
 fn described(mesh: &mut Published, bytes: &[u8]) -> Result<bool, PublicError> {
     let folder = tempfile::tempdir().map_err(io_error(&std::env::temp_dir()))?;
-    let extension = Path::new(&mesh.file_name()).extension().unwrap_or_default().to_owned();
-    let path = folder.path().join("mesh").with_extension(extension);
+    let path = folder.path().join("mesh").with_extension(mesh.extension());
     fs::write(&path, bytes).map_err(io_error(&path))?;
     let loaded = match surface::read_any(&path) {
         Ok(loaded) => loaded,
@@ -201,6 +210,6 @@ mod tests {
     fn a_stem_is_a_name() {
         assert_eq!(stem("doc/data.tar.gz!data/poly2x^2+y^2.OFF"), "poly2x-2-y-2");
         assert_eq!(stem("package/models/dragon_vrip_res4.ply.gz"), "dragon_vrip_res4");
-        assert_eq!(stem("package/index.js"), "mesh");
+        assert_eq!(stem("package/index.js"), "index");
     }
 }
