@@ -49,6 +49,9 @@ pub enum Kin {
     Surface,
 }
 
+/// The mesh of the catalogue that a file is, where it is one.
+pub type Known<'a> = Option<(&'a Published, Kin)>;
+
 impl Added {
     /// The set that it belongs to.
     pub fn set(&self) -> &'static str {
@@ -62,11 +65,7 @@ impl Library {
     ///
     /// # Errors
     /// When it cannot be read or understood, or its name cannot be used or belongs to another surface.
-    pub fn add(
-        &self,
-        file: &Path,
-        name: Option<&str>,
-    ) -> Result<(Added, Option<(&Published, Kin)>), PublicError> {
+    pub fn add(&self, file: &Path, name: Option<&str>) -> Result<(Added, Known<'_>), PublicError> {
         // First, since it refuses what is no regular file and would never end.
         let loaded = surface::read_any(file)?;
         let refused = surface::inspect(file)?.refused.map(|error| error.fault.to_string());
@@ -103,7 +102,7 @@ impl Library {
     }
 
     /// The mesh of the catalogue that a file is.
-    fn recognised(&self, sha256: &str, surface: &str) -> Option<(&Published, Kin)> {
+    fn recognised(&self, sha256: &str, surface: &str) -> Known<'_> {
         let meshes = &self.catalogue.meshes;
         let by_file = meshes.iter().find(|mesh| mesh.sha256 == sha256);
         let by_surface = || meshes.iter().find(|mesh| mesh.surface.as_deref() == Some(surface));

@@ -25,7 +25,7 @@ mod survey;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use add::{Added, Kin, added};
+pub use add::{Added, Kin, Known, added};
 pub use client::{Clients, any_version};
 pub use fetch::{FetchedPackage, Refusal, fetch_archive, fetch_package};
 pub use library::{Library, State};
