@@ -325,6 +325,11 @@ fn sets_are_compared_under_their_names() {
         .map(|r| format!("{} {}", r["mesh"], r["dataset"]))
         .collect();
     told.sort();
+    // With nothing in the cache: the study in the folder names what came along.
+    let study = fs::read_to_string(machine.at("planned/study.toml")).expect("a study");
+    assert!(study.matches("meshes/").count() >= 3 && !study.contains("dataset:ring"), "{study}");
+    let pictures = fs::read_dir(machine.at("planned/pictures")).expect("a folder");
+    assert!(pictures.count() >= 3, "the report has its pictures");
     assert_eq!(told, ["\"ball\" \"public\"", "\"ring\" \"public\"", "\"rod-thin\" \"public\""]);
 }
 
