@@ -309,7 +309,7 @@ fn sets_are_compared_under_their_names() {
     assert_eq!(told, [&public[..], &[[Some("sphere"), Some("builtin")]]].concat());
 
     // The same as a study, planned: the meshes travel, and their names with them.
-    let study = "meshes = ['dataset:ring']\ndataset = ['deb:balls']\nspheres = [10]\ncounts_only = true\n\
+    let study = "meshes = ['dataset:ring']\ndataset = 'deb:balls'\nspheres = [10]\ncounts_only = true\n\
                  samples = 200\n[[method]]\nid = 'qmat'\n";
     fs::write(machine.at("study.toml"), study).expect("written");
     assert_eq!(machine.run(&["plan", "study.toml", "-o", "planned"]).0, 0);
@@ -367,4 +367,39 @@ fn a_users_file_is_recognised() {
     fs::write(machine.at("bad.off"), "OFF\n1 1\n").expect("written");
     let (code, _, stderr) = machine.run(&["datasets", "add", "bad.off"]);
     assert!(code == 1 && stderr.contains("bad.off"), "{stderr}");
+}
+
+#[test]
+fn a_sweep_goes_past_bad_meshes_and_tells_what_must_not_be() {
+    if std::process::Command::new("python3").arg("-V").output().is_err() {
+        medial_test_support::skip("no python3");
+        return;
+    }
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name);
+    fs::create_dir(at("in")).expect("made");
+    fs::write(at("in/a ball.off"), off("sphere", 10)).expect("written");
+    fs::write(at("in/open.off"), "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").expect("written");
+    fs::write(at("in/empty.ply"), "").expect("written");
+    let sweep = |out: &str, megabytes: &str| {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../scripts/sweep.sh");
+        let mut command = std::process::Command::new(script);
+        command.args(["in", "--", "--samples", "200", "--quiet"]).current_dir(dir.path());
+        command.env("MEDIAL", env!("CARGO_BIN_EXE_medial")).env("METHODS", "qmat,angle");
+        command.env("OUT", out).env("MEMORY", megabytes).env("SPHERES", "10");
+        let output = command.output().expect("it starts");
+        let text = fs::read_to_string(at(out).join("sweep.md")).expect("a page");
+        (output.status.code(), text)
+    };
+    for _ in 0..2 {
+        let (code, text) = sweep("out", "4000");
+        assert_eq!(code, Some(0), "{text}");
+        assert!(text.contains("3 meshes, 2 methods, 6 results: no panic"), "{text}");
+        assert!(text.contains("| refused | open | all methods | "), "{text}");
+        assert!(text.contains("| refused | empty | all methods | "), "{text}");
+        assert!(text.contains("| qmat | 1 |  |  |  | 2 |"), "{text}");
+    }
+    let (code, text) = sweep("small", "1");
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("6 results that must not be, 0 missing"), "{text}");
 }
