@@ -160,7 +160,7 @@ pub enum FitBy {
     Auto,
 }
 
-/// A mesh argument: a file, or `builtin:ID[:RESOLUTION]`.
+/// A mesh argument: a file, `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
 pub type MeshArgument = PathBuf;
 
 /// The options of a shape from the command line.

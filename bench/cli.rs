@@ -53,7 +53,7 @@ pub enum Verb {
     Methods(cmd::methods::Arguments),
     /// Put methods, your own too, to the conformance corpus, and say what fails.
     Check(cmd::check::Arguments),
-    /// List or write the built-in shapes.
+    /// List or write the built-in shapes; fetch published meshes and keep them by name.
     Datasets(cmd::datasets::Arguments),
     /// Repeat tables and figures of the papers, published values beside ours.
     Paper(cmd::paper::Arguments),

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::run::public::PublicError;
 use crate::run::{
     GatherError, InputError, ParcelError, PlanError, PlannedError, RunError, Source, StoreError,
     StudyError,
@@ -62,6 +63,7 @@ impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Input(error) => error.into(),
+            StudyError::Library(error) => error.into(),
             StudyError::File { .. } => Self::input(error),
             StudyError::Value(_) | StudyError::Method { .. } | StudyError::Registry(_) => {
                 Self::usage(error)
@@ -119,10 +121,26 @@ impl From<GatherError> for Failure {
     }
 }
 
+impl From<PublicError> for Failure {
+    fn from(error: PublicError) -> Self {
+        match error {
+            PublicError::Unknown { .. }
+            | PublicError::Missing { .. }
+            | PublicError::Name { .. }
+            | PublicError::NoFolder => Self::usage(error),
+            PublicError::Interrupted => {
+                Self { code: Exit::Interrupted, message: error.to_string() }
+            }
+            _ => Self::input(error),
+        }
+    }
+}
+
 impl From<InputError> for Failure {
     fn from(error: InputError) -> Self {
         match error {
             InputError::Read { .. } | InputError::Surface(_) => Self::input(error),
+            InputError::Library(error) => error.into(),
             InputError::NoSuchShape(_)
             | InputError::Resolution(_)
             | InputError::OutOfRange { .. }

@@ -95,6 +95,7 @@ pub fn counted(number: u64, noun: &str) -> String {
     match (number, noun) {
         (1, _) => format!("1 {noun}"),
         (_, "vertex") => format!("{number} vertices"),
+        (_, "mesh") => format!("{number} meshes"),
         _ => format!("{number} {noun}s"),
     }
 }

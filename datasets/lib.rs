@@ -20,6 +20,7 @@ mod geodesic;
 mod implicit;
 mod manifold;
 mod noise;
+pub mod published;
 mod revolved;
 mod shapes;
 mod torus;

@@ -18,7 +18,7 @@ use crate::run::{Input, Source, StageLine, peak_bytes};
 /// Arguments of `axis`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// The medial mesh (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
     #[arg(short, long)]

@@ -23,7 +23,7 @@ use crate::run::{Input, Provenance, RESULTS, Registry, Source};
 /// Arguments of `baseline`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// List of the decimated surfaces (JSON), as `scripts/baselines/decimate.sh` writes it.
     #[arg(long, value_name = "LIST")]

@@ -13,18 +13,19 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::run::{
-    AXES, Here, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Store,
-    Study, StudyMethod, Supervisor, Tally, count, missing, refused_params, run_items,
+    AXES, Here, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Source,
+    Store, Study, StudyMethod, Supervisor, Tally, count, missing, refused_params, run_items,
 };
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface files (OFF, OBJ, PLY, STL, GLB) or `builtin:ID[:RESOLUTION]` [default: all built-in shapes].
+    /// Surface files (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: all built-in shapes].
     meshes: Vec<MeshArgument>,
-    /// A set of meshes beside those named: `builtin`.
+    /// A set of meshes beside those named: `builtin`, `public`, `defective`, `small`, `papers`, `added`, a package as in
+    /// `deb:libcgal-demo`, or the name of one mesh; can be given several times.
     #[arg(long, value_name = "SET")]
-    dataset: Option<String>,
+    dataset: Vec<String>,
     /// Take meshes, methods, levels and limits from a TOML file; what else is given wins over it.
     #[arg(long, value_name = "FILE")]
     study: Option<PathBuf>,
@@ -145,16 +146,16 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         Some(path) => Study::read(path)?,
         None => Study::default(),
     };
-    let absolute = |path: &PathBuf| match path.to_string_lossy().starts_with("builtin:") {
+    let absolute = |path: &PathBuf| match Source::is_name(path) {
         true => path.clone(),
         // Relative paths of the command line start at the working folder.
         false => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
     };
     if !arguments.meshes.is_empty() {
         study.meshes = arguments.meshes.iter().map(absolute).collect();
-        study.dataset = None;
+        study.dataset.clear();
     }
-    if arguments.dataset.is_some() {
+    if !arguments.dataset.is_empty() {
         study.dataset.clone_from(&arguments.dataset);
     }
     if !arguments.methods.is_empty() {

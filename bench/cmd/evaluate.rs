@@ -18,7 +18,7 @@ use crate::run::{Input, Source, StageLine};
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// Medial mesh (.ma and its dialects, .vtp, or .ply, .obj or .glb with radii), in the units of the surface unless
     /// `--fit` finds others.

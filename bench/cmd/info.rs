@@ -11,7 +11,7 @@ use crate::run::{Input, Source};
 /// Arguments of `info`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
 }
 
@@ -21,12 +21,12 @@ pub struct Arguments {
 /// When nothing can be said of the file.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
-    let (report, refusal) = match &source {
-        Source::File(path) => {
+    let (report, refusal) = match source.path() {
+        Some(path) => {
             let inspection = surface::inspect(path).map_err(Failure::input)?;
             (inspection.report, inspection.refused)
         }
-        Source::BuiltIn { .. } => (Input::load(&source)?.report, None),
+        None => (Input::load(&source)?.report, None),
     };
     if global.json {
         let mut object = serde_json::to_value(&report).map_err(Failure::input)?;

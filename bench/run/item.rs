@@ -152,7 +152,7 @@ impl Item {
         let params: std::collections::BTreeMap<_, _> = self.method.params.0.iter().collect();
         let source = match &self.scene.source {
             // The same file in another place is the same input.
-            Source::File(_) => None,
+            Source::File(_) | Source::Cached { .. } => None,
             built_in @ Source::BuiltIn { .. } => Some(built_in),
         };
         let SceneSpec { mesh, hash, scaled, displaced, noise, sampling, dual, measure, .. } =

@@ -16,6 +16,7 @@
 //! | `alternate` | two builds that take turns |
 //! | `planned` | items as files, for many processes on many hosts |
 //! | `parcel` | results from another machine |
+//! | `public` | published meshes, fetched and kept by name |
 
 mod alternate;
 mod answer;
@@ -30,6 +31,7 @@ mod planned;
 mod progress;
 mod protocol;
 mod provenance;
+pub mod public;
 pub mod record;
 mod registry;
 mod reproduce;

@@ -71,7 +71,7 @@ impl<'a> Reproducer<'a> {
     }
 
     fn scene(&self, exhibit: &Exhibit, wanted: &RowInput) -> Result<SceneSpec, String> {
-        let argument = match wanted.mesh.starts_with("builtin:") {
+        let argument = match Source::is_name(Path::new(&wanted.mesh)) {
             true => PathBuf::from(&wanted.mesh),
             false => self.folder.join(&wanted.mesh),
         };

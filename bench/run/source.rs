@@ -1,4 +1,4 @@
-//! The inputs of a comparison: files of the user, or built-in shapes.
+//! The inputs of a comparison: files of the user, meshes of the library by their names, or built-in shapes.
 
 use std::fmt;
 use std::fs;
@@ -12,6 +12,7 @@ use medial_datasets::BuiltIn;
 use serde::{Deserialize, Serialize};
 
 use super::hex_digest;
+use super::public::{Library, PublicError};
 use super::similar::did_you_mean;
 
 /// Where a mesh comes from.
@@ -27,15 +28,59 @@ pub enum Source {
         /// Resolution, in the shape's own meaning.
         resolution: Option<u32>,
     },
+    /// A mesh of the library.
+    Cached {
+        /// Its name there.
+        name: String,
+        /// The set that it belongs to.
+        set: String,
+        /// Its file.
+        path: PathBuf,
+    },
 }
 
+/// What an argument begins with that names a built-in shape.
+const BUILT_IN: &str = "builtin:";
+/// What an argument begins with that names a mesh of the library.
+const DATASET: &str = "dataset:";
+
 impl Source {
-    /// Reads an argument: `builtin:ID` or `builtin:ID:RESOLUTION`, else a path.
+    /// Whether an argument is a name rather than a path.
+    pub fn is_name(argument: &Path) -> bool {
+        let text = argument.to_string_lossy();
+        text.starts_with(BUILT_IN) || text.starts_with(DATASET)
+    }
+
+    /// The file, where it is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) | Self::Cached { path, .. } => Some(path),
+            Self::BuiltIn { .. } => None,
+        }
+    }
+
+    /// The same input with its file elsewhere; a built-in shape stays as it is.
+    #[must_use]
+    pub fn moved(&self, path: PathBuf) -> Self {
+        match self {
+            Self::File(_) => Self::File(path),
+            Self::Cached { name, set, .. } => {
+                Self::Cached { name: name.clone(), set: set.clone(), path }
+            }
+            Self::BuiltIn { .. } => self.clone(),
+        }
+    }
+
+    /// Reads an argument: `builtin:ID` or `builtin:ID:RESOLUTION`, `dataset:NAME`, else a path.
     ///
     /// # Errors
-    /// [`InputError::Resolution`] when the resolution is not a number.
+    /// [`InputError::Resolution`] when the resolution is not a number; [`InputError::Library`] when the library has no
+    /// such mesh.
     pub fn parse(argument: &Path) -> Result<Self, InputError> {
-        let Some(spec) = argument.to_str().and_then(|text| text.strip_prefix("builtin:")) else {
+        if let Some(name) = argument.to_str().and_then(|text| text.strip_prefix(DATASET)) {
+            return Ok(Library::here()?.source(name)?);
+        }
+        let Some(spec) = argument.to_str().and_then(|text| text.strip_prefix(BUILT_IN)) else {
             return Ok(Self::File(argument.to_owned()));
         };
         let (id, resolution) = match spec.split_once(':') {
@@ -55,7 +100,7 @@ impl Source {
     /// [`InputError`], which names it.
     pub fn check(&self) -> Result<(), InputError> {
         match self {
-            Self::File(path) => {
+            Self::File(path) | Self::Cached { path, .. } => {
                 let failed = |error| InputError::Read { path: path.clone(), error };
                 let kind = fs::metadata(path).map_err(failed)?;
                 // Opening one of these would wait for ever.
@@ -74,27 +119,29 @@ impl Source {
         shapes.iter().map(|shape| Self::BuiltIn { id: shape.id.into(), resolution: None }).collect()
     }
 
-    /// Name for tables: the file's stem, or the id of the built-in shape.
+    /// Name for tables: the file's stem, the name in the library, or the id of the built-in shape.
     pub fn name(&self) -> String {
         match self {
             Self::File(path) => path
                 .file_stem()
                 .map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into()),
+            Self::Cached { name, .. } => name.clone(),
             Self::BuiltIn { id, resolution: None } => id.clone(),
             Self::BuiltIn { id, resolution: Some(resolution) } => format!("{id}-{resolution}"),
         }
     }
 
     /// The set that the mesh belongs to, where it does.
-    pub fn dataset(&self) -> Option<&'static str> {
+    pub fn dataset(&self) -> Option<&str> {
         match self {
             Self::File(_) => None,
+            Self::Cached { set, .. } => Some(set),
             Self::BuiltIn { .. } => Some("builtin"),
         }
     }
 
     /// A longer name where [`Source::name`] is not unique: with the extension (depth 1), and with
-    /// the folder that holds the file (depth 2). For a built-in shape as it is written.
+    /// the folder that holds the file (depth 2). For a name as it is written.
     pub fn long_name(&self, depth: usize) -> String {
         let Self::File(path) = self else { return self.to_string() };
         let parts: Vec<_> = path
@@ -112,6 +159,7 @@ impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File(path) => write!(f, "{}", path.display()),
+            Self::Cached { name, .. } => write!(f, "{DATASET}{name}"),
             Self::BuiltIn { id, resolution: None } => write!(f, "builtin:{id}"),
             Self::BuiltIn { id, resolution: Some(r) } => write!(f, "builtin:{id}:{r}"),
         }
@@ -139,7 +187,7 @@ impl Input {
     /// When the file cannot be read or is refused, or no such built-in shape exists.
     pub fn load(source: &Source) -> Result<Self, InputError> {
         match source {
-            Source::File(path) => {
+            Source::File(path) | Source::Cached { path, .. } => {
                 // First, since it refuses what is no regular file and would never end.
                 let loaded = surface::read(path)?;
                 let bytes = fs::read(path)
@@ -174,7 +222,7 @@ impl Input {
 
     /// SHA-256 of the surface itself, whatever the format of its file.
     pub fn surface_hash(&self) -> String {
-        hex_digest(&surface_bytes(&self.mesh))
+        surface_hash(&self.mesh)
     }
 
     /// The shape, normalised, with nothing built yet.
@@ -231,6 +279,11 @@ fn meant(id: &str) -> String {
     did_you_mean(id, ids)
 }
 
+/// SHA-256 of a surface: coordinates and faces in their order, after reading.
+pub(super) fn surface_hash(mesh: &TriMesh) -> String {
+    hex_digest(&surface_bytes(mesh))
+}
+
 fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
     let coordinates = mesh.vertices.iter().flat_map(|v| v.to_array());
     let indices = mesh.faces.iter().flatten();
@@ -251,6 +304,9 @@ pub enum InputError {
     /// The surface is refused.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
+    /// The library has no such mesh.
+    #[error(transparent)]
+    Library(#[from] PublicError),
     /// The catalogue has no such shape.
     #[error("no built-in shape is called `{0}`{meant}; `medial datasets list` names them all", meant = meant(.0))]
     NoSuchShape(String),

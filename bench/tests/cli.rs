@@ -35,7 +35,15 @@ fn methods_and_their_parameters() {
 
 #[test]
 fn datasets_are_listed() {
-    insta::assert_snapshot!(run(&["datasets", "list"]).1);
+    // Whatever the user of this machine has fetched.
+    let cache = tempfile::tempdir().expect("a folder");
+    let mut command = command::medial(&["datasets", "list"]);
+    let output = command.env("MEDIAL_CACHE", cache.path()).output().expect("the command starts");
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    let (shapes, published) = text.split_once("\n\n").expect("two lists");
+    insta::assert_snapshot!(shapes);
+    let public = published.lines().next().expect("a line");
+    assert!(public.starts_with("public: 0 of ") && public.contains("fetch public"), "{public}");
 }
 
 #[test]

@@ -127,9 +127,10 @@ fn repeat_command(record: &Record) -> String {
 /// The mesh as it was named on the command line of the run, as far as it stands there; else its name.
 fn mesh_argument(record: &Record) -> String {
     let is_named = |word: &str| {
-        let name = match word.strip_prefix("builtin:") {
-            Some(spec) => spec.replacen(':', "-", 1),
-            None => {
+        let name = match (word.strip_prefix("builtin:"), word.strip_prefix("dataset:")) {
+            (Some(spec), _) => spec.replacen(':', "-", 1),
+            (None, Some(name)) => name.to_owned(),
+            (None, None) => {
                 let file = word.rsplit('/').next().unwrap_or(word);
                 // A bare word may be a method's name: files have an extension.
                 match file.rsplit_once('.') {
@@ -143,8 +144,11 @@ fn mesh_argument(record: &Record) -> String {
     let said = record.command.split_whitespace().find(|word| is_named(word));
     match said {
         Some(word) => word.to_owned(),
-        None if record.dataset.as_deref() == Some("builtin") => format!("builtin:{}", record.mesh),
-        None => record.mesh.clone(),
+        None => match record.dataset.as_deref() {
+            Some("builtin") => format!("builtin:{}", record.mesh),
+            Some(_) => format!("dataset:{}", record.mesh),
+            None => record.mesh.clone(),
+        },
     }
 }
 
@@ -184,6 +188,8 @@ mod tests {
         of = record(Level::Native(0.25));
         of.dataset = Some("builtin".to_owned());
         assert_eq!(repeat_command(&of), "medial simplify builtin:bear -m qmat --level 0.25");
+        of.dataset = Some("public".to_owned());
+        assert_eq!(repeat_command(&of), "medial simplify dataset:bear -m qmat --level 0.25");
     }
 
     #[test]

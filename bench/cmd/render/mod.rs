@@ -25,7 +25,7 @@ use crate::run::{Input, Source, StageLine};
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// Medial meshes of it (.ma, .vtp, or .ply or .glb with radii). Of several, a strip: a panel for each, from the same camera.
     axes: Vec<PathBuf>,

@@ -34,7 +34,7 @@ use outputs::Outputs;
 /// Arguments of `simplify`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), or `builtin:ID[:RESOLUTION]`.
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// Id of the method; `medial methods` lists them.
     #[arg(long, short, value_name = "ID")]

@@ -11,7 +11,7 @@ use medial::simplifier::Level;
 use medial_reports::{Record, Status, read_records};
 
 use crate::exit::Failure;
-use crate::run::{Input, Item, RESULTS, SceneSpec, Source};
+use crate::run::{Input, Item, RESULTS, SceneSpec};
 
 /// Time and memory grow with at most this power of the size, for the methods that we have.
 const GROWTH: f64 = 1.5;
@@ -146,9 +146,9 @@ impl Earlier {
         if let Some((_, size)) = self.others.iter().find(|(other, _)| other == scene) {
             return *size;
         }
-        let source = match &scene.source {
-            Source::File(path) => Source::File(dir.join(path)),
-            built_in @ Source::BuiltIn { .. } => built_in.clone(),
+        let source = match scene.source.path() {
+            Some(path) => scene.source.moved(dir.join(path)),
+            None => scene.source.clone(),
         };
         let vertices = Input::load(&source).ok().map(|input| input.mesh.vertices.len());
         let size = vertices.map(|vertices| SPHERES_PER_VERTEX * vertices as f64);

@@ -43,15 +43,20 @@ impl Surfaces {
         let study = opened.study.as_deref().and_then(|text| toml::from_str::<Study>(text).ok());
         let named = study.map_or_else(Vec::new, |study| study.meshes);
         // A path in a stranger's study is none of ours.
-        let is_shape = |path: &&PathBuf| path.to_string_lossy().starts_with("builtin:");
-        let shapes = named.iter().filter(is_shape).filter_map(|path| Source::parse(path).ok());
+        let is_name = |path: &&PathBuf| Source::is_name(path);
+        let shapes = named.iter().filter(is_name).filter_map(|path| Source::parse(path).ok());
         let meshes: HashSet<&str> = opened.records.iter().map(|r| r.mesh.as_str()).collect();
         // Only what has results is made, however long the study is.
         let has_results = |shape: &Source| {
             meshes.contains(&*shape.name()) || meshes.contains(&*shape.to_string())
         };
         let mut surfaces = BTreeMap::new();
-        for shape in shapes.chain(Source::built_ins()).filter(has_results) {
+        // Meshes of the library go by the names of the records, as far as they are here.
+        let in_library = opened.records.iter().filter(|r| r.dataset.is_some()).map(|r| &r.mesh);
+        let in_library: BTreeSet<PathBuf> =
+            in_library.map(|mesh| PathBuf::from(format!("dataset:{mesh}"))).collect();
+        let kept = in_library.iter().filter_map(|name| Source::parse(name).ok());
+        for shape in shapes.chain(Source::built_ins()).chain(kept).filter(has_results) {
             if let Ok(input) = Input::load(&shape) {
                 surfaces.insert(input.hash, shape);
             }

@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Item, Provenance, Source, hex_digest};
+use super::{Item, Provenance, hex_digest};
 
 pub use done::{done_file, keep_done, read_done};
 pub use gather::{GatherError, Gathered, gather, not_done};
@@ -280,7 +280,7 @@ impl Planned {
     /// # Errors
     /// [`PlannedError::Mesh`].
     pub fn resolved(&self, mut item: Item) -> Result<Item, PlannedError> {
-        let Source::File(relative) = &item.scene.source else { return Ok(item) };
+        let Some(relative) = item.scene.source.path() else { return Ok(item) };
         let path = self.dir.join(relative);
         let wrong = |message: String| PlannedError::Mesh { path: path.clone(), message };
         let bytes = fs::read(&path).map_err(|error| wrong(error.to_string()))?;
@@ -288,7 +288,7 @@ impl Planned {
         if item.scene.hash.as_ref().is_some_and(|planned| *planned != hash) {
             return Err(wrong(format!("not the mesh that was planned (SHA-256 {hash})")));
         }
-        item.scene.source = Source::File(path);
+        item.scene.source = item.scene.source.moved(path);
         Ok(item)
     }
 }

@@ -9,10 +9,14 @@ use medial::write_atomically;
 use sha2::{Digest, Sha256};
 
 use super::{BLOCK, Block, FORMAT, ITEMS, MESHES, PLAN, Plan, Planned, PlannedError, io_error};
-use crate::run::{Item, Provenance, Source, Study, hex, hex_digest};
+use crate::run::public::Library;
+use crate::run::{Item, Provenance, Source, Study, StudyError, hex, hex_digest};
 
 /// Name of the study beside its items.
 const STUDY: &str = "study.toml";
+
+/// The set that needs no file.
+const BUILT_INS: &str = "builtin";
 
 /// What an item of a plan is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,12 +103,10 @@ type Places = BTreeMap<PathBuf, PathBuf>;
 
 fn places(items: &[Item]) -> Places {
     let place = |item: &Item| {
-        let (Source::File(path), Some(hash)) = (&item.scene.source, &item.scene.hash) else {
-            return None;
-        };
+        let (path, hash) = (item.scene.source.path()?, item.scene.hash.as_ref()?);
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let name = extension.map_or(hash.clone(), |extension| format!("{hash}.{extension}"));
-        Some((path.clone(), Path::new(MESHES).join(name)))
+        Some((path.to_owned(), Path::new(MESHES).join(name)))
     };
     items.iter().filter_map(place).collect()
 }
@@ -112,7 +114,7 @@ fn places(items: &[Item]) -> Places {
 fn copy_meshes(dir: &Path, items: &[Item], places: &Places) -> Result<(), PlannedError> {
     let mut copied = BTreeSet::new();
     for item in items {
-        if let (Source::File(path), Some(hash)) = (&item.scene.source, &item.scene.hash)
+        if let (Some(path), Some(hash)) = (item.scene.source.path(), &item.scene.hash)
             && copied.insert(path)
         {
             copy_mesh(path, hash, &dir.join(&places[path]))?;
@@ -146,9 +148,9 @@ fn write_items(
     let (mut block, mut offset) = (Vec::new(), 0);
     for item in items {
         let mut item = item.clone();
-        if let Source::File(path) = &item.scene.source {
+        if let Some(path) = item.scene.source.path() {
             let place = places.get(path).ok_or(io::ErrorKind::NotFound)?;
-            item.scene.source = Source::File(place.clone());
+            item.scene.source = item.scene.source.moved(place.clone());
         }
         for part in parts(item, division) {
             serde_json::to_writer(&mut block, &part)?;
@@ -189,9 +191,10 @@ fn write_block(
 
 /// Writes the study with the meshes as they lie in the folder; comments say which one was which.
 fn write_study(dir: &Path, study: &Study, places: &Places) -> Result<(), PlannedError> {
-    let place = |mesh: &PathBuf| places.get(&study.resolved(mesh)).unwrap_or(mesh).clone();
-    let travelling =
-        Study { folder: None, meshes: study.meshes.iter().map(place).collect(), ..study.clone() };
+    let meshes =
+        travelling_meshes(study, places).map_err(|error| PlannedError::Study(error.to_string()))?;
+    let mut travelling = Study { folder: None, meshes, ..study.clone() };
+    travelling.dataset.retain(|word| word == BUILT_INS);
     let text = travelling.to_text(None).map_err(|error| PlannedError::Study(error.to_string()))?;
     let path = dir.join(STUDY);
     let written = write_atomically(&path, |out| {
@@ -202,4 +205,23 @@ fn write_study(dir: &Path, study: &Study, places: &Places) -> Result<(), Planned
         out.write_all(text.as_bytes())
     });
     written.map_err(io_error(&path))
+}
+
+/// The meshes of a study as they lie in the folder, those of the library too, which another host may not have.
+fn travelling_meshes(study: &Study, places: &Places) -> Result<Vec<PathBuf>, StudyError> {
+    let place = |path: &Path| places.get(path).cloned();
+    let of_source = |source: &Source| {
+        source.path().and_then(place).unwrap_or_else(|| PathBuf::from(source.to_string()))
+    };
+    let mut meshes = Vec::new();
+    for mesh in &study.meshes {
+        meshes.push(match Source::is_name(mesh) {
+            true => of_source(&Source::parse(mesh)?),
+            false => place(&study.resolved(mesh)).unwrap_or_else(|| mesh.clone()),
+        });
+    }
+    for word in study.dataset.iter().filter(|&word| word != BUILT_INS) {
+        meshes.extend(Library::here()?.sources(word)?.iter().map(of_source));
+    }
+    Ok(meshes)
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::run::public::PublicError;
 use crate::run::{InputError, RegistryError, did_you_mean};
 
 /// What is wrong with a study.
@@ -29,6 +30,9 @@ pub enum StudyError {
     /// An input is wrong.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// A set is unknown, or not here.
+    #[error(transparent)]
+    Library(#[from] PublicError),
     /// A plug-in file is wrong.
     #[error(transparent)]
     Registry(#[from] RegistryError),

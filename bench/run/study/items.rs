@@ -6,6 +6,7 @@ use std::path::Path;
 use medial::simplifier::Level;
 
 use super::{Study, StudyError, StudyMethod, VOLUME_DEPTH};
+use crate::run::public::Library;
 use crate::run::{
     Entry, INITIAL, InputError, Item, Limits, Measure, MethodSpec, Provenance, Registry, SceneSpec,
     Source, hex_digest,
@@ -85,13 +86,13 @@ impl Study {
         for mesh in &self.meshes {
             sources.push(Source::parse(&self.resolved(mesh))?);
         }
-        match self.dataset.as_deref() {
-            None if sources.is_empty() => sources = Source::built_ins(),
-            None => {}
-            Some("builtin") => sources.extend(Source::built_ins()),
-            Some(other) => {
-                let message = format!("--dataset {other}: the one set is `builtin`");
-                return Err(StudyError::Value(message));
+        if sources.is_empty() && self.dataset.is_empty() {
+            sources = Source::built_ins();
+        }
+        for word in &self.dataset {
+            match word.as_str() {
+                "builtin" => sources.extend(Source::built_ins()),
+                word => sources.extend(Library::here().and_then(|library| library.sources(word))?),
             }
         }
         sources.iter().try_for_each(Source::check)?;
@@ -112,10 +113,7 @@ impl Study {
         let names = unique_names(&sources);
         let mut items = Vec::new();
         for (source, mesh) in sources.iter().zip(names) {
-            let hash = match source {
-                Source::File(path) => Some(hash_of(path)?),
-                Source::BuiltIn { .. } => None,
-            };
+            let hash = source.path().map(hash_of).transpose()?;
             let scene = SceneSpec {
                 mesh,
                 source: source.clone(),

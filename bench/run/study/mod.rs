@@ -26,9 +26,9 @@ use std::path::{Path, PathBuf};
 
 use medial::simplifier::Params;
 use medial::surface::Sampling;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
-use super::Dual;
+use super::{Dual, Source};
 
 pub use error::{StudyError, no_such_method};
 pub use items::Here;
@@ -52,11 +52,11 @@ pub struct Study {
     /// Folder where relative paths start; the study file's own unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub folder: Option<PathBuf>,
-    /// Surface files, or `builtin:ID[:RESOLUTION]`.
+    /// Surface files, `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     pub meshes: Vec<PathBuf>,
-    /// A set of meshes beside those named: `builtin`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub dataset: Option<String>,
+    /// Sets of meshes beside those named: `builtin`, or what the library has. A text or a list of texts.
+    #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "one_or_more")]
+    pub dataset: Vec<String>,
     /// Numbers of spheres.
     pub spheres: Vec<usize>,
     /// Error bounds, fractions of the diagonal, for each of which the fewest spheres are searched.
@@ -120,12 +120,26 @@ pub struct StudyMethod {
     pub published: Option<bool>,
 }
 
+/// Reads a text, or a list of texts.
+fn one_or_more<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "a text or a list of texts")]
+    enum Words {
+        One(String),
+        More(Vec<String>),
+    }
+    Ok(match Words::deserialize(deserializer)? {
+        Words::One(word) => vec![word],
+        Words::More(words) => words,
+    })
+}
+
 impl Default for Study {
     fn default() -> Self {
         Self {
             folder: None,
             meshes: vec![],
-            dataset: None,
+            dataset: vec![],
             spheres: vec![1000, 500, 200, 100],
             max_error: vec![],
             counts_only: false,
@@ -187,8 +201,8 @@ impl Study {
     /// A path as it is meant.
     pub fn resolved(&self, path: &Path) -> PathBuf {
         match &self.folder {
-            // A built-in shape is no path.
-            Some(folder) if !path.to_string_lossy().starts_with("builtin:") => folder.join(path),
+            // A name is no path.
+            Some(folder) if !Source::is_name(path) => folder.join(path),
             _ => path.to_owned(),
         }
     }

