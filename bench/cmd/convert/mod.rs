@@ -74,7 +74,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Whether a file holds a medial mesh: `.ma`, lists of spheres and `.vtp`, or `.ply` and `.glb` whose vertices have a radius.
+/// Whether a file holds a medial mesh: `.ma`, lists of spheres and `.vtp`, or `.ply` and `.glb` whose vertices have a
+/// radius.
 fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
         "ma" | "ma_dup" | "sph" | "txt" | "xyzr" | "vtp" => Ok(true),

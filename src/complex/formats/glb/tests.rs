@@ -38,8 +38,8 @@ fn own_files_come_back() {
     assert_eq!(parse_glb(file(&points, &Look::default()).unwrap(), "x").unwrap().mesh, points);
 }
 
-/// Of the same mesh as `vtp/by_vtk`, in single precision, half as large under a node of scale 2. trimesh has sheets only,
-/// and so the lone sphere and the lone edge are missing.
+/// Of the same mesh as `vtp/by_vtk`, in single precision, half as large under a node of scale 2. trimesh has sheets
+/// only, and so the lone sphere and the lone edge are missing.
 #[test]
 fn a_file_of_trimesh_is_read_with_its_node() {
     let loaded = parse_glb(include_bytes!("by_trimesh.glb"), "x.glb").unwrap();

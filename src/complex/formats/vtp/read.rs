@@ -1,9 +1,9 @@
 //! Reads VTK PolyData.
 //!
-//! 1. The XML is walked up to `AppendedData`, behind whose underscore any bytes may follow: every `DataArray` of points,
-//!    point data and cells is noted with its place.
-//! 2. Radii, positions and cells of each piece are decoded (`arrays.rs`), each array checked against the numbers of points
-//!    and cells that the piece announces.
+//! 1. The XML is walked up to `AppendedData`, behind whose underscore any bytes may follow: every `DataArray` of
+//!    points, point data and cells is noted with its place.
+//! 2. Radii, positions and cells of each piece are decoded (`arrays.rs`), each array checked against the numbers of
+//!    points and cells that the piece announces.
 //! 3. Polylines and strips are taken apart, and the whole is brought to canonical form.
 
 use std::collections::BTreeMap;
@@ -21,8 +21,8 @@ use crate::complex::{ComplexError, Sphere};
 
 /// Reads a medial mesh from the content of a `.vtp` file; `name` stands for the file in errors.
 ///
-/// Points need an array `radius` (or `r`). Lines and strips of any length are taken apart; vertices are passed over, since
-/// every point is a sphere; other arrays are not used.
+/// Points need an array `radius` (or `r`). Lines and strips of any length are taken apart; vertices are passed over,
+/// since every point is a sphere; other arrays are not used.
 ///
 /// # Errors
 /// When it is not VTK PolyData, is cut off, is compressed by anything but zlib, has polygons other than triangles, or a
