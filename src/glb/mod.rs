@@ -124,4 +124,4 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), GlbError> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

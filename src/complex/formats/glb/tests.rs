@@ -1,5 +1,7 @@
 //! Files of ours and of trimesh's, read back.
 
+use proptest::prelude::*;
+
 use super::*;
 use crate::complex::formats::look::{Look, SphereValues};
 use crate::complex::{MedialMesh, Sphere};
@@ -113,4 +115,20 @@ fn sheets_are_turned_alike_and_normals_have_unit_length() {
     assert!(faces.iter().all(|f| up(f) == up(&faces[0])));
     let normals = normals::normals(&mesh, &faces);
     assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-12 && n.z.abs() > 0.9));
+}
+
+proptest! {
+    #[test]
+    fn damage_never_panics(
+        places in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let mut bytes = file(&mesh(), &Look::default()).unwrap();
+        for (place, byte) in places {
+            let place = place.index(bytes.len());
+            bytes[place] = byte;
+        }
+        if let Ok(loaded) = parse_glb(&bytes, "x") {
+            prop_assert_eq!(loaded.mesh.check(), Ok(()));
+        }
+    }
 }
