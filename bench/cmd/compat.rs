@@ -17,8 +17,8 @@ use crate::run::Input;
 /// Which numbers of other papers are wanted.
 #[derive(Debug, Args)]
 pub struct CompatArguments {
-    /// Also by the definitions of other papers, for comparison with their tables (docs/other-metrics.md): in a section of its
-    /// own, never in the other numbers. Several with commas, or given several times.
+    /// Also by the definitions of other papers, for comparison with their tables (docs/other-metrics.md): in a
+    /// section of its own, never in the other numbers. Several with commas, or given several times.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PAPER")]
     compat: Vec<Paper>,
     /// Reference medial mesh for `p2s_cd_mat` and `p2s_hd_mat` [default: the known axis of a built-in shape].

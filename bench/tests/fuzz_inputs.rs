@@ -108,7 +108,13 @@ fn targets(folder: &Path) -> Vec<Target> {
         "simplify builtin:box:8 -m qmat --spheres 9 -q --initial {}".to_owned(),
     ];
     let medial_mesh: Vec<&str> = medial_mesh.iter().map(String::as_str).collect();
-    targets.push(Target { extension: "ma", content: ma, commands: reading(&medial_mesh) });
+    let medial_mesh = reading(&medial_mesh);
+    for extension in ["vtp", "glb"] {
+        let file = at(&format!("axis.{extension}"));
+        let content = make(&format!("convert {} {{}}", axis.display()), &file);
+        targets.push(Target { extension, content, commands: medial_mesh.clone() });
+    }
+    targets.push(Target { extension: "ma", content: ma, commands: medial_mesh });
     targets.push(Target {
         extension: "npy",
         content: points(400),

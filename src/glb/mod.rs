@@ -4,14 +4,15 @@
 //! "glTF" 2 length | length "JSON" text | length "BIN\0" bytes
 //! ```
 //!
-//! An own reader, since the crate `gltf` trusts the lengths in a file, and since geometry alone needs few of its
-//! thousands of lines: triangles, lines and points of all meshes of the scene, under the transforms of their nodes.
-//! Materials, textures, skins, morph targets, cameras and lights are passed over; compressed meshes are refused by name.
+//! An own reader, since geometry needs few of the parts of glTF, every error is to name its element, and every length
+//! is to be checked before memory is reserved for it. Read are triangles, lines and points of all meshes of the scene,
+//! under the transforms of their nodes. Materials, textures, skins, morph targets, cameras and lights are passed over;
+//! compressed meshes are refused by name.
 //!
-//! glTF is right-handed with `y` up, the files of this field have no declared up, and most tools that look at them take
-//! `z`. So coordinates are turned by a quarter on the way: `(x, y, z)` of a glTF file is `(x, -z, y)` here, and `(x, y, z)`
-//! here is written as `(x, z, -y)`. Both are exact, and are what Blender does: what it shows of a file has the coordinates
-//! that this crate wrote.
+//! glTF is right-handed with `y` up, the files of this field have no declared up, and most tools that look at them
+//! take `z`. So coordinates are turned by a quarter on the way: `(x, y, z)` of a glTF file is `(x, -z, y)` here, and
+//! `(x, y, z)` here is written as `(x, z, -y)`. Both are exact, and are what Blender does: what it shows of a file
+//! has the coordinates that this crate wrote.
 //!
 //! Source: The Khronos Group, glTF 2.0 Specification, <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>.
 
@@ -123,4 +124,4 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), GlbError> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

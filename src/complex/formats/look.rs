@@ -30,9 +30,9 @@ impl SphereValues {
         Self { name: "radius", values, low, high, map: ColourMap::Viridis, meaning }
     }
 
-    /// Stability ratios ([`stability_ratio`]), 0 to 1: of a sphere the least of its edges', of one without edges 1, since
-    /// a ball alone is no spike. `diagonal` is the length that counts as 1 for edges without length, in the unit of the
-    /// mesh.
+    /// Stability ratios ([`stability_ratio`]), 0 to 1: of a sphere the least of its edges', of one without edges 1,
+    /// since a ball alone is no spike. `diagonal` is the length that counts as 1 for edges without length, in the
+    /// unit of the mesh.
     ///
     /// # Panics
     /// If the mesh is not in canonical form; see [`MedialMesh::check`].
@@ -55,8 +55,8 @@ impl SphereValues {
     }
 
     /// Errors of either sign, zero in the middle of the colours: of each sphere, by how much it reaches out of the
-    /// surface (positive) or falls short of it (negative), in the unit of the mesh. 99 % of them are within the ends, so
-    /// that a single bad sphere does not make all others look alike.
+    /// surface (positive) or falls short of it (negative), in the unit of the mesh. 99 % of them are within the ends,
+    /// so that a single bad sphere does not make all others look alike.
     pub fn error(values: Vec<f64>) -> Self {
         let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
         sizes.sort_unstable_by(f64::total_cmp);

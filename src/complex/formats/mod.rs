@@ -7,11 +7,11 @@
 //! | `.ply` | ASCII | ASCII | the same, with a vertex property `radius`, for viewers |
 //! | `.obj` | yes | yes | centres, edges (`l`) and faces (`f`); read with radii as fourth numbers (`v x y z r`), written without, for viewers |
 //! | `.vtp` | yes | base64 | the same as `.ma` and a value at each sphere, for ParaView |
-//! | `.glb` | yes | yes | the same in single precision, coloured, and the spheres as bodies where asked, for Blender and browsers |
+//! | `.glb` | yes | yes | the same in single precision, coloured, and the spheres as bodies, for Blender and browsers |
 //!
-//! Coordinates are read and written in the unit of the file; normalisation is up to the caller. Numbers
-//! are written with 17 significant digits or as they are in memory, so that they are read back bit for bit; but for `.glb`,
-//! which has single precision.
+//! Coordinates are read and written in the unit of the file; normalisation is up to the caller. Numbers are written
+//! with 17 significant digits or as they are in memory, so that they are read back bit for bit; but for `.glb`, which
+//! has single precision.
 
 mod annotations;
 mod canonical;
@@ -73,8 +73,7 @@ impl LoadedMa {
 }
 
 /// Reads a medial mesh from a `.ma` file, a list of spheres, an ASCII `.ply` file, an `.obj` or `.glb` file with radii or a
-/// `.vtp` file, told apart
-/// by the extension.
+/// `.vtp` file, told apart by the extension.
 ///
 /// # Errors
 /// When the file cannot be read, has another extension, or does not hold a medial mesh; the error
@@ -132,8 +131,8 @@ pub fn write(path: impl AsRef<Path>, mesh: &MedialMesh) -> Result<(), MaError> {
 /// ```
 ///
 /// # Errors
-/// As [`write()`]; when the format has no room for what is to be shown; and `.glb` for a mesh without spheres, numbers beyond
-/// single precision, or more than 4 GB.
+/// As [`write()`]; when the format has no room for what is to be shown; and `.glb` for a mesh without spheres,
+/// numbers beyond single precision, or more than 4 GB.
 ///
 /// # Panics
 /// If the values are not one for each sphere.

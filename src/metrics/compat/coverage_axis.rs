@@ -4,14 +4,14 @@
 //! Skeletonization", Computer Graphics Forum 41 (2022), <https://doi.org/10.1111/cgf.14484>; the definitions are those
 //! of the authors' `Geometry_Tools/metrics.py`.
 //!
-//! - *Chamfer*: the mean over the vertices of the first of the distance to the nearest vertex of the second, plus the same the
-//!   other way; neither squared nor halved.
-//! - *Hausdorff*: the larger of the two maxima. A helper there swaps its arguments twice and so returns one direction only;
-//!   which of the two made the published tables is not known. Both directions are given.
+//! - *Chamfer*: the mean over the vertices of the first of the distance to the nearest vertex of the second, plus the
+//!   same the other way; neither squared nor halved.
+//! - *Hausdorff*: the larger of the two maxima. A helper there swaps its arguments twice and so returns one direction
+//!   only; which of the two made the published tables is not known. Both directions are given.
 //!
 //! # Deviations from the code
-//! None in the numbers. What is compared differs: the authors remesh the union with Blender's voxels (0.09 in the unit of the file), or
-//! take unmerged hulls with buried vertices; here it is any mesh.
+//! None in the numbers. What is compared differs: the authors remesh the union with Blender's voxels (0.09 in the
+//! unit of the file), or take unmerged hulls with buried vertices; here it is any mesh.
 //!
 //! # Trap
 //! Vertices are no surface: two triangulations of the same sphere are a few per cent of its diagonal apart.

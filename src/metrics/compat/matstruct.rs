@@ -3,14 +3,14 @@
 //! N. Wang et al., "MATStruct: High-Quality Medial Mesh Computation via Structure-aware Variational Optimization",
 //! SIGGRAPH Asia 2025, <https://arxiv.org/abs/2510.10751>; the definitions are those of its `src/eval/mesh_eval.cpp`.
 //!
-//! - *Triangle quality*: `Q = 6 / sqrt(3) A / (h s)`, with the area `A`, the longest edge `h` and half the perimeter `s`; 1
-//!   for an equilateral triangle. The mean over all faces, not weighted.
+//! - *Triangle quality*: `Q = 6 / sqrt(3) A / (h s)`, with the area `A`, the longest edge `h` and half the perimeter
+//!   `s`; 1 for an equilateral triangle. The mean over all faces, not weighted.
 //! - *Bad structure*: the share of spheres on seams and junctions that are not of a feature's type.
 //!
 //! # Deviations from the code
 //! The area is that of the cross product. Heron's formula, as in the code, is the root of a negative number for some
-//! triangles whose corners are on a line, and the whole mean is then no number. Faces whose longest edge has no length have `Q = 0`; they
-//! and the collinear ones are counted.
+//! triangles whose corners are on a line, and the whole mean is then no number. Faces whose longest edge has no
+//! length have `Q = 0`; they and the collinear ones are counted.
 
 use serde::Serialize;
 
@@ -70,9 +70,9 @@ pub fn matstruct_quality(mesh: &MedialMesh) -> StructureQuality {
 
 /// The share of the spheres on seams and junctions that are not of a feature's type; `None` where there are none.
 ///
-/// `structure` has the spheres of all seams and junctions, which may repeat; each counts once. `is_feature` says of each
-/// sphere whether its type is that of a feature. Both come from the trailer and the types of a file of MATStruct's: no other
-/// file says so.
+/// `structure` has the spheres of all seams and junctions, which may repeat; each counts once. `is_feature` says of
+/// each sphere whether its type is that of a feature. Both come from the trailer and the types of a file of
+/// MATStruct's: no other file says so.
 ///
 /// # Panics
 /// If `structure` names a sphere that does not exist.

@@ -1,9 +1,9 @@
 //! Numbers by the definitions of other papers, under the names that they have there.
 //!
-//! They are for comparison with published tables and with nothing else: each depends on something that the measures of this
-//! crate do not, such as the vertices of a mesh or the densest samples of a skeleton. So they are no part of an
-//! [`Evaluation`](super::Evaluation). `docs/other-metrics.md` says how they differ. Lengths are in the unit of what is
-//! measured; all but triangle quality scale with it.
+//! They are for comparison with published tables and with nothing else: each depends on something that the measures
+//! of this crate do not, such as the vertices of a mesh or the densest samples of a skeleton. So they are no part of
+//! an [`Evaluation`](super::Evaluation). `docs/other-metrics.md` says how they differ. Lengths are in the unit of
+//! what is measured; all but triangle quality scale with it.
 
 mod coverage_axis;
 mod matstruct;

@@ -1,24 +1,25 @@
 //! CD and HD of reconstructions and of skeletons, as Point2Skeleton measures them.
 //!
 //! C. Lin, C. Li, Y. Liu, N. Chen, Y.-K. Choi, W. Wang, "Point2Skeleton: Learning Skeletal Representations from Point
-//! Clouds", CVPR 2021, <https://arxiv.org/abs/2012.00230>; the sums are those of the authors' `DistFunc.py`, the division by
-//! the counts is the first author's reply to a question about it.
+//! Clouds", CVPR 2021, <https://arxiv.org/abs/2012.00230>; the sums are those of the authors' `DistFunc.py`, the
+//! division by the counts is the first author's reply to a question about it.
 //!
-//! 1. The skeleton is sampled to `M` spheres: on faces as many as `A / (A + E)` of them, on edges without a face the rest,
-//!    with the area `A` of all faces and `E` half the sum of the squared lengths of these edges; a face by its area, an edge by its square. On a face the
-//!    weights are three random numbers over their sum, on an edge two: *not* uniform, denser in the middle.
-//! 2. CD-Recon `= 1/N sum_p | |p - c_k(p)| - r_k(p) | + 1/M sum_k | min_p |c_k - p| - r_k |`, where `k(p)` is the nearest
-//!    *centre*. HD-Recon is the larger of the two maxima.
+//! 1. The skeleton is sampled to `M` spheres: on faces as many as `A / (A + E)` of them, on edges without a face the
+//!    rest, with the area `A` of all faces and `E` half the sum of the squared lengths of these edges; a face by its
+//!    area, an edge by its square. On a face the weights are three random numbers over their sum, on an edge two:
+//!    *not* uniform, denser in the middle.
+//! 2. CD-Recon `= 1/N sum_p | |p - c_k(p)| - r_k(p) | + 1/M sum_k | min_p |c_k - p| - r_k |`, where `k(p)` is the
+//!    nearest *centre*. HD-Recon is the larger of the two maxima.
 //! 3. CD-MAT, HD-MAT: the same of centres and points without radii.
 //!
 //! # Deviations
 //! - HD is not in the public code; a maximum in place of each mean is by analogy. Both directions are given.
-//! - Without faces the code fails; here all samples are on edges. Without both, the spheres themselves are the samples. Spheres without an
-//!   edge beside others are not sampled, as there.
+//! - Without faces the code fails; here all samples are on edges. Without both, the spheres themselves are the
+//!   samples. Spheres without an edge beside others are not sampled, as there.
 //!
 //! # Trap
-//! The nearest centre is not the nearest sphere: with a large sphere beside a small one a point on the large one may be measured
-//! against the small one.
+//! The nearest centre is not the nearest sphere: with a large sphere beside a small one a point on the large one may
+//! be measured against the small one.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -141,8 +142,8 @@ impl Weighted {
     }
 }
 
-/// CD-Recon and HD-Recon of points of the surface and spheres of the skeleton, in their unit: `there` from the points to the spheres. `None`
-/// when one is empty or has what is not finite. `O((n + m) log(n + m))`.
+/// CD-Recon and HD-Recon of points of the surface and spheres of the skeleton, in their unit: `there` from the points
+/// to the spheres. `None` when one is empty or has what is not finite. `O((n + m) log(n + m))`.
 ///
 /// ```
 /// use medial::complex::Sphere;

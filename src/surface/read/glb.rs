@@ -31,3 +31,49 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
     soup.warnings.push(turned.to_owned());
     Ok(soup)
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use serde_json::json;
+
+    use crate::glb::pack;
+    use crate::glb::tests::{binary, file, scene, with};
+    use crate::surface::{Fault, Format, inspect_bytes};
+
+    #[test]
+    fn a_solid_is_one_and_the_turn_is_told() {
+        let inspection = inspect_bytes(&file(&scene()), Format::Glb).unwrap();
+        assert_eq!(inspection.refused, None);
+        let told = ["glTF has y up: read with z up, (x, y, z) as (x, -z, y), as Blender does"];
+        assert_eq!(inspection.report.warnings, told);
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_told_by_its_vertex() {
+        let mut bytes = binary();
+        bytes[16..20].copy_from_slice(&f32::NAN.to_le_bytes());
+        let bytes = pack(&scene().to_string(), &bytes).unwrap();
+        let fault = inspect_bytes(&bytes, Format::Glb).unwrap_err().fault;
+        let is_named =
+            matches!(fault, Fault::Coordinate { vertex: 1, value, .. } if value.is_nan());
+        assert!(is_named, "{fault}");
+        let points = with("/meshes/0/primitives/0/mode", json!(0));
+        let fault = inspect_bytes(&file(&points), Format::Glb).unwrap_err().fault;
+        assert_eq!(fault, Fault::NoFaces { vertices: 4 });
+    }
+
+    proptest! {
+        #[test]
+        fn damage_never_panics(
+            places in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+        ) {
+            let mut bytes = file(&scene());
+            for (place, byte) in places {
+                let place = place.index(bytes.len());
+                bytes[place] = byte;
+            }
+            let _ = inspect_bytes(&bytes, Format::Glb);
+        }
+    }
+}

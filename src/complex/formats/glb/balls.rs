@@ -1,7 +1,7 @@
 //! Spheres as round bodies.
 //!
-//! Icosahedra with every triangle cut in four: 42 vertices and 80 triangles, 2.3 kB a sphere. All in one mesh instead of
-//! instances of one: instances would share their colours, and thousands of objects make Blender slow.
+//! Icosahedra with every triangle cut in four: 42 vertices and 80 triangles, 2.3 kB a sphere. All in one mesh instead
+//! of instances of one: instances would share their colours, and thousands of objects make Blender slow.
 
 use crate::Vec3;
 

@@ -14,8 +14,8 @@ use crate::glb::{GlbError, Part, parts};
 /// turned to `z` up. Numbers are those of single precision.
 ///
 /// # Errors
-/// When the file cannot be read as glTF, has no radii, or a node scales its axes differently; when a coordinate or radius is
-/// not finite, or a radius negative.
+/// When the file cannot be read as glTF, has no radii, or a node scales its axes differently; when a coordinate or
+/// radius is not finite, or a radius negative.
 ///
 /// # Cost
 /// Linear in the file and in the copies of meshes that its scene makes, which are bounded.

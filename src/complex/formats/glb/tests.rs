@@ -1,5 +1,7 @@
 //! Files of ours and of trimesh's, read back.
 
+use proptest::prelude::*;
+
 use super::*;
 use crate::complex::formats::look::{Look, SphereValues};
 use crate::complex::{MedialMesh, Sphere};
@@ -38,8 +40,8 @@ fn own_files_come_back() {
     assert_eq!(parse_glb(file(&points, &Look::default()).unwrap(), "x").unwrap().mesh, points);
 }
 
-/// Of the same mesh as `vtp/by_vtk`, in single precision, half as large under a node of scale 2. trimesh has sheets only,
-/// and so the lone sphere and the lone edge are missing.
+/// Of the same mesh as `vtp/by_vtk`, in single precision, half as large under a node of scale 2. trimesh has sheets
+/// only, and so the lone sphere and the lone edge are missing.
 #[test]
 fn a_file_of_trimesh_is_read_with_its_node() {
     let loaded = parse_glb(include_bytes!("by_trimesh.glb"), "x.glb").unwrap();
@@ -113,4 +115,20 @@ fn sheets_are_turned_alike_and_normals_have_unit_length() {
     assert!(faces.iter().all(|f| up(f) == up(&faces[0])));
     let normals = normals::normals(&mesh, &faces);
     assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-12 && n.z.abs() > 0.9));
+}
+
+proptest! {
+    #[test]
+    fn damage_never_panics(
+        places in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let mut bytes = file(&mesh(), &Look::default()).unwrap();
+        for (place, byte) in places {
+            let place = place.index(bytes.len());
+            bytes[place] = byte;
+        }
+        if let Ok(loaded) = parse_glb(&bytes, "x") {
+            prop_assert_eq!(loaded.mesh.check(), Ok(()));
+        }
+    }
 }

@@ -1,8 +1,9 @@
 //! Decodes the arrays of a VTK XML file.
 //!
-//! Bytes stand behind a header of one word, their number; compressed ones behind one of three words and more: the number
-//! of blocks, the length of a block and of the last one (0: as the others) once they are inflated, and the length of each as it stands in the
-//! file. In base64 the header of compressed data is encoded apart, that of others together with them.
+//! Bytes stand behind a header of one word, their number; compressed ones behind one of three words and more: the
+//! number of blocks, the length of a block and of the last one (0: as the others) once they are inflated, and the
+//! length of each as it stands in the file. In base64 the header of compressed data is encoded apart, that of others
+//! together with them.
 
 use std::io::Read;
 

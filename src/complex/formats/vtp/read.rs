@@ -1,9 +1,9 @@
 //! Reads VTK PolyData.
 //!
-//! 1. The XML is walked up to `AppendedData`, behind whose underscore any bytes may follow: every `DataArray` of points,
-//!    point data and cells is noted with its place.
-//! 2. Radii, positions and cells of each piece are decoded (`arrays.rs`), each array checked against the numbers of points
-//!    and cells that the piece announces.
+//! 1. The XML is walked up to `AppendedData`, behind whose underscore any bytes may follow: every `DataArray` of
+//!    points, point data and cells is noted with its place.
+//! 2. Radii, positions and cells of each piece are decoded (`arrays.rs`), each array checked against the numbers of
+//!    points and cells that the piece announces.
 //! 3. Polylines and strips are taken apart, and the whole is brought to canonical form.
 
 use std::collections::BTreeMap;
@@ -21,8 +21,8 @@ use crate::complex::{ComplexError, Sphere};
 
 /// Reads a medial mesh from the content of a `.vtp` file; `name` stands for the file in errors.
 ///
-/// Points need an array `radius` (or `r`). Lines and strips of any length are taken apart; vertices are passed over, since
-/// every point is a sphere; other arrays are not used.
+/// Points need an array `radius` (or `r`). Lines and strips of any length are taken apart; vertices are passed over,
+/// since every point is a sphere; other arrays are not used.
 ///
 /// # Errors
 /// When it is not VTK PolyData, is cut off, is compressed by anything but zlib, has polygons other than triangles, or a
@@ -133,18 +133,24 @@ fn outline(bytes: &[u8]) -> Result<Outline<'_>, VtpError> {
                     return Err(VtpError::Xml { at: bytes.len() as u64, why });
                 }
                 Event::Eof => break,
-                Event::End(_) => open -= 1,
+                Event::End(_) => open = open.saturating_sub(1),
                 _ => {}
             }
             continue;
         };
         open += usize::from(matches!(event, Event::Start(_)));
+        // An attribute does not know where it stands.
+        let placed = |error| match error {
+            VtpError::Xml { why, .. } => VtpError::Xml { at: after as u64, why },
+            other => other,
+        };
         let name = String::from_utf8_lossy(tag.name().as_ref()).into_owned();
         match name.as_str() {
-            "VTKFile" => coding = Some(coding_of(tag)?),
-            "Piece" => pieces.push(piece(tag)?),
+            "VTKFile" => coding = Some(coding_of(tag).map_err(placed)?),
+            "Piece" => pieces.push(piece(tag).map_err(placed)?),
             "AppendedData" => {
-                let is_base64 = attribute(tag, "encoding")?.as_deref() != Some("raw");
+                let is_base64 =
+                    attribute(tag, "encoding").map_err(placed)?.as_deref() != Some("raw");
                 let rest = &bytes[after.min(bytes.len())..];
                 let start =
                     rest.iter().position(|&byte| byte == b'_').map_or(rest.len(), |at| at + 1);
@@ -158,7 +164,8 @@ fn outline(bytes: &[u8]) -> Result<Outline<'_>, VtpError> {
                 {
                     let rest = &bytes[after.min(bytes.len())..];
                     let length = rest.iter().position(|&byte| byte == b'<').unwrap_or(rest.len());
-                    let (name, array) = data_array(tag, &section, &rest[..length])?;
+                    let (name, array) =
+                        data_array(tag, &section, &rest[..length]).map_err(placed)?;
                     piece.arrays.entry((section.clone(), name)).or_insert(array);
                 }
             }

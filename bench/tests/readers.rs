@@ -1,0 +1,158 @@
+//! Files for ParaView and Blender, through VTK and trimesh: `scripts/readers.sh`, where its environment is there.
+
+use std::path::Path;
+use std::process::Command;
+
+mod command;
+use command::{json, run, text_path};
+
+/// The Python that `scripts/readers.sh` sets up, or that of `$READERS_PYTHON`.
+fn python() -> Option<String> {
+    let made = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/readers/python/bin/python");
+    let python = std::env::var("READERS_PYTHON").unwrap_or_else(|_| made.to_owned());
+    let answer = Command::new(&python).args(["-c", "import vtk, trimesh"]).output();
+    answer.is_ok_and(|output| output.status.success()).then_some(python)
+}
+
+#[test]
+fn vtk_and_trimesh_agree() {
+    let Some(python) = python() else {
+        medial_test_support::skip("no Python with vtk and trimesh (scripts/readers.sh makes one)");
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = Command::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scripts/readers.sh"))
+        .env("READERS_PYTHON", python)
+        .env("MEDIAL", env!("CARGO_BIN_EXE_medial"))
+        .env("CARGO_TARGET_DIR", folder.path())
+        .output()
+        .expect("the script starts");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(text.contains("same: ") && !text.contains("DIFFERENT"), "{text}");
+}
+
+fn axis(folder: &Path) -> String {
+    let file = folder.join("x.ma");
+    let path = text_path(&file).to_owned();
+    let (code, ..) = run(&["axis", "builtin:box:8", "-o", &path]);
+    assert_eq!(code, 0);
+    path
+}
+
+#[test]
+fn a_medial_mesh_goes_through_both_formats() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ma = axis(folder.path());
+    let at = |name: &str| text_path(&folder.path().join(name)).to_owned();
+    for (to, back, options) in [
+        ("a.vtp", "a.ma", &["--color", "stability"][..]),
+        ("b.vtp", "b.ma", &["--color", "error", "--mesh", "builtin:box:8"]),
+        ("c.glb", "c.ma", &["--colour", "error", "--mesh", "builtin:box:8", "--spheres"]),
+        ("d.glb", "d.ma", &[]),
+    ] {
+        let (code, _, stderr) = run(&[&["convert", &ma, &at(to)], options].concat());
+        assert_eq!(code, 0, "{stderr}");
+        let (code, _, stderr) = run(&["convert", &at(to), &at(back)]);
+        assert_eq!(code, 0, "{stderr}");
+        let (_, first) = json(&["evaluate", "builtin:box:8", &ma, "--samples", "500"]);
+        let (_, again) = json(&["evaluate", "builtin:box:8", &at(to), "--samples", "500"]);
+        assert_eq!(first["counts"], again["counts"]);
+        let [a, b] = [&first, &again].map(|object| object["hausdorff"].as_f64().expect("a number"));
+        assert!((a - b).abs() < 1e-6, "{a} {b}");
+    }
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect("a file");
+    assert_eq!(bytes("a.ma"), bytes("x.ma"), "bit for bit");
+    assert_eq!(bytes("b.ma"), bytes("x.ma"));
+    let (_, object) = json(&["convert", &ma, &at("e.glb")]);
+    let told = object["warnings"].to_string();
+    assert!(
+        told.contains("single precision: coordinates and radii are rounded by at most"),
+        "{told}"
+    );
+}
+
+/// A sphere of radius 0.6 in the middle of the box, whose faces are 0.5 away, and one of 0.4.
+#[test]
+fn errors_are_radii_less_depths() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&folder.path().join(name)).to_owned();
+    std::fs::write(at("x.ma"), "2 0 0\nv 0 0 0 0.6\nv 0.5 0 0 0.4\n").expect("written");
+    let error = ["--color", "error", "--mesh", "builtin:box"];
+    let (code, _, stderr) = run(&[&["convert", &at("x.ma"), &at("x.glb")], &error[..]].concat());
+    assert_eq!(code, 0, "{stderr}");
+    let bytes = std::fs::read(at("x.glb")).expect("a file");
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("4 bytes"));
+    let length = word(12) as usize;
+    let scene: serde_json::Value = serde_json::from_slice(&bytes[20..20 + length]).expect("JSON");
+    let mesh = &scene["meshes"][0];
+    let [low, high] = ["colour_low", "colour_high"].map(|key| mesh["extras"][key].as_f64());
+    assert!((high.expect("an end") - 0.1).abs() < 1e-12 && low == high.map(|high| -high));
+    let accessor = mesh["primitives"][0]["attributes"]["_ERROR"].as_u64().expect("an accessor");
+    let view = scene["accessors"][accessor as usize]["bufferView"].as_u64().expect("a view");
+    let from = scene["bufferViews"][view as usize]["byteOffset"].as_u64().expect("a place");
+    let values = [0, 4].map(|k| f32::from_bits(word(28 + length + from as usize + k)));
+    assert!((values[0] - 0.1).abs() < 1e-6 && (values[1] + 0.1).abs() < 1e-6, "{values:?}");
+}
+
+#[test]
+fn options_that_make_no_sense_are_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ma = axis(folder.path());
+    let out = |name: &str| text_path(&folder.path().join(name)).to_owned();
+    for (to, options, expected) in [
+        ("x.ply", &["--color", "error"][..], "--color: "),
+        ("x.vtp", &["--spheres"], "--spheres: "),
+        ("x.glb", &["--color", "error"], "name the surface with --mesh"),
+        ("x.glb", &["--mesh", "builtin:box"], "--mesh is for --color error only"),
+    ] {
+        let (code, _, stderr) = run(&[&["convert", &ma, &out(to)], options].concat());
+        assert_eq!(code, 2, "{stderr}");
+        assert!(stderr.contains(expected), "{stderr}");
+        assert!(!Path::new(&out(to)).exists());
+    }
+    let surface = out("s.off");
+    assert_eq!(run(&["datasets", "make", "sphere", "--resolution", "8", "-o", &surface]).0, 0);
+    for (to, options) in [("y.glb", &[][..]), ("y.vtp", &[]), ("y.off", &["--spheres"])] {
+        let (code, _, stderr) = run(&[&["convert", &surface, &out(to)], options].concat());
+        assert_eq!(code, 2, "{stderr}");
+    }
+}
+
+#[test]
+fn numbers_of_other_papers_stand_apart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ma = axis(folder.path());
+    let plain = json(&["evaluate", "builtin:box:8", &ma, "--samples", "500"]).1;
+    let papers = "coverage-axis,point2skeleton,matstruct";
+    let all = ["evaluate", "builtin:box:8", &ma, "--samples", "500", "--compat", papers];
+    let (code, mut with) = json(&all);
+    assert_eq!(code, 0);
+    let compat = with.as_object_mut().expect("an object").remove("compat").expect("a section");
+    assert_eq!(with, plain, "nothing else changes");
+    let value = |paper: &str, name: &str, unit: &str| {
+        compat[paper][name][unit].as_f64().unwrap_or_else(|| panic!("{paper} {name} in {compat}"))
+    };
+    for (paper, name) in [
+        ("coverage_axis", "ca_vertex_hausdorff"),
+        ("coverage_axis", "ca_vertex_chamfer"),
+        ("point2skeleton", "p2s_cd_recon"),
+        ("point2skeleton", "p2s_hd_recon"),
+        ("point2skeleton", "p2s_cd_mat"),
+        ("point2skeleton", "p2s_hd_mat"),
+    ] {
+        let [absolute, side, diag] =
+            ["absolute", "side", "diag"].map(|unit| value(paper, name, unit));
+        assert!(absolute > 0.0 && side > diag, "{paper} {name}");
+        let diagonal = plain["diagonal"].as_f64().expect("a diagonal");
+        assert!((absolute / diag / diagonal - 1.0).abs() < 1e-9, "{name}");
+    }
+    assert_eq!(compat["point2skeleton"]["surface_points"], 500);
+    let quality = compat["matstruct"]["matstruct_quality"].as_f64().expect("a mean");
+    assert!(quality > 0.0 && quality < 1.0);
+    // Against itself as the reference: the same samples.
+    let own = [&all[..], &["--compat-reference", &ma]].concat();
+    assert_eq!(json(&own).1["compat"]["point2skeleton"]["p2s_hd_mat"]["absolute"], 0.0);
+    let (_, text, _) = run(&all);
+    assert!(text.contains("by the definitions of matstruct:"), "{text}");
+}
