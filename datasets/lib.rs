@@ -15,13 +15,17 @@
 mod axes;
 mod blocks;
 mod catalogue;
+mod curves;
 mod fields;
 mod geodesic;
 mod implicit;
 mod manifold;
 mod noise;
+mod planar;
+mod profiles;
 mod revolved;
 mod shapes;
+mod strips;
 mod torus;
 
 pub use axes::KnownAxis;
