@@ -16,6 +16,7 @@ mod axes;
 mod blocks;
 mod catalogue;
 mod curves;
+mod dropped;
 mod fields;
 mod geodesic;
 mod implicit;
@@ -30,7 +31,7 @@ mod torus;
 
 pub use axes::KnownAxis;
 pub use catalogue::{BuiltIn, MAX_RESOLUTION, catalogue, find};
-pub use noise::add_noise;
+pub use noise::{NoiseError, NoiseKind, add_noise, noisy};
 
 #[cfg(test)]
 #[allow(clippy::print_stdout)]

@@ -3,14 +3,14 @@
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
 use medial::metrics::{spikes, triangle_quality};
-use medial::surface::{Normalisation, TriMesh};
+use medial::surface::{Normalisation, TriMesh, validate};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::fields::{Blend, Field};
 use crate::manifold::{euler, first_defect};
 use crate::shapes::{blob_field, double_torus_field, frame_field};
-use crate::{BuiltIn, add_noise, catalogue, find};
+use crate::{BuiltIn, NoiseError, NoiseKind, add_noise, catalogue, find, noisy};
 
 /// Distance from a point to the surface, positive inside.
 ///
@@ -397,6 +397,73 @@ fn noise_is_uniform_in_the_ball_repeatable_and_in_proportion() {
     assert!(mean.abs().max_element() < 4.0 * (0.2 / n).sqrt(), "{mean}");
     assert_eq!(add_noise(&mesh, 0.0, 5), mesh);
     assert_eq!(add_noise(&TriMesh::default(), 0.1, 5), TriMesh::default());
+}
+
+#[test]
+fn noise_along_normals_moves_along_them() {
+    let mesh = find("sphere").unwrap().mesh(60);
+    let diagonal = Normalisation::of(&mesh).unwrap().diagonal;
+    let noisy = |eta: f64, seed: u64| noisy(&mesh, NoiseKind::Normal, eta, seed).unwrap();
+    let moved = |eta: f64, seed: u64| -> Vec<Vec3> {
+        let pairs = noisy(eta, seed).vertices.into_iter().zip(&mesh.vertices);
+        pairs.map(|(n, v)| (n - v) / (eta * diagonal)).collect()
+    };
+    let first = moved(0.02, 5);
+    assert_eq!(first, moved(0.02, 5));
+    assert_ne!(first, moved(0.02, 6));
+    assert!(first.iter().zip(moved(0.01, 5)).all(|(a, b)| a.distance(b) < 1e-9));
+    let n = first.len() as f64;
+    for (by, v) in first.iter().zip(&mesh.vertices) {
+        // The normal of a mesh is nearly that of the sphere.
+        assert!(by.length() <= 1.0 + 1e-12 && by.reject_from(*v).length() < 0.02, "{by} at {v}");
+    }
+    let along: Vec<f64> = first.iter().zip(&mesh.vertices).map(|(by, &v)| by.dot(v)).collect();
+    // Uniform from -1 to 1: mean 0, mean square 1/3 of variance 4/45.
+    let mean = along.iter().sum::<f64>() / n;
+    let square = along.iter().map(|x| x * x).sum::<f64>() / n;
+    assert!(mean.abs() < 4.0 / (3.0 * n).sqrt(), "{mean}");
+    assert!((square - 1.0 / 3.0).abs() < 4.0 * (4.0 / 45.0 / n).sqrt() + 1e-3, "{square}");
+    assert_eq!(noisy(0.0, 5), mesh);
+}
+
+#[test]
+fn dropped_samples_leave_a_closed_embedded_surface_of_the_same_topology() {
+    for shape in catalogue() {
+        let mesh = shape.mesh(shape.default_resolution);
+        let dropped = |seed: u64| noisy(&mesh, NoiseKind::Dropped, 0.3, seed).unwrap();
+        let left = dropped(1);
+        let id = shape.id;
+        assert_eq!(left, dropped(1), "{id}");
+        assert_ne!(left, dropped(2), "{id}");
+        let gone = (0.3 * mesh.vertices.len() as f64).round() as usize;
+        assert_eq!(left.vertices.len() + gone, mesh.vertices.len(), "{id}");
+        assert_eq!((first_defect(&left), euler(&left)), (None, euler(&mesh)), "{id}");
+        let report = validate(&left).unwrap();
+        assert!(!report.self_intersecting, "{id}");
+        // Those left are vertices of before, in their order.
+        let mut before = mesh.vertices.iter();
+        assert!(left.vertices.iter().all(|v| before.any(|b| b == v)), "{id}");
+        assert!((volume(&left) / volume(&mesh) - 1.0).abs() < 0.05, "{id}");
+    }
+}
+
+#[test]
+fn noise_that_cannot_be_is_refused() {
+    let mesh = find("sphere").unwrap().mesh(0);
+    let refused = |kind, magnitude| noisy(&mesh, kind, magnitude, 0).unwrap_err();
+    for kind in NoiseKind::ALL {
+        assert_eq!(kind.to_string().parse(), Ok(kind));
+        assert_eq!(refused(kind, 1.5), NoiseError::Magnitude { kind, magnitude: 1.5 });
+        assert!(refused(kind, f64::NAN).to_string().contains("from 0 to 1"));
+    }
+    assert!("loud".parse::<NoiseKind>().unwrap_err().to_string().contains("isotropic, normal"));
+    // A sphere needs four vertices at least.
+    let all = refused(NoiseKind::Dropped, 1.0);
+    assert!(matches!(all, NoiseError::TooFew { asked, dropped, .. } if dropped < asked), "{all}");
+    let mut open = mesh.clone();
+    open.faces.pop();
+    let open = noisy(&open, NoiseKind::Dropped, 0.1, 0).unwrap_err();
+    assert!(matches!(&open, NoiseError::NotManifold(why) if why.contains("no opposite")), "{open}");
 }
 
 #[test]

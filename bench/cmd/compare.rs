@@ -20,7 +20,7 @@ use crate::run::{
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface files (OFF, OBJ, PLY, STL) or `builtin:ID[:RESOLUTION]` [default: all built-in shapes].
+    /// Surface files (OFF, OBJ, PLY, STL) or `builtin:ID[:RESOLUTION]` [default: the built-in shapes that `datasets list` says].
     meshes: Vec<MeshArgument>,
     /// A set of meshes beside those named: `builtin`.
     #[arg(long, value_name = "SET")]
