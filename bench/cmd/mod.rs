@@ -6,6 +6,7 @@ pub mod check;
 pub mod collect;
 pub mod compare;
 pub mod completions;
+pub mod convergence;
 pub mod convert;
 pub mod datasets;
 pub mod diff;
