@@ -329,9 +329,14 @@ fn order_cell(
     }
     let error = significant(100.0 * fit.finest, 2);
     match fit.order {
-        Some(Order { order, half_width, .. }) => format!("{error}; {order:.1} ± {half_width:.1}"),
+        Some(fit) => format!("{error}; {} ± {:.1}", exponent(fit.order), fit.half_width),
         None => format!("{error}; no order"),
     }
+}
+
+/// One decimal, and no minus before a zero.
+fn exponent(order: f64) -> String {
+    format!("{:.1}", if order.abs() < 0.05 { 0.0 } else { order })
 }
 
 fn far_cell(own: &[&ConvergenceRecord], set: AxisSet) -> String {
@@ -358,7 +363,7 @@ fn curves(records: &[&ConvergenceRecord]) -> Vec<ConvergenceCurve> {
         .map(|(series, set)| {
             let points: Vec<_> = (0..levels).filter_map(|level| point(set, level)).collect();
             let label = match fitted_order(&points) {
-                Some(fit) => format!("{}, h^{:.1}", set.title(), fit.order),
+                Some(fit) => format!("{}, h^{}", set.title(), exponent(fit.order)),
                 None => set.title().to_owned(),
             };
             ConvergenceCurve { series, label, points }
