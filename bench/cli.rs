@@ -61,6 +61,8 @@ pub enum Verb {
     Baseline(cmd::baseline::Arguments),
     /// Run methods on noisy surfaces, and measure against the clean ones.
     Stability(cmd::stability::Arguments),
+    /// Measure computed axes against known ones at finer and finer resolutions, and fit the orders.
+    Convergence(cmd::convergence::Arguments),
     /// Say what became worse between two sets of results, or two builds that it runs in turn.
     Diff(cmd::diff::Arguments),
     /// Rebuild the report of a folder of results.
@@ -166,6 +168,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Paper(arguments) => cmd::paper::run(&arguments, global, registry),
         Verb::Baseline(arguments) => cmd::baseline::run(&arguments, global, registry),
         Verb::Stability(arguments) => cmd::stability::run(&arguments, global, registry),
+        Verb::Convergence(arguments) => cmd::convergence::run(&arguments, global, registry),
         Verb::Diff(arguments) => cmd::diff::run(&arguments, global, registry),
         Verb::Report(arguments) => cmd::report::run(&arguments, global, registry),
         Verb::History(arguments) => cmd::history::run(&arguments, global),

@@ -8,11 +8,16 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 
+use crate::curves::Curve;
 use crate::geodesic::unit_sphere;
+use crate::profiles::triangle;
 use crate::shapes::{
-    BOX_HALF, CAVITY, COIL, CORE_HALF, ELLIPSOID, PAIR_BALL, PAIR_CAPSULE, PLATE_HALF, ROD_APEX,
-    ROD_HALF, ROD_RADIUS, ROUNDING, TORUS, coil_centre, coil_length,
+    BLIND_HOLE, BLIND_HOLE_RADIUS, BOX_HALF, BRACKET, BRACKET_ELBOW, CAVITY, CHAIN, COIL,
+    CORE_HALF, ELLIPSOID, FILLETED_ELBOW, FRUSTUM, HOLE, HOLED_HALF, PAIR_BALL, PAIR_CAPSULE,
+    PLATE_HALF, RIB, RIB_HALF, ROD_APEX, ROD_HALF, ROD_RADIUS, ROUNDING, TORUS, TUBE, TUBE_RADIUS,
+    WEDGE, coil_centre, coil_length,
 };
+use crate::strips::around_hole;
 
 /// The medial axis of a built-in shape, known without sampling, in the shape's own coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,7 +81,7 @@ pub(crate) fn ellipsoid() -> KnownAxis {
 }
 
 /// How far a regular polygon of `sides` inscribed in a circle stays away from it.
-fn sagitta(radius: f64, sides: u32) -> f64 {
+pub(crate) fn sagitta(radius: f64, sides: u32) -> f64 {
     radius * (1.0 - (PI / f64::from(sides)).cos())
 }
 
@@ -230,4 +235,93 @@ pub(crate) fn hollow_sphere() -> KnownAxis {
     let radius = (1.0 - CAVITY) / 2.0;
     let spheres = mesh.vertices.iter().map(|&v| Sphere::new(v * middle, radius)).collect();
     known(spheres, vec![], mesh.faces, middle * (1.0 - nearest))
+}
+
+/// Three sheets along the edges of the prism, and three below each end.
+pub(crate) fn wedge() -> KnownAxis {
+    let Vec3 { x: half, y: half_length, z: height } = WEDGE;
+    triangle(half, height).prism(0.0, half_length)
+}
+
+/// Flat middle sheets of the two plates, a sheet from the outer edge, and between them two parabolic cylinders
+/// about the reflex edge.
+pub(crate) fn bracket() -> KnownAxis {
+    BRACKET_ELBOW.profile().prism(BRACKET.y / 2.0, BRACKET.y / 2.0)
+}
+
+/// As of the bracket; the parabolas' focus is the centre of the fillet.
+pub(crate) fn fillet() -> KnownAxis {
+    FILLETED_ELBOW.profile().prism(BRACKET.y / 2.0, BRACKET.y / 2.0)
+}
+
+/// The middle sheets of plate and rib, joined below the rib by parabolic cylinders about both reflex edges.
+pub(crate) fn rib() -> KnownAxis {
+    RIB.profile().prism(0.0, RIB_HALF)
+}
+
+/// A segment and, at each end, a cone out to the crease.
+pub(crate) fn frustum() -> KnownAxis {
+    FRUSTUM.half_profile().revolved()
+}
+
+/// The middle disc of the bottom and the middle cylinder of the wall, joined by two surfaces of revolution of
+/// parabolas about the reflex edge, and cones to the creases.
+pub(crate) fn blind_hole() -> KnownAxis {
+    BLIND_HOLE.mirrored(BLIND_HOLE_RADIUS).revolved()
+}
+
+/// Parts of each side of the rectangles of the holed plate.
+const HOLED_SIDE: u32 = 60;
+
+/// The axis of a box, but its middle sheet ends where the hole is as near as the plate's faces; from there two
+/// cones of 45 degrees go to the edges of the hole.
+///
+/// With half thickness `c` and a hole of radius `R` about y, the hole is nearest where `rho - R < c - |y|`.
+pub(crate) fn holed_plate() -> KnownAxis {
+    let Vec3 { x: a, y: c, z: b } = HOLED_HALF;
+    let level = around_hole(HOLE + c, [a - c, b - c], [HOLED_SIDE; 2]);
+    let creases = around_hole(HOLE, [a, b], [HOLED_SIDE; 2]);
+    // The rings of the middle sheet, then those of both faces: of the rectangle, and of the circle.
+    let rings = [(&level, 0.0, c), (&creases, -c, 0.0), (&creases, c, 0.0)];
+    let spheres = rings.iter().flat_map(|&(lines, y, radius)| {
+        let ring = move |end: usize| lines.iter().map(move |line| (line[end], y, radius));
+        ring(0).chain(ring(1))
+    });
+    let spheres = spheres.map(|([x, z], y, radius)| Sphere::new(Vec3::new(x, y, z), radius));
+    let sides = level.len() as u32;
+    let mut faces = Vec::new();
+    for (from, to) in [(0, 1), (0, 2), (0, 4), (1, 3), (1, 5)] {
+        for i in 0..sides {
+            let at = |ring: u32, i: u32| ring * sides + i % sides;
+            faces.push([at(from, i), at(from, i + 1), at(to, i + 1)]);
+            faces.push([at(from, i), at(to, i + 1), at(to, i)]);
+        }
+    }
+    // A triangle to each upright edge.
+    faces.extend((0..4).map(|k| [0, 2, 4].map(|ring| ring * sides + k * HOLED_SIDE)));
+    // The longest arc is less than a third of the circle. Chords err in position, and as much in radius.
+    known(spheres.collect(), vec![], faces, 1.5 * sagitta(HOLE + c, 3 * HOLED_SIDE))
+}
+
+/// The balls along the segment of their centres; radii are linear between neighbours.
+pub(crate) fn chain() -> KnownAxis {
+    let ball = |&(z, radius): &(f64, f64)| Sphere::new(Vec3::new(0.0, 0.0, z), radius);
+    let spheres: Vec<Sphere> = CHAIN.iter().map(ball).collect();
+    let edges = (1..spheres.len() as u32).map(|i| [i - 1, i]).collect();
+    known(spheres, edges, vec![], 0.0)
+}
+
+/// The centre curve: its curvature is below one over the tube's radius, and it stays away from itself.
+pub(crate) fn tube() -> KnownAxis {
+    let curve = TUBE;
+    let Curve { start, end, .. } = curve;
+    let parts = 2 * CIRCLE_EDGES;
+    let at = |share: f64| (curve.place)(start + (end - start) * share);
+    let share = |i: u32, offset: f64| (f64::from(i) + offset) / f64::from(parts);
+    let spheres = (0..=parts).map(|i| Sphere::new(at(share(i, 0.0)), TUBE_RADIUS)).collect();
+    let edges = (0..parts).map(|i| [i, i + 1]).collect();
+    let sagging = (0..parts)
+        .map(|i| at(share(i, 0.5)).distance(at(share(i, 0.0)).midpoint(at(share(i, 1.0)))))
+        .fold(0.0, f64::max);
+    known(spheres, edges, vec![], 2.0 * sagging)
 }

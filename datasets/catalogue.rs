@@ -30,6 +30,8 @@ pub struct BuiltIn {
     pub(crate) known_axis: Option<fn() -> KnownAxis>,
     /// Bounding-box diagonal of the continuous shape, in its own unit.
     pub diagonal: f64,
+    /// Whether a comparison takes it where no mesh is named.
+    pub in_default: bool,
 }
 
 impl BuiltIn {
@@ -61,7 +63,10 @@ pub fn find(id: &str) -> Option<BuiltIn> {
 
 /// All built-in shapes, from simple to intricate.
 pub fn catalogue() -> Vec<BuiltIn> {
-    [convex(), tubular(), intricate()].concat()
+    let mut shapes = [convex(), tubular(), intricate()].concat();
+    shapes.extend(features());
+    shapes.extend(parts());
+    shapes
 }
 
 /// Convex solids.
@@ -77,6 +82,7 @@ fn convex() -> [BuiltIn; 5] {
             generate: shapes::sphere,
             known_axis: Some(axes::sphere),
             diagonal: shapes::SPHERE_DIAGONAL,
+            in_default: true,
         },
         BuiltIn {
             id: "ellipsoid",
@@ -88,6 +94,7 @@ fn convex() -> [BuiltIn; 5] {
             generate: shapes::ellipsoid,
             known_axis: Some(axes::ellipsoid),
             diagonal: shapes::ellipsoid_diagonal(),
+            in_default: true,
         },
         BuiltIn {
             id: "box",
@@ -99,6 +106,7 @@ fn convex() -> [BuiltIn; 5] {
             generate: shapes::cuboid,
             known_axis: Some(axes::cuboid),
             diagonal: shapes::diagonal_of(shapes::BOX_HALF),
+            in_default: true,
         },
         BuiltIn {
             id: "rounded-box",
@@ -110,6 +118,7 @@ fn convex() -> [BuiltIn; 5] {
             generate: shapes::rounded_box,
             known_axis: Some(axes::rounded_box),
             diagonal: shapes::diagonal_of(shapes::rounded_half()),
+            in_default: true,
         },
         BuiltIn {
             id: "plate",
@@ -121,6 +130,7 @@ fn convex() -> [BuiltIn; 5] {
             generate: shapes::plate,
             known_axis: Some(axes::plate),
             diagonal: shapes::diagonal_of(shapes::PLATE_HALF),
+            in_default: true,
         },
     ]
 }
@@ -136,8 +146,9 @@ fn tubular() -> [BuiltIn; 5] {
             default_resolution: 32,
             min_resolution: 8,
             generate: shapes::bracket,
-            known_axis: None,
+            known_axis: Some(axes::bracket),
             diagonal: shapes::bracket_diagonal(),
+            in_default: true,
         },
         BuiltIn {
             id: "capsule",
@@ -149,6 +160,7 @@ fn tubular() -> [BuiltIn; 5] {
             generate: shapes::capsule,
             known_axis: Some(axes::capsule),
             diagonal: shapes::capsule_diagonal(),
+            in_default: true,
         },
         BuiltIn {
             id: "rod",
@@ -160,6 +172,7 @@ fn tubular() -> [BuiltIn; 5] {
             generate: shapes::rod,
             known_axis: Some(axes::rod),
             diagonal: shapes::rod_diagonal(),
+            in_default: true,
         },
         BuiltIn {
             id: "pair",
@@ -171,6 +184,7 @@ fn tubular() -> [BuiltIn; 5] {
             generate: shapes::pair,
             known_axis: Some(axes::pair),
             diagonal: shapes::pair_diagonal(),
+            in_default: true,
         },
         BuiltIn {
             id: "torus",
@@ -182,6 +196,7 @@ fn tubular() -> [BuiltIn; 5] {
             generate: shapes::torus,
             known_axis: Some(axes::torus),
             diagonal: shapes::torus_diagonal(),
+            in_default: true,
         },
     ]
 }
@@ -199,6 +214,7 @@ fn intricate() -> [BuiltIn; 5] {
             generate: shapes::coil,
             known_axis: Some(axes::coil),
             diagonal: shapes::coil_diagonal(),
+            in_default: true,
         },
         BuiltIn {
             id: "hollow-sphere",
@@ -210,6 +226,7 @@ fn intricate() -> [BuiltIn; 5] {
             generate: shapes::hollow_sphere,
             known_axis: Some(axes::hollow_sphere),
             diagonal: shapes::SPHERE_DIAGONAL,
+            in_default: true,
         },
         BuiltIn {
             id: "double-torus",
@@ -221,6 +238,7 @@ fn intricate() -> [BuiltIn; 5] {
             generate: shapes::double_torus,
             known_axis: None,
             diagonal: shapes::DOUBLE_TORUS_DIAGONAL,
+            in_default: true,
         },
         BuiltIn {
             id: "frame",
@@ -232,6 +250,7 @@ fn intricate() -> [BuiltIn; 5] {
             generate: shapes::frame,
             known_axis: None,
             diagonal: shapes::FRAME_DIAGONAL,
+            in_default: true,
         },
         BuiltIn {
             id: "blob",
@@ -243,6 +262,115 @@ fn intricate() -> [BuiltIn; 5] {
             generate: shapes::blob,
             known_axis: None,
             diagonal: shapes::BLOB_DIAGONAL,
+            in_default: true,
+        },
+    ]
+}
+
+/// Convex solids and tubes with an axis that is known exactly, beside those that a comparison takes.
+fn features() -> [BuiltIn; 4] {
+    [
+        BuiltIn {
+            id: "wedge",
+            title: "Wedge",
+            summary: "Triangular prism with edges of 40 and 70 degrees; nine flat sheets, known exactly.",
+            expected_betti: [1, 0, 0],
+            default_resolution: 30,
+            min_resolution: 8,
+            generate: shapes::wedge,
+            known_axis: Some(axes::wedge),
+            diagonal: shapes::wedge_diagonal(),
+            in_default: false,
+        },
+        BuiltIn {
+            id: "frustum",
+            title: "Cone frustum",
+            summary: "Radii 0.8 and 0.4, height 2, sharp creases; its axis is a segment and two cones.",
+            expected_betti: [1, 0, 0],
+            default_resolution: 34,
+            min_resolution: 10,
+            generate: shapes::frustum,
+            known_axis: Some(axes::frustum),
+            diagonal: shapes::frustum_diagonal(),
+            in_default: false,
+        },
+        BuiltIn {
+            id: "chain",
+            title: "Chain of balls",
+            summary: "Hull of four balls in a row; its axis is a segment, the radius linear between centres.",
+            expected_betti: [1, 0, 0],
+            default_resolution: 40,
+            min_resolution: 12,
+            generate: shapes::chain,
+            known_axis: Some(axes::chain),
+            diagonal: shapes::chain_diagonal(),
+            in_default: false,
+        },
+        BuiltIn {
+            id: "tube",
+            title: "Swept tube",
+            summary: "Radius 0.22 about a curve of varying curvature, round ends; its axis is the curve.",
+            expected_betti: [1, 0, 0],
+            default_resolution: 44,
+            min_resolution: 20,
+            generate: shapes::tube,
+            known_axis: Some(axes::tube),
+            diagonal: shapes::tube_diagonal(),
+            in_default: false,
+        },
+    ]
+}
+
+/// Features of machine parts, each with a known axis.
+fn parts() -> [BuiltIn; 4] {
+    [
+        BuiltIn {
+            id: "fillet",
+            title: "Filleted bracket",
+            summary: "The bracket with a fillet of radius 0.3 in place of its reflex edge.",
+            expected_betti: [1, 0, 0],
+            default_resolution: 32,
+            min_resolution: 12,
+            generate: shapes::fillet,
+            known_axis: Some(axes::fillet),
+            diagonal: shapes::bracket_diagonal(),
+            in_default: false,
+        },
+        BuiltIn {
+            id: "rib",
+            title: "Plate with a rib",
+            summary: "A plate of 0.3 with a thin rib of 0.12 across it: two reflex edges close to each other.",
+            expected_betti: [1, 0, 0],
+            default_resolution: 40,
+            min_resolution: 16,
+            generate: shapes::rib,
+            known_axis: Some(axes::rib),
+            diagonal: shapes::rib_diagonal(),
+            in_default: false,
+        },
+        BuiltIn {
+            id: "holed-plate",
+            title: "Plate with a hole",
+            summary: "2.4 by 0.3 by 1.8 with a round hole of radius 0.5 through it, genus 1.",
+            expected_betti: [1, 1, 0],
+            default_resolution: 40,
+            min_resolution: 16,
+            generate: shapes::holed_plate,
+            known_axis: Some(axes::holed_plate),
+            diagonal: shapes::diagonal_of(shapes::HOLED_HALF),
+            in_default: false,
+        },
+        BuiltIn {
+            id: "blind-hole",
+            title: "Cylinder with a blind hole",
+            summary: "Radius 0.8 and height 1.2, a coaxial hole of radius 0.4 down to 0.45 above the bottom.",
+            expected_betti: [1, 0, 0],
+            default_resolution: 28,
+            min_resolution: 10,
+            generate: shapes::blind_hole,
+            known_axis: Some(axes::blind_hole),
+            diagonal: shapes::blind_hole_diagonal(),
+            in_default: false,
         },
     ]
 }

@@ -15,19 +15,24 @@
 mod axes;
 mod blocks;
 mod catalogue;
+mod curves;
+mod dropped;
 mod fields;
 mod geodesic;
 mod implicit;
 mod manifold;
 mod noise;
+mod planar;
+mod profiles;
 pub mod published;
 mod revolved;
 mod shapes;
+mod strips;
 mod torus;
 
 pub use axes::KnownAxis;
 pub use catalogue::{BuiltIn, MAX_RESOLUTION, catalogue, find};
-pub use noise::add_noise;
+pub use noise::{NoiseError, NoiseKind, add_noise, noisy};
 
 #[cfg(test)]
 #[allow(clippy::print_stdout)]

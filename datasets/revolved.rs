@@ -82,6 +82,59 @@ pub(crate) fn mirrored(top: &[Ring], stacks: u32) -> Vec<Ring> {
     top.iter().copied().chain(between).chain(bottom).collect()
 }
 
+/// A part of a profile, which is divided evenly.
+#[derive(Clone, Copy)]
+pub(crate) enum Piece {
+    /// A segment; both ends as radius and z.
+    Line { from: (f64, f64), to: (f64, f64) },
+    /// An arc about `(0, z)`; the angles are those to the z axis.
+    Zone { z: f64, radius: f64, from: f64, to: f64 },
+}
+
+impl Piece {
+    /// The segments between corners.
+    pub(crate) fn between(corners: &[(f64, f64)]) -> Vec<Self> {
+        corners.windows(2).map(|pair| Self::Line { from: pair[0], to: pair[1] }).collect()
+    }
+
+    /// Radius and z at a share of the way.
+    pub(crate) fn at(&self, t: f64) -> (f64, f64) {
+        match *self {
+            Self::Line { from, to } => {
+                (from.0 * (1.0 - t) + to.0 * t, from.1 * (1.0 - t) + to.1 * t)
+            }
+            Self::Zone { z, radius, from, to } => {
+                let (sin, cos) = (from * (1.0 - t) + to * t).sin_cos();
+                (radius * sin, z + radius * cos)
+            }
+        }
+    }
+
+    fn length(&self) -> f64 {
+        match *self {
+            Self::Line { from, to } => (to.0 - from.0).hypot(to.1 - from.1),
+            Self::Zone { radius, from, to, .. } => radius * (to - from),
+        }
+    }
+}
+
+/// The rings of a profile from pole to pole with edges of about `edge`: pieces in equal parts, and vertices of a
+/// ring in step with its radius.
+pub(crate) fn rings(pieces: &[Piece], edge: f64) -> Vec<Ring> {
+    let mut points = vec![pieces[0].at(0.0)];
+    for piece in pieces {
+        let n = parts(piece.length(), edge, 1);
+        points.extend((1..=n).map(|k| piece.at(f64::from(k) / f64::from(n))));
+    }
+    let last = points.len() - 1;
+    let ring = |(i, (radius, z)): (usize, (f64, f64))| match i {
+        // A pole is a pole, whatever the sine of pi is.
+        _ if i == 0 || i == last => Ring { count: 1, radius: 0.0, z },
+        _ => Ring { count: SECTORS * parts(TAU * radius / f64::from(SECTORS), edge, 1), radius, z },
+    };
+    points.into_iter().enumerate().map(ring).collect()
+}
+
 /// The number of equal parts of about `edge` in `length`, at least `least`.
 pub(crate) fn parts(length: f64, edge: f64, least: u32) -> u32 {
     ((length / edge).round() as u32).max(least)

@@ -6,10 +6,13 @@ use medial::Vec3;
 use medial::surface::TriMesh;
 
 use crate::blocks::{boundary, divided};
+use crate::curves::Curve;
 use crate::fields::{Blend, Ellipsoid, Part};
 use crate::geodesic::{frequency, joined, mapped, reversed, unit_sphere};
 use crate::implicit::{polygonise, slide};
-use crate::revolved::{Ring, SECTORS, cap, mirrored, parts, surface};
+use crate::profiles::{Elbow, Frustum, Rib};
+use crate::revolved::{Piece, Ring, SECTORS, cap, mirrored, parts, rings, surface};
+use crate::strips::{across_elbow, around_hole, strip, triangle};
 use crate::torus as torus_grid;
 
 /// Semi-axes of the ellipsoid.
@@ -40,6 +43,46 @@ pub(crate) const TORUS: (f64, f64) = (1.0, 0.4);
 pub(crate) const COIL: (f64, f64, f64, f64) = (1.0, 0.8, 2.0, 0.35);
 /// Radius of the cavity of the hollow sphere.
 pub(crate) const CAVITY: f64 = 0.5;
+/// The wedge: half its base, half its length, its height; the edge on top has 40 degrees.
+pub(crate) const WEDGE: Vec3 = Vec3::new(0.436_764_281_119_441_5, 0.8, 1.2);
+/// The bracket as a profile with a reflex corner, and with a fillet in its place.
+pub(crate) const BRACKET_ELBOW: Elbow = Elbow {
+    length: BRACKET.x,
+    height: BRACKET.z,
+    foot: BRACKET_THICKNESS,
+    leg: BRACKET_THICKNESS,
+    fillet: 0.0,
+    ends: true,
+};
+pub(crate) const FILLETED_ELBOW: Elbow = Elbow { fillet: 0.3, ..BRACKET_ELBOW };
+/// The plate with a rib, and half its width.
+pub(crate) const RIB: Rib = Rib { half: 1.0, plate: 0.3, half_rib: 0.06, height: 1.0 };
+pub(crate) const RIB_HALF: f64 = 0.4;
+/// Half the sides of the plate with a hole along y, and the radius of the hole.
+pub(crate) const HOLED_HALF: Vec3 = Vec3::new(1.2, 0.15, 0.9);
+pub(crate) const HOLE: f64 = 0.5;
+/// The frustum.
+pub(crate) const FRUSTUM: Frustum = Frustum { below: 0.8, above: 0.4, half: 1.0 };
+/// Radius of the cylinder with a blind hole; its wall as a leg, its bottom as half a foot.
+pub(crate) const BLIND_HOLE_RADIUS: f64 = 0.8;
+pub(crate) const BLIND_HOLE: Elbow = Elbow {
+    length: BLIND_HOLE_RADIUS,
+    height: 1.2,
+    foot: 0.45,
+    leg: 0.4,
+    fillet: 0.0,
+    ends: false,
+};
+/// Heights and radii of the balls of the chain, from the top.
+pub(crate) const CHAIN: [(f64, f64); 4] = [(1.1, 0.25), (0.4, 0.55), (-0.4, 0.6), (-1.1, 0.3)];
+/// The curve of the tube, of largest curvature about 2, and the tube's radius.
+pub(crate) const TUBE: Curve = Curve {
+    start: -1.6,
+    end: 1.6,
+    place: |t| Vec3::new(t, 0.4 * (2.0 * t).sin(), 0.15 * (3.0 * t).cos()),
+    derivative: |t| Vec3::new(1.0, 0.8 * (2.0 * t).cos(), -0.45 * (3.0 * t).sin()),
+};
+pub(crate) const TUBE_RADIUS: f64 = 0.22;
 
 pub(crate) const SPHERE_DIAGONAL: f64 = 3.464_101_615_137_754_6;
 /// Bounding-box diagonals of the blended shapes, as measured on fine meshes.
@@ -87,6 +130,34 @@ pub(crate) fn coil_diagonal() -> f64 {
     let (radius, pitch, turns, pipe) = COIL;
     let wide = radius + pipe;
     diagonal_of(Vec3::new(wide, wide, pitch * turns / 2.0 + pipe))
+}
+
+pub(crate) fn wedge_diagonal() -> f64 {
+    Vec3::new(2.0 * WEDGE.x, 2.0 * WEDGE.y, WEDGE.z).length()
+}
+
+pub(crate) fn rib_diagonal() -> f64 {
+    Vec3::new(2.0 * RIB.half, 2.0 * RIB_HALF, RIB.height).length()
+}
+
+pub(crate) fn frustum_diagonal() -> f64 {
+    diagonal_of(Vec3::new(FRUSTUM.below, FRUSTUM.below, FRUSTUM.half))
+}
+
+pub(crate) fn blind_hole_diagonal() -> f64 {
+    let wide = 2.0 * BLIND_HOLE_RADIUS;
+    Vec3::new(wide, wide, BLIND_HOLE.height).length()
+}
+
+pub(crate) fn chain_diagonal() -> f64 {
+    let widest = CHAIN.iter().map(|ball| ball.1).fold(0.0, f64::max);
+    let (top, bottom) = (CHAIN[0], CHAIN[CHAIN.len() - 1]);
+    Vec3::new(2.0 * widest, 2.0 * widest, top.0 + top.1 - (bottom.0 - bottom.1)).length()
+}
+
+/// The ends reach farthest along x; the crests of both waves farthest across.
+pub(crate) fn tube_diagonal() -> f64 {
+    diagonal_of(Vec3::new(1.6, 0.4, 0.15) + Vec3::splat(TUBE_RADIUS))
 }
 
 pub(crate) fn sphere(edge: f64) -> TriMesh {
@@ -182,7 +253,7 @@ fn coil_frame(along: f64) -> [Vec3; 3] {
 }
 
 /// A cylinder of the given half length and radius with a hemisphere at each end.
-fn capsule_of(half: f64, radius: f64, edge: f64) -> TriMesh {
+pub(crate) fn capsule_of(half: f64, radius: f64, edge: f64) -> TriMesh {
     let quarter = std::f64::consts::FRAC_PI_2;
     let steps = parts(quarter * radius, edge, 2);
     let top = cap(steps, |t| {
@@ -225,6 +296,77 @@ pub(crate) fn torus(edge: f64) -> TriMesh {
 pub(crate) fn hollow_sphere(edge: f64) -> TriMesh {
     let cavity = mapped(unit_sphere(frequency(CAVITY, edge)), |p| p * CAVITY);
     joined(sphere(edge), reversed(cavity))
+}
+
+pub(crate) fn wedge(edge: f64) -> TriMesh {
+    let Vec3 { x: half, y: half_length, z: height } = WEDGE;
+    // The base is shorter than the other sides: parts of about `edge` in their mean.
+    let mean_side = (2.0 * half + 2.0 * half.hypot(height)) / 3.0;
+    triangle(half, height, parts(mean_side, edge, 2)).prism(0.0, half_length, edge)
+}
+
+pub(crate) fn fillet(edge: f64) -> TriMesh {
+    let lines = across_elbow(&FILLETED_ELBOW, edge);
+    let half = BRACKET.y / 2.0;
+    strip(&lines, parts(BRACKET_THICKNESS, edge, 1), false).prism(half, half, edge)
+}
+
+pub(crate) fn rib(edge: f64) -> TriMesh {
+    let Rib { half, plate, half_rib, height } = RIB;
+    let ticks = [
+        divided(&[-half, -half_rib, half_rib, half], edge),
+        divided(&[-RIB_HALF, RIB_HALF], edge),
+        divided(&[0.0, plate, height], edge),
+    ];
+    boundary(&ticks, |p| p.z < plate || p.x.abs() < half_rib, |p| p)
+}
+
+pub(crate) fn holed_plate(edge: f64) -> TriMesh {
+    let Vec3 { x, y, z } = HOLED_HALF;
+    let corner = z.atan2(x);
+    // Between a side of the plate and its arc of the hole.
+    let upright = parts((2.0 * z + 2.0 * corner * HOLE) / 2.0, edge, 2);
+    let level = parts((2.0 * x + (TAU / 2.0 - 2.0 * corner) * HOLE) / 2.0, edge, 2);
+    let lines = around_hole(HOLE, [x, z], [upright, level]);
+    let mean_width = (x + z) / 2.0 - HOLE;
+    strip(&lines, parts(mean_width, edge, 1), true).prism(0.0, y, edge)
+}
+
+pub(crate) fn frustum(edge: f64) -> TriMesh {
+    let Frustum { below, above, half } = FRUSTUM;
+    let corners = [(0.0, half), (above, half), (below, -half), (0.0, -half)];
+    surface(&rings(&Piece::between(&corners), edge))
+}
+
+pub(crate) fn blind_hole(edge: f64) -> TriMesh {
+    let Elbow { height, foot, leg, .. } = BLIND_HOLE;
+    let (outer, inner) = (BLIND_HOLE_RADIUS, BLIND_HOLE_RADIUS - leg);
+    let corners =
+        [(0.0, foot), (inner, foot), (inner, height), (outer, height), (outer, 0.0), (0.0, 0.0)];
+    surface(&rings(&Piece::between(&corners), edge))
+}
+
+/// Zones of the balls, joined by the cones that touch both neighbours. At `(z, r)` and `(z', r')` the cone touches
+/// where the normal has the angle `acos((r' - r) / (z - z'))` to the axis.
+pub(crate) fn chain(edge: f64) -> TriMesh {
+    let touches = CHAIN.windows(2).map(|pair| {
+        let [(z, radius), (next_z, next_radius)] = [pair[0], pair[1]];
+        ((next_radius - radius) / (z - next_z)).acos()
+    });
+    let angles: Vec<f64> = [0.0].into_iter().chain(touches).chain([TAU / 2.0]).collect();
+    let mut pieces: Vec<Piece> = Vec::new();
+    for (&(z, radius), ends) in CHAIN.iter().zip(angles.windows(2)) {
+        let zone = Piece::Zone { z, radius, from: ends[0], to: ends[1] };
+        if let Some(last) = pieces.last() {
+            pieces.push(Piece::Line { from: last.at(1.0), to: zone.at(0.0) });
+        }
+        pieces.push(zone);
+    }
+    surface(&rings(&pieces, edge))
+}
+
+pub(crate) fn tube(edge: f64) -> TriMesh {
+    TUBE.tube(TUBE_RADIUS, edge)
 }
 
 pub(crate) fn double_torus(edge: f64) -> TriMesh {

@@ -1,16 +1,16 @@
 //! Every shape against an analytic depth function of its own: nothing shared with the generators.
 
 use medial::Vec3;
-use medial::complex::{MedialMesh, Sphere, betti};
+use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
 use medial::metrics::{spikes, triangle_quality};
-use medial::surface::{Normalisation, TriMesh};
+use medial::surface::{Normalisation, TriMesh, validate};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::fields::{Blend, Field};
 use crate::manifold::{euler, first_defect};
 use crate::shapes::{blob_field, double_torus_field, frame_field};
-use crate::{BuiltIn, add_noise, catalogue, find};
+use crate::{BuiltIn, NoiseError, NoiseKind, add_noise, catalogue, find, noisy};
 
 /// Distance from a point to the surface, positive inside.
 ///
@@ -33,8 +33,8 @@ fn depth(id: &str, p: Vec3) -> f64 {
             0.25 - beyond.max(Vec3::ZERO).length() - beyond.max_element().min(0.0)
         }
         "bracket" => {
-            let foot = in_box(p - Vec3::new(1.0, 0.5, 0.2), [1.0, 0.5, 0.2]);
-            foot.max(in_box(p - Vec3::new(0.2, 0.5, 0.75), [0.2, 0.5, 0.75]))
+            let sides = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.4], [0.4, 0.4], [0.4, 1.5], [0.0, 1.5]];
+            in_polygon(&sides, p.x, p.z).min(p.y).min(1.0 - p.y)
         }
         "capsule" => in_capsule(p, 0.8, 0.4),
         "rod" => (0.4 - rho).min((1.2 - p.z.abs() - rho) * 0.5f64.sqrt()),
@@ -45,11 +45,81 @@ fn depth(id: &str, p: Vec3) -> f64 {
         "torus" => 0.4 - (rho - 1.0).hypot(p.z),
         "coil" => in_coil(p),
         "hollow-sphere" => (1.0 - p.length()).min(p.length() - 0.5),
+        "wedge" => {
+            let half = 1.2 * 20f64.to_radians().tan();
+            in_polygon(&[[-half, 0.0], [half, 0.0], [0.0, 1.2]], p.x, p.z).min(0.8 - p.y.abs())
+        }
+        "frustum" => in_polygon(&[[-0.8, -1.0], [0.8, -1.0], [0.4, 1.0], [-0.4, 1.0]], rho, p.z),
+        "chain" => in_chain(rho, p.z),
+        "tube" => in_tube(p),
+        "fillet" => {
+            let inner = match (p.x < 0.7, p.z < 0.7) {
+                (true, true) => (p.x - 0.7).hypot(p.z - 0.7) - 0.3,
+                (true, false) => 0.4 - p.x,
+                (false, true) => 0.4 - p.z,
+                (false, false) => -1.0,
+            };
+            [p.x, p.z, 2.0 - p.x, 1.5 - p.z, p.y, 1.0 - p.y].into_iter().fold(inner, f64::min)
+        }
+        "rib" => {
+            let [a, w] = [1.0, 0.06];
+            let right = [[a, 0.0], [a, 0.3], [w, 0.3], [w, 1.0]];
+            let left = [[-w, 1.0], [-w, 0.3], [-a, 0.3], [-a, 0.0]];
+            in_polygon(&[right, left].concat(), p.x, p.z).min(0.4 - p.y.abs())
+        }
+        "holed-plate" => in_box(p, [1.2, 0.15, 0.9]).min(p.x.hypot(p.z) - 0.5),
+        "blind-hole" => {
+            let right = [[0.4, 0.45], [0.4, 1.2], [0.8, 1.2], [0.8, 0.0]];
+            let left = [[-0.8, 0.0], [-0.8, 1.2], [-0.4, 1.2], [-0.4, 0.45]];
+            in_polygon(&[right, left].concat(), rho, p.z)
+        }
         "double-torus" => in_blend(double_torus_field()),
         "frame" => in_blend(frame_field()),
         "blob" => in_blend(blob_field()),
         other => panic!("{other} has no depth function"),
     }
+}
+
+/// Distance to the nearest side of a polygon, positive inside, which the number of sides to the right decides.
+fn in_polygon(corners: &[[f64; 2]], x: f64, z: f64) -> f64 {
+    let p = Vec3::new(x, 0.0, z);
+    let (mut nearest, mut inside) = (f64::INFINITY, false);
+    for (i, &[ax, az]) in corners.iter().enumerate() {
+        let [bx, bz] = corners[(i + 1) % corners.len()];
+        nearest =
+            nearest.min(distance_to_segment(p, Vec3::new(ax, 0.0, az), Vec3::new(bx, 0.0, bz)));
+        inside ^= (az > z) != (bz > z) && x < ax + (bx - ax) * (z - az) / (bz - az);
+    }
+    if inside { nearest } else { -nearest }
+}
+
+/// The least of a function about the best of `steps` samples, by ternary search.
+fn least(low: f64, high: f64, steps: u32, of: impl Fn(f64) -> f64) -> f64 {
+    let width = (high - low) / f64::from(steps);
+    let samples = (0..=steps).map(|i| low + width * f64::from(i));
+    let best = samples.min_by(|&a, &b| of(a).total_cmp(&of(b))).unwrap();
+    let (mut lo, mut hi) = ((best - width).max(low), (best + width).min(high));
+    for _ in 0..100 {
+        let third = (hi - lo) / 3.0;
+        if of(lo + third) < of(hi - third) { hi -= third } else { lo += third }
+    }
+    of(lo)
+}
+
+/// By the planes that bound a convex solid: the one in each direction touches some ball.
+fn in_chain(rho: f64, z: f64) -> f64 {
+    let balls = [(1.1, 0.25), (0.4, 0.55), (-0.4, 0.6), (-1.1, 0.3)];
+    least(0.0, std::f64::consts::PI, 400, |angle| {
+        let (sin, cos) = angle.sin_cos();
+        let support = balls.iter().map(|(z, r)| z * cos + r).fold(f64::NEG_INFINITY, f64::max);
+        support - rho * sin - z * cos
+    })
+}
+
+/// By brute force over the curve.
+fn in_tube(p: Vec3) -> f64 {
+    let at = |t: f64| p.distance(Vec3::new(t, 0.4 * (2.0 * t).sin(), 0.15 * (3.0 * t).cos()));
+    0.22 - least(-1.6, 1.6, 300, at)
 }
 
 /// By brute force over the turns of the helix, then by ternary search about the best.
@@ -58,14 +128,7 @@ fn in_coil(p: Vec3) -> f64 {
         let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
         p.distance(Vec3::new(cos, sin, 0.8 * turn))
     };
-    let steps = (-400..=400).map(|i| f64::from(i) / 400.0);
-    let best = steps.min_by(|&a, &b| at(a).total_cmp(&at(b))).unwrap();
-    let (mut lo, mut hi) = ((best - 0.0025).max(-1.0), (best + 0.0025).min(1.0));
-    for _ in 0..100 {
-        let third = (hi - lo) / 3.0;
-        if at(lo + third) < at(hi - third) { hi -= third } else { lo += third }
-    }
-    0.35 - at(lo)
+    0.35 - least(-1.0, 1.0, 800, at)
 }
 
 /// By brute force over the angles of the surface, then by a pattern search from the best.
@@ -179,7 +242,7 @@ fn default_meshes_have_a_few_thousand_vertices_with_edges_as_announced() {
 fn the_catalogue_is_consistent() {
     let shapes = catalogue();
     let mut ids: Vec<_> = shapes.iter().map(|shape| shape.id).collect();
-    assert_eq!(shapes.iter().filter(|shape| shape.axis().is_some()).count(), 11);
+    assert_eq!(shapes.iter().filter(|shape| shape.axis().is_some()).count(), 20);
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), shapes.len());
@@ -337,6 +400,73 @@ fn noise_is_uniform_in_the_ball_repeatable_and_in_proportion() {
 }
 
 #[test]
+fn noise_along_normals_moves_along_them() {
+    let mesh = find("sphere").unwrap().mesh(60);
+    let diagonal = Normalisation::of(&mesh).unwrap().diagonal;
+    let noisy = |eta: f64, seed: u64| noisy(&mesh, NoiseKind::Normal, eta, seed).unwrap();
+    let moved = |eta: f64, seed: u64| -> Vec<Vec3> {
+        let pairs = noisy(eta, seed).vertices.into_iter().zip(&mesh.vertices);
+        pairs.map(|(n, v)| (n - v) / (eta * diagonal)).collect()
+    };
+    let first = moved(0.02, 5);
+    assert_eq!(first, moved(0.02, 5));
+    assert_ne!(first, moved(0.02, 6));
+    assert!(first.iter().zip(moved(0.01, 5)).all(|(a, b)| a.distance(b) < 1e-9));
+    let n = first.len() as f64;
+    for (by, v) in first.iter().zip(&mesh.vertices) {
+        // The normal of a mesh is nearly that of the sphere.
+        assert!(by.length() <= 1.0 + 1e-12 && by.reject_from(*v).length() < 0.02, "{by} at {v}");
+    }
+    let along: Vec<f64> = first.iter().zip(&mesh.vertices).map(|(by, &v)| by.dot(v)).collect();
+    // Uniform from -1 to 1: mean 0, mean square 1/3 of variance 4/45.
+    let mean = along.iter().sum::<f64>() / n;
+    let square = along.iter().map(|x| x * x).sum::<f64>() / n;
+    assert!(mean.abs() < 4.0 / (3.0 * n).sqrt(), "{mean}");
+    assert!((square - 1.0 / 3.0).abs() < 4.0 * (4.0 / 45.0 / n).sqrt() + 1e-3, "{square}");
+    assert_eq!(noisy(0.0, 5), mesh);
+}
+
+#[test]
+fn dropped_samples_leave_a_closed_embedded_surface_of_the_same_topology() {
+    for shape in catalogue() {
+        let mesh = shape.mesh(shape.default_resolution);
+        let dropped = |seed: u64| noisy(&mesh, NoiseKind::Dropped, 0.3, seed).unwrap();
+        let left = dropped(1);
+        let id = shape.id;
+        assert_eq!(left, dropped(1), "{id}");
+        assert_ne!(left, dropped(2), "{id}");
+        let gone = (0.3 * mesh.vertices.len() as f64).round() as usize;
+        assert_eq!(left.vertices.len() + gone, mesh.vertices.len(), "{id}");
+        assert_eq!((first_defect(&left), euler(&left)), (None, euler(&mesh)), "{id}");
+        let report = validate(&left).unwrap();
+        assert!(!report.self_intersecting, "{id}");
+        // Those left are vertices of before, in their order.
+        let mut before = mesh.vertices.iter();
+        assert!(left.vertices.iter().all(|v| before.any(|b| b == v)), "{id}");
+        assert!((volume(&left) / volume(&mesh) - 1.0).abs() < 0.05, "{id}");
+    }
+}
+
+#[test]
+fn noise_that_cannot_be_is_refused() {
+    let mesh = find("sphere").unwrap().mesh(0);
+    let refused = |kind, magnitude| noisy(&mesh, kind, magnitude, 0).unwrap_err();
+    for kind in NoiseKind::ALL {
+        assert_eq!(kind.to_string().parse(), Ok(kind));
+        assert_eq!(refused(kind, 1.5), NoiseError::Magnitude { kind, magnitude: 1.5 });
+        assert!(refused(kind, f64::NAN).to_string().contains("from 0 to 1"));
+    }
+    assert!("loud".parse::<NoiseKind>().unwrap_err().to_string().contains("isotropic, normal"));
+    // A sphere needs four vertices at least.
+    let all = refused(NoiseKind::Dropped, 1.0);
+    assert!(matches!(all, NoiseError::TooFew { asked, dropped, .. } if dropped < asked), "{all}");
+    let mut open = mesh.clone();
+    open.faces.pop();
+    let open = noisy(&open, NoiseKind::Dropped, 0.1, 0).unwrap_err();
+    assert!(matches!(&open, NoiseError::NotManifold(why) if why.contains("no opposite")), "{open}");
+}
+
+#[test]
 fn defects_are_found() {
     let closed = find("sphere").unwrap().mesh(0);
     assert_eq!(first_defect(&closed), None);
@@ -357,4 +487,83 @@ fn defects_are_found() {
         mesh.faces.extend(copy);
     });
     assert!(pinched.contains("more than one fan"));
+}
+
+/// The union of the axis's balls and the solid are one set, and as deep everywhere: an axis that lacks a part
+/// leaves points too shallow, one that has too much buries points outside.
+#[test]
+fn the_balls_of_a_known_axis_reproduce_the_solid() {
+    let mut random = Pcg64::seed_from_u64(13);
+    for shape in catalogue() {
+        let Some(axis) = shape.axis() else { continue };
+        let union = MedialUnion::new(&axis.mesh).unwrap();
+        let (low, high) = shape.mesh(shape.default_resolution).bounding_box().unwrap();
+        let margin = 0.1 * (high - low);
+        let count = if shape.id == "ellipsoid" { 40 } else { 2000 };
+        let (mut inside, mut outside) = (0, 0);
+        for _ in 0..count {
+            let p = low - margin + (high - low + 2.0 * margin) * unit_cube(&mut random);
+            let (signed, depth) = (union.signed(p), depth(shape.id, p));
+            let bound = axis.tolerance + 1e-9;
+            if depth > 0.0 {
+                inside += 1;
+                assert!((signed + depth).abs() <= bound, "{}: {p}, {signed} {depth}", shape.id);
+            } else {
+                outside += 1;
+                assert!(signed >= -bound, "{}: {p} outside is {signed:e} deep", shape.id);
+            }
+        }
+        assert!(inside > count / 20 && outside > count / 20, "{}", shape.id);
+    }
+}
+
+fn unit_cube(random: &mut Pcg64) -> Vec3 {
+    Vec3::new(random.random(), random.random(), random.random())
+}
+
+/// Directions in which a ball touches the surface, by pattern searches from directions all around.
+fn contacts(id: &str, Sphere { centre, radius }: Sphere, tolerance: f64) -> Vec<Vec3> {
+    const STARTS: u32 = 60;
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let gap = |u: Vec3| depth(id, centre + radius * u);
+    let mut found = Vec::new();
+    for i in 0..STARTS {
+        let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(STARTS);
+        let (sin, cos) = (golden * f64::from(i)).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        let mut at = Vec3::new(across * cos, across * sin, z);
+        let (mut least, mut step) = (gap(at), 0.2);
+        while step > 1e-6 && least > tolerance {
+            let (u, v) = at.any_orthonormal_pair();
+            let around = [u, -u, v, -v].map(|d| (at + step * d).normalize());
+            match around.into_iter().map(|d| (gap(d), d)).find(|(gap, _)| *gap < least) {
+                Some(better) => (least, at) = better,
+                None => step /= 2.0,
+            }
+        }
+        if least <= tolerance {
+            found.push(at);
+        }
+    }
+    found
+}
+
+/// What makes a point medial: its ball touches the surface in two places at least.
+#[test]
+fn the_balls_of_a_known_axis_touch_the_surface_twice() {
+    let mut random = Pcg64::seed_from_u64(14);
+    for shape in catalogue() {
+        let Some(axis) = shape.axis() else { continue };
+        let sampled = points_of(&axis.mesh, &mut random, 200);
+        // At a convex edge the ball is a point.
+        let thick = |ball: &&Sphere| ball.radius > 0.01 * shape.diagonal;
+        let balls: Vec<&Sphere> = sampled.iter().rev().filter(thick).collect();
+        let wanted = if shape.id == "ellipsoid" { 3 } else { 25 };
+        for ball in balls.iter().step_by((balls.len() / wanted).max(1)) {
+            let touched = contacts(shape.id, **ball, 2.0 * axis.tolerance + 1e-6);
+            let pairs = touched.iter().flat_map(|a| touched.iter().map(|b| a.angle_between(*b)));
+            let widest = pairs.fold(0.0, f64::max).to_degrees();
+            assert!(widest > 20.0, "{}: {ball:?} touches within {widest} degrees", shape.id);
+        }
+    }
 }

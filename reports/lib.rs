@@ -9,6 +9,7 @@
 //! | `metric` | the columns: name, unit, direction, definition |
 //! | `summary` | means over meshes at equal numbers of spheres |
 //! | `purpose` | which method for which purpose, method against method |
+//! | `convergence` | how computed axes come near to known ones: orders, tables, plots |
 //! | `scaling` | how time and memory grow with the input |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
@@ -23,6 +24,7 @@
 //! | `write` | [`write_report`], all of it into one folder |
 
 mod comparison;
+mod convergence;
 pub mod diff;
 mod equal_error;
 mod error;
@@ -48,6 +50,10 @@ mod text;
 mod view3d;
 mod write;
 
+pub use convergence::{
+    AxisSet, ConvergenceFit, ConvergenceRecord, ConvergenceReport, FAR, Measure, Order,
+    convergence_report, fitted_order,
+};
 pub use error::ReportError;
 pub use extras::{
     AxisShift, BASELINES, Baseline, NoiseRecord, ORACLES, STABILITY, read_lines, write_lines,

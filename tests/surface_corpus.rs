@@ -1,7 +1,5 @@
 //! Every mesh and every bad file of the shared collection, where it is present.
 
-use std::collections::HashMap;
-use std::fs;
 
 use medial::surface::{self, Fault, Repair};
 use medial_test_support::table;

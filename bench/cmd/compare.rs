@@ -20,7 +20,8 @@ use crate::run::{
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface files (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: all built-in shapes].
+    /// Surface files (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: the built-in shapes that
+    /// `datasets list` says].
     meshes: Vec<MeshArgument>,
     /// A set of meshes beside those named: `builtin`, `public`, `defective`, `small`, `papers`, `added`, a package as in
     /// `deb:libcgal-demo`, or the name of one mesh; can be given several times.

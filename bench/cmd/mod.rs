@@ -7,6 +7,7 @@ pub mod collect;
 pub mod compare;
 mod compat;
 pub mod completions;
+pub mod convergence;
 pub mod convert;
 pub mod datasets;
 pub mod diff;

@@ -27,7 +27,8 @@ use crate::run::{
 /// Arguments of `stability`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface files (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: all built-in shapes].
+    /// Surface files (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: the built-in shapes that
+    /// `datasets list` says].
     meshes: Vec<MeshArgument>,
     /// Methods, separated by commas, each with parameters of its own if wanted [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]

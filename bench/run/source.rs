@@ -113,10 +113,15 @@ impl Source {
         }
     }
 
-    /// All built-in shapes at their default resolutions, in the order of the catalogue.
+    /// The built-in shapes that a comparison takes where none is named, at their default resolutions, in the
+    /// order of the catalogue.
     pub fn built_ins() -> Vec<Self> {
         let shapes = medial_datasets::catalogue();
-        shapes.iter().map(|shape| Self::BuiltIn { id: shape.id.into(), resolution: None }).collect()
+        shapes
+            .iter()
+            .filter(|shape| shape.in_default)
+            .map(|shape| Self::BuiltIn { id: shape.id.into(), resolution: None })
+            .collect()
     }
 
     /// Name for tables: the file's stem, the name in the library, or the id of the built-in shape.

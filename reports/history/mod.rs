@@ -25,3 +25,4 @@ pub use findings::{Change, Difference, Findings, FoundStep, Group, Quantity, Sha
 pub use folder::History;
 pub use night::{Figures, Night, SeriesName};
 pub use steps::{Step, StepOptions, steps};
+pub(crate) use student::beyond;

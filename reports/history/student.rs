@@ -25,7 +25,7 @@ pub(super) fn both_tails(t: f64, freedom: usize) -> f64 {
 }
 
 /// The value beyond which, on both sides, lies the probability `tails`.
-pub(super) fn beyond(tails: f64, freedom: usize) -> f64 {
+pub(crate) fn beyond(tails: f64, freedom: usize) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     while both_tails(high, freedom) > tails && high < 1e9 {
         high *= 2.0;

@@ -2,6 +2,7 @@
 
 mod axis;
 mod bars;
+mod convergence;
 mod extras;
 mod figure;
 mod palette;
@@ -24,6 +25,7 @@ use self::bars::Bars;
 use self::figure::{Curve, Figure};
 use self::points::{Drawing, Origin};
 
+pub(crate) use self::convergence::{ConvergenceCurve, against_edge_length};
 pub(crate) use self::extras::{NoiseCurve, against_noise, against_numbers};
 pub(crate) use self::figure::FONTS;
 pub(crate) use self::palette::{BASELINE, style};

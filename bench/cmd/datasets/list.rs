@@ -29,6 +29,10 @@ pub(super) fn list(global: &Global) -> Result<(), Failure> {
         return Ok(());
     }
     shapes.iter().for_each(print_shape);
+    let in_default = shapes.iter().filter(|shape| shape.in_default).count();
+    print_line(&format!(
+        "compare and stability take the first {in_default} where no mesh is named"
+    ));
     for set in Set::ALL {
         print_set(set, &states);
     }
@@ -47,6 +51,7 @@ fn shape(shape: &BuiltIn) -> Value {
         "betti": shape.expected_betti,
         "default_resolution": shape.default_resolution,
         "known_axis": shape.axis().is_some(),
+        "in_default": shape.in_default,
     })
 }
 

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use medial::surface;
+use medial_datasets::NoiseKind;
 use serde_json::json;
 
 use crate::args::Global;
@@ -46,9 +47,14 @@ struct Make {
     /// Resolution, in the shape's own meaning [default: that of `compare`].
     #[arg(long)]
     resolution: Option<u32>,
-    /// Displace every vertex at random, uniformly in a ball of this fraction of the diagonal.
+    /// Noise of this magnitude, at most 1: the largest displacement of a vertex as a fraction of the diagonal; for
+    /// `dropped` the share of vertices.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     noise: f64,
+    /// Kind of the noise: `isotropic` displaces vertices uniformly in a ball, `normal` along their normals; `dropped`
+    /// removes vertices, the surface staying closed and embedded.
+    #[arg(long, value_name = "KIND", default_value_t)]
+    noise_kind: NoiseKind,
     /// Seed of the noise.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -71,17 +77,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 fn write(make: &Make, global: &Global) -> Result<(), Failure> {
     let source = Source::BuiltIn { id: make.id.clone(), resolution: make.resolution };
     let input = Input::load(&source).map_err(Failure::usage)?;
-    if !(0.0..=1.0).contains(&make.noise) {
-        return Err(Failure::usage(format!("--noise {}: a fraction from 0 to 1", make.noise)));
-    }
-    let mut mesh = input.mesh;
-    if make.noise > 0.0 {
-        mesh = medial_datasets::add_noise(&mesh, make.noise, make.seed);
-    }
+    let mesh = medial_datasets::noisy(&input.mesh, make.noise_kind, make.noise, make.seed);
+    let mesh = mesh.map_err(|error| Failure::usage(format!("--noise: {error}")))?;
     surface::write(&make.output, &mesh).map_err(Failure::input)?;
     let object = json!({
         "id": make.id, "output": make.output, "vertices": mesh.vertices.len(),
-        "faces": mesh.faces.len(), "noise": make.noise, "seed": make.seed,
+        "faces": mesh.faces.len(), "noise": make.noise, "noise_kind": make.noise_kind,
+        "seed": make.seed,
     });
     if global.json {
         print_json(&object, &[]);

@@ -76,7 +76,7 @@ impl Study {
         Ok(found)
     }
 
-    /// The inputs of the study: those named and those of the set; all built-in shapes where there
+    /// The inputs of the study: those named and those of the set; [`Source::built_ins`] where there
     /// are none.
     ///
     /// # Errors
