@@ -1,6 +1,5 @@
 //! Every mesh and every bad file of the shared collection, where it is present.
 
-
 use medial::surface::{self, Fault, Repair};
 use medial_test_support::table;
 
