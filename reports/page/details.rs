@@ -124,6 +124,9 @@ fn repeat_command(record: &Record) -> String {
     words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
 }
 
+/// The sets whose meshes `dataset:NAME` names.
+const LIBRARY: [&str; 5] = ["public", "defective", "small", "papers", "added"];
+
 /// The mesh as it was named on the command line of the run, as far as it stands there; else its name.
 fn mesh_argument(record: &Record) -> String {
     let is_named = |word: &str| {
@@ -146,8 +149,9 @@ fn mesh_argument(record: &Record) -> String {
         Some(word) => word.to_owned(),
         None => match record.dataset.as_deref() {
             Some("builtin") => format!("builtin:{}", record.mesh),
-            Some(_) => format!("dataset:{}", record.mesh),
-            None => record.mesh.clone(),
+            Some(set) if LIBRARY.contains(&set) => format!("dataset:{}", record.mesh),
+            // A set of others, whose meshes have no name here.
+            _ => record.mesh.clone(),
         },
     }
 }
@@ -190,6 +194,8 @@ mod tests {
         assert_eq!(repeat_command(&of), "medial simplify builtin:bear -m qmat --level 0.25");
         of.dataset = Some("public".to_owned());
         assert_eq!(repeat_command(&of), "medial simplify dataset:bear -m qmat --level 0.25");
+        of.dataset = Some("of-others".to_owned());
+        assert_eq!(repeat_command(&of), "medial simplify bear -m qmat --level 0.25");
     }
 
     #[test]
