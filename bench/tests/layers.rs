@@ -105,8 +105,9 @@ const BENCH: Layers<'_> = &[
     &["check"],
     &["run"],
     &["exit"],
-    &["args", "files", "interrupt"],
+    &["args", "interrupt"],
     &["output"],
+    &["files"],
     &["cmd"],
     &["cli"],
 ];

@@ -112,7 +112,7 @@ const STEPS: usize = 60;
 /// How much worse than the optimum a convention may fit to be preferred, as a factor or as a mean of `|D(c) - r|`: the optimum has four
 /// parameters to follow the errors of the medial mesh.
 const PREFERENCE: f64 = 2.0;
-const CLOSE: f64 = 0.005;
+const CLOSE: f64 = 0.01;
 
 /// The share of centres that must lie in the solid for units to be believed of points without radii.
 const INSIDE: f64 = 0.95;
