@@ -40,11 +40,16 @@ pub fn announce(slow: &[(&str, f64)]) {
     let listed = String::from_utf8_lossy(&listed.stdout);
     let names: Vec<&str> =
         listed.lines().filter_map(|line| line.strip_suffix(": benchmark")).collect();
+    // Nothing of this program meets the filter.
+    if names.is_empty() {
+        return;
+    }
     let each = (WARM_UP + MEASURED).as_secs_f64();
     let longer = |name: &&str| -> f64 {
         slow.iter().find(|(part, _)| name.contains(part)).map_or(0.0, |(_, seconds)| *seconds)
     };
-    let more: f64 = names.iter().map(longer).sum();
+    // The sum of nothing is -0, which would be told.
+    let more = names.iter().map(longer).sum::<f64>() + 0.0;
     let seconds = names.len() as f64 * each + more;
     let quick = if has("--quick") { "; with --quick much less" } else { "" };
     let _ = writeln!(
