@@ -161,7 +161,13 @@ impl<'a> Decoder<'a> {
         };
         let source = Source { data, is_base64, array };
         if self.coding.is_compressed {
-            return self.inflated(&source, expected);
+            let bytes = self.inflated(&source, expected)?;
+            // A header of no block that still names a last one adds up, and holds nothing.
+            let found = bytes.len() as u64;
+            return match found == expected {
+                true => Ok(bytes),
+                false => Err(VtpError::Length { array: array.label.clone(), expected, found }),
+            };
         }
         let word = self.coding.header;
         let length = self.unsigned(&source.take(0, word)?);

@@ -301,9 +301,8 @@ impl Piece<'_> {
             if end < start || end > last {
                 return Err(VtpError::Offsets { element, cell, end });
             }
-            // An array may hold fewer numbers than its offsets promise; points fit 32 bits.
-            let members = members.get(start as usize..end as usize);
-            let members = members.ok_or(VtpError::Offsets { element, cell, end })?;
+            // Below the number of members, which are in memory; points fit 32 bits.
+            let members = &members[start as usize..end as usize];
             cells.push(members.iter().map(|&point| point as u32).collect());
             start = end;
         }
