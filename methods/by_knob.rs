@@ -76,10 +76,14 @@ impl Simplification for ByKnob<'_> {
             return self.of_own_value(level);
         };
         let Self { prepare, search, native, .. } = self;
-        search.at(count, *native, |value| {
-            let Simplified { mesh, diagnostics, .. } =
-                prepare(Some(value))?.at(Level::Native(*native))?;
-            Ok(Probe { mesh, diagnostics })
-        })
+        search.at(
+            count,
+            |_| *native,
+            |value| {
+                let Simplified { mesh, diagnostics, .. } =
+                    prepare(Some(value))?.at(Level::Native(*native))?;
+                Ok(Probe { mesh, diagnostics })
+            },
+        )
     }
 }

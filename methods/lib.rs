@@ -9,6 +9,7 @@ use medial::simplifier::MedialSimplifier;
 pub mod angle;
 pub mod aof;
 mod by_knob;
+pub mod coverage_axis;
 pub mod dey_zhao;
 pub mod hem;
 pub mod initial;
@@ -41,6 +42,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(sat_pairwise::method()),
         Box::new(tam_heidrich::method()),
         Box::new(aof::method()),
+        Box::new(coverage_axis::method(qmat::keeping)),
     ]
 }
 

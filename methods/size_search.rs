@@ -91,8 +91,8 @@ impl SizeSearch {
         Self { knob, run: run.clone(), probes: Reuse::new() }
     }
 
-    /// The result with the nearest count from below that the search meets, at a native level that stays
-    /// the same.
+    /// The result with the nearest count from below that the search meets. `native` tells the native
+    /// level of a value.
     ///
     /// # Errors
     /// Those of `make` that do not depend on the value; [`SimplifyError::Unsupported`] where no value tried
@@ -100,7 +100,7 @@ impl SizeSearch {
     pub(crate) fn at(
         &mut self,
         count: usize,
-        native: f64,
+        native: impl Fn(f64) -> f64,
         make: impl Fn(f64) -> Result<Probe, SimplifyError>,
     ) -> Result<Simplified, SimplifyError> {
         self.probes.begin();
@@ -125,7 +125,7 @@ impl SizeSearch {
         Ok(Simplified {
             mesh: probe.mesh.clone(),
             asked: Level::Spheres(count),
-            native_level: Some(native),
+            native_level: Some(native(value)),
             work: self.probes.work(),
             diagnostics,
             extras: Extras::default(),

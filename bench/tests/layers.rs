@@ -49,6 +49,7 @@ fn methods_do_not_see_each_other() {
     let ids = [
         "angle",
         "aof",
+        "coverage_axis",
         "dey_zhao",
         "hem",
         "lambda",

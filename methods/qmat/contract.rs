@@ -23,8 +23,45 @@ pub(super) struct Contraction {
     complex: CollapseComplex,
     quadrics: Vec<Quadric>,
     queue: CollapseQueue,
+    /// Spheres that stay as they are; none where the vector is empty.
+    kept: Kept,
     skipped: Skipped,
     tally: Tally,
+}
+
+/// Spheres that stay as they are.
+#[derive(Clone, Debug, Default)]
+struct Kept(Vec<bool>);
+
+/// Where an edge may be collapsed to.
+enum Freedom {
+    Anywhere,
+    /// Onto the end that is kept.
+    Onto(Sphere),
+    /// Both ends are kept.
+    Nowhere,
+}
+
+impl Kept {
+    fn has(&self, v: u32) -> bool {
+        self.0.get(v as usize).copied().unwrap_or(false)
+    }
+
+    fn freedom(&self, complex: &CollapseComplex, [a, b]: [u32; 2]) -> Freedom {
+        match (self.has(a), self.has(b)) {
+            (false, false) => Freedom::Anywhere,
+            (true, false) => Freedom::Onto(complex.sphere(a)),
+            (false, true) => Freedom::Onto(complex.sphere(b)),
+            (true, true) => Freedom::Nowhere,
+        }
+    }
+
+    /// The merged sphere goes by the id `kept` from now on.
+    fn merge(&mut self, kept: u32, removed: u32) {
+        if self.has(removed) {
+            self.0[kept as usize] = true;
+        }
+    }
 }
 
 /// Counts of what happened to popped candidates.
@@ -90,6 +127,14 @@ impl Folded {
 impl Contraction {
     /// Steps 1 and 2: quadrics of all spheres, costs of all edges.
     pub(super) fn new(mesh: &MedialMesh, params: QmatParams) -> Self {
+        Self::keeping(mesh, params, &[])
+    }
+
+    /// As [`Contraction::new`]; some spheres stay as they are, and what is merged with one becomes it.
+    pub(super) fn keeping(mesh: &MedialMesh, params: QmatParams, kept: &[u32]) -> Self {
+        let mut marks = vec![false; if kept.is_empty() { 0 } else { mesh.spheres.len() }];
+        kept.iter().for_each(|&v| marks[v as usize] = true);
+        let kept = Kept(marks);
         let complex = CollapseComplex::from_mesh(mesh);
         // The oracle of the tests replays the collapses.
         #[cfg(test)]
@@ -99,10 +144,10 @@ impl Contraction {
             .edges
             .par_iter()
             .with_min_len(LARGE_STAR)
-            .map(|&ends| candidate(&complex, &quadrics, &params, ends))
+            .filter_map(|&ends| candidate(&complex, &quadrics, &params, &kept, ends))
             .collect();
         let queue = CollapseQueue::from_candidates(candidates);
-        Self { params, complex, quadrics, queue, skipped, tally: Tally::default() }
+        Self { params, complex, quadrics, queue, kept, skipped, tally: Tally::default() }
     }
 
     /// The parameters that it is run with.
@@ -124,7 +169,9 @@ impl Contraction {
     pub(super) fn sorted_candidates(&self) -> Vec<Candidate> {
         let edges = self.complex.edges();
         let mut all: Vec<_> = edges
-            .map(|ends| candidate(&self.complex, &self.quadrics, &self.params, ends))
+            .filter_map(|ends| {
+                candidate(&self.complex, &self.quadrics, &self.params, &self.kept, ends)
+            })
             .collect();
         all.sort_by(Candidate::order);
         all
@@ -187,6 +234,11 @@ impl Contraction {
         self.place(candidate)
     }
 
+    /// Whether some spheres stay as they are.
+    pub(super) fn keeps_spheres(&self) -> bool {
+        !self.kept.0.is_empty()
+    }
+
     /// Whether a collapse has to keep the topology now.
     pub(super) fn keeps_topology(&self) -> bool {
         self.params.topology_from.applies(self.sphere_count())
@@ -195,9 +247,15 @@ impl Contraction {
     /// Step 4: where the merged sphere goes.
     pub(super) fn place(&self, candidate: Candidate) -> Decision {
         let [a, b] = candidate.ends();
+        let mut faces = Folded::default();
+        if let Freedom::Onto(sphere) = self.kept.freedom(&self.complex, [a, b]) {
+            return match faces.holds(&self.complex, [a, b], sphere) {
+                true => Decision::Fold(faces),
+                false => Decision::Collapse(sphere),
+            };
+        }
         let (quadric, ends) = edge_quadric(&self.complex, &self.quadrics, [a, b]);
         let optimum = minimise(&quadric, ends, self.params.singular_ratio);
-        let mut faces = Folded::default();
         if !faces.holds(&self.complex, [a, b], optimum) {
             return Decision::Collapse(optimum);
         }
@@ -219,20 +277,21 @@ impl Contraction {
     /// Step 5: the collapse, the sum of the quadrics, new costs for the edges of the merged sphere,
     /// whose id is returned.
     fn merge(&mut self, [a, b]: [u32; 2], sphere: Sphere) -> u32 {
-        let Self { params, complex, quadrics, queue, tally, .. } = self;
+        let Self { params, complex, quadrics, queue, kept: marks, tally, .. } = self;
         let degree = |v| complex.neighbours(v).len();
         // Rename the smaller star, so that a growing hub is not rewritten at every collapse.
         let [kept, removed] = if degree(a) >= degree(b) { [a, b] } else { [b, a] };
         complex.collapse(kept, removed, sphere);
+        marks.merge(kept, removed);
         let gone = quadrics[removed as usize];
         quadrics[kept as usize] += &gone;
         let around = complex.neighbours(kept);
         // Both branches push in the order of the neighbours: results do not depend on threads.
-        let renewed = |&v: &u32| candidate(complex, quadrics, params, [kept, v]);
+        let renewed = |&v: &u32| candidate(complex, quadrics, params, marks, [kept, v]);
         if around.len() < LARGE_STAR {
-            around.iter().for_each(|v| queue.push(renewed(v)));
+            around.iter().filter_map(renewed).for_each(|candidate| queue.push(candidate));
         } else {
-            let candidates: Vec<_> = around.par_iter().map(renewed).collect();
+            let candidates: Vec<_> = around.par_iter().filter_map(renewed).collect();
             candidates.into_iter().for_each(|candidate| queue.push(candidate));
         }
         queue.wake(complex, kept);
@@ -273,28 +332,43 @@ impl Contraction {
             return "no edge is left, each sphere is a component of its own".to_owned();
         }
         let keeps_topology = self.keeps_topology();
-        let by_topology =
-            edges.iter().filter(|&&[a, b]| keeps_topology && !self.complex.keeps_homotopy(a, b));
-        let by_topology = by_topology.count();
-        let by_inversion = edges.len() - by_topology;
+        let (mut by_choice, mut by_topology, mut by_inversion) = (0, 0, 0);
+        for &[a, b] in &edges {
+            if self.kept.has(a) && self.kept.has(b) {
+                by_choice += 1;
+            } else if keeps_topology && !self.complex.keeps_homotopy(a, b) {
+                by_topology += 1;
+            } else {
+                by_inversion += 1;
+            }
+        }
+        let both_kept = match by_choice {
+            0 => String::new(),
+            count => format!("; {count} join spheres that are to be kept"),
+        };
         format!(
             "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \
-             and {by_inversion} would fold a face over",
+             and {by_inversion} would fold a face over{both_kept}",
             edges.len()
         )
     }
 }
 
-/// The edge at the cost of its best placement.
+/// The edge at the cost of its best placement; `None` where both ends are kept.
 fn candidate(
     complex: &CollapseComplex,
     quadrics: &[Quadric],
     params: &QmatParams,
+    kept: &Kept,
     ends: [u32; 2],
-) -> Candidate {
+) -> Option<Candidate> {
     let (quadric, spheres) = edge_quadric(complex, quadrics, ends);
-    let best = minimise(&quadric, spheres, params.singular_ratio);
-    priced(complex, params, ends, quadric.value(best))
+    let best = match kept.freedom(complex, ends) {
+        Freedom::Anywhere => minimise(&quadric, spheres, params.singular_ratio),
+        Freedom::Onto(sphere) => sphere,
+        Freedom::Nowhere => return None,
+    };
+    Some(priced(complex, params, ends, quadric.value(best)))
 }
 
 /// The edge with the cost `(E + k) Γ²` (equation 8); equal costs are ordered by `E`.

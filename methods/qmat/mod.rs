@@ -114,6 +114,33 @@ pub fn method() -> Method<QmatParams> {
     Method::new(info, prepare)
 }
 
+/// Collapses a medial mesh to `target` spheres by Q-MAT's defaults, and spares those in `kept`: what is
+/// merged with one becomes it, and two of them are never merged. This connects spheres that another
+/// method has chosen; it is mode 2 of the public program Net-Maker/QMAT.
+///
+/// # Errors
+/// When the run is cancelled, or a placement is not valid.
+pub fn keeping(
+    initial: &Arc<MedialMesh>,
+    kept: &[u32],
+    target: usize,
+    run: &RunContext,
+    diagnostics: &mut Diagnostics,
+) -> Result<MedialMesh, SimplifyError> {
+    let params = QmatParams::default().at(Level::Spheres(target));
+    let mut contraction = Contraction::keeping(initial, params, kept);
+    contraction.run_to(initial, target, run)?;
+    contraction.diagnose(diagnostics);
+    let reached = contraction.sphere_count();
+    if reached > target {
+        let why = contraction.why_stopped();
+        diagnostics.warn(format!("{reached} spheres instead of {target} are left: {why}"));
+    }
+    let mesh = contraction.to_mesh();
+    mesh.check()?;
+    Ok(mesh)
+}
+
 fn prepare<'s>(
     shape: &'s Shape,
     params: QmatParams,

@@ -31,7 +31,9 @@ impl Contraction {
     /// The cheapest edge whose collapse violates the link condition but not the topology of
     /// `initial`, else the first such cluster of coincident spheres. `None` when there is neither.
     pub(super) fn unlock(&mut self, initial: &MedialMesh) -> Option<Cluster> {
-        if self.sphere_count() > MAX_UNLOCKED_SPHERES || !self.keeps_topology() {
+        // A cluster may hold several spheres that are to be kept.
+        let is_tied = self.keeps_spheres() || !self.keeps_topology();
+        if is_tied || self.sphere_count() > MAX_UNLOCKED_SPHERES {
             return None;
         }
         // Computed on demand: few runs get here.

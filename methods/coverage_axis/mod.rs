@@ -1,0 +1,335 @@
+//! Coverage Axis and Coverage Axis++: few given inner spheres that cover the surface.
+//!
+//! Z. Dou, C. Lin, R. Xu, L. Yang, S. Xin, T. Komura, W. Wang 2022, *Coverage Axis: Inner Point Selection
+//! for 3D Shape Skeletonization*, Computer Graphics Forum 41(2), <https://doi.org/10.1111/cgf.14484>;
+//! Z. Wang, Z. Dou, R. Xu, C. Lin, Y. Liu, X. Long, S. Xin, T. Komura, X. Yuan, W. Wang 2024, *Coverage
+//! Axis++: Efficient Inner Point Selection for 3D Shape Skeletonization*, Computer Graphics Forum 43(5),
+//! <https://doi.org/10.1111/cgf.15143>. The formulas are those of the authors' public programs; of the
+//! papers only the abstracts were at hand.
+//!
+//! 1. Samples of the surface are to be covered; candidates are spheres inside (`candidates.rs`).
+//! 2. A ball inflated by `delta` covers the samples that it contains (`coverage.rs`).
+//! 3. Coverage Axis takes a smallest set of balls that covers all samples (`reduce.rs`, `exact.rs`);
+//!    Coverage Axis++ one ball after the other, by what it covers, how far it is from those chosen, and
+//!    how small it is (`greedy.rs`).
+//! 4. The spheres chosen, with the radii that they had, are connected (`connect.rs`).
+//!
+//! # Notation
+//!
+//! `p_i` a sample, `(c_j, r_j)` a candidate, `D` the coverage matrix, `delta` the dilation in longest sides
+//! of the bounding box, the unit of the authors' programs, which scale that side to 1.
+//!
+//! # Where the programs are silent
+//!
+//! - A sample that no candidate covers makes the exact cover infeasible, and the greedy choice, whose
+//!   scores become 0/0, takes the first candidate for ever. Such samples are left out and counted.
+//! - A value that is the same for all candidates scores 0; a candidate is taken once.
+//! - Candidates with a radius below `1e-9` diagonals are dropped: their penalty has no bound.
+//! - Of equal distances to two anchors the one chosen first wins.
+//! - The topology of the result is not guaranteed; a warning says where it is not the solid's.
+//!
+//! # Deviations from the programs
+//!
+//! - Random candidates are drawn in the bounding box, not in one that is enlarged, so that more of them are
+//!   inside; their radii are distances to the surface, not to the nearest sample, which are too large.
+//! - Two spheres chosen that are nearest to one vertex of the initial mesh are an error in the authors' way
+//!   of connecting them, and happen with random candidates alone: the second takes the nearest vertex that
+//!   is free, and is counted.
+//! - A number of spheres ends the greedy choice early, or, with `size=dilation` and for exact covers, is
+//!   met by a search on `delta`: the greedy choice that covers earlier delivers fewer than asked, as balls
+//!   beyond cover nothing new.
+//! - The exact cover is sought by another solver than the authors', after reductions that keep the
+//!   optimum. Smallest covers are not unique, so the spheres are others; their number is the same where
+//!   the search ends with a proof, which the counts `cover_bound` and `spheres` tell.
+
+mod candidates;
+mod connect;
+mod coverage;
+mod exact;
+mod greedy;
+mod params;
+mod reduce;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use medial::complex::{MedialMesh, Sphere, betti};
+use medial::shape::Shape;
+use medial::simplifier::{
+    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
+    Simplification, Simplified, SimplifyError, Work,
+};
+
+use crate::size_search::{Knob, Probe, SizeSearch};
+
+pub use params::{Candidates, Connection, CoverageAxisParams, Penalty, Select, Size};
+
+use candidates::Instance;
+use coverage::Coverage;
+use greedy::Score;
+use params::DILATIONS;
+
+/// Spheres that the authors' scripts choose at most.
+const PUBLISHED_PICKS: usize = 100;
+
+/// Collapses a medial mesh to a number of spheres, and spares some of them: a connection that another
+/// method lends, as `qmat::keeping`.
+pub type Keeping = fn(
+    &Arc<MedialMesh>,
+    &[u32],
+    usize,
+    &RunContext,
+    &mut Diagnostics,
+) -> Result<MedialMesh, SimplifyError>;
+
+/// Coverage Axis and Coverage Axis++ as a method; see [`method`].
+pub struct CoverageAxis {
+    info: MethodInfo,
+    keeping: Keeping,
+}
+
+/// Coverage Axis and Coverage Axis++ as a method, with the collapse for `connection=qmat`.
+///
+/// Answers all levels but an error bound. Memory: one bit for each candidate and sample.
+pub fn method(keeping: Keeping) -> CoverageAxis {
+    let info = MethodInfo::new("coverage-axis", "Coverage Axis++")
+        .citation(
+            "Zhiyang Dou, Cheng Lin, Rui Xu, Lei Yang, Shiqing Xin, Taku Komura, Wenping Wang 2022. \
+             Coverage Axis: Inner Point Selection for 3D Shape Skeletonization. Computer Graphics \
+             Forum 41(2). https://doi.org/10.1111/cgf.14484; Zimeng Wang, Zhiyang Dou, Rui Xu, Cheng \
+             Lin, Yuan Liu, Xiaoxiao Long, Shiqing Xin, Taku Komura, Xiaoming Yuan, Wenping Wang \
+             2024. Coverage Axis++: Efficient Inner Point Selection for 3D Shape Skeletonization. \
+             Computer Graphics Forum 43(5). https://doi.org/10.1111/cgf.15143",
+        )
+        .summary(
+            "Chooses inner spheres that, slightly inflated, cover the surface, and connects them by \
+             their regions on the medial mesh.",
+        )
+        .home(
+            "Some tens of spheres as a skeleton: spheres stay where the medial axis has them, and \
+             details smaller than the dilation go.",
+        )
+        .native(NativeLevel::larger_is_coarser("delta", "fraction of the longest side"))
+        .sweep(&[0.005, 0.01, 0.02, 0.03, 0.05])
+        .published("delta = 0.02 of the longest side and at most 100 spheres, as in the scripts")
+        .params(CoverageAxisParams::describe());
+    CoverageAxis { info, keeping }
+}
+
+impl MedialSimplifier for CoverageAxis {
+    fn info(&self) -> &MethodInfo {
+        &self.info
+    }
+
+    fn prepare<'s>(
+        &self,
+        shape: &'s Shape,
+        params: &Params,
+        run: &RunContext,
+    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+        let params = params.typed::<CoverageAxisParams>()?.validate()?;
+        let initial = shape.initial()?;
+        run.step(0, initial.spheres.len())?;
+        let instance = Instance::new(shape, &params, run.seed)?;
+        let axis = Axis {
+            score: Score::new(&instance.spheres, &params),
+            instance,
+            initial,
+            expected: shape.expected_betti(),
+            keeping: self.keeping,
+            params,
+            run: run.clone(),
+        };
+        Ok(Box::new(Prepared { search: SizeSearch::new(knob(), run), axis }))
+    }
+}
+
+/// The dilation as a knob that gives more spheres when it is turned up: its inverse.
+fn knob() -> Knob {
+    let range = 1.0 / DILATIONS.end()..=1.0 / DILATIONS.start();
+    let (count, unit) = ("inverse_dilation_in_thousandths", "longest sides over the dilation");
+    Knob { count, unit, range, steps: 1e3, rate: 0.5, exponent: 1.3 }
+}
+
+/// One shape, with its candidates.
+struct Prepared {
+    axis: Axis,
+    search: SizeSearch,
+}
+
+struct Axis {
+    instance: Instance,
+    score: Score,
+    initial: Arc<MedialMesh>,
+    /// Betti numbers that the solid demands.
+    expected: Option<[u64; 3]>,
+    keeping: Keeping,
+    params: CoverageAxisParams,
+    run: RunContext,
+}
+
+impl Simplification for Prepared {
+    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        let Self { axis, search } = self;
+        let CoverageAxisParams { select, size, dilation, max_iter, .. } = axis.params;
+        let by_picks = select == Select::Greedy && size == Size::Picks;
+        let (dilation, most) = match level {
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
+            Level::Spheres(0) => {
+                return Err(SimplifyError::Level("ask for at least one sphere".into()));
+            }
+            Level::Spheres(count) if by_picks => (dilation, count),
+            Level::Spheres(count) => {
+                let inverse = |value: f64| 1.0 / value;
+                return search.at(count, inverse, |value| axis.at(inverse(value), max_iter));
+            }
+            Level::Native(delta) if DILATIONS.contains(&delta) => (delta, max_iter),
+            Level::Native(delta) => {
+                let (least, most) = (DILATIONS.start(), DILATIONS.end());
+                let message = format!("delta = {delta:?} is outside {least} to {most}");
+                return Err(SimplifyError::Level(message));
+            }
+            Level::Published => (dilation, max_iter.min(PUBLISHED_PICKS)),
+        };
+        let Probe { mesh, mut diagnostics } = axis.at(dilation, most)?;
+        if let Level::Spheres(asked) = level
+            && mesh.spheres.len() < asked
+        {
+            let reached = mesh.spheres.len();
+            diagnostics.warn(format!(
+                "{reached} spheres instead of {asked}: they cover all samples that can be covered at \
+                 delta = {dilation}; a smaller dilation or size=dilation takes more"
+            ));
+        }
+        Ok(Simplified {
+            mesh,
+            asked: level,
+            native_level: Some(dilation),
+            work: Work::Anew,
+            diagnostics,
+            extras: Extras::default(),
+        })
+    }
+}
+
+impl Axis {
+    /// Steps 2 to 4, with at most so many spheres where they have an order.
+    fn at(&self, dilation: f64, most: usize) -> Result<Probe, SimplifyError> {
+        let Instance { samples, spheres, too_small, side, .. } = &self.instance;
+        let coverage = Coverage::new(samples, spheres, dilation * side);
+        let mut diagnostics = Diagnostics::default();
+        diagnostics.count("candidates", spheres.len());
+        diagnostics.count("candidates_too_small", *too_small);
+        diagnostics.count("samples", samples.len());
+        let chosen = match self.params.select {
+            Select::Greedy => self.greedy(&coverage, most, &mut diagnostics)?,
+            Select::Exact => self.exact(&coverage, &mut diagnostics)?,
+        };
+        if chosen.is_empty() {
+            return Err(SimplifyError::unsupported(format!(
+                "no candidate covers a sample at delta = {dilation}: take a larger dilation, or denser \
+                 samples of the shape"
+            )));
+        }
+        let mesh = self.connected(&chosen, &mut diagnostics)?;
+        self.warn_of_topology(&mesh, &mut diagnostics);
+        Ok(Probe { mesh, diagnostics })
+    }
+
+    fn greedy(
+        &self,
+        coverage: &Coverage,
+        most: usize,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<Vec<u32>, SimplifyError> {
+        let spheres = &self.instance.spheres;
+        let picks = greedy::choose(spheres, coverage, &self.score, most, &self.run)?;
+        diagnostics.count("uncoverable_samples", picks.uncoverable);
+        diagnostics.count("uncovered_samples", picks.uncovered);
+        if picks.uncovered > 0 {
+            let percent = 100.0 * picks.uncovered as f64 / coverage.columns() as f64;
+            diagnostics.warn(format!(
+                "{} spheres leave {} of {} samples uncovered, {percent:.1} %",
+                picks.chosen.len(),
+                picks.uncovered,
+                coverage.columns()
+            ));
+        }
+        warn_of_uncoverable(picks.uncoverable, diagnostics);
+        Ok(picks.chosen)
+    }
+
+    fn exact(
+        &self,
+        coverage: &Coverage,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<Vec<u32>, SimplifyError> {
+        let cover = exact::cover(coverage, &self.params, &self.run)?;
+        diagnostics.count("uncoverable_samples", cover.uncoverable);
+        diagnostics.count("reduced_candidates", cover.reduced[0]);
+        diagnostics.count("reduced_samples", cover.reduced[1]);
+        diagnostics.count("nodes", cover.nodes);
+        diagnostics.count("cover_bound", cover.bound);
+        warn_of_uncoverable(cover.uncoverable, diagnostics);
+        let reached = cover.chosen.len();
+        if reached > cover.bound {
+            let gap = 100.0 * (reached - cover.bound) as f64 / reached as f64;
+            let how = match cover.ended_by_time {
+                true => "time, so that another run may find another cover",
+                false => "the number of nodes",
+            };
+            diagnostics.warn(format!(
+                "{reached} spheres cover, and no cover has fewer than {}: the search was ended by {how}, \
+                 at a gap of {gap:.1} %",
+                cover.bound
+            ));
+        }
+        Ok(cover.chosen)
+    }
+
+    /// Step 4.
+    fn connected(
+        &self,
+        chosen: &[u32],
+        diagnostics: &mut Diagnostics,
+    ) -> Result<MedialMesh, SimplifyError> {
+        let spheres: Vec<Sphere> =
+            chosen.iter().map(|&ball| self.instance.spheres[ball as usize]).collect();
+        let anchors = match &self.instance.vertices {
+            Some(vertices) => chosen.iter().map(|&ball| vertices[ball as usize]).collect(),
+            None => {
+                let (anchors, moved) = connect::anchors(&self.initial, &spheres)?;
+                diagnostics.count("anchors_moved_to_a_free_vertex", moved);
+                anchors
+            }
+        };
+        match self.params.connection {
+            Connection::Geodesic => {
+                connect::by_regions(&self.initial, &anchors, spheres, diagnostics)
+            }
+            Connection::Qmat => {
+                (self.keeping)(&self.initial, &anchors, anchors.len(), &self.run, diagnostics)
+            }
+        }
+    }
+
+    fn warn_of_topology(&self, mesh: &MedialMesh, diagnostics: &mut Diagnostics) {
+        let found = betti(mesh);
+        if let Some(expected) = self.expected.filter(|&expected| expected != found) {
+            diagnostics.warn(format!(
+                "Betti numbers {found:?} instead of {expected:?}: this connection does not guarantee \
+                 the topology"
+            ));
+        }
+    }
+}
+
+fn warn_of_uncoverable(uncoverable: usize, diagnostics: &mut Diagnostics) {
+    if uncoverable > 0 {
+        diagnostics.warn(format!(
+            "{uncoverable} samples are covered by no candidate and were left out: a larger dilation or \
+             denser samples of the shape would cover them"
+        ));
+    }
+}

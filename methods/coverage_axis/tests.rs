@@ -1,0 +1,393 @@
+//! The choice and the connection against their definitions.
+
+use medial::Vec3;
+use medial::complex::MedialMesh;
+use medial::shape::ShapeOptions;
+use medial::surface::{self, TriMesh};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::coverage::ones;
+use super::exact::Cover;
+use super::greedy::Picks;
+use super::*;
+
+const STAND: CoverageAxisParams = CoverageAxisParams { penalty: Penalty::Stand, ..published() };
+
+const fn published() -> CoverageAxisParams {
+    CoverageAxisParams {
+        select: Select::Greedy,
+        candidates: Candidates::Voronoi,
+        dilation: 0.02,
+        samples: 1500,
+        points: 500_000,
+        uniformity: 1.0,
+        centrality: 1.0,
+        penalty: Penalty::Ratio,
+        max_iter: 1000,
+        size: Size::Picks,
+        connection: Connection::Geodesic,
+        nodes: 10_000,
+        time_limit: 0.0,
+    }
+}
+
+fn random_points(rng: &mut Pcg64, count: usize) -> Vec<Vec3> {
+    (0..count).map(|_| Vec3::new(rng.random(), rng.random(), rng.random())).collect()
+}
+
+fn random_balls(rng: &mut Pcg64, count: usize) -> Vec<Sphere> {
+    let centres = random_points(rng, count);
+    centres.into_iter().map(|c| Sphere::new(c, 0.05 + 0.3 * rng.random::<f64>())).collect()
+}
+
+fn covers(ball: &Sphere, sample: Vec3, delta: f64) -> bool {
+    sample.distance(ball.centre) < ball.radius + delta
+}
+
+fn choose(
+    spheres: &[Sphere],
+    coverage: &Coverage,
+    params: &CoverageAxisParams,
+    limit: usize,
+) -> Picks {
+    let score = Score::new(spheres, params);
+    greedy::choose(spheres, coverage, &score, limit, &RunContext::default()).unwrap()
+}
+
+fn exact_cover(coverage: &Coverage) -> Cover {
+    exact::cover(coverage, &published(), &RunContext::default()).unwrap()
+}
+
+#[test]
+fn a_bit_is_set_where_an_inflated_ball_contains_a_sample() {
+    let mut rng = Pcg64::seed_from_u64(1);
+    for (samples, balls) in [(1, 1), (64, 3), (65, 300), (200, 17)] {
+        let (samples, balls) = (random_points(&mut rng, samples), random_balls(&mut rng, balls));
+        let coverage = Coverage::new(&samples, &balls, 0.04);
+        for (j, ball) in balls.iter().enumerate() {
+            let covered: Vec<usize> = ones(coverage.row(j)).collect();
+            let expected = (0..samples.len()).filter(|&i| covers(ball, samples[i], 0.04));
+            assert_eq!(covered, expected.collect::<Vec<_>>());
+        }
+        assert_eq!(coverage.transposed().transposed(), coverage);
+    }
+    // Strictly: a sample on the inflated ball is not covered.
+    let on = Coverage::new(&[Vec3::X], &[Sphere::new(Vec3::ZERO, 0.75)], 0.25);
+    assert!(ones(on.row(0)).next().is_none());
+}
+
+/// The choice as its formula has it: every part of every score from nothing, in every step.
+fn by_formula(
+    samples: &[Vec3],
+    balls: &[Sphere],
+    params: &CoverageAxisParams,
+    delta: f64,
+    limit: usize,
+) -> Vec<u32> {
+    let standardised = |values: Vec<f64>| -> Vec<f64> {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let score = |x: f64| if variance > 0.0 { (x - mean) / variance.sqrt() } else { 0.0 };
+        values.into_iter().map(score).collect()
+    };
+    let largest = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);
+    let penalty = match params.penalty {
+        Penalty::Ratio => balls.iter().map(|ball| 0.1 * largest / ball.radius).collect(),
+        Penalty::Stand => standardised(balls.iter().map(|ball| 1.0 / ball.radius).collect()),
+    };
+    let is_coverable = |p: &&Vec3| balls.iter().any(|ball| covers(ball, **p, delta));
+    let mut left: Vec<Vec3> = samples.iter().filter(is_coverable).copied().collect();
+    let mut chosen: Vec<u32> = Vec::new();
+    while !left.is_empty() && chosen.len() < limit {
+        let count = |ball: &Sphere| left.iter().filter(|&&p| covers(ball, p, delta)).count() as f64;
+        let counts = standardised(balls.iter().map(count).collect());
+        let nearest = |ball: &Sphere| {
+            let distance = |&a: &u32| balls[a as usize].centre.distance(ball.centre);
+            chosen.iter().map(distance).fold(f64::INFINITY, f64::min)
+        };
+        let apart = match chosen.is_empty() {
+            true => vec![0.0; balls.len()],
+            false => standardised(balls.iter().map(nearest).collect()),
+        };
+        let score = |j: usize| counts[j] + apart[j] - penalty[j];
+        let free = (0..balls.len()).filter(|&j| !chosen.contains(&(j as u32)));
+        let best = free.reduce(|a, b| if score(b) > score(a) { b } else { a }).unwrap();
+        left.retain(|&p| !covers(&balls[best], p, delta));
+        chosen.push(best as u32);
+    }
+    chosen
+}
+
+#[test]
+fn the_greedy_choice_is_that_of_the_formula() {
+    let mut rng = Pcg64::seed_from_u64(2);
+    for params in [published(), STAND] {
+        for round in 0..30 {
+            let samples = random_points(&mut rng, 20 + 7 * round);
+            let balls = random_balls(&mut rng, 2 + 3 * round);
+            let coverage = Coverage::new(&samples, &balls, 0.03);
+            let picks = choose(&balls, &coverage, &params, 1000);
+            assert_eq!(picks.chosen, by_formula(&samples, &balls, &params, 0.03, 1000));
+            assert_eq!(picks.uncovered, 0);
+            // The first few are those of a choice that ends there.
+            let few = choose(&balls, &coverage, &params, 3);
+            assert_eq!(few.chosen, picks.chosen[..few.chosen.len()]);
+        }
+    }
+}
+
+#[test]
+fn what_nobody_covers_ends_no_choice_and_fills_none() {
+    let balls =
+        [Sphere::new(Vec3::ZERO, 1.0), Sphere::new(Vec3::X, 1.0), Sphere::new(Vec3::Y, 1.0)];
+    let samples = [Vec3::new(0.5, 0.0, 0.0), Vec3::splat(40.0), Vec3::splat(50.0)];
+    let coverage = Coverage::new(&samples, &balls, 0.02);
+    let picks = choose(&balls, &coverage, &published(), 60);
+    assert_eq!((picks.chosen.len(), picks.uncovered, picks.uncoverable), (1, 0, 2));
+    let cover = exact_cover(&coverage);
+    assert_eq!((cover.chosen.len(), cover.bound, cover.uncoverable), (1, 1, 2));
+}
+
+/// Fewest balls by looking at all sets of them.
+fn by_brute_force(coverage: &Coverage) -> usize {
+    let all = coverage.coverable();
+    let sets = 0..1_u32 << coverage.rows();
+    let covers_all = |&set: &u32| {
+        let mut covered = vec![0; all.len()];
+        let members = (0..coverage.rows()).filter(|ball| set >> ball & 1 == 1);
+        members.for_each(|ball| coverage::unite(&mut covered, coverage.row(ball)));
+        covered == all
+    };
+    sets.filter(covers_all).map(u32::count_ones).min().unwrap() as usize
+}
+
+fn assert_covers(coverage: &Coverage, chosen: &[u32]) {
+    let mut covered = vec![0; coverage.coverable().len()];
+    chosen.iter().for_each(|&ball| coverage::unite(&mut covered, coverage.row(ball as usize)));
+    assert_eq!(covered, coverage.coverable());
+}
+
+#[test]
+fn an_exact_cover_is_the_smallest() {
+    let mut rng = Pcg64::seed_from_u64(3);
+    for round in 0..60 {
+        let samples = random_points(&mut rng, 5 + 4 * round);
+        let balls = random_balls(&mut rng, 1 + round % 12);
+        let coverage = Coverage::new(&samples, &balls, 0.02);
+        let cover = exact_cover(&coverage);
+        let fewest = by_brute_force(&coverage);
+        assert_eq!((cover.chosen.len(), cover.bound), (fewest, fewest));
+        assert_covers(&coverage, &cover.chosen);
+    }
+}
+
+#[test]
+fn an_exact_cover_has_no_more_balls_than_a_greedy_one() {
+    let mut rng = Pcg64::seed_from_u64(4);
+    for round in 0..6 {
+        let samples = random_points(&mut rng, 120);
+        let balls = random_balls(&mut rng, 60 + 20 * round);
+        let coverage = Coverage::new(&samples, &balls, 0.02);
+        let cover = exact_cover(&coverage);
+        assert_covers(&coverage, &cover.chosen);
+        let greedy = choose(&balls, &coverage, &published(), 1000).chosen.len();
+        let reduced = reduce::reduce(&coverage);
+        let largest = exact::largest_first(&reduced).len() + reduced.forced.len();
+        let fewest = cover.chosen.len();
+        assert_eq!(cover.bound, fewest);
+        assert!(fewest <= greedy && fewest <= largest, "{fewest}, {greedy}, {largest}");
+    }
+}
+
+/// Samples of a ball or a cylinder along x, by the golden ratio.
+fn golden(count: usize, point: impl Fn(f64, f64) -> Vec3) -> Vec<Vec3> {
+    let turn = std::f64::consts::TAU * 0.618_033_988_749_895;
+    (0..count).map(|i| point((i as f64 + 0.5) / count as f64, turn * i as f64)).collect()
+}
+
+fn on_ball(centre: Vec3, radius: f64) -> Vec<Vec3> {
+    golden(300, |t, angle| {
+        let z = 2.0 * t - 1.0;
+        let (sin, cos) = angle.sin_cos();
+        centre + radius * Vec3::new(cos, sin, 0.0) * (1.0 - z * z).sqrt() + radius * z * Vec3::Z
+    })
+}
+
+#[test]
+fn each_sphere_takes_one_ball() {
+    let one = on_ball(Vec3::ZERO, 0.4);
+    let two: Vec<Vec3> = [one.clone(), on_ball(Vec3::X, 0.3)].concat();
+    let balls: Vec<Sphere> = [(Vec3::ZERO, 0.4), (Vec3::X, 0.3), (0.05 * Vec3::X, 0.35)]
+        .map(|(centre, radius)| Sphere::new(centre, radius))
+        .to_vec();
+    for (samples, expected) in [(one, vec![0]), (two, vec![0, 1])] {
+        let coverage = Coverage::new(&samples, &balls, 0.01);
+        assert_eq!(exact_cover(&coverage).chosen, expected);
+        let mut picks = choose(&balls, &coverage, &published(), 10).chosen;
+        picks.sort_unstable();
+        assert_eq!(picks, expected);
+    }
+}
+
+#[test]
+fn a_cylinder_takes_as_many_as_their_rings_are_wide() {
+    let (radius, length) = (0.2, 3.0);
+    let samples = golden(600, |t, angle| {
+        let (sin, cos) = angle.sin_cos();
+        Vec3::new(length * t, radius * cos, radius * sin)
+    });
+    let balls: Vec<Sphere> = (0..=600)
+        .map(|k| Sphere::new(Vec3::new(length * f64::from(k) / 600.0, 0.0, 0.0), radius))
+        .collect();
+    for delta in [0.01_f64, 0.02, 0.04, 0.08] {
+        // A ball covers a ring of this width at most.
+        let width = 2.0 * ((radius + delta).powi(2) - radius * radius).sqrt();
+        let fewest = (length / width).ceil() as usize;
+        let cover = exact_cover(&Coverage::new(&samples, &balls, delta));
+        let found = cover.chosen.len();
+        assert_eq!(cover.bound, found);
+        // Samples are fewer than points, and candidates stand on a grid: one more or less.
+        assert!(found.abs_diff(fewest) <= 1, "{delta}: {found} for {fewest}");
+    }
+}
+
+fn built_in(id: &str) -> Shape {
+    let built_in = medial_datasets::find(id).unwrap();
+    shape_of(&built_in.mesh(built_in.default_resolution))
+}
+
+fn shape_of(mesh: &TriMesh) -> Shape {
+    let report = surface::validate(mesh).unwrap();
+    Shape::new("shape", mesh, report, ShapeOptions::default()).unwrap()
+}
+
+fn answer(shape: &Shape, set: &[(&str, &str)], level: Level) -> Simplified {
+    let mut params = Params::none();
+    set.iter().for_each(|(key, value)| params.set(key, value));
+    let method = crate::find("coverage-axis").unwrap();
+    let mut prepared = method.prepare(shape, &params, &RunContext::default()).unwrap();
+    let found = prepared.at(level).unwrap();
+    found.mesh.check().unwrap();
+    found
+}
+
+#[test]
+fn regions_are_those_of_the_nearest_anchor_along_edges() {
+    let shape = built_in("bracket");
+    let initial = shape.initial().unwrap();
+    let anchors: Vec<u32> = (0..initial.spheres.len() as u32).step_by(97).collect();
+    let found = connect::regions(&initial, &anchors);
+    // Relaxes all edges until nothing changes, without a queue.
+    let mut nearest = vec![(f64::INFINITY, u32::MAX); initial.spheres.len()];
+    for (label, &v) in anchors.iter().enumerate() {
+        nearest[v as usize] = (0.0, label as u32);
+    }
+    let centre = |v: u32| initial.spheres[v as usize].centre;
+    loop {
+        let before = nearest.clone();
+        for &[a, b] in &initial.edges {
+            let length = centre(a).distance(centre(b)) + 1e-12;
+            for (from, to) in [(a as usize, b as usize), (b as usize, a as usize)] {
+                let (distance, label) = nearest[from];
+                if (distance + length, label) < nearest[to] {
+                    nearest[to] = (distance + length, label);
+                }
+            }
+        }
+        if nearest == before {
+            break;
+        }
+    }
+    let expected: Vec<u32> = nearest.into_iter().map(|(_, label)| label).collect();
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn two_spheres_on_one_vertex_are_told_apart_and_too_many_refused() {
+    let balls = [Vec3::ZERO, Vec3::X, 3.0 * Vec3::X].map(|c| Sphere::new(c, 0.5)).to_vec();
+    let initial = MedialMesh::from_simplices(balls, vec![[0, 1], [1, 2]], vec![]).unwrap();
+    let near = [0.1, 0.2, 0.3].map(|x| Sphere::new(x * Vec3::X, 0.5));
+    let (anchors, moved) = connect::anchors(&initial, &near).unwrap();
+    assert_eq!((anchors, moved), (vec![0, 1, 2], 2));
+    let four = [near[0]; 4];
+    assert!(connect::anchors(&initial, &four).is_err());
+}
+
+#[test]
+fn both_connections_keep_the_spheres_chosen() {
+    for id in ["bracket", "torus"] {
+        let shape = built_in(id);
+        let regions = answer(&shape, &[], Level::Published).mesh;
+        let kept = answer(&shape, &[("connection", "qmat")], Level::Published).mesh;
+        let sorted = |mesh: &MedialMesh| {
+            let bits = |s: &Sphere| (s.centre.to_array().map(f64::to_bits), s.radius.to_bits());
+            let mut all: Vec<_> = mesh.spheres.iter().map(bits).collect();
+            all.sort_unstable();
+            all
+        };
+        // Collapses may be held back, and then leave others beside them.
+        let after = sorted(&kept);
+        assert!(sorted(&regions).iter().all(|ball| after.binary_search(ball).is_ok()), "{id}");
+        assert_eq!(betti(&kept), betti(&shape.initial().unwrap()), "{id}");
+    }
+}
+
+#[test]
+fn a_number_of_spheres_is_met_or_the_answer_says_why_not() {
+    let shape = built_in("bracket");
+    let all = answer(&shape, &[], Level::Spheres(100_000));
+    assert!(all.diagnostics.warnings.iter().any(|w| w.contains("instead of 100000")));
+    let few = answer(&shape, &[], Level::Spheres(5));
+    assert_eq!((few.mesh.spheres.len(), few.native_level), (5, Some(0.02)));
+    assert_eq!(few.mesh.spheres[..], all.mesh.spheres[..5]);
+    assert!(few.diagnostics.warnings.iter().any(|w| w.contains("uncovered")));
+    let more = all.mesh.spheres.len() + 20;
+    let smaller = answer(&shape, &[("size", "dilation")], Level::Spheres(more));
+    let size = smaller.mesh.spheres.len();
+    assert!(size <= more && size * 100 >= more * 95, "{size} for {more}");
+    assert!(smaller.native_level.unwrap() < 0.02);
+    let again = answer(&shape, &[], Level::Native(smaller.native_level.unwrap()));
+    assert_eq!(again.mesh, smaller.mesh);
+}
+
+#[test]
+fn all_kinds_of_candidates_cover() {
+    let shape = built_in("bracket");
+    for candidates in ["voronoi", "poles", "random"] {
+        let set = [("candidates", candidates), ("points", "20000")];
+        let found = answer(&shape, &set, Level::Native(0.03));
+        assert!(found.mesh.spheres.len() > 10, "{candidates}");
+        let count = |name: &str| found.diagnostics.counts.iter().find(|c| c.0 == name).unwrap().1;
+        assert_eq!(count("uncovered_samples"), 0, "{candidates}");
+    }
+}
+
+#[test]
+fn powers_of_two_scale_nothing_but_the_result() {
+    let built_in = medial_datasets::find("bracket").unwrap();
+    let mesh = built_in.mesh(built_in.default_resolution);
+    let scaled = TriMesh {
+        vertices: mesh.vertices.iter().map(|&v| 8.0 * v).collect(),
+        faces: mesh.faces.clone(),
+    };
+    let [plain, scaled] = [mesh, scaled].map(|mesh| {
+        let found = answer(&shape_of(&mesh), &[], Level::Published);
+        (found.mesh, found.diagnostics)
+    });
+    assert_eq!(plain, scaled);
+}
+
+#[test]
+fn wrong_parameters_are_named() {
+    let shape = built_in("sphere");
+    for (key, value) in [("dilation", "0"), ("samples", "0"), ("nodes", "0"), ("penalty", "none")] {
+        let mut params = Params::none();
+        params.set(key, value);
+        let run = RunContext::default();
+        let method = crate::find("coverage-axis").unwrap();
+        let error = method.prepare(&shape, &params, &run).err().unwrap();
+        assert!(error.to_string().contains(key), "{error}");
+    }
+}
