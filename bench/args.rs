@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use medial::complex::{Radii, ReadOptions};
 use medial::metrics::JudgeOptions;
 use medial::shape::ShapeOptions;
@@ -10,7 +10,7 @@ use medial::simplifier::Params;
 use medial::surface::Sampling;
 
 use crate::exit::Failure;
-use crate::run::{Dual, Study, Verbosity};
+use crate::run::{AxisOptions, Dual, FitBy, RadiiFrom, Study, Verbosity};
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]
@@ -138,26 +138,12 @@ pub struct AxisArguments {
     pub fit: FitBy,
 }
 
-/// Where radii come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum RadiiFrom {
-    /// From the file.
-    #[default]
-    File,
-    /// From the surface.
-    Surface,
-}
-
-/// How units are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum FitBy {
-    /// The file is in the units of the surface.
-    #[default]
-    None,
-    /// By the uniform scale and the shift under which spheres and surface fit.
-    Similarity,
-    /// The same, if the file does not fit as it is and does so then.
-    Auto,
+impl AxisArguments {
+    /// What they ask of the reader.
+    pub fn options(&self) -> AxisOptions {
+        let ReadArguments { lenient, block } = self.read;
+        AxisOptions { lenient, block, radii: self.radii, fit: self.fit }
+    }
 }
 
 /// A mesh argument: a file, `builtin:ID[:RESOLUTION]` or `dataset:NAME`.

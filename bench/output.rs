@@ -99,8 +99,3 @@ pub fn counted(number: u64, noun: &str) -> String {
         _ => format!("{number} {noun}s"),
     }
 }
-
-/// A fraction of the diagonal as a percentage with three decimals.
-pub fn percent(fraction: f64) -> String {
-    format!("{:.3} %", 100.0 * fraction)
-}

@@ -22,6 +22,8 @@ use crate::text::{counted, megabytes};
 pub enum Status {
     /// A valid medial mesh came out.
     Ok,
+    /// A valid medial mesh, from a file of another program.
+    AsGiven,
     /// A valid medial mesh came out, with a number of spheres more than 2 % off the one asked.
     OtherCount,
     /// No level that was tried keeps the error bound: an answer, not a failure.
@@ -44,8 +46,9 @@ pub enum Status {
 
 impl Status {
     /// Every status, in the order of the enumeration.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Ok,
+        Self::AsGiven,
         Self::OtherCount,
         Self::BoundMissed,
         Self::Unsupported,
@@ -57,25 +60,26 @@ impl Status {
         Self::InvalidOutput,
     ];
 
-    /// Whether the result is as it was asked.
+    /// Whether the result is as it was asked, or as it was given.
     pub fn is_ok(self) -> bool {
-        self == Self::Ok
+        matches!(self, Self::Ok | Self::AsGiven)
     }
 
     /// Whether there is a result to measure, at the count that was asked or another.
     pub fn has_result(self) -> bool {
-        matches!(self, Self::Ok | Self::OtherCount)
+        matches!(self, Self::Ok | Self::AsGiven | Self::OtherCount)
     }
 
     /// Whether something went wrong: neither a result nor a plain answer that there is none.
     pub fn is_failure(self) -> bool {
-        !matches!(self, Self::Ok | Self::OtherCount | Self::BoundMissed | Self::Unsupported)
+        !self.has_result() && !matches!(self, Self::BoundMissed | Self::Unsupported)
     }
 
     /// The word that stands in the JSON.
     pub fn key(self) -> &'static str {
         match self {
             Self::Ok => "ok",
+            Self::AsGiven => "as_given",
             Self::OtherCount => "other_count",
             Self::BoundMissed => "bound_missed",
             Self::Unsupported => "unsupported",

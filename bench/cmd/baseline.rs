@@ -17,8 +17,8 @@ use serde_json::json;
 use super::report::rebuild;
 use crate::args::{Global, MeasureArguments, MeshArgument, judge_options};
 use crate::exit::{Exit, Failure};
-use crate::output::{percent, print_json, print_line};
-use crate::run::{Input, Provenance, RESULTS, Registry, Source};
+use crate::output::{print_json, print_line};
+use crate::run::{Input, Provenance, RESULTS, Registry, Source, percent};
 
 /// Arguments of `baseline`.
 #[derive(Debug, Args)]

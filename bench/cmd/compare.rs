@@ -13,8 +13,9 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::run::{
-    AXES, Here, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Source,
-    Store, Study, StudyMethod, Supervisor, Tally, count, missing, refused_params, run_items,
+    AXES, Given, Here, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError,
+    Source, Store, Study, StudyMethod, Supervisor, Tally, count, missing, refused_params,
+    run_items,
 };
 
 /// Arguments of `compare`.
@@ -57,6 +58,11 @@ pub struct Arguments {
     /// Set a parameter of one method; can be given several times.
     #[arg(long = "set", value_name = "METHOD.KEY=VALUE")]
     set: Vec<String>,
+    /// A medial mesh of another program as the result of a named method, judged like the rest; its number of spheres is
+    /// asked of the methods too, unless `--spheres` says others; `NAME@MESH=FILE.ma` with several meshes; can be given
+    /// several times.
+    #[arg(long, value_name = "NAME=FILE.ma")]
+    given: Vec<String>,
     /// Time each item so many times, the methods in turn; the median is reported, all are kept
     /// [default: 1].
     #[arg(long, value_name = "N")]
@@ -163,8 +169,15 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         let methods = arguments.methods.iter().map(|text| StudyMethod::parse(text));
         study.methods = methods.collect::<Result<_, _>>()?;
     }
+    for text in &arguments.given {
+        let mut given = Given::parse(text).map_err(Failure::usage)?;
+        given.file = absolute(&given.file);
+        study.given.push(given);
+    }
     if !arguments.spheres.is_empty() {
         study.spheres.clone_from(&arguments.spheres);
+    } else if arguments.study.is_none() && !study.given.is_empty() {
+        study.spheres = study.given_counts()?;
     }
     if !arguments.max_error.is_empty() {
         study.max_error.clone_from(&arguments.max_error);
@@ -256,7 +269,7 @@ fn finish(
     files: &[PathBuf],
     global: &Global,
 ) -> Result<Exit, Failure> {
-    let ok = count(records, Status::Ok);
+    let ok = records.iter().filter(|record| record.status.is_ok()).count();
     let page = out.join("index.html");
     if global.json {
         let by_status: serde_json::Map<String, serde_json::Value> =
@@ -270,8 +283,12 @@ fn finish(
         if ok > 0 {
             print_line(&medial_reports::summary_text(records));
         }
+        let given = match count(records, Status::AsGiven) {
+            0 => String::new(),
+            files => format!(" ({files} as given)"),
+        };
         print_line(&format!(
-            "{ok} of {} results as asked{}; {} run now, {} found; page: {}",
+            "{ok} of {} results as asked{given}{}; {} run now, {} found; page: {}",
             records.len(),
             others(records),
             tally.run,
@@ -289,7 +306,7 @@ fn finish(
 
 /// What became of the results that are not as asked: `, 2 other count, 1 failed`.
 fn others(records: &[Record]) -> String {
-    let others = Status::ALL.into_iter().filter(|&status| status != Status::Ok);
+    let others = Status::ALL.into_iter().filter(|status| !status.is_ok());
     let counted = others.map(|status| (status, count(records, status)));
     let counted = counted.filter(|&(_, count)| count > 0);
     counted.map(|(status, count)| format!(", {count} {status}")).collect()

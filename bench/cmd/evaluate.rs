@@ -12,8 +12,8 @@ use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument, judge_o
 use crate::cmd::compat::CompatArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
-use crate::output::{counted, note, percent, print_json, print_line};
-use crate::run::{Input, Source, StageLine};
+use crate::output::{counted, note, print_json, print_line};
+use crate::run::{Input, Source, StageLine, percent};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]

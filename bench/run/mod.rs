@@ -8,7 +8,7 @@
 //!
 //! | files | step |
 //! |---|---|
-//! | `source`, `item`, `registry` | what is run |
+//! | `source`, `item`, `registry`, `axis_file`, `given` | what is run |
 //! | `scene`, `answer`, `search`, `bounds`, `verdict`, `record` | the path of one item, inside a worker |
 //! | `protocol`, `serve`, `worker` | processes and their messages |
 //! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
@@ -20,8 +20,10 @@
 
 mod alternate;
 mod answer;
+mod axis_file;
 mod bounds;
 mod ending;
+mod given;
 mod item;
 mod npy;
 mod npy_header;
@@ -49,6 +51,8 @@ mod worker;
 
 pub use alternate::{Build, BuildError, Contender, missing_in_either, run_alternately};
 pub use answer::{Fault, LevelRun, Times, answer};
+pub use axis_file::{AxisError, AxisOptions, FitBy, RadiiFrom, percent, read_axis};
+pub use given::{GIVEN, Given};
 pub use item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
 pub use npy::{
     Matrix, NpyError, NpyErrorKind, parse_matrix, read_matrix, write_cells, write_npy_header,

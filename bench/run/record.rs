@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::plugin::{self, ProgramPeak};
 
-use super::{Fault, Item, LevelRun, Provenance, Scene, Times, Verdict};
+use super::{Fault, GIVEN, Item, LevelRun, Provenance, Scene, Times, Verdict};
 
 /// Largest relative difference between the number of spheres and the requested number at which a
 /// result still counts as having that number.
@@ -96,21 +96,21 @@ pub fn record(
     provenance: &Provenance,
     axes: Option<&Path>,
 ) -> Record {
+    let is_given = item.method.id == GIVEN;
     let fault = match &run.outcome {
+        Ok(_) if is_given => Fault { status: Status::AsGiven, reason: String::new() },
         Ok(result) => count_fault(run.level, result),
         Err(fault) => fault.clone(),
     };
     let mut record = failure_record(item, run.level, &fault, provenance);
     record.mesh_hash = Some(scene.input.hash.clone());
     record.initial = scene.initial();
-    record.repetitions = vec![repetition(&run.times)];
-    record.simplify.substrates =
-        run.times.substrates.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect();
-    record.simplify.seconds = Some(run.times.seconds());
-    record.simplify.cpu_seconds = Some(run.times.cpu_seconds());
-    record.simplify.peak_bytes = Some(run.times.peak_bytes);
+    // To read a file says nothing of the time that its program took.
+    if !is_given {
+        fill_costs(&mut record, &run.times);
+    }
     let Ok(result) = &run.outcome else { return record };
-    if record.status == Status::Ok {
+    if record.status.is_ok() {
         record.reason = None;
     }
     fill_result(&mut record.simplify, result);
@@ -148,6 +148,16 @@ pub fn record(
         }
     }
     record
+}
+
+/// Copies what the result cost.
+fn fill_costs(record: &mut Record, times: &Times) {
+    record.repetitions = vec![repetition(times)];
+    record.simplify.substrates =
+        times.substrates.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect();
+    record.simplify.seconds = Some(times.seconds());
+    record.simplify.cpu_seconds = Some(times.cpu_seconds());
+    record.simplify.peak_bytes = Some(times.peak_bytes);
 }
 
 /// Copies the facts of the result itself: counts, level, remarks.

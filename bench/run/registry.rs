@@ -7,6 +7,7 @@ use medial::simplifier::{Chain, MedialSimplifier};
 
 use medial_methods::initial;
 
+use super::given;
 use crate::plugin::{self, PluginError};
 
 /// Id of the pseudo-method that returns the initial medial mesh.
@@ -15,8 +16,8 @@ pub const INITIAL: &str = "initial";
 /// Methods by id, in the order of the tables.
 pub struct Registry {
     entries: Vec<Entry>,
-    /// Entries that can be run but are not methods: the initial medial mesh as it is, and every
-    /// ordered pair of methods, run one after the other. Made eagerly, so that an id means the same in
+    /// Entries that can be run but are not methods: the initial medial mesh as it is, files of other
+    /// programs, and every ordered pair of methods, run one after the other. Made eagerly, so that an id means the same in
     /// a worker.
     others: Vec<Entry>,
     /// The plug-in files that were added, as absolute paths.
@@ -75,7 +76,8 @@ impl Registry {
     /// [`RegistryError::Duplicate`] when two have one id.
     pub fn new(methods: Vec<Box<dyn MedialSimplifier>>) -> Result<Self, RegistryError> {
         let initial = Entry { method: Arc::new(initial::method()), fingerprint: None };
-        let (entries, others) = (Vec::new(), vec![initial]);
+        let given = Entry { method: Arc::new(given::method()), fingerprint: None };
+        let (entries, others) = (Vec::new(), vec![initial, given]);
         let mut registry = Self { entries, others, files: Vec::new() };
         for method in methods {
             let id = &method.info().id;
@@ -114,7 +116,7 @@ impl Registry {
         self.entries.push(new);
     }
 
-    /// The method with an id, the chain of two (`FIRST+THEN`), or [`INITIAL`].
+    /// The method with an id, the chain of two (`FIRST+THEN`), [`INITIAL`] or [`GIVEN`](super::GIVEN).
     pub fn entry(&self, id: &str) -> Option<&Entry> {
         self.entries.iter().chain(&self.others).find(|entry| entry.id() == id)
     }

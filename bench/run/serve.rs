@@ -23,12 +23,13 @@ use crate::process_tree;
 
 use super::answer::panic_message;
 use super::bounds::Bounds;
+use super::given;
 use super::protocol::{CheckItem, Event, Request, send};
 use super::record::{Kept, NoisePart, failure_record, record, repetition};
 use super::scene::{Scene, reference_key};
 use super::verdict::{judge, mesh_hash};
 use super::{
-    Entry, Fault, Input, Item, LevelRun, MethodSpec, Provenance, Registry, Source, answer,
+    Entry, Fault, GIVEN, Input, Item, LevelRun, MethodSpec, Provenance, Registry, Source, answer,
 };
 
 /// Serves requests until standard input ends. `bytes` is the memory limit of this process.
@@ -253,10 +254,15 @@ fn put_to(registry: &Registry, item: &CheckItem) -> io::Result<()> {
 fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, String> {
     let id = &method.id;
     let entry = registry.entry(id).ok_or_else(|| format!("no method is called `{id}`"))?;
-    if entry.fingerprint() != method.fingerprint.as_deref() {
-        return Err(format!(
-            "{id}: its plug-in file or program has changed since the run was planned"
-        ));
+    let now = if id == GIVEN {
+        given::fingerprint(&method.params)
+    } else {
+        entry.fingerprint().map(str::to_owned)
+    };
+    if now != method.fingerprint {
+        let what = if id == GIVEN { "its file" } else { "its plug-in file or program" };
+        let label = method.label();
+        return Err(format!("{label}: {what} has changed since the run was planned"));
     }
     Ok(entry)
 }

@@ -254,6 +254,8 @@ impl Known {
             Status::TimedOut if item.limits.seconds > self.seconds_limit => true,
             Status::OutOfMemory if item.limits.bytes > self.bytes_limit => true,
             status if status.is_failure() => failures == Failures::Retried,
+            // A file is not timed.
+            Status::AsGiven => false,
             status => status.has_result() && self.repetitions < item.repeat,
         }
     }

@@ -232,3 +232,69 @@ fn nothing_is_no_success() {
     let (code, _, stderr) = run(&["axis", &far]);
     assert!(code == 1 && stderr.contains("far.off") && stderr.contains("billionth"), "{stderr}");
 }
+
+/// A medial mesh of the built-in capsule with 20 spheres.
+fn of_another_program(file: &Path) {
+    let words = ["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o"];
+    let (code, _, stderr) = run(&[&words[..], &[text_path(file)]].concat());
+    assert_eq!(code, 0, "{stderr}");
+}
+
+#[test]
+fn given_files_are_rows_without_times_beside_the_methods() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let [file, copy, out] = ["theirs.ma", "copy.ma", "report"].map(|name| dir.path().join(name));
+    of_another_program(&file);
+    fs::copy(&file, &copy).expect("a copy");
+    let named = [("Q-MAT, theirs", &file), ("Q-MAT+", &copy)];
+    let [theirs, plus] = named.map(|(name, file)| format!("{name}={}", text_path(file)));
+    let words =
+        ["compare", "builtin:capsule", "--methods", "qmat", "--counts-only", "--given", &theirs];
+    let words =
+        [&words[..], &["--given", &plus, "--samples", "500", "--out", text_path(&out)]].concat();
+    let (code, object) = json(&words);
+    assert_eq!(code, 0, "{object}");
+    assert_eq!((&object["status"]["ok"], &object["status"]["as_given"]), (&1.into(), &2.into()));
+    let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
+    let records: Vec<Value> =
+        lines.lines().map(|line| serde_json::from_str(line).expect("a record")).collect();
+    let simplified = &records[0];
+    assert_eq!(simplified["simplify"]["level"]["spheres"], 20, "the count of the files");
+    for (record, (name, other)) in
+        records[1..].iter().zip([("Q-MAT, theirs", "Q-MAT+"), ("Q-MAT+", "Q-MAT, theirs")])
+    {
+        assert_eq!(
+            (&record["status"], &record["simplify"]["variant"]),
+            (&"as_given".into(), &name.into())
+        );
+        assert!(record["simplify"]["seconds"].is_null(), "{record}");
+        let warnings = record["simplify"]["warnings"].as_array().expect("a list");
+        let same = format!("the same bytes are given as {other}, too");
+        assert!(warnings.contains(&same.into()), "{record}");
+        // Written with all digits and read again: the same errors but for rounding.
+        let [ours, given] =
+            [simplified, record].map(|r| r["evaluate"]["hausdorff"].as_f64().expect("measured"));
+        assert!((ours - given).abs() < 1e-12, "{ours} {given}");
+    }
+    let (_, again) = json(&words);
+    assert_eq!((&again["run"], &again["found"]), (&0.into(), &3.into()));
+}
+
+#[test]
+fn given_files_that_fit_no_mesh_are_refused_before_anything_runs() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let [file, out] = ["theirs.ma", "report"].map(|name| dir.path().join(name));
+    of_another_program(&file);
+    let file = text_path(&file);
+    for (given, meshes, why) in [
+        (format!("a={file}"), &["builtin:capsule", "builtin:box"][..], "--given a@capsule="),
+        (format!("a@sphere={file}"), &["builtin:capsule"], "no mesh is called `sphere`"),
+        ("a=nowhere.ma".to_owned(), &["builtin:capsule"], "nowhere.ma"),
+        (file.to_owned(), &["builtin:capsule"], "write NAME=FILE.ma"),
+    ] {
+        let words = [&["compare"], meshes, &["--given", &given, "--out", text_path(&out)]].concat();
+        let (code, _, stderr) = run(&words);
+        assert!((1..=2).contains(&code) && stderr.contains(why), "{given}: {code}, {stderr}");
+        assert!(!out.exists(), "{given}");
+    }
+}

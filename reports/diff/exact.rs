@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use super::pairs::Pair;
 use super::{Change, DiffOptions, Meaning};
-use crate::record::{Record, Status};
+use crate::record::Record;
 
 /// Quantities of which less is better: errors, by their keys in `evaluate`.
 const ERRORS: [&str; 15] = [
@@ -80,7 +80,7 @@ fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffO
     };
     let is_bounded = matches!(pair.old.simplify.level, Level::MaxError(_));
     match key {
-        "status" => of_truth(pair.old.status == Status::Ok, pair.new.status == Status::Ok),
+        "status" => of_truth(pair.old.status.is_ok(), pair.new.status.is_ok()),
         "betti" | "union.betti" => of_truth(is_right(pair.old, old), is_right(pair.new, new)),
         // Of an error bound the number of spheres is the answer.
         "simplify.spheres" if is_bounded => of_size(old, new, 0.0, 0.5),

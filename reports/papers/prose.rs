@@ -298,7 +298,7 @@ fn outcomes(comparison: &Comparison<'_>) -> String {
 /// What became of runs that did not give what was asked.
 fn fate(status: Status) -> Option<&'static str> {
     Some(match status {
-        Status::Ok => return None,
+        Status::Ok | Status::AsGiven => return None,
         Status::OtherCount => "gave another number of spheres",
         Status::BoundMissed => "found no level within the bound",
         Status::Unsupported => "asked for what the method does not do",

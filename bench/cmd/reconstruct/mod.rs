@@ -11,13 +11,11 @@ use medial::shape::{Cost, Shape};
 use medial::surface::{self, SurfaceReport, TriMesh};
 use serde_json::{Map, Value, json};
 
-use crate::args::{
-    AxisArguments, FitBy, Global, MeshArgument, RadiiFrom, SubstrateArguments, shape_options,
-};
+use crate::args::{AxisArguments, Global, MeshArgument, SubstrateArguments, shape_options};
 use crate::exit::{Exit, Failure};
 use crate::files::{SURFACES, check_extension, check_folder, medial_mesh_for};
-use crate::output::{counted, percent, print_json, print_line};
-use crate::run::{Input, Source, StageLine, peak_bytes};
+use crate::output::{counted, print_json, print_line};
+use crate::run::{FitBy, Input, RadiiFrom, Source, StageLine, peak_bytes, percent};
 
 pub use crust::COINCIDENT;
 

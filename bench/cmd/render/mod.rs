@@ -19,8 +19,8 @@ use self::errors::Deviation;
 use crate::args::{AxisArguments, Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_extension, check_folder, medial_mesh_for};
-use crate::output::{counted, percent, print_json, print_line};
-use crate::run::{Input, Source, StageLine};
+use crate::output::{counted, print_json, print_line};
+use crate::run::{Input, Source, StageLine, percent};
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]

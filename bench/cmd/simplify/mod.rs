@@ -25,9 +25,9 @@ use crate::args::{
 };
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
-use crate::output::{counted, note, percent, print_json, print_line, version};
+use crate::output::{counted, note, print_json, print_line, version};
 use crate::run::record::fill_result;
-use crate::run::{Fault, Input, LevelRun, Registry, Source, StageLine, answer};
+use crate::run::{Fault, Input, LevelRun, Registry, Source, StageLine, answer, percent};
 use bound::Searched;
 use outputs::Outputs;
 

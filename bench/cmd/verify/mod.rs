@@ -9,13 +9,11 @@ use medial::metrics::{self, Counts, Evaluation, JudgeOptions, TriangleQuality};
 use medial::shape::{Fit, ShapeOptions};
 use serde::Serialize;
 
-use crate::args::{
-    AxisArguments, FitBy, Global, MeasureArguments, RadiiFrom, ReadArguments, judge_options,
-};
+use crate::args::{AxisArguments, Global, MeasureArguments, ReadArguments, judge_options};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_folder, medial_mesh_for};
 use crate::output::{print_json, print_raw};
-use crate::run::{Input, Source, StageLine, hex_digest};
+use crate::run::{FitBy, Input, RadiiFrom, Source, StageLine, hex_digest};
 
 mod pairs;
 mod table;

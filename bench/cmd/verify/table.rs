@@ -3,7 +3,7 @@
 use medial::metrics::Evaluation;
 
 use super::Row;
-use crate::output::percent;
+use crate::run::percent;
 
 const TITLES: [&str; 11] = [
     "file",

@@ -11,7 +11,7 @@ use medial::complex::MedialMesh;
 use medial::geometry::hash::splitmix;
 use medial::metrics::{Evaluation, Judge, JudgeOptions};
 use medial::shape::{Shape, ShapeOptions};
-use medial_reports::{Record, Status};
+use medial_reports::Record;
 use serde_json::Value;
 
 use super::Opened;
@@ -130,7 +130,7 @@ fn loaded(opened: &Opened, record: &Record) -> Result<Option<MedialMesh>, String
         // A measured result without its medial mesh can be anything.
         return Ok(None);
     };
-    if !matches!(record.status, Status::Ok | Status::OtherCount) {
+    if !record.status.has_result() {
         return Err(format!("it has a medial mesh, and the status {}", record.status));
     }
     let mesh = read(&path)?;

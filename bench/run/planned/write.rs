@@ -39,6 +39,13 @@ pub fn check_travels(study: &Study) -> Result<(), PlannedError> {
             plugin.display()
         )));
     }
+    if let Some(given) = study.given.first() {
+        return Err(PlannedError::Study(format!(
+            "given `{}`: there is nothing to plan where a file is judged; take it in with `medial compare --given` and \
+             the same --out once the plan has been collected",
+            given.name
+        )));
+    }
     Ok(())
 }
 

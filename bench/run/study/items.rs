@@ -111,6 +111,7 @@ impl Study {
         let methods = self.entries(registry)?;
         let sources = self.sources()?;
         let names = unique_names(&sources);
+        let files = self.given_files(&names)?;
         let mut items = Vec::new();
         for (source, mesh) in sources.iter().zip(names) {
             let hash = source.path().map(hash_of).transpose()?;
@@ -128,6 +129,8 @@ impl Study {
             for (method, entry) in &methods {
                 items.push(self.item(scene.clone(), method, entry, here));
             }
+            let of_mesh = files.iter().filter(|file| file.mesh == scene.mesh);
+            items.extend(of_mesh.map(|file| self.given_item(scene.clone(), file, here)));
         }
         Ok(items)
     }
@@ -201,7 +204,7 @@ impl Study {
     }
 }
 
-fn hash_of(path: &Path) -> Result<String, StudyError> {
+pub(super) fn hash_of(path: &Path) -> Result<String, StudyError> {
     let read = std::fs::read(path);
     let bytes = read.map_err(|error| InputError::Read { path: path.to_owned(), error })?;
     Ok(hex_digest(&bytes))

@@ -14,12 +14,18 @@
 //! name = "qmat, no scale term"
 //! params = { k = 0 }
 //! levels = []                              # native levels beside the counts
+//!
+//! [[given]]                                # a file of another program, judged like the rest
+//! name = "Q-MAT, authors"
+//! file = "bear-qmat.ma"
+//! mesh = "bear"
 //! ```
 //!
 //! The command line gives one too; what it names wins over the file. The study that was asked last
 //! lies beside its results.
 
 mod error;
+mod given;
 mod items;
 
 use std::path::{Path, PathBuf};
@@ -28,7 +34,7 @@ use medial::simplifier::Params;
 use medial::surface::Sampling;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::{Dual, Source};
+use super::{Dual, Given, Source};
 
 pub use error::{StudyError, no_such_method};
 pub use items::Here;
@@ -95,6 +101,9 @@ pub struct Study {
     /// Methods with their parameters; all methods unless given.
     #[serde(rename = "method")]
     pub methods: Vec<StudyMethod>,
+    /// Files of other programs as results of named methods.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub given: Vec<Given>,
 }
 
 /// A method of a study: a row of its own in tables and plots.
@@ -156,6 +165,7 @@ impl Default for Study {
             plugins: vec![],
             after_filters: vec![],
             methods: vec![],
+            given: vec![],
         }
     }
 }
