@@ -14,7 +14,7 @@ import os
 import pathlib
 import sys
 
-# In the order of the table; `medial` has no others.
+# In the order of the table; of the others, `as_given`, a sweep has none.
 OUTCOMES = ["ok", "other_count", "bound_missed", "unsupported", "refused", "failed", "panicked", "timed_out",
             "out_of_memory", "invalid_output"]
 WORST = OUTCOMES[6:]

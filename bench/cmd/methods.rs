@@ -33,10 +33,11 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     } else if arguments.id.is_some() {
         infos.into_iter().for_each(describe);
     } else {
+        let width = infos.iter().map(|info| info.id.len()).max().unwrap_or_default();
         for info in infos {
             let note = if info.on_request { " (runs where it is named)" } else { "" };
-            print_line(&format!("{:<12} {}{note}", info.id, info.title));
-            print_line(&format!("{:<12} {}", "", info.summary));
+            print_line(&format!("{:<width$} {}{note}", info.id, info.title));
+            print_line(&format!("{:<width$} {}", "", info.summary));
         }
     }
     Ok(Exit::Done)

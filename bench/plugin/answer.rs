@@ -28,6 +28,8 @@ pub(super) struct Task<'a> {
     pub shape: &'a Shape,
     pub level: Level,
     pub output: &'a Path,
+    /// Whether the answer may be in other units, which are then found.
+    pub fits: bool,
 }
 
 /// The result of a program that has ended.
@@ -123,11 +125,17 @@ fn read(task: &Task<'_>) -> Result<(MedialMesh, Vec<String>), SimplifyError> {
     let bytes = fs::read(task.output)
         .map_err(|error| invalid(format!("the file at {{output}}: {error}")))?;
     let strict = ReadOptions { radii: Radii::NotNegative, ..ReadOptions::default() };
-    let loaded = complex::parse_ma_with(bytes, "", strict).map_err(|error| {
+    let mut loaded = complex::parse_ma_with(bytes, "", strict).map_err(|error| {
         // The file's name is a temporary one and says nothing.
         let line = error.line.map_or_else(String::new, |line| format!(", line {line}"));
         invalid(format!("the file at {{output}}{line}: {}", error.kind))
     })?;
+    if task.fits
+        && let Some(fit) = task.shape.fit_if_needed(&loaded.mesh)?
+    {
+        loaded.mesh = fit.similarity.mesh(&loaded.mesh);
+        loaded.notes.push(format!("fitted: {fit}"));
+    }
     let normal = task.shape.normalisation();
     let mesh = loaded.mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p));
     mesh.check()?;

@@ -31,6 +31,19 @@ struct Written {
     native: Option<WrittenNative>,
     #[serde(default)]
     params: Vec<Spanned<WrittenParam>>,
+    #[serde(default)]
+    fit: AnswerUnits,
+}
+
+/// The units of an answer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum AnswerUnits {
+    /// Those of the surface.
+    #[default]
+    None,
+    /// Whatever scale and shift fit, where the answer does not fit as it is.
+    Auto,
 }
 
 #[derive(Deserialize)]
@@ -90,6 +103,7 @@ pub(super) struct Declaration {
     pub levels: Vec<LevelKind>,
     pub native: Option<NativeLevel>,
     pub params: Vec<ParamInfo>,
+    pub fit: AnswerUnits,
     /// The command as it was written, for the fingerprint.
     pub written: Vec<String>,
     /// The program: an absolute path, or a name that was found in `PATH`.
@@ -161,6 +175,7 @@ impl Written {
                 larger_is_coarser: native.larger_is_coarser,
             }),
             params,
+            fit: self.fit,
             written: self.command.into_inner().into_iter().map(Spanned::into_inner).collect(),
             program,
             arguments: arguments.into_iter().map(|(word, _)| word).collect(),

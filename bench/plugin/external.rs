@@ -17,7 +17,7 @@ use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::answer::{Task, answer};
-use super::declaration::{Declaration, LevelKind};
+use super::declaration::{AnswerUnits, Declaration, LevelKind};
 use super::program::{self, NoEnd};
 use super::template::Word;
 
@@ -119,11 +119,12 @@ impl MedialSimplifier for External {
         }
         values.push(("seed".to_owned(), run.seed.to_string()));
         values.push(("threads".to_owned(), rayon::current_num_threads().to_string()));
-        let Declaration { id, levels, program, arguments, .. } = &self.declaration;
+        let Declaration { id, levels, program, arguments, fit, .. } = &self.declaration;
         Ok(Box::new(Prepared {
             shape,
             id: id.clone(),
             levels: levels.clone(),
+            fits: *fit == AnswerUnits::Auto,
             program: program.clone(),
             arguments: arguments.clone(),
             folder: self.folder.clone(),
@@ -139,6 +140,7 @@ struct Prepared<'s> {
     shape: &'s Shape,
     id: String,
     levels: Vec<LevelKind>,
+    fits: bool,
     program: PathBuf,
     arguments: Vec<Word>,
     folder: PathBuf,
@@ -167,7 +169,8 @@ impl Simplification for Prepared<'_> {
                 return Err(cannot(&format!("run {}", self.program.display()), error));
             }
         };
-        answer(&Task { id: &self.id, shape: self.shape, level, output: &output }, ended)
+        let Self { id, shape, fits, .. } = self;
+        answer(&Task { id, shape, level, output: &output, fits: *fits }, ended)
     }
 }
 
@@ -240,8 +243,8 @@ fn text_like(value: &Value, default: &str) -> Result<String, &'static str> {
 
 /// SHA-256 of a declaration and of every file that a word of its command names.
 fn fingerprint(declaration: &Declaration, folder: &Path) -> io::Result<String> {
-    let Declaration { id, title, citation, levels, native, params, written, .. } = declaration;
-    let declared = json!([id, title, citation, levels, native, params, written]);
+    let Declaration { id, title, citation, levels, native, params, written, fit, .. } = declaration;
+    let declared = json!([id, title, citation, levels, native, params, written, fit]);
     let mut hasher = Sha256::new();
     hasher.update(declared.to_string());
     let words = declaration.arguments.iter().filter_map(Word::plain).map(|word| folder.join(word));

@@ -93,9 +93,7 @@ pub fn read_axis(
     let fit = match (options.fit, from_surface) {
         (FitBy::None, _) => None,
         (FitBy::Similarity, false) => Some(shape.fit(&loaded.mesh).map_err(|error| named(&error))?),
-        (FitBy::Auto, false) => {
-            fit_if_needed(&loaded.mesh, shape).map_err(|error| named(&error))?
-        }
+        (FitBy::Auto, false) => shape.fit_if_needed(&loaded.mesh).map_err(|error| named(&error))?,
         (FitBy::Similarity | FitBy::Auto, true) => {
             let fit = shape.fit_of_points(&loaded.mesh).map_err(|error| named(&error))?;
             Some(fit.ok_or_else(|| named(&"without radii only the cubes that tools write are tried, and none of them fits the surface"))?)
@@ -103,7 +101,7 @@ pub fn read_axis(
     };
     if let Some(fit) = &fit {
         loaded.mesh = fit.similarity.mesh(&loaded.mesh);
-        loaded.notes.push(said(fit));
+        loaded.notes.push(format!("fitted: {fit}"));
     }
     if from_surface {
         take_radii(&mut loaded, shape).map_err(|why| named(&why))?;
@@ -113,29 +111,6 @@ pub fn read_axis(
         loaded.warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", path.display())));
     }
     Ok((loaded, fit))
-}
-
-/// A change of units, where one is needed and found.
-fn fit_if_needed(mesh: &MedialMesh, shape: &Shape) -> Result<Option<Fit>, ShapeError> {
-    let fits = |misfit: Option<f64>| misfit.is_some_and(|misfit| misfit <= DOUBTFUL);
-    if fits(shape.misfit(mesh)?) {
-        return Ok(None);
-    }
-    Ok(Some(shape.fit(mesh)?).filter(|fit| fits(fit.misfit)))
-}
-
-/// A change of units, in words.
-fn said(fit: &Fit) -> String {
-    let Fit { similarity, source, misfit_before, misfit } = fit;
-    let misfit = match (misfit_before, misfit) {
-        (Some(before), Some(after)) => format!(
-            "; radii and distances to the surface differ by {} at the median, {} before",
-            percent(*after),
-            percent(*before)
-        ),
-        _ => String::new(),
-    };
-    format!("fitted: {similarity} ({source}){misfit}")
 }
 
 /// Gives every sphere the distance of its centre to the surface as its radius.

@@ -103,6 +103,22 @@ pub struct Fit {
     pub misfit: Option<f64>,
 }
 
+impl fmt::Display for Fit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { similarity, source, misfit_before, misfit } = self;
+        write!(f, "{similarity} ({source})")?;
+        let (Some(before), Some(after)) = (misfit_before, misfit) else { return Ok(()) };
+        let [before, after] = [before, after].map(|misfit| 100.0 * misfit);
+        write!(
+            f,
+            "; radii and distances to the surface differ by {after:.3} % at the median, {before:.3} % before"
+        )
+    }
+}
+
+/// Median misfits, as fractions of the diagonal: from here on other units are tried.
+const DOUBTFUL: f64 = 0.01;
+
 /// Not more spheres than these are looked at, evenly taken from the list.
 const SPHERES: usize = 4000;
 
@@ -156,6 +172,19 @@ impl Shape {
         let (before, misfit) = (misfit(&Similarity::IDENTITY), misfit(&normal));
         let similarity = surface.in_input_units(&normal);
         Ok(Fit { similarity, source, misfit_before: Some(before), misfit: Some(misfit) })
+    }
+
+    /// The similarity of [`Shape::fit`] where one is needed and helps: the medial mesh fits with it, to 1 % of the diagonal at
+    /// the median, and does not as it is.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn fit_if_needed(&self, mesh: &MedialMesh) -> Result<Option<Fit>, ShapeError> {
+        let fits = |misfit: Option<f64>| misfit.is_some_and(|misfit| misfit <= DOUBTFUL);
+        if fits(self.misfit(mesh)?) {
+            return Ok(None);
+        }
+        Ok(Some(self.fit(mesh)?).filter(|fit| fits(fit.misfit)))
     }
 
     /// The similarity for points without radii: that convention of a tool which brings nearly all of them into the solid, the

@@ -1,0 +1,120 @@
+//! The adapters of `examples/adapters`, with stand-ins for the programs: they write in other units, first something unfinished,
+//! and stay open in a window when they are done.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use medial::complex;
+
+mod common;
+use common::records;
+
+const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
+const ADAPTERS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/adapters/adapters.toml");
+
+fn program(path: &Path, text: &str) {
+    fs::write(path, format!("#!/bin/sh\n{text}\n")).expect("written");
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("permitted");
+}
+
+/// A medial mesh of the built-in capsule with 20 spheres, ten times as large and elsewhere.
+fn normalised(folder: &Path) -> std::path::PathBuf {
+    let file = folder.join("axis.ma");
+    let done = Command::new(MEDIAL)
+        .args(["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "--quiet", "-o"])
+        .arg(&file)
+        .status();
+    assert!(done.expect("it runs").success());
+    let axis = complex::read(&file).expect("a medial mesh").mesh;
+    let moved = axis.transformed(10.0, |p| 10.0 * p + medial::Vec3::new(5.0, -3.0, 70.0));
+    complex::write(&file, &moved).expect("written");
+    file
+}
+
+#[test]
+fn results_of_programs_that_stay_open_are_taken_and_fitted() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        eprintln!("skipped: no python3");
+        return;
+    }
+    let dir = tempfile::tempdir().expect("a folder");
+    let axis = normalised(dir.path());
+    let axis = axis.display();
+    let [tetrahedra, mattopo, matstruct, prepare, matfp] =
+        ["ftetwild", "mattopo", "matstruct", "matfp_pre", "matfp"]
+            .map(|name| dir.path().join(name));
+    program(&tetrahedra, "cp \"$2\" \"$4\"");
+    let then_waits = "sleep 600";
+    program(
+        &mattopo,
+        &format!(
+            "test \"$2 $3\" = '20 non_cad' || exit 3\nhead -4 {axis} > ../out/mat/mat.ma\nsleep 1\n\
+             cp {axis} ../out/mat/mat.ma\n{then_waits}"
+        ),
+    );
+    program(
+        &matstruct,
+        &format!("test \"$5 $6 $7\" = '-o -p 30' || exit 3\ncp {axis} \"$4\"/mat.ma"),
+    );
+    program(&prepare, "cp \"$1\" ../input/mesh/mesh_surface.geogram");
+    program(&matfp, &format!("test \"$2\" = --ds=0.1 || exit 3\ncp {axis} mat.ma\n{then_waits}"));
+    let out = dir.path().join("report");
+    let begun = Instant::now();
+    let done = Command::new(MEDIAL)
+        .args(["compare", "builtin:capsule", "--plugins", ADAPTERS, "--counts-only", "--published"])
+        .args([
+            "--methods",
+            "mattopo,matstruct,matfp",
+            "--levels",
+            "matstruct=30",
+            "--spheres",
+            "20",
+        ])
+        .args(["--samples", "500", "--quiet", "--out"])
+        .arg(&out)
+        .envs([("FTETWILD", &tetrahedra), ("MATTOPO", &mattopo), ("MATSTRUCT", &matstruct)])
+        .envs([("MATFP_PRE", &prepare), ("MATFP", &matfp)])
+        .output()
+        .expect("it runs");
+    assert!(begun.elapsed() < Duration::from_secs(300), "the programs are ended");
+    let records = records(&out);
+    let asked = [("mattopo", "spheres"), ("matstruct", "native"), ("matfp", "published")];
+    for (method, level) in asked {
+        let of_level = |record: &&serde_json::Value| {
+            let asked = &record["simplify"]["level"];
+            record["simplify"]["method"] == method && (asked == level || !asked[level].is_null())
+        };
+        let record = records.iter().find(of_level).unwrap_or_else(|| panic!("{method}"));
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(
+            (&record["status"], &record["simplify"]["spheres"]),
+            (&"ok".into(), &20.into()),
+            "{record} {said}"
+        );
+        let warnings = record["simplify"]["warnings"].to_string();
+        assert!(warnings.contains("fitted: lengths times 0.1"), "{warnings}");
+        assert!(record["evaluate"]["hausdorff"].as_f64().expect("measured") < 0.05, "{record}");
+    }
+}
+
+#[test]
+fn a_program_that_is_not_there_is_named() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("report");
+    let done = Command::new(MEDIAL)
+        .args(["compare", "builtin:capsule", "--plugins", ADAPTERS, "--counts-only", "--quiet"])
+        .args(["--methods", "mattopo", "--spheres", "20", "--samples", "500", "--out"])
+        .arg(&out)
+        .env_remove("MATTOPO")
+        .output();
+    assert_eq!(done.expect("it runs").status.code(), Some(5), "nothing measured");
+    if Command::new("python3").arg("--version").output().is_ok() {
+        let record = &records(&out)[0];
+        assert_eq!(record["status"], "unsupported", "{record}");
+        assert!(record["reason"].as_str().expect("a reason").contains("MATTOPO"), "{record}");
+    }
+}
