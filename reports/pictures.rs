@@ -1,7 +1,7 @@
 //! Which results are shown beside each other as pictures.
 //!
 //! For each mesh one strip: the results of all methods at the number of spheres that the answers of
-//! [`purpose`](crate::purpose) are for, and a 3D view of the same. Drawing needs the surfaces and the medial meshes, which are not in the
+//! [`purpose`](crate::purpose) are for, with the given files at theirs, and a 3D view of the same. Drawing needs the surfaces and the medial meshes, which are not in the
 //! records: it is for the caller, with [`strip`](crate::render::strip).
 
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use medial::geometry::hash::splitmix;
 use crate::comparison::{Comparison, reached};
 use crate::metric::HAUSDORFF;
 use crate::purpose::usual_level;
-use crate::record::Record;
+use crate::record::{Record, Status};
 use crate::text::{counted, file_stems, significant};
 
 /// Folders of the pictures and of the 3D views, beside the page.
@@ -63,7 +63,9 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     for entry in &comparison.entries {
         let record = entry.record;
-        let shown = entry.level == level && entry.measured();
+        // A file of another program has one number of spheres, whatever that is.
+        let at_level = entry.level == level || record.status == Status::AsGiven;
+        let shown = at_level && entry.measured();
         let Some(artifact) = record.artifact.clone().filter(|_| shown) else { continue };
         let mut caption = comparison.series[entry.series].clone();
         if let Some(spheres) = reached(record) {

@@ -9,6 +9,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use medial::complex;
+use medial_test_support::skip;
 
 mod common;
 use common::records;
@@ -38,7 +39,7 @@ fn normalised(folder: &Path) -> std::path::PathBuf {
 #[test]
 fn results_of_programs_that_stay_open_are_taken_and_fitted() {
     if Command::new("python3").arg("--version").output().is_err() {
-        eprintln!("skipped: no python3");
+        skip("no python3");
         return;
     }
     let dir = tempfile::tempdir().expect("a folder");

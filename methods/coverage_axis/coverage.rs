@@ -48,7 +48,7 @@ impl Coverage {
 
     /// Number of balls.
     pub fn rows(&self) -> usize {
-        if self.width == 0 { 0 } else { self.words.len() / self.width }
+        self.words.len().checked_div(self.width).unwrap_or(0)
     }
 
     /// Number of samples.

@@ -14,9 +14,16 @@
 //! * In-sphere, if that bound does not decide: the permanent itself. It shrinks with points that are
 //!   flat along an axis, while `M` does not.
 //!
-//! Differences of coordinates may underflow gradually, which is exact. Products may underflow with an
-//! absolute error below `2^-1074` each: [`UNDERFLOW`] covers it when `M <= 1`, the slack of the
-//! constants when `M > 1`.
+//! Differences of coordinates may underflow gradually, which is exact. Products may underflow, each off by at
+//! most `2^-1075`, and what multiplies them may be large: `M` is at most `2e57` by
+//! [`MAX_COORDINATE`](super::MAX_COORDINATE), `B` at most `1.4e115`.
+//!
+//! * Orientation: six products of two, each multiplied by a third difference: less than `4e-266`.
+//! * In-sphere: twelve products of two, each in two minors, multiplied by a third difference and a lift, and
+//!   four lifts of three squares, each multiplied by a minor: less than `4e-150`.
+//!
+//! [`ORIENTATION_UNDERFLOW`] and [`UNDERFLOW`] cover these sums. No rounding bound does: where a large
+//! coordinate meets tiny ones, the product that it multiplies is 0 in the permanent, too.
 
 use super::differences::Grid;
 use super::lanes::{Pair, Real};
@@ -56,7 +63,12 @@ const ORIENTATION_BOUND: f64 = 8.5 * U;
 const IN_SPHERE_BOUND: f64 = 216.0 * U;
 /// 17 roundings of the determinant, and as many of the permanent.
 const PERMANENT_BOUND: f64 = 17.5 * U;
-pub(crate) const UNDERFLOW: f64 = 1e-300;
+/// What underflow takes from an orientation at most, with room to spare.
+const ORIENTATION_UNDERFLOW: f64 = 1e-260;
+/// The same for the in-sphere test and the power test.
+pub(crate) const UNDERFLOW: f64 = 1e-145;
+/// The same relative to the largest lift, or 1.
+const RELATIVE_UNDERFLOW: f64 = 1e-300;
 
 #[inline(always)]
 fn sub(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
@@ -120,7 +132,7 @@ impl Filter {
             + c1[2].abs() * (dxby.abs() + dybx.abs())
             + d1[2].abs() * (bxcy.abs() + bycx.abs());
         let bound = ORIENTATION_BOUND * permanent;
-        if det.abs() > bound + UNDERFLOW || bound <= self.exact_orientation {
+        if det.abs() > bound + ORIENTATION_UNDERFLOW || bound <= self.exact_orientation {
             return Sign::of(det);
         }
         // The usual degenerate case, points in an axis-parallel plane, needs no arithmetic.
@@ -254,7 +266,7 @@ fn permanent_bound<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
         + lifts[3] * triple(0, 1, 2);
     // At least 1, as the bound on underflow in the documentation needs.
     let reach = lifts.into_iter().fold(1.0, f64::max);
-    (det, PERMANENT_BOUND * permanent + UNDERFLOW * (reach * reach))
+    (det, PERMANENT_BOUND * permanent + RELATIVE_UNDERFLOW * (reach * reach))
 }
 
 #[cold]

@@ -133,3 +133,54 @@ fn circumcentres_of_slivers_are_exact() {
     assert_eq!(centre, Vec3::new(0.0, 0.0, h / 2.0));
     assert_eq!(radius, 1.0);
 }
+
+#[test]
+fn huge_coordinates_beside_tiny_ones_have_the_sign_of_the_exact_stage() {
+    // Products of two tiny coordinates underflow, and a huge one multiplies what is lost.
+    let huge = 2.944_495_945_799_024_7e47;
+    let tiny = 9.704_187_067_161_276e-101;
+    let p = [
+        Vec3::ZERO,
+        Vec3::new(0.0, -huge, -1.000_000_5 * huge),
+        Vec3::new(0.0, tiny, tiny),
+        Vec3::new(1.29e-231, 0.0, 0.0),
+    ];
+    assert_eq!(orient3d(p[0], p[1], p[2], p[3]), Sign::Positive);
+    assert_eq!(orient3d(p[0], p[2], p[1], p[3]), Sign::Negative);
+    // A difference that underflows in units of the largest one is not 0.
+    let p = [
+        Vec3::new(0.0, 0.0, 5.703_928_001_733_1e-310),
+        Vec3::new(1.112_553_905_479_973e-308, -2.923_003_275_003_422_6e48, 0.0),
+        Vec3::ZERO,
+        Vec3::new(0.0, 1.295_163e-318, 0.0),
+    ];
+    assert_eq!(orient3d(p[0], p[1], p[2], p[3]), orient3d(p[3], p[2], p[1], p[0]));
+    assert_eq!(orient3d(p[0], p[1], p[2], p[3]), Sign::Positive);
+    let exponents = [-320, -231, -160, -101, -60, -30, -5, 0, 20, 47, 56];
+    let mut state = 1_u64;
+    let mut next = |bound: u64| {
+        state = crate::hash::splitmix(state);
+        state % bound
+    };
+    for _ in 0..5_000 {
+        let mut coordinate = || -> f64 {
+            // Few mantissas, so that leading terms cancel.
+            let mantissa = [0.0, 1.0, -1.0, 1.5, 1.000_000_5][next(5) as usize];
+            mantissa * 10_f64.powi(exponents[next(11) as usize])
+        };
+        let mut point = || [coordinate(), coordinate(), coordinate()];
+        let [a, b, c, d, e] = [point(), point(), point(), point(), point()];
+        let filtered = Filter::ANY.orient3d(&a, &b, &c, &d);
+        assert_eq!(filtered, exact::orient3d(&a, &b, &c, &d, None), "{a:?} {b:?} {c:?} {d:?}");
+        let weights = [0, 1, 2, 3, 4].map(|_| coordinate().powi(2));
+        let site = |p: [f64; 3], k: usize| Site { p, w: weights[k] };
+        let [s, t, u, v, w] = [site(a, 0), site(b, 1), site(c, 2), site(d, 3), site(e, 4)];
+        let filtered = Filter::ANY.power_test::<Unweighted>([&s, &t, &u, &v], &w);
+        let expected = exact::in_sphere([&a, &b, &c, &d], &e, None);
+        assert_eq!(filtered, expected, "{a:?} {b:?} {c:?} {d:?} {e:?}");
+        let filtered = Filter::ANY.power_test::<Weighted>([&s, &t, &u, &v], &w);
+        let sites = [&s, &t, &u, &v].map(|s| (&s.p, s.w));
+        let expected = exact::power_test(sites, (&e, w.w));
+        assert_eq!(filtered, expected, "{a:?} {b:?} {c:?} {d:?} {e:?}, {weights:?}");
+    }
+}
