@@ -27,6 +27,7 @@ mod size_search;
 pub mod tam_heidrich;
 mod ties;
 pub mod tight;
+pub mod vmas;
 
 /// The published methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
@@ -41,6 +42,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(sat_pairwise::method()),
         Box::new(tam_heidrich::method()),
         Box::new(aof::method()),
+        Box::new(vmas::method()),
     ]
 }
 
