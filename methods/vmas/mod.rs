@@ -10,7 +10,7 @@
 //!    10 nearest ones; or the vertices of the mesh. One sphere to begin with.
 //! 1. *Cluster* (`cluster.rs`): every point goes to the sphere with the least error (`energy.rs`). Spheres
 //!    with fewer than 5 points (4 vertices) are dropped; these points have no sphere in this round.
-//! 2. *Refit* (`refit.rs`): Gauss-Newton on the points of each sphere.
+//! 2. *Refit* (`residuals.rs`, `refit.rs`): Gauss-Newton on the points of each sphere.
 //! 3. *Correct* (`correct.rs`): the fitted centre is pushed back to the medial axis, to the shrinking ball
 //!    (`shrinking_ball.rs`) of the nearest surface point. The fitted radius is not used.
 //! 4. *Errors* (`split.rs`): `E_s` for each sphere; their sum is the total error.
@@ -77,6 +77,7 @@ mod neighbours;
 mod params;
 mod points;
 mod refit;
+mod residuals;
 mod sampling;
 mod shrinking_ball;
 mod split;

@@ -56,6 +56,15 @@ pub(super) enum Locality {
     Faces(Vec<[u32; 3]>),
 }
 
+/// A point of a surface with one tangent plane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Oriented {
+    pub position: Vec3,
+    /// Outward unit normal.
+    pub normal: Vec3,
+    pub area: f64,
+}
+
 /// A point before it has its place on the curve.
 struct Unplaced {
     position: Vec3,
@@ -71,17 +80,24 @@ impl SurfacePoints {
         let samples = sample_with_faces(mesh, count, seed ^ STREAM);
         let mut on_face = vec![0_u32; mesh.faces.len()];
         samples.iter().for_each(|&(_, face)| on_face[face as usize] += 1);
-        let unplaced = samples.iter().enumerate().map(|(place, &(position, face))| {
+        let oriented = samples.iter().map(|&(position, face)| {
             let face = face as usize;
             let vector = area_vector(mesh, face);
             let area = vector.length() / f64::from(on_face[face]);
-            let normal = vector.normalize_or_zero();
+            Oriented { position, normal: vector.normalize_or_zero(), area }
+        });
+        Self::of_oriented(&oriented.collect::<Vec<_>>(), neighbours)
+    }
+
+    /// Points with one tangent plane each, adjacent to so many nearest ones, themselves among them.
+    pub fn of_oriented(oriented: &[Oriented], neighbours: usize) -> Self {
+        let unplaced = oriented.iter().enumerate().map(|(place, point)| {
+            let &Oriented { position, normal, area } = point;
             Unplaced { position, area, normal, planes: place..place + 1 }
         });
-        let unplaced: Vec<_> = unplaced.collect();
         let planes: Vec<_> =
-            unplaced.iter().map(|point| Plane { normal: point.normal, share: 1.0 }).collect();
-        let (mut points, _) = Self::placed(&unplaced, &planes);
+            oriented.iter().map(|point| Plane { normal: point.normal, share: 1.0 }).collect();
+        let (mut points, _) = Self::placed(&unplaced.collect::<Vec<_>>(), &planes);
         let count = neighbours.min(points.len());
         let ids = nearest(&points.tree, &points.positions, points.area(), count);
         points.links = links_of(&ids, count);

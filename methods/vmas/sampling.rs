@@ -10,7 +10,8 @@ use super::correct::Solid;
 use super::energy::Energy;
 use super::params::{Connect, Points, VmasParams};
 use super::points::SurfacePoints;
-use super::refit::{Residuals, refit};
+use super::refit::refit;
+use super::residuals::Residuals;
 use super::shrinking_ball::{Ball, End};
 use super::split::{misfits, to_split};
 
@@ -72,10 +73,7 @@ impl<'a> VariationalSampling<'a> {
     /// With one sphere: the ball of sample 0 (CGAL), or the largest ball of a vertex (the authors).
     pub fn new(points: &'a SurfacePoints, solid: &'a Solid<'a>, params: VmasParams) -> Self {
         let energy = Energy { lambda: params.lambda };
-        let residuals = match params.refit {
-            super::params::Refit::Energy => Residuals::Energy(energy),
-            super::params::Refit::Published => Residuals::published(points, energy),
-        };
+        let residuals = Residuals::new(points, energy, params.refit);
         let labels = vec![NONE; points.len()];
         let mut tally = Tally::default();
         let ball = match params.points {
