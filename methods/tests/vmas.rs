@@ -72,9 +72,9 @@ fn sixteen_spheres_of_a_torus_are_a_ring() {
         for sphere in &mesh.spheres {
             let centre = shape.normalisation().backward(sphere.centre);
             let (radius, ring) = (sphere.radius * diagonal, centre.truncate().length());
-            // The surface of quadrilaterals lies up to 0.0003 within the torus.
-            assert!((0.2995..0.301).contains(&radius), "{text}: {radius}");
-            assert!((ring - 1.0).hypot(centre.z) < 2e-3, "{text}: {centre}");
+            // Of the surface of quadrilaterals: its normals are up to 2 degrees off.
+            assert!((0.298..0.301).contains(&radius), "{text}: {radius}");
+            assert!((ring - 1.0).hypot(centre.z) < 3e-3, "{text}: {centre}");
         }
     }
 }
@@ -210,14 +210,10 @@ fn fewer_spheres_than_asked_are_said() {
     };
     for (text, asked, why) in [
         ("points=vertices", 5, "dropped"),
-        ("samples=100", 1_000_000_000, "surface points"),
-        ("samples=100:iterations=3", 2, "iterations"),
+        ("samples=100:iterations=3", 20, "iterations"),
         ("points=vertices:iterations=1", 4, "iterations"),
     ] {
         for (name, mesh) in [("cube", &cube), ("tetrahedron", &tetrahedron)] {
-            if asked > 1_000 && name == "tetrahedron" {
-                continue;
-            }
             let Simplified { mesh, diagnostics, .. } = spheres(&shape_of(name, mesh), text, asked);
             mesh.check().expect("a valid complex");
             assert!((1..asked).contains(&mesh.spheres.len()), "{name} {text}");

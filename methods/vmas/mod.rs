@@ -1,10 +1,10 @@
 //! VMAS: variational medial axis sampling.
 //!
 //! Q. Huang, P. Kraemer, S. Thery, D. Bechmann 2024, *Dynamic Skeletonization via Variational Medial Axis
-//! Sampling*, SIGGRAPH Asia 2024 Conference Papers, <https://doi.org/10.1145/3680528.3687678>. The
-//! paper itself was not available to us: all formulas are those of two programs of its first author,
-//! the published code (huang46u/VMAS-code) and the CGAL package `Variational_medial_axis`, read for facts.
-//! Steps and equations have no numbers here for that reason.
+//! Sampling*, SIGGRAPH Asia 2024 Conference Papers, <https://huang46u.github.io/VMAS/>. The paper itself
+//! was not available to us: all formulas are those of two programs of its first author, the published
+//! code (huang46u/VMAS-code) and the CGAL package `Variational_medial_axis`, read for facts. Steps and
+//! equations have no numbers here for that reason, and what only the paper says is missing.
 //!
 //! 0. *Points* (`points.rs`): area-uniform samples, 100 for each sphere and at least 20,000, adjacent to their
 //!    10 nearest ones; or the vertices of the mesh. One sphere to begin with.
@@ -38,10 +38,15 @@
 //!
 //! | | `points=samples` (CGAL) | `points=vertices` (the authors) |
 //! |---|---|---|
+//! | planes of a point | that of its face | those of all faces around it |
 //! | adjacency | nearest samples | edges of the mesh |
 //! | first sphere | ball of sample 0 | the largest ball |
 //! | a cluster is dropped | below 5 points | below 4 |
 //! | normal of a point's ball | of its face | of its faces, by area |
+//!
+//! A vertex cannot fit all of its planes where they differ, so errors are larger at features and splits go
+//! there: with the same number of spheres `points=vertices` reaches farther into thin parts, and
+//! depends on the mesh.
 //!
 //! # Deviations from the programs
 //!
@@ -109,7 +114,7 @@ const PUBLISHED: usize = 100;
 const SAMPLES_PER_SPHERE: usize = 100;
 
 /// Most samples that a number of spheres asks for by itself: memory and time stay bounded.
-const MOST_SAMPLES: usize = 200_000;
+const MOST_SAMPLES: usize = 100_000;
 
 /// Variational medial axis sampling as a method.
 ///
@@ -120,7 +125,7 @@ pub fn method() -> Method<VmasParams> {
         .citation(
             "Qijia Huang, Pierre Kraemer, Sylvain Thery, Dominique Bechmann 2024. Dynamic \
              skeletonization via variational medial axis sampling. SIGGRAPH Asia 2024 Conference \
-             Papers. https://doi.org/10.1145/3680528.3687678",
+             Papers. https://huang46u.github.io/VMAS/",
         )
         .summary(
             "Clusters surface points by the sphere that fits them best, refits each sphere to its \

@@ -109,7 +109,7 @@ impl VmasParams {
                 "samples",
                 default.samples,
                 "samples",
-                "area-uniform samples at least; 100 for each sphere if that is more, up to 200000",
+                "area-uniform samples at least; 100 for each sphere if that is more, up to 100000",
             ),
             ParamInfo::new(
                 "neighbours",

@@ -2,12 +2,11 @@
 
 use medial::Vec3;
 use medial::complex::Sphere;
-use medial::simplifier::{Params, SimplifyError};
+use medial::simplifier::{Diagnostics, Params, SimplifyError};
 use medial::surface::TriMesh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::VmasParams;
 use super::cluster::{Clusters, NONE, assign, drop_small};
 use super::connect::{edges, faces};
 use super::energy::Energy;
@@ -15,7 +14,9 @@ use super::params::{Connect, Refit};
 use super::points::{Locality, Oriented, SurfacePoints};
 use super::refit::refit;
 use super::residuals::Residuals;
+use super::sampling::Ended;
 use super::split::{Misfit, misfits, to_split};
+use super::{VmasParams, explain};
 
 const ENERGY: Energy = Energy { lambda: 0.2 };
 
@@ -311,6 +312,22 @@ fn faces_are_cliques_of_spheres_or_of_points() {
             };
             assert!(a.iter().any(corner));
         }
+    }
+}
+
+#[test]
+fn it_is_said_why_there_are_fewer_spheres() {
+    for (asked, target, reached, ended, said) in [
+        (10, 10, 10, Ended::AtRest, ""),
+        (10, 10, 8, Ended::Stalled, "8 spheres instead of 10: clusters"),
+        (10, 10, 8, Ended::IterationLimit, "8 spheres instead of 10: the rounds"),
+        (10, 5, 5, Ended::AtRest, "5 spheres instead of 10: more than 5 need"),
+        (10, 10, 10, Ended::IterationLimit, "the error is not at rest"),
+    ] {
+        let mut diagnostics = Diagnostics::default();
+        explain(asked, target, reached, ended, &mut diagnostics);
+        let warnings = diagnostics.warnings.concat();
+        assert!(warnings.contains(said) && warnings.is_empty() == said.is_empty(), "{warnings}");
     }
 }
 
