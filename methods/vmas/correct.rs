@@ -32,11 +32,7 @@ impl<'s> Solid<'s> {
     }
 
     fn touched<'a>(&'a self, points: &'a SurfacePoints) -> Touched<'a> {
-        if self.touches_mesh {
-            Touched::Mesh(&self.tree)
-        } else {
-            Touched::Points { tree: &points.tree, positions: &points.positions }
-        }
+        if self.touches_mesh { Touched::Mesh(&self.tree) } else { Touched::Points(&points.nearest) }
     }
 
     /// The medial ball of a surface point; `None` where the faces around a vertex cancel.

@@ -78,6 +78,7 @@ mod cluster;
 mod connect;
 mod correct;
 mod energy;
+mod nearest_point;
 mod neighbours;
 mod params;
 mod points;

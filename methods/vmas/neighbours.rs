@@ -11,7 +11,8 @@ const AMPLE: f64 = 1.8;
 
 /// The `count` nearest points of each point, itself among them, by distance and then id; listed one point
 /// after another. There are at least `count` points, spread over so much area.
-pub(super) fn nearest(tree: &PointTree, points: &[Vec3], area: f64, count: usize) -> Vec<u32> {
+pub(super) fn nearest(points: &[Vec3], area: f64, count: usize) -> Vec<u32> {
+    let tree = PointTree::new(points);
     let guess = AMPLE * count as f64 * area / (PI * points.len() as f64);
     let of_point = |&p: &Vec3| {
         let mut squared = guess.max(f64::MIN_POSITIVE);

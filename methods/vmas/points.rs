@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use medial::Vec3;
 use medial::complex::Sphere;
-use medial::geometry::trees::{Bounds, PointTree, morton_order};
+use medial::geometry::trees::{Bounds, morton_order};
 use medial::surface::{TriMesh, sample_with_faces};
 
+use super::nearest_point::PointGroups;
 use super::neighbours::{links_of, nearest};
 
 /// Consecutive points that are assigned to spheres together.
@@ -42,7 +43,8 @@ pub(super) struct SurfacePoints {
     pub local: Locality,
     /// The point that came first: sample 0.
     pub first: u32,
-    pub tree: PointTree,
+    /// For the contacts of shrinking balls.
+    pub nearest: PointGroups,
     /// For each group a ball that holds its points.
     pub groups: Vec<Sphere>,
 }
@@ -99,7 +101,7 @@ impl SurfacePoints {
             oriented.iter().map(|point| Plane { normal: point.normal, share: 1.0 }).collect();
         let (mut points, _) = Self::placed(&unplaced.collect::<Vec<_>>(), &planes);
         let count = neighbours.min(points.len());
-        let ids = nearest(&points.tree, &points.positions, points.area(), count);
+        let ids = nearest(&points.positions, points.area(), count);
         points.links = links_of(&ids, count);
         points.local = Locality::Nearest { count, ids };
         points
@@ -157,6 +159,7 @@ impl SurfacePoints {
             placed_planes.extend_from_slice(&planes[point.planes.clone()]);
             first_plane.push(placed_planes.len() as u32);
         }
+        let groups: Vec<Sphere> = positions.chunks(GROUP).map(ball_around).collect();
         let points = Self {
             areas: ordered().map(|point| point.area).collect(),
             normals: ordered().map(|point| point.normal).collect(),
@@ -165,8 +168,8 @@ impl SurfacePoints {
             links: Vec::new(),
             local: Locality::Faces(Vec::new()),
             first: kept.first().map_or(0, |&v| place_of[v as usize]),
-            tree: PointTree::new(&positions),
-            groups: positions.chunks(GROUP).map(ball_around).collect(),
+            nearest: PointGroups::new(&positions),
+            groups,
             positions,
         };
         (points, place_of)
@@ -195,7 +198,8 @@ pub(super) fn area_vector(mesh: &TriMesh, face: usize) -> Vec3 {
     0.5 * (b - a).cross(c - a)
 }
 
-fn ball_around(points: &[Vec3]) -> Sphere {
+/// A ball that holds some points.
+pub(super) fn ball_around(points: &[Vec3]) -> Sphere {
     let Bounds { lo, hi } = Bounds::of_points(points.iter().copied());
     let centre = 0.5 * (lo + hi);
     Sphere::new(centre, points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max))

@@ -11,8 +11,9 @@
 
 use medial::Vec3;
 use medial::complex::Sphere;
-use medial::geometry::trees::PointTree;
 use medial::surface::TriangleBvh;
+
+use super::nearest_point::PointGroups;
 
 /// Steps at most.
 const STEPS: usize = 30;
@@ -30,7 +31,7 @@ const IN_FRONT: f64 = 1e-12;
 /// What a ball may touch.
 #[derive(Clone, Copy)]
 pub(super) enum Touched<'a> {
-    Points { tree: &'a PointTree, positions: &'a [Vec3] },
+    Points(&'a PointGroups),
     Mesh(&'a TriangleBvh),
 }
 
@@ -38,9 +39,9 @@ impl Touched<'_> {
     /// The nearest point, `None` if the query is not finite.
     fn nearest(&self, query: Vec3) -> Option<(Vec3, f64)> {
         match self {
-            Self::Points { tree, positions } => {
-                let (id, squared) = tree.nearest(query)?;
-                Some((positions[id as usize], squared.sqrt()))
+            Self::Points(points) => {
+                let (point, squared) = points.nearest(query)?;
+                Some((point, squared.sqrt()))
             }
             Self::Mesh(tree) => {
                 let closest = tree.closest(query);
@@ -165,8 +166,8 @@ mod tests {
             Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
         };
         let positions: Vec<Vec3> = (0..2_000).map(direction).collect();
-        let tree = PointTree::new(&positions);
-        let touched = Touched::Points { tree: &tree, positions: &positions };
+        let groups = PointGroups::new(&positions);
+        let touched = Touched::Points(&groups);
         for &p in positions.iter().step_by(17) {
             let Ball { sphere, steps, end } = shrinking_ball(p, p, 2.0, touched);
             assert_eq!((steps, end), (1, End::Empty));
@@ -188,8 +189,8 @@ mod tests {
             }
         }
         let positions: Vec<Vec3> = points.iter().map(|&(p, _)| p).collect();
-        let tree = PointTree::new(&positions);
-        let touched = Touched::Points { tree: &tree, positions: &positions };
+        let groups = PointGroups::new(&positions);
+        let touched = Touched::Points(&groups);
         let mut steps = 0;
         for &(p, normal) in points.iter().step_by(20) {
             let ball = shrinking_ball(p, normal, 2.6, touched);
@@ -232,8 +233,8 @@ mod tests {
     fn a_contact_in_front_of_the_surface_ends_the_search() {
         // A normal that is no unit vector: no ball that touches its plane holds a point in front of it.
         let positions = [Vec3::new(0.3, 0.0, 0.05)];
-        let tree = PointTree::new(&positions);
-        let touched = Touched::Points { tree: &tree, positions: &positions };
+        let groups = PointGroups::new(&positions);
+        let touched = Touched::Points(&groups);
         let ball = shrinking_ball(Vec3::ZERO, 0.5 * Vec3::Z, 1.0, touched);
         assert_eq!((ball.steps, ball.end), (0, End::InFront));
     }
