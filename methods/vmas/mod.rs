@@ -92,12 +92,12 @@ mod tests;
 
 use std::sync::Arc;
 
-use medial::complex::betti;
+use medial::complex::{MedialMesh, betti};
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Extras, Level, Method, MethodInfo, RunContext, Simplification, Simplified,
-    SimplifyError,
+    SimplifyError, Work,
 };
 
 use crate::reuse::Reuse;
@@ -153,7 +153,8 @@ fn prepare<'s>(
     }
     run.step(0, 1)?;
     let solid = Solid::new(shape, params.contact == Contact::Mesh)?;
-    Ok(Box::new(Prepared { shape, solid, params, run: run.clone(), points: Reuse::new() }))
+    let (points, answers) = (Reuse::new(), Reuse::new());
+    Ok(Box::new(Prepared { shape, solid, params, run: run.clone(), points, answers }))
 }
 
 /// One shape.
@@ -164,6 +165,15 @@ struct Prepared<'s> {
     run: RunContext,
     /// Surface points by their number, 0 for the vertices.
     points: Reuse<usize, SurfacePoints>,
+    /// By the number of points and the target: different requests beyond the most have the same answer.
+    answers: Reuse<(usize, usize), Answer>,
+}
+
+/// The result for a target.
+struct Answer {
+    mesh: MedialMesh,
+    tally: Tally,
+    ended: Ended,
 }
 
 impl Simplification for Prepared<'_> {
@@ -180,19 +190,31 @@ impl Simplification for Prepared<'_> {
                 return Err(SimplifyError::unsupported(why));
             }
         };
-        let mut diagnostics = Diagnostics::default();
         let points = self.points(asked)?;
         let target = asked.min(self.most_spheres(&points));
-        let mut sampling = VariationalSampling::new(&points, &self.solid, self.params);
-        let ended = sampling.run(target, &self.run)?;
-        let mesh = sampling.mesh(self.params.connect)?;
-        sampling.tally.describe(points.len(), &mut diagnostics);
-        explain(asked, target, mesh.spheres.len(), ended, &mut diagnostics);
+        let answer = self.answer(&points, target)?;
+        let mesh = answer.mesh.clone();
+        let mut diagnostics = Diagnostics::default();
+        answer.tally.describe(points.len(), &mut diagnostics);
+        explain(asked, target, mesh.spheres.len(), answer.ended, &mut diagnostics);
         if let Some(warning) = topology_warning(betti(&mesh), self.shape.expected_betti()) {
             diagnostics.warn(warning);
         }
-        let (work, extras) = (self.points.work(), Extras::default());
+        let work = both(self.points.work(), self.answers.work());
+        let extras = Extras::default();
         Ok(Simplified { mesh, asked: level, native_level: None, work, diagnostics, extras })
+    }
+}
+
+/// The work of a request that asked for two things.
+fn both(first: Work, second: Work) -> Work {
+    match (first, second) {
+        (Work::Reused(mut cost), Work::Reused(other)) => {
+            cost += other;
+            Work::Reused(cost)
+        }
+        (Work::Reused(cost), _) | (_, Work::Reused(cost)) => Work::Reused(cost),
+        _ => Work::Anew,
     }
 }
 
@@ -219,6 +241,21 @@ impl Prepared<'_> {
             Ok(points)
         })?;
         Ok(points)
+    }
+
+    /// Steps 1 to 6.
+    fn answer(
+        &mut self,
+        points: &SurfacePoints,
+        target: usize,
+    ) -> Result<Arc<Answer>, SimplifyError> {
+        let Self { solid, params, run, answers, .. } = self;
+        answers.begin();
+        answers.get((points.len(), target), || {
+            let mut sampling = VariationalSampling::new(points, solid, *params);
+            let ended = sampling.run(target, run)?;
+            Ok(Answer { mesh: sampling.mesh(params.connect)?, tally: sampling.tally, ended })
+        })
     }
 
     /// The largest number of spheres that is tried.

@@ -1,5 +1,7 @@
 //! The steps one by one, against closed forms and brute force.
 
+use std::f64::consts::PI;
+
 use medial::Vec3;
 use medial::complex::Sphere;
 use medial::simplifier::{Diagnostics, Params, SimplifyError};
@@ -40,7 +42,8 @@ fn slab(count: usize, h: f64) -> Vec<Oriented> {
     };
     let disc = |z: f64| {
         let normal = z.signum() * Vec3::Z;
-        let lifted = move |p: Vec3| Oriented { position: p + z * Vec3::Z, normal, area: 1.0 };
+        let area = PI / count as f64;
+        let lifted = move |p: Vec3| Oriented { position: p + z * Vec3::Z, normal, area };
         (0..count).map(point).map(lifted)
     };
     disc(h).chain(disc(-h)).collect()
@@ -301,7 +304,7 @@ fn faces_are_cliques_of_spheres_or_of_points() {
         assert_eq!(faces(&points, &labels, &joined, Connect::Cliques), cliques);
         let met = faces(&points, &labels, &joined, Connect::Faces);
         assert!(!met.is_empty() && met.iter().all(|face| cliques.contains(face)));
-        let touch = |x: u32, y: u32| points.links.contains(&[x.min(y), x.max(y)]);
+        let touch = |x: u32, y: u32| points.links.binary_search(&[x.min(y), x.max(y)]).is_ok();
         let of = |s: u32| {
             all(&points).into_iter().filter(|&v| labels[v as usize] == s).collect::<Vec<_>>()
         };
