@@ -28,6 +28,7 @@ mod size_search;
 pub mod tam_heidrich;
 mod ties;
 pub mod tight;
+pub mod vmas;
 
 /// The published methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
@@ -43,6 +44,7 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(tam_heidrich::method()),
         Box::new(aof::method()),
         Box::new(coverage_axis::method(qmat::keeping)),
+        Box::new(vmas::method()),
     ]
 }
 

@@ -59,6 +59,7 @@ fn methods_do_not_see_each_other() {
         "sat_pairwise",
         "tam_heidrich",
         "tight",
+        "vmas",
     ];
     let mut folders = vec![std::path::PathBuf::from(root)];
     let mut read = 0;

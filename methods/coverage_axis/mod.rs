@@ -26,7 +26,7 @@
 //! - A value that is the same for all candidates scores 0; a candidate is taken once.
 //! - Candidates with a radius below `1e-9` diagonals are dropped: their penalty has no bound.
 //! - Of equal distances to two anchors the one chosen first wins.
-//! - The topology of the result is not guaranteed; a warning says where it is not the solid's.
+//! - The topology of the result is not guaranteed; nothing is mended, and the judge tells the Betti numbers.
 //!
 //! # Deviations from the programs
 //!
@@ -54,7 +54,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use medial::complex::{MedialMesh, Sphere, betti};
+use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
@@ -136,7 +136,6 @@ impl MedialSimplifier for CoverageAxis {
             score: Score::new(&instance.spheres, &params),
             instance,
             initial,
-            expected: shape.expected_betti(),
             keeping: self.keeping,
             params,
             run: run.clone(),
@@ -162,8 +161,6 @@ struct Axis {
     instance: Instance,
     score: Score,
     initial: Arc<MedialMesh>,
-    /// Betti numbers that the solid demands.
-    expected: Option<[u64; 3]>,
     keeping: Keeping,
     params: CoverageAxisParams,
     run: RunContext,
@@ -233,7 +230,6 @@ impl Axis {
             )));
         }
         let mesh = self.connected(&chosen, &mut diagnostics)?;
-        self.warn_of_topology(&mesh, &mut diagnostics);
         Ok(Probe { mesh, diagnostics })
     }
 
@@ -311,16 +307,6 @@ impl Axis {
             Connection::Qmat => {
                 (self.keeping)(&self.initial, &anchors, anchors.len(), &self.run, diagnostics)
             }
-        }
-    }
-
-    fn warn_of_topology(&self, mesh: &MedialMesh, diagnostics: &mut Diagnostics) {
-        let found = betti(mesh);
-        if let Some(expected) = self.expected.filter(|&expected| expected != found) {
-            diagnostics.warn(format!(
-                "Betti numbers {found:?} instead of {expected:?}: this connection does not guarantee \
-                 the topology"
-            ));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The choice and the connection against their definitions.
 
 use medial::Vec3;
-use medial::complex::MedialMesh;
+use medial::complex::{MedialMesh, betti};
 use medial::shape::ShapeOptions;
 use medial::surface::{self, TriMesh};
 use rand::{RngExt, SeedableRng};

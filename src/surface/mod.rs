@@ -47,7 +47,7 @@ pub use mesh::{Normalisation, TriMesh};
 pub use power_crust::{crust_surface, crust_surface_while};
 pub use read::Format;
 pub use report::{Repair, SurfaceReport};
-pub use sample::{ParseSamplingError, Sampling, sample};
+pub use sample::{ParseSamplingError, Sampling, sample, sample_with_faces};
 pub use signed_distance::SignedDistance;
 pub use triangles::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree};
 pub use winding::GeneralisedWinding;

@@ -171,6 +171,15 @@ pub fn sample(mesh: &TriMesh, sampling: &Sampling) -> Vec<Vec3> {
     }
 }
 
+/// Independent points, uniformly distributed by area, each with the face that it is on: those of
+/// [`Sampling::AreaUniform`]. None if the mesh has no area.
+///
+/// # Panics
+/// If a face names a vertex that does not exist.
+pub fn sample_with_faces(mesh: &TriMesh, count: usize, seed: u64) -> Vec<(Vec3, u32)> {
+    Areas::new(mesh).points(count, seed)
+}
+
 /// Cumulative areas in scaled units.
 struct Areas<'a> {
     mesh: &'a TriMesh,

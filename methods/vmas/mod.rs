@@ -1,0 +1,303 @@
+//! VMAS: variational medial axis sampling.
+//!
+//! Q. Huang, P. Kraemer, S. Thery, D. Bechmann 2024, *Dynamic Skeletonization via Variational Medial Axis
+//! Sampling*, SIGGRAPH Asia 2024 Conference Papers, <https://huang46u.github.io/VMAS/>. The paper itself
+//! was not available to us: all formulas are those of two programs of its first author, the published
+//! code (huang46u/VMAS-code) and the CGAL package `Variational_medial_axis`, read for facts. Steps and
+//! equations have no numbers here for that reason, and what only the paper says is missing.
+//!
+//! 0. *Points* (`points.rs`): area-uniform samples, 100 for each sphere and at least 20,000, adjacent to their
+//!    10 nearest ones; or the vertices of the mesh. One sphere to begin with.
+//! 1. *Cluster* (`cluster.rs`): every point goes to the sphere with the least error (`energy.rs`). Spheres
+//!    with fewer than 5 points (4 vertices) are dropped; these points have no sphere in this round.
+//! 2. *Refit* (`residuals.rs`, `refit.rs`): Gauss-Newton on the points of each sphere.
+//! 3. *Correct* (`correct.rs`): the fitted centre is pushed back to the medial axis, to the shrinking ball
+//!    (`shrinking_ball.rs`) of the nearest surface point. The fitted radius is not used.
+//! 4. *Errors* (`split.rs`): `E_s` for each sphere; their sum is the total error.
+//! 5. *Split* (`split.rs`): where the total error is at rest, and every 10 rounds, the spheres with the largest
+//!    `E_s` are split, at most 20 % of them and at most 10, no two adjacent ones: the shrinking ball
+//!    of the worst point joins.
+//! 6. The rounds end with the target reached and the error at rest. Spheres are joined where their
+//!    clusters are adjacent, and faces are all triples that are adjacent in pairs (`connect.rs`).
+//!
+//! # Notation
+//!
+//! `v` a surface point of area `a_v` with tangent planes of unit normals `n_f` and areas `a_f`, one for
+//! a sample, one for each face around a vertex (a third of it); `s = (c, r)` a medial sphere;
+//!
+//! ```text
+//! err_v(s) = sum_f a_f (n_f . (v - c) - r)^2 + lambda a_v (|v - c| - r)^2
+//! E_s      = sum_v err_v(s) / sum_v a_v     over the cluster of s
+//! ```
+//!
+//! Lengths are fractions of the bounding-box diagonal. The programs' constants are fractions of the longest
+//! *side* of the box, and are converted: at rest is a change below `1e-5 side^2`; a ball is empty to
+//! `1e-5 side` and begins with the radius `side`; a step of the refit ends it below `1e-8 side`.
+//!
+//! # Where the two programs differ
+//!
+//! | | `points=samples` (CGAL) | `points=vertices` (the authors) |
+//! |---|---|---|
+//! | planes of a point | that of its face | those of all faces around it |
+//! | adjacency | nearest samples | edges of the mesh |
+//! | first sphere | ball of sample 0 | the largest ball |
+//! | a cluster is dropped | below 5 points | below 4 |
+//! | normal of a point's ball | of its face | of its faces, by area |
+//!
+//! A vertex cannot fit all of its planes where they differ, so errors are larger at features and splits go
+//! there: with the same number of spheres `points=vertices` reaches farther into thin parts, and
+//! depends on the mesh.
+//!
+//! # Deviations from the programs
+//!
+//! - Both programs refit another energy than they cluster by: the Euclidean rows are multiplied by `lambda`
+//!   instead of its square root, and the plane distances of a point are summed before they are squared.
+//!   By default the refit minimises the energy above; `refit=published` does as they do.
+//! - The refit starts from the current sphere. CGAL's starts from memory that was never set. A
+//!   step that would raise the sum of errors is halved.
+//! - A shrinking ball always begins with the radius `side`, where the authors take 0.5 and in step 3 0.25 of
+//!   it, and ends when the ball is empty to one side, `d >= r - 1e-5 side`. The authors compare
+//!   `|d - r|`, by which a ball that begins too small may grow. A ball that never shrinks is not used.
+//! - Centres are tested against the exact winding number (CGAL: an approximate one, the authors: the
+//!   sign of a face normal).
+//! - The search for the least error leaves out spheres that cannot have it; the result is that of looking
+//!   at all.
+//! - The rounds end when 20 rounds with splits have passed without more spheres than ever before:
+//!   dropped clusters can keep the target out of reach for ever. A warning says so.
+//! - The last cluster is never dropped, so that the result is never empty.
+//! - Points without area are left out.
+//!
+//! # What is not promised
+//!
+//! Nothing holds the topology: four clusters that are adjacent in pairs give a hollow tetrahedron, and a ring
+//! of three a false triangle. `connect=faces` keeps only the triangles in which three clusters meet.
+//! Betti numbers that differ from the solid's are for the judge to tell, and not mended. CGAL's manual does not
+//! recommend more than 300 spheres, nor CAD models.
+
+mod cluster;
+mod connect;
+mod correct;
+mod energy;
+mod nearest_point;
+mod neighbours;
+mod params;
+mod points;
+mod refit;
+mod residuals;
+mod sampling;
+mod shrinking_ball;
+mod split;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use medial::complex::MedialMesh;
+use medial::shape::Shape;
+use medial::simplifier::{
+    Diagnostics, Extras, Level, Method, MethodInfo, RunContext, Simplification, Simplified,
+    SimplifyError, Work,
+};
+
+use crate::reuse::Reuse;
+
+pub use params::{Connect, Contact, Points, Refit, VmasParams};
+
+use correct::Solid;
+use points::SurfacePoints;
+use sampling::{Ended, Tally, VariationalSampling};
+
+/// Spheres of [`Level::Published`]: CGAL's default.
+const PUBLISHED: usize = 100;
+
+/// Samples for each sphere: fewer do not carry it, by CGAL's manual.
+const SAMPLES_PER_SPHERE: usize = 100;
+
+/// Most samples that a number of spheres asks for by itself: memory and time stay bounded.
+const MOST_SAMPLES: usize = 100_000;
+
+/// Variational medial axis sampling as a method.
+///
+/// Answers [`Level::Spheres`] and [`Level::Published`], each from one sphere on: `O(P)` for each of some
+/// hundred rounds, with `P` the number of surface points.
+pub fn method() -> Method<VmasParams> {
+    let info = MethodInfo::new("vmas", "Variational medial axis sampling")
+        .citation(
+            "Qijia Huang, Pierre Kraemer, Sylvain Thery, Dominique Bechmann 2024. Dynamic \
+             skeletonization via variational medial axis sampling. SIGGRAPH Asia 2024 Conference \
+             Papers. https://huang46u.github.io/VMAS/",
+        )
+        .summary(
+            "Clusters surface points by the sphere that fits them best, refits each sphere to its \
+             cluster, pushes it back to the medial axis, and splits the worst.",
+        )
+        .home(
+            "Few spheres in even places, on organic shapes; no Voronoi diagram is needed. Nothing \
+             holds the topology, and it is not for CAD models or more than a few hundred spheres.",
+        )
+        .published("100 spheres, the default of the CGAL package")
+        .params(VmasParams::describe());
+    Method::new(info, prepare)
+}
+
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: VmasParams,
+    run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let params = params.validate()?;
+    if shape.has_given_initial() {
+        let why = "it samples the surface and starts from no medial mesh: leave out --initial";
+        return Err(SimplifyError::unsupported(why));
+    }
+    run.step(0, 1)?;
+    let solid = Solid::new(shape, params.contact == Contact::Mesh)?;
+    let (points, answers) = (Reuse::new(), Reuse::new());
+    Ok(Box::new(Prepared { shape, solid, params, run: run.clone(), points, answers }))
+}
+
+/// One shape.
+struct Prepared<'s> {
+    shape: &'s Shape,
+    solid: Solid<'s>,
+    params: VmasParams,
+    run: RunContext,
+    /// Surface points by their number, 0 for the vertices.
+    points: Reuse<usize, SurfacePoints>,
+    /// By the number of points and the target: different requests beyond the most have the same answer.
+    answers: Reuse<(usize, usize), Answer>,
+}
+
+/// The result for a target.
+struct Answer {
+    mesh: MedialMesh,
+    tally: Tally,
+    ended: Ended,
+}
+
+impl Simplification for Prepared<'_> {
+    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        let asked = match level {
+            Level::Spheres(0) => {
+                return Err(SimplifyError::Level("ask for at least one sphere".into()));
+            }
+            Level::Spheres(count) => count,
+            Level::Published => PUBLISHED,
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
+            Level::Native(_) => {
+                let why = "its own level is the number of spheres: ask for that";
+                return Err(SimplifyError::unsupported(why));
+            }
+        };
+        let points = self.points(asked)?;
+        let target = asked.min(self.most_spheres(&points));
+        let answer = self.answer(&points, target)?;
+        let mesh = answer.mesh.clone();
+        let mut diagnostics = Diagnostics::default();
+        answer.tally.describe(points.len(), &mut diagnostics);
+        explain(asked, target, mesh.spheres.len(), answer.ended, &mut diagnostics);
+        let work = both(self.points.work(), self.answers.work());
+        let extras = Extras::default();
+        Ok(Simplified { mesh, asked: level, native_level: None, work, diagnostics, extras })
+    }
+}
+
+/// The work of a request that asked for two things.
+fn both(first: Work, second: Work) -> Work {
+    match (first, second) {
+        (Work::Reused(mut cost), Work::Reused(other)) => {
+            cost += other;
+            Work::Reused(cost)
+        }
+        (Work::Reused(cost), _) | (_, Work::Reused(cost)) => Work::Reused(cost),
+        _ => Work::Anew,
+    }
+}
+
+impl Prepared<'_> {
+    /// Step 0, made once for each number of samples.
+    fn points(&mut self, spheres: usize) -> Result<Arc<SurfacePoints>, SimplifyError> {
+        let (mesh, VmasParams { samples, neighbours, .. }) = (self.shape.mesh(), self.params);
+        let count = match self.params.points {
+            Points::Samples => {
+                spheres.saturating_mul(SAMPLES_PER_SPHERE).min(MOST_SAMPLES).max(samples)
+            }
+            Points::Vertices => 0,
+        };
+        let seed = self.run.seed;
+        self.points.begin();
+        let points = self.points.get(count, || {
+            let points = match count {
+                0 => SurfacePoints::of_vertices(mesh),
+                _ => SurfacePoints::of_samples(mesh, count, seed, neighbours),
+            };
+            if points.len() == 0 {
+                return Err(SimplifyError::unsupported("the surface has no area"));
+            }
+            Ok(points)
+        })?;
+        Ok(points)
+    }
+
+    /// Steps 1 to 6.
+    fn answer(
+        &mut self,
+        points: &SurfacePoints,
+        target: usize,
+    ) -> Result<Arc<Answer>, SimplifyError> {
+        let Self { solid, params, run, answers, .. } = self;
+        answers.begin();
+        answers.get((points.len(), target), || {
+            let mut sampling = VariationalSampling::new(points, solid, *params);
+            let ended = sampling.run(target, run)?;
+            Ok(Answer { mesh: sampling.mesh(params.connect)?, tally: sampling.tally, ended })
+        })
+    }
+
+    /// The largest number of spheres that is tried.
+    fn most_spheres(&self, points: &SurfacePoints) -> usize {
+        match self.params.points {
+            Points::Samples => (points.len() / SAMPLES_PER_SPHERE).max(1),
+            Points::Vertices => points.len(),
+        }
+    }
+}
+
+/// Why there are fewer spheres than asked, or the error is not at rest.
+fn explain(
+    asked: usize,
+    target: usize,
+    reached: usize,
+    ended: Ended,
+    diagnostics: &mut Diagnostics,
+) {
+    let instead = format!("{reached} spheres instead of {asked}");
+    if reached < target {
+        let why = match ended {
+            Ended::IterationLimit => "the rounds at most were made (iterations)",
+            _ => "clusters of too few points are dropped as fast as spheres are split",
+        };
+        diagnostics.warn(format!("{instead}: {why}"));
+    } else if target < asked {
+        diagnostics.warn(format!(
+            "{instead}: more than {target} need more surface points than there are (samples)"
+        ));
+    } else if ended == Ended::IterationLimit {
+        diagnostics.warn("the rounds at most were made, and the error is not at rest");
+    }
+}
+
+impl Tally {
+    fn describe(&self, points: usize, diagnostics: &mut Diagnostics) {
+        diagnostics.count("surface_points", points);
+        diagnostics.count("iterations", self.iterations);
+        diagnostics.count("splits", self.splits);
+        diagnostics.count("dropped_clusters", self.dropped);
+        diagnostics.count("shrinking_balls", self.balls);
+        diagnostics.count("balls_at_the_step_limit", self.at_the_step_limit);
+        diagnostics.count("balls_stopped_on_the_wrong_side", self.in_front);
+        diagnostics.count("spheres_left_uncorrected", self.uncorrected);
+        // Counts are whole numbers: billionths of a squared diagonal.
+        diagnostics.count("total_error_in_billionths", (self.total_error * 1e9).round() as usize);
+    }
+}

@@ -1,0 +1,225 @@
+//! Step 2: the sphere that fits the points of its cluster, by Gauss-Newton.
+//!
+//! A residual `rho(c, r)` of weight `w` has the Jacobian `-(n, k)`: `n_f` and 1 for the distance to a
+//! plane, `(v - c) / |v - c|` and 1 for the distance to the sphere. The first kind is linear: its sum of
+//! squares is one quadric in `s` for the whole cluster, made once. The second is summed anew in each step,
+//! four points at a time.
+
+use medial::Vec3;
+use medial::complex::Sphere;
+use wide::f64x4;
+
+use super::points::SurfacePoints;
+use super::residuals::{PlaneSum, Residuals};
+
+/// Steps at most.
+const STEPS: usize = 10;
+
+/// Halvings of a step at most, until the sum of errors does not rise.
+const HALVINGS: usize = 12;
+
+/// Bound on the rounding error of a sum of errors, as a share of the sum of squared lengths in it.
+const ROUNDING: f64 = 1e-14;
+
+/// Share of the largest diagonal element below which a pivot counts as zero.
+const FLAT: f64 = 1e-14;
+
+/// A squared distance from which a direction can be had.
+const NO_DIRECTION: f64 = 1e-300;
+
+/// The sphere that minimises the sum over a cluster, from `start`: at most [`STEPS`] steps, until one is shorter
+/// than `shortest`. A step is halved while the sum would rise.
+pub(super) fn refit(
+    points: &SurfacePoints,
+    residuals: &Residuals,
+    cluster: &[u32],
+    start: Sphere,
+    shortest: f64,
+) -> Sphere {
+    let sum = ClusterSum::new(points, residuals, cluster, start.centre);
+    // Relative to the first centre, where the quadric loses the least to rounding.
+    let mut at = [0.0, 0.0, 0.0, start.radius];
+    let mut here = sum.system(&at);
+    for _ in 0..STEPS {
+        let Some(mut step) = here.solved() else { break };
+        let mut next = moved(&at, &step);
+        let mut there = sum.system(&next);
+        for _ in 0..HALVINGS {
+            if there.value <= here.value + sum.rounding {
+                break;
+            }
+            step = step.map(|x| 0.5 * x);
+            next = moved(&at, &step);
+            there = sum.system(&next);
+        }
+        // A value that is not a number has not fallen either.
+        let falls = there.value <= here.value + sum.rounding;
+        if !falls {
+            break;
+        }
+        (at, here) = (next, there);
+        if step.iter().map(|x| x * x).sum::<f64>() < shortest * shortest {
+            break;
+        }
+    }
+    Sphere::new(start.centre + Vec3::new(at[0], at[1], at[2]), at[3])
+}
+
+fn moved(s: &[f64; 4], step: &[f64; 4]) -> [f64; 4] {
+    [0, 1, 2, 3].map(|k| s[k] + step[k])
+}
+
+/// The normal equations of a Gauss-Newton step from a sphere, and the sum of squares there.
+#[derive(Clone, Copy, Debug, Default)]
+struct System {
+    /// Its lower triangle.
+    matrix: [[f64; 4]; 4],
+    right: [f64; 4],
+    value: f64,
+}
+
+/// The sum of squares that a refit minimises, relative to an origin.
+struct ClusterSum {
+    /// At the origin with the radius 0: the part of the planes.
+    planes: System,
+    /// Points in lanes of four; a lane without one has weight 0.
+    points: Vec<[f64x4; 3]>,
+    weights: Vec<f64x4>,
+    /// Bound on the rounding error of a value.
+    rounding: f64,
+}
+
+impl ClusterSum {
+    /// In the order of the cluster, so that the sums are the same with any number of threads.
+    fn new(points: &SurfacePoints, residuals: &Residuals, cluster: &[u32], origin: Vec3) -> Self {
+        let mut planes = System::default();
+        let mut squares = 0.0;
+        let factor = residuals.euclidean();
+        let position = |v: u32| points.positions[v as usize] - origin;
+        let weight = |v: u32| factor * points.areas[v as usize];
+        for &v in cluster {
+            residuals.each_plane(points, v as usize, |PlaneSum { normal, ties, level }, weight| {
+                planes.add(normal, ties, level - normal.dot(origin), weight);
+            });
+            squares += points.areas[v as usize] * position(v).length_squared();
+        }
+        let lane = |four: &[u32], value: &dyn Fn(u32) -> f64| {
+            f64x4::new([0, 1, 2, 3].map(|k| four.get(k).map_or(0.0, |&v| value(v))))
+        };
+        let axis = |four: &[u32], axis: usize| lane(four, &|v| position(v)[axis]);
+        Self {
+            planes,
+            points: cluster.chunks(4).map(|four| [0, 1, 2].map(|k| axis(four, k))).collect(),
+            weights: cluster.chunks(4).map(|four| lane(four, &weight)).collect(),
+            rounding: ROUNDING * squares,
+        }
+    }
+
+    /// The step from a sphere and the value there.
+    fn system(&self, s: &[f64; 4]) -> System {
+        let mut system = self.planes.moved_to(s);
+        let centre = [0, 1, 2].map(|k| f64x4::splat(s[k]));
+        let radius = f64x4::splat(s[3]);
+        let zero = f64x4::splat(0.0);
+        // Sums of w d_i d_j in the lower triangle, of w d_i, of w, of w rho d_i, of w rho, of w rho^2.
+        let (mut pairs, mut singles, mut all) = ([zero; 6], [zero; 3], zero);
+        let (mut right, mut last, mut value) = ([zero; 3], zero, zero);
+        for (point, &weight) in self.points.iter().zip(&self.weights) {
+            let u = [0, 1, 2].map(|k| point[k] - centre[k]);
+            let squared = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+            let distance = squared.sqrt();
+            // At the centre itself no direction is the nearest: zero there.
+            let inverse = f64x4::splat(1.0) / squared.max(f64x4::splat(NO_DIRECTION)).sqrt();
+            let d = u.map(|x| x * inverse);
+            let rest = distance - radius;
+            let scaled = d.map(|x| weight * x);
+            let weighted = weight * rest;
+            for (pair, (i, j)) in
+                [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)].into_iter().enumerate()
+            {
+                pairs[pair] += scaled[i] * d[j];
+            }
+            for k in 0..3 {
+                singles[k] += scaled[k];
+                right[k] += weighted * d[k];
+            }
+            all += weight;
+            last += weighted;
+            value += weighted * rest;
+        }
+        let pairs = pairs.map(f64x4::reduce_add);
+        let singles = singles.map(f64x4::reduce_add);
+        let rows = [
+            [pairs[0], 0.0, 0.0, 0.0],
+            [pairs[1], pairs[2], 0.0, 0.0],
+            [pairs[3], pairs[4], pairs[5], 0.0],
+            [singles[0], singles[1], singles[2], all.reduce_add()],
+        ];
+        for i in 0..4 {
+            for j in 0..=i {
+                system.matrix[i][j] += rows[i][j];
+            }
+            system.right[i] += if i < 3 { right[i].reduce_add() } else { last.reduce_add() };
+        }
+        system.value += value.reduce_add();
+        system
+    }
+}
+
+impl System {
+    /// Adds a residual that is `rest` here.
+    #[inline]
+    fn add(&mut self, normal: Vec3, ties: f64, rest: f64, weight: f64) {
+        let row = [normal.x, normal.y, normal.z, ties];
+        for i in 0..4 {
+            let scaled = weight * row[i];
+            for j in 0..=i {
+                self.matrix[i][j] += scaled * row[j];
+            }
+            self.right[i] += scaled * rest;
+        }
+        self.value += weight * rest * rest;
+    }
+
+    /// The same linear residuals `y` farther: `s^T A s - 2 b . s + c` in the paper's words.
+    fn moved_to(&self, y: &[f64; 4]) -> Self {
+        let entry = |i: usize, j: usize| self.matrix[i.max(j)][i.min(j)];
+        let image = [0, 1, 2, 3].map(|i| (0..4).map(|j| entry(i, j) * y[j]).sum::<f64>());
+        let dot = |x: &[f64; 4]| (0..4).map(|k| x[k] * y[k]).sum::<f64>();
+        Self {
+            matrix: self.matrix,
+            right: [0, 1, 2, 3].map(|k| self.right[k] - image[k]),
+            value: self.value - 2.0 * dot(&self.right) + dot(&image),
+        }
+    }
+
+    /// The step, by a factorisation `L D L^T`; `None` where the points leave the sphere undetermined.
+    fn solved(&self) -> Option<[f64; 4]> {
+        let largest = (0..4).map(|i| self.matrix[i][i]).fold(0.0, f64::max);
+        let mut factor = self.matrix;
+        let mut pivots = [0.0; 4];
+        for j in 0..4 {
+            let before: f64 = (0..j).map(|k| factor[j][k] * factor[j][k] * pivots[k]).sum();
+            pivots[j] = self.matrix[j][j] - before;
+            let is_positive = pivots[j] > FLAT * largest;
+            if !is_positive {
+                return None;
+            }
+            for i in j + 1..4 {
+                let before: f64 = (0..j).map(|k| factor[i][k] * factor[j][k] * pivots[k]).sum();
+                factor[i][j] = (self.matrix[i][j] - before) / pivots[j];
+            }
+        }
+        let mut x = self.right;
+        for i in 0..4 {
+            x[i] -= (0..i).map(|k| factor[i][k] * x[k]).sum::<f64>();
+        }
+        for i in 0..4 {
+            x[i] /= pivots[i];
+        }
+        for i in (0..4).rev() {
+            x[i] -= (i + 1..4).map(|k| factor[k][i] * x[k]).sum::<f64>();
+        }
+        x.iter().all(|x| x.is_finite()).then_some(x)
+    }
+}

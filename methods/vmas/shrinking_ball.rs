@@ -1,0 +1,241 @@
+//! The medial ball of a surface point, by shrinking.
+//!
+//! J. Ma, S. W. Bae, S. Choi 2012, *3D medial axis point approximation using nearest neighbors and the
+//! normal field*, The Visual Computer 28, <https://doi.org/10.1007/s00371-011-0594-7>; as the
+//! implementations that we read agree on it.
+//!
+//! The ball that touches the surface at `p`, with outward unit normal `n`, and passes through `q` has the
+//! centre `p - r n` and `r = |p - q|^2 / (2 n . (p - q))`. Beginning with a ball that is too large, `q`
+//! is the surface point nearest to the centre, again and again; `r` decreases, and in the end the ball is
+//! empty.
+
+use medial::Vec3;
+use medial::complex::Sphere;
+use medial::surface::TriangleBvh;
+
+use super::nearest_point::PointGroups;
+
+/// Steps at most.
+const STEPS: usize = 30;
+
+/// A ball is empty if it holds nothing deeper than this, as a fraction of the box's longest side.
+const EMPTY: f64 = 1e-5;
+
+/// After the first step a ball that touches at points less than this angle apart, in degrees, seen from its
+/// centre, is that of noise: the one before it is kept.
+const SEPARATION: f64 = 20.0;
+
+/// A contact is in front of the surface if the cosine of its angle to the normal is at most this.
+const IN_FRONT: f64 = 1e-12;
+
+/// What a ball may touch.
+#[derive(Clone, Copy)]
+pub(super) enum Touched<'a> {
+    Points(&'a PointGroups),
+    Mesh(&'a TriangleBvh),
+}
+
+impl Touched<'_> {
+    /// The nearest point, `None` if the query is not finite.
+    fn nearest(&self, query: Vec3) -> Option<(Vec3, f64)> {
+        match self {
+            Self::Points(points) => {
+                let (point, squared) = points.nearest(query)?;
+                Some((point, squared.sqrt()))
+            }
+            Self::Mesh(tree) => {
+                let closest = tree.closest(query);
+                closest.distance.is_finite().then_some((closest.point, closest.distance))
+            }
+        }
+    }
+}
+
+/// A ball that has been shrunk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ball {
+    pub sphere: Sphere,
+    /// Times that it shrank.
+    pub steps: usize,
+    pub end: End,
+}
+
+/// Why a ball shrinks no further.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// It is empty.
+    Empty,
+    /// The next contact is too near to the first, seen from the centre.
+    Noise,
+    /// The nearest point lies in front of the tangent plane: by rounding, or because of a wrong normal.
+    InFront,
+    /// All steps were taken.
+    StepLimit,
+}
+
+/// The ball that touches at `p`, with outward unit normal `n`. `side` is the longest side of the bounding
+/// box: no ball inside is as large.
+pub(super) fn shrinking_ball(p: Vec3, n: Vec3, side: f64, touched: Touched<'_>) -> Ball {
+    let mut radius = side;
+    let ball = |radius: f64, steps: usize, end: End| Ball {
+        sphere: Sphere::new(p - radius * n, radius),
+        steps,
+        end,
+    };
+    let half_separation = (0.5 * SEPARATION.to_radians()).sin();
+    for steps in 0..STEPS {
+        let nearest = touched.nearest(p - radius * n);
+        let Some((q, distance)) = nearest.filter(|&(q, _)| q != p) else {
+            return ball(radius, steps, End::Empty);
+        };
+        if distance >= radius - EMPTY * side {
+            return ball(radius, steps, End::Empty);
+        }
+        let chord = p - q;
+        let depth = n.dot(chord);
+        if depth <= IN_FRONT * chord.length() {
+            return ball(radius, steps, End::InFront);
+        }
+        let smaller = chord.length_squared() / (2.0 * depth);
+        if smaller >= radius {
+            return ball(radius, steps, End::Empty);
+        }
+        if steps > 0 && chord.length() < 2.0 * smaller * half_separation {
+            return ball(radius, steps, End::Noise);
+        }
+        radius = smaller;
+    }
+    ball(radius, STEPS, End::StepLimit)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use medial::surface::TriMesh;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+
+    /// The box with half sizes 2, 1 and 0.5.
+    fn slab() -> TriangleBvh {
+        let corner = |k: u32| {
+            let sign = |bit: u32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            Vec3::new(2.0 * sign(0), sign(1), 0.5 * sign(2))
+        };
+        let sides =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let faces = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let mesh = TriMesh { vertices: (0..8).map(corner).collect(), faces };
+        TriangleBvh::new(&mesh).expect("twelve triangles")
+    }
+
+    #[test]
+    fn in_a_box_the_radius_is_the_distance_to_the_nearest_other_side() {
+        let tree = slab();
+        let mut random = Pcg64::seed_from_u64(11);
+        let mut points = vec![Vec3::new(1.9, 0.2, 0.5)];
+        for _ in 0..300 {
+            let (x, y) = (random.random_range(-1.95..1.95), random.random_range(-0.95..0.95));
+            points.push(Vec3::new(x, y, 0.5));
+        }
+        for p in points {
+            let ball = shrinking_ball(p, Vec3::Z, 4.0, Touched::Mesh(&tree));
+            let expected = (2.0 - p.x.abs()).min(1.0 - p.y.abs()).min(0.5);
+            let radius = ball.sphere.radius;
+            assert!(
+                radius >= expected - 1e-12 && radius <= expected + 4e-5,
+                "{p}: {radius} {expected}"
+            );
+            assert_eq!(ball.end, End::Empty);
+            assert!((1..=11).contains(&ball.steps), "{} steps", ball.steps);
+            // It touches: nothing is deeper in it than the bound, and something is as near.
+            let distance = tree.closest(ball.sphere.centre).distance;
+            assert!((distance - radius).abs() <= EMPTY * 4.0 + 1e-12);
+        }
+        let first = shrinking_ball(Vec3::new(1.9, 0.2, 0.5), Vec3::Z, 4.0, Touched::Mesh(&tree));
+        assert!((first.sphere.radius - 0.1).abs() < 4e-5);
+    }
+
+    #[test]
+    fn a_ball_of_a_ball_is_there_after_one_step() {
+        let direction = |k: u32| {
+            let z = 1.0 - (f64::from(k) + 0.5) / 1_000.0;
+            let (sin, cos) = (2.399_963_229_728_653 * f64::from(k)).sin_cos();
+            Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+        };
+        let positions: Vec<Vec3> = (0..2_000).map(direction).collect();
+        let groups = PointGroups::new(&positions);
+        let touched = Touched::Points(&groups);
+        for &p in positions.iter().step_by(17) {
+            let Ball { sphere, steps, end } = shrinking_ball(p, p, 2.0, touched);
+            assert_eq!((steps, end), (1, End::Empty));
+            assert!((sphere.radius - 1.0).abs() < 1e-12 && sphere.centre.length() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn in_a_torus_the_centres_are_on_its_circle() {
+        let (large, small) = (1.0, 0.3);
+        let mut random = Pcg64::seed_from_u64(12);
+        let mut points: Vec<(Vec3, Vec3)> = Vec::new();
+        while points.len() < 20_000 {
+            let (u, v) = (random.random_range(0.0..TAU), random.random_range(0.0..TAU));
+            // By area: the outside is longer.
+            if random.random_range(0.0..large + small) < large + small * v.cos() {
+                let normal = Vec3::new(v.cos() * u.cos(), v.cos() * u.sin(), v.sin());
+                points.push((large * Vec3::new(u.cos(), u.sin(), 0.0) + small * normal, normal));
+            }
+        }
+        let positions: Vec<Vec3> = points.iter().map(|&(p, _)| p).collect();
+        let groups = PointGroups::new(&positions);
+        let touched = Touched::Points(&groups);
+        let mut steps = 0;
+        for &(p, normal) in points.iter().step_by(20) {
+            let ball = shrinking_ball(p, normal, 2.6, touched);
+            let Sphere { centre, radius } = ball.sphere;
+            assert!((0.3 - 1e-9..0.30003).contains(&radius), "{radius}");
+            let away = (centre.truncate().length() - large).hypot(centre.z);
+            assert!(away < 3e-5, "{away}");
+            steps += ball.steps;
+        }
+        assert!(steps < 3_000, "{steps} steps for 1,000 balls");
+    }
+
+    #[test]
+    fn scale_and_rotation_change_nothing_but_scale_and_rotation() {
+        let tree = slab();
+        let [a, b] = [Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.8, 0.0, 0.6)];
+        let turned = |p: Vec3| 8.0 * (p.x * a + p.y * Vec3::Y + p.z * b);
+        let corners: Vec<[Vec3; 3]> = {
+            let sides = [[-2.0, -1.0, 0.5], [2.0, -1.0, 0.5], [2.0, 1.0, 0.5], [-2.0, 1.0, 0.5]];
+            let top = sides.map(Vec3::from);
+            let bottom = top.map(|p| p - Vec3::Z);
+            let walls = (0..4).flat_map(|k| {
+                let next = (k + 1) % 4;
+                [[top[k], bottom[k], bottom[next]], [top[k], bottom[next], top[next]]]
+            });
+            let caps = [top, bottom].into_iter().flat_map(|[p, q, r, s]| [[p, q, r], [p, r, s]]);
+            walls.chain(caps).map(|t| t.map(turned)).collect()
+        };
+        let other = TriangleBvh::from_triangles(&corners).expect("twelve triangles");
+        for p in [Vec3::new(1.9, 0.2, 0.5), Vec3::new(-0.3, 0.7, 0.5), Vec3::new(0.1, 0.0, 0.5)] {
+            let here = shrinking_ball(p, Vec3::Z, 4.0, Touched::Mesh(&tree));
+            let there = shrinking_ball(turned(p), b, 32.0, Touched::Mesh(&other));
+            assert_eq!((here.steps, here.end), (there.steps, there.end));
+            assert!((8.0 * here.sphere.radius - there.sphere.radius).abs() < 1e-12);
+            assert!(turned(here.sphere.centre).distance(there.sphere.centre) < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_contact_in_front_of_the_surface_ends_the_search() {
+        // A normal that is no unit vector: no ball that touches its plane holds a point in front of it.
+        let positions = [Vec3::new(0.3, 0.0, 0.05)];
+        let groups = PointGroups::new(&positions);
+        let touched = Touched::Points(&groups);
+        let ball = shrinking_ball(Vec3::ZERO, 0.5 * Vec3::Z, 1.0, touched);
+        assert_eq!((ball.steps, ball.end), (0, End::InFront));
+    }
+}
