@@ -44,13 +44,12 @@ pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
         Box::new(tam_heidrich::method()),
         Box::new(aof::method()),
         Box::new(coverage_axis::method(qmat::keeping)),
-        Box::new(vmas::method()),
     ]
 }
 
 /// Methods that run where they are named, because they take long.
 pub fn on_request() -> Vec<Box<dyn MedialSimplifier>> {
-    vec![Box::new(tight::method(qmat::method()))]
+    vec![Box::new(vmas::method()), Box::new(tight::method(qmat::method()))]
 }
 
 /// The method with an id, or `None`. [`initial`] simplifies nothing and is not among them.

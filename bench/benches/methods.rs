@@ -25,12 +25,11 @@ const SIZES: [(&str, u32); 6] =
 const SMALLEST: (&str, u32) = ("box", 8);
 
 /// Seconds beyond those that each benchmark has, by parts of names: ten runs and those before them.
-const SLOW: [(&str, f64); 7] = [
+const SLOW: [(&str, f64); 6] = [
     ("tight/", 55.0),
     ("hem/blob", 12.0),
     ("hem/box", 5.0),
     ("aof/", 5.0),
-    ("vmas/", 20.0),
     ("sat/", 2.0),
     ("tam-heidrich/", 1.0),
 ];

@@ -136,6 +136,7 @@ pub fn method() -> Method<VmasParams> {
              holds the topology, and it is not for CAD models or more than a few hundred spheres.",
         )
         .published("100 spheres, the default of the CGAL package")
+        .on_request()
         .params(VmasParams::describe());
     Method::new(info, prepare)
 }
