@@ -1,5 +1,6 @@
 //! The arguments of the command, and the way from a verb to an exit code.
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -8,8 +9,10 @@ use medial::simplifier::MedialSimplifier;
 use crate::args::Global;
 use crate::cmd;
 use crate::exit::{Exit, Failure};
+use crate::host::Host;
 use crate::interrupt;
 use crate::output::{exit_after_output, print_failure, print_raw};
+use crate::plugin::ScriptLoader;
 use crate::run::Registry;
 
 /// Simplify the 3D medial axis transform, and compare the published methods that do.
@@ -91,18 +94,45 @@ pub enum Verb {
 /// The command with these methods: parses the command line, runs the verb, and turns the outcome
 /// into an exit code.
 pub fn main_with(methods: Vec<Box<dyn MedialSimplifier>>) -> ExitCode {
+    run_with(methods, None, std::env::args_os()).into()
+}
+
+/// [`main_with`] inside another program, which loads plug-ins of its own language.
+///
+/// # Panics
+/// When called twice: the command belongs to its process.
+pub fn main_hosted(
+    methods: Vec<Box<dyn MedialSimplifier>>,
+    host: Host,
+    loader: Box<dyn ScriptLoader>,
+) -> Exit {
+    let words = std::iter::once(OsString::from("medial")).chain(host.words.iter().cloned());
+    let words: Vec<OsString> = words.collect();
+    host.enter();
+    run_with(methods, Some(loader), words.into_iter())
+}
+
+fn run_with(
+    methods: Vec<Box<dyn MedialSimplifier>>,
+    loader: Option<Box<dyn ScriptLoader>>,
+    words: impl Iterator<Item = OsString>,
+) -> Exit {
     interrupt::install();
-    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
-    let cli = match parsed {
+    let matches = command().try_get_matches_from(words);
+    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         // Help and version are asked for, and belong on standard output.
         Err(error) if !error.use_stderr() => {
             print_raw(&error.render().to_string());
-            return exit_after_output(Exit::Done).into();
+            return exit_after_output(Exit::Done);
         }
-        Err(error) => error.exit(),
+        Err(error) => {
+            // Nobody can be told where standard error is closed.
+            let _ = error.print();
+            return Exit::Usage;
+        }
     };
-    let registry = registry(methods, &cli.global);
+    let registry = registry(methods, loader, &cli.global);
     let outcome = set_threads(cli.global.threads)
         .and(registry)
         .and_then(|mut registry| run(cli.verb, &cli.global, &mut registry));
@@ -110,7 +140,7 @@ pub fn main_with(methods: Vec<Box<dyn MedialSimplifier>>) -> ExitCode {
         print_failure(&failure, &cli.global);
         failure.code
     });
-    exit_after_output(exit).into()
+    exit_after_output(exit)
 }
 
 /// The command line: as derived, but lists of defaults are shown as they would be written.
@@ -141,8 +171,15 @@ fn defaults_with_commas(argument: Arg) -> Arg {
     }
 }
 
-fn registry(methods: Vec<Box<dyn MedialSimplifier>>, global: &Global) -> Result<Registry, Failure> {
+fn registry(
+    methods: Vec<Box<dyn MedialSimplifier>>,
+    loader: Option<Box<dyn ScriptLoader>>,
+    global: &Global,
+) -> Result<Registry, Failure> {
     let mut registry = Registry::new(methods).map_err(Failure::usage)?;
+    if let Some(loader) = loader {
+        registry = registry.with_loader(loader);
+    }
     for file in &global.plugins {
         registry.add_plugins(file).map_err(Failure::usage)?;
     }

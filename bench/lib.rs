@@ -2,7 +2,7 @@
 //!
 //! A crate of its own gets the whole command with its methods beside the others by [`main_with`].
 //!
-//! From below: [`process_tree`] ends what was started; [`plugin`] makes methods of external programs; [`check`] is what
+//! From below: [`host`] is the process that it runs in; [`process_tree`] ends what was started; [`plugin`] makes methods of external programs; [`check`] is what
 //! every method must do; [`run`] knows inputs, items, workers and records, and nothing of the command line; [`args`], [`exit`], [`output`], [`files`] and
 //! [`interrupt`] are what verbs share; [`cmd`] holds one file for each verb; [`cli`] lists them.
 
@@ -12,13 +12,14 @@ pub mod cli;
 pub mod cmd;
 pub mod exit;
 pub mod files;
+pub mod host;
 pub mod interrupt;
 pub mod output;
 pub mod plugin;
 pub mod process_tree;
 pub mod run;
 
-pub use cli::main_with;
+pub use cli::{main_hosted, main_with};
 
 /// Counts what each item takes of the heap.
 #[global_allocator]

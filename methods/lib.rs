@@ -29,6 +29,7 @@ pub mod tam_heidrich;
 mod ties;
 pub mod tight;
 pub mod vmas;
+mod within;
 
 /// The published methods, in the order of the tables.
 pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {

@@ -53,6 +53,9 @@ use substrate::{Cache, Use};
 /// assert!(second.spent().seconds < first.spent().seconds);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// A clone is the same view: what is used through either counts for both.
+#[derive(Clone)]
 pub struct Shape {
     store: Arc<Store>,
     /// Shared by a view and those that start from another medial mesh on its behalf.
@@ -168,7 +171,7 @@ impl Shape {
 
     /// A fresh view: the same substrates, nothing used yet.
     pub fn view(&self) -> Self {
-        Self { used: Arc::default(), ..self.sharing() }
+        Self { used: Arc::default(), ..self.clone() }
     }
 
     /// The shape with an initial medial mesh in place of its own, in normalised units, on behalf of
@@ -180,12 +183,7 @@ impl Shape {
         if initial.spheres.is_empty() {
             return Err(ShapeError::EmptyInitial);
         }
-        Ok(Self { given: Some(Ok(initial)), ..self.sharing() })
-    }
-
-    fn sharing(&self) -> Self {
-        let (store, used) = (Arc::clone(&self.store), Arc::clone(&self.used));
-        Self { store, used, given: self.given.clone() }
+        Ok(Self { given: Some(Ok(initial)), ..self.clone() })
     }
 
     /// Name of the input.

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use crate::args::{self, Global};
 use crate::check::{Case, Outcome, cases, find};
 use crate::exit::{Exit, Failure};
+use crate::host::Host;
 use crate::interrupt;
 use crate::output::{counted, print_json, print_line};
 use crate::run::{
@@ -164,6 +165,9 @@ impl Arguments {
 
 /// The name of this program. A crate that adds methods builds a program of its own.
 fn program() -> String {
+    if Host::here().is_ok_and(Host::is_foreign) {
+        return "medial".to_owned();
+    }
     let path = std::env::args_os().next().map(std::path::PathBuf::from);
     let name = path.as_ref().and_then(|path| path.file_stem());
     name.map_or_else(|| "medial".to_owned(), |name| name.to_string_lossy().into_owned())

@@ -150,14 +150,19 @@ pub(super) fn read(
     document.method.into_iter().map(check).collect()
 }
 
+/// Whether a text would do as an id on the command line.
+pub(super) fn is_id(text: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    !text.is_empty() && text.chars().all(allowed)
+}
+
 /// What is wrong, and the bytes of the file that it belongs to.
 type Misfit = (Range<usize>, PluginFault);
 
 impl Written {
     fn check(self, folder: &Path) -> Result<Declaration, Misfit> {
         let id = self.id.get_ref();
-        let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-        if id.is_empty() || !id.chars().all(allowed) {
+        if !is_id(id) {
             return Err((self.id.span(), PluginFault::Id(id.clone())));
         }
         let params = check_params(&self.params)?;

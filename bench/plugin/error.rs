@@ -37,6 +37,18 @@ pub enum PluginFault {
     /// A key that a plug-in does not have.
     #[error("{0}; correct the key, or take it out")]
     UnknownKey(String),
+    /// A file of Python classes, given to the command on its own.
+    #[error(
+        "Python classes run in the command of the Python package: `pip install medialaxis`, and use its `medial`; \
+         or declare a program that runs them, in a TOML file"
+    )]
+    NoInterpreter,
+    /// The interpreter could not load the file.
+    #[error("{0}")]
+    Script(String),
+    /// The file has no class that is a method.
+    #[error("no class is a method; put @medial_axis.simplifier before one")]
+    NoClass,
     /// The file declares nothing.
     #[error("no method is declared; add a table [[method]]")]
     NoMethod,

@@ -255,7 +255,12 @@ fn fingerprint(declaration: &Declaration, folder: &Path) -> io::Result<String> {
         hasher.update(format!("\n{place} {}\n", fs::metadata(&file)?.len()));
         io::copy(&mut File::open(&file)?, &mut Hashed(&mut hasher))?;
     }
-    Ok(hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(hexadecimal(&hasher.finalize()))
+}
+
+/// Bytes of a digest as text.
+pub(super) fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Hashes what is written.

@@ -18,6 +18,7 @@
 //! | `external` | the method: parameters, files for the program, its command |
 //! | `program` | one run of it, to its end |
 //! | `answer`, `report` | what its end, its output and its last words mean |
+//! | `script` | classes instead of programs, where the command runs inside an interpreter |
 
 use std::fs;
 use std::path::Path;
@@ -28,12 +29,14 @@ mod error;
 mod external;
 mod program;
 mod report;
+mod script;
 mod template;
 
 pub use answer::ProgramPeak;
 pub use error::{PluginError, PluginFault};
 pub use external::{External, SCRATCH};
 pub use report::OwnSeconds;
+pub use script::{ScriptLoader, is_script, load_script};
 
 /// Reads and checks a file of plug-ins: its methods, in its order.
 ///

@@ -68,12 +68,6 @@ impl Given {
         let (radii, lenient, block) = (RadiiFrom::File, false, None);
         Ok(Self { name, file, mesh, fit: FitBy::Auto, radii, lenient, block })
     }
-
-    /// How the file is read.
-    pub fn options(&self) -> AxisOptions {
-        let Self { fit, radii, lenient, block, .. } = *self;
-        AxisOptions { lenient, block, radii, fit }
-    }
 }
 
 /// Parameters of the pseudo-method.

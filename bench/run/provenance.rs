@@ -9,6 +9,8 @@ use medial_reports::Machine;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::host::Host;
+
 /// The facts that are the same for every record of a run.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Provenance {
@@ -27,8 +29,8 @@ impl Provenance {
     pub fn here() -> Self {
         Self {
             machine: machine(),
-            binary_hash: env::current_exe()
-                .and_then(fs::read)
+            binary_hash: Host::here()
+                .and_then(|host| fs::read(&host.code))
                 .map_or_else(|_| String::new(), |bytes| hex_digest(&bytes)),
             command: command_line(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -66,7 +68,8 @@ fn kibibytes(value: &str) -> Option<u64> {
 
 /// The command line with the program's bare name, quoted where a shell would need it.
 fn command_line() -> String {
-    let words = env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    let words = Host::here().map(|host| &host.words[..]).unwrap_or_default();
+    let words = words.iter().map(|word| word.to_string_lossy().into_owned());
     let words: Vec<String> = std::iter::once("medial".to_owned()).chain(words).collect();
     shell_line(&words)
 }

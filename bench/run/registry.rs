@@ -8,7 +8,7 @@ use medial::simplifier::{Chain, MedialSimplifier};
 use medial_methods::initial;
 
 use super::given;
-use crate::plugin::{self, PluginError};
+use crate::plugin::{self, PluginError, ScriptLoader};
 
 /// Id of the pseudo-method that returns the initial medial mesh.
 pub const INITIAL: &str = "initial";
@@ -22,6 +22,8 @@ pub struct Registry {
     others: Vec<Entry>,
     /// The plug-in files that were added, as absolute paths.
     files: Vec<PathBuf>,
+    /// What loads plug-in files that are no declarations.
+    loader: Option<Box<dyn ScriptLoader>>,
 }
 
 /// A method, and for a plug-in a hash of its files.
@@ -78,7 +80,7 @@ impl Registry {
         let initial = Entry { method: Arc::new(initial::method()), fingerprint: None };
         let given = Entry { method: Arc::new(given::method()), fingerprint: None };
         let (entries, others) = (Vec::new(), vec![initial, given]);
-        let mut registry = Self { entries, others, files: Vec::new() };
+        let mut registry = Self { entries, others, files: Vec::new(), loader: None };
         for method in methods {
             let id = &method.info().id;
             if registry.entry(id).is_some() {
@@ -87,6 +89,12 @@ impl Registry {
             registry.add(Entry { method: method.into(), fingerprint: None });
         }
         Ok(registry)
+    }
+
+    /// The same with a loader for plug-in files of its language.
+    #[must_use]
+    pub fn with_loader(self, loader: Box<dyn ScriptLoader>) -> Self {
+        Self { loader: Some(loader), ..self }
     }
 
     /// Adds the methods of a plug-in file.
@@ -99,10 +107,19 @@ impl Registry {
             return Ok(());
         }
         let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
-        for external in plugin::load(&file, &taken)? {
-            let fingerprint = Some(external.fingerprint().to_owned());
-            self.add(Entry { method: Arc::new(external), fingerprint });
-        }
+        let new: Vec<Entry> = if plugin::is_script(&file) {
+            let methods = plugin::load_script(&file, self.loader.as_deref(), &taken)?.into_iter();
+            methods
+                .map(|(method, hash)| Entry { method: method.into(), fingerprint: Some(hash) })
+                .collect()
+        } else {
+            let entry = |external: plugin::External| {
+                let fingerprint = Some(external.fingerprint().to_owned());
+                Entry { method: Arc::new(external), fingerprint }
+            };
+            plugin::load(&file, &taken)?.into_iter().map(entry).collect()
+        };
+        new.into_iter().for_each(|entry| self.add(entry));
         self.files.push(file);
         Ok(())
     }

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
+use crate::host::Host;
 use crate::plugin::SCRATCH;
 use crate::process_tree;
 
@@ -61,8 +62,16 @@ impl Worker {
     /// # Errors
     /// When the process cannot be started.
     pub fn start(options: WorkerOptions) -> io::Result<Self> {
-        let own = || options.program.clone().map_or_else(program, Ok);
-        let mut command = Command::new(own()?);
+        let mut command = match &options.program {
+            Some(program) => Command::new(program),
+            None => {
+                let host = Host::here()?;
+                let mut command = Command::new(&host.program);
+                command.args(&host.arguments);
+                command
+            }
+        };
+        let is_foreign = options.program.is_none() && Host::here()?.is_foreign();
         command.arg("worker").arg("--threads").arg(options.threads.to_string());
         command.arg("--bytes").arg(options.bytes.to_string());
         for file in &options.plugins {
@@ -77,8 +86,11 @@ impl Worker {
         {
             use std::os::unix::process::CommandExt;
             command.process_group(0);
-            // Shown in lists of processes, instead of the link by which it was started.
-            command.arg0("medial");
+            // Shown in lists of processes, instead of the link by which it was started. An interpreter
+            // finds its library by this name.
+            if !is_foreign {
+                command.arg0("medial");
+            }
         }
         let mut child = command.spawn()?;
         let pipe = || io::Error::other("a pipe of the worker is missing");
@@ -166,12 +178,6 @@ impl Drop for Worker {
         }
         let _ = process_tree::end_tree(&mut self.child);
     }
-}
-
-/// The running program: on Linux by a link that stays valid when the program is rebuilt.
-fn program() -> io::Result<PathBuf> {
-    let link = PathBuf::from("/proc/self/exe");
-    if cfg!(target_os = "linux") && link.exists() { Ok(link) } else { std::env::current_exe() }
 }
 
 fn keep_last(mut from: impl Read, kept: &Mutex<VecDeque<u8>>) {

@@ -102,7 +102,7 @@ const MEDIAL: Layers<'_> = &[
 
 /// Inside `medial-bench`.
 const BENCH: Layers<'_> = &[
-    &["process_tree"],
+    &["host", "process_tree"],
     &["plugin"],
     &["check"],
     &["run"],

@@ -5,7 +5,7 @@ use medial::complex::Sphere;
 use rayon::prelude::*;
 
 /// Bits of a word.
-const WORD: usize = 64;
+pub(super) const WORD: usize = 64;
 
 /// Rows that one task fills.
 const ROWS: usize = 256;

@@ -31,8 +31,20 @@ pub(super) struct Cover {
     pub nodes: usize,
     /// Samples that no candidate covers.
     pub uncoverable: usize,
-    /// Whether time ended the search, so that another run may find another cover.
-    pub ended_by_time: bool,
+    /// What ended the search.
+    pub end: End,
+}
+
+/// What ends a search for a smallest cover.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum End {
+    /// The solver: nothing better is left, but for its rounding.
+    #[default]
+    Solver,
+    /// The number of nodes.
+    Nodes,
+    /// Time, so that another run may find another cover.
+    Time,
 }
 
 /// A smallest cover of all samples that can be covered, or the best that the limits allow.
@@ -107,7 +119,11 @@ fn solve(
         bound: bound.min(places.len()),
         chosen: places.iter().map(|&place| reduced.balls[place as usize]).collect(),
         nodes: stats.nodes_solved as usize,
-        ended_by_time: outcome.termination_reason() == TerminationReason::TimeLimit,
+        end: match outcome.termination_reason() {
+            TerminationReason::NodeLimit => End::Nodes,
+            TerminationReason::TimeLimit => End::Time,
+            _ => End::Solver,
+        },
         ..Cover::default()
     })
 }

@@ -271,9 +271,10 @@ impl Axis {
         let reached = cover.chosen.len();
         if reached > cover.bound {
             let gap = 100.0 * (reached - cover.bound) as f64 / reached as f64;
-            let how = match cover.ended_by_time {
-                true => "time, so that another run may find another cover",
-                false => "the number of nodes",
+            let how = match cover.end {
+                exact::End::Solver => "the solver's rounding",
+                exact::End::Nodes => "the number of nodes",
+                exact::End::Time => "time, so that another run may find another cover",
             };
             diagnostics.warn(format!(
                 "{reached} spheres cover, and no cover has fewer than {}: the search was ended by {how}, \

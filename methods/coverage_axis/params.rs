@@ -5,6 +5,8 @@ use std::ops::RangeInclusive;
 use medial::simplifier::{ParamInfo, SimplifyError};
 use serde::{Deserialize, Serialize};
 
+use crate::within::within;
+
 /// Parameters of Coverage Axis and Coverage Axis++; the defaults are those of the scripts of
 /// Coverage Axis++ for meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -212,12 +214,4 @@ impl CoverageAxisParams {
             ),
         ]
     }
-}
-
-fn within(name: &str, value: f64, range: RangeInclusive<f64>) -> Result<(), SimplifyError> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    let (least, most) = (range.start(), range.end());
-    Err(SimplifyError::Parameter(format!("{name} = {value} is outside {least} to {most}")))
 }

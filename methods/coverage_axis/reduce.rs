@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::coverage::{Bits, Coverage, is_subset, ones, size};
+use super::coverage::{Bits, Coverage, WORD, is_subset, ones, size};
 
 /// What is left of a set cover, and what is decided.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,7 +155,7 @@ fn new_ones(set: &Bits, tried: &mut Bits) -> Vec<usize> {
 /// Removes a row, here and where the matrix is transposed.
 fn clear_row(rows: &mut [Vec<u64>], columns: &mut [Vec<u64>], row: usize) {
     for column in ones(&rows[row]) {
-        columns[column][row / 64] &= !(1 << (row % 64));
+        columns[column][row / WORD] &= !(1 << (row % WORD));
     }
     rows[row].fill(0);
 }

@@ -3,6 +3,8 @@
 use medial::simplifier::{ParamInfo, SimplifyError};
 use serde::{Deserialize, Serialize};
 
+use crate::within::within;
+
 /// Parameters of the scale axis transform; the default is that of the authors' tool, without its
 /// angle filter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,13 +44,7 @@ impl SatParams {
             ("sat_angle", self.sat_angle, 0.0..=90.0),
         ];
         for (name, value, range) in ranges {
-            if !range.contains(&value) {
-                return Err(SimplifyError::Parameter(format!(
-                    "{name} = {value} is outside {} to {}",
-                    range.start(),
-                    range.end()
-                )));
-            }
+            within(name, value, range)?;
         }
         Ok(self)
     }

@@ -3,6 +3,8 @@
 use medial::simplifier::{ParamInfo, SimplifyError};
 use serde::{Deserialize, Serialize};
 
+use crate::within::within;
+
 /// Parameters of part pruning; the default is the paper's usual schedule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -121,13 +123,7 @@ impl TamHeidrichParams {
         ];
         let t_v = self.t_v.0.iter().map(|&t| ("t_v", t, 0.0..=100.0));
         for (name, value, range) in ranges.into_iter().chain(t_v) {
-            if !range.contains(&value) {
-                return Err(SimplifyError::Parameter(format!(
-                    "{name} = {value} is outside {} to {}",
-                    range.start(),
-                    range.end()
-                )));
-            }
+            within(name, value, range)?;
         }
         Ok(self)
     }

@@ -1,10 +1,9 @@
 //! The parameters of VMAS.
 
-use std::fmt::Display;
-use std::ops::RangeInclusive;
-
 use medial::simplifier::{ParamInfo, SimplifyError};
 use serde::{Deserialize, Serialize};
+
+use crate::within::within;
 
 /// Parameters of VMAS; the defaults are CGAL's, with the refit that minimises the energy as written.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -146,16 +145,4 @@ impl VmasParams {
             ParamInfo::new("iterations", default.iterations, "rounds", "rounds at most"),
         ]
     }
-}
-
-fn within<T: PartialOrd + Display>(
-    name: &str,
-    value: T,
-    range: RangeInclusive<T>,
-) -> Result<(), SimplifyError> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    let (least, most) = (range.start(), range.end());
-    Err(SimplifyError::Parameter(format!("{name} = {value} is outside {least} to {most}")))
 }

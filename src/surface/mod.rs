@@ -39,7 +39,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use crate::Vec3;
 pub use contract::{Contraction, Folds, contract_short_edges, contract_short_edges_while};
+
 pub use error::{Fault, Place, SurfaceError, VertexName};
 pub use inside::{InsideTest, Side};
 pub use mend::{Components, MendOptions, mend, mend_bytes};
@@ -153,6 +155,28 @@ pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
 pub fn inspect_bytes(bytes: &[u8], format: Format) -> Result<Inspection, SurfaceError> {
     let examined = examine(bytes, format)?;
     Ok(Inspection { report: examined.report, refused: examined.fault.map(SurfaceError::from) })
+}
+
+/// [`read`] for arrays: the same repairs, the same orientation, the same refusals.
+///
+/// # Errors
+/// When a coordinate is not finite, a face names a vertex that does not exist, or the surface does not bound a solid after the
+/// repairs; errors name faces and vertices by their numbers from 0.
+///
+/// ```
+/// use medial::{Vec3, surface::{self, Fault}};
+///
+/// let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+/// // Inside out: it is turned.
+/// let loaded = surface::read_triangles(&corners, &[[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])?;
+/// assert_eq!(loaded.mesh.faces[0], [0, 2, 1]);
+/// let open = surface::read_triangles(&corners, &[[0, 1, 2]]).unwrap_err();
+/// assert!(matches!(open.fault, Fault::Open { edges: 3, .. }));
+/// # Ok::<(), surface::SurfaceError>(())
+/// ```
+pub fn read_triangles(vertices: &[Vec3], faces: &[[u32; 3]]) -> Result<Loaded, SurfaceError> {
+    let soup = soup::PolygonSoup::of_triangles(vertices, faces)?;
+    Ok(accept(check::orient_and_examine(repair::repair(soup)?))?)
 }
 
 /// Checks a mesh that was not read from a file. Nothing is repaired: repeated corners, duplicate

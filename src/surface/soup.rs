@@ -19,6 +19,32 @@ pub(super) struct PolygonSoup {
 }
 
 impl PolygonSoup {
+    /// The triangles of arrays; places are numbers of rows.
+    ///
+    /// # Errors
+    /// When a coordinate is not finite, a corner is no vertex, or there are too many.
+    pub fn of_triangles(vertices: &[Vec3], faces: &[[u32; 3]]) -> Result<Self, Fault> {
+        let mut soup = Self::default();
+        for (row, vertex) in vertices.iter().enumerate() {
+            soup.push_vertex(vertex.to_array(), || Place::Element("vertex", row))?;
+        }
+        for (face, corners) in faces.iter().enumerate() {
+            if let Some(&corner) = corners.iter().find(|&&corner| corner as usize >= vertices.len())
+            {
+                let at = Place::Element("face", face);
+                return Err(Fault::Index {
+                    at,
+                    face,
+                    index: corner.into(),
+                    vertices: vertices.len(),
+                });
+            }
+            soup.corners.extend(corners);
+            soup.end_polygon(None)?;
+        }
+        Ok(soup)
+    }
+
     /// Number of polygons.
     pub fn len(&self) -> usize {
         self.ends.len()

@@ -18,6 +18,7 @@ use crate::output::{counted, print_json, print_line};
 use crate::run::{FitBy, Input, RadiiFrom, Source, StageLine, peak_bytes, percent};
 
 pub use crust::COINCIDENT;
+pub use union::{Fitting, fitting_surface};
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]

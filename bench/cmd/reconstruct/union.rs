@@ -65,16 +65,22 @@ pub fn surface_of(
 }
 
 /// A surface of a union at the tolerance that was taken.
-struct Fitting {
-    made: UnionSurface,
-    tolerance: f64,
+pub struct Fitting {
+    /// The surface.
+    pub made: UnionSurface,
+    /// The tolerance, in diagonals.
+    pub tolerance: f64,
     /// Largest distance of a face's centre from the union, in diagonals.
-    off: f64,
-    betti: Option<[u64; 3]>,
+    pub off: f64,
+    /// Betti numbers of the union, where there are not too many balls to tell.
+    pub betti: Option<[u64; 3]>,
 }
 
-/// The surface of a union at a tolerance, or at the coarsest that shows what there is.
-fn fitting_surface(
+/// The surface of a union at a tolerance in diagonals, or at the coarsest that shows what there is.
+///
+/// # Errors
+/// When the tolerance is too fine or too coarse for this union: which one would do.
+pub fn fitting_surface(
     axis: &MedialMesh,
     union: &MedialUnion,
     diagonal: f64,

@@ -26,8 +26,9 @@ use self::estimate::{Earlier, Need};
 use self::script::Submission;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
+use crate::host::Host;
 use crate::output::{counted, print_json, print_line, print_raw};
-use crate::run::{Planned, Provenance, not_done};
+use crate::run::{Planned, Provenance, not_done, shell_line};
 
 /// The engines that there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -181,10 +182,22 @@ fn copy_program(to: &Path) -> io::Result<()> {
     if to.exists() {
         return Ok(());
     }
-    let from = std::env::current_exe()?;
-    let bytes = fs::read(&from)?;
+    let host = Host::here()?;
+    let (bytes, like) = match host.is_foreign() {
+        false => (fs::read(&host.code)?, &host.code),
+        // An interpreter with its packages cannot be copied: jobs start it where it is.
+        true => (starter(host).into_bytes(), &host.program),
+    };
     write_atomically(to, |out| out.write_all(&bytes))?;
-    fs::set_permissions(to, fs::metadata(&from)?.permissions())
+    fs::set_permissions(to, fs::metadata(like)?.permissions())
+}
+
+/// A script that starts the command as it was started here.
+fn starter(host: &Host) -> String {
+    let words =
+        std::iter::once(host.program.as_os_str()).chain(host.arguments.iter().map(AsRef::as_ref));
+    let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
+    format!("#!/bin/sh\nexec {} \"$@\"\n", shell_line(&words))
 }
 
 fn print_scripts(submission: &Submission<'_>, global: &Global) {

@@ -1,0 +1,60 @@
+//! The process that the command runs in: a program of its own, or an interpreter that loaded it as a library.
+//!
+//! Workers are started as the command itself was, and results belong to the code that made them. Alone, both are the
+//! running program's file; inside an interpreter that file says nothing about the methods, and does not start a worker
+//! unless it is told to.
+
+use std::env;
+use std::ffi::OsString;
+use std::io;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+/// How the command is started again, and what it is made of.
+#[derive(Clone, Debug)]
+pub struct Host {
+    /// The program that is started.
+    pub program: PathBuf,
+    /// Its arguments before the verb.
+    pub arguments: Vec<OsString>,
+    /// The file that the methods are part of: its hash tells one build from another.
+    pub code: PathBuf,
+    /// The words of this command line, without the program's name.
+    pub words: Vec<OsString>,
+}
+
+static HOST: OnceLock<Host> = OnceLock::new();
+
+impl Host {
+    /// Says that the command runs inside another program, before anything else is done.
+    ///
+    /// # Panics
+    /// When it was said, or asked, before: the command runs once in a process.
+    pub fn enter(self) {
+        assert!(HOST.set(self).is_ok(), "the command runs once in a process");
+    }
+
+    /// The host of this process: the one that was entered, or the running program itself.
+    ///
+    /// # Errors
+    /// When the system does not tell which program runs.
+    pub fn here() -> io::Result<&'static Self> {
+        if let Some(host) = HOST.get() {
+            return Ok(host);
+        }
+        let (program, code) = (own_program()?, env::current_exe()?);
+        let words = env::args_os().skip(1).collect();
+        Ok(HOST.get_or_init(|| Self { program, arguments: vec![], code, words }))
+    }
+
+    /// Whether the command is a part of another program.
+    pub fn is_foreign(&self) -> bool {
+        !self.arguments.is_empty()
+    }
+}
+
+/// The running program: on Linux by a link that stays valid when the program is rebuilt.
+fn own_program() -> io::Result<PathBuf> {
+    let link = PathBuf::from("/proc/self/exe");
+    if cfg!(target_os = "linux") && link.exists() { Ok(link) } else { env::current_exe() }
+}

@@ -1,0 +1,28 @@
+"""Error against spheres, from the results of a comparison.
+
+    python plots.py medial-report errors.png
+"""
+
+from __future__ import annotations
+
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+import medial_axis
+
+folder, picture = sys.argv[1:3] if len(sys.argv) > 2 else ("medial-report", "errors.png")
+results = medial_axis.load(folder)
+# Off the count that was asked is no reason to leave a result out of this plot: its own count is on the axis.
+results = results[results.status.isin(["ok", "other_count"])]
+figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+for method, rows in results.groupby("method"):
+    # All meshes together, by what was asked: the median of each.
+    medians = rows.groupby("asked")[["spheres", "hausdorff"]].median().sort_values("spheres")
+    axes.plot(medians.spheres, 100 * medians.hausdorff, marker="o", label=method)
+axes.set(xscale="log", yscale="log", xlabel="spheres", ylabel="Hausdorff error, % of the diagonal")
+axes.legend()
+figure.savefig(picture, dpi=150)

@@ -1,0 +1,80 @@
+"""Simplify the 3D medial axis transform, and compare the published methods that do.
+
+    import medial_axis
+
+    mesh = medial_axis.Mesh.read("bear.off")
+    axis = mesh.medial_axis().simplify("qmat", spheres=100)
+    print(axis.evaluate())
+
+Lengths are in the units of the mesh, but for errors and for what methods of one's own are given: these are fractions of
+the bounding-box diagonal, as their documentation says. Arrays are n x 3 (points, float64; triangles, uint32, from 0).
+Arrays that an object gives are shared and read-only.
+"""
+
+from __future__ import annotations
+
+from . import _medial
+from ._medial import __version__
+from .axis import MedialAxis, Run
+from .comparison import Report, compare, load
+from .errors import (
+    CancelledError,
+    FailedError,
+    InputError,
+    InternalError,
+    MedialError,
+    ParameterError,
+    UnsupportedError,
+)
+from .evaluation import Certificate, Counts, Evaluation, Spikes, TriangleQuality
+from .mesh import Mesh
+from .method import (
+    Level,
+    MethodInfo,
+    NativeLevel,
+    Param,
+    RunContext,
+    Shape,
+    Simplified,
+    methods,
+    simplifier,
+)
+from .points import Triangulation, betti, closest_points, signed_distance, triangulate
+
+__all__ = [
+    "CancelledError",
+    "Certificate",
+    "Counts",
+    "Evaluation",
+    "FailedError",
+    "InputError",
+    "InternalError",
+    "Level",
+    "MedialAxis",
+    "MedialError",
+    "Mesh",
+    "MethodInfo",
+    "NativeLevel",
+    "Param",
+    "ParameterError",
+    "Report",
+    "Run",
+    "RunContext",
+    "Shape",
+    "Simplified",
+    "Spikes",
+    "Triangulation",
+    "TriangleQuality",
+    "UnsupportedError",
+    "__version__",
+    "betti",
+    "closest_points",
+    "compare",
+    "load",
+    "methods",
+    "signed_distance",
+    "simplifier",
+    "triangulate",
+]
+
+del _medial

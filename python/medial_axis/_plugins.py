@@ -1,0 +1,155 @@
+"""What stands between classes of users and the extension: descriptions, checks, and words for exceptions."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import sys
+import traceback
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from . import _medial, method
+from .axis import MedialAxis
+from .errors import ParameterError
+from .method import Level, MethodInfo, Param, RunContext, Shape, Simplified
+
+#: The file that is being loaded for its classes, if any: it must not start comparisons of its own.
+loading: str | None = None
+
+
+class Answer(NamedTuple):
+    """What the extension reads."""
+
+    axis: _medial.Axis
+    native_level: float | None
+    warnings: list[str]
+    continued: bool
+
+
+def describe(cls: Any) -> str:
+    """The description of a class, as JSON."""
+    info = getattr(cls, "info", None)
+    if not isinstance(info, MethodInfo):
+        raise ParameterError(f"{cls!r} is no method: put @medial_axis.simplifier before the class")
+    native = info.native
+    return json.dumps(
+        {
+            "id": info.id,
+            "title": info.title,
+            "citation": info.citation,
+            "summary": info.summary or f"A Python class: {cls.__qualname__}.",
+            "native": native and {
+                "name": native.name,
+                "unit": native.unit,
+                "larger_is_coarser": bool(native.larger_is_coarser),
+            },
+            "sweep": [float(level) for level in info.sweep],
+            "params": [
+                {"name": p.name, "default": _written(p.default), "unit": p.unit, "help": p.help}
+                for p in info.params
+            ],
+            "published": info.published,
+            "on_request": bool(info.on_request),
+        }
+    )
+
+
+def _written(value: Any) -> str:
+    """A default as it would be written on the command line."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(value)
+
+
+def prepare(cls: Any, shape: _medial.ShapeHandle, params: str, run: _medial.RunHandle) -> Any:
+    """An instance, prepared for a shape."""
+    values = _values(cls.info.params, json.loads(params))
+    instance = cls()
+    instance.prepare(Shape(shape), values, RunContext(run))
+    return instance
+
+
+def _values(known: tuple[Param, ...], given: dict[str, Any]) -> dict[str, Any]:
+    """The value of every parameter: as it was set, or the default, which decides the type."""
+    names = [param.name for param in known]
+    for key in given:
+        if key not in names:
+            there = ", ".join(names) or "none"
+            raise ParameterError(f"unknown parameter `{key}`; there are: {there}")
+    return {param.name: _typed(param, given.get(param.name, param.default)) for param in known}
+
+
+def _typed(param: Param, value: Any) -> Any:
+    default = param.default
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if isinstance(default, bool):
+        fits, needed = isinstance(value, bool), "true or false"
+    elif isinstance(default, int):
+        fits, needed = is_number and float(value).is_integer(), "a whole number"
+    elif isinstance(default, float):
+        fits, needed = is_number, "a number"
+    else:
+        value = value if isinstance(value, str) else json.dumps(value)
+        fits, needed = True, "a text"
+    if not fits:
+        raise ParameterError(f"{param.name} = {value!r}: {needed} is needed")
+    return type(default)(value)
+
+
+def at(instance: Any, kind: str, value: float) -> Answer:
+    """The result of an instance at a level."""
+    levels = {
+        "published": Level(),
+        "spheres": Level(spheres=int(value)),
+        "native": Level(native=value),
+    }
+    answer = instance.at(levels[kind])
+    if isinstance(answer, MedialAxis):
+        answer = Simplified(answer)
+    if not isinstance(answer, Simplified):
+        name = type(instance).__qualname__
+        raise TypeError(f"{name}.at: a MedialAxis or Simplified is needed, not a {type(answer).__name__}")
+    axis = answer.axis
+    if not isinstance(axis, MedialAxis):
+        raise TypeError(f"Simplified.axis: a MedialAxis is needed, not a {type(axis).__name__}")
+    level = None if answer.native_level is None else float(answer.native_level)
+    warnings = [str(warning) for warning in answer.warnings]
+    return Answer(axis._axis, level, warnings, bool(answer.continued))
+
+
+def tell(error: BaseException) -> str:
+    """An exception in a line: its type, its message, and where in the user's own file it was raised."""
+    here = os.path.dirname(os.path.abspath(__file__))
+    frames = traceback.extract_tb(_traceback(error))
+    own = [frame for frame in frames if not os.path.abspath(frame.filename).startswith(here)]
+    where = f" ({os.path.basename(own[-1].filename)}, line {own[-1].lineno})" if own else ""
+    message = str(error)
+    return f"{type(error).__name__}{': ' if message else ''}{message}{where}"
+
+
+def _traceback(error: BaseException) -> TracebackType | None:
+    return error.__traceback__
+
+
+def load(path: str | os.PathLike[str]) -> list[type[Any]]:
+    """The classes of a file that are methods, in its order."""
+    global loading
+    path = os.path.abspath(path)
+    stem = os.path.splitext(os.path.basename(path))[0]
+    name = f"_medial_plugin_{stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ParameterError(f"{path} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    # What it imports from its own folder is found, as when it is run.
+    sys.path.insert(0, os.path.dirname(path))
+    sys.modules[name] = module
+    loading = path
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        loading = None
+    return [cls for cls in method.registered().values() if cls.__module__ == name]
+

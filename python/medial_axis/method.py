@@ -1,0 +1,219 @@
+"""Methods: those that there are, and classes of one's own."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from . import _medial
+from ._arrays import BoolArray, FloatArray, IndexArray, floats
+from .axis import MedialAxis
+from .errors import ParameterError
+
+_Class = TypeVar("_Class", bound=type[Any])
+
+
+@dataclass(frozen=True)
+class NativeLevel:
+    """The scalar that a method is controlled by in its paper."""
+
+    name: str
+    unit: str
+    larger_is_coarser: bool = True
+
+
+@dataclass(frozen=True)
+class Param:
+    """A parameter. The type of the default is that of the value."""
+
+    name: str
+    default: float | int | bool | str
+    unit: str
+    help: str
+
+
+@dataclass(frozen=True)
+class MethodInfo:
+    """What a method says of itself."""
+
+    id: str
+    """Lower-case letters, digits and hyphens."""
+    title: str
+    citation: str = ""
+    summary: str = ""
+    params: tuple[Param, ...] = ()
+    native: NativeLevel | None = None
+    sweep: tuple[float, ...] = ()
+    """Native levels of a default comparison, from fine to coarse."""
+    published: str | None = None
+    """What the level without a number means, where there is one."""
+    on_request: bool = False
+    """Whether it runs only where it is named, because it takes long."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """How far to simplify: `spheres` or `native` is a number, or neither for the published level."""
+
+    spheres: int | None = None
+    native: float | None = None
+
+    @property
+    def published(self) -> bool:
+        return self.spheres is None and self.native is None
+
+
+@dataclass(frozen=True)
+class Simplified:
+    """A result with more to say than its medial mesh."""
+
+    axis: MedialAxis
+    native_level: float | None = None
+    """The method's own level that met a number of spheres."""
+    warnings: tuple[str, ...] = field(default_factory=tuple)
+    continued: bool = False
+    """Whether it went on from the level before: then the seconds of both are those of this one."""
+
+
+class Shape:
+    """A surface as a method sees it: normalised to a bounding-box diagonal of 1.
+
+    What is asked of it is built once for all methods of a comparison, and its cost is told beside each that used it. So
+    build nothing yourself that it has.
+    """
+
+    def __init__(self, handle: _medial.ShapeHandle) -> None:
+        self._handle = handle
+
+    @property
+    def name(self) -> str:
+        return self._handle.name
+
+    @property
+    def diagonal(self) -> float:
+        """Bounding-box diagonal of the input, in its unit."""
+        return self._handle.diagonal
+
+    @property
+    def expected_betti(self) -> tuple[int, int, int] | None:
+        """The Betti numbers that the solid's topology demands of its medial axis."""
+        return self._handle.expected_betti
+
+    def vertices(self) -> FloatArray:
+        """Positions, n x 3; a new array each time."""
+        return self._handle.vertices()
+
+    def faces(self) -> IndexArray:
+        """Triangles, n x 3, counter-clockwise from outside; a new array each time."""
+        return self._handle.faces()
+
+    def samples(self) -> FloatArray:
+        """Boundary samples, n x 3; a new array each time."""
+        return self._handle.samples()
+
+    def initial(self) -> MedialAxis:
+        """The medial mesh that every method starts from."""
+        return MedialAxis._of(self._handle.initial(), None)
+
+    def inside(self, points: Any) -> BoolArray:
+        """Which of n points are inside."""
+        return self._handle.inside(floats(points, "points"))
+
+    def distances(self, points: Any) -> FloatArray:
+        """The distances of n points to the surface."""
+        return self._handle.distances(floats(points, "points"))
+
+
+class RunContext:
+    """What surrounds a run."""
+
+    def __init__(self, handle: _medial.RunHandle) -> None:
+        self._handle = handle
+
+    @property
+    def seed(self) -> int:
+        """Seed of every random choice."""
+        return self._handle.seed
+
+    @property
+    def threads(self) -> int:
+        """How many threads to use."""
+        return self._handle.threads
+
+    def step(self, done: int, total: int) -> None:
+        """Reports progress; raises `CancelledError` once the run is to stop. Call it now and then."""
+        self._handle.step(done, total)
+
+
+_REGISTERED: dict[str, type[Any]] = {}
+_ID = re.compile(r"[a-z0-9-]+")
+
+
+def simplifier(cls: _Class) -> _Class:
+    """Makes a class a method, for `MedialAxis.simplify`, `compare`, and `medial compare --plugins FILE.py`.
+
+        @medial_axis.simplifier
+        class Largest:
+            info = medial_axis.MethodInfo(id="largest", title="Largest balls first")
+
+            def prepare(self, shape, params, run):   # once for a shape; Shape, dict, RunContext
+                self.axis = shape.initial()
+                self.order = np.argsort(-self.axis.radii, kind="stable")
+
+            def at(self, level):                     # for each Level, from fine to coarse
+                if level.spheres is None:
+                    raise medial_axis.UnsupportedError("ask for a number of spheres")
+                keep = np.zeros(len(self.axis), bool)
+                keep[self.order[: level.spheres]] = True
+                return self.axis.induced(keep)       # a MedialAxis, or Simplified
+
+    All lengths are fractions of the bounding-box diagonal, those of results too.
+    """
+    info = getattr(cls, "info", None)
+    name = getattr(cls, "__qualname__", repr(cls))
+    if not isinstance(cls, type):
+        raise ParameterError(f"@simplifier stands before a class, not before {cls!r}")
+    if not isinstance(info, MethodInfo):
+        raise ParameterError(f"{name}.info: a MethodInfo is needed, not {info!r}")
+    if not _ID.fullmatch(info.id):
+        raise ParameterError(
+            f"{name}.info.id: {info.id!r} is not made of lower-case letters, digits and hyphens"
+        )
+    for method in ("prepare", "at"):
+        if not callable(getattr(cls, method, None)):
+            raise ParameterError(f"{name} has no method `{method}`")
+    _REGISTERED[info.id] = cls
+    return cls
+
+
+def registered() -> dict[str, type[Any]]:
+    """The classes of this process by their ids."""
+    return dict(_REGISTERED)
+
+
+def methods() -> dict[str, dict[str, Any]]:
+    """The methods of the program by their ids: titles, citations, levels, parameters with units and defaults."""
+    return {info["id"]: info for info in json.loads(_medial.methods())}
+
+
+def id_of(method: str | type[Any]) -> str:
+    """The id of a method that is named by it, or is a class."""
+    if isinstance(method, str):
+        return method
+    info = getattr(method, "info", None)
+    return info.id if isinstance(info, MethodInfo) else method.__qualname__
+
+
+def file_of(cls: type[Any]) -> str:
+    """The file of a class, which workers load."""
+    module = sys.modules.get(cls.__module__)
+    path = getattr(module, "__file__", None)
+    if path is None:
+        raise ParameterError(
+            f"{cls.__qualname__} stands in no file, so no worker can load it: put it into a .py file and import it "
+            "(in a notebook: a cell that begins with %%writefile my_method.py)"
+        )
+    return str(path)

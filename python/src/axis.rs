@@ -1,0 +1,353 @@
+//! A medial mesh, in the units of its surface.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use medial::complex::{self, Look, MedialMesh, MedialUnion, SphereValues};
+use medial::geometry::Sphere;
+use medial::metrics::JudgeOptions;
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, Params, RunContext, Simplified};
+use medial::surface::{self, Loaded, Normalisation, SurfaceReport, TriMesh};
+use medial_bench::cmd::reconstruct::fitting_surface;
+use medial_bench::run::{Found, Probe, Search, Times, answer};
+use numpy::{PyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use serde_json::{Map, Value, json};
+
+use crate::arrays::{Once, of_points, of_rows, points, triangles};
+use crate::error::{Failure, Kind};
+use crate::method::Method;
+use crate::surface::{Surface, shape_options};
+use crate::work::{Call, Monitor, long};
+
+/// A medial mesh in input units, and the shape that it is of, where that is known.
+#[pyclass(frozen, module = "medial_axis._medial")]
+pub struct Axis {
+    /// In input units.
+    pub mesh: Arc<MedialMesh>,
+    shape: Option<Shape>,
+    /// Whether it is the initial medial mesh of its shape.
+    is_initial: bool,
+    centres: Once,
+    radii: Once,
+    edges: Once,
+    faces: Once,
+}
+
+impl Axis {
+    /// A medial mesh, in input units.
+    pub fn new(mesh: MedialMesh, shape: Option<Shape>) -> Self {
+        Self {
+            mesh: Arc::new(mesh),
+            shape,
+            is_initial: false,
+            centres: Once::default(),
+            radii: Once::default(),
+            edges: Once::default(),
+            faces: Once::default(),
+        }
+    }
+
+    /// The initial medial mesh of a shape, which has normalised units.
+    pub fn initial(mesh: &MedialMesh, shape: Shape) -> Self {
+        Self { is_initial: true, ..Self::of_normal(mesh, shape) }
+    }
+
+    /// A medial mesh in the normalised units of a shape.
+    fn of_normal(mesh: &MedialMesh, shape: Shape) -> Self {
+        Self::new(in_input_units(mesh, shape.normalisation()), Some(shape))
+    }
+
+    /// What a method starts from: the shape, with this mesh as the initial one unless it is.
+    fn start(&self) -> Result<Shape, Failure> {
+        let shape = self.shape.as_ref().ok_or_else(|| {
+            Failure::input("this medial axis knows no surface; read it with Mesh.read_axis, or give it one by axis.of(mesh)")
+        })?;
+        let view = shape.view();
+        Ok(if self.is_initial { view } else { view.with_initial(&self.mesh) })
+    }
+}
+
+/// A medial mesh of normalised units in those of the input.
+pub fn in_input_units(mesh: &MedialMesh, units: &Normalisation) -> MedialMesh {
+    mesh.transformed(units.diagonal, |point| units.backward(point))
+}
+
+/// The level of a call: at most one of the three is given.
+fn level(
+    spheres: Option<usize>,
+    native: Option<f64>,
+    bound: Option<f64>,
+) -> Result<Level, Failure> {
+    let given = [spheres.is_some(), native.is_some(), bound.is_some()];
+    if given.iter().filter(|is_given| **is_given).count() > 1 {
+        return Err(Failure::parameter("give one of spheres, level and max_error"));
+    }
+    if let Some(bound) = bound.filter(|bound| !(*bound > 0.0 && *bound < 1.0)) {
+        let message = format!("max_error = {bound}: a fraction of the diagonal, between 0 and 1");
+        return Err(Failure::parameter(message));
+    }
+    let of_count = spheres.map(Level::Spheres);
+    Ok(of_count
+        .or(native.map(Level::Native))
+        .or(bound.map(Level::MaxError))
+        .unwrap_or(Level::Published))
+}
+
+#[pymethods]
+impl Axis {
+    /// Arrays, as a complex in canonical form.
+    #[staticmethod]
+    fn from_arrays(
+        centres: PyReadonlyArray2<'_, f64>,
+        radii: numpy::PyReadonlyArray1<'_, f64>,
+        edges: PyReadonlyArray2<'_, u32>,
+        faces: PyReadonlyArray2<'_, u32>,
+    ) -> PyResult<Self> {
+        let (centres, radii) = (points(&centres)?, crate::arrays::numbers(&radii)?);
+        if centres.rows().len() != radii.rows().len() {
+            let (n, m) = (centres.rows().len(), radii.rows().len());
+            return Err(Failure::input(format!("{n} centres, but {m} radii")).into());
+        }
+        let both = centres.rows().iter().zip(radii.rows());
+        let spheres = both.map(|(&centre, &radius)| Sphere::new(centre, radius)).collect();
+        let faces = triangles(&faces)?.rows().to_vec();
+        let edges = edges.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect();
+        let mesh = MedialMesh::from_simplices(spheres, edges, faces).map_err(Failure::from)?;
+        Ok(Self::new(mesh, None))
+    }
+
+    /// A file: the mesh, and what is to be said of it.
+    #[staticmethod]
+    fn read(path: &str) -> PyResult<(Self, Vec<String>)> {
+        let (mesh, remarks) = complex::read(Path::new(path)).map_err(Failure::from)?.with_remarks();
+        Ok((Self::new(mesh, None), remarks))
+    }
+
+    /// The same mesh as one of a surface.
+    fn of(&self, surface: &Surface, sampling: &str, dual: &str, seed: u64) -> PyResult<Self> {
+        let shape = surface.model.shape(&shape_options(sampling, dual, seed)?)?;
+        let mesh = Arc::clone(&self.mesh);
+        Ok(Self { mesh, ..Self::new(MedialMesh::default(), Some(shape)) })
+    }
+
+    #[getter]
+    fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.centres.get(py, || of_points(py, self.mesh.spheres.iter().map(|s| s.centre)))
+    }
+
+    #[getter]
+    fn radii<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let radii = || self.mesh.spheres.iter().map(|sphere| sphere.radius);
+        self.radii.get(py, || Ok(PyArray1::from_iter(py, radii())))
+    }
+
+    #[getter]
+    fn edges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.edges.get(py, || of_rows(py, self.mesh.edges.iter().copied()))
+    }
+
+    #[getter]
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.faces.get(py, || of_rows(py, self.mesh.faces.iter().copied()))
+    }
+
+    /// The spheres that are kept, with the edges and faces between them, and what the spheres touch.
+    fn induced(&self, keep: Vec<bool>) -> PyResult<Self> {
+        let (given, count) = (keep.len(), self.mesh.spheres.len());
+        if given != count {
+            let message = format!("{given} truth values for {count} spheres");
+            return Err(Failure::input(message).into());
+        }
+        Ok(Self::new(self.mesh.induced(&keep), self.shape.clone()))
+    }
+
+    #[getter]
+    fn betti(&self) -> (u64, u64, u64) {
+        complex::betti(&self.mesh).into()
+    }
+
+    #[getter]
+    fn euler(&self) -> i64 {
+        complex::euler(&self.mesh)
+    }
+
+    /// Writes it by the extension of the path, for viewers coloured by these values.
+    fn save(&self, path: PathBuf, color: Option<&str>, balls: bool) -> PyResult<()> {
+        let values = match color {
+            None => None,
+            Some("stability") => Some(SphereValues::stability(&self.mesh, 1.0)),
+            Some("radius") => None,
+            Some(other) => {
+                let message = format!("color = {other:?}: radius or stability");
+                return Err(Failure::parameter(message).into());
+            }
+        };
+        Ok(complex::write_with(path, &self.mesh, &Look { values, balls }).map_err(Failure::from)?)
+    }
+
+    /// A simplification by a method, at a level; with it the facts of the run, as JSON.
+    #[pyo3(signature = (method, spheres, native, bound, params, call))]
+    #[allow(clippy::too_many_arguments)]
+    fn simplify(
+        &self,
+        py: Python<'_>,
+        method: &Bound<'_, PyAny>,
+        spheres: Option<usize>,
+        native: Option<f64>,
+        bound: Option<f64>,
+        params: &str,
+        call: Call,
+    ) -> PyResult<(Self, String)> {
+        let method = Method::find(method)?;
+        let level = level(spheres, native, bound)?;
+        let map: Map<String, Value> = serde_json::from_str(params)
+            .map_err(|error| Failure::parameter(format!("parameters: {error}")))?;
+        let start = self.start()?;
+        let home = self.shape.clone();
+        let run = Run { method, params: Params(map), start };
+        let (simplified, facts) = long(py, &call, move |context, monitor| {
+            let (simplified, facts) = run.at(level, context, monitor)?;
+            let mesh = in_input_units(&simplified.mesh, run.start.normalisation());
+            Ok((mesh, facts.to_string()))
+        })?;
+        Ok((Self::new(simplified, home), facts))
+    }
+
+    /// All metrics against a surface, as JSON.
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        surface: &Surface,
+        samples: usize,
+        certify: Option<f64>,
+        call: Call,
+    ) -> PyResult<String> {
+        let options = JudgeOptions { samples, seed: call.seed, ..JudgeOptions::default() };
+        let (model, mesh) = (Arc::clone(&surface.model), Arc::clone(&self.mesh));
+        long(py, &call, move |_, monitor| {
+            monitor.at("preparing the surface");
+            let shape = model.shape(&ShapeOptions::default())?;
+            let units = *shape.normalisation();
+            let judge = model.judge(options)?;
+            let normal = mesh.transformed(1.0 / units.diagonal, |point| units.forward(point));
+            let certified = match certify {
+                None => None,
+                Some(tolerance) => {
+                    monitor.at("certifying the Hausdorff distance");
+                    let mut certificate = judge.certify(&normal, tolerance)?;
+                    certificate.witness.point = units.backward(certificate.witness.point);
+                    Some(certificate)
+                }
+            };
+            monitor.at("measuring");
+            let evaluation = judge.evaluate(&normal)?;
+            let evaluation = medial::metrics::Evaluation { certified, ..evaluation };
+            serde_json::to_string(&evaluation).map_err(|error| Failure::new(Kind::Internal, error))
+        })
+    }
+
+    /// The boundary of the union of spheres, cones and slabs: whether it bounds a solid, else why not.
+    fn reconstruct(
+        &self,
+        py: Python<'_>,
+        tolerance: Option<f64>,
+        name: String,
+        call: Call,
+    ) -> PyResult<(Surface, Option<String>)> {
+        let mesh = Arc::clone(&self.mesh);
+        let diagonal = self.shape.as_ref().map(|shape| shape.normalisation().diagonal);
+        long(py, &call, move |_, monitor| {
+            monitor.at("reconstructing");
+            let union = MedialUnion::new(&mesh)?;
+            let (low, high) = union.bounding_box();
+            let corners = TriMesh { vertices: vec![low, high], faces: vec![] };
+            let of_balls = || Normalisation::of(&corners).map(|units| units.diagonal);
+            let diagonal = diagonal.or_else(of_balls).ok_or_else(|| {
+                Failure::input("the spheres have no extent, or one that is not finite")
+            })?;
+            let made = fitting_surface(&mesh, &union, diagonal, tolerance)?.made.mesh;
+            let (report, problem) = match surface::validate(&made) {
+                Ok(report) => (report, None),
+                // It can be looked at and written all the same.
+                Err(error) => (SurfaceReport::default(), Some(error.to_string())),
+            };
+            Ok((Surface::new(name, Loaded { mesh: made, report }, None), problem))
+        })
+    }
+}
+
+/// A method on what it starts from.
+struct Run {
+    method: Method,
+    params: Params,
+    start: Shape,
+}
+
+impl Run {
+    /// The result at a level, and what is to be known of it.
+    fn at(
+        &self,
+        level: Level,
+        context: &RunContext,
+        monitor: &Monitor,
+    ) -> Result<(Simplified, Value), Failure> {
+        let (level, search) = match level {
+            Level::MaxError(bound) => {
+                monitor.at("searching the bound");
+                let (level, search) = self.search(bound, context)?;
+                (level, Some(search))
+            }
+            other => (other, None),
+        };
+        monitor.at("simplifying");
+        let view = self.start.view();
+        let prepare = || self.method.get().prepare(&view, &self.params, context);
+        let mut runs = answer(&view, prepare, &[level], |_| {});
+        let run = runs.pop().expect("one level was asked");
+        let simplified = run.outcome.map_err(Failure::of_fault)?;
+        let facts = facts(&simplified, &run.times, level, search);
+        Ok((simplified, facts))
+    }
+
+    /// The level with the fewest spheres within an error bound, as the command searches it.
+    fn search(&self, bound: f64, context: &RunContext) -> Result<(Level, Value), Failure> {
+        let judge = self.start.judge(None, JudgeOptions::default())?;
+        let view = self.start.view();
+        let mut prepared = self.method.get().prepare(&view, &self.params, context)?;
+        let most = self.start.initial()?.spheres.len();
+        let measure = |mesh: &MedialMesh| {
+            judge.distances(mesh).map(|found| found.hausdorff).map_err(|error| error.to_string())
+        };
+        // Between two levels is where a search can be ended.
+        let trying = |_: Level| {
+            let _ = context.step(0, usize::MAX);
+        };
+        let info = self.method.get().info();
+        let mut search = Search::new(prepared.as_mut(), info, most, &measure, &trying);
+        let found = search.within(bound)?;
+        let Found { within: Some(Probe { level, error, .. }), tried, .. } = found else {
+            return Err(Failure::parameter(found.refusal(bound)));
+        };
+        Ok((level, json!({ "bound": bound, "hausdorff": error, "tried": tried })))
+    }
+}
+
+fn facts(simplified: &Simplified, times: &Times, level: Level, search: Option<Value>) -> Value {
+    let substrates = times.substrates.iter();
+    let substrates: Map<String, Value> = substrates
+        .map(|(substrate, cost)| (substrate.name().to_owned(), cost.seconds.into()))
+        .collect();
+    let seconds = times.seconds();
+    json!({
+        "asked": level.to_string(),
+        "native_level": simplified.native_level,
+        "seconds": {
+            "substrate": seconds.substrate, "prepare": seconds.prepare, "simplify": seconds.simplify,
+        },
+        "substrates": substrates,
+        "warnings": simplified.diagnostics.warnings,
+        "max_error": search,
+    })
+}

@@ -1,0 +1,343 @@
+//! Methods: those of the program by their ids, and Python classes as [`MedialSimplifier`].
+//!
+//! A class is described, prepared and asked by `medial_axis/_plugins.py`, which users' mistakes meet first; here its
+//! answers become those of a method, and its exceptions the errors of one. Everything that it is given and gives back is
+//! in normalised units: lengths are fractions of the bounding-box diagonal.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use medial::complex::MedialMesh;
+use medial::shape::Shape;
+use medial::simplifier::{
+    Level, MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, RunContext,
+    Simplification, Simplified, SimplifyError, Work,
+};
+use medial::surface::Side;
+use medial_bench::plugin::ScriptLoader;
+use medial_bench::run::{Registry, no_such_method};
+use numpy::{PyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use serde::Deserialize;
+
+use crate::arrays::{of_points, of_rows, points};
+use crate::axis::Axis;
+use crate::error::{Failure, Kind};
+
+/// The module that stands between a class and this file.
+const BETWEEN: &str = "medial_axis._plugins";
+
+/// All methods of the program, those that run only where they are named too.
+pub fn built_in() -> Vec<Box<dyn MedialSimplifier>> {
+    medial_methods::registry().into_iter().chain(medial_methods::on_request()).collect()
+}
+
+fn registry() -> &'static Registry {
+    static REGISTRY: OnceLock<Registry> = OnceLock::new();
+    REGISTRY.get_or_init(|| Registry::new(built_in()).expect("the ids of the program differ"))
+}
+
+/// What the methods of the program say of themselves, as JSON.
+#[pyfunction]
+pub fn methods() -> PyResult<String> {
+    let infos: Vec<&MethodInfo> =
+        registry().entries().iter().map(|entry| entry.method().info()).collect();
+    Ok(serde_json::to_string(&infos).map_err(|error| Failure::new(Kind::Internal, error))?)
+}
+
+/// A method of either kind.
+pub enum Method {
+    /// Of the program.
+    BuiltIn(&'static dyn MedialSimplifier),
+    /// A class.
+    Class(ClassMethod),
+}
+
+impl Method {
+    /// The method that an id or a class names.
+    pub fn find(name: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let Ok(id) = name.extract::<String>() else {
+            return Ok(Self::Class(ClassMethod::new(name)?));
+        };
+        let known =
+            || registry().entries().iter().map(|entry| entry.id().to_owned()).collect::<Vec<_>>();
+        match registry().entry(&id) {
+            Some(entry) => Ok(Self::BuiltIn(entry.method())),
+            None => Err(Failure::parameter(no_such_method(&id, &known())).into()),
+        }
+    }
+
+    /// The method.
+    pub fn get(&self) -> &dyn MedialSimplifier {
+        match self {
+            Self::BuiltIn(method) => *method,
+            Self::Class(method) => method,
+        }
+    }
+}
+
+/// A Python class as a method.
+pub struct ClassMethod {
+    class: Py<PyAny>,
+    info: MethodInfo,
+}
+
+/// What `_plugins.describe` says of a class.
+#[derive(Deserialize)]
+struct Described {
+    id: String,
+    title: String,
+    citation: String,
+    summary: String,
+    native: Option<DescribedLevel>,
+    sweep: Vec<f64>,
+    params: Vec<DescribedParam>,
+    published: Option<String>,
+    on_request: bool,
+}
+
+#[derive(Deserialize)]
+struct DescribedLevel {
+    name: String,
+    unit: String,
+    larger_is_coarser: bool,
+}
+
+#[derive(Deserialize)]
+struct DescribedParam {
+    name: String,
+    default: String,
+    unit: String,
+    help: String,
+}
+
+impl ClassMethod {
+    fn new(class: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = class.py();
+        let text: String = py.import(BETWEEN)?.call_method1("describe", (class,))?.extract()?;
+        let described: Described = serde_json::from_str(&text)
+            .map_err(|error| Failure::new(Kind::Internal, format!("describe: {error}")))?;
+        Ok(Self { class: class.clone().unbind(), info: described.into() })
+    }
+}
+
+impl From<Described> for MethodInfo {
+    fn from(described: Described) -> Self {
+        let level = |level: DescribedLevel| match level.larger_is_coarser {
+            true => NativeLevel::larger_is_coarser(level.name, level.unit),
+            false => NativeLevel::larger_is_finer(level.name, level.unit),
+        };
+        let param = |param: DescribedParam| {
+            ParamInfo::new(param.name, param.default, param.unit, param.help)
+        };
+        let info = Self::new(described.id, described.title)
+            .citation(described.citation)
+            .summary(described.summary)
+            .sweep(&described.sweep)
+            .params(described.params.into_iter().map(param));
+        let info =
+            Self { on_request: described.on_request, native: described.native.map(level), ..info };
+        match described.published {
+            Some(published) => info.published(published),
+            None => info,
+        }
+    }
+}
+
+impl MedialSimplifier for ClassMethod {
+    fn info(&self) -> &MethodInfo {
+        &self.info
+    }
+
+    fn prepare<'s>(
+        &self,
+        shape: &'s Shape,
+        params: &Params,
+        run: &RunContext,
+    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+        let params = serde_json::to_string(params).expect("plain data");
+        Python::attach(|py| {
+            let between = py.import(BETWEEN)?;
+            let shape = ShapeHandle { shape: shape.clone() };
+            let given = (&self.class, shape, params, RunHandle { run: run.clone() });
+            let prepared = between.call_method1("prepare", given)?;
+            Ok(Box::new(Prepared(prepared.unbind())) as Box<dyn Simplification + 's>)
+        })
+        .map_err(of_exception)
+    }
+}
+
+/// An instance that is prepared for a shape.
+struct Prepared(Py<PyAny>);
+
+impl Simplification for Prepared {
+    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        let (kind, value) = match level {
+            Level::Published => ("published", 0.0),
+            Level::Spheres(0) => {
+                return Err(SimplifyError::Level("ask for at least one sphere".into()));
+            }
+            Level::Spheres(count) => ("spheres", count as f64),
+            Level::Native(value) if !value.is_finite() => {
+                return Err(SimplifyError::Level(format!("{value} is not a finite number")));
+            }
+            Level::Native(value) => ("native", value),
+            Level::MaxError(_) => return Err(SimplifyError::searched()),
+        };
+        let answer = Python::attach(|py| {
+            let answer = py.import(BETWEEN)?.call_method1("at", (&self.0, kind, value))?;
+            answer.extract::<Answer>()
+        });
+        let answer = answer.map_err(of_exception)?;
+        let mesh = MedialMesh::clone(&answer.axis.get().mesh);
+        let mut simplified = Simplified::new(mesh, level);
+        simplified.native_level = answer.native_level;
+        simplified.work = if answer.continued { Work::Continued } else { Work::Anew };
+        answer.warnings.into_iter().for_each(|warning| simplified.diagnostics.warn(warning));
+        Ok(simplified)
+    }
+}
+
+/// What `_plugins.at` gives back.
+#[derive(FromPyObject)]
+struct Answer {
+    axis: Py<Axis>,
+    native_level: Option<f64>,
+    warnings: Vec<String>,
+    continued: bool,
+}
+
+/// An exception of a class as the error of a method.
+fn of_exception(error: PyErr) -> SimplifyError {
+    Python::attach(|py| {
+        let is = |name: &str| {
+            let class = py.import("medial_axis.errors").and_then(|module| module.getattr(name));
+            class.is_ok_and(|class| error.is_instance(py, &class))
+        };
+        let message = error.value(py).to_string();
+        if is("UnsupportedError") {
+            return SimplifyError::unsupported(message);
+        }
+        if is("ParameterError") {
+            return SimplifyError::Parameter(message);
+        }
+        if is("CancelledError") || error.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py)
+        {
+            return SimplifyError::Cancelled;
+        }
+        // The type, the message and the innermost line of the user's file.
+        let told = py.import(BETWEEN).and_then(|between| between.call_method1("tell", (&error,)));
+        let told = told.and_then(|told| told.extract::<String>()).unwrap_or(message);
+        SimplifyError::Failed(told)
+    })
+}
+
+/// Loads the classes of a file.
+pub struct Classes;
+
+impl ScriptLoader for Classes {
+    fn load(&self, path: &Path) -> Result<Vec<Box<dyn MedialSimplifier>>, String> {
+        Python::attach(|py| {
+            let classes = py.import(BETWEEN)?.call_method1("load", (path,))?;
+            let method = |class: PyResult<Bound<'_, PyAny>>| {
+                Ok(Box::new(ClassMethod::new(&class?)?) as Box<dyn MedialSimplifier>)
+            };
+            classes.try_iter()?.map(method).collect::<PyResult<Vec<_>>>()
+        })
+        .map_err(|error: PyErr| match of_exception(error) {
+            SimplifyError::Failed(why) | SimplifyError::Parameter(why) => why,
+            other => other.to_string(),
+        })
+    }
+}
+
+/// A shape as a class sees it, in normalised units. What is asked of it is built once for all methods, and counted
+/// as a substrate that the class used.
+#[pyclass(frozen, module = "medial_axis._medial")]
+pub struct ShapeHandle {
+    shape: Shape,
+}
+
+#[pymethods]
+impl ShapeHandle {
+    #[getter]
+    fn name(&self) -> &str {
+        self.shape.name()
+    }
+
+    /// Bounding-box diagonal of the input, in its units.
+    #[getter]
+    fn diagonal(&self) -> f64 {
+        self.shape.normalisation().diagonal
+    }
+
+    #[getter]
+    fn expected_betti(&self) -> Option<(u64, u64, u64)> {
+        self.shape.expected_betti().map(Into::into)
+    }
+
+    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(of_points(py, self.shape.mesh().vertices.iter().copied())?.into_any())
+    }
+
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(of_rows(py, self.shape.mesh().faces.iter().copied())?.into_any())
+    }
+
+    fn samples<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let samples = py.detach(|| self.shape.samples());
+        Ok(of_points(py, samples.iter().copied())?.into_any())
+    }
+
+    fn initial(&self, py: Python<'_>) -> PyResult<Axis> {
+        let initial = py.detach(|| self.shape.initial()).map_err(Failure::from)?;
+        Ok(Axis::new(MedialMesh::clone(&initial), None))
+    }
+
+    /// Which points are inside.
+    fn inside<'py>(
+        &self,
+        py: Python<'py>,
+        queries: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let queries = points(&queries)?;
+        let sides = py.detach(|| self.shape.inside_test().sides(queries.rows()));
+        Ok(PyArray1::from_iter(py, sides.into_iter().map(|side| side == Side::Inside)))
+    }
+
+    /// The distances of points to the surface.
+    fn distances<'py>(
+        &self,
+        py: Python<'py>,
+        queries: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let queries = points(&queries)?;
+        let tree = py.detach(|| self.shape.surface_tree()).map_err(Failure::from)?;
+        Ok(PyArray1::from_vec(py, py.detach(|| tree.distance_batch(queries.rows()))))
+    }
+}
+
+/// What surrounds a run, as a class sees it.
+#[pyclass(frozen, module = "medial_axis._medial")]
+pub struct RunHandle {
+    run: RunContext,
+}
+
+#[pymethods]
+impl RunHandle {
+    #[getter]
+    fn seed(&self) -> u64 {
+        self.run.seed
+    }
+
+    /// Number of threads to use.
+    #[getter]
+    fn threads(&self) -> usize {
+        rayon::current_num_threads()
+    }
+
+    /// Reports progress; raises when the run was cancelled.
+    fn step(&self, done: usize, total: usize) -> PyResult<()> {
+        Ok(self.run.step(done, total).map_err(|_| Failure::new(Kind::Cancelled, "cancelled"))?)
+    }
+}

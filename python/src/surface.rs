@@ -1,0 +1,226 @@
+//! A closed surface with its substrates, each built once.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use medial::complex::{self, MedialMesh};
+use medial::metrics::{Judge, JudgeOptions};
+use medial::shape::{Shape, ShapeOptions};
+use medial::surface::{
+    self, InsideTest, Loaded, Sampling, SignedDistance, SurfaceReport, TriMesh, TriangleBvh,
+};
+use medial_bench::run::{Dual, Input, Source};
+use numpy::{PyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays::{Once, of_points, of_rows, points, triangles};
+use crate::axis::Axis;
+use crate::error::{Failure, Kind};
+use crate::work::{Call, long};
+
+/// A surface that bounds a solid, in its own units.
+#[pyclass(frozen, module = "medial_axis._medial")]
+pub struct Surface {
+    /// Shared with the threads of long calls.
+    pub model: Arc<Model>,
+    vertices: Once,
+    faces: Once,
+}
+
+/// The surface and what was built of it.
+pub struct Model {
+    name: String,
+    /// In its own units.
+    pub mesh: TriMesh,
+    report: SurfaceReport,
+    /// The exactly known medial axis of a built-in shape.
+    truth: Option<MedialMesh>,
+    tree: OnceLock<TriangleBvh>,
+    inside: OnceLock<InsideTest>,
+    /// By what their samples are.
+    shapes: Mutex<Vec<(ShapeOptions, Shape)>>,
+    /// The last judge: it has as many samples as were asked.
+    judge: Mutex<Option<Arc<Judge>>>,
+}
+
+impl Model {
+    fn new(name: String, loaded: Loaded, truth: Option<MedialMesh>) -> Self {
+        let Loaded { mesh, report } = loaded;
+        let (tree, inside) = (OnceLock::new(), OnceLock::new());
+        let (shapes, judge) = (Mutex::default(), Mutex::default());
+        Self { name, mesh, report, truth, tree, inside, shapes, judge }
+    }
+
+    /// The shape with these samples; the same one, with what was built of it, each time.
+    pub fn shape(&self, options: &ShapeOptions) -> Result<Shape, Failure> {
+        let mut shapes = self.shapes.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, shape)) = shapes.iter().find(|(known, _)| known == options) {
+            return Ok(shape.view());
+        }
+        let shape =
+            Shape::new(self.name.clone(), &self.mesh, self.report.clone(), options.clone())?;
+        shapes.push((options.clone(), shape.view()));
+        Ok(shape)
+    }
+
+    /// What measures medial meshes of this surface.
+    pub fn judge(&self, options: JudgeOptions) -> Result<Arc<Judge>, Failure> {
+        let mut judge = self.judge.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = judge.as_ref().filter(|known| known.options() == options) {
+            return Ok(Arc::clone(known));
+        }
+        let made = self.shape(&ShapeOptions::default())?.judge(self.truth.as_ref(), options)?;
+        Ok(Arc::clone(judge.insert(Arc::new(made))))
+    }
+
+    fn tree(&self) -> Result<&TriangleBvh, Failure> {
+        if let Some(tree) = self.tree.get() {
+            return Ok(tree);
+        }
+        let tree = TriangleBvh::new(&self.mesh)?;
+        Ok(self.tree.get_or_init(|| tree))
+    }
+
+    fn inside(&self) -> &InsideTest {
+        self.inside.get_or_init(|| InsideTest::new(&self.mesh))
+    }
+}
+
+impl Surface {
+    /// A surface of which it is known that it bounds a solid.
+    pub fn new(name: String, loaded: Loaded, truth: Option<MedialMesh>) -> Self {
+        let model = Arc::new(Model::new(name, loaded, truth));
+        Self { model, vertices: Once::default(), faces: Once::default() }
+    }
+}
+
+/// Samples and dual of a shape from their words.
+pub fn shape_options(sampling: &str, dual: &str, seed: u64) -> Result<ShapeOptions, Failure> {
+    let parsed: Sampling =
+        sampling.parse().map_err(|error| Failure::parameter(format!("sampling: {error}")))?;
+    // A seed that stands in the word itself is meant more than that of the call.
+    let has_seed = sampling.split(':').count() > 2;
+    let dual = match dual {
+        "fan" => Dual::Fan,
+        "delaunay" => Dual::Delaunay,
+        other => return Err(Failure::parameter(format!("dual = {other:?}: fan or delaunay"))),
+    };
+    let sampling = if has_seed { parsed } else { parsed.with_seed(seed) };
+    Ok(ShapeOptions { sampling, dual: dual.into() })
+}
+
+#[pymethods]
+impl Surface {
+    /// A file, `builtin:ID` or `dataset:NAME`.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf, call: Call) -> PyResult<Self> {
+        long(py, &call, move |_, monitor| {
+            monitor.at("reading");
+            let Input { name, mesh, report, axis, .. } = Input::load(&Source::parse(&path)?)?;
+            Ok(Self::new(name, Loaded { mesh, report }, axis))
+        })
+    }
+
+    /// Arrays, repaired and oriented as a file would be.
+    #[staticmethod]
+    fn from_arrays(
+        py: Python<'_>,
+        vertices: PyReadonlyArray2<'_, f64>,
+        faces: PyReadonlyArray2<'_, u32>,
+        name: String,
+        call: Call,
+    ) -> PyResult<Self> {
+        let (vertices, faces) = (points(&vertices)?, triangles(&faces)?);
+        long(py, &call, move |_, monitor| {
+            monitor.at("reading");
+            let loaded = surface::read_triangles(vertices.rows(), faces.rows())?;
+            Ok(Self::new(name, loaded, None))
+        })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.model.name
+    }
+
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.vertices.get(py, || of_points(py, self.model.mesh.vertices.iter().copied()))
+    }
+
+    #[getter]
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.faces.get(py, || of_rows(py, self.model.mesh.faces.iter().copied()))
+    }
+
+    /// The report of reading it, as JSON.
+    fn report(&self) -> PyResult<String> {
+        let json = serde_json::to_string(&self.model.report);
+        Ok(json.map_err(|error| Failure::new(Kind::Internal, error))?)
+    }
+
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        Ok(surface::write(path, &self.model.mesh).map_err(Failure::from)?)
+    }
+
+    /// The initial Voronoi medial mesh.
+    fn medial_axis(
+        &self,
+        py: Python<'_>,
+        sampling: &str,
+        dual: &str,
+        call: Call,
+    ) -> PyResult<Axis> {
+        let options = shape_options(sampling, dual, call.seed)?;
+        let model = Arc::clone(&self.model);
+        long(py, &call, move |_, monitor| {
+            monitor.at("computing the medial axis");
+            let shape = model.shape(&options)?;
+            let initial = shape.initial()?;
+            Ok(Axis::initial(&initial, shape))
+        })
+    }
+
+    /// A file as a medial mesh of this surface.
+    fn read_axis(&self, path: &str) -> PyResult<(Axis, Vec<String>)> {
+        let shape = self.model.shape(&ShapeOptions::default())?;
+        let (mesh, remarks) = complex::read(Path::new(path)).map_err(Failure::from)?.with_remarks();
+        Ok((Axis::new(mesh, Some(shape)), remarks))
+    }
+
+    /// For each point the closest one of the surface, its distance and its face.
+    fn closest_points<'py>(
+        &self,
+        py: Python<'py>,
+        queries: PyReadonlyArray2<'py, f64>,
+        call: Call,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let queries = points(&queries)?;
+        let model = Arc::clone(&self.model);
+        let found = long(py, &call, move |_, monitor| {
+            monitor.at("searching the closest points");
+            Ok(model.tree()?.closest_batch(queries.rows()))
+        })?;
+        let distances = PyArray1::from_iter(py, found.iter().map(|closest| closest.distance));
+        let faces = PyArray1::from_iter(py, found.iter().map(|closest| closest.face));
+        let found = of_points(py, found.iter().map(|closest| closest.point))?;
+        Ok((found.into_any(), distances.into_any(), faces.into_any()))
+    }
+
+    /// The distances of points to the surface, negative inside.
+    fn signed_distance<'py>(
+        &self,
+        py: Python<'py>,
+        queries: PyReadonlyArray2<'py, f64>,
+        call: Call,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let queries = points(&queries)?;
+        let model = Arc::clone(&self.model);
+        let found = long(py, &call, move |_, monitor| {
+            monitor.at("measuring signed distances");
+            let distance = SignedDistance::closed(model.tree()?, model.inside());
+            Ok(distance.batch(queries.rows()))
+        })?;
+        Ok(PyArray1::from_vec(py, found))
+    }
+}

@@ -1,0 +1,124 @@
+"""Long calls: threads, Ctrl-C, progress, memory."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import medial_axis
+from medial_axis import MedialAxis, Mesh
+
+
+def test_two_threads_at_once(axis: MedialAxis) -> None:
+    found: dict[int, list[bytes]] = {}
+
+    def work(thread: int) -> None:
+        methods = ["qmat", "hem"] if thread else ["hem", "qmat"]
+        results = {method: axis.simplify(method, spheres=50) for method in methods}
+        found[thread] = [results[method].centres.tobytes() for method in ("qmat", "hem")]
+
+    threads = [threading.Thread(target=work, args=(thread,)) for thread in range(2)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert found[0] == found[1]
+
+
+def test_others_run_during_a_long_call() -> None:
+    """The interpreter's lock is free: another thread counts meanwhile."""
+    points = np.random.default_rng(0).random((200_000, 3))
+    ticks, done = [0], threading.Event()
+
+    def tick() -> None:
+        while not done.wait(0.005):
+            ticks[0] += 1
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    start = time.perf_counter()
+    medial_axis.triangulate(points)
+    seconds = time.perf_counter() - start
+    done.set()
+    thread.join()
+    # One tick in 5 ms if nobody held it; a lock that is held gives none.
+    assert ticks[0] > 10 * seconds
+
+
+def test_the_number_of_threads_changes_nothing(blob: Mesh) -> None:
+    axes = [blob.medial_axis(threads=n).simplify("qmat", spheres=50, threads=n) for n in (1, 2)]
+    assert axes[0].centres.tobytes() == axes[1].centres.tobytes()
+
+
+def test_progress_is_told_and_its_errors_are_raised(blob: Mesh) -> None:
+    fine = Mesh.read("builtin:torus:160")
+    told: list[tuple[str, float | None]] = []
+    fine.medial_axis(progress=lambda stage, share: told.append((stage, share)))
+    assert told and all(share is None or 0 <= share <= 1 for _, share in told)
+
+    def refuse(stage: str, share: float | None) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        Mesh.read("builtin:torus:170").medial_axis(progress=refuse)
+
+
+INTERRUPTED = """
+import sys, time
+import numpy as np
+import medial_axis
+points = np.random.default_rng(0).random((3_000_000, 3))
+print("ready", flush=True)
+start = time.monotonic()
+try:
+    medial_axis.triangulate(points)
+except KeyboardInterrupt:
+    print("interrupted", time.monotonic(), flush=True)
+    sys.exit(7)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_an_interrupt_ends_a_long_call() -> None:
+    process = subprocess.Popen([sys.executable, "-c", INTERRUPTED], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdout.readline() == "ready\n"
+    time.sleep(0.5)
+    sent = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    word, at = process.stdout.readline().split()
+    assert word == "interrupted"
+    assert process.wait(timeout=60) == 7
+    # Half a second is promised; a busy machine may be slower, but not as slow as the whole call.
+    assert float(at) - sent < 2.0
+
+
+def resident_bytes() -> int:
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc")
+def test_a_thousand_calls_leave_nothing_behind() -> None:
+    mesh = Mesh.read("builtin:box")
+    corners = np.random.default_rng(1).random((50, 3))
+    initial = mesh.medial_axis()
+
+    def calls(count: int) -> None:
+        for _ in range(count):
+            medial_axis.triangulate(corners)
+            copy = Mesh(mesh.vertices, mesh.faces)
+            copy.signed_distance(corners)
+            small = initial.simplify("angle", level=60)
+            small.betti, small.centres, small.faces
+            with pytest.raises(medial_axis.ParameterError):
+                initial.simplify("angle", level=60, wrong=1)
+
+    calls(100)  # What is allocated once.
+    before = resident_bytes()
+    calls(200)
+    assert resident_bytes() - before < 20_000_000, "a thousand calls and errors"

@@ -1,0 +1,60 @@
+"""Every example runs, and all of it passes the type checker."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+def run(name: str, *words: object, cwd: Path) -> str:
+    command = [sys.executable, str(EXAMPLES / name), *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def needs(module: str) -> None:
+    if importlib.util.find_spec(module) is None:
+        pytest.skip(f"{module} is not installed")
+
+
+def test_three_lines(tmp_path: Path) -> None:
+    printed = run("three_lines.py", cwd=tmp_path)
+    assert printed.startswith("100 spheres") and "certified" in printed
+
+
+def test_a_class_of_ones_own_and_plots_of_its_results(tmp_path: Path) -> None:
+    printed = run("largest.py", tmp_path / "report", cwd=tmp_path)
+    assert printed.strip().endswith("index.html")
+    needs("matplotlib")
+    run("plots.py", tmp_path / "report", tmp_path / "errors.png", cwd=tmp_path)
+    assert (tmp_path / "errors.png").stat().st_size > 10_000
+
+
+def test_round_trips(tmp_path: Path) -> None:
+    printed = run("round_trips.py", cwd=tmp_path)
+    for module, name in [("trimesh", "trimesh"), ("open3d", "Open3D")]:
+        if importlib.util.find_spec(module) is not None:
+            line = next(line for line in printed.splitlines() if line.startswith(name))
+            assert "=True" in line, line
+
+
+def test_a_view(tmp_path: Path) -> None:
+    needs("pyvista")
+    run("view.py", tmp_path / "view.png", cwd=tmp_path)
+    assert (tmp_path / "view.png").stat().st_size > 10_000
+
+
+def test_types(tmp_path: Path) -> None:
+    needs("mypy")
+    files = [str(EXAMPLES), str(Path(__file__).parent)]
+    package = Path(__file__).parent.parent / "medial_axis"
+    command = [sys.executable, "-m", "mypy", "--strict", "--ignore-missing-imports", "--cache-dir", str(tmp_path)]
+    done = subprocess.run([*command, str(package), *files[:1]], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
