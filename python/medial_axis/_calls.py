@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import os
 from collections.abc import Callable
 from typing import Any
 
@@ -44,14 +45,10 @@ def real(value: Any, what: str) -> float:
 
 def path_text(path: Any, what: str = "path") -> str:
     """A path as text."""
-    import os
-
     try:
-        text = os.fspath(path)
+        text = os.fsdecode(path)
     except TypeError:
         raise ParameterError(f"{what}: a path is needed, not a {type(path).__name__}") from None
-    if isinstance(text, bytes):
-        text = os.fsdecode(text)
     if "\0" in text:
         raise ParameterError(f"{what}: {text!r} has a zero byte")
     return text

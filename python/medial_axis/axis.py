@@ -228,7 +228,7 @@ class MedialAxis:
         color: str | None = None,
         balls: bool = False,
     ) -> None:
-        """Writes `.ma`, `.ply`, `.obj`, `.vtp` (ParaView) or `.glb` (Blender, browsers), complete or not at all.
+        """Writes `.ma`, `.ply`, `.vtp` (ParaView), `.glb` (Blender, browsers), or `.obj` without radii; complete or not at all.
 
         For viewers: `color` is `radius` or `stability`, and `balls` adds the spheres themselves.
         """

@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from dataclasses import dataclass, field
-from typing import Any
+import typing
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 _DIAGONAL = "fraction of the bounding-box diagonal"
 
-
-def _in(unit: str) -> Any:
-    return field(metadata={"unit": unit})
+# A number with its unit, as `Evaluation.unit` tells it.
+_Length = Annotated[float, _DIAGONAL]
+_Degrees = Annotated["float | None", "degrees"]
+_OfTriangles = Annotated["float | None", "share of the triangles"]
 
 
 @dataclass(frozen=True)
 class Certificate:
     """An interval that contains the Hausdorff distance."""
 
-    lower: float = _in(_DIAGONAL)
-    upper: float = _in(_DIAGONAL)
-    tolerance: float = _in(_DIAGONAL)
+    lower: _Length
+    upper: _Length
+    tolerance: _Length
     pieces: int
     """Number of pieces that were evaluated."""
-    point: tuple[float, float, float] = _in("unit of the mesh")
+    point: Annotated[tuple[float, float, float], "unit of the mesh"]
     """Where the distance is `lower`."""
     on: str
     """The surface that `point` is on: `surface` or `union`."""
@@ -33,12 +35,12 @@ class Certificate:
 class TriangleQuality:
     """Angles of the medial triangles; None without triangles."""
 
-    min_angle_mean: float | None = _in("degrees")
-    max_angle_mean: float | None = _in("degrees")
-    below_30: float | None = _in("share of the triangles")
-    below_10: float | None = _in("share of the triangles")
-    below_1: float | None = _in("share of the triangles")
-    zero_area: int = _in("triangles")
+    min_angle_mean: _Degrees
+    max_angle_mean: _Degrees
+    below_30: _OfTriangles
+    below_10: _OfTriangles
+    below_1: _OfTriangles
+    zero_area: Annotated[int, "triangles"]
 
 
 @dataclass(frozen=True)
@@ -74,27 +76,27 @@ class Evaluation:
     METHODOLOGY.md defines each number.
     """
 
-    hausdorff: float = _in(_DIAGONAL)
+    hausdorff: _Length
     """The larger of `epsilon_union` and `reverse`."""
-    epsilon: float = _in(_DIAGONAL)
+    epsilon: _Length
     """Largest distance from the surface to a primitive, buried or not: the reading of the Q-MAT paper."""
-    epsilon_union: float = _in(_DIAGONAL)
+    epsilon_union: _Length
     """Largest distance from the surface to the union."""
-    reverse: float = _in(_DIAGONAL)
+    reverse: _Length
     """Largest distance from the union's boundary to the surface."""
-    mean: float = _in(_DIAGONAL)
-    rms: float = _in(_DIAGONAL)
-    p95: float = _in(_DIAGONAL)
-    p99: float = _in(_DIAGONAL)
-    reverse_mean: float = _in(_DIAGONAL)
-    spheres_only: float = _in(_DIAGONAL)
+    mean: _Length
+    rms: _Length
+    p95: _Length
+    p99: _Length
+    reverse_mean: _Length
+    spheres_only: _Length
     """`epsilon_union` without cones and slabs."""
     samples: int
     reverse_samples: int
-    volume_error: float | None = _in("fraction of the solid's volume")
-    protrusion: float | None = _in(_DIAGONAL)
+    volume_error: Annotated[float | None, "fraction of the solid's volume"]
+    protrusion: Annotated[float | None, _DIAGONAL]
     """How far the union's boundary reaches out of the solid."""
-    centres_outside: float | None = _in("share of the spheres")
+    centres_outside: Annotated[float | None, "share of the spheres"]
     quality: TriangleQuality
     spikes: Spikes
     betti: tuple[int, int, int]
@@ -106,7 +108,7 @@ class Evaluation:
     certified: Certificate | None
     axis: dict[str, Any] | None
     """Distances to the exactly known axis of a built-in shape."""
-    diagonal: float = _in("unit of the mesh")
+    diagonal: Annotated[float, "unit of the mesh"]
     """The bounding-box diagonal of the mesh."""
     seed: int
     warnings: tuple[str, ...]
@@ -137,8 +139,9 @@ class Evaluation:
     @classmethod
     def unit(cls, name: str) -> str | None:
         """The unit of a field; None for counts and what is no number."""
-        unit: str | None = cls.__dataclass_fields__[name].metadata.get("unit")
-        return unit
+        hint = typing.get_type_hints(cls, include_extras=True)[name]
+        noted: tuple[str, ...] = getattr(hint, "__metadata__", ())
+        return noted[0] if noted else None
 
     def in_units(self, name: str) -> float:
         """A length in the unit of the mesh instead of diagonals."""

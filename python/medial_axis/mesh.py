@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _medial
 from ._arrays import FloatArray, IndexArray, floats, indices
-from ._calls import Progress, call, path_text
-from .errors import InputError
+from ._calls import Progress, call, path_text, whole
+from .errors import InputError, ParameterError
 
 if TYPE_CHECKING:
     from .axis import MedialAxis
@@ -117,12 +117,33 @@ class Mesh:
         made = self._surface.medial_axis(str(sampling), str(dual), call(seed, threads, progress))
         return MedialAxis._of(made, self)
 
-    def read_axis(self, path: str | os.PathLike[str]) -> MedialAxis:
-        """Reads a medial mesh of this surface, in its units: `.ma` in any dialect, `.ply`, `.obj`, `.vtp`, `.glb`."""
+    def read_axis(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        fit: Literal["none", "similarity", "auto"] = "none",
+        radii: Literal["file", "surface"] = "file",
+        lenient: bool = False,
+        block: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> MedialAxis:
+        """Reads a medial mesh of this surface: `.ma` in any dialect, `.ply`, `.obj`, `.vtp`, `.glb`.
+
+        In the units of the surface, unless `fit` finds others (`auto`: if it does not fit as it is). `radii="surface"` gives
+        spheres without radii their distance to the surface; `lenient` takes lines that the header does not announce;
+        `block` is which of several meshes in one file is meant, from 1. `.remarks` of the result says what was done.
+        """
         from .axis import MedialAxis
 
         self._solid()
-        axis, remarks = self._surface.read_axis(path_text(path))
+        block = None if block is None else whole(block, "block", 1, 2**31)
+        options = {"fit": fit, "radii": radii, "lenient": lenient, "block": block}
+        try:
+            text = json.dumps(options)
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"read_axis: {error}") from None
+        axis, remarks = self._surface.read_axis(path_text(path), text, call(0, threads, progress))
         return MedialAxis._of(axis, self, remarks=remarks)
 
     def closest_points(
@@ -146,7 +167,7 @@ class Mesh:
         """As an `open3d.geometry.TriangleMesh`."""
         import open3d
 
-        vertices = open3d.utility.Vector3dVector(self.vertices)
+        vertices = open3d.utility.Vector3dVector(self.vertices.copy())
         faces = open3d.utility.Vector3iVector(self.faces.astype("int32"))
         return open3d.geometry.TriangleMesh(vertices, faces)
 

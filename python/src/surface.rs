@@ -1,15 +1,15 @@
 //! A closed surface with its substrates, each built once.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use medial::complex::{self, MedialMesh};
+use medial::complex::MedialMesh;
 use medial::metrics::{Judge, JudgeOptions};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{
     self, InsideTest, Loaded, Sampling, SignedDistance, SurfaceReport, TriMesh, TriangleBvh,
 };
-use medial_bench::run::{Dual, Input, Source};
+use medial_bench::run::{AxisOptions, Dual, Input, Source, read_axis};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -181,11 +181,23 @@ impl Surface {
         })
     }
 
-    /// A file as a medial mesh of this surface.
-    fn read_axis(&self, path: &str) -> PyResult<(Axis, Vec<String>)> {
-        let shape = self.model.shape(&ShapeOptions::default())?;
-        let (mesh, remarks) = complex::read(Path::new(path)).map_err(Failure::from)?.with_remarks();
-        Ok((Axis::new(mesh, Some(shape)), remarks))
+    /// A file as a medial mesh of this surface, read and fitted as the options say, a JSON object.
+    fn read_axis(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        options: &str,
+        call: Call,
+    ) -> PyResult<(Axis, Vec<String>)> {
+        let options: AxisOptions = serde_json::from_str(options).map_err(Failure::parameter)?;
+        let model = Arc::clone(&self.model);
+        long(py, &call, move |_, monitor| {
+            monitor.at("reading");
+            let shape = model.shape(&ShapeOptions::default())?;
+            let (loaded, _) = read_axis(&path, &shape, &options).map_err(Failure::input)?;
+            let (mesh, remarks) = loaded.with_remarks();
+            Ok((Axis::new(mesh, Some(shape)), remarks))
+        })
     }
 
     /// For each point the closest one of the surface, its distance and its face.

@@ -29,8 +29,10 @@ def test_in_this_process(axis: MedialAxis) -> None:
     expected = np.sort(axis.radii)[-30:]
     assert np.allclose(np.sort(largest.radii), expected, rtol=1e-12)
     assert largest.run is not None and largest.run.method == "largest-class"
-    few = axis.simplify(Largest, spheres=30, least=0.9 * largest.radii.max() / axis.evaluate(samples=100).diagonal)
-    assert 0 < len(few) < 30, "`least` is a fraction of the diagonal"
+    # A fraction of the diagonal, half-way between two radii.
+    tenth, next_one = np.sort(largest.radii)[::-1][9:11]
+    least = float(tenth + next_one) / 2 / axis.evaluate(samples=100).diagonal
+    assert len(axis.simplify(Largest, spheres=30, least=least)) == 10
     with pytest.raises(UnsupportedError, match="ask for a number"):
         axis.simplify(Largest)
     with pytest.raises(ParameterError, match="unknown parameter `most`; there are: least"):
