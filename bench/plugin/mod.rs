@@ -36,7 +36,7 @@ pub use answer::ProgramPeak;
 pub use error::{PluginError, PluginFault};
 pub use external::{External, SCRATCH};
 pub use report::OwnSeconds;
-pub use script::{ScriptLoader, is_script, load_script};
+pub use script::{ScriptLoader, ScriptMethod, is_script, load_script};
 
 /// Reads and checks a file of plug-ins: its methods, in its order.
 ///

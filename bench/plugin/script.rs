@@ -25,12 +25,20 @@ pub trait ScriptLoader: Send + Sync {
     fn load(&self, path: &Path) -> Result<Vec<Box<dyn MedialSimplifier>>, String>;
 }
 
+/// A method of a file of classes, and the SHA-256 of that file: an edited class is not taken for the old one.
+pub struct ScriptMethod {
+    /// The method.
+    pub method: Box<dyn MedialSimplifier>,
+    /// The hash.
+    pub fingerprint: String,
+}
+
 /// Whether a plug-in file holds classes of Python rather than declarations of programs.
 pub fn is_script(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == PYTHON)
 }
 
-/// The methods of a file of classes, each with the fingerprint of that file.
+/// The methods of a file of classes.
 ///
 /// # Errors
 /// When there is no loader or it refuses the file, and when an id is no id or among `taken`.
@@ -38,7 +46,7 @@ pub fn load_script(
     path: &Path,
     loader: Option<&dyn ScriptLoader>,
     taken: &[&str],
-) -> Result<Vec<(Box<dyn MedialSimplifier>, String)>, PluginError> {
+) -> Result<Vec<ScriptMethod>, PluginError> {
     let refuse = |fault| PluginError { file: path.to_owned(), line: None, fault };
     let loader = loader.ok_or_else(|| refuse(PluginFault::NoInterpreter))?;
     let bytes = fs::read(path).map_err(|error| refuse(error.into()))?;
@@ -58,5 +66,67 @@ pub fn load_script(
         }
         ids.push(id);
     }
-    Ok(methods.into_iter().map(|method| (method, fingerprint.clone())).collect())
+    let with_hash = |method| ScriptMethod { method, fingerprint: fingerprint.clone() };
+    Ok(methods.into_iter().map(with_hash).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use medial::shape::Shape;
+    use medial::simplifier::{
+        Method, MethodInfo, NoParams, RunContext, Simplification, SimplifyError,
+    };
+
+    use super::*;
+
+    /// A loader whose files hold methods of these ids.
+    struct Ids(&'static [&'static str]);
+
+    impl ScriptLoader for Ids {
+        fn load(&self, _: &Path) -> Result<Vec<Box<dyn MedialSimplifier>>, String> {
+            fn prepare<'s>(
+                _: &'s Shape,
+                _: NoParams,
+                _: &RunContext,
+            ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+                Err(SimplifyError::unsupported("never asked here"))
+            }
+            let method = |id: &&'static str| -> Box<dyn MedialSimplifier> {
+                Box::new(Method::new(MethodInfo::new(*id, "A class"), prepare))
+            };
+            match self.0 {
+                ["?"] => Err("SyntaxError: line 1".to_owned()),
+                ids => Ok(ids.iter().map(method).collect()),
+            }
+        }
+    }
+
+    #[test]
+    fn classes_need_a_loader_and_ids_of_their_own() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let file = dir.path().join("mine.py");
+        fs::write(&file, "class A: ...").expect("a file");
+        let refused = |loader: Option<&dyn ScriptLoader>| {
+            load_script(&file, loader, &["qmat"]).err().expect("a refusal").to_string()
+        };
+        assert!(refused(None).contains("pip install medialaxis"));
+        assert!(refused(Some(&Ids(&["?"]))).ends_with("mine.py: SyntaxError: line 1"));
+        assert!(refused(Some(&Ids(&[]))).contains("@medial_axis.simplifier"));
+        assert!(refused(Some(&Ids(&["Mine"]))).contains("lower-case"));
+        assert!(refused(Some(&Ids(&["qmat"]))).contains("called `qmat`"));
+        assert!(refused(Some(&Ids(&["mine", "mine"]))).contains("called `mine`"));
+    }
+
+    #[test]
+    fn an_edited_class_is_another_method() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let file = dir.path().join("mine.py");
+        let fingerprints = ["a", "a", "b"].map(|text| {
+            fs::write(&file, text).expect("a file");
+            let mut loaded = load_script(&file, Some(&Ids(&["mine"])), &[]).ok().expect("a method");
+            loaded.remove(0).fingerprint
+        });
+        assert_eq!(fingerprints[0], fingerprints[1]);
+        assert_ne!(fingerprints[0], fingerprints[2]);
+    }
 }

@@ -8,7 +8,7 @@ use medial::simplifier::{Chain, MedialSimplifier};
 use medial_methods::initial;
 
 use super::given;
-use crate::plugin::{self, PluginError, ScriptLoader};
+use crate::plugin::{self, PluginError, ScriptLoader, ScriptMethod};
 
 /// Id of the pseudo-method that returns the initial medial mesh.
 pub const INITIAL: &str = "initial";
@@ -108,10 +108,12 @@ impl Registry {
         }
         let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
         let new: Vec<Entry> = if plugin::is_script(&file) {
-            let methods = plugin::load_script(&file, self.loader.as_deref(), &taken)?.into_iter();
-            methods
-                .map(|(method, hash)| Entry { method: method.into(), fingerprint: Some(hash) })
-                .collect()
+            let entry = |ScriptMethod { method, fingerprint }| Entry {
+                method: method.into(),
+                fingerprint: Some(fingerprint),
+            };
+            let methods = plugin::load_script(&file, self.loader.as_deref(), &taken)?;
+            methods.into_iter().map(entry).collect()
         } else {
             let entry = |external: plugin::External| {
                 let fingerprint = Some(external.fingerprint().to_owned());
