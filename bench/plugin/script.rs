@@ -123,7 +123,7 @@ mod tests {
         let file = dir.path().join("mine.py");
         let fingerprints = ["a", "a", "b"].map(|text| {
             fs::write(&file, text).expect("a file");
-            let mut loaded = load_script(&file, Some(&Ids(&["mine"])), &[]).ok().expect("a method");
+            let mut loaded = load_script(&file, Some(&Ids(&["mine"])), &[]).expect("a method");
             loaded.remove(0).fingerprint
         });
         assert_eq!(fingerprints[0], fingerprints[1]);
