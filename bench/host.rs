@@ -8,6 +8,7 @@ use std::env;
 use std::ffi::OsString;
 use std::io;
 use std::path::PathBuf;
+use std::process::Command;
 use std::sync::OnceLock;
 
 /// How the command is started again, and what it is made of.
@@ -47,10 +48,29 @@ impl Host {
         Ok(HOST.get_or_init(|| Self { program, arguments: vec![], code, words }))
     }
 
+    /// The start of another process of the command; its verb is to follow.
+    pub fn command(&self) -> Command {
+        let mut command = Command::new(&self.program);
+        command.args(&self.arguments);
+        // An interpreter finds its library by its own name.
+        if self.is_foreign() { command } else { named(command) }
+    }
+
     /// Whether the command is a part of another program.
     pub fn is_foreign(&self) -> bool {
         !self.arguments.is_empty()
     }
+}
+
+/// A command under the name that lists of processes show, instead of the link by which it is started.
+pub fn named(command: Command) -> Command {
+    #[cfg(unix)]
+    let command = {
+        let mut command = command;
+        std::os::unix::process::CommandExt::arg0(&mut command, "medial");
+        command
+    };
+    command
 }
 
 /// The running program: on Linux by a link that stays valid when the program is rebuilt.

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
-use crate::host::Host;
+use crate::host::{self, Host};
 use crate::plugin::SCRATCH;
 use crate::process_tree;
 
@@ -63,15 +63,9 @@ impl Worker {
     /// When the process cannot be started.
     pub fn start(options: WorkerOptions) -> io::Result<Self> {
         let mut command = match &options.program {
-            Some(program) => Command::new(program),
-            None => {
-                let host = Host::here()?;
-                let mut command = Command::new(&host.program);
-                command.args(&host.arguments);
-                command
-            }
+            Some(program) => host::named(Command::new(program)),
+            None => Host::here()?.command(),
         };
-        let is_foreign = options.program.is_none() && Host::here()?.is_foreign();
         command.arg("worker").arg("--threads").arg(options.threads.to_string());
         command.arg("--bytes").arg(options.bytes.to_string());
         for file in &options.plugins {
@@ -83,15 +77,7 @@ impl Worker {
         // A group of its own: an interrupt from the keyboard goes to the supervisor alone, and one
         // signal ends the worker with what it started.
         #[cfg(unix)]
-        {
-            use std::os::unix::process::CommandExt;
-            command.process_group(0);
-            // Shown in lists of processes, instead of the link by which it was started. An interpreter
-            // finds its library by this name.
-            if !is_foreign {
-                command.arg0("medial");
-            }
-        }
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn()?;
         let pipe = || io::Error::other("a pipe of the worker is missing");
         let requests = child.stdin.take().ok_or_else(pipe)?;

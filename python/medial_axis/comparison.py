@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from . import _plugins
 from ._calls import path_text
+from ._command import STARTED_BY
 from .errors import FailedError, InputError, ParameterError
 from .mesh import Mesh
 from .method import file_of, id_of, registered
@@ -139,7 +140,7 @@ def _word(value: Any) -> str:
 
 def _run(words: list[str], quiet: bool) -> tuple[int, str, str]:
     """Runs the command: its exit code and what it printed. Ctrl-C ends it as it ends the command itself."""
-    command = [sys.executable, "-m", "medial_axis", *words, *(["--quiet"] if quiet else [])]
+    command = [*STARTED_BY, *words, *(["--quiet"] if quiet else [])]
     # Of a session of its own: a terminal would interrupt it once, and this function a second time.
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True

@@ -1,6 +1,6 @@
 //! The command `medial`, inside a Python process.
 //!
-//! It is the same command; only its workers are started as `python -m medial_axis worker`, and plug-in files may
+//! It is the same command; only its workers are started by Python as it was, and plug-in files may
 //! hold Python classes.
 
 use std::ffi::OsString;

@@ -162,6 +162,18 @@ def test_what_goes_wrong_is_a_row_of_the_table(tmp_path: Path) -> None:
     assert "a MedialAxis or Simplified is needed, not a ndarray" in reason["wrong"]
 
 
+def test_files_of_the_user_are_not_taken_for_modules(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("numpy", "random", "medial_axis", "errors", "json"):
+        (tmp_path / f"{name}.py").write_text("raise RuntimeError('not me')")
+    monkeypatch.chdir(tmp_path)
+    report = medial_axis.compare(
+        "builtin:box", methods=Largest, spheres=20, out=tmp_path / "report", quiet=True
+    )
+    assert (report.frame().status != "panicked").all()
+
+
 def test_files_that_cannot_be_loaded(tmp_path: Path) -> None:
     for text, named in [
         ("import nothing_of_the_kind", "ModuleNotFoundError"),
