@@ -3,6 +3,8 @@
 //! `medial_axis/_arrays.py` has checked kind and shape, and made them contiguous where they were not; here they are
 //! borrowed. An array that a thread reads stays alive as long as that thread ([`Held`]).
 
+#![allow(unsafe_code)] // Memory that numpy owns cannot be borrowed without.
+
 use std::sync::OnceLock;
 
 use medial::Vec3;

@@ -50,14 +50,14 @@ pub enum Method {
     /// Of the program.
     BuiltIn(&'static dyn MedialSimplifier),
     /// A class.
-    Class(ClassMethod),
+    Class(Box<ClassMethod>),
 }
 
 impl Method {
     /// The method that an id or a class names.
     pub fn find(name: &Bound<'_, PyAny>) -> PyResult<Self> {
         let Ok(id) = name.extract::<String>() else {
-            return Ok(Self::Class(ClassMethod::new(name)?));
+            return Ok(Self::Class(Box::new(ClassMethod::new(name)?)));
         };
         let known =
             || registry().entries().iter().map(|entry| entry.id().to_owned()).collect::<Vec<_>>();
@@ -71,7 +71,7 @@ impl Method {
     pub fn get(&self) -> &dyn MedialSimplifier {
         match self {
             Self::BuiltIn(method) => *method,
-            Self::Class(method) => method,
+            Self::Class(method) => method.as_ref(),
         }
     }
 }
