@@ -45,9 +45,12 @@ fn all_built_in_methods_pass() {
 
 #[test]
 fn variants_pass() {
-    for variant in ["facet", "grid", "homotopy"] {
+    for variant in ["facet", "homotopy"] {
         assert_passes(check(MEDIAL, &["angle", "--set", &format!("variant={variant}")]), 1);
     }
+    // Two million voxels take minutes, and have no case that these lack.
+    let coarse = ["angle", "--set", "variant=grid", "--set", "resolution=32"];
+    assert_passes(check(MEDIAL, &coarse), 1);
     assert_passes(check(MEDIAL, &["lambda", "--set", "variant=cell"]), 1);
     // Without a limit of rounds it takes minutes where a number of spheres is out of its reach.
     assert_passes(check(MEDIAL, &["vmas", "--set", "iterations=20"]), 1);
