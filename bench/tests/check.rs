@@ -48,9 +48,13 @@ fn variants_pass() {
     for variant in ["facet", "homotopy"] {
         assert_passes(check(MEDIAL, &["angle", "--set", &format!("variant={variant}")]), 1);
     }
-    // Two million voxels take minutes, and have no case that these lack.
-    let coarse = ["angle", "--set", "variant=grid", "--set", "resolution=32"];
-    assert_passes(check(MEDIAL, &coarse), 1);
+    let ranking = ["angle", "--set", "variant=grid", "--set", "size=ranking"];
+    assert_passes(check(MEDIAL, &ranking), 1);
+    // A number of spheres that no lattice gives is looked for up to the finest, for minutes.
+    let sampling = ["counts-above", "valid-box", "valid-torus", "continuing", "published", "scale"];
+    let cases: Vec<&str> = sampling.iter().flat_map(|case| ["--case", case]).collect();
+    let sampling = check(MEDIAL, &[&["angle", "--set", "variant=grid"][..], &cases].concat());
+    assert_eq!((sampling.0, sampling.1["passed"].as_u64()), (0, Some(6)), "{}", sampling.1);
     assert_passes(check(MEDIAL, &["lambda", "--set", "variant=cell"]), 1);
     // Without a limit of rounds it takes minutes where a number of spheres is out of its reach.
     assert_passes(check(MEDIAL, &["vmas", "--set", "iterations=20"]), 1);
