@@ -1,11 +1,10 @@
-//! Methods from elsewhere, all three ways in: a crate of one's own, a program, a Python script. Each
-//! stands in tables, plots, page and `medial methods` beside the built-in ones.
+//! Methods from elsewhere: a program, a Python script. Each stands in tables, plots, page and `medial methods`
+//! beside the built-in ones. (The third way in, a crate of one's own, has its test in `examples/plugin-crate`.)
 
 mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use common::{code, records, run, stderr};
 
@@ -66,25 +65,6 @@ fn a_python_script() {
     let file = file.to_str().expect("UTF-8");
     let method = ("largest", "Largest balls first (Python)");
     compares(Path::new(MEDIAL), &["--plugins", file], &[method]);
-}
-
-#[test]
-fn a_crate_of_ones_own() {
-    let crate_ = root().join("examples/plugin-crate");
-    // Its dependencies are those of this workspace, already there: nothing is fetched.
-    fs::copy(root().join("Cargo.lock"), crate_.join("Cargo.lock")).expect("the lock file");
-    let target = std::env::current_exe().expect("the test knows its file");
-    let target = target.ancestors().nth(3).expect("target/PROFILE/deps/TEST").to_owned();
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--offline", "--quiet", "--manifest-path"])
-        .arg(crate_.join("Cargo.toml"))
-        .arg("--target-dir")
-        .arg(&target)
-        .output()
-        .expect("cargo runs");
-    assert!(built.status.success(), "{}", stderr(&built));
-    let program = target.join("debug").join("medial-largest");
-    compares(&program, &[], &[("largest-rust", "Largest balls first")]);
 }
 
 #[test]
