@@ -16,7 +16,7 @@ fn root() -> PathBuf {
 
 /// Compares methods on a box, and asks that each has results, a line in the CSV, a curve in a plot,
 /// and its title on the page.
-fn compares(program: &Path, plugins: &[&str], methods: &[(&str, &str)]) {
+fn compares(plugins: &[&str], methods: &[(&str, &str)]) {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
     let ids = methods.iter().map(|(id, _)| *id).collect::<Vec<_>>().join(",") + ",qmat";
@@ -25,7 +25,7 @@ fn compares(program: &Path, plugins: &[&str], methods: &[(&str, &str)]) {
         &["--samples", "200", "--counts-only", "--quiet", "--out", out.to_str().expect("UTF-8")],
         plugins,
     ];
-    let output = run(program, &arguments.concat());
+    let output = run(MEDIAL, &arguments.concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let records = records(&out);
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
@@ -42,7 +42,7 @@ fn compares(program: &Path, plugins: &[&str], methods: &[(&str, &str)]) {
         assert!(table.contains(id), "{id} is not in the table");
         assert!(plots.iter().any(|plot| plot.contains(id)), "{id} is in no plot");
     }
-    let listed = run(program, &[&["methods"][..], plugins].concat());
+    let listed = run(MEDIAL, &[&["methods"][..], plugins].concat());
     let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
     assert!(methods.iter().all(|(id, title)| listed.contains(id) && listed.contains(title)));
 }
@@ -53,7 +53,7 @@ fn a_program() {
     let file = root().join("examples/plugins/largest.toml");
     let file = file.to_str().expect("UTF-8");
     let method = ("largest-awk", "Largest balls first (POSIX shell and awk)");
-    compares(Path::new(MEDIAL), &["--plugins", file], &[method]);
+    compares(&["--plugins", file], &[method]);
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn a_python_script() {
     let file = root().join("examples/plugins/largest.toml");
     let file = file.to_str().expect("UTF-8");
     let method = ("largest", "Largest balls first (Python)");
-    compares(Path::new(MEDIAL), &["--plugins", file], &[method]);
+    compares(&["--plugins", file], &[method]);
 }
 
 #[test]
