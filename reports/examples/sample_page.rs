@@ -1,7 +1,7 @@
 //! Writes a report of made-up records, to look at the page and the plots:
 //! `cargo run -p medial-reports --example sample_page -- FOLDER [METHODS [MESHES]]`.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/it/common.rs"]
 #[allow(dead_code)]
 mod common;
 

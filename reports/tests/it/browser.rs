@@ -1,8 +1,6 @@
 //! The page in a browser, from disk and without a network: no error, no request, and its script
 //! answers.
 
-mod common;
-
 use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -10,7 +8,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use common::{SHAPES, comparison, header};
+use super::common::{SHAPES, comparison, header};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::surface::TriMesh;

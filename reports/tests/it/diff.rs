@@ -1,12 +1,9 @@
 //! The difference of two sets of records: what is alarmed, what is listed, and what is left alone.
 
-#[allow(dead_code)] // Headers are for pages.
-mod common;
-
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
 use medial_reports::{Record, Repetition, Stages};
 
-use common::{SHAPES, comparison};
+use super::common::{SHAPES, comparison};
 
 const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
 

@@ -1,12 +1,10 @@
 //! A report as a whole: what is in the folder, what the numbers in it are, what cannot spoil it.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use common::{SHAPES, comparison, failed, header, ok};
+use super::common::{SHAPES, comparison, failed, header, ok};
 use medial_reports::{Record, Status, read_header, summary_text, write_report};
 
 const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];

@@ -1,12 +1,9 @@
 //! What a report shows from files of their own: the baseline, stability under noise, oracles.
 
-#[allow(dead_code)]
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{comparison, header};
+use super::common::{comparison, header};
 use medial::metrics::{AxisSpan, SurfaceDistances};
 use medial_reports::{
     AxisShift, BASELINES, Baseline, NoiseRecord, ORACLES, Record, STABILITY, read_lines,

@@ -1,11 +1,9 @@
 //! What a paper takes over: BibTeX, and the text on the methods.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{SHAPES, comparison, failed, header, ok};
+use super::common::{SHAPES, comparison, failed, header, ok};
 use medial::metrics::{Certificate, Witness, WitnessSide};
 use medial::simplifier::Level;
 use medial_reports::{Conditions, Header, Record, Status, write_report};

@@ -1,11 +1,8 @@
 //! `results.jsonl`: what was written reads back, and an interrupted write costs one line.
 
-#[allow(dead_code)]
-mod common;
-
 use std::fs;
 
-use common::{asked, comparison, ok};
+use super::common::{asked, comparison, ok};
 use medial_reports::{Journal, JournalError, Status, read_records, write_records};
 use proptest::prelude::*;
 

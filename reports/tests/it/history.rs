@@ -1,12 +1,9 @@
 //! Histories of made-up nights: what is kept, what is refused, what is found and what is said of it.
 
-#[allow(dead_code)]
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::ok;
+use super::common::ok;
 use medial_reports::history::{Findings, History, HistoryError, Night, Quantity};
 use medial_reports::{Record, Repetition, Stages, Status};
 
@@ -75,7 +72,13 @@ fn nights_survive_their_files_and_are_small() {
     let history = history(folder.path(), 3, |_, record, _| {
         // Everything that may be missing is missing somewhere.
         if record.simplify.method == "hem" && record.mesh == "box" {
-            *record = common::failed("box", "hem", 500, Status::TimedOut, "no result within 300 s");
+            *record = super::common::failed(
+                "box",
+                "hem",
+                500,
+                Status::TimedOut,
+                "no result within 300 s",
+            );
             record.mesh_hash = None;
         }
     });

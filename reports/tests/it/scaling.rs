@@ -1,11 +1,8 @@
 //! How time and memory grow with the input: tables and plots of a whole report.
 
-#[allow(dead_code)]
-mod common;
-
 use std::fs;
 
-use common::{SHAPES, header, ok};
+use super::common::{SHAPES, header, ok};
 use medial_reports::{Record, write_report};
 use tempfile::TempDir;
 
