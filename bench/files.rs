@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use medial::complex::{self, LoadedMa};
+use medial::complex::LoadedMa;
 use medial::shape::{Fit, Shape};
 
 use crate::args::AxisArguments;
@@ -27,15 +27,14 @@ pub fn medial_mesh_for(
 /// What a file holds is told by its first bytes; no header of a PLY file is longer than so many.
 const HEADER_LIMIT: u64 = 1 << 20;
 
-/// Whether a file holds a medial mesh: `.ma`, lists of spheres and `.vtp`, `.ply` and `.glb` whose vertices have a radius,
+/// Whether a file holds a medial mesh: `.ma`, lists of spheres, `.ply` whose vertices have a radius,
 /// `.obj` whose vertices have a fourth number.
 ///
 /// # Errors
 /// When it cannot be read.
 pub fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" | "vtp" => Ok(true),
-        "glb" => complex::glb_has_radii(path).map_err(Failure::input),
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
         "ply" => any_line(path, |words| match words {
             [b"end_header"] => Some(false),
             [b"property", _, b"radius" | b"r"] => Some(true),

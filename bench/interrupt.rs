@@ -16,8 +16,6 @@ pub fn install() {
     let handle = || {
         let again = INTERRUPTED.swap(true, Ordering::Relaxed);
         if again || !LISTENING.load(Ordering::Relaxed) {
-            // Half-written files are nobody's result.
-            medial::remove_temporaries();
             std::process::exit(Exit::Interrupted as i32);
         }
     };

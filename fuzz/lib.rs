@@ -14,13 +14,11 @@ mod kernels;
 pub type Target = fn(&[u8]);
 
 /// All targets, by name.
-pub const TARGETS: [(&str, Target); 19] = [
+pub const TARGETS: [(&str, Target); 17] = [
     ("off", formats::off),
     ("obj", formats::obj),
     ("ply", formats::ply),
     ("stl", formats::stl),
-    ("glb", formats::glb),
-    ("vtp", formats::vtp),
     ("ma", formats::ma),
     ("ma_lenient", formats::ma_lenient),
     ("ma_points", formats::ma_points),

@@ -1,11 +1,6 @@
-"""Our .vtp and .glb files in other people's readers, and theirs in ours. Needs vtk and trimesh; see readers.sh.
+"""Our .vtp and .glb files in the readers of VTK and trimesh; see readers.sh.
 
-    readers.py make FOLDER                  files written by VTK and by trimesh, of the mesh in FOLDER/x.ma
-    readers.py check MESH.ma FILE ...       what VTK (.vtp) and trimesh (.glb) read, against the text of MESH.ma
-    readers.py near MESH.ma OTHER.ma        two files that differ in the last digits of numbers
-    readers.py single MESH.ma OTHER.ma      the faces of MESH.ma, and their spheres in single precision
-    readers.py solid FOLDER                 solids written by trimesh, with what a reader of surfaces should find
-    readers.py compare FOLDER               what was found: FOLDER/solids.off
+    readers.py MESH.ma FILE ...     compare what VTK (.vtp) and trimesh (.glb) read with the text of MESH.ma
 
 Prints a line for each comparison; exit code 1 when one differs.
 """
@@ -16,7 +11,7 @@ import sys
 import numpy as np
 import trimesh
 import vtk
-from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtk.util.numpy_support import vtk_to_numpy
 
 failed = False
 
@@ -149,113 +144,8 @@ def check_glb(file, spheres, edges, faces):
         say(f"{file}: their vertices on the spheres, within {off:.1e}", off < 1e-5 * np.abs(centres).max())
 
 
-def make_vtp(folder, spheres, edges, faces):
-    points = vtk.vtkPoints()
-    points.SetDataTypeToDouble()
-    points.SetData(numpy_to_vtk(np.ascontiguousarray(spheres[:, :3]), deep=True))
-    data = vtk.vtkPolyData()
-    data.SetPoints(points)
-    lines, polygons = vtk.vtkCellArray(), vtk.vtkCellArray()
-    for e in lone_edges(edges, faces):
-        lines.InsertNextCell(2, e)
-    for f in faces:
-        polygons.InsertNextCell(3, f)
-    data.SetLines(lines)
-    data.SetPolys(polygons)
-    radii = numpy_to_vtk(np.ascontiguousarray(spheres[:, 3]), deep=True)
-    radii.SetName("radius")
-    data.GetPointData().AddArray(radii)
-    writer = vtk.vtkXMLPolyDataWriter()
-    writer.SetInputData(data)
-    for name, mode, zipped, encoded, wide, swapped in (
-        ("default", None, True, True, False, False),
-        ("ascii", vtk.vtkXMLWriter.Ascii, False, True, False, False),
-        ("binary", vtk.vtkXMLWriter.Binary, False, True, False, False),
-        ("binary-zlib", vtk.vtkXMLWriter.Binary, True, True, True, False),
-        ("appended", vtk.vtkXMLWriter.Appended, False, True, True, False),
-        ("raw", vtk.vtkXMLWriter.Appended, False, False, True, False),
-        ("raw-zlib", vtk.vtkXMLWriter.Appended, True, False, False, True),
-    ):
-        writer.SetFileName(f"{folder}/vtk-{name}.vtp")
-        if mode is not None:
-            writer.SetDataMode(mode)
-            writer.SetCompressorTypeToZLib() if zipped else writer.SetCompressorTypeToNone()
-            writer.SetEncodeAppendedData(encoded)
-            writer.SetHeaderTypeToUInt64() if wide else writer.SetHeaderTypeToUInt32()
-            writer.SetByteOrderToBigEndian() if swapped else writer.SetByteOrderToLittleEndian()
-        assert writer.Write() == 1, name
-
-
-def make_glb(folder, spheres, faces):
-    points = np.stack((spheres[:, 0], spheres[:, 2], -spheres[:, 1]), axis=1)
-    mesh = trimesh.Trimesh(points, faces, process=False)
-    mesh.vertex_attributes["_RADIUS"] = spheres[:, 3].astype(np.float32)
-    scene = trimesh.Scene()
-    # Half as large, and put right by its node.
-    mesh.vertices *= 0.5
-    mesh.vertex_attributes["_RADIUS"] *= np.float32(0.5)
-    scene.add_geometry(mesh, transform=np.diag([2.0, 2.0, 2.0, 1.0]))
-    scene.export(f"{folder}/trimesh.glb")
-
-
-def make_solids(folder):
-    scene = trimesh.Scene()
-    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3], [0, 0, 0])
-    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
-    mirror[0, 3] = 5
-    box = trimesh.creation.box((1, 2, 3))
-    scene.add_geometry(box, transform=turn)
-    scene.add_geometry(trimesh.creation.icosphere(2, 0.5), transform=mirror)
-    scene.add_geometry(trimesh.creation.icosphere(1, 0.25), transform=trimesh.transformations.translation_matrix([0, 9, 0]))
-    scene.export(f"{folder}/solids.glb")
-    whole = scene.to_geometry()
-    low, high = whole.bounds
-    expected = {"volume": abs(whole.volume), "area": whole.area, "faces": len(whole.faces),
-                "low": [low[0], -high[2], low[1]], "high": [high[0], -low[2], high[1]]}
-    json.dump(expected, open(f"{folder}/solids.json", "w"))
-
-
-def near(file, other):
-    (a, *simplices), (b, *others) = read_ma(file), read_ma(other)
-    return simplices == others and np.allclose(a, b, rtol=1e-9, atol=1e-12)
-
-
-def single(file, other):
-    """trimesh keeps faces only, so the rest is missing in its file."""
-    (spheres, _, faces), (theirs, _, their_faces) = read_ma(file), read_ma(other)
-    used = sorted({v for f in faces for v in f})
-    say(f"{other}: {len(faces)} faces and radii of trimesh, read by medial", sorted(map(sorted, faces)) == sorted(their_faces)
-        and np.allclose(spheres[used], theirs[used], rtol=0, atol=1e-6 * np.abs(spheres).max()))
-
-
-def compare(folder):
-    expected = json.load(open(f"{folder}/solids.json"))
-    mesh = trimesh.load_mesh(f"{folder}/solids.off", process=False)
-    say(f"solids.glb: {len(mesh.faces)} faces of three solids, read by medial", len(mesh.faces) == expected["faces"])
-    say("solids.glb: volume and area, outward", np.isclose(mesh.volume, expected["volume"], rtol=1e-5)
-        and np.isclose(mesh.area, expected["area"], rtol=1e-5))
-    say("solids.glb: where their nodes put them, z up", np.allclose(mesh.bounds, [expected["low"], expected["high"]], atol=1e-5))
-
-
-verb, *arguments = sys.argv[1:]
-if verb == "make":
-    (folder,) = arguments
-    read = read_ma(f"{folder}/x.ma")
-    make_vtp(folder, *read)
-    if read[2]:
-        make_glb(folder, read[0], read[2])
-elif verb == "solid":
-    make_solids(arguments[0])
-elif verb == "near":
-    sys.exit(not near(*arguments))
-elif verb == "single":
-    single(*arguments)
-elif verb == "compare":
-    compare(*arguments)
-elif verb == "check":
-    read = read_ma(arguments[0])
-    for file in arguments[1:]:
-        (check_vtp if file.endswith(".vtp") else check_glb)(file, *read)
-else:
-    sys.exit(__doc__)
+file, *written = sys.argv[1:] or sys.exit(__doc__)
+read = read_ma(file)
+for other in written:
+    (check_vtp if other.endswith(".vtp") else check_glb)(other, *read)
 sys.exit(failed)

@@ -38,7 +38,6 @@ mod atomic;
 mod colour;
 pub mod complex;
 mod diagnostics;
-mod glb;
 pub mod heap;
 pub mod metrics;
 pub mod shape;
@@ -46,9 +45,8 @@ pub mod simplifier;
 mod sum;
 pub mod surface;
 
-pub use atomic::{remove_temporaries, write_atomically};
+pub use atomic::write_atomically;
 pub use colour::{ColourMap, decode_srgb};
-pub use glb::GlbError;
 
 pub use geometry::Vec3;
 /// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a crate of its own.

@@ -20,7 +20,7 @@ use crate::run::{Input, Source, StageLine, percent};
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Medial mesh (.ma and its dialects, .vtp, or .ply, .obj or .glb with radii), in the units of the surface unless
+    /// Medial mesh (.ma and its dialects, or .ply or .obj with radii), in the units of the surface unless
     /// `--fit` finds others.
     axis: PathBuf,
     #[command(flatten)]

@@ -109,11 +109,6 @@ fn targets(folder: &Path) -> Vec<Target> {
     ];
     let medial_mesh: Vec<&str> = medial_mesh.iter().map(String::as_str).collect();
     let medial_mesh = reading(&medial_mesh);
-    for extension in ["vtp", "glb"] {
-        let file = at(&format!("axis.{extension}"));
-        let content = make(&format!("convert {} {{}}", axis.display()), &file);
-        targets.push(Target { extension, content, commands: medial_mesh.clone() });
-    }
     targets.push(Target { extension: "ma", content: ma, commands: medial_mesh });
     targets.push(Target {
         extension: "npy",

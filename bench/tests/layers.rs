@@ -95,7 +95,7 @@ type Layers<'a> = &'a [&'a [&'a str]];
 
 /// Inside `medial`. The kernel is a crate of its own, below all of them.
 const MEDIAL: Layers<'_> = &[
-    &["atomic", "colour", "diagnostics", "glb", "heap", "sum"],
+    &["atomic", "colour", "diagnostics", "heap", "sum"],
     &["surface"],
     &["complex"],
     &["metrics"],

@@ -40,30 +40,24 @@ fn axis(folder: &Path) -> String {
     path
 }
 
+/// What VTK and trimesh read of the files is compared above; here every option is written, and neither format read.
 #[test]
-fn a_medial_mesh_goes_through_both_formats() {
+fn viewer_formats_are_written_and_never_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let ma = axis(folder.path());
     let at = |name: &str| text_path(&folder.path().join(name)).to_owned();
-    for (to, back, options) in [
-        ("a.vtp", "a.ma", &["--color", "stability"][..]),
-        ("b.vtp", "b.ma", &["--color", "error", "--mesh", "builtin:box:8"]),
-        ("c.glb", "c.ma", &["--colour", "error", "--mesh", "builtin:box:8", "--spheres"]),
-        ("d.glb", "d.ma", &[]),
+    for (to, options) in [
+        ("a.vtp", &["--color", "stability"][..]),
+        ("b.vtp", &["--color", "error", "--mesh", "builtin:box:8"]),
+        ("c.glb", &["--colour", "error", "--mesh", "builtin:box:8", "--spheres"]),
+        ("d.glb", &[]),
     ] {
         let (code, _, stderr) = run(&[&["convert", &ma, &at(to)], options].concat());
         assert_eq!(code, 0, "{stderr}");
-        let (code, _, stderr) = run(&["convert", &at(to), &at(back)]);
-        assert_eq!(code, 0, "{stderr}");
-        let (_, first) = json(&["evaluate", "builtin:box:8", &ma, "--samples", "500"]);
-        let (_, again) = json(&["evaluate", "builtin:box:8", &at(to), "--samples", "500"]);
-        assert_eq!(first["counts"], again["counts"]);
-        let [a, b] = [&first, &again].map(|object| object["hausdorff"].as_f64().expect("a number"));
-        assert!((a - b).abs() < 1e-6, "{a} {b}");
+        let (code, _, stderr) = run(&["convert", &at(to), &at("back.ma")]);
+        assert_ne!(code, 0);
+        assert!(stderr.contains(to) && !Path::new(&at("back.ma")).exists(), "{stderr}");
     }
-    let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect("a file");
-    assert_eq!(bytes("a.ma"), bytes("x.ma"), "bit for bit");
-    assert_eq!(bytes("b.ma"), bytes("x.ma"));
     let (_, object) = json(&["convert", &ma, &at("e.glb")]);
     let told = object["warnings"].to_string();
     assert!(

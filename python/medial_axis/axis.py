@@ -73,7 +73,7 @@ class MedialAxis:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> MedialAxis:
-        """Reads `.ma` in any dialect, `.ply`, `.obj`, `.vtp` or `.glb`; no surface is known then."""
+        """Reads `.ma` in any dialect, `.ply` or `.obj`; no surface is known then."""
         axis, remarks = _medial.Axis.read(path_text(path))
         return cls._of(axis, None, remarks=remarks)
 

@@ -128,7 +128,7 @@ class Mesh:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> MedialAxis:
-        """Reads a medial mesh of this surface: `.ma` in any dialect, `.ply`, `.obj`, `.vtp`, `.glb`.
+        """Reads a medial mesh of this surface: `.ma` in any dialect, `.ply`, `.obj`.
 
         In the units of the surface, unless `fit` finds others (`auto`: if it does not fit as it is). `radii="surface"` gives
         spheres without radii their distance to the surface; `lenient` takes lines that the header does not announce;

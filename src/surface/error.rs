@@ -4,7 +4,6 @@ use std::fmt;
 use std::path::PathBuf;
 
 use crate::Vec3;
-use crate::glb::GlbError;
 
 /// A surface that could not be read or may not be used, and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,14 +92,11 @@ pub enum Fault {
     #[error("{0}")]
     Io(String),
     /// The extension names no format that is known here.
-    #[error("unknown extension {extension:?}; use .off, .obj, .ply, .stl or .glb")]
+    #[error("unknown extension {extension:?}; use .off, .obj, .ply or .stl")]
     UnknownFormat {
         /// The extension, without the dot.
         extension: String,
     },
-    /// A binary glTF file that cannot be read.
-    #[error(transparent)]
-    Glb(#[from] GlbError),
     /// The format is known, but not this variant or not in this direction.
     #[error("{0}")]
     Unsupported(String),

@@ -83,15 +83,14 @@ fn as_message<S: serde::Serializer>(
 }
 
 /// Reads a surface, repairs it and checks it. The extension tells the format (`.off`, `.obj`,
-/// `.ply`, `.stl`, `.glb`).
+/// `.ply`, `.stl`).
 ///
 /// # Errors
 /// When the file cannot be read, is not what its extension says, or does not bound a solid after
 /// the repairs. The error names the file and the line or element.
 ///
 /// # Cost
-/// `O(n log n)` time; memory below 16 MB plus 100 times the size of the file; for a scene that repeats its meshes,
-/// plus that of the copies, of which there may be some 3 million vertices and corners.
+/// `O(n log n)` time; memory below 16 MB plus 100 times the size of the file.
 ///
 /// ```no_run
 /// let medial::surface::Loaded { mesh, report } = medial::surface::read("bunny.ply")?;

@@ -16,7 +16,7 @@ use crate::atomic::write_atomically;
 /// A file of that name is replaced, but only by a complete one.
 ///
 /// # Errors
-/// When the extension is unknown or `.stl` or `.glb` (single precision would move vertices), or the file
+/// When the extension is unknown or `.stl` (single precision would move vertices), or the file
 /// cannot be written.
 ///
 /// ```no_run
@@ -31,7 +31,7 @@ pub fn write(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), SurfaceError>
 }
 
 fn replace(path: &Path, mesh: &TriMesh, format: Format) -> Result<(), Fault> {
-    if matches!(format, Format::Stl | Format::Glb) {
+    if format == Format::Stl {
         let why = format!("{format} holds single precision only; write .off, .obj or .ply");
         return Err(Fault::Unsupported(why));
     }
@@ -54,7 +54,7 @@ fn write_to(out: &mut dyn Write, mesh: &TriMesh, format: Format) -> io::Result<(
             writeln!(out, "element face {faces}")?;
             writeln!(out, "property list uchar uint vertex_indices\nend_header")?;
         }
-        Format::Obj | Format::Stl | Format::Glb => {}
+        Format::Obj | Format::Stl => {}
     }
     for v in &mesh.vertices {
         writeln!(out, "{vertex_word}{:?} {:?} {:?}", v.x, v.y, v.z)?;

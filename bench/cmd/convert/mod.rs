@@ -17,8 +17,7 @@ use crate::output::{print_json, print_line};
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface (OFF, OBJ, PLY, STL, GLB) or medial mesh (.ma and its dialects, .vtp, .ply or .obj with radii, .glb with
-    /// `_RADIUS`).
+    /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma and its dialects, .ply or .obj with radii).
     from: PathBuf,
     /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers).
     /// `.glb` has single precision, and its y is up: z here, as Blender shows it.

@@ -23,7 +23,7 @@ pub use union::{Fitting, fitting_surface};
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Medial mesh (.ma, .vtp, or .ply or .glb with radii). The power crust can do without one: it then takes all
+    /// Medial mesh (.ma, or .ply with radii). The power crust can do without one: it then takes all
     /// inner poles of the mesh.
     axis: Option<PathBuf>,
     /// The surface (.ply, .off, .obj), in the units of the medial mesh.

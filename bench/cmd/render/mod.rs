@@ -27,7 +27,7 @@ use crate::run::{Input, Source, StageLine, percent};
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Medial meshes of it (.ma, .vtp, or .ply or .glb with radii). Of several, a strip: a panel for each, from
+    /// Medial meshes of it (.ma, or .ply with radii). Of several, a strip: a panel for each, from
     /// the same camera.
     axes: Vec<PathBuf>,
     /// The picture (.png).

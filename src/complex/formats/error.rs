@@ -4,9 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 
-use super::vtp::VtpError;
 use crate::complex::ComplexError;
-use crate::glb::GlbError;
 
 /// Why a file could not be read or written as a medial mesh: the file, the line, the reason.
 #[derive(Debug, thiserror::Error)]
@@ -54,12 +52,9 @@ pub enum MaErrorKind {
         /// The extensions that would do.
         known: &'static str,
     },
-    /// A VTK PolyData file that cannot be read.
-    #[error(transparent)]
-    Vtp(#[from] VtpError),
-    /// A binary glTF file that cannot be read or written.
-    #[error(transparent)]
-    Glb(#[from] GlbError),
+    /// The format cannot hold this mesh.
+    #[error("{0}")]
+    Unwritable(String),
     /// The format holds no such thing.
     #[error("{extension:?} files hold no {what}; write {known}")]
     NoRoom {
@@ -159,7 +154,7 @@ impl MaErrorKind {
     pub(super) fn unreadable(extension: &str) -> Self {
         Self::Extension {
             extension: extension.to_owned(),
-            known: ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj, .vtp, .glb",
+            known: ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj",
         }
     }
 

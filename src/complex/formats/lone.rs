@@ -21,12 +21,3 @@ pub(super) fn isolated(mesh: &MedialMesh) -> Vec<u32> {
     mesh.edges.iter().flatten().for_each(|&v| has_edge[v as usize] = true);
     (0..).zip(has_edge).filter(|&(_, has)| !has).map(|(v, _)| v).collect()
 }
-
-/// Edges with the sides of all faces, each once: what `canonical` would otherwise add and tell as a repair.
-pub(super) fn with_sides(mut edges: Vec<[u32; 2]>, faces: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    edges.extend(faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [a, c]]));
-    edges.iter_mut().for_each(|edge| edge.sort_unstable());
-    edges.sort_unstable();
-    edges.dedup();
-    edges
-}

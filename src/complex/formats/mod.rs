@@ -6,8 +6,8 @@
 //! | `.ma_dup`, `.sph`, `.txt`, `.xyzr` | yes | no | the same, and lists of spheres alone |
 //! | `.ply` | ASCII | ASCII | the same, with a vertex property `radius`, for viewers |
 //! | `.obj` | yes | yes | centres, edges (`l`) and faces (`f`); read with radii as fourth numbers (`v x y z r`), written without, for viewers |
-//! | `.vtp` | yes | base64 | the same as `.ma` and a value at each sphere, for ParaView |
-//! | `.glb` | yes | yes | the same in single precision, coloured, and the spheres as bodies, for Blender and browsers |
+//! | `.vtp` | no | base64 | the same as `.ma` and a value at each sphere, for ParaView |
+//! | `.glb` | no | yes | the same in single precision, coloured, and the spheres as bodies, for Blender and browsers |
 //!
 //! Coordinates are read and written in the unit of the file; normalisation is up to the caller. Numbers are written
 //! with 17 significant digits or as they are in memory, so that they are read back bit for bit; but for `.glb`, which
@@ -35,17 +35,16 @@ use std::path::Path;
 
 pub use annotations::{Annotations, Part, PartKind};
 pub use error::{MaError, MaErrorKind};
-pub use glb::{parse_glb, single_precision_loss};
+pub use glb::single_precision_loss;
+use lone::{isolated, lone_edges};
 pub use look::{Look, SphereValues};
 pub use ma::{parse_ma, parse_ma_with};
 pub use obj::parse_obj;
 pub use options::{Radii, ReadOptions};
 pub use ply::{parse_ply, parse_ply_with};
-pub use vtp::{VtpError, parse_vtp};
 
 use super::MedialMesh;
 use crate::atomic::write_atomically;
-use crate::glb::has_radii;
 
 /// A medial mesh from a file, in canonical form, and what had to be done to bring it there.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,8 +71,7 @@ impl LoadedMa {
     }
 }
 
-/// Reads a medial mesh from a `.ma` file, a list of spheres, an ASCII `.ply` file, an `.obj` or `.glb` file with radii or a
-/// `.vtp` file, told apart by the extension.
+/// Reads a medial mesh from a `.ma` file, a list of spheres, an ASCII `.ply` file or an `.obj` file with radii, told apart by the extension.
 ///
 /// # Errors
 /// When the file cannot be read, has another extension, or does not hold a medial mesh; the error
@@ -93,8 +91,6 @@ pub fn read_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<LoadedM
         "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => parse_ma_with(load(path)?, &name, options),
         "ply" => parse_ply_with(load(path)?, &name, options),
         "obj" => parse_obj(load(path)?, &name, options),
-        "vtp" => parse_vtp(load(path)?, &name),
-        "glb" => parse_glb(load(path)?, &name),
         other => Err(MaError::of_file(path, MaErrorKind::unreadable(other))),
     }
 }
@@ -154,20 +150,12 @@ pub fn write_with(path: impl AsRef<Path>, mesh: &MedialMesh, look: &Look) -> Res
         "obj" => write_atomically(path, |out| obj::write_to(out, mesh)),
         "vtp" => write_atomically(path, |out| vtp::write_to(out, mesh, look)),
         _ => {
-            let bytes = glb::file(mesh, look).map_err(|error| fail(error.into()))?;
+            let bytes =
+                glb::file(mesh, look).map_err(|error| fail(MaErrorKind::Unwritable(error)))?;
             write_atomically(path, |out| out.write_all(&bytes))
         }
     };
     written.map_err(|error| fail(error.into()))
-}
-
-/// Whether a `.glb` file holds a medial mesh rather than a surface.
-///
-/// # Errors
-/// When the file cannot be read, or is no binary glTF file.
-pub fn glb_has_radii(path: impl AsRef<Path>) -> Result<bool, MaError> {
-    let path = path.as_ref();
-    has_radii(&load(path)?).map_err(|error| MaError::of_file(path, error.into()))
 }
 
 /// Extensions that [`write()`] knows; the last is the arm for all others there.

@@ -1,6 +1,5 @@
 //! From bytes to a polygon soup, one file for each format.
 
-mod glb;
 mod obj;
 mod off;
 mod ply;
@@ -24,8 +23,6 @@ pub enum Format {
     Ply,
     /// Stereolithography, text or binary.
     Stl,
-    /// Binary glTF 2.0: the triangles of its scene.
-    Glb,
 }
 
 impl Format {
@@ -40,7 +37,6 @@ impl Format {
             "obj" => Ok(Self::Obj),
             "ply" => Ok(Self::Ply),
             "stl" => Ok(Self::Stl),
-            "glb" => Ok(Self::Glb),
             _ => Err(Fault::UnknownFormat { extension }),
         }
     }
@@ -53,7 +49,6 @@ impl fmt::Display for Format {
             Self::Obj => "OBJ",
             Self::Ply => "PLY",
             Self::Stl => "STL",
-            Self::Glb => "GLB",
         })
     }
 }
@@ -65,7 +60,6 @@ pub(super) fn parse(bytes: &[u8], format: Format) -> Result<PolygonSoup, Fault> 
         Format::Obj => obj::parse(bytes),
         Format::Ply => ply::parse(bytes),
         Format::Stl => stl::parse(bytes),
-        Format::Glb => glb::parse(bytes),
     }?;
     match soup.len() {
         0 => Err(Fault::NoFaces { vertices: soup.vertices.len() }),

@@ -173,63 +173,25 @@ fn bytes_of(hierarchy: &Hierarchy) -> Vec<u8> {
 }
 
 #[test]
-fn every_damaged_byte_and_every_cut_is_found() {
-    use HierarchyFileErrorKind as Kind;
-    let bytes = bytes_of(&path());
-    for place in 0..bytes.len() {
-        for bit in [0x01, 0x80] {
-            let mut damaged = bytes.clone();
-            damaged[place] ^= bit;
-            let error = Hierarchy::parse(&damaged, "x").unwrap_err();
-            assert!(error.offset <= place as u64, "{error} for byte {place}");
-            let expected = match error.kind {
-                Kind::Signature => place < 8,
-                Kind::Version(_) => (8..12).contains(&place),
-                Kind::Checksum { part } => place >= 8 && (part == "header") == (place < 36),
-                _ => false,
-            };
-            assert!(expected, "{error} for byte {place}");
-        }
-        let error = Hierarchy::parse(&bytes[..place], "x").unwrap_err();
-        assert!(matches!(error.kind, Kind::Length { .. }), "{error} for {place} bytes");
-        assert_eq!(error.offset, place as u64);
-        assert!(error.to_string().starts_with(&format!("x, byte {place}: ")), "{error}");
+fn cut_and_forged_files_are_refused_with_the_reason() {
+    let text = String::from_utf8(bytes_of(&path())).unwrap();
+    for end in 0..text.len() {
+        assert!(Hierarchy::parse(&text.as_bytes()[..end], "x").is_err(), "cut to {end} bytes");
     }
-    let longer = [&bytes[..], &[0]].concat();
-    let error = Hierarchy::parse(&longer, "x").unwrap_err();
-    assert!(matches!(error.kind, Kind::Length { .. }) && error.offset == bytes.len() as u64);
-}
-
-/// The bytes with another number at `place`, and the checksum of its part made to fit.
-fn forged(place: usize, number: &[u8], part: std::ops::Range<usize>) -> Vec<u8> {
-    let mut bytes = bytes_of(&path());
-    bytes[place..place + number.len()].copy_from_slice(number);
-    let checksum = crc32fast::hash(&bytes[part.clone()]).to_le_bytes();
-    bytes[part.end..part.end + 4].copy_from_slice(&checksum);
-    bytes
-}
-
-#[test]
-fn forged_files_are_refused_at_the_place() {
-    let lying = forged(16, &u32::MAX.to_le_bytes(), 0..32);
-    let error = Hierarchy::parse(&lying, "x").unwrap_err();
-    assert!(error.to_string().contains("the header announces 137438953"), "{error}");
-    // Header 36, label 7 + 4, spheres 5 * 32 + 4, edges 6 * 8 + 4, faces 2 * 12 + 4, steps 3 * 16.
-    let (spheres, edges, faces) = (47, 211, 263);
-    let steps = 291;
-    assert_eq!(bytes_of(&path()).len(), steps + 48 + 4);
-    let nan = f64::NAN.to_le_bytes();
-    let cases: [(usize, &[u8], std::ops::Range<usize>, usize); 6] = [
-        (38, &[0xff], 36..43, 38),
-        (spheres + 32 + 8, &nan, spheres..spheres + 160, spheres + 32),
-        (edges + 8, &[9], edges..edges + 48, edges + 8),
-        (faces + 12, &[0], faces..faces + 24, faces + 12),
-        (steps + 16, &[1], steps..steps + 48, steps + 16),
-        (steps + 32 + 8, &nan, steps..steps + 48, steps + 32),
-    ];
-    for (place, number, part, offset) in cases {
-        let error = Hierarchy::parse(&forged(place, number, part), "x").unwrap_err();
-        assert_eq!(error.offset, offset as u64, "{error}");
+    for (from, to, why) in [
+        ("hierarchy 1", "hierarchy 2", "unknown variant"),
+        ("{\"format\":\"medial hierarchy 1\",", "{", "missing field `format`"),
+        ("\"steps\"", "\"more\":1,\"steps\"", "unknown field `more`"),
+        ("[1.0,0.0,0.0,0.25]", "[1.0,0.0,0.0,-0.25]", "sphere 1 is not valid"),
+        ("[1.0,0.0,0.0,0.25]", "[1.0,0.0,1e999,0.25]", "out of range at line 1"),
+        ("[0,1],", "", "not valid"),
+        ("[4,3,null]", "[4,2,null]", "step 1: there is no edge between the spheres 4 and 2"),
+        ("[4,3,null]", "[1,3,null]", "step 1: sphere 1 does not exist"),
+    ] {
+        assert!(text.contains(from), "{from} in {text}");
+        let error = Hierarchy::parse(text.replacen(from, to, 1).as_bytes(), "x").unwrap_err();
+        let error = error.to_string();
+        assert!(error.starts_with("x: ") && error.contains(why), "{from} by {to}: {error}");
     }
 }
 

@@ -1,19 +1,21 @@
-//! Writes VTK PolyData.
+//! Writes VTK PolyData in XML (`.vtp`), the format of ParaView.
+//!
+//! Points are the spheres, with the point data `radius` and, on request, a second array. Cells are all faces
+//! (`Polys`), the edges *without a face* (`Lines`) and the spheres without an edge (`Verts`): a face brings its sides
+//! along, so that nothing is lost, and ParaView draws no line over a sheet unless asked ("Surface With Edges").
+//! Arrays are in base64 without compression: every number as it is in memory, bit for bit.
+//!
+//! Source: The VTK file formats, <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>.
 
 use std::io::{self, Write};
 
 use base64::prelude::{BASE64_STANDARD, Engine};
 
-use crate::complex::formats::lone::{isolated, lone_edges};
-use crate::complex::formats::look::{Look, SphereValues};
+use super::{Look, SphereValues, isolated, lone_edges};
 use crate::complex::{MedialMesh, Sphere};
 
-/// Writes a medial mesh as VTK PolyData: every number as it is in memory, in base64.
-pub(in crate::complex::formats) fn write_to(
-    out: &mut dyn Write,
-    mesh: &MedialMesh,
-    look: &Look,
-) -> io::Result<()> {
+/// Writes a medial mesh as VTK PolyData.
+pub(super) fn write_to(out: &mut dyn Write, mesh: &MedialMesh, look: &Look) -> io::Result<()> {
     let (points, lines) = (isolated(mesh), lone_edges(mesh));
     let shown = look.values.as_ref().filter(|values| values.name != RADIUS);
     writeln!(out, "<?xml version=\"1.0\"?>")?;
