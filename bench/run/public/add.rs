@@ -1,4 +1,4 @@
-//! From a user's file into the library: recognised by its bytes, or by the surface that they stand for.
+//! From a user's file into the library: recognised by its bytes.
 
 use std::fs;
 use std::io;
@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 use super::library::keep;
 use super::{Library, PublicError, io_error};
 use crate::run::hex_digest;
-use crate::run::source::surface_hash;
 
 /// A user's file in the library.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,8 +22,6 @@ pub struct Added {
     pub file: String,
     /// SHA-256 of the file.
     pub sha256: String,
-    /// SHA-256 of the surface after reading.
-    pub surface: String,
     /// Number of vertices after reading.
     pub vertices: usize,
     /// Number of triangles after reading.
@@ -40,18 +37,6 @@ pub struct Added {
     pub known_set: Option<Set>,
 }
 
-/// How a file is recognised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kin {
-    /// It is the file of the catalogue.
-    File,
-    /// It has the same surface, in another format or written in another way.
-    Surface,
-}
-
-/// The mesh of the catalogue that a file is, where it is one.
-pub type Known<'a> = Option<(&'a Published, Kin)>;
-
 impl Added {
     /// The set that it belongs to.
     pub fn set(&self) -> &'static str {
@@ -65,32 +50,35 @@ impl Library {
     ///
     /// # Errors
     /// When it cannot be read or understood, or its name cannot be used or belongs to another surface.
-    pub fn add(&self, file: &Path, name: Option<&str>) -> Result<(Added, Known<'_>), PublicError> {
+    pub fn add(
+        &self,
+        file: &Path,
+        name: Option<&str>,
+    ) -> Result<(Added, Option<&Published>), PublicError> {
         // First, since it refuses what is no regular file and would never end.
         let loaded = surface::read_any(file)?;
         let refused = surface::inspect(file)?.refused.map(|error| error.fault.to_string());
         let bytes = fs::read(file).map_err(io_error(file))?;
-        let (sha256, surface) = (hex_digest(&bytes), surface_hash(&loaded.mesh));
-        let known = self.recognised(&sha256, &surface);
+        let sha256 = hex_digest(&bytes);
+        let known = self.catalogue.meshes.iter().find(|mesh| mesh.sha256 == sha256);
         let name = match (name, known) {
             (Some(name), _) => name.to_owned(),
-            (None, Some((mesh, _))) => mesh.name.clone(),
+            (None, Some(mesh)) => mesh.name.clone(),
             (None, None) => {
                 file.file_stem().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
             }
         };
-        self.check_name(&name, &sha256, known.map(|(mesh, _)| mesh))?;
+        self.check_name(&name, &sha256, known)?;
         let extension = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let added = Added {
             file: format!("{name}.{extension}"),
             name,
             sha256,
-            surface,
             vertices: loaded.report.vertices,
             faces: loaded.report.faces,
             refused,
-            known: known.map(|(mesh, _)| mesh.name.clone()),
-            known_set: known.map(|(mesh, _)| mesh.set),
+            known: known.map(|mesh| mesh.name.clone()),
+            known_set: known.map(|mesh| mesh.set),
         };
         let folder = self.added_folder();
         keep(&folder.join(&added.file), &bytes)?;
@@ -99,16 +87,6 @@ impl Library {
         let text = serde_json::to_vec(&added).map_err(|error| io_error(&path)(error.into()))?;
         keep(&path, &text)?;
         Ok((added, known))
-    }
-
-    /// The mesh of the catalogue that a file is.
-    fn recognised(&self, sha256: &str, surface: &str) -> Known<'_> {
-        let meshes = &self.catalogue.meshes;
-        let by_file = meshes.iter().find(|mesh| mesh.sha256 == sha256);
-        let by_surface = || meshes.iter().find(|mesh| mesh.surface.as_deref() == Some(surface));
-        by_file
-            .map(|mesh| (mesh, Kin::File))
-            .or_else(|| by_surface().map(|mesh| (mesh, Kin::Surface)))
     }
 
     fn check_name(

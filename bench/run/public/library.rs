@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use etcetera::BaseStrategy;
 use medial::write_atomically;
-use medial_datasets::published::{Catalogue, PackageKind, Published, Set, published};
+use medial_datasets::published::{Catalogue, Published, Set, published};
 
 use super::{Added, PublicError, added, io_error};
 use crate::run::{Source, did_you_mean, hex_digest};
@@ -109,14 +109,6 @@ impl Library {
         }
     }
 
-    /// Keeps the content of a mesh. The caller has compared its hash.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub(super) fn keep(&self, mesh: &Published, bytes: &[u8]) -> Result<(), PublicError> {
-        keep(&self.path(mesh), bytes)
-    }
-
     /// The meshes of the catalogue that a word stands for: a set, a package, or the name of one.
     ///
     /// # Errors
@@ -200,11 +192,8 @@ impl Library {
 
     fn missing(&self, word: &str, names: Vec<String>) -> PublicError {
         let mut wanted = self.catalogue.meshes.iter().filter(|mesh| names.contains(&mesh.name));
-        let is_file = |mesh: &Published| {
-            let package = self.catalogue.package_of(mesh);
-            package.is_none_or(|package| package.kind == PackageKind::File)
-        };
-        let how = match word == ADDED || word == Set::Papers.key() || wanted.any(is_file) {
+        let is_added = word == ADDED || word == Set::Papers.key();
+        let how = match is_added || wanted.any(Published::is_file) {
             true => "`medial datasets add FILE` takes them in".to_owned(),
             false => format!("`medial datasets fetch {word}` gets what is missing"),
         };
@@ -213,9 +202,9 @@ impl Library {
 
     fn unknown(&self, word: &str) -> PublicError {
         let meshes = self.catalogue.meshes.iter().map(|mesh| mesh.name.as_str());
-        let packages: Vec<_> = self.catalogue.packages.iter().map(|p| p.id()).collect();
+        let packages = self.catalogue.packages.iter().map(|package| package.id.as_str());
         let sets = Set::ALL.map(Set::key).into_iter().chain(["builtin", ADDED]);
-        let known = sets.chain(packages.iter().map(String::as_str)).chain(meshes);
+        let known = sets.chain(packages).chain(meshes);
         let meant = did_you_mean(word, known);
         PublicError::Unknown { word: word.to_owned(), meant }
     }
@@ -236,11 +225,7 @@ pub(super) fn keep(path: &Path, bytes: &[u8]) -> Result<(), PublicError> {
     write_atomically(path, |out| out.write_all(bytes)).map_err(io_error(path))
 }
 
-/// Reads a catalogue from a file.
-///
-/// # Errors
-/// When it cannot be read, or is none.
-pub(super) fn read_catalogue(path: &Path) -> Result<Catalogue, PublicError> {
+fn read_catalogue(path: &Path) -> Result<Catalogue, PublicError> {
     let text = fs::read_to_string(path).map_err(io_error(path))?;
     Catalogue::parse(&text)
         .map_err(|message| PublicError::Catalogue { path: path.to_owned(), message })

