@@ -62,6 +62,7 @@ pub use header::{Header, MethodNote, RunNote};
 pub use journal::{
     BadLine, Journal, JournalError, Journaled, parse_records, read_records, write_records,
 };
+pub use metric::{Better, METRICS, Metric, measured_rows};
 pub use pictures::{PictureStrip, picture_strips};
 pub use record::{
     Conditions, Initial, Machine, Origin, OwnSeconds, Record, Repetition, Simplify, Stages, Status,

@@ -1,16 +1,23 @@
-//! The columns of the tables: what each number is, its unit, and which way is better.
+//! The metrics: one table of every number that is measured on a result.
 //!
-//! One list drives the tables, the plots and the definitions on the page, so that a number is
-//! called by the same name everywhere.
+//! Name, unit, direction and definition of a metric are declared in [`METRICS`] alone. The columns of the CSV and of the
+//! tables, the plots, the definitions on the page, the gates of `diff` and the output of `medial evaluate` follow from
+//! it. A new metric needs its computation in `medial::metrics` and one entry here.
+
+use medial::metrics::Evaluation;
 
 use crate::record::Record;
 use crate::text::{grouped, significant};
 
 /// Which way a number is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Better {
+pub enum Better {
+    /// Less is better.
     Lower,
+    /// More is better.
     Higher,
+    /// Neither: a size or a setting.
+    Neither,
 }
 
 impl Better {
@@ -19,14 +26,7 @@ impl Better {
         match self {
             Self::Lower => a < b,
             Self::Higher => a > b,
-        }
-    }
-
-    /// The arrow in the column's head.
-    pub(crate) fn arrow(self) -> &'static str {
-        match self {
-            Self::Lower => "↓",
-            Self::Higher => "↑",
+            Self::Neither => false,
         }
     }
 }
@@ -64,9 +64,13 @@ impl Mean {
     }
 }
 
+/// Lengths and seconds span orders of magnitude. Below the floor (% of the diagonal, seconds) they count as the floor,
+/// so that a single zero does not make a geometric mean zero.
+const GEOMETRIC: Mean = Mean::Geometric { floor: 1e-6 };
+
 /// How a number is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Digits {
+enum Digits {
     /// Three significant digits.
     Significant,
     /// One decimal.
@@ -75,30 +79,50 @@ pub(crate) enum Digits {
     Count,
 }
 
+/// Where a number is found, in the unit of the JSON.
+#[derive(Clone, Copy)]
+pub(crate) enum Value {
+    Evaluation(fn(&Evaluation) -> Option<f64>),
+    Record(fn(&Record) -> Option<f64>),
+}
+
 /// One number of a record.
-pub(crate) struct Metric {
-    /// Name in the JSON and in file names.
-    pub(crate) key: &'static str,
+#[derive(Clone, Copy)]
+pub struct Metric {
+    /// Column of the CSV, and name in the JSON and in file names of reports.
+    pub key: &'static str,
+    /// Place below `evaluate` in a record, keys joined by `.`.
+    pub(crate) path: &'static str,
     /// Name in a column's head.
-    pub(crate) title: &'static str,
+    pub title: &'static str,
     /// Unit in a column's head.
-    pub(crate) unit: &'static str,
-    pub(crate) better: Better,
+    pub unit: &'static str,
+    /// Which way it is better.
+    pub better: Better,
     pub(crate) mean: Mean,
-    pub(crate) digits: Digits,
+    digits: Digits,
     /// One or two sentences for the page.
-    pub(crate) definition: &'static str,
-    /// The number in `unit`.
-    pub(crate) value: fn(&Record) -> Option<f64>,
+    pub definition: &'static str,
+    pub(crate) value: Value,
+    /// `unit` over the unit of the JSON: 100 for shares, which are shown as percentages.
+    times: f64,
+    /// Whether the comparison tables have a column for it.
+    is_compared: bool,
+    /// Whether `diff` calls an increase beyond its threshold a regression.
+    pub(crate) is_gate: bool,
 }
 
 impl Metric {
-    /// The number of a record, where it was measured.
+    /// The number of a record in `unit`, where it was measured.
     pub(crate) fn of(&self, record: &Record) -> Option<f64> {
-        (self.value)(record).filter(|value| value.is_finite())
+        let value = match self.value {
+            Value::Evaluation(value) => value(record.evaluate.as_ref()?)?,
+            Value::Record(value) => value(record)?,
+        };
+        Some(self.times * value).filter(|value| value.is_finite())
     }
 
-    /// A value of one record as text.
+    /// A value of one record, in `unit`, as text.
     pub(crate) fn format(&self, value: f64) -> String {
         match self.digits {
             Digits::Significant => significant(value, 3),
@@ -117,11 +141,13 @@ impl Metric {
 
     /// Name, unit and arrow: `Hausdorff (%) ↓`.
     pub(crate) fn heading(&self) -> String {
-        if self.unit.is_empty() {
-            format!("{} {}", self.title, self.better.arrow())
-        } else {
-            format!("{} ({}) {}", self.title, self.unit, self.better.arrow())
-        }
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
+        let arrow = match self.better {
+            Better::Lower => " ↓",
+            Better::Higher => " ↑",
+            Better::Neither => "",
+        };
+        format!("{}{unit}{arrow}", self.title)
     }
 
     /// Name and unit for a plot's axis.
@@ -129,153 +155,454 @@ impl Metric {
         let unit = if self.unit == "%" { "% of the diagonal" } else { self.unit };
         if unit.is_empty() { self.title.to_owned() } else { format!("{} ({unit})", self.title) }
     }
+
+    const fn new(
+        key: &'static str,
+        title: &'static str,
+        unit: &'static str,
+        (better, digits, mean): (Better, Digits, Mean),
+        value: Value,
+        definition: &'static str,
+    ) -> Self {
+        let times = if unit.is_empty() || unit.as_bytes()[0] != b'%' { 1.0 } else { 100.0 };
+        Self {
+            key,
+            path: key,
+            title,
+            unit,
+            better,
+            mean,
+            digits,
+            definition,
+            value,
+            times,
+            is_compared: false,
+            is_gate: false,
+        }
+    }
+
+    /// Gives it a column in the comparison tables.
+    const fn compared(mut self) -> Self {
+        self.is_compared = true;
+        self
+    }
+
+    /// Makes `diff` call an increase a regression.
+    const fn gate(mut self) -> Self {
+        self.is_gate = true;
+        self
+    }
+
+    /// Takes the direction away: a size.
+    const fn neutral(mut self) -> Self {
+        self.better = Better::Neither;
+        self
+    }
+
+    const fn at(mut self, path: &'static str) -> Self {
+        self.path = path;
+        self
+    }
 }
 
-/// Threshold on the stability ratio whose spikes stand in the tables; the others are in the CSV.
+type Measured = fn(&Evaluation) -> Option<f64>;
+
+/// A length, as a fraction of the bounding-box diagonal in the JSON, in % of it elsewhere.
+const fn length(
+    key: &'static str,
+    title: &'static str,
+    value: Measured,
+    definition: &'static str,
+) -> Metric {
+    let kind = (Better::Lower, Digits::Significant, GEOMETRIC);
+    Metric::new(key, title, "%", kind, Value::Evaluation(value), definition)
+}
+
+/// A share of `unit`, which begins with `%`.
+const fn share(
+    key: &'static str,
+    title: &'static str,
+    unit: &'static str,
+    value: Measured,
+    definition: &'static str,
+) -> Metric {
+    let kind = (Better::Lower, Digits::Tenths, Mean::Arithmetic);
+    Metric::new(key, title, unit, kind, Value::Evaluation(value), definition)
+}
+
+/// An angle in degrees; larger is better.
+const fn angle(
+    key: &'static str,
+    title: &'static str,
+    value: Measured,
+    definition: &'static str,
+) -> Metric {
+    let kind = (Better::Higher, Digits::Tenths, Mean::Arithmetic);
+    Metric::new(key, title, "°", kind, Value::Evaluation(value), definition)
+}
+
+/// A number of things.
+const fn count(
+    key: &'static str,
+    title: &'static str,
+    value: Measured,
+    definition: &'static str,
+) -> Metric {
+    let kind = (Better::Lower, Digits::Count, Mean::Arithmetic);
+    Metric::new(key, title, "", kind, Value::Evaluation(value), definition)
+}
+
+/// Threshold on the stability ratio whose spikes stand in the tables; the CSV has the others, too.
 pub(crate) const SPIKE_RATIO: f64 = 0.1;
 
-/// Errors below this, in % of the diagonal, count as this in a geometric mean.
-const ERROR_FLOOR: Mean = Mean::Geometric { floor: 1e-6 };
-/// The same for seconds.
-const TIME_FLOOR: Mean = Mean::Geometric { floor: 1e-6 };
-
-fn percent(record: &Record, length: fn(&medial::metrics::Distances) -> f64) -> Option<f64> {
-    record.evaluate.as_ref().map(|evaluation| 100.0 * length(&evaluation.distances))
-}
-
-macro_rules! metric {
-    ($name:ident, $key:literal, $title:literal, $unit:literal, $better:ident, $mean:expr,
-     $digits:ident, $value:expr, $definition:literal) => {
-        pub(crate) static $name: Metric = Metric {
-            key: $key,
-            title: $title,
-            unit: $unit,
-            better: Better::$better,
-            mean: $mean,
-            digits: Digits::$digits,
-            definition: $definition,
-            value: $value,
-        };
-    };
-}
-
-metric!(
-    HAUSDORFF,
-    "hausdorff",
-    "Hausdorff",
-    "%",
-    Lower,
-    ERROR_FLOOR,
-    Significant,
-    |record| percent(record, |d| d.hausdorff),
-    "The larger of two sampled maxima: from the surface to the union of the spheres, cones and \
-     slabs, and from the boundary of that union back to the surface."
-);
-metric!(
-    EPSILON,
-    "epsilon",
-    "ε",
-    "%",
-    Lower,
-    ERROR_FLOOR,
-    Significant,
-    |record| percent(record, |d| d.epsilon),
-    "The error of the Q-MAT paper: the largest distance from a surface sample to the nearest \
-     surface of a sphere, cone or slab, whether that surface is buried in another one or not."
-);
-metric!(
-    MEAN_ERROR,
-    "mean",
-    "mean error",
-    "%",
-    Lower,
-    ERROR_FLOOR,
-    Significant,
-    |record| percent(record, |d| d.mean),
-    "Mean over area-uniform surface samples of the absolute signed distance to the union. Less \
-     noisy than a maximum, which a single unlucky collapse decides."
-);
-metric!(
-    SPHERES_ONLY,
-    "spheres_only",
-    "balls only",
-    "%",
-    Lower,
-    ERROR_FLOOR,
-    Significant,
-    |record| percent(record, |d| d.spheres_only),
-    "The largest distance from a surface sample to the union of the balls alone, without cones \
-     and slabs: it separates good spheres from good connectivity."
-);
-metric!(
-    MIN_ANGLE,
-    "min_angle_mean",
-    "min angle",
-    "°",
-    Higher,
-    Mean::Arithmetic,
-    Tenths,
-    |record| record.evaluate.as_ref()?.quality.min_angle_mean,
-    "Mean over the medial triangles of the smallest angle. Triangles of zero area are left out \
-     and counted apart."
-);
-metric!(
-    BELOW_30,
-    "below_30",
-    "below 30°",
-    "% of triangles",
-    Lower,
-    Mean::Arithmetic,
-    Tenths,
-    |record| record.evaluate.as_ref()?.quality.below_30.map(|share| 100.0 * share),
-    "Share of the medial triangles whose smallest angle is below 30 degrees."
-);
-metric!(
-    SPIKES,
-    "spikes",
-    "spikes",
-    "",
-    Lower,
-    Mean::Arithmetic,
-    Count,
-    |record| {
-        let by_ratio = &record.evaluate.as_ref()?.spikes.by_ratio;
-        by_ratio
-            .iter()
-            .find(|spikes| (spikes.threshold - SPIKE_RATIO).abs() < 1e-9)
-            .map(|spikes| spikes.spikes as f64)
-    },
-    "Connected components of the medial edges with a stability ratio below 0.1 that reach the \
-     boundary of the medial mesh. Smooth shapes have some even on their exact axis; the CSV holds \
-     the other thresholds and measures."
-);
-metric!(
-    TOTAL_SECONDS,
-    "seconds_total",
-    "time",
-    "s",
-    Lower,
-    TIME_FLOOR,
-    Significant,
-    |record| record.simplify.seconds.map(|seconds| seconds.total),
-    "Wall-clock seconds as if this level had been asked alone: the shared substrates that the \
-     method uses, its preparation, and the simplification. Evaluation is never included."
-);
-
-/// The columns of the comparison tables, in their order.
-pub(crate) static COMPARED: [&Metric; 8] = [
-    &HAUSDORFF,
-    &EPSILON,
-    &MEAN_ERROR,
-    &SPHERES_ONLY,
-    &MIN_ANGLE,
-    &BELOW_30,
-    &SPIKES,
-    &TOTAL_SECONDS,
+/// Every metric, in the order of the CSV and of `medial evaluate`.
+pub const METRICS: &[Metric] = &[
+    length(
+        "hausdorff",
+        "Hausdorff",
+        |e| Some(e.distances.hausdorff),
+        "The larger of two sampled maxima: from the surface to the union of the spheres, cones and \
+         slabs, and from the boundary of that union back to the surface.",
+    )
+    .compared()
+    .gate(),
+    length(
+        "epsilon",
+        "ε",
+        |e| Some(e.distances.epsilon),
+        "The error of the Q-MAT paper: the largest distance from a surface sample to the nearest \
+         surface of a sphere, cone or slab, whether that surface is buried in another one or not.",
+    )
+    .compared()
+    .gate(),
+    length(
+        "mean",
+        "mean error",
+        |e| Some(e.distances.mean),
+        "Mean over area-uniform surface samples of the absolute signed distance to the union. Less \
+         noisy than a maximum, which a single unlucky collapse decides.",
+    )
+    .compared()
+    .gate(),
+    length(
+        "spheres_only",
+        "balls only",
+        |e| Some(e.distances.spheres_only),
+        "The largest distance from a surface sample to the union of the balls alone, without cones \
+         and slabs: it separates good spheres from good connectivity.",
+    )
+    .compared()
+    .gate(),
+    length(
+        "epsilon_union",
+        "surface to union, max",
+        |e| Some(e.distances.epsilon_union),
+        "Largest absolute signed distance from a surface sample to the union.",
+    )
+    .gate(),
+    length(
+        "reverse",
+        "union to surface, max",
+        |e| Some(e.distances.reverse),
+        "Largest distance from a point of the union's boundary to the surface.",
+    )
+    .gate(),
+    length(
+        "rms",
+        "rms error",
+        |e| Some(e.distances.rms),
+        "Root mean square of the distances that `mean error` is the mean of.",
+    )
+    .gate(),
+    length(
+        "p95",
+        "95 % of errors",
+        |e| Some(e.distances.p95),
+        "95th percentile of the same distances.",
+    )
+    .gate(),
+    length(
+        "p99",
+        "99 % of errors",
+        |e| Some(e.distances.p99),
+        "99th percentile of the same distances.",
+    )
+    .gate(),
+    length(
+        "reverse_mean",
+        "union to surface, mean",
+        |e| Some(e.distances.reverse_mean),
+        "Mean distance from the boundary of the union to the surface, by area.",
+    )
+    .gate(),
+    length(
+        "certified_lower",
+        "Hausdorff, certified from",
+        |e| Some(e.certified?.lower),
+        "Lower end of an interval that contains the Hausdorff distance.",
+    )
+    .at("certified.lower")
+    .gate(),
+    length(
+        "certified_upper",
+        "Hausdorff, certified to",
+        |e| Some(e.certified?.upper),
+        "Upper end of that interval.",
+    )
+    .at("certified.upper")
+    .gate(),
+    length(
+        "protrusion",
+        "outside the solid, max",
+        |e| e.protrusion,
+        "Largest distance from the surface of a boundary point of the union outside the solid.",
+    )
+    .gate(),
+    share(
+        "centres_outside",
+        "centres outside",
+        "% of spheres",
+        |e| e.centres_outside,
+        "Share of the sphere centres that are outside the solid.",
+    )
+    .gate(),
+    share(
+        "volume_error",
+        "volume error",
+        "% of the volume",
+        |e| e.volume_error,
+        "Volume of the symmetric difference of solid and union, over the solid's volume.",
+    )
+    .gate(),
+    angle(
+        "min_angle_mean",
+        "min angle",
+        |e| e.quality.min_angle_mean,
+        "Mean over the medial triangles of the smallest angle. Triangles of zero area are left out \
+         and counted apart.",
+    )
+    .compared(),
+    angle(
+        "max_angle_mean",
+        "max angle",
+        |e| e.quality.max_angle_mean,
+        "Mean over the medial triangles of the largest angle.",
+    )
+    .neutral(),
+    share(
+        "below_30",
+        "below 30°",
+        "% of triangles",
+        |e| e.quality.below_30,
+        "Share of the medial triangles whose smallest angle is below 30 degrees.",
+    )
+    .compared(),
+    share(
+        "below_10",
+        "below 10°",
+        "% of triangles",
+        |e| e.quality.below_10,
+        "Share of the medial triangles whose smallest angle is below 10 degrees.",
+    ),
+    share(
+        "below_1",
+        "below 1°",
+        "% of triangles",
+        |e| e.quality.below_1,
+        "Share of the medial triangles whose smallest angle is below 1 degree.",
+    ),
+    count(
+        "zero_area",
+        "zero-area triangles",
+        |e| Some(e.quality.zero_area as f64),
+        "Triangles with a height below 1e-12, which enter no mean and no share.",
+    ),
+    count(
+        "spikes",
+        "spikes",
+        |e| {
+            let by_ratio = &e.spikes.by_ratio;
+            let at = by_ratio.iter().find(|at| (at.threshold - SPIKE_RATIO).abs() < 1e-9)?;
+            Some(at.spikes as f64)
+        },
+        "Connected components of the medial edges with a stability ratio below 0.1 that reach the \
+         boundary of the medial mesh. Smooth shapes have some even on their exact axis; the CSV holds \
+         the other thresholds and measures.",
+    )
+    .compared(),
+    count(
+        "dangling_edges",
+        "dangling edges",
+        |e| Some(e.spikes.dangling_edges as f64),
+        "Edges without a face that end in a sphere with no other edge.",
+    ),
+    count(
+        "fins",
+        "fins",
+        |e| Some(e.spikes.fins as f64),
+        "Faces with two or three boundary edges and a smallest angle below 10 degrees.",
+    ),
+    count(
+        "idle_spheres",
+        "idle spheres",
+        |e| Some(e.spikes.idle_spheres as f64),
+        "Boundary spheres whose ball protrudes by less than 0.001 from the ball of a larger neighbour.",
+    ),
+    count(
+        "angle_spikes",
+        "small separation angles",
+        |e| e.spikes.angle_spikes.map(|spikes| spikes as f64),
+        "Spheres with a separation angle below 20 degrees, where contact points are known.",
+    ),
+    count(
+        "lone_edges",
+        "edges without a face",
+        |e| Some(e.counts.lone_edges as f64),
+        "Edges without a face.",
+    )
+    .neutral(),
+    count(
+        "isolated",
+        "isolated spheres",
+        |e| Some(e.counts.isolated as f64),
+        "Spheres without an edge.",
+    )
+    .neutral(),
+    count(
+        "nonmanifold_edges",
+        "non-manifold edges",
+        |e| Some(e.counts.nonmanifold_edges as f64),
+        "Edges with three faces or more.",
+    )
+    .neutral(),
+    count(
+        "stored_bytes",
+        "stored bytes",
+        |e| Some(e.counts.bytes() as f64),
+        "Bytes in the plainest binary form: 8 for each float, 4 for each index.",
+    ),
+    length(
+        "axis_computed_to_true_max",
+        "to the true axis, max",
+        |e| Some(e.axis.as_ref()?.in_space.computed_to_true_max),
+        "Largest distance from the computed axis to the exactly known one.",
+    ),
+    length(
+        "axis_computed_to_true_mean",
+        "to the true axis, mean",
+        |e| Some(e.axis.as_ref()?.in_space.computed_to_true_mean),
+        "Mean distance from the computed axis to the exactly known one.",
+    ),
+    length(
+        "axis_true_to_computed_max",
+        "from the true axis, max",
+        |e| Some(e.axis.as_ref()?.in_space.true_to_computed_max),
+        "Largest distance from the exactly known axis to the computed one.",
+    ),
+    length(
+        "axis_true_to_computed_mean",
+        "from the true axis, mean",
+        |e| Some(e.axis.as_ref()?.in_space.true_to_computed_mean),
+        "Mean distance from the exactly known axis to the computed one.",
+    ),
+    count(
+        "samples",
+        "samples of the surface",
+        |e| Some(e.distances.samples as f64),
+        "Surface samples, the vertices of the mesh included.",
+    )
+    .neutral(),
+    count(
+        "reverse_samples",
+        "samples of the union",
+        |e| Some(e.distances.reverse_samples as f64),
+        "Samples on the boundary of the union. Where they are few, nearly all primitives are buried.",
+    )
+    .neutral(),
+    Metric::new(
+        "seconds_total",
+        "time",
+        "s",
+        (Better::Lower, Digits::Significant, GEOMETRIC),
+        Value::Record(|record| Some(record.simplify.seconds?.total)),
+        "Wall-clock seconds as if this level had been asked alone: the shared substrates that the \
+         method uses, its preparation, and the simplification. Evaluation is never included.",
+    )
+    .compared(),
 ];
+
+/// The metric with a key, at compile time: a key that no metric has stops the build.
+const fn named(key: &str) -> Metric {
+    let mut index = 0;
+    while index < METRICS.len() {
+        let (a, b) = (METRICS[index].key.as_bytes(), key.as_bytes());
+        let mut same = 0;
+        while same < a.len() && same < b.len() && a[same] == b[same] {
+            same += 1;
+        }
+        if same == a.len() && same == b.len() {
+            return METRICS[index];
+        }
+        index += 1;
+    }
+    panic!("no metric has this key")
+}
+
+// The metrics that plots and answers name.
+pub(crate) static HAUSDORFF: Metric = named("hausdorff");
+pub(crate) static EPSILON: Metric = named("epsilon");
+pub(crate) static MEAN_ERROR: Metric = named("mean");
+pub(crate) static SPHERES_ONLY: Metric = named("spheres_only");
+pub(crate) static MIN_ANGLE: Metric = named("min_angle_mean");
+pub(crate) static BELOW_30: Metric = named("below_30");
+pub(crate) static SPIKES: Metric = named("spikes");
+pub(crate) static TOTAL_SECONDS: Metric = named("seconds_total");
+
+const COMPARED_METRICS: usize = {
+    let (mut compared, mut index) = (0, 0);
+    while index < METRICS.len() {
+        compared += METRICS[index].is_compared as usize;
+        index += 1;
+    }
+    compared
+};
+
+/// The columns of the comparison tables, in the order of [`METRICS`].
+pub(crate) static COMPARED: [&Metric; COMPARED_METRICS] = {
+    let mut compared = [&METRICS[0]; COMPARED_METRICS];
+    let (mut filled, mut index) = (0, 0);
+    while index < METRICS.len() {
+        if METRICS[index].is_compared {
+            compared[filled] = &METRICS[index];
+            filled += 1;
+        }
+        index += 1;
+    }
+    compared
+};
+
+/// Every metric that was measured on at least one of some medial meshes: a row with its name and unit, and a cell for
+/// each mesh, `-` where it was not measured there.
+pub fn measured_rows(evaluations: &[&Evaluation]) -> Vec<(String, Vec<String>)> {
+    let row = |metric: &Metric| {
+        let Value::Evaluation(value) = metric.value else { return None };
+        let found: Vec<Option<f64>> = evaluations.iter().map(|e| value(e)).collect();
+        let cell = |value: &Option<f64>| {
+            value.map_or_else(|| "-".to_owned(), |v| metric.format(metric.times * v))
+        };
+        found.iter().any(Option::is_some).then(|| {
+            let unit =
+                if metric.unit.is_empty() { String::new() } else { format!(" ({})", metric.unit) };
+            (format!("{}{unit}", metric.title), found.iter().map(cell).collect())
+        })
+    };
+    METRICS.iter().filter_map(row).collect()
+}
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]
@@ -284,5 +611,16 @@ mod tests {
         assert!((mean.unwrap() - 1.0).abs() < 1e-12);
         assert_eq!(Mean::Arithmetic.of(&[]), None);
         assert!((Mean::Geometric { floor: 1e-6 }.of(&[0.0, 1e-6]).unwrap() - 1e-6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn keys_are_unique_and_the_tables_have_their_columns() {
+        let keys: BTreeSet<&str> = METRICS.iter().map(|metric| metric.key).collect();
+        assert_eq!(keys.len(), METRICS.len());
+        let compared = COMPARED.map(|metric| metric.key).join(" ");
+        assert_eq!(
+            compared,
+            "hausdorff epsilon mean spheres_only min_angle_mean below_30 spikes seconds_total"
+        );
     }
 }

@@ -6,6 +6,7 @@ use clap::Args;
 use medial::complex::LoadedMa;
 use medial::metrics::{Certificate, Evaluation, JudgeOptions, MetricError, Witness, WitnessSide};
 use medial::shape::{Fit, ShapeOptions};
+use medial_reports::measured_rows;
 use serde::Serialize;
 
 use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument, judge_options};
@@ -13,7 +14,7 @@ use crate::cmd::compat::CompatArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
 use crate::output::{counted, note, print_json, print_line};
-use crate::run::{Input, Source, StageLine, percent};
+use crate::run::{Input, Source, StageLine};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -102,9 +103,9 @@ struct Evaluated<'a> {
     fit: Option<Fit>,
 }
 
-/// Prints the main numbers, lengths in percent of the diagonal.
+/// Prints every metric, lengths in percent of the diagonal.
 pub fn print_evaluation(evaluation: &Evaluation) {
-    let Evaluation { distances, quality, counts, .. } = evaluation;
+    let counts = &evaluation.counts;
     print_line(&format!(
         "{}, {} ({} without a face), {}",
         counted(counts.spheres, "sphere"),
@@ -112,51 +113,23 @@ pub fn print_evaluation(evaluation: &Evaluation) {
         counts.lone_edges,
         counted(counts.faces, "face")
     ));
-    let or_dash = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2}"));
     let betti = match evaluation.expected_betti {
         Some(expected) => format!("{:?} (the solid's: {expected:?})", evaluation.betti),
         None => format!("{:?}", evaluation.betti),
     };
-    let lines = [
-        ("Hausdorff, symmetric", percent(distances.hausdorff)),
-        ("surface to union, max", percent(distances.epsilon_union)),
-        ("  paper's reading", percent(distances.epsilon)),
-        ("  mean / rms", format!("{} / {}", percent(distances.mean), percent(distances.rms))),
-        ("  95 % / 99 %", format!("{} / {}", percent(distances.p95), percent(distances.p99))),
-        ("union to surface, max", percent(distances.reverse)),
-        ("  mean", percent(distances.reverse_mean)),
-        ("spheres only, max", percent(distances.spheres_only)),
-        (
-            "volume difference",
-            evaluation
-                .volume_error
-                .map_or_else(|| "-".to_owned(), |e| format!("{:.3} % of the volume", 100.0 * e)),
-        ),
-        (
-            "outside the solid, max",
-            format!(
-                "{}; {:.1} % of the centres",
-                evaluation.protrusion.map_or_else(|| "-".to_owned(), percent),
-                100.0 * evaluation.centres_outside.unwrap_or(0.0)
-            ),
-        ),
-        ("mean smallest angle", format!("{} degrees", or_dash(quality.min_angle_mean))),
-        ("Betti numbers", betti),
-    ];
-    for (label, value) in lines {
-        print_line(&format!("  {label:<24} {value}"));
+    for (metric, mut values) in measured_rows(&[evaluation]) {
+        print_line(&format!("  {metric:<32} {}", values.remove(0)));
     }
+    print_line(&format!("  {:<32} {betti}", "Betti numbers"));
     if let Some(certified) = evaluation.certified {
-        let (lower, upper) = (percent(certified.lower), percent(certified.upper));
-        print_line(&format!("  {:<24} {lower} to {upper}", "Hausdorff, certified"));
         let Witness { point, on } = certified.witness;
         let on = match on {
             WitnessSide::Surface => "surface",
             WitnessSide::Union => "union",
         };
         print_line(&format!(
-            "  {:<24} on the {on}: {} {} {}",
-            "  farthest point", point.x, point.y, point.z
+            "  {:<32} on the {on}: {} {} {}",
+            "farthest point", point.x, point.y, point.z
         ));
     }
 }

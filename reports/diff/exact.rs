@@ -7,26 +7,8 @@ use serde_json::{Map, Value};
 
 use super::pairs::Pair;
 use super::{Change, DiffOptions, Meaning};
+use crate::metric::METRICS;
 use crate::record::Record;
-
-/// Quantities of which less is better: errors, by their keys in `evaluate`.
-const ERRORS: [&str; 15] = [
-    "hausdorff",
-    "epsilon",
-    "epsilon_union",
-    "reverse",
-    "mean",
-    "rms",
-    "p95",
-    "p99",
-    "reverse_mean",
-    "spheres_only",
-    "certified.lower",
-    "certified.upper",
-    "volume_error",
-    "protrusion",
-    "centres_outside",
-];
 
 /// Errors below this share of the diagonal are rounding.
 const NEGLIGIBLE: f64 = 1e-9;
@@ -84,7 +66,9 @@ fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffO
         "betti" | "union.betti" => of_truth(is_right(pair.old, old), is_right(pair.new, new)),
         // Of an error bound the number of spheres is the answer.
         "simplify.spheres" if is_bounded => of_size(old, new, 0.0, 0.5),
-        key if ERRORS.contains(&key) => of_size(old, new, options.error, NEGLIGIBLE),
+        key if METRICS.iter().any(|metric| metric.is_gate && metric.path == key) => {
+            of_size(old, new, options.error, NEGLIGIBLE)
+        }
         _ => Meaning::Changed,
     }
 }

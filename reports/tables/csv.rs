@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use medial::simplifier::Level;
 
 use crate::comparison::{Comparison, Entry};
+use crate::metric::{METRICS, Metric, Value};
 use crate::record::{Record, Stages};
 use crate::text::printable;
 
@@ -54,10 +55,9 @@ fn columns(comparison: &Comparison<'_>) -> Vec<Column> {
     columns.extend(stages("seconds", |record| record.simplify.seconds));
     columns.extend(stages("cpu_seconds", |record| record.simplify.cpu_seconds));
     columns.extend(substrates(comparison));
-    columns.extend(distances());
-    columns.extend(quality_and_spikes(comparison));
+    columns.extend(METRICS.iter().filter_map(measured));
+    columns.extend(spikes(comparison));
     columns.extend(topology());
-    columns.extend(axis());
     columns.extend(provenance());
     columns
 }
@@ -103,14 +103,6 @@ fn sizes() -> Vec<Column> {
         column("spheres", move |r| count(r.simplify.spheres)),
         column("edges", move |r| count(r.simplify.edges)),
         column("faces", move |r| count(r.simplify.faces)),
-        column("lone_edges", |r| Some(r.evaluate.as_ref()?.counts.lone_edges.to_string())),
-        column("isolated", |r| Some(r.evaluate.as_ref()?.counts.isolated.to_string())),
-        column("nonmanifold_edges", |r| {
-            Some(r.evaluate.as_ref()?.counts.nonmanifold_edges.to_string())
-        }),
-        column("certified_lower", |r| Some(number(r.evaluate.as_ref()?.certified?.lower))),
-        column("certified_upper", |r| Some(number(r.evaluate.as_ref()?.certified?.upper))),
-        column("stored_bytes", |r| Some(r.evaluate.as_ref()?.counts.bytes().to_string())),
         column("peak_bytes", |r| r.simplify.peak_bytes.map(|bytes| bytes.to_string())),
         column("threads", move |r| count(r.simplify.threads)),
     ]
@@ -143,47 +135,14 @@ fn substrates(comparison: &Comparison<'_>) -> Vec<Column> {
     names.into_iter().map(substrate).collect()
 }
 
-fn distances() -> Vec<Column> {
-    macro_rules! lengths {
-        ($($key:ident),*) => {
-            vec![$(column(stringify!($key), |r| {
-                Some(r.evaluate.as_ref()?.distances.$key.to_string())
-            })),*]
-        };
-    }
-    let mut columns = lengths!(
-        epsilon,
-        epsilon_union,
-        reverse,
-        hausdorff,
-        mean,
-        rms,
-        p95,
-        p99,
-        reverse_mean,
-        spheres_only,
-        samples,
-        reverse_samples
-    );
-    columns.push(column("protrusion", |r| r.evaluate.as_ref()?.protrusion.map(number)));
-    columns.push(column("centres_outside", |r| r.evaluate.as_ref()?.centres_outside.map(number)));
-    columns.push(column("volume_error", |r| r.evaluate.as_ref()?.volume_error.map(number)));
-    columns.push(column("diagonal", |r| Some(number(r.evaluate.as_ref()?.diagonal))));
-    columns.push(column("evaluation_seed", |r| Some(r.evaluate.as_ref()?.seed.to_string())));
-    columns.push(column("evaluate_seconds", |r| r.evaluate_seconds.map(number)));
-    columns
+/// The column of a metric of the evaluation; those of the record itself have columns above.
+fn measured(metric: &'static Metric) -> Option<Column> {
+    let Value::Evaluation(value) = metric.value else { return None };
+    Some(column(metric.key, move |r| value(r.evaluate.as_ref()?).map(number)))
 }
 
-fn quality_and_spikes(comparison: &Comparison<'_>) -> Vec<Column> {
-    macro_rules! quality {
-        ($($key:ident),*) => {
-            vec![$(column(stringify!($key), |r| {
-                r.evaluate.as_ref()?.quality.$key.map(number)
-            })),*]
-        };
-    }
-    let mut columns = quality!(min_angle_mean, max_angle_mean, below_30, below_10, below_1);
-    columns.push(column("zero_area", |r| Some(r.evaluate.as_ref()?.quality.zero_area.to_string())));
+/// The spike measures at every threshold on the stability ratio.
+fn spikes(comparison: &Comparison<'_>) -> Vec<Column> {
     let mut thresholds: Vec<f64> = comparison
         .entries
         .iter()
@@ -192,16 +151,7 @@ fn quality_and_spikes(comparison: &Comparison<'_>) -> Vec<Column> {
         .collect();
     thresholds.sort_by(f64::total_cmp);
     thresholds.dedup();
-    for threshold in thresholds {
-        columns.extend(spikes_at(threshold));
-    }
-    columns.extend([
-        column("dangling_edges", |r| Some(r.evaluate.as_ref()?.spikes.dangling_edges.to_string())),
-        column("fins", |r| Some(r.evaluate.as_ref()?.spikes.fins.to_string())),
-        column("idle_spheres", |r| Some(r.evaluate.as_ref()?.spikes.idle_spheres.to_string())),
-        column("angle_spikes", |r| Some(r.evaluate.as_ref()?.spikes.angle_spikes?.to_string())),
-    ]);
-    columns
+    thresholds.into_iter().flat_map(spikes_at).collect()
 }
 
 /// The measures for one threshold on the stability ratio.
@@ -236,19 +186,11 @@ fn topology() -> Vec<Column> {
     columns
 }
 
-fn axis() -> Vec<Column> {
-    macro_rules! axis {
-        ($($key:ident),*) => {
-            vec![$(column(concat!("axis_", stringify!($key)), |r| {
-                Some(number(r.evaluate.as_ref()?.axis.as_ref()?.in_space.$key))
-            })),*]
-        };
-    }
-    axis!(computed_to_true_max, computed_to_true_mean, true_to_computed_max, true_to_computed_mean)
-}
-
 fn provenance() -> Vec<Column> {
     vec![
+        column("diagonal", |r| Some(number(r.evaluate.as_ref()?.diagonal))),
+        column("evaluation_seed", |r| Some(r.evaluate.as_ref()?.seed.to_string())),
+        column("evaluate_seconds", |r| r.evaluate_seconds.map(number)),
         column("diagnostics", |r| serde_json::to_string(&r.simplify.diagnostics).ok()),
         column("warnings", |r| Some(warnings(r).join("; "))),
         column("repetitions", |r| serde_json::to_string(&r.repetitions).ok()),
