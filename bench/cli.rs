@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
-use medial::simplifier::MedialSimplifier;
+use medial::simplifier::Registered;
 
 use crate::args::Global;
 use crate::cmd;
@@ -93,7 +93,7 @@ pub enum Verb {
 
 /// The command with these methods: parses the command line, runs the verb, and turns the outcome
 /// into an exit code.
-pub fn main_with(methods: Vec<Box<dyn MedialSimplifier>>) -> ExitCode {
+pub fn main_with(methods: Vec<Registered>) -> ExitCode {
     run_with(methods, None, std::env::args_os()).into()
 }
 
@@ -101,11 +101,7 @@ pub fn main_with(methods: Vec<Box<dyn MedialSimplifier>>) -> ExitCode {
 ///
 /// # Panics
 /// When called twice: the command belongs to its process.
-pub fn main_hosted(
-    methods: Vec<Box<dyn MedialSimplifier>>,
-    host: Host,
-    loader: Box<dyn ScriptLoader>,
-) -> Exit {
+pub fn main_hosted(methods: Vec<Registered>, host: Host, loader: Box<dyn ScriptLoader>) -> Exit {
     let words = std::iter::once(OsString::from("medial")).chain(host.words.iter().cloned());
     let words: Vec<OsString> = words.collect();
     host.enter();
@@ -113,7 +109,7 @@ pub fn main_hosted(
 }
 
 fn run_with(
-    methods: Vec<Box<dyn MedialSimplifier>>,
+    methods: Vec<Registered>,
     loader: Option<Box<dyn ScriptLoader>>,
     words: impl Iterator<Item = OsString>,
 ) -> Exit {
@@ -172,7 +168,7 @@ fn defaults_with_commas(argument: Arg) -> Arg {
 }
 
 fn registry(
-    methods: Vec<Box<dyn MedialSimplifier>>,
+    methods: Vec<Registered>,
     loader: Option<Box<dyn ScriptLoader>>,
     global: &Global,
 ) -> Result<Registry, Failure> {

@@ -1,8 +1,8 @@
 //! Methods that meet a number of spheres by a knob other than their level: the density of the samples,
 //! or the resolution of a lattice (`size_search.rs`).
 
-use medial::shape::{Cost, Shape};
-use medial::simplifier::{Level, RunContext, Simplification, Simplified, SimplifyError, Work};
+use medial::shape::Shape;
+use medial::simplifier::{Level, RunContext, Simplification, Simplified, SimplifyError};
 
 use crate::size_search::{Knob, Probe, SizeSearch, resampled};
 
@@ -13,10 +13,10 @@ type Prepared<'s> = Box<dyn Simplification + 's>;
 type Prepare<'s> = Box<dyn Fn(Option<f64>) -> Result<Prepared<'s>, SimplifyError> + Send + 's>;
 
 /// A shape whose numbers of spheres are met by a knob. All other levels are those of the value that the
-/// shape and the parameters have, prepared when the first of them is asked.
+/// shape and the parameters have. Nothing is kept between levels, so that each costs what it would
+/// cost alone.
 pub(crate) struct ByKnob<'s> {
     prepare: Prepare<'s>,
-    own: Option<(Prepared<'s>, Cost)>,
     search: SizeSearch,
     /// The native level of every number of spheres.
     native: f64,
@@ -31,7 +31,7 @@ impl<'s> ByKnob<'s> {
         prepare: impl Fn(Option<f64>) -> Result<Prepared<'s>, SimplifyError> + Send + 's,
     ) -> Self {
         let search = SizeSearch::new(knob, run);
-        Self { prepare: Box::new(prepare), own: None, search, native }
+        Self { prepare: Box::new(prepare), search, native }
     }
 
     /// By the number of samples of a shape. Builds what all samplings share, the tree and the inside
@@ -55,25 +55,12 @@ impl<'s> ByKnob<'s> {
         };
         Ok(Self::new(Knob::samples(), native, run, at))
     }
-
-    fn of_own_value(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
-        if let Some((own, cost)) = &mut self.own {
-            let found = own.at(level)?;
-            let mut earlier = *cost;
-            if let Work::Reused(more) = found.work {
-                earlier += more;
-            }
-            return Ok(Simplified { work: Work::Reused(earlier), ..found });
-        }
-        let (own, cost) = Cost::of(|| (self.prepare)(None));
-        self.own.insert((own?, cost)).0.at(level)
-    }
 }
 
 impl Simplification for ByKnob<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let Level::Spheres(count @ 1..) = level else {
-            return self.of_own_value(level);
+            return (self.prepare)(None)?.at(level);
         };
         let Self { prepare, search, native, .. } = self;
         search.at(

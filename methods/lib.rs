@@ -1,10 +1,9 @@
 //! The published simplifiers of the medial axis, one module each, and one of this project.
 //!
 //! Every method implements [`medial::simplifier::MedialSimplifier`] and knows neither the others
-//! nor the runner. [`registry`] lists the published ones, in the order of every table;
-//! [`on_request`] has what runs only where it is named.
+//! nor the runner. [`registry`] lists them in the order of every table.
 
-use medial::simplifier::MedialSimplifier;
+use medial::simplifier::{Level, MedialSimplifier, Registered};
 
 pub mod angle;
 pub mod aof;
@@ -19,7 +18,6 @@ pub mod pmat;
 pub mod qmat;
 mod ranked;
 mod ranked_facets;
-mod reuse;
 pub mod sat;
 pub mod sat_pairwise;
 mod scale;
@@ -31,51 +29,125 @@ pub mod tight;
 pub mod vmas;
 mod within;
 
-/// The published methods, in the order of the tables.
-pub fn registry() -> Vec<Box<dyn MedialSimplifier>> {
+/// All methods, in the order of the tables. Those that take long are marked to run only when named.
+pub fn registry() -> Vec<Registered> {
     vec![
-        Box::new(angle::method()),
-        Box::new(lambda::method()),
-        Box::new(dey_zhao::method()),
-        Box::new(qmat::method()),
-        Box::new(pmat::method()),
-        Box::new(hem::method()),
-        Box::new(sat::method()),
-        Box::new(sat_pairwise::method()),
-        Box::new(tam_heidrich::method()),
-        Box::new(aof::method()),
-        Box::new(coverage_axis::method(qmat::keeping)),
+        Registered::from(angle::method())
+            .best_for(
+                "Dense samples, when the axis is to stay where it is and only its spikes go, \
+                 on small and large parts alike; not for few spheres, and the topology may \
+                 break (the variant homotopy keeps it).",
+            )
+            .filter(Level::Published)
+            .sweep(&[20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0]),
+        Registered::from(lambda::method())
+            .best_for(
+                "Dense samples, when whatever is small in absolute size is to go, with a \
+                 proof that what stays is stable; not where thin parts must stay beside \
+                 thick ones, and not for few spheres.",
+            )
+            .filter(Level::Published)
+            .sweep(&[0.0025, 0.005, 0.01, 0.02]),
+        Registered::from(dey_zhao::method())
+            .best_for(
+                "Dense samples, when one pair of constants is to do for every shape and \
+                 every density; with denser samples it converges to the medial axis, but it \
+                 promises no topology, and is not for few spheres.",
+            )
+            .filter(Level::Published)
+            .sweep(&[0.5, 1.0, 1.5, 2.0, 3.0]),
+        Registered::from(qmat::method()).best_for(
+            "A small number of spheres in about a second: spikes go first, and each \
+                 merged sphere is placed anew.",
+        ),
+        Registered::from(pmat::method())
+            .best_for(
+                "Every level from one run, nested and without a parameter, with spheres of \
+                 the start alone; loops may close, and with few spheres the error is large.",
+            )
+            .sweep(&[1.1, 1.5, 2.0, 4.0, 8.0, 16.0]),
+        Registered::from(hem::method())
+            .best_for(
+                "Few spheres for a given error where speed matters less: usually fewer than \
+                 Q-MAT needs, at many times its seconds.",
+            )
+            .sweep(&[0.01, 0.02, 0.04, 0.08]),
+        Registered::from(sat::method())
+            .best_for(
+                "Features that are small beside what is around them, when they are to go and \
+                 equally small ones elsewhere to stay; gaps may fill, spheres are new ones, \
+                 and it is not for few spheres.",
+            )
+            .filter(Level::Published)
+            .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0]),
+        Registered::from(sat_pairwise::method())
+            .filter(Level::Native(1.1))
+            .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0]),
+        Registered::from(tam_heidrich::method())
+            .best_for(
+                "Whole features of little volume, when they are to go and loops to stay, and \
+                 a surface is to be rebuilt by the power crust; it does not reach small \
+                 numbers of spheres.",
+            )
+            .filter(Level::Published)
+            .sweep(&[0.01, 0.1, 0.5, 1.0, 5.0]),
+        Registered::from(aof::method())
+            .best_for(
+                "Straight from the surface, where its samples give too poor a start: the \
+                 lattice is as fine as is asked; for thousands of spheres rather than \
+                 hundreds.",
+            )
+            // The published lattice takes far longer: that of the other levels is enough.
+            .filter(Level::Native(30.0))
+            .sweep(&[15.0, 25.0, 35.0, 45.0, 60.0]),
+        Registered::from(coverage_axis::method(qmat::keeping))
+            .best_for(
+                "Some tens of spheres as a skeleton: spheres stay where the medial axis has \
+                 them, and details smaller than the dilation go.",
+            )
+            .sweep(&[0.005, 0.01, 0.02, 0.03, 0.05]),
+        Registered::from(vmas::method())
+            .best_for(
+                "Few spheres in even places, on organic shapes; no Voronoi diagram is \
+                 needed. Nothing holds the topology, and it is not for CAD models or more \
+                 than a few hundred spheres.",
+            )
+            .on_request(),
+        Registered::from(tight::method(qmat::method()))
+            .best_for(
+                "The least two-sided error with few spheres, the topology of its start kept, \
+                 where seconds to a minute for each number of spheres do not matter.",
+            )
+            .on_request(),
     ]
-}
-
-/// Methods that run where they are named, because they take long.
-pub fn on_request() -> Vec<Box<dyn MedialSimplifier>> {
-    vec![Box::new(vmas::method()), Box::new(tight::method(qmat::method()))]
 }
 
 /// The method with an id, or `None`. [`initial`] simplifies nothing and is not among them.
 pub fn find(id: &str) -> Option<Box<dyn MedialSimplifier>> {
-    registry().into_iter().chain(on_request()).find(|method| method.info().id == id)
+    registry().into_iter().map(|entry| entry.method).find(|method| method.info().id == id)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::registry;
+    use super::{Registered, registry};
 
     #[test]
     fn default_sweeps_go_from_fine_to_coarse_wherever_there_is_a_native_level() {
-        for method in registry() {
-            let info = method.info();
-            let Some(native) = &info.native else {
-                assert!(info.sweep.is_empty(), "{}: levels of no scalar", info.id);
-                continue;
+        for Registered { method, presentation } in registry() {
+            let (info, sweep) = (method.info(), presentation.sweep);
+            let native = match &info.native {
+                Some(native) if !presentation.on_request => native,
+                _ => {
+                    assert!(sweep.is_empty(), "{}: a sweep that no comparison runs", info.id);
+                    continue;
+                }
             };
-            assert!(info.sweep.len() >= 3, "{}: {:?}", info.id, info.sweep);
+            assert!(sweep.len() >= 3, "{}: {sweep:?}", info.id);
             let is_coarser = |pair: &[f64]| match native.larger_is_coarser {
                 true => pair[0] < pair[1],
                 false => pair[0] > pair[1],
             };
-            assert!(info.sweep.windows(2).all(is_coarser), "{}: {:?}", info.id, info.sweep);
+            assert!(sweep.windows(2).all(is_coarser), "{}: {sweep:?}", info.id);
         }
     }
 }

@@ -4,9 +4,7 @@
 use std::sync::Arc;
 
 use medial::complex::MedialMesh;
-use medial::simplifier::{
-    Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work,
-};
+use medial::simplifier::{Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError};
 
 use crate::scale::{Scale, Wanted};
 use crate::ties::{break_ties, tie};
@@ -86,7 +84,6 @@ impl Simplification for Ranked {
             mesh,
             asked: level,
             native_level: Some(native),
-            work: Work::Anew,
             diagnostics,
             extras: Extras::default(),
         })

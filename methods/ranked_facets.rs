@@ -1,14 +1,11 @@
 //! The common part of the per-facet filters: rank the Voronoi facets once, then keep those above a
 //! threshold, or as many of the best as a number of spheres allows, with their edges and vertices.
 
-use std::cell::OnceCell;
 use std::sync::Arc;
 
 use medial::complex::{DualTriangulation, MedialMesh, Sphere, VoronoiFacets};
 use medial::shape::Shape;
-use medial::simplifier::{
-    Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work,
-};
+use medial::simplifier::{Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError};
 
 use rayon::prelude::*;
 
@@ -72,8 +69,6 @@ impl FacetValue for Vec<f64> {
 pub(crate) struct RankedFacets<'s> {
     set: FacetSet,
     value: Box<dyn FacetValue + 's>,
-    /// Values and facets by descending value; only levels that ask for spheres need it.
-    order: OnceCell<Vec<(f64, u32)>>,
     scale: Scale,
     /// Counts and warnings of the preparation, repeated with every level.
     prepared: Diagnostics,
@@ -87,26 +82,26 @@ impl<'s> RankedFacets<'s> {
         scale: Scale,
         prepared: Diagnostics,
     ) -> Self {
-        let value = Box::new(value);
-        Self { set, value, order: OnceCell::new(), scale, prepared }
+        Self { set, value: Box::new(value), scale, prepared }
     }
 
-    fn order(&self) -> &[(f64, u32)] {
-        self.order.get_or_init(|| {
-            let facets = (0..self.set.facets.len()).into_par_iter().with_min_len(256);
-            let mut ranked: Vec<(f64, u32)> =
-                facets.map(|facet| (self.value.value(facet), facet as u32)).collect();
-            ranked.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            break_ties(&mut ranked, |(value, _)| value, |(_, facet)| self.set.middle(facet));
-            ranked
-        })
+    /// Values and facets by descending value. Only numbers of spheres need it, and each pays for it,
+    /// because native levels are often decided without the values.
+    fn order(&self) -> Vec<(f64, u32)> {
+        let facets = (0..self.set.facets.len()).into_par_iter().with_min_len(256);
+        let mut ranked: Vec<(f64, u32)> =
+            facets.map(|facet| (self.value.value(facet), facet as u32)).collect();
+        ranked.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        break_ties(&mut ranked, |(value, _)| value, |(_, facet)| self.set.middle(facet));
+        ranked
     }
 
-    /// The number of best facets that together have at most `spheres` vertices; at least one.
-    fn facets_for(&self, spheres: usize) -> usize {
+    /// The number of first facets of an order that together have at most `spheres` vertices; at least
+    /// one.
+    fn facets_for(&self, order: &[(f64, u32)], spheres: usize) -> usize {
         let mut seen = vec![false; self.set.mesh.spheres.len()];
         let mut count = 0;
-        for (rank, &(_, facet)) in self.order().iter().enumerate() {
+        for (rank, &(_, facet)) in order.iter().enumerate() {
             for &sphere in self.set.facets.polygon(facet as usize) {
                 count += usize::from(!std::mem::replace(&mut seen[sphere as usize], true));
             }
@@ -133,7 +128,7 @@ impl<'s> RankedFacets<'s> {
     /// others.
     fn by_count(&self, spheres: usize) -> (Vec<u32>, f64) {
         let order = self.order();
-        let count = self.facets_for(spheres);
+        let count = self.facets_for(&order, spheres);
         let dropped = order.get(count).map(|&(value, _)| value);
         let mut kept: Vec<u32> = order[..count].iter().map(|&(_, facet)| facet).collect();
         kept.sort_unstable();
@@ -173,7 +168,6 @@ impl Simplification for RankedFacets<'_> {
             mesh,
             asked: level,
             native_level: Some(native),
-            work: Work::Anew,
             diagnostics,
             extras: Extras::default(),
         })

@@ -23,12 +23,24 @@ mod containment;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Level, Method, MethodInfo, NativeLevel, NoParams, RunContext, Simplification,
+    Diagnostics, Method, MethodInfo, NativeLevel, NoParams, RunContext, Simplification,
     SimplifyError,
 };
 
 use crate::ranked::Ranked;
 use crate::scale::{Published, Scale};
+
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@article{MiklosGiesenPauly2010,
+  author  = {Miklos, Balint and Giesen, Joachim and Pauly, Mark},
+  title   = {Discrete scale axis representations for {3D} geometry},
+  journal = {ACM Transactions on Graphics},
+  volume  = {29},
+  number  = {4},
+  year    = {2010},
+  doi     = {10.1145/1778765.1778838}
+}";
 
 /// The pairwise scale filter as a method.
 pub fn method() -> Method<NoParams> {
@@ -38,10 +50,9 @@ pub fn method() -> Method<NoParams> {
              https://doi.org/10.1145/2753755, of Miklos, Giesen, Pauly 2010, \
              https://doi.org/10.1145/1778765.1778838",
         )
+        .bibtex(BIBTEX)
         .summary("Removes the spheres that another sphere contains once both are scaled.")
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
-        .filter(Level::Native(1.1))
-        .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0])
         .published("unsupported: it is described, not published, as a method");
     Method::new(info, prepare)
 }

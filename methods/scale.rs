@@ -43,7 +43,6 @@ impl Scale {
         diagnostics: &mut Diagnostics,
     ) -> Result<Wanted, SimplifyError> {
         match level {
-            Level::MaxError(_) => Err(SimplifyError::searched()),
             Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
             Level::Spheres(count) => Ok(Wanted::Spheres(count)),
             Level::Native(level) => self.check(level).map(|()| Wanted::Native(level)),

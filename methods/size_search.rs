@@ -10,17 +10,13 @@
 //!
 //! The search ends at a count of at most [`TOLERANCE`] below the requested one, after [`MAX_PROBES`]
 //! values, or when no value is left to try. The answer is the largest count met that does not exceed the
-//! request. The values tried depend on the count alone, so that the same request has the same answer,
-//! whatever was asked before; results for earlier requests are reused.
+//! request. No value is tried twice.
 
 use std::ops::RangeInclusive;
-use std::sync::Arc;
 
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError};
-use medial::simplifier::{Diagnostics, Extras, Level, RunContext, Simplified, SimplifyError};
-
-use crate::reuse::Reuse;
+use medial::simplifier::{Diagnostics, Level, RunContext, Simplified, SimplifyError};
 
 /// A count within this fraction below the requested one ends the search; comparisons at equal counts
 /// accept such a count.
@@ -78,17 +74,15 @@ pub(crate) struct Probe {
     pub diagnostics: Diagnostics,
 }
 
-/// The results of one shape by a knob.
+/// A search by a knob.
 pub(crate) struct SizeSearch {
     knob: Knob,
     run: RunContext,
-    /// By the bits of the value.
-    probes: Reuse<u64, Probe>,
 }
 
 impl SizeSearch {
     pub(crate) fn new(knob: Knob, run: &RunContext) -> Self {
-        Self { knob, run: run.clone(), probes: Reuse::new() }
+        Self { knob, run: run.clone() }
     }
 
     /// The result with the nearest count from below that the search meets. `native` tells the native
@@ -98,17 +92,16 @@ impl SizeSearch {
     /// Those of `make` that do not depend on the value; [`SimplifyError::Unsupported`] where no value tried
     /// gives a sphere.
     pub(crate) fn at(
-        &mut self,
+        &self,
         count: usize,
         native: impl Fn(f64) -> f64,
         make: impl Fn(f64) -> Result<Probe, SimplifyError>,
     ) -> Result<Simplified, SimplifyError> {
-        self.probes.begin();
         let mut path = Path::new(&self.knob, count);
-        let mut best: Option<(f64, Arc<Probe>)> = None;
+        let mut best: Option<(f64, Probe)> = None;
         while let Some(value) = path.next {
             self.run.step(path.tried.len(), MAX_PROBES)?;
-            let probe = self.probes.get(value.to_bits(), || or_empty(make(value)))?;
+            let probe = or_empty(make(value))?;
             let size = probe.mesh.spheres.len();
             path.tell(value, size);
             let rank = |size: usize| (size == 0, size > count, size.abs_diff(count));
@@ -118,18 +111,12 @@ impl SizeSearch {
         }
         let tried = path.tried.len();
         let (value, probe) = best.expect("at least one value is tried");
-        let mut diagnostics = probe.diagnostics.clone();
+        let Probe { mesh, mut diagnostics } = probe;
         diagnostics.count(self.knob.count, (value * self.knob.steps).round() as usize);
         diagnostics.count("values_tried", tried);
-        self.explain(count, value, probe.mesh.spheres.len(), &mut diagnostics)?;
-        Ok(Simplified {
-            mesh: probe.mesh.clone(),
-            asked: Level::Spheres(count),
-            native_level: Some(native(value)),
-            work: self.probes.work(),
-            diagnostics,
-            extras: Extras::default(),
-        })
+        self.explain(count, value, mesh.spheres.len(), &mut diagnostics)?;
+        let native_level = Some(native(value));
+        Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, Level::Spheres(count)) })
     }
 
     fn explain(

@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
-use medial::simplifier::Level;
+use crate::Target;
 
 use crate::record::{Record, Status};
 use crate::text::{grouped, printable};
@@ -23,7 +23,7 @@ pub(crate) struct Comparison<'a> {
     /// Ids of the methods behind the series.
     pub(crate) methods: Vec<&'a str>,
     /// The levels that were asked: sphere counts from many to few, published, native.
-    pub(crate) levels: Vec<Level>,
+    pub(crate) levels: Vec<Target>,
     /// One entry for each combination that was run, by mesh, level and series.
     pub(crate) entries: Vec<Entry<'a>>,
     /// Records that a later one of the same item replaced.
@@ -50,7 +50,7 @@ impl Entry<'_> {
     /// Whether the result may be compared with others asked for the same number of spheres.
     pub(crate) fn comparable(&self) -> bool {
         match (self.record.simplify.level, reached(self.record)) {
-            (Level::Spheres(asked), Some(reached)) if self.measured() => {
+            (Target::Spheres(asked), Some(reached)) if self.measured() => {
                 reached.abs_diff(asked) as f64 <= COUNT_TOLERANCE * asked as f64
             }
             _ => false,
@@ -73,12 +73,12 @@ pub(crate) fn reached(record: &Record) -> Option<usize> {
 }
 
 /// The level as it stands in a table: `100`, `published`, `level 0.3`.
-pub(crate) fn level_label(level: Level) -> String {
+pub(crate) fn level_label(level: Target) -> String {
     match level {
-        Level::Spheres(count) => grouped(count as u64),
-        Level::Published => "published".to_owned(),
-        Level::Native(value) => format!("level {value}"),
-        Level::MaxError(_) => level.to_string(),
+        Target::Spheres(count) => grouped(count as u64),
+        Target::Published => "published".to_owned(),
+        Target::Native(value) => format!("level {value}"),
+        Target::MaxError(_) => level.to_string(),
     }
 }
 
@@ -89,17 +89,17 @@ pub(crate) fn row_name(record: &Record) -> String {
 
 /// Sphere counts from many to few, error bounds from large to small, published, native levels
 /// ascending.
-fn compare_levels(a: Level, b: Level) -> Ordering {
+fn compare_levels(a: Target, b: Target) -> Ordering {
     let rank = |level| match level {
-        Level::Spheres(_) => 0,
-        Level::MaxError(_) => 1,
-        Level::Published => 2,
-        Level::Native(_) => 3,
+        Target::Spheres(_) => 0,
+        Target::MaxError(_) => 1,
+        Target::Published => 2,
+        Target::Native(_) => 3,
     };
     match (a, b) {
-        (Level::Spheres(a), Level::Spheres(b)) => b.cmp(&a),
-        (Level::Native(a), Level::Native(b)) => a.total_cmp(&b),
-        (Level::MaxError(a), Level::MaxError(b)) => b.total_cmp(&a),
+        (Target::Spheres(a), Target::Spheres(b)) => b.cmp(&a),
+        (Target::Native(a), Target::Native(b)) => a.total_cmp(&b),
+        (Target::MaxError(a), Target::MaxError(b)) => b.total_cmp(&a),
         _ => rank(a).cmp(&rank(b)),
     }
 }
@@ -112,7 +112,7 @@ impl<'a> Comparison<'a> {
         let superseded = records.len() - counted.len();
         let mesh_keys = first_seen(counted.iter().map(|record| hashes.key(record)));
         let series_keys = first_seen(counted.iter().copied().map(SeriesKey::of));
-        let mut levels: Vec<Level> = counted.iter().map(|record| record.simplify.level).collect();
+        let mut levels: Vec<Target> = counted.iter().map(|record| record.simplify.level).collect();
         levels.sort_by(|&a, &b| compare_levels(a, b));
         levels.dedup_by(|a, b| compare_levels(*a, *b).is_eq());
 
@@ -157,7 +157,7 @@ impl<'a> Comparison<'a> {
     /// The sphere counts that were asked, with their level indices, from many to few.
     pub(crate) fn counts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.levels.iter().enumerate().filter_map(|(index, level)| match level {
-            Level::Spheres(count) => Some((index, *count)),
+            Target::Spheres(count) => Some((index, *count)),
             _ => None,
         })
     }

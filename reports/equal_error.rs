@@ -1,7 +1,7 @@
 //! Equal error: how many spheres, stored numbers and seconds each method needs for the same
 //! Hausdorff error. The levels were searched for, not read off counts.
 
-use medial::simplifier::Level;
+use crate::Target;
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::{Mean, TOTAL_SECONDS};
@@ -39,7 +39,7 @@ pub(crate) struct BoundRow {
 pub(crate) fn by_bound(comparison: &Comparison<'_>) -> Vec<BoundSummary> {
     let reference = reference(comparison);
     let bounds = comparison.levels.iter().enumerate().filter_map(|(index, level)| match level {
-        Level::MaxError(bound) => Some((index, *bound)),
+        Target::MaxError(bound) => Some((index, *bound)),
         _ => None,
     });
     let at_bound = |(level, bound): (usize, f64)| {

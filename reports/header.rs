@@ -1,6 +1,6 @@
 //! What stands above the results: what was run, when and where.
 
-use medial::simplifier::MethodInfo;
+use medial::simplifier::{MethodInfo, Presentation};
 use serde::{Deserialize, Serialize};
 
 use crate::record::Machine;
@@ -52,6 +52,9 @@ pub struct MethodNote {
     pub title: String,
     /// Authors, year, title, venue, DOI.
     pub citation: String,
+    /// The same source as BibTeX; empty where there is no publication.
+    #[serde(default)]
+    pub bibtex: String,
     /// One sentence on what the method does.
     pub summary: String,
     /// One sentence on where the method is at home; empty where it does not say.
@@ -64,14 +67,16 @@ pub struct MethodNote {
     pub native: Option<String>,
 }
 
-impl From<&MethodInfo> for MethodNote {
-    fn from(info: &MethodInfo) -> Self {
+impl MethodNote {
+    /// The note of a method and its presentation.
+    pub fn new(info: &MethodInfo, presentation: &Presentation) -> Self {
         Self {
             id: info.id.to_string(),
             title: info.title.to_string(),
             citation: info.citation.to_string(),
+            bibtex: info.bibtex.to_string(),
             summary: info.summary.to_string(),
-            home: info.home.to_string(),
+            home: presentation.best_for.to_string(),
             published: info.published.to_string(),
             native: info.native.as_ref().map(|native| format!("{} ({})", native.name, native.unit)),
         }

@@ -66,7 +66,7 @@ pub use metric::{Better, METRICS, Metric, measured_rows};
 pub use pictures::{PictureStrip, picture_strips};
 pub use record::{
     Conditions, Initial, Machine, Origin, OwnSeconds, Record, Repetition, Simplify, Stages, Status,
-    Trust, UnionTopology,
+    Target, Trust, UnionTopology,
 };
 pub use terminal::summary_text;
 pub use text::{file_stem, printable};

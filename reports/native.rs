@@ -3,7 +3,7 @@
 //! As at equal counts, each method has one set of meshes for all its levels
 //! ([`OwnSet`](crate::summary::OwnSet)), so that a curve never changes meshes on its way.
 
-use medial::simplifier::Level;
+use crate::Target;
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Mean, TOTAL_SECONDS};
@@ -24,7 +24,7 @@ pub(crate) struct NativeCurve {
 
 /// Means at one level.
 pub(crate) struct NativePoint {
-    pub(crate) level: Level,
+    pub(crate) level: Target,
     /// Geometric means: spheres, errors in % of the diagonal, seconds.
     pub(crate) spheres: f64,
     pub(crate) hausdorff: f64,
@@ -41,7 +41,7 @@ pub(crate) fn native_curves(comparison: &Comparison<'_>) -> Vec<NativeCurve> {
 
 fn curve(comparison: &Comparison<'_>, series: usize) -> Option<NativeCurve> {
     let is_own =
-        |level: usize| matches!(comparison.levels[level], Level::Native(_) | Level::Published);
+        |level: usize| matches!(comparison.levels[level], Target::Native(_) | Target::Published);
     let own: Vec<&Entry<'_>> =
         comparison.entries.iter().filter(|e| e.series == series && is_own(e.level)).collect();
     let set = OwnSet::of(own.iter().map(|entry| (entry.level, entry.mesh, entry.measured())));
@@ -59,7 +59,7 @@ fn curve(comparison: &Comparison<'_>, series: usize) -> Option<NativeCurve> {
     (!points.is_empty()).then_some(NativeCurve { series, over, asked, points })
 }
 
-fn point(level: Level, entries: &[&Entry<'_>]) -> Option<NativePoint> {
+fn point(level: Target, entries: &[&Entry<'_>]) -> Option<NativePoint> {
     let mean = |of: &dyn Fn(&Entry<'_>) -> Option<f64>| {
         let values: Option<Vec<f64>> = entries.iter().map(|entry| of(entry)).collect();
         Mean::Geometric { floor: 1e-6 }.of(&values?)
@@ -86,7 +86,7 @@ pub(crate) fn native_table(
         let axis = axis(method);
         curve.points.iter().enumerate().map(move |(index, point)| {
             let level = match (point.level, &axis) {
-                (Level::Native(value), Some(axis)) => format!("{value} {axis}"),
+                (Target::Native(value), Some(axis)) => format!("{value} {axis}"),
                 (level, _) => level_label(level),
             };
             let (right, known) = point.topology;

@@ -215,7 +215,7 @@ pub struct Simplify {
     #[serde(default)]
     pub seed: u64,
     /// The level that was asked.
-    pub level: Level,
+    pub level: Target,
     /// Number of spheres that was reached.
     #[serde(default)]
     pub reached: Option<usize>,
@@ -263,7 +263,7 @@ pub struct Simplify {
 
 impl Simplify {
     /// A request without an answer: what a run that failed at once leaves behind.
-    pub fn asked(method: impl Into<String>, level: Level, status: Status) -> Self {
+    pub fn asked(method: impl Into<String>, level: Target, status: Status) -> Self {
         Self {
             status,
             method: method.into(),
@@ -403,5 +403,53 @@ impl fmt::Display for Machine {
         let parts = [Some(self.cpu.clone()), cores, memory, Some(self.os.clone())];
         let known: Vec<String> = parts.into_iter().flatten().filter(|p| !p.is_empty()).collect();
         f.write_str(&known.join(", "))
+    }
+}
+
+/// The target of a run: a level of the method, or an error bound that the runner meets by a search
+/// among such levels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Target {
+    /// [`Level::Published`].
+    Published,
+    /// [`Level::Spheres`].
+    Spheres(usize),
+    /// [`Level::Native`].
+    Native(f64),
+    /// The fewest spheres that the search finds with a symmetric Hausdorff error of at most this
+    /// fraction of the diagonal.
+    MaxError(f64),
+}
+
+impl From<Level> for Target {
+    fn from(level: Level) -> Self {
+        match level {
+            Level::Published => Self::Published,
+            Level::Spheres(count) => Self::Spheres(count),
+            Level::Native(value) => Self::Native(value),
+        }
+    }
+}
+
+impl Target {
+    /// The level of the method, or the error bound.
+    pub fn level(self) -> Result<Level, f64> {
+        match self {
+            Self::Published => Ok(Level::Published),
+            Self::Spheres(count) => Ok(Level::Spheres(count)),
+            Self::Native(value) => Ok(Level::Native(value)),
+            Self::MaxError(bound) => Err(bound),
+        }
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.level() {
+            Ok(level) => level.fmt(f),
+            // Rounded, without the digits that the multiplication adds.
+            Err(bound) => write!(f, "at most {} % error", (bound * 1e12).round() / 1e10),
+        }
     }
 }

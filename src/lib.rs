@@ -51,3 +51,6 @@ pub use colour::{ColourMap, decode_srgb};
 pub use geometry::Vec3;
 /// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a crate of its own.
 pub use medial_geometry as geometry;
+// For the code that `parameters!` generates.
+#[doc(hidden)]
+pub use serde;

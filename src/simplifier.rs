@@ -1,18 +1,17 @@
-//! The one door for every method: [`MedialSimplifier`], what it is asked, and what it answers.
+//! The interface of every method: [`MedialSimplifier`], its levels and its results.
 //!
-//! A method is prepared once for a shape ([`MedialSimplifier::prepare`]) and then asked for as
-//! many levels as wanted ([`Simplification::at`]), so that filters rank once and edge-collapse
-//! methods continue from finer levels.
+//! A method is prepared once for a shape ([`MedialSimplifier::prepare`]). Then
+//! [`Simplification::at`] returns any number of levels, so that filters rank once and methods that
+//! collapse edges continue from finer levels.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use crate::complex::MedialMesh;
-use crate::shape::{Cost, Shape};
+use crate::shape::Shape;
 
 mod chain;
-mod error;
 mod extras;
 mod info;
 mod method;
@@ -21,67 +20,33 @@ mod run;
 
 pub use crate::diagnostics::Diagnostics;
 pub use chain::Chain;
-pub use error::SimplifyError;
 pub use extras::Extras;
-pub use info::{Capability, MethodInfo, NativeLevel, ParamInfo};
-pub use method::{Method, Prepare};
-pub use params::{NoParams, Params};
-pub use run::{Progress, RunContext};
+pub use info::{Capability, MethodInfo, NativeLevel, ParamInfo, Presentation, Registered};
+pub use method::{Method, Prepare, Simple, simple};
+pub use params::{NoParams, ParamFields, Params};
+pub use run::{Progress, RunContext, SimplifyError};
 
 /// A method that simplifies the medial axis of a shape.
 ///
-/// Most methods are a [`Method`]: a description and a function. This is a whole one, which keeps the
-/// largest balls with the edges and faces between them:
+/// The smallest method is a description and a function from a shape and a number of spheres to a
+/// medial mesh ([`simple`]). This one keeps the largest balls:
 ///
 /// ```
-/// use medial::shape::Shape;
-/// use medial::simplifier::{
-///     Level, Method, MethodInfo, ParamInfo, RunContext, Simplification, Simplified, SimplifyError,
-/// };
-/// use serde::Deserialize;
+/// use medial::simplifier::{MedialSimplifier, MethodInfo, simple};
 ///
-/// #[derive(Deserialize)]
-/// #[serde(default, deny_unknown_fields)]
-/// struct LargestParams {
-///     /// Balls below this radius, a fraction of the diagonal, are never kept.
-///     least: f64,
+/// fn largest() -> impl MedialSimplifier {
+///     simple(MethodInfo::new("largest", "Largest balls first"), |shape, spheres| {
+///         let initial = shape.initial()?;
+///         let mut order: Vec<usize> = (0..initial.spheres.len()).collect();
+///         order.sort_by(|&a, &b| initial.spheres[b].radius.total_cmp(&initial.spheres[a].radius));
+///         let mut keep = vec![false; order.len()];
+///         order.iter().take(spheres).for_each(|&sphere| keep[sphere] = true);
+///         Ok(initial.induced(&keep))
+///     })
 /// }
 ///
-/// impl Default for LargestParams {
-///     fn default() -> Self {
-///         Self { least: 0.0 }
-///     }
-/// }
-///
-/// fn largest() -> Method<LargestParams> {
-///     let info = MethodInfo::new("largest", "Largest balls first")
-///         .summary("Keeps the largest balls, with the edges and faces between them.")
-///         .param(ParamInfo::new("least", 0.0, "fraction of the diagonal", "least radius"));
-///     Method::new(info, prepare)
-/// }
-///
-/// fn prepare<'s>(
-///     shape: &'s Shape,
-///     params: LargestParams,
-///     _run: &RunContext,
-/// ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-///     let initial = shape.initial()?;
-///     let radius = |i: usize| initial.spheres[i].radius;
-///     let mut order: Vec<usize> = (0..initial.spheres.len()).collect();
-///     order.retain(|&i| radius(i) >= params.least);
-///     order.sort_by(|&a, &b| radius(b).total_cmp(&radius(a)).then(a.cmp(&b)));
-///     Ok(Box::new(move |level: Level| {
-///         let Level::Spheres(count @ 1..) = level else {
-///             return Err(SimplifyError::unsupported("ask for a number of spheres, at least 1"));
-///         };
-///         let mut keep = vec![false; initial.spheres.len()];
-///         order.iter().take(count).for_each(|&i| keep[i] = true);
-///         Ok(Simplified::new(initial.induced(&keep), level))
-///     }))
-/// }
-///
-/// use medial::simplifier::{MedialSimplifier, Params};
-///
+/// # use medial::shape::Shape;
+/// # use medial::simplifier::{Level, Params, RunContext};
 /// # let tetrahedron = medial::surface::read_bytes(
 /// #     b"OFF 4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n",
 /// #     medial::surface::Format::Off,
@@ -98,9 +63,11 @@ pub use run::{Progress, RunContext};
 /// # assert!(largest().prepare(&shape, &wrong, &RunContext::default()).is_err());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// A method with parameters, or with work that serves all levels, is a [`Method`].
 pub trait MedialSimplifier: Send + Sync {
-    /// Id, title, citation, native level, parameters with units and defaults, and what its answers
-    /// carry beside the medial mesh.
+    /// Id, title, citation, native level, parameters with units and defaults, and the extras of its
+    /// results.
     fn info(&self) -> &MethodInfo;
 
     /// All work that does not depend on the level. Timed as `prepare`.
@@ -117,10 +84,13 @@ pub trait MedialSimplifier: Send + Sync {
     ) -> Result<Box<dyn Simplification + 's>, SimplifyError>;
 }
 
-/// One shape, prepared once, asked for many levels.
+/// One shape, prepared once for many levels.
 pub trait Simplification: Send {
-    /// The simplified medial mesh at a level. Levels asked from fine to coarse may continue from
-    /// earlier work, and say so in [`Simplified::work`].
+    /// The simplified medial mesh at a level. It depends on the level alone, never on earlier calls.
+    ///
+    /// An [incremental](MethodInfo::incremental) method may continue from the state of the previous
+    /// call. Every other method computes each level from the prepared state: a cache between calls
+    /// would make the seconds of a level depend on the levels before it.
     ///
     /// # Errors
     /// [`SimplifyError::Unsupported`] when the method has no such level,
@@ -128,7 +98,7 @@ pub trait Simplification: Send {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError>;
 }
 
-/// A closure is enough where a method needs no helper beside [`Simplification::at`].
+/// A closure is enough where a method needs no helper besides [`Simplification::at`].
 impl<F> Simplification for F
 where
     F: FnMut(Level) -> Result<Simplified, SimplifyError> + Send,
@@ -148,9 +118,6 @@ pub enum Level {
     Spheres(usize),
     /// The method's own scalar, in the unit that [`MethodInfo::native`] names.
     Native(f64),
-    /// As few spheres as keep the symmetric Hausdorff error within this fraction of the diagonal.
-    /// For methods that do not do this of themselves, a harness searches among their other levels.
-    MaxError(f64),
 }
 
 impl fmt::Display for Level {
@@ -159,50 +126,29 @@ impl fmt::Display for Level {
             Self::Published => write!(f, "published"),
             Self::Spheres(count) => write!(f, "{count} spheres"),
             Self::Native(value) => write!(f, "level {value}"),
-            Self::MaxError(bound) => write!(f, "at most {} % error", percent(*bound)),
         }
     }
 }
 
-/// A fraction as a percentage, without the digits that the multiplication adds.
-fn percent(fraction: f64) -> f64 {
-    (fraction * 1e12).round() / 1e10
-}
-
-/// A simplified medial mesh and what is to be known of it.
+/// A simplified medial mesh with its diagnostics.
 #[derive(Clone, Debug)]
 pub struct Simplified {
     /// The medial mesh, in normalised units, in canonical form.
     pub mesh: MedialMesh,
-    /// The level that was asked.
+    /// The requested level.
     pub asked: Level,
     /// The native level that was used to meet the request, where the method has one.
     pub native_level: Option<f64>,
-    /// Whether this level was reached by going on from the previous one.
-    pub work: Work,
-    /// Why fewer or more spheres than asked were returned, rejected collapses, and the like.
+    /// Why the count differs from the requested one, rejected collapses, and the like.
     pub diagnostics: Diagnostics,
-    /// What only some methods have; [`MethodInfo::extras`] announces it.
+    /// Results that only some methods have; [`MethodInfo::extras`] announces them.
     pub extras: Extras,
 }
 
 impl Simplified {
-    /// A medial mesh made anew for a level, with nothing else to say of it.
+    /// A medial mesh without native level, diagnostics and extras.
     pub fn new(mesh: MedialMesh, asked: Level) -> Self {
         let (diagnostics, extras) = (Diagnostics::default(), Extras::default());
-        Self { mesh, asked, native_level: None, work: Work::Anew, diagnostics, extras }
+        Self { mesh, asked, native_level: None, diagnostics, extras }
     }
-}
-
-/// How the work of one level relates to earlier levels; decides what counts into its seconds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Work {
-    /// All of it was done for this level: its seconds are those of this call.
-    Anew,
-    /// It went on from the previous call: its seconds add to those.
-    Continued,
-    /// Parts of it had been done for earlier calls: what these cost then adds to the seconds of
-    /// this call.
-    Reused(Cost),
 }

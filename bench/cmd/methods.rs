@@ -1,7 +1,6 @@
 //! `medial methods [ID]`: lists the methods, or describes one.
 
 use clap::Args;
-use medial::simplifier::{MedialSimplifier, MethodInfo};
 use serde_json::json;
 
 use crate::args::Global;
@@ -21,21 +20,20 @@ pub struct Arguments {
 /// # Errors
 /// When no method has the id.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
-    let all = registry.entries();
-    let wanted = |info: &MethodInfo| arguments.id.as_ref().is_none_or(|id| info.id == *id);
-    let infos: Vec<&MethodInfo> =
-        all.iter().map(|entry| entry.method().info()).filter(|i| wanted(i)).collect();
-    if let (Some(id), true) = (&arguments.id, infos.is_empty()) {
+    let wanted = |entry: &&Entry| arguments.id.as_ref().is_none_or(|id| entry.id() == *id);
+    let entries: Vec<&Entry> = registry.entries().iter().filter(wanted).collect();
+    if let (Some(id), true) = (&arguments.id, entries.is_empty()) {
         return Err(unknown_method(registry, id));
     }
     if global.json {
-        print_json(&json!({ "methods": infos }), &[]);
+        print_json(&json!({ "methods": entries }), &[]);
     } else if arguments.id.is_some() {
-        infos.into_iter().for_each(describe);
+        entries.into_iter().for_each(describe);
     } else {
-        let width = infos.iter().map(|info| info.id.len()).max().unwrap_or_default();
-        for info in infos {
-            let note = if info.on_request { " (runs where it is named)" } else { "" };
+        let width = entries.iter().map(|entry| entry.id().len()).max().unwrap_or_default();
+        for entry in entries {
+            let note = if entry.presentation().on_request { " (runs only when named)" } else { "" };
+            let info = entry.method().info();
             print_line(&format!("{:<width$} {}{note}", info.id, info.title));
             print_line(&format!("{:<width$} {}", "", info.summary));
         }
@@ -47,8 +45,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
 ///
 /// # Errors
 /// When no method has it; those that exist are named.
-pub fn method<'r>(registry: &'r Registry, id: &str) -> Result<&'r dyn MedialSimplifier, Failure> {
-    registry.entry(id).map(Entry::method).ok_or_else(|| unknown_method(registry, id))
+pub fn method<'r>(registry: &'r Registry, id: &str) -> Result<&'r Entry, Failure> {
+    registry.entry(id).ok_or_else(|| unknown_method(registry, id))
 }
 
 /// The failure for an id that no method has, naming those that exist.
@@ -57,11 +55,12 @@ fn unknown_method(registry: &Registry, id: &str) -> Failure {
     Failure::usage(no_such_method(id, &known))
 }
 
-fn describe(info: &MethodInfo) {
+fn describe(entry: &Entry) {
+    let (info, best_for) = (entry.method().info(), &entry.presentation().best_for);
     print_line(&format!("{}: {}", info.id, info.title));
     print_line(&format!("  {}", info.summary));
-    if !info.home.is_empty() {
-        print_line(&format!("  at home: {}", info.home));
+    if !best_for.is_empty() {
+        print_line(&format!("  best for: {best_for}"));
     }
     print_line(&format!("  source: {}", info.citation));
     match &info.native {

@@ -153,7 +153,7 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
     let ids = records.iter().map(|record| record.simplify.method.as_str());
     let ids: BTreeSet<&str> = ids.collect();
     for entry in ids.into_iter().filter_map(|id| registry.entry(id)) {
-        let note = entry.method().info().into();
+        let note = medial_reports::MethodNote::new(entry.method().info(), entry.presentation());
         match header.methods.iter_mut().find(|known| known.id == entry.id()) {
             Some(known) => *known = note,
             None => header.methods.push(note),

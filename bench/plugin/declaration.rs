@@ -75,13 +75,12 @@ pub(super) enum LevelKind {
 }
 
 impl LevelKind {
-    /// The kind of a level; `None` for an error bound, which is searched for by other levels.
-    pub fn of(level: Level) -> Option<Self> {
+    /// The kind of a level.
+    pub fn of(level: Level) -> Self {
         match level {
-            Level::Spheres(_) => Some(Self::Spheres),
-            Level::Native(_) => Some(Self::Native),
-            Level::Published => Some(Self::Published),
-            Level::MaxError(_) => None,
+            Level::Spheres(_) => Self::Spheres,
+            Level::Native(_) => Self::Native,
+            Level::Published => Self::Published,
         }
     }
 

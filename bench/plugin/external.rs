@@ -176,7 +176,7 @@ impl Simplification for Prepared<'_> {
 
 impl Prepared<'_> {
     fn check(&self, level: Level) -> Result<(), SimplifyError> {
-        if !LevelKind::of(level).is_some_and(|kind| self.levels.contains(&kind)) {
+        if !self.levels.contains(&LevelKind::of(level)) {
             let known: Vec<&str> = self.levels.iter().map(|kind| kind.name()).collect();
             let why = format!(
                 "the plug-in {} is not asked for {level}: its levels are {}",

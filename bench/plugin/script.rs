@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 
-use medial::simplifier::MedialSimplifier;
+use medial::simplifier::Registered;
 use sha2::{Digest, Sha256};
 
 use super::declaration::is_id;
@@ -22,13 +22,13 @@ pub trait ScriptLoader: Send + Sync {
     ///
     /// # Errors
     /// When the file cannot be loaded or has no method: why, in a sentence.
-    fn load(&self, path: &Path) -> Result<Vec<Box<dyn MedialSimplifier>>, String>;
+    fn load(&self, path: &Path) -> Result<Vec<Registered>, String>;
 }
 
 /// A method of a file of classes, and the SHA-256 of that file: an edited class is not taken for the old one.
 pub struct ScriptMethod {
     /// The method.
-    pub method: Box<dyn MedialSimplifier>,
+    pub method: Registered,
     /// The hash.
     pub fingerprint: String,
 }
@@ -57,7 +57,7 @@ pub fn load_script(
     }
     let mut ids: Vec<&str> = taken.to_vec();
     for method in &methods {
-        let id = &*method.info().id;
+        let id = &*method.method.info().id;
         if !is_id(id) {
             return Err(refuse(PluginFault::Id(id.to_owned())));
         }
@@ -83,7 +83,7 @@ mod tests {
     struct Ids(&'static [&'static str]);
 
     impl ScriptLoader for Ids {
-        fn load(&self, _: &Path) -> Result<Vec<Box<dyn MedialSimplifier>>, String> {
+        fn load(&self, _: &Path) -> Result<Vec<Registered>, String> {
             fn prepare<'s>(
                 _: &'s Shape,
                 _: NoParams,
@@ -91,8 +91,8 @@ mod tests {
             ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
                 Err(SimplifyError::unsupported("never asked here"))
             }
-            let method = |id: &&'static str| -> Box<dyn MedialSimplifier> {
-                Box::new(Method::new(MethodInfo::new(*id, "A class"), prepare))
+            let method = |id: &&'static str| {
+                Registered::from(Method::new(MethodInfo::new(*id, "A class"), prepare))
             };
             match self.0 {
                 ["?"] => Err("SyntaxError: line 1".to_owned()),

@@ -9,14 +9,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use medial::heap::Usage;
 use medial::shape::{Cost, Shape, Substrate};
-use medial::simplifier::{Level, Simplification, Simplified, SimplifyError, Work};
-use medial_reports::{Stages, Status};
+use medial::simplifier::{Level, MethodInfo, Simplification, Simplified, SimplifyError};
+use medial_reports::{Stages, Status, Target};
 use serde::{Deserialize, Serialize};
 
 /// The outcome of one level.
 pub struct LevelRun {
-    /// The level that was asked.
-    pub level: Level,
+    /// The target of the run.
+    pub level: Target,
     /// The result, or why there is none.
     pub outcome: Result<Simplified, Fault>,
     /// The cost of the level, and of the substrates that it used.
@@ -90,30 +90,75 @@ fn speaks_of_memory(why: &str) -> bool {
     words.iter().chain(&more).any(|word| why.contains(word))
 }
 
-/// Starts a simplification on a view of a shape and asks it for every level, from fine to coarse.
-/// `on_level` is called with each level before it is asked.
+/// Starts a simplification on a view of a shape and computes every level, given from fine to coarse
+/// within each kind. `on_level` gets each level before it is computed.
 ///
-/// The view must be fresh: the answer lists as used everything that was used through it.
+/// The seconds of a level are those of its call alone. Where `info` declares the method incremental,
+/// they are those of all calls since the preparation; levels of another kind, and a finer level after
+/// a coarser one, then get a preparation of their own, because they cannot continue.
+///
+/// The view must be fresh: everything that was used through it is listed as used.
 pub fn answer<'s>(
     view: &Shape,
+    info: &MethodInfo,
+    start: impl Fn() -> Result<Box<dyn Simplification + 's>, SimplifyError>,
+    levels: &[Level],
+    on_level: impl Fn(Level),
+) -> Vec<LevelRun> {
+    let mut runs = Vec::new();
+    let mut rest = levels;
+    while let Some(&first) = rest.first() {
+        let mut previous = first;
+        let count = 1 + rest[1..]
+            .iter()
+            .take_while(|&&next| {
+                let goes_on = !info.incremental || continues(info, previous, next);
+                previous = next;
+                goes_on
+            })
+            .count();
+        let (together, others) = rest.split_at(count);
+        runs.extend(of_one_preparation(view, info.incremental, &start, together, &on_level));
+        rest = others;
+    }
+    runs
+}
+
+/// Whether a level can continue from another: one of the same kind that is no finer.
+fn continues(info: &MethodInfo, previous: Level, next: Level) -> bool {
+    match (previous, next) {
+        (Level::Spheres(before), Level::Spheres(count)) => count <= before,
+        (Level::Native(before), Level::Native(value)) => match &info.native {
+            Some(native) if native.larger_is_coarser => value >= before,
+            _ => value <= before,
+        },
+        _ => false,
+    }
+}
+
+/// Prepares once and computes all levels.
+fn of_one_preparation<'s>(
+    view: &Shape,
+    is_incremental: bool,
     start: impl FnOnce() -> Result<Box<dyn Simplification + 's>, SimplifyError>,
     levels: &[Level],
-    mut on_level: impl FnMut(Level),
+    on_level: impl Fn(Level),
 ) -> Vec<LevelRun> {
+    let before = view.spent();
     let (started, mut prepare) = Cost::of(|| guarded(start));
     // Substrates are shared between methods, so building them here is not the method's own work.
     let built = view.spent();
-    prepare.seconds = (prepare.seconds - built.seconds).max(0.0);
-    prepare.cpu_seconds = (prepare.cpu_seconds - built.cpu_seconds).max(0.0);
+    prepare.seconds = (prepare.seconds - (built.seconds - before.seconds)).max(0.0);
+    prepare.cpu_seconds = (prepare.cpu_seconds - (built.cpu_seconds - before.cpu_seconds)).max(0.0);
     // Substrates built here are still live; they are counted with those that were found.
-    prepare.usage = without(prepare.usage, built.usage);
-    let mut clock =
-        Clock { view, prepare, so_far: Cost::default(), held: prepare.usage.held_bytes };
+    prepare.usage = without(prepare.usage, without(built.usage, before.usage));
+    let held = prepare.usage.held_bytes;
+    let mut clock = Clock { view, is_incremental, prepare, so_far: Cost::default(), held };
     let mut simplification = match started {
         Ok(simplification) => simplification,
         Err(fault) => {
             let failed = |&level: &Level| LevelRun {
-                level,
+                level: level.into(),
                 outcome: Err(fault.clone()),
                 times: clock.times(),
             };
@@ -122,25 +167,27 @@ pub fn answer<'s>(
     };
     let mut broken: Option<Fault> = None;
     let ask = |&level: &Level| {
+        let target = level.into();
         if let Some(fault) = &broken {
-            return LevelRun { level, outcome: Err(fault.clone()), times: clock.times() };
+            return LevelRun { level: target, outcome: Err(fault.clone()), times: clock.times() };
         }
         on_level(level);
         let (outcome, lap) = Cost::of(|| guarded(|| simplification.at(level)));
-        clock.add(lap, outcome.as_ref().map_or(Work::Anew, |simplified| simplified.work));
+        clock.add(lap);
         let outcome = outcome.and_then(checked);
         if matches!(&outcome, Err(fault) if fault.status == Status::Panicked) {
             let reason = format!("not run: the method panicked at {level}");
             broken = Some(Fault { status: Status::Panicked, reason });
         }
-        LevelRun { level, outcome, times: clock.times() }
+        LevelRun { level: target, outcome, times: clock.times() }
     };
     levels.iter().map(ask).collect()
 }
 
-/// Adds up the costs of levels, as if each had been asked alone.
+/// The costs of levels, each as if it had been computed alone.
 struct Clock<'s> {
     view: &'s Shape,
+    is_incremental: bool,
     prepare: Cost,
     so_far: Cost,
     /// Live bytes of the method itself when the next level begins.
@@ -148,24 +195,17 @@ struct Clock<'s> {
 }
 
 impl Clock<'_> {
-    fn add(&mut self, lap: Cost, work: Work) {
+    fn add(&mut self, lap: Cost) {
         let peak = self.held + lap.usage.peak_bytes;
         self.held += lap.usage.held_bytes;
-        match work {
-            Work::Continued => {
-                self.so_far.seconds += lap.seconds;
-                self.so_far.cpu_seconds += lap.cpu_seconds;
-                self.so_far.usage.peak_bytes = self.so_far.usage.peak_bytes.max(peak);
-                return;
-            }
-            Work::Anew => self.so_far = lap,
-            Work::Reused(earlier) => {
-                self.so_far = lap;
-                self.so_far.seconds += earlier.seconds;
-                self.so_far.cpu_seconds += earlier.cpu_seconds;
-            }
+        if self.is_incremental {
+            self.so_far.seconds += lap.seconds;
+            self.so_far.cpu_seconds += lap.cpu_seconds;
+            self.so_far.usage.peak_bytes = self.so_far.usage.peak_bytes.max(peak);
+        } else {
+            self.so_far = lap;
+            self.so_far.usage.peak_bytes = peak;
         }
-        self.so_far.usage.peak_bytes = peak;
     }
 
     fn times(&self) -> Times {

@@ -2,7 +2,7 @@
 
 use medial::shape::Shape;
 use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
-use medial_reports::Status;
+use medial_reports::{Status, Target};
 
 use super::answer::guarded;
 use super::search::{Measure, Search};
@@ -18,12 +18,14 @@ pub struct Bounds<'a> {
     pub shape: &'a Shape,
     /// The description of the method.
     pub info: &'a MethodInfo,
+    /// Native levels of its default comparison.
+    pub sweep: &'a [f64],
     /// Starts the method.
     pub prepare: &'a Prepare<'a>,
     /// Measures results.
     pub measure: &'a Measure<'a>,
-    /// Is told each bound before it is searched for.
-    pub searching: &'a dyn Fn(Level),
+    /// Gets each bound before the search for it.
+    pub searching: &'a dyn Fn(Target),
 }
 
 impl Bounds<'_> {
@@ -40,11 +42,11 @@ impl Bounds<'_> {
         let view = self.shape.view();
         let mut runs = match levels.is_empty() {
             true => Vec::new(),
-            false => answer(&view, || (self.prepare)(&view), &levels, |_| {}),
+            false => answer(&view, self.info, || (self.prepare)(&view), &levels, |_| {}),
         }
         .into_iter();
         let run = |(&bound, found): (&f64, Result<Level, Fault>)| {
-            let level = Level::MaxError(bound);
+            let level = Target::MaxError(bound);
             match found {
                 Ok(_) => LevelRun { level, ..runs.next().expect("one for each level") },
                 Err(fault) => LevelRun { level, outcome: Err(fault), times: Times::default() },
@@ -59,11 +61,11 @@ impl Bounds<'_> {
         let most = view.initial()?.spheres.len();
         let mut simplification = (self.prepare)(&view)?;
         let mut search =
-            Search::new(simplification.as_mut(), self.info, most, self.measure, &|_| {});
+            Search::new(simplification.as_mut(), self.sweep, most, self.measure, &|_| {});
         let mut found = Vec::new();
         // The loosest bound first: the levels tried for it help the others.
         for &bound in bounds.iter().rev() {
-            (self.searching)(Level::MaxError(bound));
+            (self.searching)(Target::MaxError(bound));
             let result = search.within(bound)?;
             found.push(result.within.map(|probe| probe.level).ok_or_else(|| Fault {
                 status: Status::BoundMissed,

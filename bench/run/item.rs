@@ -10,8 +10,9 @@ use std::time::Duration;
 use medial::complex::DualTriangulation;
 use medial::metrics::JudgeOptions;
 use medial::shape::ShapeOptions;
-use medial::simplifier::{Level, Params};
+use medial::simplifier::Params;
 use medial::surface::Sampling;
+use medial_reports::Target;
 use serde::{Deserialize, Serialize};
 
 use super::{Source, hex_digest};
@@ -25,7 +26,7 @@ pub struct Item {
     /// The method.
     pub method: MethodSpec,
     /// Levels, from fine to coarse.
-    pub levels: Vec<Level>,
+    pub levels: Vec<Target>,
     /// Seed of the method's random choices.
     pub seed: u64,
     /// How often each level is timed, at least once.
@@ -138,7 +139,7 @@ pub struct Limits {
 impl Item {
     /// The key of one level: equal for equal work. Limits and the number of repetitions are not in
     /// it, since a result that came in time is the same under any.
-    pub fn key(&self, level: Level) -> String {
+    pub fn key(&self, level: Target) -> String {
         self.keys_of(&[level]).remove(0)
     }
 
@@ -147,7 +148,7 @@ impl Item {
         self.keys_of(&self.levels)
     }
 
-    fn keys_of(&self, levels: &[Level]) -> Vec<String> {
+    fn keys_of(&self, levels: &[Target]) -> Vec<String> {
         // Parameters in the order of their names, however they were given.
         let params: std::collections::BTreeMap<_, _> = self.method.params.0.iter().collect();
         let source = match &self.scene.source {
@@ -161,7 +162,7 @@ impl Item {
         let scene = (mesh, source, hash, scaled, displaced, noise, sampling, dual, measure);
         let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.binary);
         let common = serde_json::to_string(&rest).expect("plain data");
-        let key = |level: &Level| {
+        let key = |level: &Target| {
             let level = serde_json::to_string(level).expect("plain data");
             hex_digest(format!("{common}\n{level}").as_bytes())
         };
@@ -261,7 +262,7 @@ mod tests {
                 params: Params::none(),
                 fingerprint: None,
             },
-            levels: vec![Level::Spheres(100), Level::Native(0.1), Level::Published],
+            levels: vec![Target::Spheres(100), Target::Native(0.1), Target::Published],
             seed: 0,
             repeat: 1,
             threads: 2,
@@ -275,7 +276,7 @@ mod tests {
         let key = |change: fn(&mut Item)| {
             let mut changed = item();
             change(&mut changed);
-            changed.key(Level::Spheres(100))
+            changed.key(Target::Spheres(100))
         };
         let plain = key(|_| ());
         let same: [fn(&mut Item); 4] = [

@@ -6,8 +6,7 @@
 use std::io::{self, Read, Write};
 use std::path::PathBuf;
 
-use medial::simplifier::Level;
-use medial_reports::Repetition;
+use medial_reports::{Repetition, Target};
 use serde::{Deserialize, Serialize};
 
 use crate::check::Outcome;
@@ -87,9 +86,9 @@ pub enum Event {
     /// The input is ready, its SHA-256; the method prepares.
     Preparing(String),
     /// The method is asked for a level.
-    Asked(Level),
+    Asked(Target),
     /// The search for the fewest spheres within a bound begins; it is not timed as the method's work.
-    Searching(Level),
+    Searching(Target),
     /// The results are being measured.
     Measuring,
     /// The input is refused: why.
@@ -99,7 +98,7 @@ pub enum Event {
     /// The record of a level.
     Record(Box<Kept>),
     /// The times of a repetition of a level, and a hash of its result.
-    Repeated(Level, Result<(Repetition, String), Fault>),
+    Repeated(Target, Result<(Repetition, String), Fault>),
     /// A case of the conformance corpus has reached this step.
     Doing(String),
     /// How the case ended.

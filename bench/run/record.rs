@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use medial::complex;
-use medial::simplifier::{Level, Simplified};
+use medial::simplifier::Simplified;
 use medial_reports::{
-    AxisShift, Conditions, Record, Repetition, Simplify, Stages, Status, file_stem,
+    AxisShift, Conditions, Record, Repetition, Simplify, Stages, Status, Target, file_stem,
 };
 use serde::{Deserialize, Serialize};
 
@@ -37,7 +37,12 @@ pub struct NoisePart {
 }
 
 /// The record of a level that was not run, or did not finish.
-pub fn failure_record(item: &Item, level: Level, fault: &Fault, provenance: &Provenance) -> Record {
+pub fn failure_record(
+    item: &Item,
+    level: Target,
+    fault: &Fault,
+    provenance: &Provenance,
+) -> Record {
     let Fault { status, reason } = fault;
     let simplify = Simplify {
         variant: item.method.name.clone(),
@@ -125,7 +130,7 @@ pub fn record(
         match evaluation {
             Some(Ok(evaluation)) => {
                 // The level found by a search was run again: only the error of this run counts.
-                if let Level::MaxError(bound) = run.level
+                if let Target::MaxError(bound) = run.level
                     && evaluation.distances.hausdorff > bound
                 {
                     let error = evaluation.distances.hausdorff;
@@ -176,10 +181,10 @@ pub fn fill_result(simplify: &mut Simplify, result: &Simplified) {
 }
 
 /// `ok`, or the fault of a result with another count than the requested one.
-fn count_fault(level: Level, result: &Simplified) -> Fault {
+fn count_fault(level: Target, result: &Simplified) -> Fault {
     let reached = result.mesh.spheres.len();
     match level {
-        Level::Spheres(asked)
+        Target::Spheres(asked)
             if reached.abs_diff(asked) as f64 > COUNT_TOLERANCE * asked as f64 =>
         {
             let why = result.diagnostics.warnings.join("; ");
@@ -211,10 +216,10 @@ fn save(
     axes: &Path,
 ) -> Result<String, Box<dyn std::error::Error>> {
     let level = match record.simplify.level {
-        Level::Published => "published".to_owned(),
-        Level::Spheres(count) => count.to_string(),
-        Level::Native(value) => format!("level-{value}"),
-        Level::MaxError(bound) => format!("error-{bound}"),
+        Target::Published => "published".to_owned(),
+        Target::Spheres(count) => count.to_string(),
+        Target::Native(value) => format!("level-{value}"),
+        Target::MaxError(bound) => format!("error-{bound}"),
     };
     let mesh = file_stem(&record.mesh);
     let method = file_stem(record.simplify.variant.as_ref().unwrap_or(&record.simplify.method));

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use medial::simplifier::{Chain, MedialSimplifier};
+use medial::simplifier::{Chain, Level, MedialSimplifier, MethodInfo, Presentation, Registered};
 
 use medial_methods::initial;
+use serde::{Serialize, Serializer};
 
 use super::given;
 use crate::plugin::{self, PluginError, ScriptLoader, ScriptMethod};
@@ -26,10 +27,26 @@ pub struct Registry {
     loader: Option<Box<dyn ScriptLoader>>,
 }
 
-/// A method, and for a plug-in a hash of its files.
+/// A method, its presentation, and for a plug-in a hash of its files.
 pub struct Entry {
     method: Arc<dyn MedialSimplifier>,
+    presentation: Presentation,
     fingerprint: Option<String>,
+}
+
+/// The description and the presentation as one object.
+impl Serialize for Entry {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Described<'a> {
+            #[serde(flatten)]
+            info: &'a MethodInfo,
+            #[serde(flatten)]
+            presentation: &'a Presentation,
+        }
+        let (info, presentation) = (self.method.info(), &self.presentation);
+        Described { info, presentation }.serialize(to)
+    }
 }
 
 impl Entry {
@@ -38,14 +55,25 @@ impl Entry {
         self.method.as_ref()
     }
 
+    /// How it is presented.
+    pub fn presentation(&self) -> &Presentation {
+        &self.presentation
+    }
+
+    fn new(registered: Registered, fingerprint: Option<String>) -> Self {
+        let Registered { method, presentation } = registered;
+        Self { method: method.into(), presentation, fingerprint }
+    }
+
     fn chain(first: &Self, then: &Self) -> Self {
-        let method = Arc::new(Chain::new(Arc::clone(&first.method), Arc::clone(&then.method)));
+        let filter = first.presentation.filter.unwrap_or(Level::Published);
+        let chain = Chain::new(Arc::clone(&first.method), filter, Arc::clone(&then.method));
         let parts = [&first.fingerprint, &then.fingerprint];
         let fingerprint = parts
             .iter()
             .any(|part| part.is_some())
             .then(|| parts.map(|part| part.as_deref().unwrap_or("built in")).join(" + "));
-        Self { method, fingerprint }
+        Self::new(Registered::from(chain).sweep(&then.presentation.sweep), fingerprint)
     }
 
     /// Its id.
@@ -76,17 +104,17 @@ impl Registry {
     ///
     /// # Errors
     /// [`RegistryError::Duplicate`] when two have one id.
-    pub fn new(methods: Vec<Box<dyn MedialSimplifier>>) -> Result<Self, RegistryError> {
-        let initial = Entry { method: Arc::new(initial::method()), fingerprint: None };
-        let given = Entry { method: Arc::new(given::method()), fingerprint: None };
+    pub fn new(methods: Vec<Registered>) -> Result<Self, RegistryError> {
+        let initial = Entry::new(initial::method().into(), None);
+        let given = Entry::new(given::method().into(), None);
         let (entries, others) = (Vec::new(), vec![initial, given]);
         let mut registry = Self { entries, others, files: Vec::new(), loader: None };
-        for method in methods {
-            let id = &method.info().id;
+        for registered in methods {
+            let id = &registered.method.info().id;
             if registry.entry(id).is_some() {
                 return Err(RegistryError::Duplicate(id.clone().into_owned()));
             }
-            registry.add(Entry { method: method.into(), fingerprint: None });
+            registry.add(Entry::new(registered, None));
         }
         Ok(registry)
     }
@@ -108,16 +136,14 @@ impl Registry {
         }
         let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
         let new: Vec<Entry> = if plugin::is_script(&file) {
-            let entry = |ScriptMethod { method, fingerprint }| Entry {
-                method: method.into(),
-                fingerprint: Some(fingerprint),
-            };
+            let entry =
+                |ScriptMethod { method, fingerprint }| Entry::new(method, Some(fingerprint));
             let methods = plugin::load_script(&file, self.loader.as_deref(), &taken)?;
             methods.into_iter().map(entry).collect()
         } else {
             let entry = |external: plugin::External| {
                 let fingerprint = Some(external.fingerprint().to_owned());
-                Entry { method: Arc::new(external), fingerprint }
+                Entry::new(external.into(), fingerprint)
             };
             plugin::load(&file, &taken)?.into_iter().map(entry).collect()
         };
@@ -147,7 +173,7 @@ impl Registry {
 
     /// The methods that run where none is named: all but those on request.
     pub fn usual(&self) -> impl Iterator<Item = &Entry> {
-        self.entries.iter().filter(|entry| !entry.method().info().on_request)
+        self.entries.iter().filter(|entry| !entry.presentation.on_request)
     }
 
     /// The plug-in files that were added.

@@ -6,7 +6,7 @@ use medial::complex::MedialMesh;
 use medial::metrics::{AxisOptions, Judge, axis_distance};
 use medial::shape::Shape;
 use medial::surface::{self, SurfaceReport, TriMesh};
-use medial_reports::{AxisShift, Initial};
+use medial_reports::{AxisShift, Initial, Target};
 
 use super::{Input, Measure, MethodSpec, Noise, SceneSpec};
 
@@ -181,7 +181,7 @@ impl SceneSpec {
 }
 
 /// Under which name a result without noise is kept.
-pub fn reference_key(method: &MethodSpec, seed: u64, level: medial::simplifier::Level) -> String {
+pub fn reference_key(method: &MethodSpec, seed: u64, level: Target) -> String {
     serde_json::to_string(&(method, seed, level)).expect("plain data")
 }
 

@@ -14,7 +14,7 @@
 //! The level found is within the bound; a coarser one that happens to be within it can be missed.
 
 use medial::complex::MedialMesh;
-use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
+use medial::simplifier::{Level, Simplification, SimplifyError};
 
 /// Counts tried at first.
 const COUNTS: usize = 7;
@@ -66,11 +66,11 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search among counts from `most` on and the levels that `info` names. `trying` is told each
-    /// level before it is tried.
+    /// A search among counts from `most` on and the native levels of `sweep`. `trying` gets each level
+    /// before it is tried.
     pub fn new(
         simplification: &'a mut dyn Simplification,
-        info: &MethodInfo,
+        sweep: &[f64],
         most: usize,
         measure: &'a Measure<'a>,
         trying: &'a dyn Fn(Level),
@@ -81,7 +81,7 @@ impl<'a> Search<'a> {
             .map(count)
             .filter(|&count| count >= most.min(MIN_SPHERES as usize))
             .collect();
-        let sweep = info.sweep.iter().copied().map(Level::Native);
+        let sweep = sweep.iter().copied().map(Level::Native);
         let own = sweep.chain([Level::Published]).collect();
         let (probes, tried, refusal) = (Vec::new(), 0, None);
         Self { simplification, measure, trying, probes, tried, refusal, counts, own }
@@ -226,9 +226,8 @@ mod tests {
             let mesh = MedialMesh { spheres, ..MedialMesh::default() };
             Ok(Simplified::new(mesh, level))
         };
-        let info = MethodInfo::new("made-up", "Made up").sweep(&[1.0, 2.0, 4.0, 8.0]);
         let measure = |mesh: &MedialMesh| Ok(error(mesh.spheres.len()));
-        let mut search = Search::new(&mut method, &info, most, &measure, &|_| {});
+        let mut search = Search::new(&mut method, &[1.0, 2.0, 4.0, 8.0], most, &measure, &|_| {});
         search.within(bound).expect("some level has a result")
     }
 

@@ -188,33 +188,32 @@ fn answer_item(registry: &Registry, item: &Item, scene: &Scene, shape: &Shape) -
         Ok(entry) => entry.method().prepare(view, &item.method.params, &context),
         Err(why) => Err(SimplifyError::Failed(why.clone())),
     });
-    let bound = |level: &Level| match level {
-        Level::MaxError(bound) => Some(*bound),
-        _ => None,
-    };
-    let levels: Vec<Level> = item.levels.iter().copied().filter(|l| bound(l).is_none()).collect();
-    let bounds: Vec<f64> = item.levels.iter().filter_map(bound).collect();
+    let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
+    let bounds: Vec<f64> = item.levels.iter().filter_map(|target| target.level().err()).collect();
+    let unknown = MethodInfo::default();
+    let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
     // The supervisor notices by itself when the pipe is closed.
     let view = shape.view();
     let mut runs = answer(
         &view,
+        info,
         || prepare(&view),
         &levels,
         |level| {
-            let _ = send(&Event::Asked(level));
+            let _ = send(&Event::Asked(level.into()));
         },
     );
     let measure = |mesh: &MedialMesh| {
         let distances = scene.judge.distances(&scene.carried(mesh));
         distances.map(|distances| distances.hausdorff).map_err(|error| error.to_string())
     };
-    let unknown = MethodInfo::default();
     let search = Bounds {
         shape,
-        info: entry.as_ref().map_or(&unknown, |entry| entry.method().info()),
+        info,
+        sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation().sweep),
         prepare: &prepare,
         measure: &measure,
-        searching: &|level| drop(send(&Event::Searching(level))),
+        searching: &|bound| drop(send(&Event::Searching(bound))),
     };
     runs.extend(search.answer(&bounds));
     runs

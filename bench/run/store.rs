@@ -10,8 +10,7 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
-use medial::simplifier::Level;
-use medial_reports::{Journal, JournalError, Record, Status, read_records};
+use medial_reports::{Journal, JournalError, Record, Status, Target, read_records};
 use serde::{Deserialize, Serialize};
 
 use super::Item;
@@ -169,7 +168,7 @@ impl Store {
 
     /// The levels of an item that have to be run: levels without a record, levels that were ended by a
     /// limit that is larger now, and failed levels if failures are to be retried.
-    pub fn missing(&self, item: &Item, failures: Failures) -> Vec<Level> {
+    pub fn missing(&self, item: &Item, failures: Failures) -> Vec<Target> {
         let missing = |key: &String| match self.known.get(key) {
             None => true,
             Some(known) => known.is_incomplete(item, failures),

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use medial::simplifier::Level;
-use medial_reports::{Record, Repetition, Status};
+use medial_reports::{Record, Repetition, Status, Target};
 
 use crate::check::Outcome;
 
@@ -56,7 +55,7 @@ pub struct Supervisor<'a> {
 }
 
 /// The times of a repetition of a level, and a hash of its result.
-type Repeated = (Level, Result<(Repetition, String), Fault>);
+type Repeated = (Target, Result<(Repetition, String), Fault>);
 
 /// How an attempt at some levels ended.
 enum Attempt {
@@ -113,10 +112,10 @@ impl<'a> Supervisor<'a> {
         while let Some(levels) = groups.pop() {
             let part = Item { levels, ..item.clone() };
             let (attempt, told) = self.attempt(&part)?;
-            let untold = |level: &&Level| told.iter().all(|k| k.record.simplify.level != **level);
-            let missing: Vec<Level> = part.levels.iter().filter(untold).copied().collect();
+            let untold = |level: &&Target| told.iter().all(|k| k.record.simplify.level != **level);
+            let missing: Vec<Target> = part.levels.iter().filter(untold).copied().collect();
             kept.extend(told);
-            let mut fail = |levels: &[Level], fault: &Fault| {
+            let mut fail = |levels: &[Target], fault: &Fault| {
                 kept.extend(levels.iter().map(|&level| self.failed(item, level, fault)));
             };
             match attempt {
@@ -213,7 +212,7 @@ impl<'a> Supervisor<'a> {
         Ok(outcome)
     }
 
-    fn failed(&self, item: &Item, level: Level, fault: &Fault) -> Kept {
+    fn failed(&self, item: &Item, level: Target, fault: &Fault) -> Kept {
         let noise =
             item.scene.noise.map(|_| super::record::NoisePart { growth: None, shift: None });
         let mut record = failure_record(item, level, fault, &self.provenance);

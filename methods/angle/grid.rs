@@ -21,7 +21,7 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, RunContext, Simplification, Simplified, SimplifyError, Work,
+    Diagnostics, Extras, Level, RunContext, Simplification, Simplified, SimplifyError,
 };
 use medial::surface::TriangleBvh;
 use medial::surface::{InsideTest, Side};
@@ -298,7 +298,6 @@ impl Simplification for Faces {
             mesh,
             asked: level,
             native_level: Some(native),
-            work: Work::Anew,
             diagnostics,
             extras: Extras::default(),
         })

@@ -41,7 +41,7 @@ use medial::Vec3;
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, RunContext, Simplification, Simplified, SimplifyError, Work,
+    Diagnostics, Extras, Level, RunContext, Simplification, Simplified, SimplifyError,
 };
 use rayon::prelude::*;
 
@@ -208,7 +208,6 @@ impl Simplification for Peeled {
             mesh,
             asked: level,
             native_level: Some(native),
-            work: Work::Anew,
             diagnostics,
             extras: Extras::default(),
         })

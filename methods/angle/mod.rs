@@ -21,7 +21,7 @@
 //! - `homotopy` (file `homotopy.rs`): sheets, removed only where that changes no topology (Sud et al.).
 //!
 //! # The published level
-//! The papers choose `theta` for each model. [`Level::Published`] is
+//! The papers choose `theta` for each model. [`Level::Published`](medial::simplifier::Level) is
 //! `theta` = 60 degrees: an object angle of 30, at which the authors' tool of the scale axis (Miklos,
 //! Giesen, Pauly 2010) filters the sheets of its own results. A warning says so.
 //!
@@ -37,7 +37,7 @@ mod vertex;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Level, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
+    Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
@@ -55,7 +55,7 @@ pub struct AngleParams {
     pub resolution: f64,
     /// How a number of spheres is met; for `grid` and `homotopy` only.
     pub size: Size,
-    /// Separation angle, in degrees, of [`Level::Published`], and
+    /// Separation angle, in degrees, of [`Level::Published`](medial::simplifier::Level), and
     /// of a number of spheres that is met by the sampling.
     pub theta: f64,
 }
@@ -174,6 +174,25 @@ fn scale(published: f64) -> Scale {
     Scale { name: "theta", range: 0.0..=180.0, inclusive: false, published }
 }
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@inproceedings{AttaliMontanvert1996,
+  author    = {Attali, Dominique and Montanvert, Annick},
+  title     = {Modeling noise for a better simplification of skeletons},
+  booktitle = {IEEE International Conference on Image Processing},
+  year      = {1996},
+  doi       = {10.1109/ICIP.1996.560357}
+}
+@article{FoskeyLinManocha2003,
+  author  = {Foskey, Mark and Lin, Ming C. and Manocha, Dinesh},
+  title   = {Efficient computation of a simplified medial axis},
+  journal = {Journal of Computing and Information Science in Engineering},
+  volume  = {3},
+  number  = {4},
+  year    = {2003},
+  doi     = {10.1115/1.1631582}
+}";
+
 /// The angle filter as a method.
 pub fn method() -> Method<AngleParams> {
     let info = MethodInfo::new("angle", "Angle filter")
@@ -184,15 +203,9 @@ pub fn method() -> Method<AngleParams> {
              Efficient computation of a simplified medial axis. Journal of Computing and Information \
              Science in Engineering 3(4). https://doi.org/10.1115/1.1631582",
         )
+        .bibtex(BIBTEX)
         .summary("Keeps the spheres whose contact points subtend the largest angles.")
-        .home(
-            "Dense samples, when the axis is to stay where it is and only its spikes go, on \
-             small and large parts alike; not for few spheres, and the topology may break (the \
-             variant homotopy keeps it).",
-        )
         .native(NativeLevel::larger_is_coarser("theta", "degrees of separation angle"))
-        .filter(Level::Published)
-        .sweep(&[20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0])
         .published(
             "theta = 60 degrees (parameter `theta`), an object angle of 30, the sheet filter of the \
              authors' tool of the scale axis; the papers choose theta for each model",

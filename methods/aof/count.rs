@@ -10,10 +10,7 @@
 //!    to the coarsest lattice that has both.
 //! 4. The rest is deleted, simple voxels of the largest flux first.
 //!
-//! The lattices tried depend on the count alone, so that the same count has the same answer, whatever
-//! was asked before. Lattices made before are reused.
-
-use std::sync::Arc;
+//! No lattice is tried twice.
 
 use medial::simplifier::{Diagnostics, SimplifyError};
 
@@ -25,10 +22,6 @@ use super::output::sorted;
 use super::params::Variant;
 use super::solid::{Axis, Solid, betti_of};
 use super::thinning::{Order, thin};
-use crate::reuse::Reuse;
-
-/// Lattices tried by resolution; `None` where the topology or a part of the base is lost.
-pub type Lattices = Reuse<u32, Option<Axis>>;
 
 /// A lattice with at most this share of voxels above the count is not made coarser.
 const ENOUGH: f64 = 1.15;
@@ -51,26 +44,24 @@ impl Solid<'_> {
         &self,
         base: &Base,
         count: usize,
-        lattices: &mut Lattices,
         diagnostics: &mut Diagnostics,
     ) -> Result<Axis, SimplifyError> {
         let angle = self.params().angle;
-        let first = lattices
-            .get(base.resolution, || self.axis(base.resolution, &base.descent, angle).map(Some))?;
+        let first = self.axis(base.resolution, &base.descent, angle)?;
         let mut search = Search {
-            growth: Growth::of(&taken(&first), base.resolution),
+            growth: Growth::of(&first, base.resolution),
             best: first,
             high: base.resolution,
             low: 1,
             tried: 0,
         };
-        if size(&search.best) < count {
-            self.climb(base, count, lattices, &mut search)?;
+        if search.best.len() < count {
+            self.climb(base, count, &mut search)?;
         }
-        if size(&search.best) > count {
-            self.descend_to(base, count, lattices, &mut search)?;
+        if search.best.len() > count {
+            self.descend_to(base, count, &mut search)?;
         }
-        let mut axis = taken(&search.best);
+        let mut axis = search.best;
         if axis.len() < count {
             diagnostics.warn(format!(
                 "{} spheres instead of {count}: the axis has no more voxels at resolution {}, the \
@@ -90,15 +81,9 @@ impl Solid<'_> {
     }
 
     /// Step 2.
-    fn climb(
-        &self,
-        base: &Base,
-        count: usize,
-        lattices: &mut Lattices,
-        search: &mut Search,
-    ) -> Result<(), SimplifyError> {
+    fn climb(&self, base: &Base, count: usize, search: &mut Search) -> Result<(), SimplifyError> {
         let mut at = search.high;
-        while search.tried < MAX_TRIES && size(&search.best) < count {
+        while search.tried < MAX_TRIES && search.best.len() < count {
             let ideal = search.growth.resolution_of(AIM * count as f64);
             // At least a sixteenth finer, so that few tries suffice; at most twice, since estimates
             // from a coarse lattice are poor.
@@ -107,9 +92,11 @@ impl Solid<'_> {
                 break;
             }
             search.tried += 1;
-            let lattice = lattices.get(next, || self.faithful_axis(next, base))?;
-            let (before, found) = (size(&search.best), size(&lattice));
-            if found > before {
+            let lattice = self.faithful_axis(next, base)?;
+            let found = lattice.as_ref().map_or(0, Axis::len);
+            if let Some(lattice) = lattice
+                && found > search.best.len()
+            {
                 search.growth.correct(next, found);
                 (search.low, search.high) = (search.high, next);
                 search.best = lattice;
@@ -127,11 +114,10 @@ impl Solid<'_> {
         &self,
         base: &Base,
         count: usize,
-        lattices: &mut Lattices,
         search: &mut Search,
     ) -> Result<(), SimplifyError> {
         let mut is_lost = false;
-        while search.tried < MAX_TRIES && size(&search.best) as f64 > ENOUGH * count as f64 {
+        while search.tried < MAX_TRIES && search.best.len() as f64 > ENOUGH * count as f64 {
             let Search { low, high, .. } = *search;
             // The bracket is narrow enough, the sooner if its lower end lost the topology.
             if high - low <= 1 + high / if is_lost { 8 } else { 16 } {
@@ -141,21 +127,23 @@ impl Solid<'_> {
             let ideal = search.growth.resolution_of(AIM * count as f64);
             // An estimate outside the bracket has been refuted: bisect.
             let next = if low < ideal && ideal < high { ideal } else { low.midpoint(high) };
-            let lattice = lattices.get(next, || self.faithful_axis(next, base))?;
+            let lattice = self.faithful_axis(next, base)?;
             is_lost |= lattice.is_none();
-            let found = size(&lattice);
+            let found = lattice.as_ref().map_or(0, Axis::len);
             if found > 0 {
                 search.growth.correct(next, found);
             }
-            if found >= count {
-                (search.best, search.high) = (lattice, next);
-            } else {
-                search.low = next;
+            match lattice {
+                Some(lattice) if found >= count => {
+                    (search.best, search.high) = (lattice, next);
+                }
+                _ => search.low = next,
             }
         }
         Ok(())
     }
 
+    /// The axis of a lattice; `None` where the topology or a part of the base is lost.
     fn faithful_axis(&self, resolution: u32, base: &Base) -> Result<Option<Axis>, SimplifyError> {
         let start = self.descend(resolution, self.wanted())?;
         let (topology, base_loss) = (base.topology, base.loss.map_or(0.0, |loss| loss.distance));
@@ -227,20 +215,12 @@ impl Solid<'_> {
 struct Search {
     growth: Growth,
     /// The coarsest with the count, or the finest that was tried.
-    best: Arc<Option<Axis>>,
+    best: Axis,
     /// Its resolution.
     high: u32,
     /// A coarser resolution that has too few voxels, or not the topology.
     low: u32,
     tried: usize,
-}
-
-fn size(lattice: &Option<Axis>) -> usize {
-    lattice.as_ref().map_or(0, Axis::len)
-}
-
-fn taken(lattice: &Option<Axis>) -> Axis {
-    lattice.clone().expect("a lattice with voxels")
 }
 
 fn bricks_of(axis: &Axis) -> Bricks {

@@ -95,8 +95,6 @@ use medial::simplifier::{
 };
 use medial::surface::TriangleBvh;
 
-use count::Lattices;
-
 pub use base::Base;
 pub use bricks::{Bricks, Place, Voxel};
 pub use coarse_to_fine::{Descent, Surface, Tally, Wanted, coarse_to_fine};
@@ -116,6 +114,16 @@ pub use thinning::{Order, is_end_point, thin};
 /// Name of the extra that holds the [`LatticeVoxels`].
 pub const VOXELS: &str = "voxels";
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@inproceedings{StolpnerSiddiqi2006,
+  author    = {Stolpner, Svetlana and Siddiqi, Kaleem},
+  title     = {Revealing Significant Medial Structure in Polyhedral Meshes},
+  booktitle = {International Symposium on 3D Data Processing, Visualization and Transmission (3DPVT)},
+  year      = {2006},
+  doi       = {10.1109/3DPVT.2006.117}
+}";
+
 /// The average outward flux as a method.
 ///
 /// Answers every level, the published one with the paper's parameters where none are set. Cost `O(V N)` closest points for `V` voxels, memory `O(V)`.
@@ -125,18 +133,12 @@ pub fn method() -> Method<AofSettings> {
             "Svetlana Stolpner, Kaleem Siddiqi 2006. Revealing Significant Medial Structure in \
              Polyhedral Meshes. 3DPVT. https://doi.org/10.1109/3DPVT.2006.117",
         )
+        .bibtex(BIBTEX)
         .summary(
             "Keeps the voxels into which the gradient of the distance flows, coarse to fine, \
              straight from the surface.",
         )
-        .home(
-            "Straight from the surface, where its samples give too poor a start: the lattice is \
-             as fine as is asked; for thousands of spheres rather than hundreds.",
-        )
         .native(NativeLevel::larger_is_coarser("alpha", "degrees of object angle"))
-        // The published lattice takes far longer: the one of the other levels will do.
-        .filter(Level::Native(30.0))
-        .sweep(&[15.0, 25.0, 35.0, 45.0, 60.0])
         .published(
             "the paper's rule and lattice: voxels with a flux of at most -0.2 of 369 along the longest \
              side, or as many as fit into memory; the paper chooses a flux for each model, -0.15 to \
@@ -157,8 +159,8 @@ fn prepare<'s>(
     let tree = shape.surface_tree()?;
     let solid = Solid::new(shape, Surface::of(shape), params, run.clone());
     let base = solid.base()?;
-    let usual = Stage { solid, base, lattices: Lattices::new() };
-    Ok(Box::new(Prepared { shape, settings, run: run.clone(), tree, usual, published: None }))
+    let usual = Stage { solid, base };
+    Ok(Box::new(Prepared { shape, settings, run: run.clone(), tree, usual }))
 }
 
 /// One shape at the resolution of the parameters.
@@ -168,26 +170,19 @@ struct Prepared<'s> {
     run: RunContext,
     tree: Arc<TriangleBvh>,
     usual: Stage<'s>,
-    /// Where the published level has parameters of its own, once it was asked for.
-    published: Option<Stage<'s>>,
 }
 
 /// One shape with one set of parameters.
 struct Stage<'s> {
     solid: Solid<'s>,
     base: Base,
-    lattices: Lattices,
 }
 
 impl Simplification for Prepared<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let is_other = self.settings.at(level) != *self.usual.solid.params();
         if level == Level::Published && is_other {
-            if self.published.is_none() {
-                let stage = published::stage(self.shape, &self.settings, &self.run)?;
-                self.published = Some(stage);
-            }
-            let stage = self.published.as_mut().expect("made above");
+            let stage = published::stage(self.shape, &self.settings, &self.run)?;
             return stage.at(level, &self.tree);
         }
         self.usual.at(level, &self.tree)
@@ -195,12 +190,10 @@ impl Simplification for Prepared<'_> {
 }
 
 impl Stage<'_> {
-    fn at(&mut self, level: Level, tree: &TriangleBvh) -> Result<Simplified, SimplifyError> {
-        let Self { solid, base, lattices } = self;
+    fn at(&self, level: Level, tree: &TriangleBvh) -> Result<Simplified, SimplifyError> {
+        let Self { solid, base } = self;
         let mut diagnostics = base.diagnostics.clone();
-        lattices.begin();
         let angle = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Native(angle) => angle,
             Level::Spheres(_) | Level::Published => solid.params().angle,
         };
@@ -208,8 +201,8 @@ impl Stage<'_> {
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }
-            Level::Spheres(count) => solid.with_count(base, count, lattices, &mut diagnostics)?,
-            Level::Native(_) | Level::Published | Level::MaxError(_) => {
+            Level::Spheres(count) => solid.with_count(base, count, &mut diagnostics)?,
+            Level::Native(_) | Level::Published => {
                 params::check_angle(angle).map_err(SimplifyError::Level)?;
                 solid.say_what_is_lost(base, base.resolution, &mut diagnostics)?;
                 solid.axis(base.resolution, &base.descent, angle)?
@@ -224,7 +217,6 @@ impl Stage<'_> {
             mesh,
             asked: level,
             native_level: native,
-            work: lattices.work(),
             diagnostics,
             extras: Extras::with(axis.lattice_voxels()),
         })

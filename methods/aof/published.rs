@@ -9,7 +9,6 @@ use medial::simplifier::{Level, RunContext, SimplifyError};
 use super::Stage;
 use super::base::Base;
 use super::coarse_to_fine::{Surface, Wanted};
-use super::count::Lattices;
 use super::params::{AofParams, Start};
 use super::settings::AofSettings;
 use super::solid::Solid;
@@ -66,7 +65,7 @@ pub(super) fn stage<'s>(
              solid",
         );
     }
-    Ok(Stage { solid, base, lattices: Lattices::new() })
+    Ok(Stage { solid, base })
 }
 
 impl Solid<'_> {

@@ -58,7 +58,7 @@ use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError, Work,
+    Simplification, Simplified, SimplifyError,
 };
 
 use crate::size_search::{Knob, Probe, SizeSearch};
@@ -89,6 +89,29 @@ pub struct CoverageAxis {
     keeping: Keeping,
 }
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@article{DouEtAl2022,
+  author  = {Dou, Zhiyang and Lin, Cheng and Xu, Rui and Yang, Lei and Xin, Shiqing and Komura, Taku
+             and Wang, Wenping},
+  title   = {Coverage Axis: Inner Point Selection for {3D} Shape Skeletonization},
+  journal = {Computer Graphics Forum},
+  volume  = {41},
+  number  = {2},
+  year    = {2022},
+  doi     = {10.1111/cgf.14484}
+}
+@article{WangEtAl2024,
+  author  = {Wang, Zimeng and Dou, Zhiyang and Xu, Rui and Lin, Cheng and Liu, Yuan and Long, Xiaoxiao
+             and Xin, Shiqing and Komura, Taku and Yuan, Xiaoming and Wang, Wenping},
+  title   = {Coverage Axis++: Efficient Inner Point Selection for {3D} Shape Skeletonization},
+  journal = {Computer Graphics Forum},
+  volume  = {43},
+  number  = {5},
+  year    = {2024},
+  doi     = {10.1111/cgf.15143}
+}";
+
 /// Coverage Axis and Coverage Axis++ as a method, with the collapse for `connection=qmat`.
 ///
 /// Answers all levels but an error bound. Memory: one bit for each candidate and sample.
@@ -102,16 +125,12 @@ pub fn method(keeping: Keeping) -> CoverageAxis {
              2024. Coverage Axis++: Efficient Inner Point Selection for 3D Shape Skeletonization. \
              Computer Graphics Forum 43(5). https://doi.org/10.1111/cgf.15143",
         )
+        .bibtex(BIBTEX)
         .summary(
             "Chooses inner spheres that, slightly inflated, cover the surface, and connects them by \
              their regions on the medial mesh.",
         )
-        .home(
-            "Some tens of spheres as a skeleton: spheres stay where the medial axis has them, and \
-             details smaller than the dilation go.",
-        )
         .native(NativeLevel::larger_is_coarser("delta", "fraction of the longest side"))
-        .sweep(&[0.005, 0.01, 0.02, 0.03, 0.05])
         .published("delta = 0.02 of the longest side and at most 100 spheres, as in the scripts")
         .params(CoverageAxisParams::describe());
     CoverageAxis { info, keeping }
@@ -172,7 +191,6 @@ impl Simplification for Prepared {
         let CoverageAxisParams { select, size, dilation, max_iter, .. } = axis.params;
         let by_picks = select == Select::Greedy && size == Size::Picks;
         let (dilation, most) = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }
@@ -203,7 +221,6 @@ impl Simplification for Prepared {
             mesh,
             asked: level,
             native_level: Some(dilation),
-            work: Work::Anew,
             diagnostics,
             extras: Extras::default(),
         })

@@ -58,7 +58,7 @@ use medial::complex::VoronoiFacets;
 use medial::geometry::VertexId;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification,
+    Diagnostics, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification,
     SimplifyError,
 };
 use serde::{Deserialize, Serialize};
@@ -171,6 +171,16 @@ impl DeyZhaoParams {
     }
 }
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@inproceedings{DeyZhao2002,
+  author    = {Dey, Tamal K. and Zhao, Wulue},
+  title     = {Approximate medial axis as a {Voronoi} subcomplex},
+  booktitle = {ACM Symposium on Solid Modeling and Applications},
+  year      = {2002},
+  doi       = {10.1145/566282.566333}
+}";
+
 /// The Voronoi subcomplex as a method.
 pub fn method() -> Method<DeyZhaoParams> {
     let info = MethodInfo::new("dey-zhao", "Dey-Zhao Voronoi subcomplex")
@@ -178,21 +188,15 @@ pub fn method() -> Method<DeyZhaoParams> {
             "Tamal K. Dey, Wulue Zhao 2002. Approximate medial axis as a Voronoi subcomplex. ACM \
              Symposium on Solid Modeling and Applications. https://doi.org/10.1145/566282.566333",
         )
+        .bibtex(BIBTEX)
         .summary(
             "Keeps the Voronoi facets whose Delaunay edge is steep to the surface, or long beside \
              the samples' spacing.",
-        )
-        .home(
-            "Dense samples, when one pair of constants is to do for every shape and every \
-             density; with denser samples it converges to the medial axis, but it promises no \
-             topology, and is not for few spheres.",
         )
         .native(NativeLevel::larger_is_coarser(
             "strength",
             "multiple of the paper's two thresholds",
         ))
-        .filter(Level::Published)
-        .sweep(&[0.5, 1.0, 1.5, 2.0, 3.0])
         .published(
             "the paper's constants, strength 1; other strengths, of both thresholds together, are \
              not in the paper",

@@ -19,8 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // From here on lengths are fractions of the bounding box's diagonal.
     let shape = Shape::new(mesh, &loaded.mesh, loaded.report, ShapeOptions::default())?;
 
-    let methods = medial_methods::registry();
-    let qmat = methods.iter().find(|method| method.info().id == "qmat").ok_or("no such method")?;
+    let qmat = medial_methods::find("qmat").ok_or("no such method")?;
     let mut levels = qmat.prepare(&shape, &Params::none(), &RunContext::default())?;
     let simplified = levels.at(Level::Spheres(spheres.parse()?))?;
     for warning in &simplified.diagnostics.warnings {

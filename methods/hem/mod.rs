@@ -117,8 +117,8 @@ use medial::complex::MedialMesh;
 use medial::complex::collapse::replay;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification,
-    Simplified, SimplifyError, Work,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification, Simplified,
+    SimplifyError,
 };
 
 pub use params::{Blocking, HemParams, Inside, Sides};
@@ -129,6 +129,18 @@ use samples::SampleLists;
 
 /// Cost at which [`Level::Published`] stops: the default of the authors' code.
 const PUBLISHED: f64 = 1e-4;
+
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@article{SunChoiYuWang2016,
+  author  = {Sun, Feng and Choi, Yi-King and Yu, Yizhou and Wang, Wenping},
+  title   = {Medial Meshes -- A Compact and Accurate Representation of Medial Axis Transform},
+  journal = {IEEE Transactions on Visualization and Computer Graphics},
+  volume  = {22},
+  number  = {3},
+  year    = {2016},
+  doi     = {10.1109/TVCG.2015.2448080}
+}";
 
 /// The HEM simplifier.
 ///
@@ -155,16 +167,13 @@ pub fn method() -> Method<HemParams> {
              Accurate Representation of Medial Axis Transform. IEEE Transactions on Visualization \
              and Computer Graphics 22(3). https://doi.org/10.1109/TVCG.2015.2448080",
         )
+        .bibtex(BIBTEX)
+        .incremental()
         .summary(
             "Collapses the edges of the medial mesh in the order of the Hausdorff error from the \
              boundary samples to the primitives around the surviving end: one-sided, at the samples.",
         )
-        .home(
-            "Few spheres for a given error where speed matters less: usually fewer than Q-MAT \
-             needs, at many times its seconds.",
-        )
         .native(NativeLevel::larger_is_coarser("epsilon", "fraction of the diagonal"))
-        .sweep(&[0.01, 0.02, 0.04, 0.08])
         .published(
             "before the first collapse of a local error above 1e-4 of the diagonal, the default \
              of the authors' code; the error of the whole is measured, not held",
@@ -192,8 +201,7 @@ fn prepare<'s>(
     let ruler = Ruler { samples: samples.touched(), inside: params.inside, surface };
     let contraction = Contraction::new(&initial, samples.clone(), params);
     let run = run.clone();
-    let asked = false;
-    Ok(Box::new(Prepared { initial, samples, params, ruler, run, remarks, contraction, asked }))
+    Ok(Box::new(Prepared { initial, samples, params, ruler, run, remarks, contraction }))
 }
 
 /// One shape, as far as it was contracted.
@@ -207,13 +215,11 @@ struct Prepared {
     /// Warnings of the preparation, repeated with every level.
     remarks: Diagnostics,
     contraction: Contraction,
-    asked: bool,
 }
 
 impl Simplification for Prepared {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         match level {
-            Level::MaxError(_) => Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
             }
@@ -233,7 +239,7 @@ impl Prepared {
     fn at_count(&mut self, target: usize) -> Result<Simplified, SimplifyError> {
         let spheres = self.initial.spheres.len();
         let too_far = self.contraction.sphere_count() < target.min(spheres);
-        let work = self.contract(Stop::Spheres(target), too_far)?;
+        self.contract(Stop::Spheres(target), too_far)?;
         let mut diagnostics = self.diagnostics();
         let reached = self.contraction.sphere_count();
         if target > spheres {
@@ -246,12 +252,12 @@ impl Prepared {
         }
         let native_level = Some(self.contraction.largest());
         let mesh = self.contraction.to_mesh();
-        answer(Level::Spheres(target), mesh, native_level, work, diagnostics)
+        answer(Level::Spheres(target), mesh, native_level, diagnostics)
     }
 
     fn at_bound(&mut self, epsilon: f64) -> Result<Simplified, SimplifyError> {
         let too_far = self.contraction.largest() > epsilon;
-        let work = self.contract(Stop::Error(epsilon), too_far)?;
+        self.contract(Stop::Error(epsilon), too_far)?;
         let record = self.contraction.record();
         let error_at = |collapses: usize| {
             self.run.step(record.len() - collapses, record.len())?;
@@ -267,7 +273,7 @@ impl Prepared {
         let mut diagnostics = self.diagnostics();
         diagnostics.count("taken_back_for_the_bound", record.len() - kept);
         let mesh = replay(&self.initial, &record[..kept]);
-        answer(Level::Native(epsilon), mesh, Some(epsilon), work, diagnostics)
+        answer(Level::Native(epsilon), mesh, Some(epsilon), diagnostics)
     }
 
     fn cannot_be_held(
@@ -292,7 +298,7 @@ impl Prepared {
 
     fn as_published(&mut self) -> Result<Simplified, SimplifyError> {
         let too_far = self.contraction.largest() > PUBLISHED;
-        let work = self.contract(Stop::Error(PUBLISHED), too_far)?;
+        self.contract(Stop::Error(PUBLISHED), too_far)?;
         let mesh = self.contraction.to_mesh();
         let error = self.ruler.error(&mesh)?;
         let mut diagnostics = self.diagnostics();
@@ -306,18 +312,14 @@ impl Prepared {
                  {error:.3e} of the diagonal off the result"
             ));
         }
-        answer(Level::Published, mesh, Some(PUBLISHED), work, diagnostics)
+        answer(Level::Published, mesh, Some(PUBLISHED), diagnostics)
     }
 
-    fn contract(&mut self, stop: Stop, anew: bool) -> Result<Work, SimplifyError> {
-        let mut work = if self.asked { Work::Continued } else { Work::Anew };
+    fn contract(&mut self, stop: Stop, anew: bool) -> Result<(), SimplifyError> {
         if anew {
             self.contraction = Contraction::new(&self.initial, self.samples.clone(), self.params);
-            work = Work::Anew;
         }
-        self.asked = true;
-        self.contraction.run_to(stop, &self.run)?;
-        Ok(work)
+        self.contraction.run_to(stop, &self.run)
     }
 
     fn diagnostics(&self) -> Diagnostics {
@@ -331,9 +333,8 @@ fn answer(
     asked: Level,
     mesh: MedialMesh,
     native_level: Option<f64>,
-    work: Work,
     diagnostics: Diagnostics,
 ) -> Result<Simplified, SimplifyError> {
     mesh.check()?;
-    Ok(Simplified { mesh, asked, native_level, work, diagnostics, extras: Extras::default() })
+    Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
 }

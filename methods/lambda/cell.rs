@@ -24,9 +24,7 @@ use std::sync::Arc;
 use medial::complex::{DualTriangulation, MedialMesh, VoronoiFacets};
 use medial::geometry::enclosing_ball;
 use medial::shape::Shape;
-use medial::simplifier::{
-    Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError, Work,
-};
+use medial::simplifier::{Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError};
 use rayon::prelude::*;
 
 use crate::ranked_facets::{FacetSet, RankedFacets};
@@ -162,7 +160,6 @@ impl Simplification for Cells {
             mesh,
             asked: level,
             native_level: Some(lambda),
-            work: Work::Anew,
             diagnostics,
             extras: Extras::default(),
         })

@@ -15,7 +15,7 @@
 //!   value, as the definition has it.
 //!
 //! # The published level
-//! The paper gives no universal `lambda`. [`Level::Published`] is
+//! The paper gives no universal `lambda`. [`Level::Published`](medial::simplifier::Level) is
 //! the default of the program that Yan, Letscher and Ju published with *Voxel cores: efficient, robust,
 //! and provably good approximation of 3D medial axes*, ACM Transactions on Graphics 37(4), 2018, which
 //! prunes by the same measure: facets whose two samples are less than 4 % of the longest side of the
@@ -32,7 +32,7 @@ mod vertex;
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Level, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
+    Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +84,7 @@ impl LambdaParams {
     }
 }
 
-/// `lambda` of [`Level::Published`], as a fraction of the longest
+/// `lambda` of [`Level::Published`](medial::simplifier::Level), as a fraction of the longest
 /// side of the box of the spheres' centres.
 const PUBLISHED: f64 = 0.02;
 
@@ -103,6 +103,18 @@ fn scale(mesh: &MedialMesh) -> Scale {
     Scale { name: "lambda", range: 0.0..=1.0, inclusive: true, published }
 }
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@article{ChazalLieutier2005,
+  author  = {Chazal, Fr{\\'e}d{\\'e}ric and Lieutier, Andr{\\'e}},
+  title   = {The $\\lambda$-medial axis},
+  journal = {Graphical Models},
+  volume  = {67},
+  number  = {4},
+  year    = {2005},
+  doi     = {10.1016/j.gmod.2005.01.002}
+}";
+
 /// The lambda-medial axis as a method.
 pub fn method() -> Method<LambdaParams> {
     let info = MethodInfo::new("lambda", "Lambda-medial axis")
@@ -110,15 +122,9 @@ pub fn method() -> Method<LambdaParams> {
             "Frederic Chazal, Andre Lieutier 2005. The lambda-medial axis. Graphical Models 67(4). \
              https://doi.org/10.1016/j.gmod.2005.01.002",
         )
+        .bibtex(BIBTEX)
         .summary("Keeps the spheres whose contact points need the largest enclosing balls.")
-        .home(
-            "Dense samples, when whatever is small in absolute size is to go, with a proof that \
-             what stays is stable; not where thin parts must stay beside thick ones, and not for \
-             few spheres.",
-        )
         .native(NativeLevel::larger_is_coarser("lambda", "fraction of the bounding-box diagonal"))
-        .filter(Level::Published)
-        .sweep(&[0.0025, 0.005, 0.01, 0.02])
         .published(
             "lambda = 2 % of the longest side of the box of the spheres' centres, the default of the \
              authors' program of voxel cores; the paper gives no universal lambda",

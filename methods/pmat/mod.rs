@@ -59,7 +59,7 @@ use medial::complex::collapse::Hierarchy;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
     Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, NoParams, Params,
-    RunContext, Simplification, Simplified, SimplifyError, Work,
+    RunContext, Simplification, Simplified, SimplifyError,
 };
 
 pub use cost::absorption_scale;
@@ -72,6 +72,16 @@ const PUBLISHED: f64 = 1.18;
 /// Name of the extra that holds all levels as a [`Hierarchy`], for [`resume`].
 pub const HIERARCHY: &str = "hierarchy";
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@inproceedings{FarajThieryBoubekeur2013,
+  author    = {Faraj, Noura and Thiery, Jean-Marc and Boubekeur, Tamy},
+  title     = {Progressive Medial Axis Filtration},
+  booktitle = {SIGGRAPH Asia 2013 Technical Briefs},
+  year      = {2013},
+  doi       = {10.1145/2542355.2542359}
+}";
+
 /// Progressive medial axis filtration as a method.
 ///
 /// Builds the whole hierarchy once, in `O(n log n)` for an initial mesh of bounded degree; then
@@ -83,16 +93,12 @@ pub fn method() -> Method<NoParams> {
              Filtration. SIGGRAPH Asia 2013 Technical Briefs. \
              https://doi.org/10.1145/2542355.2542359",
         )
+        .bibtex(BIBTEX)
         .summary(
             "Collapses each edge into its larger sphere, in the order of the scales at which that \
              absorbs the smaller one: the scale axis as a hierarchy.",
         )
-        .home(
-            "Every level from one run, nested and without a parameter, with spheres of the start \
-             alone; loops may close, and with few spheres the error is large.",
-        )
         .native(NativeLevel::larger_is_coarser("s", "factor by which all balls grow, at least 1"))
-        .sweep(&[1.1, 1.5, 2.0, 4.0, 8.0, 16.0])
         .published(
             "s = 1.18, the least scale of the paper's Table 1, with the whole hierarchy; the paper \
              picks scales by eye for each shape",
@@ -174,7 +180,6 @@ impl Levels {
     /// The number of collapses that a level asks for.
     fn stage_of(&self, level: Level) -> Result<usize, SimplifyError> {
         match level {
-            Level::MaxError(_) => Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
             }
@@ -233,7 +238,6 @@ impl Simplification for Levels {
             mesh: self.hierarchy.stage(stage).to_mesh(),
             asked: level,
             native_level: scale.is_finite().then_some(scale),
-            work: Work::Anew,
             diagnostics: self.diagnose(level, stage),
             extras,
         })

@@ -76,8 +76,7 @@ use std::sync::Arc;
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Extras, Level, Method, MethodInfo, RunContext, Simplification, Simplified,
-    SimplifyError, Work,
+    Diagnostics, Level, Method, MethodInfo, RunContext, Simplification, Simplified, SimplifyError,
 };
 
 pub use params::{Boundary, QmatParams, TopologyFrom};
@@ -86,6 +85,18 @@ use contract::Contraction;
 
 /// Spheres of [`Level::Published`]: the count of the paper's Table II.
 const PUBLISHED: usize = 100;
+
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@article{LiEtAl2015,
+  author  = {Li, Pan and Wang, Bin and Sun, Feng and Guo, Xiaohu and Zhang, Caiming and Wang, Wenping},
+  title   = {{Q-MAT}: Computing Medial Axis Transform by Quadratic Error Minimization},
+  journal = {ACM Transactions on Graphics},
+  volume  = {35},
+  number  = {1},
+  year    = {2015},
+  doi     = {10.1145/2753755}
+}";
 
 /// The Q-MAT simplifier.
 ///
@@ -98,13 +109,11 @@ pub fn method() -> Method<QmatParams> {
              Computing Medial Axis Transform by Quadratic Error Minimization. ACM Transactions on \
              Graphics 35(1). https://doi.org/10.1145/2753755",
         )
+        .bibtex(BIBTEX)
+        .incremental()
         .summary(
             "Collapses the edges of the medial mesh by slab quadric error and stability ratio, \
              each merged sphere placed where its error is least.",
-        )
-        .home(
-            "A small number of spheres in about a second: spikes go first, and each merged \
-             sphere is placed anew.",
         )
         .published(
             "100 spheres, the topology kept from 200 spheres on: the paper leaves the count to the \
@@ -154,7 +163,7 @@ fn prepare<'s>(
     run.step(0, initial.spheres.len())?;
     // At the preparation the level is unknown; most levels share the parameters of this one.
     let contraction = Contraction::new(&initial, params.at(Level::Spheres(1)));
-    Ok(Box::new(Prepared { initial, params, run: run.clone(), contraction, asked: false }))
+    Ok(Box::new(Prepared { initial, params, run: run.clone(), contraction }))
 }
 
 /// One shape, as far as it was contracted.
@@ -163,13 +172,11 @@ struct Prepared {
     params: QmatParams,
     run: RunContext,
     contraction: Contraction,
-    asked: bool,
 }
 
 impl Simplification for Prepared {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let target = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("at least one sphere must stay".to_owned()));
             }
@@ -187,7 +194,7 @@ impl Simplification for Prepared {
         if target >= self.initial.spheres.len() {
             return Ok(self.initial_mesh(level, target, diagnostics));
         }
-        let work = self.contract(target, level)?;
+        self.contract(target, level)?;
         self.contraction.diagnose(&mut diagnostics);
         let reached = self.contraction.sphere_count();
         if reached > target {
@@ -196,24 +203,19 @@ impl Simplification for Prepared {
         }
         let mesh = self.contraction.to_mesh();
         mesh.check()?;
-        let extras = Extras::default();
-        Ok(Simplified { mesh, asked: level, native_level: None, work, diagnostics, extras })
+        Ok(Simplified { diagnostics, ..Simplified::new(mesh, level) })
     }
 }
 
 impl Prepared {
-    fn contract(&mut self, target: usize, level: Level) -> Result<Work, SimplifyError> {
+    fn contract(&mut self, target: usize, level: Level) -> Result<(), SimplifyError> {
         let params = self.params.at(level);
-        let mut work = if self.asked { Work::Continued } else { Work::Anew };
         let is_of_other = self.contraction.params() != params;
         // Collapses are not undone, so a finer level starts anew.
         if is_of_other || self.contraction.sphere_count() < target {
             self.contraction = Contraction::new(&self.initial, params);
-            work = Work::Anew;
         }
-        self.asked = true;
-        self.contraction.run_to(&self.initial, target, &self.run)?;
-        Ok(work)
+        self.contraction.run_to(&self.initial, target, &self.run)
     }
 
     fn initial_mesh(
@@ -229,8 +231,7 @@ impl Prepared {
             ));
         }
         let mesh = MedialMesh::clone(&self.initial);
-        let (work, extras) = (Work::Anew, Extras::default());
-        Simplified { mesh, asked, native_level: None, work, diagnostics, extras }
+        Simplified { diagnostics, ..Simplified::new(mesh, asked) }
     }
 
     fn published_warning(&self) -> String {

@@ -33,8 +33,8 @@
 //!   spheres is met by the number of samples at `s` = 1.1 (`methods/size_search.rs`). Each count then
 //!   has balls of its own.
 //! - By default a number of spheres is met by a search on `s`. Not every count occurs: the result is the
-//!   largest count met that does not exceed the request; a count within 1 % ends the search. Scales are
-//!   reused by later requests; the seconds of a request are those of all scales that it needed.
+//!   largest count met that does not exceed the request; a count within 1 % ends the search. The seconds
+//!   of a request are those of all scales that it tried.
 
 mod params;
 mod search;
@@ -53,7 +53,6 @@ use medial::simplifier::{
 
 use crate::by_knob::ByKnob;
 use crate::perturb::perturbed;
-use crate::reuse::Reuse;
 
 pub use params::{SatParams, Size};
 
@@ -63,10 +62,28 @@ const PUBLISHED: f64 = 1.1;
 /// The largest scale: radii of up to a million diagonals, beyond which positions mean nothing.
 const LARGEST_SCALE: f64 = 1e6;
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@inproceedings{GiesenMiklosPaulyWormser2009,
+  author    = {Giesen, Joachim and Miklos, Balint and Pauly, Mark and Wormser, Camille},
+  title     = {The scale axis transform},
+  booktitle = {Symposium on Computational Geometry},
+  year      = {2009},
+  doi       = {10.1145/1542362.1542388}
+}
+@article{MiklosGiesenPauly2010,
+  author  = {Miklos, Balint and Giesen, Joachim and Pauly, Mark},
+  title   = {Discrete scale axis representations for {3D} geometry},
+  journal = {ACM Transactions on Graphics},
+  volume  = {29},
+  number  = {4},
+  year    = {2010},
+  doi     = {10.1145/1778765.1778838}
+}";
+
 /// The scale axis transform as a method.
 ///
-/// Answers all levels. Each scale costs one regular and one Delaunay triangulation, and the memory
-/// of its axis for as long as levels can be asked.
+/// Has all levels. Each scale costs one regular and one Delaunay triangulation.
 pub fn method() -> Method<SatParams> {
     let info = MethodInfo::new("sat", "Scale axis transform")
         .citation(
@@ -76,18 +93,12 @@ pub fn method() -> Method<SatParams> {
              2010. Discrete scale axis representations for 3D geometry. ACM Transactions on \
              Graphics 29(4). https://doi.org/10.1145/1778765.1778838",
         )
+        .bibtex(BIBTEX)
         .summary(
             "Grows all polar balls by a factor, takes the medial axis of their union, and shrinks \
              its balls back.",
         )
-        .home(
-            "Features that are small beside what is around them, when they are to go and equally \
-             small ones elsewhere to stay; gaps may fill, spheres are new ones, and it is not \
-             for few spheres.",
-        )
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
-        .filter(Level::Published)
-        .sweep(&[1.0, 1.1, 1.25, 1.5, 2.0])
         .published(
             "s = 1.1, the default of the authors' tool, without its angle filter (sat_angle=30)",
         )
@@ -121,8 +132,6 @@ struct Prepared {
     spheres: Vec<Sphere>,
     params: SatParams,
     run: RunContext,
-    /// The scales computed so far, by the bits of the scale.
-    scales: Reuse<u64, Scaled>,
 }
 
 /// The scale axis at one scale.
@@ -141,13 +150,12 @@ impl Prepared {
         let balls = shape.inner_balls()?;
         run.step(0, balls.spheres.len())?;
         let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
-        Ok(Self { spheres, params, run: run.clone(), scales: Reuse::new() })
+        Ok(Self { spheres, params, run: run.clone() })
     }
 
-    /// The axis at a scale, computed once.
-    fn at_scale(&mut self, scale: f64) -> Result<Arc<Scaled>, SimplifyError> {
-        let Self { spheres, params, scales, .. } = self;
-        scales.get(scale.to_bits(), || Scaled::new(spheres, params, scale))
+    /// The axis at a scale.
+    fn at_scale(&self, scale: f64) -> Result<Arc<Scaled>, SimplifyError> {
+        Scaled::new(&self.spheres, &self.params, scale).map(Arc::new)
     }
 }
 
@@ -192,9 +200,7 @@ impl Scaled {
 impl Simplification for Prepared {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let mut diagnostics = Diagnostics::default();
-        self.scales.begin();
         let scaled = match level {
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Published => self.at_scale(PUBLISHED)?,
             Level::Native(scale) if (1.0..=LARGEST_SCALE).contains(&scale) => {
                 self.at_scale(scale)?
@@ -214,7 +220,6 @@ impl Simplification for Prepared {
             mesh: scaled.mesh.clone(),
             asked: level,
             native_level: Some(scaled.scale),
-            work: self.scales.work(),
             diagnostics,
             extras: Extras::default(),
         })

@@ -6,8 +6,7 @@
 //! 2. Between the last two scales the Illinois variant of regula falsi, on logarithms of scale and
 //!    count.
 //!
-//! The scales tried depend on the count alone, so that the same count has the same answer, whatever was
-//! asked before. Scales computed before are reused.
+//! No scale is tried twice.
 
 use std::sync::Arc;
 
@@ -36,7 +35,7 @@ const TOLERANCE: f64 = 0.01;
 /// The scale axis with the largest count that the search meets of those not above `count`; with a
 /// larger one, the smallest met, where there is none.
 pub(super) fn to_count(
-    sat: &mut Prepared,
+    sat: &Prepared,
     count: usize,
     diagnostics: &mut Diagnostics,
 ) -> Result<Arc<Scaled>, SimplifyError> {

@@ -98,7 +98,7 @@ use medial::complex::{MedialMesh, betti};
 use medial::shape::Shape;
 use medial::simplifier::{
     Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, RunContext,
-    Simplification, Simplified, SimplifyError, Work,
+    Simplification, Simplified, SimplifyError,
 };
 
 use serde::Serialize;
@@ -134,6 +134,16 @@ pub struct PartInfo {
     pub removed: bool,
 }
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@inproceedings{TamHeidrich2003,
+  author    = {Tam, Roger and Heidrich, Wolfgang},
+  title     = {Shape simplification based on the medial axis transform},
+  booktitle = {IEEE Visualization},
+  year      = {2003},
+  doi       = {10.1109/VISUAL.2003.1250410}
+}";
+
 /// Pruning by parts as a method.
 ///
 /// Answers all levels. The axis is computed once for all; a level costs a few passes over it.
@@ -143,18 +153,12 @@ pub fn method() -> Method<TamHeidrichParams> {
             "Roger Tam, Wolfgang Heidrich 2003. Shape simplification based on the medial axis \
              transform. IEEE Visualization. https://doi.org/10.1109/VISUAL.2003.1250410",
         )
+        .bibtex(BIBTEX)
         .summary(
             "Cuts the axis of the polar balls into its sheets and removes small ones from the \
              outside in, loops and components kept.",
         )
-        .home(
-            "Whole features of little volume, when they are to go and loops to stay, and a \
-             surface is to be rebuilt by the power crust; it does not reach small numbers of \
-             spheres.",
-        )
         .native(NativeLevel::larger_is_coarser("t_v", "per cent of the solid's volume"))
-        .filter(Level::Published)
-        .sweep(&[0.01, 0.1, 0.5, 1.0, 5.0])
         .published("up to three rounds with t_t = 5 triangles, then two with t_v = 1 %")
         .params(TamHeidrichParams::describe())
         .extra(Capability::new(PARTS, "the parts that the axis was cut into, the largest first"))
@@ -205,14 +209,7 @@ impl Simplification for Prepared {
                 poles.remaining(&remaining.sphere_kept)
             }),
         );
-        Ok(Simplified {
-            mesh: remaining.mesh(),
-            asked: level,
-            native_level,
-            work: Work::Anew,
-            diagnostics,
-            extras,
-        })
+        Ok(Simplified { mesh: remaining.mesh(), asked: level, native_level, diagnostics, extras })
     }
 }
 
@@ -221,7 +218,6 @@ impl Prepared {
     fn schedule(&self, level: Level) -> Result<(Vec<f64>, usize), SimplifyError> {
         let published = &self.params.t_v.0;
         match level {
-            Level::MaxError(_) => Err(SimplifyError::searched()),
             Level::Published => Ok((published.clone(), 0)),
             Level::Native(t) if (0.0..=100.0).contains(&t) => {
                 Ok((vec![t; published.len().max(1)], 0))

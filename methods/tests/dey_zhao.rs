@@ -3,9 +3,7 @@
 use medial::Vec3;
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{
-    Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError, Work,
-};
+use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
 use medial_methods::dey_zhao;
 
@@ -130,7 +128,7 @@ fn a_number_of_spheres_is_the_published_result_of_fewer_samples() {
 }
 
 #[test]
-fn a_level_asked_after_others_is_the_same_and_says_what_it_reused() {
+fn a_level_does_not_depend_on_earlier_ones() {
     let shape = shape_of(&built_in("capsule", 36), "vertices");
     let run = RunContext::default();
     let mut prepared = dey_zhao::method().prepare(&shape, &Params::none(), &run).expect("ready");
@@ -139,8 +137,6 @@ fn a_level_asked_after_others_is_the_same_and_says_what_it_reused() {
         let found = prepared.at(level).expect("a level");
         assert_eq!(found.mesh, at(&shape, &[], level).mesh, "{level}");
     }
-    let again = prepared.at(Level::Spheres(400)).expect("a level");
-    assert!(matches!(again.work, Work::Reused(_)));
     let many = prepared.at(Level::Spheres(1_000_000_000)).expect("as many as there are");
     assert!(many.diagnostics.warnings.iter().any(|w| w.contains("are not tried")));
 }

@@ -37,7 +37,7 @@
 //!   the start may go on.
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   says how much.
-//! - The level of its own is a bound of the two-sided error, a fraction of the diagonal, and is held by a
+//! - The native level `error` is a bound of the two-sided error, a fraction of the diagonal, held by a
 //!   certificate (`bound.rs`). It takes several times as long as a number of spheres.
 //!
 //! # Starting from a given mesh
@@ -67,8 +67,8 @@ use std::sync::Arc;
 use medial::complex::{MedialMesh, crossing_faces};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError, Work,
+    Diagnostics, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
+    Simplification, Simplified, SimplifyError,
 };
 
 pub use params::TightParams;
@@ -118,13 +118,8 @@ pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
             "Collapses and inserts spheres in the order of the two-sided error at samples, and moves all \
              of them together to lessen its maximum.",
         )
-        .home(
-            "The least two-sided error with few spheres, the topology of its start kept, where \
-             seconds to a minute for each number of spheres do not matter.",
-        )
         .published("nothing is published: 100 spheres")
-        .native(NativeLevel::larger_is_coarser("bound", "fraction of the diagonal"))
-        .on_request()
+        .native(NativeLevel::larger_is_coarser("error", "fraction of the diagonal"))
         .params(TightParams::describe());
     Tight { info, starter: Arc::new(starter) }
 }
@@ -163,7 +158,6 @@ impl Simplification for Prepared {
             }
             Level::Spheres(count) => count,
             Level::Published => USUAL,
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Native(bound) => return self.within(bound),
         };
         let mut diagnostics = Diagnostics::default();
@@ -225,8 +219,7 @@ fn answer(
     diagnostics: Diagnostics,
 ) -> Result<Simplified, SimplifyError> {
     mesh.check()?;
-    let (work, extras) = (Work::Anew, Extras::default());
-    Ok(Simplified { mesh, asked, native_level, work, diagnostics, extras })
+    Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
 }
 
 /// # Errors

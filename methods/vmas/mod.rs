@@ -90,16 +90,10 @@ mod split;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
-
-use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, Method, MethodInfo, RunContext, Simplification, Simplified,
-    SimplifyError, Work,
+    Diagnostics, Level, Method, MethodInfo, RunContext, Simplification, Simplified, SimplifyError,
 };
-
-use crate::reuse::Reuse;
 
 pub use params::{Connect, Contact, Points, Refit, VmasParams};
 
@@ -116,6 +110,16 @@ const SAMPLES_PER_SPHERE: usize = 100;
 /// Most samples that a number of spheres asks for by itself: memory and time stay bounded.
 const MOST_SAMPLES: usize = 100_000;
 
+/// The source as BibTeX.
+const BIBTEX: &str = "\
+@inproceedings{HuangKraemerTheryBechmann2024,
+  author    = {Huang, Qijia and Kraemer, Pierre and Thery, Sylvain and Bechmann, Dominique},
+  title     = {Dynamic skeletonization via variational medial axis sampling},
+  booktitle = {SIGGRAPH Asia 2024 Conference Papers},
+  year      = {2024},
+  url       = {https://huang46u.github.io/VMAS/}
+}";
+
 /// Variational medial axis sampling as a method.
 ///
 /// Answers [`Level::Spheres`] and [`Level::Published`], each from one sphere on: `O(P)` for each of some
@@ -127,16 +131,12 @@ pub fn method() -> Method<VmasParams> {
              skeletonization via variational medial axis sampling. SIGGRAPH Asia 2024 Conference \
              Papers. https://huang46u.github.io/VMAS/",
         )
+        .bibtex(BIBTEX)
         .summary(
             "Clusters surface points by the sphere that fits them best, refits each sphere to its \
              cluster, pushes it back to the medial axis, and splits the worst.",
         )
-        .home(
-            "Few spheres in even places, on organic shapes; no Voronoi diagram is needed. Nothing \
-             holds the topology, and it is not for CAD models or more than a few hundred spheres.",
-        )
         .published("100 spheres, the default of the CGAL package")
-        .on_request()
         .params(VmasParams::describe());
     Method::new(info, prepare)
 }
@@ -153,8 +153,7 @@ fn prepare<'s>(
     }
     run.step(0, 1)?;
     let solid = Solid::new(shape, params.contact == Contact::Mesh)?;
-    let (points, answers) = (Reuse::new(), Reuse::new());
-    Ok(Box::new(Prepared { shape, solid, params, run: run.clone(), points, answers }))
+    Ok(Box::new(Prepared { shape, solid, params, run: run.clone() }))
 }
 
 /// One shape.
@@ -163,17 +162,6 @@ struct Prepared<'s> {
     solid: Solid<'s>,
     params: VmasParams,
     run: RunContext,
-    /// Surface points by their number, 0 for the vertices.
-    points: Reuse<usize, SurfacePoints>,
-    /// By the number of points and the target: different requests beyond the most have the same answer.
-    answers: Reuse<(usize, usize), Answer>,
-}
-
-/// The result for a target.
-struct Answer {
-    mesh: MedialMesh,
-    tally: Tally,
-    ended: Ended,
 }
 
 impl Simplification for Prepared<'_> {
@@ -184,7 +172,6 @@ impl Simplification for Prepared<'_> {
             }
             Level::Spheres(count) => count,
             Level::Published => PUBLISHED,
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
             Level::Native(_) => {
                 let why = "its own level is the number of spheres: ask for that";
                 return Err(SimplifyError::unsupported(why));
@@ -192,67 +179,32 @@ impl Simplification for Prepared<'_> {
         };
         let points = self.points(asked)?;
         let target = asked.min(self.most_spheres(&points));
-        let answer = self.answer(&points, target)?;
-        let mesh = answer.mesh.clone();
+        let mut sampling = VariationalSampling::new(&points, &self.solid, self.params);
+        let ended = sampling.run(target, &self.run)?;
+        let mesh = sampling.mesh(self.params.connect)?;
         let mut diagnostics = Diagnostics::default();
-        answer.tally.describe(points.len(), &mut diagnostics);
-        explain(asked, target, mesh.spheres.len(), answer.ended, &mut diagnostics);
-        let work = both(self.points.work(), self.answers.work());
-        let extras = Extras::default();
-        Ok(Simplified { mesh, asked: level, native_level: None, work, diagnostics, extras })
-    }
-}
-
-/// The work of a request that asked for two things.
-fn both(first: Work, second: Work) -> Work {
-    match (first, second) {
-        (Work::Reused(mut cost), Work::Reused(other)) => {
-            cost += other;
-            Work::Reused(cost)
-        }
-        (Work::Reused(cost), _) | (_, Work::Reused(cost)) => Work::Reused(cost),
-        _ => Work::Anew,
+        sampling.tally.describe(points.len(), &mut diagnostics);
+        explain(asked, target, mesh.spheres.len(), ended, &mut diagnostics);
+        Ok(Simplified { diagnostics, ..Simplified::new(mesh, level) })
     }
 }
 
 impl Prepared<'_> {
-    /// Step 0, made once for each number of samples.
-    fn points(&mut self, spheres: usize) -> Result<Arc<SurfacePoints>, SimplifyError> {
+    /// Step 0.
+    fn points(&self, spheres: usize) -> Result<SurfacePoints, SimplifyError> {
         let (mesh, VmasParams { samples, neighbours, .. }) = (self.shape.mesh(), self.params);
-        let count = match self.params.points {
+        let points = match self.params.points {
+            Points::Vertices => SurfacePoints::of_vertices(mesh),
             Points::Samples => {
-                spheres.saturating_mul(SAMPLES_PER_SPHERE).min(MOST_SAMPLES).max(samples)
+                let count = spheres.saturating_mul(SAMPLES_PER_SPHERE);
+                let count = count.min(MOST_SAMPLES).max(samples);
+                SurfacePoints::of_samples(mesh, count, self.run.seed, neighbours)
             }
-            Points::Vertices => 0,
         };
-        let seed = self.run.seed;
-        self.points.begin();
-        let points = self.points.get(count, || {
-            let points = match count {
-                0 => SurfacePoints::of_vertices(mesh),
-                _ => SurfacePoints::of_samples(mesh, count, seed, neighbours),
-            };
-            if points.len() == 0 {
-                return Err(SimplifyError::unsupported("the surface has no area"));
-            }
-            Ok(points)
-        })?;
+        if points.len() == 0 {
+            return Err(SimplifyError::unsupported("the surface has no area"));
+        }
         Ok(points)
-    }
-
-    /// Steps 1 to 6.
-    fn answer(
-        &mut self,
-        points: &SurfacePoints,
-        target: usize,
-    ) -> Result<Arc<Answer>, SimplifyError> {
-        let Self { solid, params, run, answers, .. } = self;
-        answers.begin();
-        answers.get((points.len(), target), || {
-            let mut sampling = VariationalSampling::new(points, solid, *params);
-            let ended = sampling.run(target, run)?;
-            Ok(Answer { mesh: sampling.mesh(params.connect)?, tally: sampling.tally, ended })
-        })
     }
 
     /// The largest number of spheres that is tried.

@@ -25,7 +25,6 @@ class Answer(NamedTuple):
     axis: _medial.Axis
     native_level: float | None
     warnings: list[str]
-    continued: bool
 
 
 def describe(cls: Any) -> str:
@@ -52,6 +51,7 @@ def describe(cls: Any) -> str:
             ],
             "published": info.published,
             "on_request": bool(info.on_request),
+            "incremental": bool(info.incremental),
         }
     )
 
@@ -116,7 +116,7 @@ def at(instance: Any, kind: str, value: float) -> Answer:
         raise TypeError(f"Simplified.axis: a MedialAxis is needed, not a {type(axis).__name__}")
     level = None if answer.native_level is None else float(answer.native_level)
     warnings = [str(warning) for warning in answer.warnings]
-    return Answer(axis._axis, level, warnings, bool(answer.continued))
+    return Answer(axis._axis, level, warnings)
 
 
 def tell(error: BaseException) -> str:

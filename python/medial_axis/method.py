@@ -51,7 +51,10 @@ class MethodInfo:
     published: str | None = None
     """What the level without a number means, where there is one."""
     on_request: bool = False
-    """Whether it runs only where it is named, because it takes long."""
+    """Whether it runs only when named, because it takes long."""
+    incremental: bool = False
+    """Whether `at` continues from the previous level. Levels are then requested from fine to coarse, and the seconds
+    of a level are those of all calls up to it."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,6 @@ class Simplified:
     native_level: float | None = None
     """The method's own level that met a number of spheres."""
     warnings: tuple[str, ...] = field(default_factory=tuple)
-    continued: bool = False
-    """Whether it went on from the level before: then the seconds of both are those of this one."""
 
 
 class Shape:

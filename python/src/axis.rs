@@ -11,6 +11,7 @@ use medial::simplifier::{Level, Params, RunContext, Simplified};
 use medial::surface::{self, Loaded, Normalisation, SurfaceReport, TriMesh};
 use medial_bench::cmd::reconstruct::fitting_surface;
 use medial_bench::run::{Found, Probe, Search, Times, answer};
+use medial_reports::Target;
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
@@ -79,7 +80,7 @@ fn level(
     spheres: Option<usize>,
     native: Option<f64>,
     bound: Option<f64>,
-) -> Result<Level, Failure> {
+) -> Result<Target, Failure> {
     let given = [spheres.is_some(), native.is_some(), bound.is_some()];
     if given.iter().filter(|is_given| **is_given).count() > 1 {
         return Err(Failure::parameter("give one of spheres, level and max_error"));
@@ -88,11 +89,11 @@ fn level(
         let message = format!("max_error = {bound}: a fraction of the diagonal, between 0 and 1");
         return Err(Failure::parameter(message));
     }
-    let of_count = spheres.map(Level::Spheres);
+    let of_count = spheres.map(Target::Spheres);
     Ok(of_count
-        .or(native.map(Level::Native))
-        .or(bound.map(Level::MaxError))
-        .unwrap_or(Level::Published))
+        .or(native.map(Target::Native))
+        .or(bound.map(Target::MaxError))
+        .unwrap_or(Target::Published))
 }
 
 #[pymethods]
@@ -289,22 +290,22 @@ impl Run {
     /// The result at a level, and what is to be known of it.
     fn at(
         &self,
-        level: Level,
+        target: Target,
         context: &RunContext,
         monitor: &Monitor,
     ) -> Result<(Simplified, Value), Failure> {
-        let (level, search) = match level {
-            Level::MaxError(bound) => {
+        let (level, search) = match target.level() {
+            Ok(level) => (level, None),
+            Err(bound) => {
                 monitor.at("searching the bound");
                 let (level, search) = self.search(bound, context)?;
                 (level, Some(search))
             }
-            other => (other, None),
         };
         monitor.at("simplifying");
         let view = self.start.view();
         let prepare = || self.method.get().prepare(&view, &self.params, context);
-        let mut runs = answer(&view, prepare, &[level], |_| {});
+        let mut runs = answer(&view, self.method.get().info(), prepare, &[level], |_| {});
         let run = runs.pop().expect("one level was asked");
         let simplified = run.outcome.map_err(Failure::of_fault)?;
         let facts = facts(&simplified, &run.times, level, search);
@@ -324,8 +325,8 @@ impl Run {
         let trying = |_: Level| {
             let _ = context.step(0, usize::MAX);
         };
-        let info = self.method.get().info();
-        let mut search = Search::new(prepared.as_mut(), info, most, &measure, &trying);
+        let sweep = self.method.sweep();
+        let mut search = Search::new(prepared.as_mut(), sweep, most, &measure, &trying);
         let found = search.within(bound)?;
         let Found { within: Some(Probe { level, error, .. }), tried, .. } = found else {
             return Err(Failure::parameter(found.refusal(bound)));

@@ -10,7 +10,7 @@ use medial_bench::host::Host;
 use medial_bench::main_hosted;
 use pyo3::prelude::*;
 
-use crate::method::{Classes, built_in};
+use crate::method::Classes;
 
 /// Runs the command and gives its exit code. `program` with `arguments` starts it again; `code` is the file of this
 /// module.
@@ -23,5 +23,5 @@ pub fn run_command(
     words: Vec<OsString>,
 ) -> u8 {
     let host = Host { program, arguments, code, words };
-    py.detach(|| main_hosted(built_in(), host, Box::new(Classes)) as u8)
+    py.detach(|| main_hosted(medial_methods::registry(), host, Box::new(Classes)) as u8)
 }

@@ -10,12 +10,12 @@ use std::sync::OnceLock;
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Level, MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, RunContext,
-    Simplification, Simplified, SimplifyError, Work,
+    Level, MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, Presentation, Registered,
+    RunContext, Simplification, Simplified, SimplifyError,
 };
 use medial::surface::Side;
 use medial_bench::plugin::ScriptLoader;
-use medial_bench::run::{Registry, no_such_method};
+use medial_bench::run::{Entry, Registry, no_such_method};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde::Deserialize;
@@ -27,28 +27,24 @@ use crate::error::{Failure, Kind};
 /// The module that stands between a class and this file.
 const BETWEEN: &str = "medial_axis._plugins";
 
-/// All methods of the program, those that run only where they are named too.
-pub fn built_in() -> Vec<Box<dyn MedialSimplifier>> {
-    medial_methods::registry().into_iter().chain(medial_methods::on_request()).collect()
-}
-
 fn registry() -> &'static Registry {
     static REGISTRY: OnceLock<Registry> = OnceLock::new();
-    REGISTRY.get_or_init(|| Registry::new(built_in()).expect("the ids of the program differ"))
+    REGISTRY.get_or_init(|| {
+        Registry::new(medial_methods::registry()).expect("the ids of the program differ")
+    })
 }
 
-/// What the methods of the program say of themselves, as JSON.
+/// The descriptions of the methods of the program, as JSON.
 #[pyfunction]
 pub fn methods() -> PyResult<String> {
-    let infos: Vec<&MethodInfo> =
-        registry().entries().iter().map(|entry| entry.method().info()).collect();
-    Ok(serde_json::to_string(&infos).map_err(|error| Failure::new(Kind::Internal, error))?)
+    Ok(serde_json::to_string(registry().entries())
+        .map_err(|error| Failure::new(Kind::Internal, error))?)
 }
 
 /// A method of either kind.
 pub enum Method {
     /// Of the program.
-    BuiltIn(&'static dyn MedialSimplifier),
+    BuiltIn(&'static Entry),
     /// A class.
     Class(Box<ClassMethod>),
 }
@@ -62,7 +58,7 @@ impl Method {
         let known =
             || registry().entries().iter().map(|entry| entry.id().to_owned()).collect::<Vec<_>>();
         match registry().entry(&id) {
-            Some(entry) => Ok(Self::BuiltIn(entry.method())),
+            Some(entry) => Ok(Self::BuiltIn(entry)),
             None => Err(Failure::parameter(no_such_method(&id, &known())).into()),
         }
     }
@@ -70,8 +66,16 @@ impl Method {
     /// The method.
     pub fn get(&self) -> &dyn MedialSimplifier {
         match self {
-            Self::BuiltIn(method) => *method,
+            Self::BuiltIn(entry) => entry.method(),
             Self::Class(method) => method.as_ref(),
+        }
+    }
+
+    /// Native levels of a default comparison.
+    pub fn sweep(&self) -> &[f64] {
+        match self {
+            Self::BuiltIn(entry) => &entry.presentation().sweep,
+            Self::Class(method) => &method.presentation.sweep,
         }
     }
 }
@@ -80,6 +84,7 @@ impl Method {
 pub struct ClassMethod {
     class: Py<PyAny>,
     info: MethodInfo,
+    presentation: Presentation,
 }
 
 /// What `_plugins.describe` says of a class.
@@ -94,6 +99,7 @@ struct Described {
     params: Vec<DescribedParam>,
     published: Option<String>,
     on_request: bool,
+    incremental: bool,
 }
 
 #[derive(Deserialize)]
@@ -117,7 +123,12 @@ impl ClassMethod {
         let text: String = py.import(BETWEEN)?.call_method1("describe", (class,))?.extract()?;
         let described: Described = serde_json::from_str(&text)
             .map_err(|error| Failure::new(Kind::Internal, format!("describe: {error}")))?;
-        Ok(Self { class: class.clone().unbind(), info: described.into() })
+        let presentation = Presentation {
+            sweep: described.sweep.clone(),
+            on_request: described.on_request,
+            ..Presentation::default()
+        };
+        Ok(Self { class: class.clone().unbind(), info: described.into(), presentation })
     }
 }
 
@@ -133,10 +144,9 @@ impl From<Described> for MethodInfo {
         let info = Self::new(described.id, described.title)
             .citation(described.citation)
             .summary(described.summary)
-            .sweep(&described.sweep)
             .params(described.params.into_iter().map(param));
-        let info =
-            Self { on_request: described.on_request, native: described.native.map(level), ..info };
+        let (native, incremental) = (described.native.map(level), described.incremental);
+        let info = Self { native, incremental, ..info };
         match described.published {
             Some(published) => info.published(published),
             None => info,
@@ -182,7 +192,6 @@ impl Simplification for Prepared {
                 return Err(SimplifyError::Level(format!("{value} is not a finite number")));
             }
             Level::Native(value) => ("native", value),
-            Level::MaxError(_) => return Err(SimplifyError::searched()),
         };
         let answer = Python::attach(|py| {
             let answer = py.import(BETWEEN)?.call_method1("at", (&self.0, kind, value))?;
@@ -192,7 +201,6 @@ impl Simplification for Prepared {
         let mesh = MedialMesh::clone(&answer.axis.get().mesh);
         let mut simplified = Simplified::new(mesh, level);
         simplified.native_level = answer.native_level;
-        simplified.work = if answer.continued { Work::Continued } else { Work::Anew };
         answer.warnings.into_iter().for_each(|warning| simplified.diagnostics.warn(warning));
         Ok(simplified)
     }
@@ -204,7 +212,6 @@ struct Answer {
     axis: Py<Axis>,
     native_level: Option<f64>,
     warnings: Vec<String>,
-    continued: bool,
 }
 
 /// An exception of a class as the error of a method.
@@ -236,11 +243,13 @@ fn of_exception(error: PyErr) -> SimplifyError {
 pub struct Classes;
 
 impl ScriptLoader for Classes {
-    fn load(&self, path: &Path) -> Result<Vec<Box<dyn MedialSimplifier>>, String> {
+    fn load(&self, path: &Path) -> Result<Vec<Registered>, String> {
         Python::attach(|py| {
             let classes = py.import(BETWEEN)?.call_method1("load", (path,))?;
             let method = |class: PyResult<Bound<'_, PyAny>>| {
-                Ok(Box::new(ClassMethod::new(&class?)?) as Box<dyn MedialSimplifier>)
+                let method = ClassMethod::new(&class?)?;
+                let presentation = method.presentation.clone();
+                Ok(Registered { method: Box::new(method), presentation })
             };
             classes.try_iter()?.map(method).collect::<PyResult<Vec<_>>>()
         })

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use medial::simplifier::Level;
+use crate::Target;
 use serde_json::{Map, Value};
 
 use super::pairs::Pair;
@@ -60,7 +60,7 @@ fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffO
     let is_right = |record: &Record, betti: &Value| {
         demanded(record).is_some_and(|demanded| *betti == Value::from(demanded.to_vec()))
     };
-    let is_bounded = matches!(pair.old.simplify.level, Level::MaxError(_));
+    let is_bounded = matches!(pair.old.simplify.level, Target::MaxError(_));
     match key {
         "status" => of_truth(pair.old.status.is_ok(), pair.new.status.is_ok()),
         "betti" | "union.betti" => of_truth(is_right(pair.old, old), is_right(pair.new, new)),

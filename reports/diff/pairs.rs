@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use medial::simplifier::Level;
+use crate::Target;
 
 use super::{ItemName, Unlike};
 use crate::comparison::{level_label, row_name};
@@ -95,7 +95,7 @@ fn arranged(records: &[Record]) -> Arranged<'_> {
             row: row_name(record),
             seed: record.simplify.seed,
             level: match record.simplify.level {
-                Level::Spheres(count) => LevelKey::Spheres(std::cmp::Reverse(count)),
+                Target::Spheres(count) => LevelKey::Spheres(std::cmp::Reverse(count)),
                 level => LevelKey::Other(level_label(level)),
             },
         };

@@ -277,8 +277,7 @@ fn best_medial<'e, 'a>(
 ) -> Option<&'e Entry<'a>> {
     let at = |entry: &&Entry<'_>| {
         let level = entry.record.simplify.level;
-        let asked =
-            matches!(level, medial::simplifier::Level::Spheres(n) if medial_numbers(n) == numbers);
+        let asked = matches!(level, crate::Target::Spheres(n) if medial_numbers(n) == numbers);
         asked && entry.comparable()
     };
     let error = |entry: &Entry<'_>| HAUSDORFF.of(entry.record).unwrap_or(f64::INFINITY);

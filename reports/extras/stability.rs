@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::Target;
 use medial::metrics::AxisSpan;
-use medial::simplifier::Level;
 use serde::{Deserialize, Serialize};
 
 use super::{Extra, STABILITY, read_lines};
@@ -46,7 +46,7 @@ pub struct AxisShift {
 impl NoiseRecord {
     /// The number of spheres that was asked, where the result has it to within 2 %.
     fn at_count(&self) -> Option<usize> {
-        let Level::Spheres(asked) = self.record.simplify.level else { return None };
+        let Target::Spheres(asked) = self.record.simplify.level else { return None };
         let reached = self.record.simplify.reached?;
         let measured = self.record.status.has_result() && self.record.evaluate.is_some();
         let near = reached.abs_diff(asked) as f64 <= 0.02 * asked as f64;
@@ -133,7 +133,7 @@ impl<'a> Study<'a> {
         for noisy in all {
             let simplify = &noisy.record.simplify;
             let series = comparison.series_of(&noisy.record);
-            if let (Level::Spheres(count), Some(series)) = (simplify.level, series) {
+            if let (Target::Spheres(count), Some(series)) = (simplify.level, series) {
                 let key = (series, count, key_of(noisy.noise));
                 *study.asked.entry(key).or_default() += 1;
                 if noisy.at_count().is_some() {

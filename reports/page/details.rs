@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use medial::simplifier::Level;
+use crate::Target;
 use serde_json::{Map, Value, json};
 
 use crate::comparison::Comparison;
@@ -104,10 +104,10 @@ fn repeat_command(record: &Record) -> String {
         words.extend(["--set".to_owned(), format!("{key}={value}")]);
     }
     match simplify.level {
-        Level::Published => {}
-        Level::Spheres(count) => words.extend(["--spheres".to_owned(), count.to_string()]),
-        Level::Native(value) => words.extend(["--level".to_owned(), value.to_string()]),
-        Level::MaxError(value) => words.extend(["--max-error".to_owned(), value.to_string()]),
+        Target::Published => {}
+        Target::Spheres(count) => words.extend(["--spheres".to_owned(), count.to_string()]),
+        Target::Native(value) => words.extend(["--level".to_owned(), value.to_string()]),
+        Target::MaxError(value) => words.extend(["--max-error".to_owned(), value.to_string()]),
     }
     if let Some(conditions) = &record.conditions {
         let defaults =
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
     use crate::record::{Simplify, Status};
 
-    fn record(level: Level) -> Record {
+    fn record(level: Target) -> Record {
         let simplify = serde_json::to_value(Simplify::asked("qmat", level, Status::Ok)).unwrap();
         let json = serde_json::json!({"mesh": "bear", "status": "ok", "simplify": simplify});
         serde_json::from_value(json).unwrap()
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn the_command_repeats_the_item() {
-        let mut of = record(Level::Spheres(100));
+        let mut of = record(Target::Spheres(100));
         assert_eq!(repeat_command(&of), "medial simplify bear -m qmat --spheres 100");
         of.command = "medial compare in/bear.off --methods qmat".to_owned();
         of.simplify.params.set("k", "0.5");
@@ -189,7 +189,7 @@ mod tests {
             repeat_command(&of),
             "medial simplify in/bear.off -m qmat --set k=0.5 --set 'mode=a b' --spheres 100 --seed 7"
         );
-        of = record(Level::Native(0.25));
+        of = record(Target::Native(0.25));
         of.dataset = Some("builtin".to_owned());
         assert_eq!(repeat_command(&of), "medial simplify builtin:bear -m qmat --level 0.25");
         of.dataset = Some("public".to_owned());
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_record_cannot_leave_its_script() {
-        let mut of = record(Level::Published);
+        let mut of = record(Target::Published);
         of.reason = Some("</script><!--\u{202e}".to_owned());
         let line = line(&of, &mut Shared::default());
         assert!(

@@ -207,7 +207,7 @@ fn row(page: &Page<'_>, entry: &Entry<'_>, best: &Best) -> Row {
     let facets = [mesh.clone(), series.clone(), level.clone(), status.clone()];
     let mut row = Row { html, facets, values: vec![mesh.as_str().into()] };
     let asked = match simplify.level {
-        medial::simplifier::Level::Spheres(count) => Some(count as f64),
+        crate::Target::Spheres(count) => Some(count as f64),
         _ => None,
     };
     row.number(asked, &escape_html(&level));

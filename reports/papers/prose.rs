@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use medial::simplifier::Level;
+use crate::Target;
 
 use crate::comparison::Comparison;
 use crate::header::Header;
@@ -237,7 +237,7 @@ fn levels(comparison: &Comparison<'_>) -> Option<String> {
     let counts: Vec<String> = comparison.counts().map(|(_, n)| grouped(n as u64)).collect();
     let bounds: Vec<String> = levels()
         .filter_map(|level| match level {
-            Level::MaxError(bound) => Some(significant_percent(*bound)),
+            Target::MaxError(bound) => Some(significant_percent(*bound)),
             _ => None,
         })
         .collect();
@@ -251,10 +251,10 @@ fn levels(comparison: &Comparison<'_>) -> Option<String> {
             list(&bounds)
         ));
     }
-    if levels().any(|level| matches!(level, Level::Published)) {
+    if levels().any(|level| matches!(level, Target::Published)) {
         asked.push("at published levels".to_owned());
     }
-    if levels().any(|level| matches!(level, Level::Native(_))) {
+    if levels().any(|level| matches!(level, Target::Native(_))) {
         asked.push("at levels of the methods' own".to_owned());
     }
     let reached = match counts.is_empty() {

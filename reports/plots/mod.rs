@@ -11,7 +11,7 @@ mod scaling;
 
 use std::fmt::Display;
 
-use medial::simplifier::Level;
+use crate::Target;
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::equal_error::BoundSummary;
@@ -165,7 +165,7 @@ pub(crate) fn mesh_plots(
 /// error bounds as a line, those at levels of its own as dashes.
 fn mesh_curves(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &Kind) -> Vec<Curve> {
     let is_own = |entry: &Entry<'_>| {
-        matches!(entry.record.simplify.level, Level::Native(_) | Level::Published)
+        matches!(entry.record.simplify.level, Target::Native(_) | Target::Published)
     };
     let mut curves: Vec<Curve> = [false, true]
         .into_iter()
@@ -297,7 +297,7 @@ pub(crate) fn native_plots(
     let stems = crate::text::file_stems(comparison.series.iter().map(String::as_str));
     for native in natives {
         let at = |point: &NativePoint| match point.level {
-            Level::Native(value) => Some((value, point.hausdorff)),
+            Target::Native(value) => Some((value, point.hausdorff)),
             _ => None,
         };
         let points: Vec<(f64, f64)> = native.points.iter().filter_map(at).collect();
@@ -483,7 +483,7 @@ fn stage_bars(
     let label = |row: &SeriesSummary| label_over(&comparison.series[row.series], summary, row.over);
     let rows = summary.rows.iter().filter(|row| row.over > 0);
     let rows: Vec<_> = rows.filter_map(|row| Some((label(row), row.stages?))).collect();
-    let level = level_label(Level::Spheres(summary.count));
+    let level = level_label(Target::Spheres(summary.count));
     let title = format!("Seconds by stage, to {level} spheres");
     let svg = Bars { title: title.clone(), rows }.to_svg()?;
     let points = serde_json::Value::Null;

@@ -12,7 +12,8 @@ mod text;
 
 use std::collections::BTreeMap;
 
-use medial::simplifier::{Level, Params};
+use crate::Target;
+use medial::simplifier::Params;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -55,7 +56,7 @@ pub struct Run {
     #[serde(default)]
     pub params: Params,
     /// How far it simplifies.
-    pub level: Level,
+    pub level: Target,
 }
 
 /// A number of the table.

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use medial::simplifier::Level;
+use crate::Target;
 
 use crate::comparison::{Comparison, Entry};
 use crate::metric::{METRICS, Metric, Value};
@@ -73,18 +73,18 @@ fn identity() -> Vec<Column> {
         column("level", |r| {
             Some(
                 match r.simplify.level {
-                    Level::Published => "published",
-                    Level::Spheres(_) => "spheres",
-                    Level::Native(_) => "native",
-                    Level::MaxError(_) => "max_error",
+                    Target::Published => "published",
+                    Target::Spheres(_) => "spheres",
+                    Target::Native(_) => "native",
+                    Target::MaxError(_) => "max_error",
                 }
                 .to_owned(),
             )
         }),
         column("asked", |r| match r.simplify.level {
-            Level::Published => None,
-            Level::Spheres(count) => Some(count.to_string()),
-            Level::Native(value) | Level::MaxError(value) => Some(number(value)),
+            Target::Published => None,
+            Target::Spheres(count) => Some(count.to_string()),
+            Target::Native(value) | Target::MaxError(value) => Some(number(value)),
         }),
         column("status", |r| Some(r.status.key().to_owned())),
         column("reason", |r| r.reason.clone()),

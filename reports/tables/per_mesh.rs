@@ -61,9 +61,7 @@ pub(crate) fn remark(entry: &Entry<'_>) -> String {
     if record.evaluate.is_none() {
         return "not evaluated".to_owned();
     }
-    if let (medial::simplifier::Level::Spheres(_), false) =
-        (record.simplify.level, entry.comparable())
-    {
+    if let (crate::Target::Spheres(_), false) = (record.simplify.level, entry.comparable()) {
         return "another number of spheres: not compared".to_owned();
     }
     record.origin.as_ref().map_or_else(String::new, |origin| origin.trust.to_string())

@@ -1,4 +1,4 @@
-//! One method after another: a filter first, then a collapse of what it left.
+//! One method after another: a filter first, then a collapse of its result.
 
 use std::sync::Arc;
 
@@ -16,25 +16,29 @@ const PUBLISHED: &str = "published";
 /// What stands before the parameters of the first method.
 const FIRST: &str = "first.";
 
-/// Two methods as one: the second starts from what the first leaves at one level of its own, and
-/// answers all levels.
-///
-/// Each level is made anew from there, as if it had been asked alone.
+/// Two methods as one: the second starts from the result of the first at one level, and returns all
+/// levels, each after a preparation of its own.
 pub struct Chain {
     first: Arc<dyn MedialSimplifier>,
+    filter: Level,
     then: Arc<dyn MedialSimplifier>,
     info: MethodInfo,
 }
 
 impl Chain {
-    /// `first` at the level that the parameter `level` sets, or else at that of
-    /// [`MethodInfo::filter`], or the published one; then `then`. The id is `FIRST+THEN`; parameters are those of `then`, and those of `first` with `first.`
+    /// `first` at the level that the parameter `level` sets, by default `filter`; then `then`.
+    ///
+    /// The id is `FIRST+THEN`. The parameters are those of `then`, and those of `first` with `first.`
     /// before their names.
-    pub fn new(first: Arc<dyn MedialSimplifier>, then: Arc<dyn MedialSimplifier>) -> Self {
+    pub fn new(
+        first: Arc<dyn MedialSimplifier>,
+        filter: Level,
+        then: Arc<dyn MedialSimplifier>,
+    ) -> Self {
         let (a, b) = (first.info(), then.info());
         let unit = a.native.as_ref().map_or("none".into(), |native| native.unit.clone());
-        let default = match a.filter {
-            Some(Level::Native(value)) => value.to_string(),
+        let default = match filter {
+            Level::Native(value) => value.to_string(),
             _ => PUBLISHED.to_owned(),
         };
         let level = ParamInfo::new(LEVEL, default, unit, format!("level of {} first", a.id));
@@ -52,15 +56,15 @@ impl Chain {
         .param(level)
         .params(a.params.iter().map(of_first))
         .params(b.params.iter().cloned());
-        let native = b.native.clone();
-        let info = MethodInfo { native, extras: b.extras.clone(), ..info }.sweep(&b.sweep);
-        Self { first, then, info }
+        let (native, extras) = (b.native.clone(), b.extras.clone());
+        let info = MethodInfo { native, extras, ..info };
+        Self { first, filter, then, info }
     }
 
     /// The level of the first method, its parameters, and those of the second.
     fn split(&self, params: &Params) -> Result<(Level, Params, Params), SimplifyError> {
         let first = self.first.info();
-        let mut level = first.filter.unwrap_or(Level::Published);
+        let mut level = self.filter;
         let (mut of_first, mut of_then) = (Params::none(), Params::none());
         for (key, value) in &params.0 {
             if let Some(key) = key.strip_prefix(FIRST) {
@@ -127,7 +131,6 @@ impl Simplification for Started {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let prepared = self.then.prepare(&self.shape, &self.params, &self.run);
         let mut simplified = prepared?.at(level)?;
-        simplified.work = super::Work::Anew;
         simplified.diagnostics.warnings.splice(0..0, self.remarks.iter().cloned());
         Ok(simplified)
     }

@@ -1,15 +1,15 @@
-//! What a method says of itself.
+//! The description of a method, and how the harness presents it.
 
 use std::borrow::Cow;
 
 use serde::Serialize;
 
-use super::Level;
+use super::{Level, MedialSimplifier};
 
 /// Text of a method's description: a literal in code, owned where it was read from a file.
 type Text = Cow<'static, str>;
 
-/// What a method says of itself.
+/// The description of a method.
 ///
 /// ```
 /// use medial::simplifier::{MethodInfo, NativeLevel, ParamInfo};
@@ -17,9 +17,7 @@ type Text = Cow<'static, str>;
 /// let info = MethodInfo::new("shrink", "Shrinking balls")
 ///     .citation("Who, when, where, DOI")
 ///     .summary("Keeps the balls that shrink least.")
-///     .home("Dense samples; not for few spheres.")
 ///     .native(NativeLevel::larger_is_coarser("t", "fraction of the diagonal"))
-///     .sweep(&[0.01, 0.02, 0.05])
 ///     .param(ParamInfo::new("rounds", 3, "rounds", "how often all balls shrink"));
 /// assert_eq!(info.params[0].default, "3");
 /// ```
@@ -29,30 +27,26 @@ pub struct MethodInfo {
     pub id: Text,
     /// Full name.
     pub title: Text,
-    /// Authors, year, title, venue, DOI.
+    /// Authors, year, title, venue, DOI, in one line.
     pub citation: Text,
+    /// The same source as a BibTeX entry; empty where there is no publication.
+    pub bibtex: Text,
     /// One sentence on what the method does.
     pub summary: Text,
-    /// One sentence on where the method is at home, and where not; empty where it does not say.
-    pub home: Text,
     /// The method's own level, where it has a scalar one.
     pub native: Option<NativeLevel>,
-    /// Native levels of a default comparison, from fine to coarse, in the unit of
-    /// [`MethodInfo::native`]; none for a method without one.
-    pub sweep: Vec<f64>,
-    /// Of a method that keeps a part of the medial axis as it is: the level from which a collapse
-    /// may go on, unless another is named.
-    pub filter: Option<Level>,
+    /// Whether [`at`](super::Simplification::at) continues from the previous level. It is then called
+    /// from fine to coarse, with levels of one kind after one preparation, and the seconds of a level
+    /// are those of all calls up to it. The seconds of other methods are those of each call alone.
+    pub incremental: bool,
     /// Whether there is one result for each shape, at [`Level::Published`](super::Level::Published)
     /// alone.
     pub fixed: bool,
-    /// Whether it runs only where it is named, because it takes long: not when all methods run.
-    pub on_request: bool,
     /// What [`Level::Published`](super::Level::Published) means here.
     pub published: Text,
     /// Parameters, in the order of the paper.
     pub params: Vec<ParamInfo>,
-    /// What the answers carry in [`Extras`](super::Extras).
+    /// What the results carry in [`Extras`](super::Extras).
     pub extras: Vec<Capability>,
 }
 
@@ -73,9 +67,9 @@ impl MethodInfo {
         Self { summary: summary.into(), ..self }
     }
 
-    /// With [`MethodInfo::home`].
-    pub fn home(self, home: impl Into<Text>) -> Self {
-        Self { home: home.into(), ..self }
+    /// With [`MethodInfo::bibtex`].
+    pub fn bibtex(self, bibtex: impl Into<Text>) -> Self {
+        Self { bibtex: bibtex.into(), ..self }
     }
 
     /// With [`MethodInfo::native`].
@@ -83,24 +77,14 @@ impl MethodInfo {
         Self { native: Some(native), ..self }
     }
 
-    /// With [`MethodInfo::sweep`], from fine to coarse.
-    pub fn sweep(self, levels: &[f64]) -> Self {
-        Self { sweep: levels.to_vec(), ..self }
-    }
-
-    /// With [`MethodInfo::filter`].
-    pub fn filter(self, level: Level) -> Self {
-        Self { filter: Some(level), ..self }
+    /// With [`MethodInfo::incremental`]: levels continue from the previous one.
+    pub fn incremental(self) -> Self {
+        Self { incremental: true, ..self }
     }
 
     /// With [`MethodInfo::fixed`]: no levels.
     pub fn fixed(self) -> Self {
         Self { fixed: true, ..self }
-    }
-
-    /// With [`MethodInfo::on_request`]: it runs where it is named, and only there.
-    pub fn on_request(self) -> Self {
-        Self { on_request: true, ..self }
     }
 
     /// With [`MethodInfo::published`].
@@ -120,13 +104,13 @@ impl MethodInfo {
         self
     }
 
-    /// With one thing more that the answers carry.
+    /// With one more extra of the results.
     pub fn extra(mut self, extra: Capability) -> Self {
         self.extras.push(extra);
         self
     }
 
-    /// Whether the answers carry an extra of this name.
+    /// Whether the results carry an extra of this name.
     pub fn has_extra(&self, name: &str) -> bool {
         self.extras.iter().any(|extra| extra.name == name)
     }
@@ -181,7 +165,7 @@ impl ParamInfo {
     }
 }
 
-/// Something that only some methods give beside the medial mesh.
+/// A result of only some methods, next to the medial mesh.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Capability {
     /// Name, such as `hierarchy`.
@@ -191,8 +175,63 @@ pub struct Capability {
 }
 
 impl Capability {
-    /// What is given, and what it is.
+    /// An extra by its name.
     pub fn new(name: impl Into<Text>, help: impl Into<Text>) -> Self {
         Self { name: name.into(), help: help.into() }
+    }
+}
+
+/// A method in a registry, and how the harness presents it.
+pub struct Registered {
+    /// The method.
+    pub method: Box<dyn MedialSimplifier>,
+    /// Its place in a comparison.
+    pub presentation: Presentation,
+}
+
+/// How the harness presents a method. Nothing here changes a result.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Presentation {
+    /// One sentence on the inputs and counts that suit the method; empty where there is none.
+    pub best_for: Text,
+    /// Native levels of a default comparison, from fine to coarse, in the unit of
+    /// [`MethodInfo::native`]; empty for a method without one.
+    pub sweep: Vec<f64>,
+    /// For a method that keeps a part of the medial axis as it is: the default level from which
+    /// another method continues in a chain.
+    pub filter: Option<Level>,
+    /// Whether it runs only when named, because it takes long.
+    pub on_request: bool,
+}
+
+impl<M: MedialSimplifier + 'static> From<M> for Registered {
+    fn from(method: M) -> Self {
+        Self { method: Box::new(method), presentation: Presentation::default() }
+    }
+}
+
+impl Registered {
+    /// With [`Presentation::best_for`].
+    pub fn best_for(mut self, sentence: impl Into<Text>) -> Self {
+        self.presentation.best_for = sentence.into();
+        self
+    }
+
+    /// With [`Presentation::sweep`], from fine to coarse.
+    pub fn sweep(mut self, levels: &[f64]) -> Self {
+        self.presentation.sweep = levels.to_vec();
+        self
+    }
+
+    /// With [`Presentation::filter`].
+    pub fn filter(mut self, level: Level) -> Self {
+        self.presentation.filter = Some(level);
+        self
+    }
+
+    /// With [`Presentation::on_request`].
+    pub fn on_request(mut self) -> Self {
+        self.presentation.on_request = true;
+        self
     }
 }

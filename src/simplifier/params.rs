@@ -3,7 +3,7 @@
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::SimplifyError;
+use super::{ParamInfo, SimplifyError};
 
 /// Parameters as given by the user, not yet typed: a JSON object.
 ///
@@ -54,3 +54,97 @@ impl Params {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoParams {}
+
+/// A struct of parameters that describes its fields; [`parameters!`](crate::parameters) implements
+/// it.
+pub trait ParamFields: Default + Serialize + DeserializeOwned {
+    /// Name, unit and help of each field, in the order of declaration.
+    const FIELDS: &'static [(&'static str, &'static str, &'static str)];
+
+    /// The parameters with their defaults, for [`MethodInfo::params`](super::MethodInfo::params).
+    fn describe() -> Vec<ParamInfo> {
+        let defaults = serde_json::to_value(Self::default()).expect("parameters are plain data");
+        let describe = |&(name, unit, help): &(&'static str, &'static str, &'static str)| {
+            ParamInfo::new(name, as_written(&defaults[name]), unit, help.trim_start())
+        };
+        Self::FIELDS.iter().map(describe).collect()
+    }
+}
+
+/// A value in the form that `--set` reads.
+fn as_written(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::String(text) => text.clone(),
+        serde_json::Value::Array(values) => {
+            values.iter().map(as_written).collect::<Vec<_>>().join(",")
+        }
+        value => value.to_string(),
+    }
+}
+
+/// Declares the parameters of a method once: the struct, its defaults, its keys, and its
+/// documentation.
+///
+/// Each field has its help as doc comment, then name, type, default and unit (or the list of
+/// allowed words). Unknown keys are rejected. A field can have serde attributes.
+///
+/// ```
+/// use medial::simplifier::{ParamFields, Params};
+///
+/// medial::parameters! {
+///     /// Parameters of an example.
+///     #[derive(Clone, Copy, Debug)]
+///     pub struct ExampleParams {
+///         /// Spheres below this radius are removed.
+///         least: f64 = 0.25, "fraction of the diagonal";
+///         /// How often all spheres shrink.
+///         rounds: usize = 3, "rounds";
+///     }
+/// }
+///
+/// let described = ExampleParams::describe();
+/// assert_eq!((&*described[0].name, &*described[0].default), ("least", "0.25"));
+/// assert_eq!(described[1].help, "How often all spheres shrink.");
+/// let mut params = Params::none();
+/// params.set("rounds", "5");
+/// assert_eq!(params.typed::<ExampleParams>()?.rounds, 5);
+/// params.set("round", "5");
+/// assert!(params.typed::<ExampleParams>().is_err());
+/// # Ok::<(), medial::simplifier::SimplifyError>(())
+/// ```
+#[macro_export]
+macro_rules! parameters {
+    (
+        $(#[$about:meta])*
+        pub struct $name:ident {
+            $(
+                $(#[doc = $help:literal])+
+                $(#[serde($($serde:tt)*)])*
+                $field:ident: $type:ty = $default:expr, $unit:expr;
+            )+
+        }
+    ) => {
+        $(#[$about])*
+        #[derive($crate::serde::Serialize, $crate::serde::Deserialize)]
+        #[serde(crate = "medial::serde", default, deny_unknown_fields)]
+        pub struct $name {
+            $(
+                $(#[doc = $help])+
+                #[doc = concat!("\n\nUnit or values: ", $unit, ".")]
+                $(#[serde($($serde)*)])*
+                pub $field: $type,
+            )+
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)+ }
+            }
+        }
+
+        impl $crate::simplifier::ParamFields for $name {
+            const FIELDS: &'static [(&'static str, &'static str, &'static str)] =
+                &[$((stringify!($field), $unit, concat!($($help),+)),)+];
+        }
+    };
+}

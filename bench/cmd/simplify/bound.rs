@@ -74,8 +74,8 @@ pub fn search(
         }
     };
     let trying = |level: Level| line.at(format!("searching the bound: {level}"));
-    let info = start.method.info();
-    let mut search = Search::new(simplification.as_mut(), info, initial, &measure, &trying);
+    let sweep = &start.entry.presentation().sweep;
+    let mut search = Search::new(simplification.as_mut(), sweep, initial, &measure, &trying);
     let found = search.within(bound).map_err(refused)?;
     let Some(Probe { level, spheres, error }) = found.within else {
         return Err(Failure::usage(found.refusal(bound)));

@@ -27,7 +27,7 @@ use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
 use crate::output::{counted, note, print_json, print_line, version};
 use crate::run::record::fill_result;
-use crate::run::{Fault, Input, LevelRun, Registry, Source, StageLine, answer, percent};
+use crate::run::{Entry, Fault, Input, LevelRun, Registry, Source, StageLine, answer, percent};
 use bound::Searched;
 use outputs::Outputs;
 
@@ -77,7 +77,8 @@ pub struct Arguments {
 /// When the input is refused, the level is not met at all, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
-    let method = method(registry, &arguments.method)?;
+    let entry = method(registry, &arguments.method)?;
+    let method = entry.method();
     let options = shape_options(&arguments.substrate)?;
     bound::check(arguments)?;
     check_hierarchy(arguments, method)?;
@@ -97,7 +98,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         Origin::new(&arguments.method, &params, &input, &shape, arguments.initial.as_deref());
     let loaded = arguments.hierarchy.as_deref();
     let loaded = loaded.map(|path| hierarchy::load(path, &origin, &shape)).transpose()?;
-    let start = Start { method, params, shape: &shape, loaded };
+    let start = Start { entry, params, shape: &shape, loaded };
     let (run, search) = simplify(arguments, &start, &input, &line)?;
     let mut simplify = describe(arguments, &start, &run);
     let simplified = run.outcome.map_err(|fault| failure(&source, fault))?;
@@ -165,7 +166,7 @@ fn check_hierarchy(arguments: &Arguments, method: &dyn MedialSimplifier) -> Resu
 
 /// What a method starts from.
 struct Start<'a> {
-    method: &'a dyn MedialSimplifier,
+    entry: &'a Entry,
     params: Params,
     shape: &'a Shape,
     loaded: Option<Loaded>,
@@ -178,9 +179,10 @@ impl<'a> Start<'a> {
         view: &'v Shape,
         run: &RunContext,
     ) -> Result<Box<dyn Simplification + 'v>, SimplifyError> {
-        let Self { method, params, loaded, .. } = self;
+        let Self { entry, params, loaded, .. } = self;
+        let method = entry.method();
         match loaded {
-            Some(loaded) => loaded.resume(*method, params),
+            Some(loaded) => loaded.resume(method, params),
             None => method.prepare(view, params, run),
         }
     }
@@ -217,6 +219,7 @@ fn simplify(
     let view = start.shape.view();
     let mut runs = answer(
         &view,
+        start.entry.method().info(),
         || start.begin(&view, &run),
         &[level],
         |level| {

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use medial::simplifier::Level;
+use medial_reports::Target;
 use medial_reports::{Record, Status, read_records};
 
 use crate::exit::Failure;
@@ -67,7 +67,7 @@ impl Need {
     /// All that the limits of an item allow. They hold for the reading, for the method and for the measuring, each, and
     /// for each search again.
     pub fn at_most(number: usize, item: &Item) -> Self {
-        let searches = item.levels.iter().filter(|level| matches!(level, Level::MaxError(_)));
+        let searches = item.levels.iter().filter(|level| matches!(level, Target::MaxError(_)));
         let stages = 3 * item.repeat + searches.count();
         // A limit beyond every machine is none.
         let bytes = match item.limits.bytes {
@@ -103,7 +103,7 @@ impl Earlier {
         let most = Need::at_most(number, item);
         let Some((seconds, bytes)) = self.a_level(item, dir) else { return most };
         let levels = item.levels.iter().map(|level| match level {
-            Level::MaxError(_) => SEARCHED,
+            Target::MaxError(_) => SEARCHED,
             _ => 1.0,
         });
         let runs = levels.sum::<f64>() * item.repeat as f64;

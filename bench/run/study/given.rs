@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use medial::complex::{self, Radii, ReadOptions};
-use medial::simplifier::{Level, Params};
+use medial::simplifier::Params;
+use medial_reports::Target;
 
 use super::items::hash_of;
 use super::{Here, Study, StudyError};
@@ -107,7 +108,7 @@ impl Study {
                 params,
                 fingerprint: Some(file.hash.clone()),
             },
-            levels: vec![Level::Spheres(file.spheres)],
+            levels: vec![Target::Spheres(file.spheres)],
             seed: self.seed,
             repeat: 1,
             threads: self.threads.unwrap_or(here.threads),

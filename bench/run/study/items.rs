@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use medial::simplifier::Level;
+use medial_reports::Target;
 
 use super::{Study, StudyError, StudyMethod, VOLUME_DEPTH};
 use crate::run::public::Library;
@@ -49,7 +49,7 @@ impl Study {
             methods = registry.usual().map(|e| StudyMethod::of(e.id())).collect();
         }
         for then in &self.after_filters {
-            let filters = registry.entries().iter().filter(|e| e.method().info().filter.is_some());
+            let filters = registry.entries().iter().filter(|e| e.presentation().filter.is_some());
             let chains = filters.map(|filter| format!("{}+{then}", filter.id()));
             methods.extend(chains.map(|id| StudyMethod::of(&id)));
         }
@@ -172,21 +172,21 @@ impl Study {
 
     /// The published level, the counts, the method's own levels and the error bounds, each from
     /// fine to coarse.
-    fn levels(&self, method: &StudyMethod, entry: &Entry) -> Vec<Level> {
+    fn levels(&self, method: &StudyMethod, entry: &Entry) -> Vec<Target> {
         let info = entry.method().info();
         if info.fixed {
-            return vec![Level::Published];
+            return vec![Target::Published];
         }
         let mut levels = Vec::new();
         if method.published.unwrap_or(self.published) {
-            levels.push(Level::Published);
+            levels.push(Target::Published);
         }
         let mut counts = method.spheres.as_ref().unwrap_or(&self.spheres).clone();
         counts.sort_unstable_by(|a, b| b.cmp(a));
         counts.dedup();
-        levels.extend(counts.into_iter().map(Level::Spheres));
+        levels.extend(counts.into_iter().map(Target::Spheres));
         let mut native = match method.levels.is_empty() && !self.counts_only {
-            true => info.sweep.clone(),
+            true => entry.presentation().sweep.clone(),
             false => method.levels.clone(),
         };
         native.sort_by(f64::total_cmp);
@@ -194,12 +194,12 @@ impl Study {
         if info.native.as_ref().is_some_and(|native| !native.larger_is_coarser) {
             native.reverse();
         }
-        levels.extend(native.into_iter().map(Level::Native));
+        levels.extend(native.into_iter().map(Target::Native));
         // Last, since a search that does not end must cost nothing else.
         let mut bounds = self.max_error.clone();
         bounds.sort_by(f64::total_cmp);
         bounds.dedup();
-        levels.extend(bounds.into_iter().map(Level::MaxError));
+        levels.extend(bounds.into_iter().map(Target::MaxError));
         levels
     }
 }

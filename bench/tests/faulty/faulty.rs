@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Level, MedialSimplifier, Method, MethodInfo, NoParams, RunContext, Simplification, Simplified,
+    Level, Method, MethodInfo, NoParams, Registered, RunContext, Simplification, Simplified,
     SimplifyError,
 };
 
@@ -147,8 +147,8 @@ fn slow<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
 }
 
 fn main() -> ExitCode {
-    let method = |id: &'static str, prepare| -> Box<dyn MedialSimplifier> {
-        Box::new(Method::<NoParams>::new(MethodInfo::new(id, id), prepare))
+    let method = |id: &'static str, prepare| {
+        Registered::from(Method::<NoParams>::new(MethodInfo::new(id, id), prepare))
     };
     let mut methods = medial_methods::registry();
     methods.extend([

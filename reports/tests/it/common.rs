@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use medial::metrics::{Counts, Distances, Evaluation, RatioSpikes, Spikes, TriangleQuality};
-use medial::simplifier::Level;
+use medial_reports::Target;
 use medial_reports::{
     Header, Initial, Machine, MethodNote, Record, Repetition, RunNote, Simplify, Stages, Status,
 };
@@ -151,7 +151,7 @@ fn evaluation(error: f64, wobble: f64, count: usize, rank: usize) -> Evaluation 
 
 /// The record of a run that led to nothing.
 pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
-    let mut simplify = Simplify::asked(method, Level::Spheres(count), status);
+    let mut simplify = Simplify::asked(method, Target::Spheres(count), status);
     simplify.seed = 1;
     simplify.threads = Some(1);
     simplify.version = "0.1.0".to_owned();
@@ -201,6 +201,7 @@ pub fn header(methods: &[&str]) -> Header {
         id: (*id).to_owned(),
         title: format!("Method {id}"),
         citation: "A. Author, 2015, Title, Journal, doi:10.1145/0000000".to_owned(),
+        bibtex: String::new(),
         summary: "Collapses edges by a quadric error.".to_owned(),
         home: format!("Few spheres; {id} is made up."),
         published: "a count of 1,000 spheres".to_owned(),

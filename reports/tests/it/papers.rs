@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::common::{SHAPES, comparison, failed, header, ok};
 use medial::metrics::{Certificate, Witness, WitnessSide};
-use medial::simplifier::Level;
+use medial_reports::Target;
 use medial_reports::{Conditions, Header, Record, Status, write_report};
 
 const METHODS: [&str; 3] = ["qmat", "angle", "tight"];
@@ -134,7 +134,7 @@ fn what_the_records_do_not_hold_is_named_and_not_said() {
     let mut record = ok("bear", "qmat", 100, 0, 0);
     (record.dataset, record.version) = (None, String::new());
     record.machine = medial_reports::Machine::default();
-    record.simplify.level = Level::MaxError(0.005);
+    record.simplify.level = Target::MaxError(0.005);
     let text = Report::of(&[record], &Header::default()).text("tables/methods.txt");
     let missing = text.lines().last().unwrap();
     for what in ["the version", "where the meshes come from", "vertices", "samples", "the machine"]

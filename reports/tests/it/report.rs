@@ -191,21 +191,21 @@ fn what_some_results_do_not_have_is_averaged_over_the_others() {
 
 #[test]
 fn bounds_and_own_levels_have_tables_of_their_own() {
-    use medial::simplifier::Level;
+    use medial_reports::Target;
 
     let mut records = Vec::new();
     for (shape, mesh) in SHAPES[..4].iter().enumerate() {
         for (rank, method) in ["qmat", "angle"].iter().enumerate() {
             for (count, level) in [(900, 30.0), (300, 60.0), (90, 90.0)] {
                 let mut record = ok(mesh, method, count, shape, rank);
-                record.simplify.level = Level::Native(level);
+                record.simplify.level = Target::Native(level);
                 records.push(record);
             }
             let mut within = ok(mesh, method, 200 * (1 + rank), shape, rank);
-            within.simplify.level = Level::MaxError(0.01);
+            within.simplify.level = Target::MaxError(0.01);
             if (shape, rank) == (3, 1) {
                 within = failed(mesh, method, 1, Status::BoundMissed, "the lowest is 1.2 %");
-                within.simplify.level = Level::MaxError(0.01);
+                within.simplify.level = Target::MaxError(0.01);
             }
             records.push(within);
         }

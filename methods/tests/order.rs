@@ -1,8 +1,7 @@
-//! Searches that keep what they computed: the answers do not depend on what was asked before, and
-//! the work says what had been done.
+//! Results of searches do not depend on earlier levels.
 
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, Work};
+use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified};
 use medial::surface;
 
 fn built_in(id: &str) -> Shape {
@@ -31,26 +30,7 @@ fn answers_do_not_depend_on_earlier_ones() {
                 assert_eq!(after.mesh, alone.mesh, "{name}");
                 assert_eq!(after.native_level, alone.native_level, "{name}");
                 assert_eq!(after.diagnostics, alone.diagnostics, "{name}");
-                assert_eq!(alone.work, Work::Anew, "{name}");
             }
         }
-    }
-}
-
-#[test]
-fn work_that_was_done_before_is_told() {
-    for id in ["sat", "aof"] {
-        let method = medial_methods::find(id).expect("registered");
-        let shape = built_in("bracket");
-        let works = answers(method.as_ref(), &shape, &[400, 100, 100]).into_iter().map(|a| a.work);
-        let costs: Vec<f64> = works
-            .map(|work| match work {
-                Work::Reused(cost) => cost.cpu_seconds,
-                Work::Anew => 0.0,
-                Work::Continued => panic!("{id} does not go on from level to level"),
-            })
-            .collect();
-        // The first has nothing to reuse, the second some, the third everything.
-        assert!(costs[0] == 0.0 && costs[1] > 0.0 && costs[2] >= costs[1], "{id}: {costs:?}");
     }
 }
