@@ -1,76 +1,74 @@
-"""Decimates FOLDER/input.off by fast-simplification to so many floats (three for each vertex) and
-writes the surfaces and their list, as `medial baseline` reads it.
+#!/usr/bin/env python3
+"""The baseline: surfaces decimated by quadrics, as external results of a comparison.
 
-    decimate.py FOLDER NUMBERS ...
+    python3 -m venv venv && venv/bin/pip install fast-simplification
+    venv/bin/python scripts/baselines/decimate.py FOLDER MESH.off... [--numbers 16000,8000,...]
+    medial compare MESH.off... --given fast-simplification=FOLDER
 
-The tool takes a number of triangles. A closed surface of Euler number chi with V vertices has 2 (V - chi)
-of them, which gives the first guess; a second one corrects it by what came out. Where a mesh cannot be
-brought to within 2 % (below the smallest surface that the tool reaches, or above the input), the nearest
-result is written once and says its own number. All else is the tool's default. Seconds are those of the
-call that made the surface.
+Writes FOLDER/MESH-NUMBERS.off for each number of floats, three for a vertex: as many as N spheres take are
+4 N. Makes no file where a mesh cannot be brought within 2 % of a number (below the smallest surface that
+the tool reaches, or above the input).
 """
 
-import importlib.metadata
-import json
-import sys
-import time
+import argparse
+from pathlib import Path
 
 import fast_simplification
 import numpy as np
 
-folder, targets = sys.argv[1], sorted(map(int, sys.argv[2:]), reverse=True)
-words = open(f"{folder}/input.off").read().split()
-vertex_count, face_count = int(words[1]), int(words[2])
-body = np.array(words[4 : 4 + 3 * vertex_count], float)
-vertices = body.reshape(-1, 3)
-rows = np.array(words[4 + 3 * vertex_count : 4 + 3 * vertex_count + 4 * face_count], int)
-faces = rows.reshape(-1, 4)[:, 1:]
-euler = vertex_count - face_count // 2
 
-# Single precision inside the tool: around the origin and of size one nothing is lost to the position.
-low, high = vertices.min(0), vertices.max(0)
-middle, size = (low + high) / 2, np.linalg.norm(high - low)
-unit = np.ascontiguousarray((vertices - middle) / size)
+def read_off(path):
+    words = path.read_text().split()
+    vertex_count, face_count = int(words[1]), int(words[2])
+    vertices = np.array(words[4 : 4 + 3 * vertex_count], float).reshape(-1, 3)
+    rows = np.array(words[4 + 3 * vertex_count : 4 + 3 * vertex_count + 4 * face_count], int)
+    return vertices, rows.reshape(-1, 4)[:, 1:].astype(np.int32)
 
 
-def decimate(triangles):
-    """The surface, its vertices in use, and the seconds of the call."""
-    triangles = min(max(triangles, 4), face_count)
-    start = time.perf_counter()
-    points, kept = fast_simplification.simplify(unit, faces.astype(np.int32), target_count=triangles)
-    seconds = time.perf_counter() - start
-    used, corners = np.unique(np.asarray(kept).ravel(), return_inverse=True)
-    return points[used], corners.reshape(-1, 3), seconds
+def write_off(path, vertices, faces):
+    with open(path, "w") as out:
+        out.write(f"OFF\n{len(vertices)} {len(faces)} 0\n")
+        np.savetxt(out, vertices, fmt="%.17g")
+        np.savetxt(out, np.column_stack([np.full(len(faces), 3), faces]), fmt="%d")
 
 
-surfaces, seen = [], set()
-for numbers in targets:
-    wanted = numbers / 3
-    if wanted > vertex_count:
-        continue
+def decimate(vertices, faces, wanted):
+    """The surface with the number of vertices nearest to `wanted`. The tool takes a number of triangles:
+    2 (V - chi) of a closed surface with Euler number chi, corrected by the result."""
+    euler = len(vertices) - len(faces) // 2
     triangles = round(2 * (wanted - euler))
     best = None
     for _ in range(4):
-        found = decimate(triangles)
-        if best is None or abs(len(found[0]) - wanted) < abs(len(best[0]) - wanted):
-            best = found
-        missing = wanted - len(found[0])
-        if abs(missing) <= 0.5 or not 4 <= triangles <= face_count:
+        target = min(max(triangles, 4), len(faces))
+        points, kept = fast_simplification.simplify(vertices, faces, target_count=target)
+        used, corners = np.unique(np.asarray(kept).ravel(), return_inverse=True)
+        if best is None or abs(len(used) - wanted) < abs(len(best[0]) - wanted):
+            best = points[used], corners.reshape(-1, 3)
+        missing = wanted - len(used)
+        if abs(missing) <= 0.5 or not 4 <= triangles <= len(faces):
             break
         triangles = max(4, round(triangles + 2 * missing))
-    points, corners, seconds = best
-    if len(corners) == 0 or len(points) in seen:
-        continue
-    seen.add(len(points))
-    name = f"{numbers}.off"
-    with open(f"{folder}/{name}", "w") as out:
-        out.write(f"OFF\n{len(points)} {len(corners)} 0\n")
-        for point in points * size + middle:
-            out.write("%.17g %.17g %.17g\n" % tuple(point))
-        for corner in corners:
-            out.write("3 %d %d %d\n" % tuple(corner))
-    surfaces.append({"file": name, "numbers": numbers, "seconds": seconds})
+    return best
 
-tool = "fast-simplification " + importlib.metadata.version("fast-simplification")
-with open(f"{folder}/surfaces.json", "w") as out:
-    json.dump({"tool": tool, "surfaces": surfaces}, out)
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("meshes", nargs="+", type=Path)
+    parser.add_argument("--numbers", default="16000,8000,4000,2000,800,400,200")
+    arguments = parser.parse_args()
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    for mesh in arguments.meshes:
+        vertices, faces = read_off(mesh)
+        # The tool works in single precision: around the origin and of size one it loses nothing to the position.
+        low, high = vertices.min(0), vertices.max(0)
+        middle, size = (low + high) / 2, np.linalg.norm(high - low)
+        unit = np.ascontiguousarray((vertices - middle) / size)
+        for numbers in map(int, arguments.numbers.split(",")):
+            points, corners = decimate(unit, faces, numbers / 3)
+            if len(corners) and abs(len(points) - numbers / 3) <= 0.02 * numbers / 3:
+                write_off(arguments.folder / f"{mesh.stem}-{numbers}.off", points * size + middle, corners)
+
+
+if __name__ == "__main__":
+    main()
