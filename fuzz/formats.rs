@@ -38,14 +38,6 @@ pub(crate) fn stl(bytes: &[u8]) {
 fn medial(loaded: &LoadedMa) {
     let mesh = &loaded.mesh;
     assert_eq!(mesh.check(), Ok(()));
-    let annotations = &loaded.annotations;
-    for (values, elements) in [
-        (annotations.sphere_types.len(), mesh.spheres.len()),
-        (annotations.edge_types.len(), mesh.edges.len()),
-        (annotations.importance.len(), mesh.faces.len()),
-    ] {
-        assert!(values == 0 || values == elements);
-    }
     if mesh.spheres.len() + mesh.faces.len() < SMALL {
         let [b0, b1, b2] = complex::betti(mesh).map(|number| number as i64);
         assert_eq!(b0 - b1 + b2, complex::euler(mesh));

@@ -101,20 +101,6 @@ def check_glb(file, spheres, edges, faces):
         say(f"{file}: radii in single precision", np.array_equal(radii, spheres[:, 3].astype(np.float32)))
         theirs = sorted(tuple(sorted(int(v) for v in f)) for f in sheet.faces)
         say(f"{file}: {len(faces)} faces", theirs == sorted(tuple(f) for f in faces))
-        normals = np.asarray(sheet.vertex_normals)
-        say(f"{file}: normals of unit length", np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 1e-6)
-        used = np.unique(sheet.faces)
-        flat = np.zeros((len(centres), 3))
-        # In double precision: small faces of single precision have any normal.
-        corner = np.stack((spheres[:, 0], spheres[:, 2], -spheres[:, 1]), axis=1)[sheet.faces]
-        area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        largest = np.zeros(len(centres))
-        size = np.linalg.norm(area, axis=1)
-        for k in np.argsort(size):
-            for v in sheet.faces[k]:
-                flat[v], largest[v] = area[k] / max(size[k], 1e-300), size[k]
-        on_side = np.einsum("ij,ij->i", flat[used], normals[used])
-        say(f"{file}: normals on the side of the largest face", bool((on_side[largest[used] > 0] > -1e-4).all()))
         # With a material trimesh keeps them as an attribute: 16 bits of linear light.
         colours = np.asarray(sheet.visual.vertex_attributes["color"], float) / 65535
         extras = sheet.metadata

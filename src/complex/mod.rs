@@ -22,9 +22,9 @@ pub use contour::{
 pub use crossing::{Crossings, crossing_faces};
 pub use cubical::cubical_betti;
 pub use formats::{
-    Annotations, LoadedMa, Look, MaError, MaErrorKind, Part, PartKind, Radii, ReadOptions,
-    SphereValues, parse_ma, parse_ma_with, parse_obj, parse_ply, parse_ply_with, read, read_ma,
-    read_with, single_precision_loss, write, write_with,
+    LoadedMa, Look, MaError, MaErrorKind, Radii, ReadOptions, SphereValues, parse_ma,
+    parse_ma_with, parse_obj, parse_ply, parse_ply_with, read, read_with, single_precision_loss,
+    write, write_with,
 };
 pub use incidence::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};

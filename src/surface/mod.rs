@@ -20,6 +20,7 @@ mod mend;
 mod mesh;
 mod nesting;
 mod orient;
+pub(crate) mod ply;
 mod power_crust;
 mod read;
 mod repair;

@@ -177,9 +177,8 @@ fn alone(row: &mut Row, arguments: &Arguments) -> Result<(), Failure> {
 
 /// What is told of a medial mesh by itself.
 fn describe(row: &mut Row, loaded: LoadedMa) {
-    let LoadedMa { mesh, notes, warnings, kept, .. } = loaded;
-    let dropped = kept.as_ref().and_then(|kept| kept.last()).map(|&last| last as usize + 1);
-    row.spheres_in_file = Some(dropped.unwrap_or(mesh.spheres.len()));
+    let LoadedMa { mesh, notes, warnings } = loaded;
+    row.spheres_in_file = Some(mesh.spheres.len());
     row.counts = Some(metrics::counts(&mesh));
     row.euler = Some(complex::euler(&mesh));
     row.betti = Some(complex::betti(&mesh));

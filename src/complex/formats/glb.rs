@@ -5,19 +5,18 @@
 //! ```
 //!
 //! One mesh `medial axis`, whose primitives share their vertices, the spheres: faces as triangles, edges *without a
-//! face* as lines, spheres without an edge as points. A vertex has a position, a normal, a colour (`COLOR_0`, linear
+//! face* as lines, spheres without an edge as points. A vertex has a position, a colour (`COLOR_0`, linear
 //! light), the radius (`_RADIUS`) and the value it is coloured by (`_STABILITY`, `_ERROR`). The mesh's `extras`
 //! describe the colours. On request a second mesh `spheres` holds the spheres as round bodies.
 //!
 //! - glTF has `y` up, medial meshes by habit `z`: `(x, y, z)` is written as `(x, z, -y)`, which Blender turns back.
 //! - Numbers are rounded to single precision ([`single_precision_loss`]), the only one of glTF.
-//! - Sheets have two sides and may meet in threes, so a smooth normal is a compromise there. Faces are turned alike
-//!   across edges of two faces. A vertex normal is the sum of the faces' area vectors, each on the side of the largest.
+//! - Sheets have two sides and may meet in threes, where no smooth normal is right: they have none, and viewers shade
+//!   them flat, as the specification demands then.
 //!
 //! Source: The Khronos Group, glTF 2.0 Specification, <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>.
 
-use std::collections::{HashMap, VecDeque};
-use std::mem;
+use std::collections::HashMap;
 
 use serde_json::{Map, Value, json};
 
@@ -135,7 +134,6 @@ fn y_up(point: Vec3) -> Vec3 {
 
 /// The mesh of faces, lone edges and lone spheres on common vertices.
 fn axis(out: &mut Arrays, mesh: &MedialMesh, values: &SphereValues) -> Value {
-    let faces = turned_alike(mesh);
     let points: Vec<Vec3> = mesh.spheres.iter().map(|sphere| y_up(sphere.centre)).collect();
     let mut attributes = Map::new();
     attributes.insert("POSITION".into(), out.positions(&points).into());
@@ -147,21 +145,15 @@ fn axis(out: &mut Arrays, mesh: &MedialMesh, values: &SphereValues) -> Value {
     if attribute != RADIUS {
         attributes.insert(attribute, out.scalars(values.values.iter().copied()).into());
     }
-    let mut primitives = Vec::new();
-    if !faces.is_empty() {
-        let normals: Vec<Vec3> = normals(mesh, &faces).into_iter().map(y_up).collect();
-        let mut attributes = attributes.clone();
-        attributes.insert("NORMAL".into(), out.vectors(&normals).into());
-        primitives.push((TRIANGLES, attributes, faces.as_flattened().to_vec()));
-    }
-    // Without normals viewers show lines and points unshaded.
-    let lines = lone_edges(mesh).as_flattened().to_vec();
-    primitives.push((LINES, attributes.clone(), lines));
-    primitives.push((POINTS, attributes, isolated(mesh)));
+    let primitives = [
+        (TRIANGLES, mesh.faces.as_flattened().to_vec()),
+        (LINES, lone_edges(mesh).as_flattened().to_vec()),
+        (POINTS, isolated(mesh)),
+    ];
     let primitives: Vec<Value> = primitives
         .into_iter()
-        .filter(|(.., indices)| !indices.is_empty())
-        .map(|(mode, attributes, indices)| {
+        .filter(|(_, indices)| !indices.is_empty())
+        .map(|(mode, indices)| {
             let indices = out.indices(&indices);
             json!({ "attributes": attributes, "indices": indices, "material": 0, "mode": mode })
         })
@@ -266,74 +258,6 @@ impl Arrays {
     }
 }
 
-/// The faces of a medial mesh, turned alike across edges of exactly two faces: from the first face of each sheet
-/// outwards. On one-sided sheets two neighbours stay opposed somewhere.
-fn turned_alike(mesh: &MedialMesh) -> Vec<[u32; 3]> {
-    let mut of_edge: Vec<Vec<u32>> = vec![Vec::new(); mesh.edges.len()];
-    for (face, corners) in (0..).zip(&mesh.faces) {
-        sides(mesh, corners).for_each(|edge| of_edge[edge].push(face));
-    }
-    let mut faces = mesh.faces.clone();
-    let mut reached = vec![false; faces.len()];
-    for first in 0..faces.len() {
-        if mem::replace(&mut reached[first], true) {
-            continue;
-        }
-        let mut ahead = VecDeque::from([first]);
-        while let Some(face) = ahead.pop_front() {
-            for edge in sides(mesh, &mesh.faces[face]) {
-                let [one, two] = of_edge[edge][..] else { continue };
-                let other = (if one as usize == face { two } else { one }) as usize;
-                if mem::replace(&mut reached[other], true) {
-                    continue;
-                }
-                // Neighbours that are turned alike pass their edge in opposite directions.
-                let ends = mesh.edges[edge];
-                if passes(&faces[face], ends) == passes(&faces[other], ends) {
-                    faces[other].swap(1, 2);
-                }
-                ahead.push_back(other);
-            }
-        }
-    }
-    faces
-}
-
-/// The edges of a face.
-fn sides(mesh: &MedialMesh, &[a, b, c]: &[u32; 3]) -> impl Iterator<Item = usize> {
-    [[a, b], [a, c], [b, c]].into_iter().filter_map(|side| mesh.edges.binary_search(&side).ok())
-}
-
-/// Whether a face passes an edge from its first end to its second.
-fn passes(face: &[u32; 3], [a, b]: [u32; 2]) -> bool {
-    (0..3).any(|k| face[k] == a && face[(k + 1) % 3] == b)
-}
-
-/// A unit normal at each sphere; `z` where no face has an area.
-fn normals(mesh: &MedialMesh, faces: &[[u32; 3]]) -> Vec<Vec3> {
-    let areas = faces.iter().map(|face| {
-        let [a, b, c] = face.map(|v| mesh.spheres[v as usize].centre);
-        (b - a).cross(c - a)
-    });
-    let mut largest = vec![Vec3::ZERO; mesh.spheres.len()];
-    for (face, area) in faces.iter().zip(areas.clone()) {
-        for &v in face {
-            let known = &mut largest[v as usize];
-            if area.length_squared() > known.length_squared() {
-                *known = area;
-            }
-        }
-    }
-    let mut sums = vec![Vec3::ZERO; mesh.spheres.len()];
-    for (face, area) in faces.iter().zip(areas) {
-        for &v in face {
-            let same_side = area.dot(largest[v as usize]) >= 0.0;
-            sums[v as usize] += if same_side { area } else { -area };
-        }
-    }
-    sums.into_iter().map(|sum| sum.try_normalize().unwrap_or(Vec3::Z)).collect()
-}
-
 /// The unit ball as an icosahedron with every triangle cut in four, counter-clockwise from outside.
 fn ball() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
@@ -428,23 +352,6 @@ mod tests {
         let many = MedialMesh { spheres, ..MedialMesh::default() };
         let error = file(&many, &Look { values: None, balls: true }).unwrap_err();
         assert!(error.starts_with("4608000000 bytes are more than the 4 GB"), "{error}");
-    }
-
-    #[test]
-    fn sheets_are_turned_alike_and_normals_have_unit_length() {
-        let at = |x: f64, y: f64, z: f64| Sphere::new(Vec3::new(x, y, z), 0.1);
-        let spheres =
-            (0..10).map(|k| at(f64::from(k / 2), f64::from(k % 2), 0.01 * f64::from(k))).collect();
-        let strip: Vec<[u32; 3]> = (0..8).map(|k| [k, k + 1, k + 2]).collect();
-        let mesh = MedialMesh::from_simplices(spheres, vec![], strip).unwrap();
-        let faces = turned_alike(&mesh);
-        let is_up = |f: &[u32; 3]| {
-            let [a, b, c] = f.map(|v| mesh.spheres[v as usize].centre);
-            (b - a).cross(c - a).z > 0.0
-        };
-        assert!(faces.iter().all(|f| is_up(f) == is_up(&faces[0])));
-        let normals = normals(&mesh, &faces);
-        assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-12 && n.z.abs() > 0.9));
     }
 
     #[test]

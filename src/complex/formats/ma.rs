@@ -1,4 +1,4 @@
-//! The `.ma` format.
+//! The `.ma` format in its dialects, and the `.obj` files with radii of the tools around Q-MAT.
 //!
 //! ```text
 //! nV nE nF          numbers of spheres, edges, faces
@@ -7,32 +7,39 @@
 //! f i j k           nF times: indices of three spheres
 //! ```
 //!
-//! Tools of the field add types of features and marks of deletion at the end of a line, and a
-//! fourth count with lines `t a b c d` of tetrahedra: `flags.rs` says which. What is marked as
-//! deleted is dropped, with whatever uses it, and counted.
+//! # Dialects
+//! - Lists of spheres alone, by their first line: `n` or nothing before lines `v x y z r` (MATFP, Coverage Axis), `n` or
+//!   `4 n` before lines `x y z r` (Point2Skeleton, MATTopo's `.sph`), `3 n` before lines `x y z`.
+//! - A fourth count and lines `t a b c d` of tetrahedra (MATTopo's `.ma_dup`), lines `n x y z` of normals (SEG-MAT), a
+//!   trailer of parts (MATStruct): checked, counted in a note, and not used.
+//! - Several medial meshes in one file, since some tools open their file for appending ([`ReadOptions::block`]).
+//! - Words after the values of a record: types of features and marks of deletion. Marked elements are dropped, with
+//!   everything that uses them, and counted. The number of words determines their meaning:
 //!
-//! Lists of spheres alone are read, too, by their first line: `n` or nothing before lines `v x y z r` (MATFP, Coverage
-//! Axis), `n` or `4 n` before lines `x y z r` (Point2Skeleton, MATTopo's `.sph`). Lines `n x y z` of normals (SEG-MAT) are
-//! counted and not used. Types of features, importances, tetrahedra and a trailer of parts (MATStruct) are kept as
-//! [`Annotations`](super::Annotations).
+//! | record | 1 word | 2 words | 3 words |
+//! |---|---|---|---|
+//! | `v` | type | type, deleted | type, deleted, copies |
+//! | `e` | type | type, deleted | type, deleted, copies |
+//! | `f` | deleted | importance, deleted | importance, deleted, copies |
+//!
+//! So MATFP writes two words for a sphere and one for an edge, which is its *type*; MATTopo's `.ma_dup` writes three
+//! everywhere. Three words behind a face are a colour in other files.
 
+use std::borrow::Cow;
+use std::collections::VecDeque;
 use std::io::{self, Write};
+use std::str::SplitAsciiWhitespace;
 
-use super::error::{MaError, MaErrorKind};
-use super::layout::{Layout, counts};
-use super::obj::{has_elements, parse_obj};
-use super::options::ReadOptions;
-use super::records::Records;
-use super::scan::lines;
-use super::{LoadedMa, trailer};
+use super::{LoadedMa, MaError, MaErrorKind, Radii, ReadOptions};
+use crate::Vec3;
 use crate::complex::{MedialMesh, Sphere};
 
 /// Reads a medial mesh from the text of a `.ma` file; `name` stands for the file in errors.
 ///
 /// Empty lines, comments (`#`), carriage returns and any order of the lines are accepted. Edges and
-/// faces may be in any order and orientation; missing sides of faces are added. What a trailing flag
-/// marks as deleted is dropped, with the edges and faces that use it. Of negative radii the absolute values are taken.
-/// [`LoadedMa::notes`] and [`LoadedMa::warnings`] say what was done.
+/// faces may be in any order and orientation; missing sides of faces are added. Elements that a trailing flag
+/// marks as deleted are dropped, with the edges and faces that use them. Of negative radii the absolute values are
+/// taken. [`LoadedMa::notes`] and [`LoadedMa::warnings`] list the changes.
 ///
 /// ```
 /// let text = "3 0 1\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 0 1 2\n";
@@ -62,23 +69,24 @@ pub fn parse_ma_with(
 ) -> Result<LoadedMa, MaError> {
     let bytes = text.as_ref();
     let mut rest = lines(bytes, name);
-    let of_file = |kind| MaError::of(name, kind);
-    let header = rest.next().ok_or_else(|| {
-        of_file(MaErrorKind::Malformed("the file is empty; expected a line `nV nE nF`".into()))
-    })?;
-    let mut records = Records::announced(&header, bytes.len(), options)?;
+    let Some(first) = rest.next() else {
+        let why = "the file is empty; expected a line `nV nE nF`".to_owned();
+        return Err(MaError::of(name, MaErrorKind::Malformed(why)));
+    };
+    let mut records = Records::announced(&first, bytes.len(), options)?;
     if records.layout == Layout::Bare {
-        if has_elements(bytes) {
+        if has_obj_elements(bytes) {
             return parse_obj(bytes, name, options);
         }
-        records.take(&header)?;
+        records.take(&first)?;
     }
     let mut block = 1;
     while let Some(line) = rest.next() {
-        if records.are_complete() && line.words().rest().count() == 1 && records.parts.is_empty() {
-            records.parts = trailer::parts(&line, &mut rest, records.announced)?;
-        } else if records.are_complete() && counts(&line).is_some() {
-            // Tools that open their file for appending write a second result behind the first.
+        let is_complete = records.layout == Layout::Complex
+            && records.found().map(|count| count as u64) == records.announced;
+        if is_complete && line.words().rest.count() == 1 && records.parts == 0 {
+            records.parts = trailer(&line, &mut rest, records.announced)?;
+        } else if is_complete && counts(&line).is_some() {
             match options.block {
                 None => return Err(line.error(MaErrorKind::Appended)),
                 Some(wanted) if wanted == block => break,
@@ -93,14 +101,14 @@ pub fn parse_ma_with(
     }
     match options.block {
         Some(wanted) if wanted != block => {
-            Err(of_file(MaErrorKind::Block { wanted, blocks: block }))
+            Err(MaError::of(name, MaErrorKind::Block { wanted, blocks: block }))
         }
         _ => records.finish(name),
     }
 }
 
 /// Writes a medial mesh as `.ma`.
-pub(super) fn write_to(out: &mut dyn Write, mesh: &MedialMesh) -> io::Result<()> {
+pub(super) fn write_ma(out: &mut dyn Write, mesh: &MedialMesh) -> io::Result<()> {
     writeln!(out, "{} {} {}", mesh.spheres.len(), mesh.edges.len(), mesh.faces.len())?;
     for Sphere { centre: c, radius } in &mesh.spheres {
         writeln!(out, "v {:.16e} {:.16e} {:.16e} {radius:.16e}", c.x, c.y, c.z)?;
@@ -112,4 +120,691 @@ pub(super) fn write_to(out: &mut dyn Write, mesh: &MedialMesh) -> io::Result<()>
         writeln!(out, "f {a} {b} {c}")?;
     }
     Ok(())
+}
+
+// Lines and words, with the place of each for error messages.
+
+/// A line that holds something.
+struct Line<'a> {
+    file: &'a str,
+    number: usize,
+    text: Cow<'a, str>,
+}
+
+/// The lines of `bytes` that are neither empty nor comments (`#`), numbered from 1.
+///
+/// Bytes that are not UTF-8 become replacement characters: harmless in a comment, and refused
+/// with their line number anywhere else.
+fn lines<'a>(bytes: &'a [u8], file: &'a str) -> impl Iterator<Item = Line<'a>> {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    bytes.split(|&byte| byte == b'\n').enumerate().filter_map(move |(index, raw)| {
+        let content = raw.split(|&byte| byte == b'#').next().unwrap_or(raw).trim_ascii();
+        let line = Line { file, number: index + 1, text: String::from_utf8_lossy(content) };
+        (!content.is_empty()).then_some(line)
+    })
+}
+
+impl Line<'_> {
+    fn words(&self) -> Words<'_> {
+        Words { line: self, rest: self.text.split_ascii_whitespace() }
+    }
+
+    fn error(&self, kind: MaErrorKind) -> MaError {
+        MaError { file: self.file.to_owned(), line: Some(self.number), kind }
+    }
+
+    fn malformed(&self, why: String) -> MaError {
+        self.error(MaErrorKind::Malformed(why))
+    }
+}
+
+/// The words of one line, taken one by one.
+struct Words<'a> {
+    line: &'a Line<'a>,
+    rest: SplitAsciiWhitespace<'a>,
+}
+
+impl<'a> Words<'a> {
+    fn required(&mut self, field: &'static str) -> Result<&'a str, MaError> {
+        self.rest.next().ok_or_else(|| self.line.error(MaErrorKind::Missing { field }))
+    }
+
+    fn number(&mut self, field: &'static str) -> Result<f64, MaError> {
+        let text = self.required(field)?;
+        finite(text, field).map_err(|kind| self.line.error(kind))
+    }
+
+    fn point(&mut self) -> Result<Vec3, MaError> {
+        let x = self.number("x coordinate")?;
+        let y = self.number("y coordinate")?;
+        let z = self.number("z coordinate")?;
+        Ok(Vec3::new(x, y, z))
+    }
+
+    /// Centre and radius, which may be negative; radius 0 where there is none and none is needed.
+    fn sphere(&mut self, radii: Radii) -> Result<Sphere, MaError> {
+        let centre = self.point()?;
+        if radii == Radii::NotNeeded && self.rest.clone().next().is_none() {
+            return Ok(Sphere::new(centre, 0.0));
+        }
+        let radius = self.number("radius")?;
+        if radii == Radii::NotNegative && radius < 0.0 {
+            return Err(self.line.error(MaErrorKind::NegativeRadius(radius)));
+        }
+        Ok(Sphere::new(centre, radius))
+    }
+}
+
+fn finite(text: &str, field: &'static str) -> Result<f64, MaErrorKind> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| MaErrorKind::Number { field, text: shortened(text) })
+}
+
+/// A word as it may be repeated in a message.
+fn shortened(text: &str) -> String {
+    const LIMIT: usize = 40;
+    match text.char_indices().nth(LIMIT) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// The three counts of a line that is the header of a complex, and whether there is a fourth, of tetrahedra.
+fn counts(line: &Line<'_>) -> Option<([u64; 3], bool)> {
+    let words = line.words().rest.map(|word| word.parse().ok());
+    match *words.collect::<Option<Vec<u64>>>()?.as_slice() {
+        [spheres, edges, faces] => Some(([spheres, edges, faces], false)),
+        [spheres, edges, faces, _] => Some(([spheres, edges, faces], true)),
+        _ => None,
+    }
+}
+
+/// The number of parts in a trailer that starts with `first`, their number: each `id type m` with the indices of `m`
+/// records, of faces for type 0, edges for 1 and 2, spheres for 3. Line breaks mean nothing in it.
+///
+/// `records` are the numbers of spheres, edges and faces.
+fn trailer<'a>(
+    first: &Line<'_>,
+    rest: &mut impl Iterator<Item = Line<'a>>,
+    records: [u64; 3],
+) -> Result<u64, MaError> {
+    let broken = || first.error(MaErrorKind::Trailer);
+    let parts: u64 = first.text.parse().map_err(|_| broken())?;
+    let mut numbers: VecDeque<u64> = VecDeque::new();
+    for _ in 0..parts {
+        while (numbers.len() as u64) < numbers.get(2).map_or(3, |members| members.saturating_add(3))
+        {
+            let line = rest.next().ok_or_else(broken)?;
+            for word in line.words().rest {
+                numbers.push_back(word.parse().map_err(|_| broken())?);
+            }
+        }
+        let members = numbers[2] as usize;
+        let kind = match numbers[1] {
+            0 => FACE,
+            1 | 2 => EDGE,
+            3 => SPHERE,
+            _ => return Err(broken()),
+        };
+        if numbers.range(3..).take(members).any(|&index| index >= records[kind]) {
+            return Err(broken());
+        }
+        numbers.drain(..3 + members);
+    }
+    // The rest of the line of the last index belongs to nothing.
+    if numbers.is_empty() { Ok(parts) } else { Err(broken()) }
+}
+
+const SPHERE: usize = 0;
+const EDGE: usize = 1;
+const FACE: usize = 2;
+const KINDS: [&str; 3] = ["spheres", "edges", "faces"];
+
+/// Bytes of the shortest possible line, `e 0 1`: bounds allocations by the size of the file.
+const SHORTEST_RECORD: usize = 5;
+
+/// More words than this follow no record.
+const MAX_WORDS: usize = 3;
+
+/// The form of the lines of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Layout {
+    /// Spheres, edges and faces, each line with its letter.
+    Complex,
+    /// A number of spheres alone, with a letter or without.
+    Counted,
+    /// A number of points alone, `x y z`.
+    Points,
+    /// Spheres alone, without a number: the first line is one.
+    Bare,
+}
+
+/// The records read so far, compared with the header.
+struct Records {
+    options: ReadOptions,
+    layout: Layout,
+    announced: [u64; 3],
+    /// Whether the header has a fourth count, of tetrahedra.
+    four_counts: bool,
+    spheres: Vec<Sphere>,
+    edges: Vec<[u32; 2]>,
+    faces: Vec<[u32; 3]>,
+    tetrahedra: usize,
+    normals: usize,
+    parts: u64,
+    /// For each kind, which records are marked as deleted.
+    deleted: [Vec<bool>; 3],
+    /// Number of records by kind and by number of words behind their values.
+    words: [[usize; MAX_WORDS + 1]; 3],
+    /// Marks of spheres and edges that leave open whether they are deleted: kept.
+    unknown: usize,
+    /// Faces with three words under a header of three counts, and their mark of deletion if the words are flags: `None`
+    /// where they can only be a colour.
+    doubtful: Vec<(usize, Option<bool>)>,
+    /// The line of the first edge and face beyond those announced.
+    excess: [Option<usize>; 3],
+    /// The largest index so far and its line. The number of spheres is known only at the end.
+    largest: Option<(u32, usize)>,
+}
+
+impl Records {
+    /// None yet, below the header `line` of a file of `bytes` bytes.
+    fn announced(line: &Line<'_>, bytes: usize, options: ReadOptions) -> Result<Self, MaError> {
+        let numbers: Vec<Option<u64>> = line.words().rest.map(|word| word.parse().ok()).collect();
+        let (announced, layout, four_counts) = match (counts(line), numbers.as_slice()) {
+            (Some((announced, four_counts)), _) => (announced, Layout::Complex, four_counts),
+            _ if line.words().rest.next() == Some("v") => ([0; 3], Layout::Bare, false),
+            (_, &[Some(n)] | &[Some(4), Some(n)]) => ([n, 0, 0], Layout::Counted, false),
+            (_, &[Some(3), Some(n)]) if options.radii == Radii::NotNeeded => {
+                ([n, 0, 0], Layout::Points, false)
+            }
+            (_, &[Some(3), Some(_)]) => return Err(line.error(MaErrorKind::NoRadii)),
+            _ => {
+                let found = shortened(&line.text);
+                let why = format!("expected three counts `nV nE nF` first, found {found:?}");
+                return Err(line.malformed(why));
+            }
+        };
+        let room = bytes / SHORTEST_RECORD;
+        for (what, &announced) in KINDS.into_iter().zip(&announced) {
+            if announced > u64::from(u32::MAX) || (announced > room as u64 && !options.lenient) {
+                return Err(line.error(MaErrorKind::Announced { what, announced, bytes }));
+            }
+        }
+        let [spheres, edges, faces] = announced.map(|count| room.min(count as usize));
+        Ok(Self {
+            options,
+            layout,
+            announced,
+            four_counts,
+            spheres: Vec::with_capacity(spheres),
+            edges: Vec::with_capacity(edges),
+            faces: Vec::with_capacity(faces),
+            tetrahedra: 0,
+            normals: 0,
+            parts: 0,
+            deleted: Default::default(),
+            words: Default::default(),
+            unknown: 0,
+            doubtful: Vec::new(),
+            excess: [None; 3],
+            largest: None,
+        })
+    }
+
+    fn found(&self) -> [usize; 3] {
+        [self.spheres.len(), self.edges.len(), self.faces.len()]
+    }
+
+    /// Takes the next line.
+    fn take(&mut self, line: &Line<'_>) -> Result<(), MaError> {
+        let mut words = line.words();
+        let is_list = self.layout != Layout::Complex;
+        // Lists have their letter in every line or in none.
+        let has_letter = !is_list || self.layout == Layout::Bare || line.text.starts_with('v');
+        let letter = if has_letter { words.rest.next().unwrap_or_default() } else { "v" };
+        let kind = match letter {
+            "v" if self.layout == Layout::Points => {
+                self.spheres.push(Sphere::new(words.point()?, 0.0));
+                SPHERE
+            }
+            "v" => {
+                self.spheres.push(words.sphere(self.options.radii)?);
+                SPHERE
+            }
+            _ if is_list => return Err(line.error(MaErrorKind::NoSphere(shortened(letter)))),
+            "e" => {
+                let edge = self.indices(&mut words)?;
+                self.edges.push(edge);
+                EDGE
+            }
+            "f" => {
+                let face = self.indices(&mut words)?;
+                self.faces.push(face);
+                FACE
+            }
+            "t" if self.four_counts => {
+                self.indices::<4>(&mut words)?;
+                self.tetrahedra += usize::from(words.rest.next().is_none_or(|mark| mark == "0"));
+                return Ok(());
+            }
+            "n" => {
+                self.normals += 1;
+                return Ok(());
+            }
+            _ => return Err(line.error(MaErrorKind::Record(shortened(letter)))),
+        };
+        let flags: Vec<&str> = words.rest.take(MAX_WORDS + 1).collect();
+        let deleted = self.mark(kind, &flags).map_err(|kind| line.error(kind))?;
+        self.words[kind][flags.len()] += 1;
+        self.deleted[kind].push(deleted);
+        let (announced, found) = (self.announced[kind], self.found()[kind] as u64);
+        if found > announced && !self.options.lenient && self.layout != Layout::Bare {
+            // More spheres than announced would make every index doubtful; of the others a known tool may write more.
+            if kind == SPHERE {
+                let what = KINDS[kind];
+                return Err(line.error(MaErrorKind::Count { what, announced, found }));
+            }
+            self.excess[kind].get_or_insert(line.number);
+        }
+        Ok(())
+    }
+
+    /// The next `N` words as indices, which are compared with the number of spheres at the end.
+    fn indices<const N: usize>(&mut self, words: &mut Words<'_>) -> Result<[u32; N], MaError> {
+        let mut indices = [0; N];
+        for index in &mut indices {
+            let text = words.required("index of a sphere")?;
+            *index = text.parse().map_err(|_| {
+                let (text, spheres) = (shortened(text), self.announced[SPHERE]);
+                words.line.error(MaErrorKind::Index { text, spheres })
+            })?;
+            if self.largest.is_none_or(|(largest, _)| *index > largest) {
+                self.largest = Some((*index, words.line.number));
+            }
+        }
+        Ok(indices)
+    }
+
+    /// Whether the words behind the values of a record mark it as deleted.
+    fn mark(&mut self, kind: usize, words: &[&str]) -> Result<bool, MaErrorKind> {
+        match (kind, words) {
+            (_, []) => Ok(false),
+            (FACE, ["0"]) => Ok(false),
+            (FACE, ["1"]) => Ok(true),
+            (FACE, [word]) => Err(MaErrorKind::Malformed(format!(
+                "a face has three spheres; the fourth word {:?} is no mark of deletion (0 or 1)",
+                shortened(word)
+            ))),
+            (FACE, [importance, deleted]) => {
+                finite(importance, "flag")?;
+                Ok(integer(deleted)? != 0.0)
+            }
+            (FACE, [first, deleted, copies]) => {
+                let are_flags = finite(first, "flag").is_ok() && integer(copies).is_ok();
+                let mark = integer(deleted).ok().filter(|_| are_flags);
+                if self.four_counts {
+                    return mark.map(|mark| mark != 0.0).ok_or_else(|| not_flags(words));
+                }
+                let mark = mark.filter(|&mark| mark == 0.0 || mark == 1.0);
+                self.doubtful.push((self.deleted[FACE].len(), mark.map(|mark| mark != 0.0)));
+                Ok(false)
+            }
+            (_, [feature]) => integer(feature).map(|_| false),
+            (_, [feature, deleted, copies @ ..]) if copies.len() <= 1 => {
+                for word in [feature].into_iter().chain(copies) {
+                    integer(word)?;
+                }
+                // MATFP writes -1 where it does not know.
+                let mark = integer(deleted)?;
+                self.unknown += usize::from(mark < 0.0);
+                Ok(mark > 0.0)
+            }
+            _ => Err(not_flags(words)),
+        }
+    }
+
+    /// The medial mesh of all records; `name` stands for the file in errors.
+    fn finish(mut self, name: &str) -> Result<LoadedMa, MaError> {
+        let (mut notes, mut warnings) = (Vec::new(), Vec::new());
+        self.check_counts(name, &mut notes, &mut warnings)?;
+        let spheres = self.spheres.len() as u64;
+        if let Some((largest, line)) = self.largest.filter(|&(i, _)| u64::from(i) >= spheres) {
+            let kind = MaErrorKind::Index { text: largest.to_string(), spheres };
+            return Err(MaError { line: Some(line), ..MaError::of(name, kind) });
+        }
+        self.warn_of_doubts(&mut warnings);
+        let flagged = self.flagged();
+        if flagged > 0 {
+            notes.push(format!("{flagged} lines carry flags; marks of deletion were obeyed"));
+        }
+        note(&mut notes, self.normals, "normal", "not used");
+        note(&mut notes, self.tetrahedra, "tetrahedron", "not used");
+        note(&mut notes, self.parts as usize, "part of the structure", "not used");
+        self.drop_deleted(&mut notes);
+        let loaded = canonical(self.spheres, self.edges, self.faces, self.options.radii, notes);
+        let mut loaded = loaded.map_err(|kind| MaError::of(name, kind))?;
+        loaded.warnings.splice(0..0, warnings);
+        Ok(loaded)
+    }
+
+    /// Number of records that have flags of any kind.
+    fn flagged(&self) -> usize {
+        self.words.iter().flat_map(|records| &records[1..]).sum()
+    }
+
+    fn check_counts(
+        &self,
+        name: &str,
+        notes: &mut Vec<String>,
+        warnings: &mut Vec<String>,
+    ) -> Result<(), MaError> {
+        let found = self.found().map(|count| count as u64);
+        if self.layout != Layout::Complex {
+            notes.push("a list of spheres without edges and faces".to_owned());
+        }
+        // libmat counts edges and faces of its own lists instead of the lines; its flags tell its files.
+        let all_have = |kind: usize, words: usize| self.words[kind][words] as u64 == found[kind];
+        let miscounts = self.normals > 0
+            || (found[EDGE] > 0 && all_have(SPHERE, 2) && all_have(EDGE, 2) && all_have(FACE, 1));
+        for kind in [SPHERE, EDGE, FACE] {
+            let (what, announced, found) = (KINDS[kind], self.announced[kind], found[kind]);
+            if found == announced || self.layout == Layout::Bare {
+                continue;
+            }
+            let differ = format!("the header announces {announced} {what}, the file holds {found}");
+            if self.layout == Layout::Counted && self.flagged() > 0 && found < announced {
+                // MATFP leaves out spheres that it has announced.
+                let left = announced - found;
+                notes.push(format!("the header announces {left} spheres more than the file holds"));
+            } else if kind != SPHERE && miscounts {
+                let why = "taken as they are, since writers of these flags count otherwise";
+                notes.push(format!("{differ}: {why}"));
+            } else if self.options.lenient {
+                warnings.push(format!("{differ}: taken as they are"));
+            } else {
+                // Where the first record too many stands, the message counts up to it.
+                let line = self.excess[kind];
+                let found = if line.is_some() { announced + 1 } else { found };
+                let kind = MaErrorKind::Count { what, announced, found };
+                return Err(MaError { line, ..MaError::of(name, kind) });
+            }
+        }
+        Ok(())
+    }
+
+    /// Warns of words that could be read in more than one way. Three words behind faces are flags if the spheres have
+    /// flags and all of them can be.
+    fn warn_of_doubts(&mut self, warnings: &mut Vec<String>) {
+        if self.unknown > 0 {
+            let many = self.unknown;
+            warnings.push(format!("{many} marks of deletion are negative, for unknown: kept"));
+        }
+        let unusual = "type, deleted and copies, though the header has three counts";
+        let is_complex = self.layout == Layout::Complex && !self.four_counts;
+        for (kind, words, is_doubtful, read) in [
+            (SPHERE, 1, true, "a type, though a mark of deletion usually follows it"),
+            (FACE, 2, true, "importance and deleted"),
+            (SPHERE, 3, is_complex, unusual),
+            (EDGE, 3, is_complex, unusual),
+        ] {
+            let many = self.words[kind][words];
+            if many > 0 && is_doubtful {
+                let (what, noun) = (KINDS[kind], if words == 1 { "word" } else { "words" });
+                warnings.push(format!("{words} {noun} behind {many} {what}: read as {read}"));
+            }
+        }
+        let many = self.doubtful.len();
+        if many == 0 || self.words[SPHERE][1..] == [0; MAX_WORDS] {
+            return;
+        }
+        if self.doubtful.iter().all(|(_, mark)| mark.is_some()) {
+            warnings.push(format!(
+                "three words behind {many} faces: read as importance, deleted and copies, though \
+                 they could be a colour"
+            ));
+            for &(face, mark) in &self.doubtful {
+                self.deleted[FACE][face] = mark == Some(true);
+            }
+        } else {
+            warnings.push(format!(
+                "three words behind {many} faces: read as a colour, though spheres have flags"
+            ));
+        }
+    }
+
+    /// Drops marked elements and the edges and faces that use a dropped sphere.
+    fn drop_deleted(&mut self, notes: &mut Vec<String>) {
+        let [dead, dead_edges, dead_faces] = &self.deleted;
+        drop_simplices(&mut self.edges, "edge", dead_edges, dead, notes);
+        drop_simplices(&mut self.faces, "face", dead_faces, dead, notes);
+        // Spheres before each one that stay; only those of spheres that stay are used.
+        let mut kept = 0;
+        let renumbered: Vec<u32> = dead
+            .iter()
+            .map(|&dead| {
+                kept += u32::from(!dead);
+                kept.wrapping_sub(1)
+            })
+            .collect();
+        let dropped = dead.len() - kept as usize;
+        note(notes, dropped, "sphere", "dropped: marked as deleted");
+        if dropped > 0 {
+            let mut dead = dead.iter();
+            self.spheres.retain(|_| dead.next() != Some(&true));
+            self.edges.iter_mut().flatten().for_each(|v| *v = renumbered[*v as usize]);
+            self.faces.iter_mut().flatten().for_each(|v| *v = renumbered[*v as usize]);
+        }
+    }
+}
+
+fn drop_simplices<const N: usize>(
+    simplices: &mut Vec<[u32; N]>,
+    what: &str,
+    marked: &[bool],
+    dead: &[bool],
+    notes: &mut Vec<String>,
+) {
+    let all = simplices.len();
+    let mut marks = marked.iter();
+    simplices.retain(|_| marks.next() != Some(&true));
+    note(notes, all - simplices.len(), what, "dropped: marked as deleted");
+    let all = simplices.len();
+    simplices.retain(|simplex| !simplex.iter().any(|&v| dead[v as usize]));
+    note(notes, all - simplices.len(), what, "dropped: on a deleted sphere");
+}
+
+fn integer(word: &str) -> Result<f64, MaErrorKind> {
+    let value = finite(word, "flag")?;
+    if value.fract() != 0.0 || value.abs() > f64::from(i32::MAX) {
+        return Err(MaErrorKind::Malformed(format!("the flag {word} is not a whole number")));
+    }
+    Ok(value)
+}
+
+fn not_flags(words: &[&str]) -> MaErrorKind {
+    let found = shortened(&words.join(" "));
+    MaErrorKind::Malformed(format!("{found:?} behind the values: flags of no known tool"))
+}
+
+/// Statements of OBJ that do not concern spheres, edges and faces.
+const IGNORED: [&str; 11] =
+    ["vn", "vt", "vp", "o", "g", "s", "p", "usemtl", "mtllib", "mg", "usemap"];
+
+/// Whether lines of edges or faces stand in a text: they tell OBJ from a list of spheres.
+fn has_obj_elements(bytes: &[u8]) -> bool {
+    bytes.split(|&byte| byte == b'\n').any(|line| {
+        matches!(line.trim_ascii_start(), [b'l' | b'f', next, ..] if next.is_ascii_whitespace())
+    })
+}
+
+/// Reads a medial mesh from the text of an OBJ file: vertices `v x y z r`, lines `l i j ...`, triangles `f i j k`, with indices
+/// from 1 or, if negative, back from the last vertex; `name` stands for the file in errors.
+///
+/// ```
+/// use medial::complex::{ReadOptions, parse_obj};
+///
+/// let loaded = parse_obj("v 0 0 0 1\nv 1 0 0 0.5\nl 1 2\n", "x.obj", ReadOptions::default())?;
+/// assert_eq!((loaded.mesh.spheres[1].radius, loaded.mesh.edges[0]), (0.5, [0, 1]));
+/// # Ok::<(), medial::complex::MaError>(())
+/// ```
+///
+/// # Errors
+/// When a vertex has no fourth number and radii are needed, a face is no triangle, a line is not of this format, a
+/// number is not finite, or an index is out of range.
+pub fn parse_obj(
+    text: impl AsRef<[u8]>,
+    name: &str,
+    options: ReadOptions,
+) -> Result<LoadedMa, MaError> {
+    let (mut spheres, mut edges, mut faces) = (Vec::new(), Vec::new(), Vec::new());
+    for line in lines(text.as_ref(), name) {
+        let mut words = line.words();
+        match words.rest.next().unwrap_or_default() {
+            "v" => spheres.push(match (words.rest.clone().count(), options.radii) {
+                (4, radii) => words.sphere(radii)?,
+                // Behind the coordinates there may be colours.
+                (_, Radii::NotNeeded) => Sphere::new(words.point()?, 0.0),
+                (3, _) => return Err(line.error(MaErrorKind::NoRadii)),
+                (numbers, _) => {
+                    let why = "a vertex has 4 numbers, x y z and a radius";
+                    return Err(line.malformed(format!("{why}; found {numbers}")));
+                }
+            }),
+            "l" => {
+                let corners = obj_indices(words, spheres.len())?;
+                if corners.len() < 2 {
+                    return Err(line.error(MaErrorKind::Missing { field: "index of a sphere" }));
+                }
+                edges.extend(corners.windows(2).map(|pair| [pair[0], pair[1]]));
+            }
+            "f" => match *obj_indices(words, spheres.len())? {
+                [a, b, c] => faces.push([a, b, c]),
+                ref corners => {
+                    let found = corners.len();
+                    let why = format!("faces must be triangles, found {found} corners");
+                    return Err(line.malformed(why));
+                }
+            },
+            word if IGNORED.contains(&word) => {}
+            word => {
+                let found = shortened(word);
+                let why = format!("expected a line that starts with v, l or f, found {found:?}");
+                return Err(line.malformed(why));
+            }
+        }
+    }
+    canonical(spheres, edges, faces, options.radii, Vec::new())
+        .map_err(|kind| MaError::of(name, kind))
+}
+
+/// The vertices that a line names, out of those above it.
+fn obj_indices(words: Words<'_>, vertices: usize) -> Result<Vec<u32>, MaError> {
+    let line = words.line;
+    let index = |word: &str| {
+        // Behind a slash stand texture coordinates and normals.
+        let number = word.split('/').next().and_then(|text| text.parse::<i64>().ok());
+        let from_zero = number.and_then(|number| match number {
+            1.. => Some(number - 1),
+            0 => None,
+            _ => (vertices as i64).checked_add(number),
+        });
+        let index = from_zero.filter(|&index| index < vertices as i64);
+        index.and_then(|index| u32::try_from(index).ok()).ok_or_else(|| {
+            let found = shortened(word);
+            let why = "is not one of the";
+            line.malformed(format!("{found:?} {why} {vertices} vertices above, counted from 1"))
+        })
+    };
+    words.rest.map(index).collect()
+}
+
+/// A few spheres of radius 0 are a medial mesh of little use; at least this many are the vertices of a surface.
+const FEWEST_OF_A_SURFACE: usize = 4;
+
+/// Brings the simplices of a file to canonical form: indices ascend, lists are sorted, every
+/// simplex stands once, every side of a face is an edge. The set of points covered stays the same.
+///
+/// Precondition: indices are below the number of spheres, and numbers are finite.
+///
+/// # Errors
+/// When radii are needed and all are 0.
+pub(super) fn canonical(
+    mut spheres: Vec<Sphere>,
+    mut edges: Vec<[u32; 2]>,
+    mut faces: Vec<[u32; 3]>,
+    radii: Radii,
+    mut notes: Vec<String>,
+) -> Result<LoadedMa, MaErrorKind> {
+    let all_are_points = spheres.iter().all(|sphere| sphere.radius == 0.0);
+    if radii != Radii::NotNeeded && spheres.len() >= FEWEST_OF_A_SURFACE && all_are_points {
+        return Err(MaErrorKind::Points);
+    }
+    // Some tools write negative radii for spheres outside of a surface.
+    let negative = spheres.iter().filter(|sphere| sphere.radius < 0.0).count();
+    spheres.iter_mut().for_each(|sphere| sphere.radius = sphere.radius.abs());
+    let warnings = match negative {
+        _ if radii == Radii::NotNeeded => Vec::new(),
+        0 => Vec::new(),
+        1 => vec!["1 radius is negative: its absolute value was taken".to_owned()],
+        _ => vec![format!("{negative} radii are negative: their absolute values were taken")],
+    };
+    ascend(&mut edges, "edge", &mut notes);
+    ascend(&mut faces, "face", &mut notes);
+    // A face that names a sphere twice covers one edge: keep that, drop the face.
+    let all = faces.len();
+    faces.retain(|&[a, b, c]| {
+        let is_proper = a != b && b != c;
+        if !is_proper {
+            edges.push([a, c]);
+        }
+        is_proper
+    });
+    let verb = "replaced by an edge: two corners are the same sphere";
+    note(&mut notes, all - faces.len(), "face", verb);
+    let all = edges.len();
+    edges.retain(|[a, b]| a != b);
+    note(&mut notes, all - edges.len(), "edge", "dropped: both ends are the same sphere");
+    sort_once(&mut edges, "edge", &mut notes);
+    sort_once(&mut faces, "face", &mut notes);
+    let listed = edges.len();
+    let sides = faces.iter().flat_map(|&[a, b, c]| [[a, b], [a, c], [b, c]]);
+    edges.extend(sides);
+    edges.sort_unstable();
+    edges.dedup();
+    let verb = "added: sides of faces that were not listed";
+    note(&mut notes, edges.len() - listed, "edge", verb);
+    let mesh = MedialMesh { spheres, edges, faces, contacts: None };
+    debug_assert_eq!(mesh.check(), Ok(()));
+    Ok(LoadedMa { mesh, notes, warnings })
+}
+
+/// Makes the indices of each simplex ascend, with a note for those who compare files.
+fn ascend<const N: usize>(simplices: &mut [[u32; N]], what: &str, notes: &mut Vec<String>) {
+    let descending = simplices.iter().filter(|simplex| !simplex.is_sorted()).count();
+    note(notes, descending, what, "written with descending indices");
+    if !simplices.is_sorted() {
+        notes.push(format!("the {what}s were not in ascending order and were sorted"));
+    }
+    simplices.iter_mut().for_each(|simplex| simplex.sort_unstable());
+}
+
+fn sort_once<T: Ord>(simplices: &mut Vec<T>, what: &str, notes: &mut Vec<String>) {
+    let all = simplices.len();
+    simplices.sort_unstable();
+    simplices.dedup();
+    note(notes, all - simplices.len(), what, "listed more than once and merged");
+}
+
+/// Reports a change of a number of things, if there are any.
+fn note(notes: &mut Vec<String>, count: usize, one: &str, verb: &str) {
+    match (count, one.split_once(' ')) {
+        (0, _) => {}
+        (1, _) => notes.push(format!("1 {one} was {verb}")),
+        (_, Some((noun, rest))) => notes.push(format!("{count} {noun}s {rest} were {verb}")),
+        (_, None) => {
+            let many = one.strip_suffix("on").map_or(format!("{one}s"), |stem| format!("{stem}a"));
+            notes.push(format!("{count} {many} were {verb}"));
+        }
+    }
 }

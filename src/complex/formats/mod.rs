@@ -4,46 +4,28 @@
 //! |---|---|---|---|
 //! | `.ma` | yes | yes | spheres, edges, faces: the interchange format of the field, in all its dialects |
 //! | `.ma_dup`, `.sph`, `.txt`, `.xyzr` | yes | no | the same, and lists of spheres alone |
-//! | `.ply` | ASCII | ASCII | the same, with a vertex property `radius`, for viewers |
+//! | `.ply` | yes | text | the same, with a vertex property `radius`, for viewers |
 //! | `.obj` | yes | yes | centres, edges (`l`) and faces (`f`); read with radii as fourth numbers (`v x y z r`), written without, for viewers |
 //! | `.vtp` | no | base64 | the same as `.ma` and a value at each sphere, for ParaView |
 //! | `.glb` | no | yes | the same in single precision, coloured, and the spheres as bodies, for Blender and browsers |
 //!
-//! Coordinates are read and written in the unit of the file; normalisation is up to the caller. Numbers are written
-//! with 17 significant digits or as they are in memory, so that they are read back bit for bit; but for `.glb`, which
-//! has single precision.
+//! Coordinates are read and written in the unit of the file; the caller normalises. Numbers are written with 17
+//! significant digits or as they are in memory, so that they are read back bit for bit.
 
-mod annotations;
-mod canonical;
-mod error;
-mod flags;
 mod glb;
-mod layout;
-mod lone;
-mod look;
 mod ma;
-mod obj;
-mod options;
-mod ply;
-mod records;
-mod scan;
-mod trailer;
-mod vtp;
+mod viewers;
 
+use std::fmt;
 use std::fs;
+use std::io;
 use std::path::Path;
 
-pub use annotations::{Annotations, Part, PartKind};
-pub use error::{MaError, MaErrorKind};
 pub use glb::single_precision_loss;
-use lone::{isolated, lone_edges};
-pub use look::{Look, SphereValues};
-pub use ma::{parse_ma, parse_ma_with};
-pub use obj::parse_obj;
-pub use options::{Radii, ReadOptions};
-pub use ply::{parse_ply, parse_ply_with};
+pub use ma::{parse_ma, parse_ma_with, parse_obj};
+pub use viewers::{Look, SphereValues, parse_ply, parse_ply_with};
 
-use super::MedialMesh;
+use super::{ComplexError, MedialMesh};
 use crate::atomic::write_atomically;
 
 /// A medial mesh from a file, in canonical form, and what had to be done to bring it there.
@@ -51,15 +33,11 @@ use crate::atomic::write_atomically;
 pub struct LoadedMa {
     /// The medial mesh, in the file's unit.
     pub mesh: MedialMesh,
-    /// One sentence for each thing done: added edges, dropped repetitions, deleted elements.
+    /// One sentence for each change: added edges, dropped repetitions, deleted elements.
     /// Empty for a file that this crate wrote.
     pub notes: Vec<String>,
     /// One sentence for each doubt: words that could be read in more than one way.
     pub warnings: Vec<String>,
-    /// Where deleted spheres were dropped: for each sphere left, its index in the file.
-    pub kept: Option<Vec<u32>>,
-    /// Types and structure, where the file has them.
-    pub annotations: Annotations,
 }
 
 impl LoadedMa {
@@ -71,7 +49,174 @@ impl LoadedMa {
     }
 }
 
-/// Reads a medial mesh from a `.ma` file, a list of spheres, an ASCII `.ply` file or an `.obj` file with radii, told apart by the extension.
+/// How to read files that are not what their header says, or hold more or less than one medial mesh.
+///
+/// ```
+/// use medial::complex::{ReadOptions, parse_ma_with};
+///
+/// let short = "3 0 0\nv 0 0 0 1\nv 1 0 0 1\n";
+/// assert!(parse_ma_with(short, "short.ma", ReadOptions::default()).is_err());
+/// let lenient = ReadOptions { lenient: true, ..ReadOptions::default() };
+/// let loaded = parse_ma_with(short, "short.ma", lenient)?;
+/// assert_eq!((loaded.mesh.spheres.len(), loaded.warnings.len()), (2, 1));
+/// # Ok::<(), medial::complex::MaError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Takes the lines as they are where the header announces another number of them, with a warning.
+    pub lenient: bool,
+    /// Which medial mesh of a file with several appended ones, from 1. Without it such a file is refused.
+    pub block: Option<usize>,
+    /// Whether the radii of the file are wanted.
+    pub radii: Radii,
+}
+
+/// Whether the radii of a file are wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Radii {
+    /// A file without radii is refused. Of negative ones, which some tools write, the absolute values are taken, with a
+    /// warning.
+    #[default]
+    Needed,
+    /// A negative radius is refused, too: for plug-ins, whose mistakes are to show.
+    NotNegative,
+    /// The caller has radii: files of points are accepted, and the values in the place of radii (0 where there are none)
+    /// mean nothing.
+    NotNeeded,
+}
+
+/// Why a file could not be read or written as a medial mesh: the file, the line, the reason.
+#[derive(Debug, thiserror::Error)]
+pub struct MaError {
+    /// The file's name as it was given.
+    pub file: String,
+    /// Line number from 1, where the reason belongs to a line.
+    pub line: Option<usize>,
+    /// The reason.
+    pub kind: MaErrorKind,
+}
+
+impl fmt::Display for MaError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "{}, line {line}: {}", self.file, self.kind),
+            None => write!(f, "{}: {}", self.file, self.kind),
+        }
+    }
+}
+
+impl MaError {
+    /// A reason that belongs to no line of the file `name`.
+    fn of(name: impl fmt::Display, kind: impl Into<MaErrorKind>) -> Self {
+        Self { file: name.to_string(), line: None, kind: kind.into() }
+    }
+}
+
+/// The defect, without the place.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MaErrorKind {
+    /// The operating system refused.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// No such format.
+    #[error("the extension {extension:?} is not one of {known}")]
+    Extension {
+        /// The file's extension, in lower case.
+        extension: String,
+        /// The extensions that would do.
+        known: &'static str,
+    },
+    /// The format cannot hold this mesh, or no such values.
+    #[error("{0}")]
+    Unwritable(String),
+    /// The mesh to be written is not in canonical form.
+    #[error("the medial mesh is not valid: {0}")]
+    Mesh(#[from] ComplexError),
+    /// The header or a line is missing or is not what the format asks for.
+    #[error("{0}")]
+    Malformed(String),
+    /// The header announces more elements than the file has bytes for, or than 32-bit ids reach.
+    #[error("the header announces {announced} {what}, but the file is only {bytes} bytes long")]
+    Announced {
+        /// `"spheres"`, `"edges"` or `"faces"`.
+        what: &'static str,
+        /// The number in the header.
+        announced: u64,
+        /// Size of the file.
+        bytes: usize,
+    },
+    /// The file holds fewer or more elements than its header announces.
+    #[error("the header announces {announced} {what}, the file holds {}{found}",
+        if found > announced { "at least " } else { "only " })]
+    Count {
+        /// `"spheres"`, `"edges"` or `"faces"`.
+        what: &'static str,
+        /// The number in the header.
+        announced: u64,
+        /// The number of lines found.
+        found: u64,
+    },
+    /// A line starts with a word that the format does not have.
+    #[error("expected a line that starts with v, e or f, found {0:?}")]
+    Record(String),
+    /// A line of a list of spheres is none.
+    #[error("a list of spheres alone has lines `v x y z r`, found {0:?}")]
+    NoSphere(String),
+    /// Points without radii.
+    #[error("points without radii: `--radii surface` takes their distances to a surface")]
+    NoRadii,
+    /// A second file was appended.
+    #[error(
+        "all that the header announces stands above: another medial mesh begins here, written behind the first; \
+         `--block 1`, `--block 2` ... say which is meant"
+    )]
+    Appended,
+    /// The file has fewer medial meshes.
+    #[error("there is no block {wanted}: the file holds {blocks}, counted from 1")]
+    Block {
+        /// The requested block.
+        wanted: usize,
+        /// Number of medial meshes in the file.
+        blocks: usize,
+    },
+    /// The lines after the last record are no list of parts.
+    #[error(
+        "expected the parts of the structure behind the last record: a number of them, and for each `id type m` with m indices"
+    )]
+    Trailer,
+    /// Every radius is 0.
+    #[error("every radius is 0: a surface or a set of points, no medial mesh")]
+    Points,
+    /// A line ends too early.
+    #[error("the {field} is missing")]
+    Missing {
+        /// The missing value.
+        field: &'static str,
+    },
+    /// A word is not a finite number.
+    #[error("the {field} {text:?} is not a finite number")]
+    Number {
+        /// The value that the number stands for.
+        field: &'static str,
+        /// The word.
+        text: String,
+    },
+    /// A radius is negative, where none may be.
+    #[error("the radius {0} is negative")]
+    NegativeRadius(f64),
+    /// A word is not the index of a sphere.
+    #[error("{text:?} is not one of the {spheres} spheres; indices start at 0")]
+    Index {
+        /// The word.
+        text: String,
+        /// Number of spheres.
+        spheres: u64,
+    },
+}
+
+/// Reads a medial mesh from a `.ma` file, a list of spheres, a `.ply` file or an `.obj` file with radii, told apart by
+/// the extension.
 ///
 /// # Errors
 /// When the file cannot be read, has another extension, or does not hold a medial mesh; the error
@@ -86,27 +231,24 @@ pub fn read(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
 /// As [`read`], but for what the options allow.
 pub fn read_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<LoadedMa, MaError> {
     let path = path.as_ref();
-    let name = path.display().to_string();
-    match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => parse_ma_with(load(path)?, &name, options),
-        "ply" => parse_ply_with(load(path)?, &name, options),
-        "obj" => parse_obj(load(path)?, &name, options),
-        other => Err(MaError::of_file(path, MaErrorKind::unreadable(other))),
-    }
-}
-
-/// Reads a `.ma` file, whatever its extension.
-///
-/// # Errors
-/// When the file cannot be read or [`parse_ma`] refuses it.
-pub fn read_ma(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
-    let path = path.as_ref();
-    parse_ma(load(path)?, &path.display().to_string())
+    type Parser = fn(Vec<u8>, &str, ReadOptions) -> Result<LoadedMa, MaError>;
+    let parse: Parser = match extension(path).as_str() {
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => parse_ma_with,
+        "ply" => parse_ply_with,
+        "obj" => parse_obj,
+        other => {
+            let known = ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj";
+            let extension = other.to_owned();
+            return Err(MaError::of(path.display(), MaErrorKind::Extension { extension, known }));
+        }
+    };
+    let bytes = fs::read(path).map_err(|error| MaError::of(path.display(), error))?;
+    parse(bytes, &path.display().to_string(), options)
 }
 
 /// Writes a medial mesh as `.ma`, `.ply`, `.obj`, `.vtp` or `.glb`, told apart by the extension.
 ///
-/// The file appears under its name only when it is complete: it is written beside the target
+/// The file appears under its name only when it is complete: it is written next to the target
 /// and renamed. Contact points are not part of any of these formats.
 ///
 /// # Errors
@@ -127,63 +269,73 @@ pub fn write(path: impl AsRef<Path>, mesh: &MedialMesh) -> Result<(), MaError> {
 /// ```
 ///
 /// # Errors
-/// As [`write()`]; when the format has no room for what is to be shown; and `.glb` for a mesh without spheres,
+/// As [`write()`]; when the format cannot hold the values or bodies; and `.glb` for a mesh without spheres,
 /// numbers beyond single precision, or more than 4 GB.
 ///
 /// # Panics
 /// If the values are not one for each sphere.
 pub fn write_with(path: impl AsRef<Path>, mesh: &MedialMesh, look: &Look) -> Result<(), MaError> {
     let path = path.as_ref();
-    let fail = |kind| MaError::of_file(path, kind);
-    let extension = extension(path);
     if let Some(SphereValues { values, .. }) = &look.values {
         assert_eq!(values.len(), mesh.spheres.len(), "a value for each sphere");
     }
-    if !WRITTEN.contains(&extension.as_str()) {
-        return Err(fail(MaErrorKind::unwritable(&extension)));
-    }
-    has_room(&extension, look).map_err(fail)?;
-    mesh.check().map_err(|error| fail(error.into()))?;
-    let written = match extension.as_str() {
-        "ma" => write_atomically(path, |out| ma::write_to(out, mesh)),
-        "ply" => write_atomically(path, |out| ply::write_to(out, mesh)),
-        "obj" => write_atomically(path, |out| obj::write_to(out, mesh)),
-        "vtp" => write_atomically(path, |out| vtp::write_to(out, mesh, look)),
-        _ => {
-            let bytes =
-                glb::file(mesh, look).map_err(|error| fail(MaErrorKind::Unwritable(error)))?;
-            write_atomically(path, |out| out.write_all(&bytes))
-        }
-    };
-    written.map_err(|error| fail(error.into()))
+    write_as(&extension(path), path, mesh, look).map_err(|kind| MaError::of(path.display(), kind))
 }
 
-/// Extensions that [`write()`] knows; the last is the arm for all others there.
-const WRITTEN: [&str; 5] = ["ma", "ply", "obj", "vtp", "glb"];
-
-fn has_room(extension: &str, look: &Look) -> Result<(), MaErrorKind> {
-    let refused =
-        |what, known| Err(MaErrorKind::NoRoom { extension: extension.to_owned(), what, known });
+fn write_as(
+    extension: &str,
+    path: &Path,
+    mesh: &MedialMesh,
+    look: &Look,
+) -> Result<(), MaErrorKind> {
+    let lacks = |what: &str, known: &str| {
+        Err(MaErrorKind::Unwritable(format!("{extension:?} files hold no {what}; write {known}")))
+    };
     match extension {
-        "glb" => Ok(()),
-        _ if look.balls => refused("spheres as bodies", ".glb"),
-        "vtp" => Ok(()),
-        _ if look.values.is_some() => refused("values", ".vtp or .glb"),
-        _ => Ok(()),
+        "ma" | "ply" | "obj" | "vtp" if look.balls => return lacks("spheres as bodies", ".glb"),
+        "ma" | "ply" | "obj" if look.values.is_some() => return lacks("values", ".vtp or .glb"),
+        "ma" | "ply" | "obj" | "vtp" | "glb" => mesh.check()?,
+        _ => {
+            let known = ".ma, .ply, .obj, .vtp, .glb";
+            return Err(MaErrorKind::Extension { extension: extension.to_owned(), known });
+        }
     }
+    match extension {
+        "ma" => write_atomically(path, |out| ma::write_ma(out, mesh))?,
+        "ply" => write_atomically(path, |out| viewers::write_ply(out, mesh))?,
+        "obj" => write_atomically(path, |out| viewers::write_obj(out, mesh))?,
+        "vtp" => write_atomically(path, |out| viewers::write_vtp(out, mesh, look))?,
+        _ => {
+            let bytes = glb::file(mesh, look).map_err(MaErrorKind::Unwritable)?;
+            write_atomically(path, |out| out.write_all(&bytes))?;
+        }
+    }
+    Ok(())
 }
 
 fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
-fn load(path: &Path) -> Result<Vec<u8>, MaError> {
-    fs::read(path).map_err(|error| MaError::of_file(path, error.into()))
+/// Edges without a face, in the order of the mesh: for formats in which a face brings its sides along.
+fn lone_edges(mesh: &MedialMesh) -> Vec<[u32; 2]> {
+    let mut has_face = vec![false; mesh.edges.len()];
+    for &[a, b, c] in &mesh.faces {
+        for side in [[a, b], [a, c], [b, c]] {
+            if let Ok(edge) = mesh.edges.binary_search(&side) {
+                has_face[edge] = true;
+            }
+        }
+    }
+    mesh.edges.iter().zip(has_face).filter(|&(_, has)| !has).map(|(&edge, _)| edge).collect()
 }
 
-#[cfg(test)]
-mod dialects_tests;
-#[cfg(test)]
-mod flags_tests;
+/// Spheres without an edge.
+fn isolated(mesh: &MedialMesh) -> Vec<u32> {
+    let mut has_edge = vec![false; mesh.spheres.len()];
+    mesh.edges.iter().flatten().for_each(|&v| has_edge[v as usize] = true);
+    (0..).zip(has_edge).filter(|&(_, has)| !has).map(|(v, _)| v).collect()
+}
+
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
-use std::path::PathBuf;
-use std::{env, fs, io, process};
+//! One table for the dialects, one for the errors, and what must hold for any file.
+
+use std::fs;
 
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -9,25 +10,361 @@ use super::*;
 use crate::Vec3;
 use crate::complex::Sphere;
 
-/// A folder of its own under the system's temporary one, removed at the end of the test.
-struct Folder(PathBuf);
+/// A triangle of three live spheres, its edges and its face, as plain `.ma`.
+const PLAIN: &str = "3 3 1\nv 0 0 0 1\nv 1 0 0 2\nv 0 1 0 3\ne 0 1\ne 0 2\ne 1 2\nf 0 1 2\n";
 
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = env::temp_dir().join(format!("medial-{}-{name}", process::id()));
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
+const LENIENT: ReadOptions = ReadOptions { lenient: true, block: None, radii: Radii::Needed };
+const POINTS: ReadOptions = ReadOptions { lenient: false, block: None, radii: Radii::NotNeeded };
+const STRICT: ReadOptions = ReadOptions { lenient: false, block: None, radii: Radii::NotNegative };
+
+fn load(text: &str) -> LoadedMa {
+    parse_ma(text, "x.ma").unwrap_or_else(|error| panic!("{text:?}: {error}"))
+}
+
+fn as_written(mesh: &MedialMesh) -> String {
+    let mut bytes = Vec::new();
+    ma::write_ma(&mut bytes, mesh).unwrap();
+    String::from_utf8(bytes).unwrap()
+}
+
+fn counts(mesh: &MedialMesh) -> [usize; 3] {
+    [mesh.spheres.len(), mesh.edges.len(), mesh.faces.len()]
+}
+
+fn ply(radius: &str) -> String {
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n\
+         property double {radius}\nelement edge 1\nproperty int vertex1\nproperty int vertex2\nelement face 1\n\
+         property list uchar int vertex_indices\nend_header\n0 0 0 1\n1 0 0 2\n0 1 0 3\n1 0\n3 0 1 2\n"
+    )
+}
+
+/// The triangle in each dialect that has faces, with a deleted sphere where the dialect has marks, and remarks.
+const TRIANGLES: [(&str, &str, &[&str]); 10] = [
+    ("A", PLAIN, &[]),
+    (
+        "A, edges repeated as by voxel cores",
+        "3 5 1\nv 0 0 0 1\nv 1 0 0 2\nv 0 1 0 3\ne 0 1\ne 0 1\ne 2 0\ne 2 1\ne 0 2\nf 2 1 0\n",
+        &["2 edges were listed more than once and merged"],
+    ),
+    (
+        "B, of MATFP: the last word of an edge is its type",
+        "4 4 1\nv 0 0 0 1 2 0\nv 1 0 0 2 3 0\nv 9 9 9 1 2 1\nv 0 1 0 3 1 0\n\
+         e 0 1 0\ne 0 3 2\ne 1 3 1\ne 0 2 0\nf 0 1 3\n",
+        &["1 sphere was dropped: marked as deleted", "1 edge was dropped: on a deleted sphere"],
+    ),
+    (
+        "B'",
+        "4 5 3\nv 0 0 0 1 2 0\nv 1 0 0 2 3 0\nv 9 9 9 1 2 1\nv 0 1 0 3 1 0\n\
+         e 0 1 0 0\ne 0 3 2 0\ne 1 3 1 0\ne 0 2 0 1\ne 1 2 0 0\nf 0 1 3 0\nf 0 1 2 1\nf 1 2 3 0\n",
+        &[
+            "1 edge was dropped: marked as deleted",
+            "1 face was dropped: marked as deleted",
+            "1 face was dropped: on a deleted sphere",
+        ],
+    ),
+    (
+        "C, of libmat: miscounted",
+        "4 9 9\nv 0 0 0 1 2 0\nv 1 0 0 2 3 0\nv 9 9 9 1 2 1\nv 0 1 0 3 1 0\n\
+         e 0 1 0 0\ne 0 3 2 0\ne 1 3 1 0\nf 0 1 3 0\n",
+        &["the header announces 9 edges, the file holds 3: taken as they are"],
+    ),
+    (
+        "D, of MATTopo: four counts",
+        "4 3 2 2\nv 0 0 0 1 2 0 1\nv 1 0 0 2 3 0 1\nv 9 9 9 1 2 1 1\nv 0 1 0 3 1 0 1\n\
+         e 0 1 0 0 1\ne 0 3 2 0 1\ne 1 3 1 0 2\nf 0 1 3 0.5 0 1\nf 0 1 2 0.1 1 1\nt 0 1 2 3 0 1\nt 0 1 2 3 1 1\n",
+        &["1 tetrahedron was not used", "9 lines carry flags; marks of deletion were obeyed"],
+    ),
+    (
+        "E, of MATStruct: parts over several lines, one empty",
+        "3 3 1\nv 0 0 0 1\nv 1 0 0 2\nv 0 1 0 3\ne 0 1\ne 0 2\ne 1 2\nf 0 1 2\n\
+         4\n0 0 1\n0\n1 1 2 0\n1\n2 3 1 2\n7 2 0\n",
+        &["4 parts of the structure were not used"],
+    ),
+    (
+        "I, of SEG-MAT: counts ignored",
+        "3 7 7\nn 0 0 1\nv 0 0 0 1\nv 1 0 0 2\nf 0 1 2\nv 0 1 0 3\ne 0 1\ne 0 2\nn 0 0 1\ne 1 2\n",
+        &["2 normals were not used"],
+    ),
+    (
+        "J, as far as it can be told: three words behind a face are a colour",
+        "3 3 1\nv 0 0 0 1\nv 1 0 0 2\nv 0 1 0 3\ne 0 1\ne 0 2\ne 1 2\nf 0 1 2 0.5 1 1\n",
+        &[],
+    ),
+    (
+        "three words behind a face are flags where spheres have flags",
+        "3 3 2\nv 0 0 0 1 2 0\nv 1 0 0 2 2 0\nv 0 1 0 3 2 0\ne 0 1\ne 0 2\ne 1 2\nf 0 1 2 0.5 0 1\nf 0 1 2 0.5 1 1\n",
+        &["three words behind 2 faces: read as importance, deleted and copies"],
+    ),
+];
+
+#[test]
+fn every_dialect_gives_the_same_bytes_as_the_plain_one() {
+    let plain = as_written(&load(PLAIN).mesh);
+    assert_eq!(plain.lines().count(), 8);
+    for (dialect, text, expected) in TRIANGLES {
+        let loaded = load(text);
+        assert_eq!(as_written(&loaded.mesh), plain, "{dialect}");
+        let (_, remarks) = loaded.with_remarks();
+        for remark in expected {
+            assert!(
+                remarks.iter().any(|r| r.starts_with(remark)),
+                "{dialect}: {remark}: {remarks:?}"
+            );
+        }
+        assert!(!expected.is_empty() || remarks.len() <= 1, "{dialect}: {remarks:?}");
+        let mut lines: Vec<&str> = text.lines().collect();
+        let decorated = format!("\u{feff}# exported\r\n{}", lines.join(" # x\r\n\r\n"));
+        assert_eq!(as_written(&load(&decorated).mesh), plain, "{dialect}, decorated");
+        if !dialect.starts_with('E') {
+            // Spheres keep their order, whatever stands between them.
+            lines[1..].sort_by_key(|line| !line.starts_with(['e', 'f', 't', 'n']));
+            let shuffled = load(&lines.join("\n")).mesh;
+            assert_eq!(as_written(&shuffled), plain, "{dialect}, in another order");
+        }
     }
+    // O: as OBJ, told by its lines, and by its extension with other statements and indices from the end.
+    let obj = "v 0 0 0 1\nv 1 0 0 2\nv 0 1 0 3\nl 1 2\nl 3 1\nl 2 3\nf 1 2 3\n";
+    assert_eq!(as_written(&load(obj).mesh), plain);
+    let obj =
+        "mtllib x\no a\nv 0 0 0 1\nv 1 0 0 2\nv 0 1 0 3\nvn 0 0 1\nl 1 2 -1\nf 1//1 -2//1 3//1\n";
+    let loaded = parse_obj(obj, "x.obj", ReadOptions::default()).unwrap();
+    assert_eq!(as_written(&loaded.mesh), plain);
+    // N: with `radius` as CGAL has it, and `r`.
+    for name in ["radius", "r"] {
+        assert_eq!(as_written(&parse_ply(ply(name), "x.ply").unwrap().mesh), plain);
+    }
+    // H: all faces of a tetrahedron, over and over.
+    let tetrahedra = "4 0 8\nv 0 0 0 1 2 0\nv 1 0 0 1 2 0\nv 0 1 0 1 2 0\nv 0 0 1 1 2 0\nf 0 1 2\nf 0 1 3\n\
+                      f 0 2 3\nf 1 2 3\nf 2 1 0\nf 3 1 0\nf 3 2 0\nf 3 2 1\n";
+    assert_eq!(counts(&load(tetrahedra).mesh), [4, 6, 4]);
+}
 
-    fn names(&self) -> Vec<String> {
-        let entries = fs::read_dir(&self.0).unwrap();
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+#[test]
+fn lists_of_spheres_alone_are_read() {
+    // Coverage Axis, Point2Skeleton, MATTopo's .sph with and without flags, MATFP with those it calls deleted.
+    for (text, radii) in [
+        ("v 0 0 0 1\nv 1 0 0 2\n", &[1.0, 2.0][..]),
+        ("2\n0 0 0 1\n1 0 0 2\n", &[1.0, 2.0]),
+        ("4 2\n0 0 0 1\n1 0 0 2\n", &[1.0, 2.0]),
+        ("4 3\n0 0 0 1 2 0 1\n1 0 0 2 2 1 1\n2 0 0 3 2 0 1\n", &[1.0, 3.0]),
+        ("4\nv 0 0 0 1 2 0 0 \nv 1 0 0 2 2 3 0 \nv 1 0 0 3 2 -1 0 \n", &[1.0, 3.0]),
+    ] {
+        let loaded = load(text);
+        let found: Vec<f64> = loaded.mesh.spheres.iter().map(|sphere| sphere.radius).collect();
+        assert_eq!((&*found, counts(&loaded.mesh)), (radii, [radii.len(), 0, 0]), "{text:?}");
+        assert!(loaded.notes[0].contains("list of spheres"), "{:?}", loaded.notes);
     }
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
+#[test]
+fn doubts_are_warnings() {
+    for (text, expected) in [
+        ("1 0 0\nv 0 0 0 1 2\n", "1 word behind 1 spheres: read as a type"),
+        ("1 0 0\nv 0 0 0 1 2 0 1\n", "3 words behind 1 spheres: read as type, deleted and copies"),
+        ("1 0 0\nv 0 0 0 1 2 -1\n", "1 marks of deletion are negative, for unknown: kept"),
+        ("1 0 0\nv 0 0 0 -1\n", "1 radius is negative: its absolute value was taken"),
+        (
+            "2 0 1\nv 0 0 0 1\nv 1 0 0 1\nf 0 1 1 0.5 0\n",
+            "2 words behind 1 faces: read as importance",
+        ),
+        (
+            "1 0 1\nv 0 0 0 1 2 0\nf 0 0 0 0.2 0.5 0.1\n",
+            "three words behind 1 faces: read as a colour",
+        ),
+    ] {
+        let loaded = load(text);
+        assert!(loaded.warnings[0].starts_with(expected), "{text:?}: {:?}", loaded.warnings);
+        assert_eq!((loaded.warnings.len(), loaded.mesh.spheres[0].radius), (1, 1.0), "{text:?}");
+    }
+}
+
+#[test]
+fn wrong_counts_are_taken_with_a_warning_if_lenient() {
+    for (text, expected) in [
+        (PLAIN.replace("3 3 1", "9 3 1"), [3, 3, 1]),
+        (PLAIN.replace("3 3 1", "2 3 1"), [3, 3, 1]),
+        (PLAIN.replace("3 3 1", "3 1 4000000"), [3, 3, 1]),
+        ("5\n0 0 0 1\n1 0 0 1\n".to_owned(), [2, 0, 0]),
+        ("1\n0 0 0 1\n1 0 0 1\n".to_owned(), [2, 0, 0]),
+    ] {
+        assert!(parse_ma(&text, "x.ma").is_err(), "{text:?}");
+        let loaded = parse_ma_with(&text, "x.ma", LENIENT).unwrap();
+        assert_eq!(counts(&loaded.mesh), expected, "{text:?}");
+        assert!(loaded.warnings[0].contains("taken as they are"), "{text:?}");
+    }
+}
+
+#[test]
+fn one_of_several_blocks_is_chosen() {
+    let second = "1 0 0\nv 5 5 5 5\n";
+    let text = format!("{PLAIN}{second}{PLAIN}1\n0 0 1\n0\n");
+    let read =
+        |block| parse_ma_with(&text, "x.ma", ReadOptions { block, ..ReadOptions::default() });
+    assert!(read(None).unwrap_err().to_string().starts_with("x.ma, line 9: all that"));
+    for (number, alone) in [(1, PLAIN), (2, second), (3, PLAIN)] {
+        assert_eq!(read(Some(number)).unwrap().mesh, load(alone).mesh, "{number}");
+    }
+    for number in [0, 4] {
+        let expected =
+            format!("x.ma: there is no block {number}: the file holds 3, counted from 1");
+        assert_eq!(read(Some(number)).unwrap_err().to_string(), expected);
+    }
+}
+
+#[test]
+fn disorder_is_repaired_and_reported() {
+    let loaded = load(
+        "4 3 3\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nv 0 0 1 1\n\
+         e 3 2\ne 2 3\ne 1 1\nf 2 1 0\nf 0 1 2\nf 3 1 3\n",
+    );
+    assert_eq!(loaded.mesh.check(), Ok(()));
+    assert_eq!(loaded.mesh.edges, [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]);
+    assert_eq!(loaded.mesh.faces, [[0, 1, 2]]);
+    let expected = [
+        "1 edge was written with descending indices",
+        "the edges were not in ascending order and were sorted",
+        "2 faces were written with descending indices",
+        "the faces were not in ascending order and were sorted",
+        "1 face was replaced by an edge: two corners are the same sphere",
+        "1 edge was dropped: both ends are the same sphere",
+        "1 edge was listed more than once and merged",
+        "1 face was listed more than once and merged",
+        "3 edges were added: sides of faces that were not listed",
+    ];
+    assert_eq!(loaded.notes, expected);
+}
+
+type Parser = fn(Vec<u8>, &str, ReadOptions) -> Result<LoadedMa, MaError>;
+
+/// Each text is refused with an error that begins as given.
+fn refuses(parse: Parser, options: ReadOptions, cases: &[(&str, &str)]) {
+    for (text, expected) in cases {
+        let error = parse(text.as_bytes().to_vec(), "x", options).expect_err(text).to_string();
+        assert!(error.starts_with(&format!("x{expected}")), "{text:?} gives {error:?}");
+    }
+}
+
+#[test]
+fn errors_name_the_line_and_the_reason() {
+    let default = ReadOptions::default();
+    refuses(
+        parse_ma_with,
+        default,
+        &[
+            ("", ": the file is empty"),
+            ("# only\n", ": the file is empty"),
+            ("7 5\n", ", line 1: expected three counts"),
+            ("OFF\n", ", line 1: expected three counts"),
+            ("-1 0 0\n", ", line 1: expected three counts"),
+            ("1 0 0 0 0\nv 0 0 0 1\n", ", line 1: expected three counts"),
+            ("4000000000 0 0\nv 0 0 0 1\n", ", line 1: the header announces 4000000000 spheres"),
+            (
+                "1 99999999999999 0\nv 0 0 0 1\n",
+                ", line 1: the header announces 99999999999999 edges",
+            ),
+            ("99999999999\n0 0 0 1\n", ", line 1: the header announces 99999999999 spheres"),
+            ("2 0 0\nv 0 0 0 1\n", ": the header announces 2 spheres, the file holds only 1"),
+            ("1 0 0\nv 0 0 0 1\nv 0 0 0 1\n", ", line 3: the header announces 1 spheres"),
+            (
+                "2 1 0\nv 0 0 0 1\nv 0 0 0 1\ne 0 1\ne 0 1\n",
+                ", line 5: the header announces 1 edges, the file holds at least 2",
+            ),
+            (
+                "4 1 1\nv 0 0 0 1 2 0\nv 1 0 0 1 2 0\ne 0 1 0\n",
+                ": the header announces 4 spheres, the file holds only 2",
+            ),
+            ("2\n0 0 0 1\n", ": the header announces 2 spheres"),
+            ("1\n0 0 0 1\n1 0 0 1\n", ", line 3: the header announces 1 spheres"),
+            ("v 0 0 0 1\ne 0 0\n", ", line 2: a list of spheres alone"),
+            ("3 2\n0 0 0\n1 0 0\n", ", line 1: points without radii: `--radii surface` takes"),
+            ("1 0 0\nv 0 0 1\n", ", line 2: the radius is missing"),
+            ("1 0 0\nv 0 0 zero 1\n", ", line 2: the z coordinate \"zero\" is not a finite number"),
+            ("1 0 0\nv nan 0 0 1\n", ", line 2: the x coordinate \"nan\""),
+            ("1 0 0\nv 0 inf 0 1\n", ", line 2: the y coordinate \"inf\""),
+            ("1 0 0\nv 0 0 0 1e999\n", ", line 2: the radius \"1e999\""),
+            (
+                "1 1 0\nv 0 0 0 1\ne 0 1\n",
+                ", line 3: \"1\" is not one of the 1 spheres; indices start at 0",
+            ),
+            ("1 1 0\nv 0 0 0 1\ne 0 -1\n", ", line 3: \"-1\" is not one of the 1 spheres"),
+            ("1 1 0\nv 0 0 0 1\ne 0\n", ", line 3: the index of a sphere is missing"),
+            (
+                "1 0 0\nv 0 0 0 1\nt 0 0 0 0\n",
+                ", line 3: expected a line that starts with v, e or f",
+            ),
+            ("1 0 0\nv 0 0 0 1 2 0 0 0\n", ", line 2: \"2 0 0 0\" behind the values"),
+            ("1 0 0\nv 0 0 0 1 2 x\n", ", line 2: the flag \"x\" is not a finite number"),
+            ("1 0 0\nv 0 0 0 1 2 0.5\n", ", line 2: the flag 0.5 is not a whole number"),
+            ("1 0 1\nv 0 0 0 1\nf 0 0 0 7\n", ", line 3: a face has three spheres"),
+            ("4 0 1\nv 0 0 0 0\nv 1 0 0 0\nv 0 1 0 0\nv 0 0 1 0\nf 0 2 1\n", ": every radius is 0"),
+            ("1 0 0\nv 0 0 0 1\n1\n0 0 1\n0\n", ", line 3: expected the parts"),
+            ("1 0 0\nv 0 0 0 1\n1\n0 4 0\n", ", line 3: expected the parts"),
+            ("1 0 0\nv 0 0 0 1\n2\n0 3 1\n0\n", ", line 3: expected the parts"),
+            ("1 0 0\nv 0 0 0 1\n1\n0 3 1\n0 7\n", ", line 3: expected the parts"),
+            ("1 0 0\nv 0 0 0 1\n1\n0 3 18446744073709551615\n", ", line 3: expected the parts"),
+        ],
+    );
+    refuses(
+        parse_ma_with,
+        STRICT,
+        &[("1 0 0\nv 0 0 0 -3\n", ", line 2: the radius -3 is negative")],
+    );
+    let wrong = PLAIN.replace("3 3 1", "2 3 1").replace("e 1 2", "e 1 7");
+    refuses(parse_ma_with, LENIENT, &[(&wrong, ", line 7: \"7\" is not one of the 3 spheres")]);
+    refuses(
+        parse_obj,
+        default,
+        &[
+            ("v 0 0 0 1\nl 1\n", ", line 2: the index of a sphere is missing"),
+            ("v 0 0 0 1\nl 0 1\n", ", line 2: \"0\" is not one of the 1 vertices above"),
+            ("v 0 0 0 1\nl 1 -2\n", ", line 2: \"-2\" is not one"),
+            ("v 0 0 0 1\nf 1 1 1 1\n", ", line 2: faces must be triangles, found 4 corners"),
+            ("v 0 0 0 1 2 3\n", ", line 1: a vertex has 4 numbers"),
+            ("v 0 0 0\n", ", line 1: points without radii"),
+            ("v 0 0 0 1\ncurv 1\n", ", line 2: expected a line that starts with v, l or f"),
+            ("v 0 0 x 1\n", ", line 1: the z coordinate"),
+        ],
+    );
+    let valid = ply("radius");
+    for (from, to, expected) in [
+        ("ply", "solid", ": line 1: expected a PLY header, found"),
+        (
+            "radius",
+            "weight",
+            ": element vertex has no property radius: not a medial mesh; `--radii",
+        ),
+        ("vertex2", "other", ": element edge has no property vertex2: not a medial mesh"),
+        ("vertex 3", "vertex 4", ": line 17: expected vertex 3, found"),
+        ("vertex 3", "vertex 4000000000", ": the header announces 4000000000 vertices"),
+        ("end_header", "comment", ": line 14: expected a PLY header, found"),
+        ("3 0 1 2", "4 0 1 2 2", ": line 18: faces must be triangles, found 4 corners"),
+        ("3 0 1 2", "3 0 1 3", ": line 18: 3 is not one of the 3 spheres"),
+        ("1 0\n3", "1 0.5\n3", ": line 17: 0.5 is not one of the 3 spheres"),
+        ("3 0 1 2", "", ": end of file: expected face 0, found nothing more"),
+    ] {
+        refuses(parse_ply_with, default, &[(&valid.replacen(from, to, 1), expected)]);
+    }
+    assert!(read("/nonexistent/x.ma").unwrap_err().to_string().starts_with("/nonexistent/x.ma: "));
+    for extension in ["off", "vtp", "glb"] {
+        let error = read(format!("x.{extension}")).unwrap_err().to_string();
+        assert!(error.contains("is not one of .ma, .ma_dup"), "{error}");
+    }
+}
+
+#[test]
+fn files_without_radii_are_read_where_none_are_needed() {
+    let point = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                 end_header\n1 2 3\n";
+    // A surface written as .ma is a list of points, too.
+    let surface = "4 0 1\nv 1 2 3 0\nv 1 0 0 0\nv 0 1 0 0\nv 0 0 1 0\nf 0 2 1\n";
+    for loaded in [
+        parse_ma_with("3 1\n1 2 3\n", "x.sph", POINTS),
+        parse_ma_with(surface, "x.ma", POINTS),
+        parse_obj("v 1 2 3\n", "x.obj", POINTS),
+        parse_ply_with(point, "x.ply", POINTS),
+    ] {
+        assert_eq!(loaded.unwrap().mesh.spheres[0].centre.to_array(), [1.0, 2.0, 3.0]);
     }
 }
 
@@ -42,152 +379,53 @@ fn awkward_mesh() -> MedialMesh {
     MedialMesh::from_simplices(spheres, vec![[0, 5], [3, 4]], vec![[0, 1, 2], [1, 2, 3]]).unwrap()
 }
 
-const VALID: &str = "4 5 2\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nv 0 0 1 0.5\n\
-                     e 0 1\ne 0 2\ne 0 3\ne 1 2\ne 1 3\nf 0 1 2\nf 0 1 3\n";
-
-fn message(text: &str) -> String {
-    parse_ma(text, "x.ma").unwrap_err().to_string()
-}
-
 #[test]
-fn what_is_written_is_read_back_bit_for_bit() {
-    let folder = Folder::new("round-trip");
-    for (name, mesh) in [("a.ma", awkward_mesh()), ("b.PLY", awkward_mesh())] {
-        let path = folder.0.join(name);
-        write(&path, &mesh).unwrap();
-        let loaded = read(&path).unwrap();
-        assert_eq!(loaded.notes, Vec::<String>::new(), "{name}");
-        assert_eq!(loaded.mesh, mesh, "{name}");
+fn written_files_come_back_bit_for_bit_or_hold_every_element() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mesh = awkward_mesh();
+    for (name, mesh) in [("a.ma", &mesh), ("b.PLY", &mesh), ("c.ma", &MedialMesh::default())] {
+        write(at(name), mesh).unwrap();
+        let loaded = read(at(name)).unwrap();
+        assert_eq!((&loaded.mesh, loaded.notes), (mesh, vec![]), "{name}");
     }
-    write(folder.0.join("empty.ma"), &MedialMesh::default()).unwrap();
-    assert_eq!(read(folder.0.join("empty.ma")).unwrap().mesh, MedialMesh::default());
-}
-
-#[test]
-fn obj_lists_every_element_from_one() {
-    let folder = Folder::new("obj");
-    write(folder.0.join("a.obj"), &awkward_mesh()).unwrap();
-    let text = fs::read_to_string(folder.0.join("a.obj")).unwrap();
-    let starting = |word: &str| text.lines().filter(|l| l.starts_with(word)).count();
+    let loaded = read_with(at("b.PLY"), POINTS).unwrap();
+    assert_eq!(loaded.mesh, mesh);
+    for name in ["a.obj", "a.vtp"] {
+        write(at(name), &mesh).unwrap();
+    }
+    let text = fs::read_to_string(at("a.obj")).unwrap();
+    let starting = |word: &str| text.lines().filter(|line| line.starts_with(word)).count();
     assert_eq!([starting("v "), starting("l "), starting("f ")], [6, 7, 2]);
     assert!(text.contains("\nf 1 2 3\n") && text.contains("\nl 1 6\n"));
-}
+    let text = fs::read_to_string(at("a.vtp")).unwrap();
+    let counts = "NumberOfPoints=\"6\" NumberOfVerts=\"0\" NumberOfLines=\"2\" NumberOfStrips=\"0\" NumberOfPolys=\"2\"";
+    assert!(text.contains(counts), "{text}");
 
-#[test]
-fn a_failed_write_keeps_the_old_file_and_leaves_nothing_behind() {
-    let folder = Folder::new("atomic");
-    let path = folder.0.join("a.ma");
-    write(&path, &awkward_mesh()).unwrap();
-    let before = fs::read(&path).unwrap();
-    let failed = write_atomically(&path, |out| {
-        out.write_all(b"half")?;
-        Err(io::Error::other("disk full"))
-    });
-    assert_eq!(failed.unwrap_err().to_string(), "disk full");
-    assert_eq!(fs::read(&path).unwrap(), before);
-    let mut invalid = awkward_mesh();
+    let values = Some(SphereValues::radius(&mesh));
+    let look = |values, balls| Look { values, balls };
+    for (name, look, why) in [
+        ("a.ma", look(values.clone(), false), "hold no values"),
+        ("a.vtp", look(values, true), "hold no spheres as bodies"),
+        ("a.xyz", Look::default(), "\"xyz\" is not one of .ma, .ply, .obj, .vtp, .glb"),
+        ("no/a.ma", Look::default(), "no/a.ma: "),
+    ] {
+        let error = write_with(at(name), &mesh, &look).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}");
+    }
+    let mut invalid = mesh;
     invalid.edges.clear();
-    assert!(matches!(write(&path, &invalid).unwrap_err().kind, MaErrorKind::Mesh(_)));
-    assert_eq!(folder.names(), ["a.ma"]);
-    let error = write(folder.0.join("a.xyz"), &awkward_mesh()).unwrap_err();
-    assert!(error.to_string().contains("\"xyz\" is not one of .ma, .ply, .obj"));
-    assert!(write(folder.0.join("nowhere/a.ma"), &awkward_mesh()).is_err());
-}
-
-#[test]
-fn comments_and_line_ends_are_read_over() {
-    let decorated = "\u{feff}# exported\r\n4 5 2\r\n\r\nv 0 0 0 1 2 0\r\nv 1 0 0 1 # last\r\n\
-                     v 0 1 0 1\r\nv 0 0 1 .5\r\ne 0 1 0\r\ne 0 2\r\ne 0 3\r\ne 1 2\r\ne 1 3\r\n\
-                     f 0 1 2\r\nf 0 1 3\r\n# end\r\n";
-    let loaded = parse_ma(decorated, "x.ma").unwrap();
-    assert_eq!(loaded.mesh, parse_ma(VALID, "y.ma").unwrap().mesh);
-    assert_eq!(loaded.notes, ["2 lines carry flags; marks of deletion were obeyed"]);
-    assert_eq!(loaded.warnings, Vec::<String>::new());
-}
-
-#[test]
-fn disorder_is_repaired_and_reported() {
-    let loaded = parse_ma(
-        "4 3 3\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nv 0 0 1 1\n\
-         e 3 2\ne 2 3\ne 1 1\nf 2 1 0\nf 0 1 2\nf 3 1 3\n",
-        "x.ma",
-    )
-    .unwrap();
-    assert_eq!(loaded.mesh.check(), Ok(()));
-    assert_eq!(loaded.mesh.edges, [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]);
-    assert_eq!(loaded.mesh.faces, [[0, 1, 2]]);
-    let notes = loaded.notes.join("\n");
-    for part in [
-        "1 edge was written with descending indices",
-        "the edges were not in ascending order",
-        "1 face was replaced by an edge",
-        "1 edge was dropped: both ends are the same sphere",
-        "1 edge was listed more than once",
-        "1 face was listed more than once",
-        "3 edges were added: sides of faces",
-    ] {
-        assert!(notes.contains(part), "{part:?} not in:\n{notes}");
-    }
-}
-
-#[test]
-fn errors_name_the_line_and_the_reason() {
-    for (text, expected) in [
-        ("", "x.ma: the file is empty"),
-        ("# only\n", "x.ma: the file is empty"),
-        ("7 5\n", "line 1: expected three counts"),
-        ("OFF\n", "line 1: expected three counts"),
-        ("-1 0 0\n", "line 1: expected three counts"),
-        ("4000000000 0 0\nv 0 0 0 1\n", "line 1: the header announces 4000000000 spheres"),
-        ("1 99999999999999 0\nv 0 0 0 1\n", "line 1: the header announces 99999999999999 edges"),
-        ("2 0 0\nv 0 0 0 1\n", "x.ma: the header announces 2 spheres, the file holds only 1"),
-        ("1 0 0\nv 0 0 0 1\nv 0 0 0 1\n", "line 3: the header announces 1 spheres"),
-        ("1 0 0\nv 0 0 1\n", "line 2: the radius is missing"),
-        ("1 0 0\nv 0 0 zero 1\n", "line 2: the z coordinate \"zero\" is not a finite number"),
-        ("1 0 0\nv nan 0 0 1\n", "line 2: the x coordinate \"nan\""),
-        ("1 0 0\nv 0 inf 0 1\n", "line 2: the y coordinate \"inf\""),
-        ("1 0 0\nv 0 0 0 1e999\n", "line 2: the radius \"1e999\""),
-        ("1 1 0\nv 0 0 0 1\ne 0 1\n", "line 3: \"1\" is not one of the 1 spheres"),
-        ("1 1 0\nv 0 0 0 1\ne 0 -1\n", "line 3: \"-1\" is not one of the 1 spheres"),
-        ("1 1 0\nv 0 0 0 1\ne 0\n", "line 3: the index of a sphere is missing"),
-        ("1 0 0\nv 0 0 0 1\nt 0 0 0 0\n", "line 3: expected a line that starts with v, e or f"),
-    ] {
-        assert!(message(text).contains(expected), "{text:?} gives {:?}", message(text));
-    }
-    assert!(read_ma("/nonexistent/x.ma").unwrap_err().to_string().starts_with("/nonexistent/x.ma"));
-    assert!(read("x.off").unwrap_err().to_string().contains("is not one of .ma, .ma_dup"));
-}
-
-#[test]
-fn ply_errors_name_the_line_and_the_reason() {
-    let head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
-                property float z\n";
-    for (text, expected) in [
-        ("solid".to_owned(), "not a PLY file"),
-        ("ply\nformat binary_little_endian 1.0\nend_header\n".into(), "line 2: only ASCII PLY"),
-        (format!("{head}end_header\n0 0 0\n"), "vertices have no property radius"),
-        (format!("{head}property float radius\nend_header\n"), "1 vertices, the file holds only 0"),
-        (head.to_owned(), "the header has no end"),
-        ("ply\nelement vertex 4000000000\nend_header\n".into(), "announces 4000000000 vertices"),
-    ] {
-        let error = parse_ply(&text, "x.ply").unwrap_err().to_string();
-        assert!(error.contains(expected), "{text:?} gives {error:?}");
-    }
+    assert!(matches!(write(at("a.ma"), &invalid).unwrap_err().kind, MaErrorKind::Mesh(_)));
 }
 
 #[test]
 fn damaged_files_are_refused_or_read_but_never_panic() {
-    let folder = Folder::new("fuzz");
-    write(folder.0.join("a.ply"), &awkward_mesh()).unwrap();
-    let ply = fs::read(folder.0.join("a.ply")).unwrap();
-    type Parser = fn(Vec<u8>) -> Result<LoadedMa, MaError>;
-    let parsers: [(&[u8], Parser); 2] = [
-        (VALID.as_bytes(), |bytes| parse_ma(bytes, "x.ma")),
-        (&ply, |bytes| parse_ply(bytes, "x.ply")),
-    ];
     let mut random = Pcg64::seed_from_u64(7);
-    let mut accepted = 0;
-    for (valid, parse) in parsers {
+    let ply = ply("radius");
+    let [_, _, (_, b, _), .., (_, flagged, _)] = TRIANGLES;
+    for (text, is_ply) in [(PLAIN, false), (b, false), (flagged, false), (&*ply, true)] {
+        let valid = text.as_bytes();
+        let mut accepted = 0;
         let mut damaged: Vec<Vec<u8>> = (0..valid.len()).map(|n| valid[..n].to_vec()).collect();
         for _ in 0..4000 {
             let mut bytes = valid.to_vec();
@@ -198,13 +436,14 @@ fn damaged_files_are_refused_or_read_but_never_panic() {
             damaged.push(bytes);
         }
         for bytes in damaged {
-            if let Ok(loaded) = parse(bytes) {
+            let loaded = if is_ply { parse_ply(bytes, "x") } else { parse_ma(bytes, "x") };
+            if let Ok(loaded) = loaded {
                 assert_eq!(loaded.mesh.check(), Ok(()));
                 accepted += 1;
             }
         }
+        assert!(accepted > 50, "so much damage hardly exercises the reader: {accepted}");
     }
-    assert!(accepted > 100, "the damage is so heavy that the readers are hardly exercised");
 }
 
 proptest! {

@@ -1,0 +1,190 @@
+//! PLY, the polygon file format of Stanford, for surfaces and medial meshes: text, and binary of either byte order.
+//!
+//! `ply-rs-bw` parses the header and the rows. Around it:
+//! - Counts of the header are compared with the bytes that follow before a row is read.
+//! - Rows are handed on one by one, so that memory is that of the result, and faults name the line or the element.
+//! - Text is read in double precision, whatever precision the header declares.
+//!
+//! In a text file every element has a line of its own. Values behind the declared ones are ignored, as are other
+//! elements and properties, and lines or bytes after the last element.
+
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
+};
+
+use super::error::{Fault, Place};
+
+/// The values of one row that matter here, each 0 where the header does not declare it.
+#[derive(Default)]
+pub(crate) struct Row {
+    /// `x`, `y`, `z` and `radius` (or `r`).
+    pub numbers: [f64; 4],
+    /// `vertex1` and `vertex2` of an edge.
+    pub ends: [f64; 2],
+    /// `vertex_indices` (or `vertex_index`) of a face.
+    pub corners: Vec<u32>,
+}
+
+impl PropertyAccess for Row {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if let "vertex_indices" | "vertex_index" = name {
+            // Neither numbers with a fraction nor negative ones are indices.
+            let Some(corners) = property.to_u32_list() else {
+                return PropertyAccessResult::UnsupportedType;
+            };
+            self.corners = corners;
+            return PropertyAccessResult::Set;
+        }
+        let place = match name {
+            "x" => &mut self.numbers[0],
+            "y" => &mut self.numbers[1],
+            "z" => &mut self.numbers[2],
+            "radius" | "r" => &mut self.numbers[3],
+            "vertex1" => &mut self.ends[0],
+            "vertex2" => &mut self.ends[1],
+            _ => return PropertyAccessResult::Ignored,
+        };
+        *place = match property {
+            Property::Char(value) => value.into(),
+            Property::UChar(value) => value.into(),
+            Property::Short(value) => value.into(),
+            Property::UShort(value) => value.into(),
+            Property::Int(value) => value.into(),
+            Property::UInt(value) => value.into(),
+            Property::Float(value) => value.into(),
+            Property::Double(value) => value,
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+/// The elements of a header, and the bytes of their rows.
+pub(crate) struct Ply<'a> {
+    pub elements: Vec<ElementDef>,
+    encoding: Encoding,
+    rows: &'a [u8],
+    /// Number of the first line of the rows.
+    line: usize,
+}
+
+/// Reads the header of a PLY file.
+///
+/// # Errors
+/// When it is not understood, or announces more rows than the file has bytes for.
+pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
+    let mut reader = Reader::new(bytes);
+    let header = Parser::<Row>::new()
+        .read_header(&mut reader)
+        .map_err(|error| fault(Place::Line(error.line().unwrap_or(1)), "a PLY header", &error))?;
+    let line = reader.line();
+    let rows = reader.into_inner();
+    let text = header.encoding == Encoding::Ascii;
+    let mut elements: Vec<ElementDef> = header.elements.into_values().collect();
+    for element in &mut elements {
+        let sizes = element.properties.values().map(|property| match &property.data_type {
+            PropertyType::List(scalar, _) | PropertyType::Scalar(scalar) => match scalar {
+                // A digit and a blank.
+                _ if text => 2,
+                ScalarType::Char | ScalarType::UChar => 1,
+                ScalarType::Short | ScalarType::UShort => 2,
+                ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+                ScalarType::Double => 8,
+            },
+        });
+        let least = sizes.sum::<usize>().max(1);
+        if element.count.checked_mul(least).is_none_or(|size| size > rows.len() + 1) {
+            let what = match element.name.as_str() {
+                "vertex" => "vertices",
+                "edge" => "edges",
+                "face" => "faces",
+                _ => "elements",
+            };
+            let holds = format!("only {} bytes more", rows.len());
+            return Err(Fault::Count { what, announced: element.count as u64, holds });
+        }
+        for property in element.properties.values_mut().filter(|_| text) {
+            if let PropertyType::Scalar(scalar) = &mut property.data_type {
+                *scalar = ScalarType::Double;
+            }
+        }
+    }
+    Ok(Ply { elements, encoding: header.encoding, rows, line })
+}
+
+impl Ply<'_> {
+    /// Whether an element has a property, under one of these names.
+    pub fn has(&self, element: &str, names: &[&str]) -> bool {
+        let mut elements = self.elements.iter().filter(|e| e.name == element);
+        elements.any(|e| names.iter().any(|&name| e.properties.contains_key(name)))
+    }
+
+    /// Number of rows of an element.
+    pub fn count(&self, element: &str) -> usize {
+        self.elements.iter().filter(|e| e.name == element).map(|e| e.count).sum()
+    }
+
+    /// Hands all rows on in their order: the name of the element, the number of the row in it, its place, its values.
+    ///
+    /// # Errors
+    /// When a row is missing or not what the header declares, or `take` fails.
+    pub fn rows<E: From<Fault>>(
+        &self,
+        mut take: impl FnMut(&str, usize, &Place, Row) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let parser = Parser::<Row>::new();
+        let mut rest = self.rows;
+        let lines = (self.line..).zip(rest.split(|&byte| byte == b'\n'));
+        let mut lines = lines.filter(|(_, line)| !line.trim_ascii().is_empty());
+        for element in &self.elements {
+            // Static, for the places of faults.
+            let name = match element.name.as_str() {
+                "vertex" => "vertex",
+                "edge" => "edge",
+                "face" => "face",
+                _ => "element",
+            };
+            for row in 0..element.count {
+                let (place, values) = match self.encoding {
+                    Encoding::Ascii => {
+                        let Some((line, text)) = lines.next() else {
+                            let (expected, found) =
+                                (format!("{name} {row}"), "nothing more".into());
+                            return Err(Fault::Syntax { at: Place::End, expected, found }.into());
+                        };
+                        let text = String::from_utf8_lossy(text);
+                        (Place::Line(line), parser.read_ascii_element(text.trim(), element))
+                    }
+                    Encoding::BinaryLittleEndian => (
+                        Place::Element(name, row),
+                        parser.read_little_endian_element(&mut rest, element),
+                    ),
+                    Encoding::BinaryBigEndian => (
+                        Place::Element(name, row),
+                        parser.read_big_endian_element(&mut rest, element),
+                    ),
+                };
+                let values = values
+                    .map_err(|error| fault(place.clone(), &format!("{name} {row}"), &error))?;
+                take(name, row, &place, values)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A fault of the crate in one line: what is wrong and the text that is, without line number and Rust's debug output.
+fn fault(at: Place, expected: &str, error: &ParseError) -> Fault {
+    const MOST: usize = 80;
+    let text = error.to_string();
+    let text = text.split_once(": ").filter(|_| text.starts_with("Line ")).map_or(&*text, |t| t.1);
+    let parts: Vec<&str> = text.splitn(3, "\n\t").take(2).map(str::trim).collect();
+    let found =
+        parts.join(" ").chars().take(MOST).collect::<String>().replace(char::is_control, " ");
+    Fault::Syntax { at, expected: expected.to_owned(), found }
+}
