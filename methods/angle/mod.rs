@@ -37,27 +37,30 @@ mod vertex;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
+    Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::scale::{Published, Scale};
 
-/// Parameters of the angle filter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AngleParams {
-    /// The elements that are filtered.
-    pub variant: Variant,
-    /// Where the angle of a facet is measured; `facet` alone.
-    pub at: FacetAngle,
-    /// Voxels along the longest side of the bounding box, which may have a fraction; `grid` alone.
-    pub resolution: f64,
-    /// How a number of spheres is met; for `grid` and `homotopy` only.
-    pub size: Size,
-    /// Separation angle, in degrees, of [`Level::Published`](medial::simplifier::Level), and
-    /// of a number of spheres that is met by the sampling.
-    pub theta: f64,
+medial::parameters! {
+    /// Parameters of the angle filter.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct AngleParams {
+        /// The filtered elements: Voronoi vertices, Voronoi facets, faces between voxels, or sheets
+        /// whose removal changes no topology.
+        variant: Variant = Variant::Vertex, "vertex, facet, grid or homotopy";
+        /// For `facet`: where the angle is measured, at the mean of a facet's vertices or at the
+        /// vertex where it is smallest.
+        at: FacetAngle = FacetAngle::Barycentre, "barycentre or minimum";
+        /// For `grid`: voxels along the longest side of the bounding box, a fraction allowed.
+        resolution: f64 = 64.0, "voxels";
+        /// For `grid` and `homotopy`: meet a number of spheres by the resolution or the number of
+        /// samples at the angle `theta`, or by the angle at the given ones.
+        size: Size = Size::Sampling, "sampling or ranking";
+        /// Angle of the published level, and of a number of spheres met by the sampling.
+        theta: f64 = 60.0, "degrees of separation angle";
+    }
 }
 
 /// The elements that are filtered.
@@ -96,18 +99,6 @@ pub enum FacetAngle {
     Minimum,
 }
 
-impl Default for AngleParams {
-    fn default() -> Self {
-        Self {
-            variant: Variant::Vertex,
-            at: FacetAngle::Barycentre,
-            resolution: 64.0,
-            size: Size::Sampling,
-            theta: 60.0,
-        }
-    }
-}
-
 impl AngleParams {
     fn validate(self) -> Result<Self, SimplifyError> {
         let [least, most] = [grid::MIN_RESOLUTION, grid::MAX_RESOLUTION];
@@ -124,43 +115,6 @@ impl AngleParams {
             )));
         }
         Ok(self)
-    }
-
-    fn describe() -> Vec<ParamInfo> {
-        vec![
-            ParamInfo::new(
-                "variant",
-                "vertex",
-                "vertex, facet, grid or homotopy",
-                "filter Voronoi vertices, Voronoi facets, faces between voxels, or sheets whose \
-                 removal changes no topology",
-            ),
-            ParamInfo::new(
-                "at",
-                "barycentre",
-                "barycentre or minimum",
-                "facet: angle at the mean of a facet's vertices, or the smallest of the facet",
-            ),
-            ParamInfo::new(
-                "resolution",
-                Self::default().resolution,
-                "voxels",
-                "grid: voxels along the longest side of the bounding box, a fraction allowed",
-            ),
-            ParamInfo::new(
-                "size",
-                "sampling",
-                "sampling or ranking",
-                "grid, homotopy: meet a number of spheres by the resolution or the number of samples \
-                 at the angle `theta`, or by the angle at the given ones",
-            ),
-            ParamInfo::new(
-                "theta",
-                Self::default().theta,
-                "degrees of separation angle",
-                "angle of the published level, and of a number of spheres met by the sampling",
-            ),
-        ]
     }
 }
 

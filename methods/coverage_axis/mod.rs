@@ -57,8 +57,8 @@ use std::sync::Arc;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, ParamFields, Params,
+    RunContext, Simplification, Simplified, SimplifyError,
 };
 
 use crate::size_search::{Knob, Probe, SizeSearch};

@@ -58,7 +58,7 @@ use medial::complex::VoronoiFacets;
 use medial::geometry::VertexId;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification,
+    Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
     SimplifyError,
 };
 use serde::{Deserialize, Serialize};
@@ -68,20 +68,23 @@ use crate::ranked_facets::{FacetSet, FacetValue, RankedFacets};
 use crate::scale::{Published, Scale};
 use umbrella::{Place, Umbrellas};
 
-/// Parameters of the Voronoi subcomplex; the default is the paper's.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DeyZhaoParams {
-    /// `theta_0` of the angle condition, in degrees.
-    pub theta: f64,
-    /// `rho_0` of the ratio condition, a pure number.
-    pub rho: f64,
-    /// The conditions that are tested.
-    pub condition: Condition,
-    /// How a requested number of spheres is met.
-    pub size: Size,
-    /// The part of a facet that must be inside.
-    pub inside: Inside,
+medial::parameters! {
+    /// Parameters of the Voronoi subcomplex; the default is the paper's.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct DeyZhaoParams {
+        /// `theta_0` of the angle condition.
+        theta: f64 = 22.5, "degrees";
+        /// `rho_0` of the ratio condition.
+        rho: f64 = 8.0, "pure number";
+        /// The tested conditions; the paper's figures show each alone.
+        condition: Condition = Condition::Both, "both, angle or ratio";
+        /// Meet a number of spheres by the number of samples, as the paper does, or by strengthening
+        /// both thresholds on the given samples.
+        size: Size = Size::Density, "density or ranking";
+        /// The part of a facet that must be inside: its vertices, or the middle of its Delaunay edge
+        /// too, and then the difference is counted.
+        inside: Inside = Inside::Vertices, "vertices or edge";
+    }
 }
 
 /// The part of a facet that must be inside.
@@ -117,18 +120,6 @@ pub enum Condition {
     Ratio,
 }
 
-impl Default for DeyZhaoParams {
-    fn default() -> Self {
-        Self {
-            theta: 22.5,
-            rho: 8.0,
-            condition: Condition::Both,
-            size: Size::Density,
-            inside: Inside::Vertices,
-        }
-    }
-}
-
 impl DeyZhaoParams {
     fn validate(self) -> Result<Self, SimplifyError> {
         if !(self.theta > 0.0 && self.theta < 90.0) {
@@ -140,34 +131,6 @@ impl DeyZhaoParams {
             return Err(SimplifyError::Parameter(message));
         }
         Ok(self)
-    }
-
-    fn describe() -> Vec<ParamInfo> {
-        let Self { theta, rho, .. } = Self::default();
-        vec![
-            ParamInfo::new("theta", theta, "degrees", "theta_0 of the angle condition"),
-            ParamInfo::new("rho", rho, "none", "rho_0 of the ratio condition"),
-            ParamInfo::new(
-                "condition",
-                "both",
-                "both | angle | ratio",
-                "conditions that are tested; the paper's figures show each alone",
-            ),
-            ParamInfo::new(
-                "size",
-                "density",
-                "density | ranking",
-                "meet a number of spheres by the number of samples, as the paper does, or by \
-                 strengthening both thresholds on the given samples",
-            ),
-            ParamInfo::new(
-                "inside",
-                "vertices",
-                "vertices | edge",
-                "what is inside of a facet that is inside: its vertices, or the middle of its Delaunay \
-                 edge too; then the difference is counted",
-            ),
-        ]
     }
 }
 

@@ -117,8 +117,8 @@ use medial::complex::MedialMesh;
 use medial::complex::collapse::replay;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification, Simplified,
-    SimplifyError,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
 
 pub use params::{Blocking, HemParams, Inside, Sides};

@@ -32,20 +32,23 @@ mod vertex;
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Method, MethodInfo, NativeLevel, ParamInfo, RunContext, Simplification, SimplifyError,
+    Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::scale::{Published, Scale};
 
-/// Parameters of the lambda-medial axis.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LambdaParams {
-    /// The elements that are filtered.
-    pub variant: Variant,
-    /// Whether edges and vertices are kept that pass without a facet; `cell` alone.
-    pub leftovers: bool,
+medial::parameters! {
+    /// Parameters of the lambda-medial axis.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct LambdaParams {
+        /// The filtered elements: Voronoi vertices, or Voronoi facets, edges and vertices, each by
+        /// its own value.
+        variant: Variant = Variant::Vertex, "vertex or cell";
+        /// For `cell`: keep edges and vertices that pass without a facet, parts like curves and
+        /// points, which belong to the lambda-medial axis by definition.
+        leftovers: bool = true, "true or false";
+    }
 }
 
 /// The elements that are filtered.
@@ -56,32 +59,6 @@ pub enum Variant {
     Vertex,
     /// Voronoi facets, edges and vertices.
     Cell,
-}
-
-impl Default for LambdaParams {
-    fn default() -> Self {
-        Self { variant: Variant::Vertex, leftovers: true }
-    }
-}
-
-impl LambdaParams {
-    fn describe() -> Vec<ParamInfo> {
-        vec![
-            ParamInfo::new(
-                "variant",
-                "vertex",
-                "vertex or cell",
-                "filter Voronoi vertices, or Voronoi facets, edges and vertices each by its value",
-            ),
-            ParamInfo::new(
-                "leftovers",
-                "true",
-                "true or false",
-                "cell: keep edges and vertices that pass without a facet, parts like curves and \
-                 points, which belong to the lambda-medial axis by definition",
-            ),
-        ]
-    }
 }
 
 /// `lambda` of [`Level::Published`](medial::simplifier::Level), as a fraction of the longest

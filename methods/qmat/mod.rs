@@ -76,7 +76,8 @@ use std::sync::Arc;
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Level, Method, MethodInfo, RunContext, Simplification, Simplified, SimplifyError,
+    Diagnostics, Level, Method, MethodInfo, ParamFields, RunContext, Simplification, Simplified,
+    SimplifyError,
 };
 
 pub use params::{Boundary, QmatParams, TopologyFrom};

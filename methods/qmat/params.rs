@@ -1,37 +1,28 @@
 //! The parameters of Q-MAT.
 
-use medial::simplifier::{Level, ParamInfo, SimplifyError};
+use medial::simplifier::{Level, SimplifyError};
 use serde::{Deserialize, Serialize};
 
 /// `η` of the paper: the number of spheres from which on it checks the link condition.
 const PUBLISHED_FROM: usize = 200;
 
-/// Parameters of Q-MAT; the defaults are the paper's, except [`QmatParams::topology_from`]. Lengths
-/// are fractions of the bounding-box diagonal.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct QmatParams {
-    /// `k` of equation 8, in squared fractions of the diagonal: the larger, the earlier spikes go.
-    pub k: f64,
-    /// How stable boundaries are kept from shrinking.
-    pub boundary: Boundary,
-    /// `k'` of section 4.4, the weight of the boundary planes; a pure number.
-    pub k_boundary: f64,
-    /// From which sphere count on a collapse has to keep the topology.
-    pub topology_from: TopologyFrom,
-    /// Ratio of the smallest to the largest eigenvalue at which a quadric counts as singular.
-    pub singular_ratio: f64,
-}
-
-impl Default for QmatParams {
-    fn default() -> Self {
-        Self {
-            k: 1e-5,
-            boundary: Boundary::Paper,
-            k_boundary: 0.1,
-            topology_from: TopologyFrom::Auto,
-            singular_ratio: 1e-10,
-        }
+medial::parameters! {
+    /// Parameters of Q-MAT; the defaults are the paper's, except `topology_from`. Lengths are
+    /// fractions of the bounding-box diagonal.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct QmatParams {
+        /// `k` of equation 8, added to the error of every edge: the larger, the earlier spikes go.
+        k: f64 = 1e-5, "squared fraction of the diagonal";
+        /// Planes that keep stable boundaries from shrinking (section 4.4).
+        boundary: Boundary = Boundary::Paper, "paper, legacy or none";
+        /// `k'` of section 4.4, the weight of the boundary planes.
+        k_boundary: f64 = 0.1, "pure number";
+        /// From this sphere count on a collapse has to keep the topology (section 4.5). `all` is from
+        /// the start, 200 is the paper's, `auto` is 200 at the published level and `all` at others.
+        topology_from: TopologyFrom = TopologyFrom::Auto, "spheres, or all, never or auto";
+        /// Ratio of the smallest to the largest eigenvalue at which a quadric counts as singular; not
+        /// in the paper.
+        singular_ratio: f64 = 1e-10, "pure number in [0, 1)";
     }
 }
 
@@ -140,43 +131,5 @@ impl QmatParams {
             )));
         }
         Ok(self)
-    }
-
-    pub(super) fn describe() -> Vec<ParamInfo> {
-        let defaults = Self::default();
-        vec![
-            ParamInfo::new(
-                "k",
-                format!("{:e}", defaults.k),
-                "squared fraction of the diagonal",
-                "added to the error of every edge: the larger, the earlier spikes go (equation 8)",
-            ),
-            ParamInfo::new(
-                "boundary",
-                "paper",
-                "paper, legacy or none",
-                "planes that keep stable boundaries from shrinking (section 4.4)",
-            ),
-            ParamInfo::new(
-                "k_boundary",
-                defaults.k_boundary,
-                "pure number",
-                "weight k' of the boundary planes",
-            ),
-            ParamInfo::new(
-                "topology_from",
-                "auto",
-                "spheres, or all, never or auto",
-                "from this count on a collapse has to keep the topology (section 4.5): all is from \
-                 the start, 200 is the paper's, auto is 200 at the published level and all at others",
-            ),
-            ParamInfo::new(
-                "singular_ratio",
-                format!("{:e}", defaults.singular_ratio),
-                "pure number in [0, 1)",
-                "smallest to largest eigenvalue at which a quadric counts as singular; not in the \
-                 paper",
-            ),
-        ]
     }
 }

@@ -47,8 +47,8 @@ use std::sync::Arc;
 use medial::complex::{AxisTally, MedialMesh, Sphere, UnionAxis, betti};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification,
-    Simplified, SimplifyError,
+    Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
+    Simplification, Simplified, SimplifyError,
 };
 
 use crate::by_knob::ByKnob;

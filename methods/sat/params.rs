@@ -1,23 +1,24 @@
 //! The parameters of the scale axis transform.
 
-use medial::simplifier::{ParamInfo, SimplifyError};
+use medial::simplifier::SimplifyError;
 use serde::{Deserialize, Serialize};
 
 use crate::within::within;
 
-/// Parameters of the scale axis transform; the default is that of the authors' tool, without its
-/// angle filter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SatParams {
-    /// Factor of all radii, applied before anything else; a pure number.
-    pub radius_factor: f64,
-    /// How far a centre is moved at most along each axis, as a fraction of the radius.
-    pub jitter: f64,
-    /// Facets with a smaller object angle are removed from the outside in; degrees, 0 for none.
-    pub sat_angle: f64,
-    /// How a number of spheres is met.
-    pub size: Size,
+medial::parameters! {
+    /// Parameters of the scale axis transform; the default is that of the authors' tool, without its
+    /// angle filter.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SatParams {
+        /// Factor of all radii before the scale, so that balls that touch in a sample overlap.
+        radius_factor: f64 = 1.002, "pure number";
+        /// Largest seeded displacement of a centre along each axis.
+        jitter: f64 = 1e-4, "fraction of the radius";
+        /// Facets below it are removed from the outside in; the authors' tool has 30.
+        sat_angle: f64 = 0.0, "degrees of object angle, 0 for no filter";
+        /// Meet a number of spheres by the scale, or by the number of samples at scale 1.1.
+        size: Size = Size::Scale, "scale or density";
+    }
 }
 
 /// How a number of spheres is met.
@@ -28,12 +29,6 @@ pub enum Size {
     Scale,
     /// The number of samples, at the published scale.
     Density,
-}
-
-impl Default for SatParams {
-    fn default() -> Self {
-        Self { radius_factor: 1.002, jitter: 1e-4, sat_angle: 0.0, size: Size::Scale }
-    }
 }
 
 impl SatParams {
@@ -47,40 +42,5 @@ impl SatParams {
             within(name, value, range)?;
         }
         Ok(self)
-    }
-
-    pub(super) fn describe() -> Vec<ParamInfo> {
-        let defaults = Self::default();
-        // Debug keeps the point of a whole number, and small numbers short.
-        let info = |name: &'static str, default: f64, unit: &'static str, help: &'static str| {
-            ParamInfo::new(name, format!("{default:?}"), unit, help)
-        };
-        vec![
-            info(
-                "radius_factor",
-                defaults.radius_factor,
-                "pure number",
-                "all radii are multiplied by this before the scale, so that balls that touch in a \
-                 sample overlap",
-            ),
-            info(
-                "jitter",
-                defaults.jitter,
-                "fraction of the radius",
-                "centres are moved by at most this along each axis, seeded",
-            ),
-            info(
-                "sat_angle",
-                defaults.sat_angle,
-                "degrees of object angle, 0 for no filter",
-                "facets below it are removed from the outside in; the authors' tool has 30",
-            ),
-            ParamInfo::new(
-                "size",
-                "scale",
-                "scale or density",
-                "meet a number of spheres by the scale, or by the number of samples at scale 1.1",
-            ),
-        ]
     }
 }

@@ -97,8 +97,8 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields,
+    RunContext, Simplification, Simplified, SimplifyError,
 };
 
 use serde::Serialize;

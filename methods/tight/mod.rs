@@ -67,7 +67,7 @@ use std::sync::Arc;
 use medial::complex::{MedialMesh, crossing_faces};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Level, MedialSimplifier, MethodInfo, NativeLevel, Params, RunContext,
+    Diagnostics, Level, MedialSimplifier, MethodInfo, NativeLevel, ParamFields, Params, RunContext,
     Simplification, Simplified, SimplifyError,
 };
 

@@ -92,7 +92,8 @@ mod tests;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Level, Method, MethodInfo, RunContext, Simplification, Simplified, SimplifyError,
+    Diagnostics, Level, Method, MethodInfo, ParamFields, RunContext, Simplification, Simplified,
+    SimplifyError,
 };
 
 pub use params::{Connect, Contact, Points, Refit, VmasParams};
