@@ -101,7 +101,7 @@ pub struct Metric {
     pub better: Better,
     pub(crate) mean: Mean,
     digits: Digits,
-    /// One or two sentences for the page.
+    /// One or two sentences for the page, of compared metrics. METHODOLOGY.md defines all.
     pub definition: &'static str,
     pub(crate) value: Value,
     /// `unit` over the unit of the JSON: 100 for shares, which are shown as percentages.
@@ -162,7 +162,6 @@ impl Metric {
         unit: &'static str,
         (better, digits, mean): (Better, Digits, Mean),
         value: Value,
-        definition: &'static str,
     ) -> Self {
         let times = if unit.is_empty() || unit.as_bytes()[0] != b'%' { 1.0 } else { 100.0 };
         Self {
@@ -173,7 +172,7 @@ impl Metric {
             better,
             mean,
             digits,
-            definition,
+            definition: "",
             value,
             times,
             is_compared: false,
@@ -181,9 +180,10 @@ impl Metric {
         }
     }
 
-    /// Gives it a column in the comparison tables.
-    const fn compared(mut self) -> Self {
+    /// Gives it a column in the comparison tables, whose page defines it.
+    const fn compared(mut self, definition: &'static str) -> Self {
         self.is_compared = true;
+        self.definition = definition;
         self
     }
 
@@ -208,14 +208,9 @@ impl Metric {
 type Measured = fn(&Evaluation) -> Option<f64>;
 
 /// A length, as a fraction of the bounding-box diagonal in the JSON, in % of it elsewhere.
-const fn length(
-    key: &'static str,
-    title: &'static str,
-    value: Measured,
-    definition: &'static str,
-) -> Metric {
+const fn length(key: &'static str, title: &'static str, value: Measured) -> Metric {
     let kind = (Better::Lower, Digits::Significant, GEOMETRIC);
-    Metric::new(key, title, "%", kind, Value::Evaluation(value), definition)
+    Metric::new(key, title, "%", kind, Value::Evaluation(value))
 }
 
 /// A share of `unit`, which begins with `%`.
@@ -224,32 +219,21 @@ const fn share(
     title: &'static str,
     unit: &'static str,
     value: Measured,
-    definition: &'static str,
 ) -> Metric {
     let kind = (Better::Lower, Digits::Tenths, Mean::Arithmetic);
-    Metric::new(key, title, unit, kind, Value::Evaluation(value), definition)
+    Metric::new(key, title, unit, kind, Value::Evaluation(value))
 }
 
 /// An angle in degrees; larger is better.
-const fn angle(
-    key: &'static str,
-    title: &'static str,
-    value: Measured,
-    definition: &'static str,
-) -> Metric {
+const fn angle(key: &'static str, title: &'static str, value: Measured) -> Metric {
     let kind = (Better::Higher, Digits::Tenths, Mean::Arithmetic);
-    Metric::new(key, title, "°", kind, Value::Evaluation(value), definition)
+    Metric::new(key, title, "°", kind, Value::Evaluation(value))
 }
 
 /// A number of things.
-const fn count(
-    key: &'static str,
-    title: &'static str,
-    value: Measured,
-    definition: &'static str,
-) -> Metric {
+const fn count(key: &'static str, title: &'static str, value: Measured) -> Metric {
     let kind = (Better::Lower, Digits::Count, Mean::Arithmetic);
-    Metric::new(key, title, "", kind, Value::Evaluation(value), definition)
+    Metric::new(key, title, "", kind, Value::Evaluation(value))
 }
 
 /// Threshold on the stability ratio whose spikes stand in the tables; the CSV has the others, too.
@@ -257,278 +241,104 @@ pub(crate) const SPIKE_RATIO: f64 = 0.1;
 
 /// Every metric, in the order of the CSV and of `medial evaluate`.
 pub const METRICS: &[Metric] = &[
-    length(
-        "hausdorff",
-        "Hausdorff",
-        |e| Some(e.distances.hausdorff),
-        "The larger of two sampled maxima: from the surface to the union of the spheres, cones and \
-         slabs, and from the boundary of that union back to the surface.",
-    )
-    .compared()
-    .gate(),
-    length(
-        "epsilon",
-        "ε",
-        |e| Some(e.distances.epsilon),
-        "The error of the Q-MAT paper: the largest distance from a surface sample to the nearest \
-         surface of a sphere, cone or slab, whether that surface is buried in another one or not.",
-    )
-    .compared()
-    .gate(),
-    length(
-        "mean",
-        "mean error",
-        |e| Some(e.distances.mean),
-        "Mean over area-uniform surface samples of the absolute signed distance to the union. Less \
-         noisy than a maximum, which a single unlucky collapse decides.",
-    )
-    .compared()
-    .gate(),
-    length(
-        "spheres_only",
-        "balls only",
-        |e| Some(e.distances.spheres_only),
-        "The largest distance from a surface sample to the union of the balls alone, without cones \
-         and slabs: it separates good spheres from good connectivity.",
-    )
-    .compared()
-    .gate(),
-    length(
-        "epsilon_union",
-        "surface to union, max",
-        |e| Some(e.distances.epsilon_union),
-        "Largest absolute signed distance from a surface sample to the union.",
-    )
-    .gate(),
-    length(
-        "reverse",
-        "union to surface, max",
-        |e| Some(e.distances.reverse),
-        "Largest distance from a point of the union's boundary to the surface.",
-    )
-    .gate(),
-    length(
-        "rms",
-        "rms error",
-        |e| Some(e.distances.rms),
-        "Root mean square of the distances that `mean error` is the mean of.",
-    )
-    .gate(),
-    length(
-        "p95",
-        "95 % of errors",
-        |e| Some(e.distances.p95),
-        "95th percentile of the same distances.",
-    )
-    .gate(),
-    length(
-        "p99",
-        "99 % of errors",
-        |e| Some(e.distances.p99),
-        "99th percentile of the same distances.",
-    )
-    .gate(),
-    length(
-        "reverse_mean",
-        "union to surface, mean",
-        |e| Some(e.distances.reverse_mean),
-        "Mean distance from the boundary of the union to the surface, by area.",
-    )
-    .gate(),
-    length(
-        "certified_lower",
-        "Hausdorff, certified from",
-        |e| Some(e.certified?.lower),
-        "Lower end of an interval that contains the Hausdorff distance.",
-    )
-    .at("certified.lower")
-    .gate(),
-    length(
-        "certified_upper",
-        "Hausdorff, certified to",
-        |e| Some(e.certified?.upper),
-        "Upper end of that interval.",
-    )
-    .at("certified.upper")
-    .gate(),
-    length(
-        "protrusion",
-        "outside the solid, max",
-        |e| e.protrusion,
-        "Largest distance from the surface of a boundary point of the union outside the solid.",
-    )
-    .gate(),
-    share(
-        "centres_outside",
-        "centres outside",
-        "% of spheres",
-        |e| e.centres_outside,
-        "Share of the sphere centres that are outside the solid.",
-    )
-    .gate(),
-    share(
-        "volume_error",
-        "volume error",
-        "% of the volume",
-        |e| e.volume_error,
-        "Volume of the symmetric difference of solid and union, over the solid's volume.",
-    )
-    .gate(),
-    angle(
-        "min_angle_mean",
-        "min angle",
-        |e| e.quality.min_angle_mean,
-        "Mean over the medial triangles of the smallest angle. Triangles of zero area are left out \
-         and counted apart.",
-    )
-    .compared(),
-    angle(
-        "max_angle_mean",
-        "max angle",
-        |e| e.quality.max_angle_mean,
-        "Mean over the medial triangles of the largest angle.",
-    )
-    .neutral(),
-    share(
-        "below_30",
-        "below 30°",
-        "% of triangles",
-        |e| e.quality.below_30,
-        "Share of the medial triangles whose smallest angle is below 30 degrees.",
-    )
-    .compared(),
-    share(
-        "below_10",
-        "below 10°",
-        "% of triangles",
-        |e| e.quality.below_10,
-        "Share of the medial triangles whose smallest angle is below 10 degrees.",
+    length("hausdorff", "Hausdorff", |e| Some(e.distances.hausdorff))
+        .compared(
+            "The larger of two sampled maxima: from the surface to the union of the spheres, \
+         cones and slabs, and from the boundary of that union back to the surface.",
+        )
+        .gate(),
+    length("epsilon", "ε", |e| Some(e.distances.epsilon))
+        .compared(
+            "The error of the Q-MAT paper: the largest distance from a surface sample to the \
+         nearest surface of a sphere, cone or slab, whether that surface is buried in another \
+         one or not.",
+        )
+        .gate(),
+    length("mean", "mean error", |e| Some(e.distances.mean))
+        .compared(
+            "Mean over area-uniform surface samples of the absolute signed distance to the union. \
+         Less noisy than a maximum, which a single unlucky collapse decides.",
+        )
+        .gate(),
+    length("spheres_only", "balls only", |e| Some(e.distances.spheres_only))
+        .compared(
+            "The largest distance from a surface sample to the union of the balls alone, without \
+         cones and slabs: it separates good spheres from good connectivity.",
+        )
+        .gate(),
+    length("epsilon_union", "surface to union, max", |e| Some(e.distances.epsilon_union)).gate(),
+    length("reverse", "union to surface, max", |e| Some(e.distances.reverse)).gate(),
+    length("rms", "rms error", |e| Some(e.distances.rms)).gate(),
+    length("p95", "95 % of errors", |e| Some(e.distances.p95)).gate(),
+    length("p99", "99 % of errors", |e| Some(e.distances.p99)).gate(),
+    length("reverse_mean", "union to surface, mean", |e| Some(e.distances.reverse_mean)).gate(),
+    length("certified_lower", "Hausdorff, certified from", |e| Some(e.certified?.lower))
+        .at("certified.lower")
+        .gate(),
+    length("certified_upper", "Hausdorff, certified to", |e| Some(e.certified?.upper))
+        .at("certified.upper")
+        .gate(),
+    length("protrusion", "outside the solid, max", |e| e.protrusion).gate(),
+    share("centres_outside", "centres outside", "% of spheres", |e| e.centres_outside).gate(),
+    share("volume_error", "volume error", "% of the volume", |e| e.volume_error).gate(),
+    angle("min_angle_mean", "min angle", |e| e.quality.min_angle_mean).compared(
+        "Mean over the medial triangles of the smallest angle. Triangles of zero area are \
+         left out and counted apart.",
     ),
-    share(
-        "below_1",
-        "below 1°",
-        "% of triangles",
-        |e| e.quality.below_1,
-        "Share of the medial triangles whose smallest angle is below 1 degree.",
+    angle("max_angle_mean", "max angle", |e| e.quality.max_angle_mean).neutral(),
+    share("below_30", "below 30°", "% of triangles", |e| e.quality.below_30)
+        .compared("Share of the medial triangles whose smallest angle is below 30 degrees."),
+    share("below_10", "below 10°", "% of triangles", |e| e.quality.below_10),
+    share("below_1", "below 1°", "% of triangles", |e| e.quality.below_1),
+    count("zero_area", "zero-area triangles", |e| Some(e.quality.zero_area as f64)),
+    count("spikes", "spikes", |e| {
+        let by_ratio = &e.spikes.by_ratio;
+        let at = by_ratio.iter().find(|at| (at.threshold - SPIKE_RATIO).abs() < 1e-9)?;
+        Some(at.spikes as f64)
+    })
+    .compared(
+        "Connected components of the medial edges with a stability ratio below 0.1 that reach \
+         the boundary of the medial mesh. Smooth shapes have some even on their exact axis; \
+         the CSV holds the other thresholds and measures.",
     ),
-    count(
-        "zero_area",
-        "zero-area triangles",
-        |e| Some(e.quality.zero_area as f64),
-        "Triangles with a height below 1e-12, which enter no mean and no share.",
-    ),
-    count(
-        "spikes",
-        "spikes",
-        |e| {
-            let by_ratio = &e.spikes.by_ratio;
-            let at = by_ratio.iter().find(|at| (at.threshold - SPIKE_RATIO).abs() < 1e-9)?;
-            Some(at.spikes as f64)
-        },
-        "Connected components of the medial edges with a stability ratio below 0.1 that reach the \
-         boundary of the medial mesh. Smooth shapes have some even on their exact axis; the CSV holds \
-         the other thresholds and measures.",
-    )
-    .compared(),
-    count(
-        "dangling_edges",
-        "dangling edges",
-        |e| Some(e.spikes.dangling_edges as f64),
-        "Edges without a face that end in a sphere with no other edge.",
-    ),
-    count(
-        "fins",
-        "fins",
-        |e| Some(e.spikes.fins as f64),
-        "Faces with two or three boundary edges and a smallest angle below 10 degrees.",
-    ),
-    count(
-        "idle_spheres",
-        "idle spheres",
-        |e| Some(e.spikes.idle_spheres as f64),
-        "Boundary spheres whose ball protrudes by less than 0.001 from the ball of a larger neighbour.",
-    ),
-    count(
-        "angle_spikes",
-        "small separation angles",
-        |e| e.spikes.angle_spikes.map(|spikes| spikes as f64),
-        "Spheres with a separation angle below 20 degrees, where contact points are known.",
-    ),
-    count(
-        "lone_edges",
-        "edges without a face",
-        |e| Some(e.counts.lone_edges as f64),
-        "Edges without a face.",
-    )
-    .neutral(),
-    count(
-        "isolated",
-        "isolated spheres",
-        |e| Some(e.counts.isolated as f64),
-        "Spheres without an edge.",
-    )
-    .neutral(),
-    count(
-        "nonmanifold_edges",
-        "non-manifold edges",
-        |e| Some(e.counts.nonmanifold_edges as f64),
-        "Edges with three faces or more.",
-    )
-    .neutral(),
-    count(
-        "stored_bytes",
-        "stored bytes",
-        |e| Some(e.counts.bytes() as f64),
-        "Bytes in the plainest binary form: 8 for each float, 4 for each index.",
-    ),
-    length(
-        "axis_computed_to_true_max",
-        "to the true axis, max",
-        |e| Some(e.axis.as_ref()?.in_space.computed_to_true_max),
-        "Largest distance from the computed axis to the exactly known one.",
-    ),
-    length(
-        "axis_computed_to_true_mean",
-        "to the true axis, mean",
-        |e| Some(e.axis.as_ref()?.in_space.computed_to_true_mean),
-        "Mean distance from the computed axis to the exactly known one.",
-    ),
-    length(
-        "axis_true_to_computed_max",
-        "from the true axis, max",
-        |e| Some(e.axis.as_ref()?.in_space.true_to_computed_max),
-        "Largest distance from the exactly known axis to the computed one.",
-    ),
-    length(
-        "axis_true_to_computed_mean",
-        "from the true axis, mean",
-        |e| Some(e.axis.as_ref()?.in_space.true_to_computed_mean),
-        "Mean distance from the exactly known axis to the computed one.",
-    ),
-    count(
-        "samples",
-        "samples of the surface",
-        |e| Some(e.distances.samples as f64),
-        "Surface samples, the vertices of the mesh included.",
-    )
-    .neutral(),
-    count(
-        "reverse_samples",
-        "samples of the union",
-        |e| Some(e.distances.reverse_samples as f64),
-        "Samples on the boundary of the union. Where they are few, nearly all primitives are buried.",
-    )
-    .neutral(),
+    count("dangling_edges", "dangling edges", |e| Some(e.spikes.dangling_edges as f64)),
+    count("fins", "fins", |e| Some(e.spikes.fins as f64)),
+    count("idle_spheres", "idle spheres", |e| Some(e.spikes.idle_spheres as f64)),
+    count("angle_spikes", "small separation angles", |e| {
+        e.spikes.angle_spikes.map(|spikes| spikes as f64)
+    }),
+    count("lone_edges", "edges without a face", |e| Some(e.counts.lone_edges as f64)).neutral(),
+    count("isolated", "isolated spheres", |e| Some(e.counts.isolated as f64)).neutral(),
+    count("nonmanifold_edges", "non-manifold edges", |e| Some(e.counts.nonmanifold_edges as f64))
+        .neutral(),
+    count("stored_bytes", "stored bytes", |e| Some(e.counts.bytes() as f64)),
+    length("axis_computed_to_true_max", "to the true axis, max", |e| {
+        Some(e.axis.as_ref()?.in_space.computed_to_true_max)
+    }),
+    length("axis_computed_to_true_mean", "to the true axis, mean", |e| {
+        Some(e.axis.as_ref()?.in_space.computed_to_true_mean)
+    }),
+    length("axis_true_to_computed_max", "from the true axis, max", |e| {
+        Some(e.axis.as_ref()?.in_space.true_to_computed_max)
+    }),
+    length("axis_true_to_computed_mean", "from the true axis, mean", |e| {
+        Some(e.axis.as_ref()?.in_space.true_to_computed_mean)
+    }),
+    count("samples", "samples of the surface", |e| Some(e.distances.samples as f64)).neutral(),
+    count("reverse_samples", "samples of the union", |e| Some(e.distances.reverse_samples as f64))
+        .neutral(),
     Metric::new(
         "seconds_total",
         "time",
         "s",
         (Better::Lower, Digits::Significant, GEOMETRIC),
         Value::Record(|record| Some(record.simplify.seconds?.total)),
-        "Wall-clock seconds as if this level had been asked alone: the shared substrates that the \
-         method uses, its preparation, and the simplification. Evaluation is never included.",
     )
-    .compared(),
+    .compared(
+        "Wall-clock seconds as if this level had been asked alone: the shared substrates that \
+         the method uses, its preparation, and the simplification. Evaluation is never \
+         included.",
+    ),
 ];
 
 /// The metric with a key, at compile time: a key that no metric has stops the build.

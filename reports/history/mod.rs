@@ -1,28 +1,279 @@
-//! Results of many nights: one file for each in a folder, and what they tell together.
+//! The results of many runs: at which run and commits a series changed.
 //!
-//! | module | holds |
-//! |---|---|
-//! | `night` | [`Night`], one file: a line for each series |
-//! | `folder` | [`History`], the folder: added to, read |
-//! | `steps` | [`steps()`], lasting changes of one noisy sequence |
-//! | `student` | the distribution of its test |
-//! | `findings` | [`Findings`], steps and changes of all series, with their commits |
-//! | `text` | what was found as Markdown and as JSON |
-//! | `page`, `sparkline` | what was found as a page |
+//! A series is compared with itself alone, on one machine, under one set of conditions, on one content of its mesh: such
+//! runs make a [`Track`]. Machines that take turns have a track each.
+//!
+//! - Seconds and memory are noisy: [`change_points`] finds their steps. A step that most series of the same runs make is
+//!   that of the machine or of the compiler, and raises no alarm.
+//! - Status, errors, counts, topology and results are exact: each difference from the run before is a [`Change`].
 
-mod error;
-mod findings;
-mod folder;
-mod night;
-mod page;
-mod sparkline;
-mod steps;
+mod change_points;
+mod report;
+mod run;
 mod student;
-mod text;
 
-pub use error::HistoryError;
-pub use findings::{Change, Difference, Findings, FoundStep, Group, Quantity, Shared, Track};
-pub use folder::History;
-pub use night::{Figures, Night, SeriesName};
-pub use steps::{Step, StepOptions, steps};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+pub use change_points::{ChangePoint, change_points};
+pub use run::{HistoryError, Point, Run, read_runs};
+
+use change_points::median;
 pub(crate) use student::beyond;
+
+/// A change point that is found one run later may lie this many runs beside its earlier place.
+const SAME_PLACE: usize = 3;
+
+/// An error that rises by less than this share is no regression.
+const LEAST_RISE: f64 = 1e-3;
+
+/// A run by date and commit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct RunName {
+    /// Date of the commit.
+    pub date: String,
+    /// Hash of the commit.
+    pub commit: String,
+}
+
+/// The runs of one series that are compared with each other.
+#[derive(Clone, Debug)]
+pub struct Track<'a> {
+    /// Machine and conditions.
+    pub setting: [&'a str; 2],
+    /// Indices of the runs, and what they measured.
+    pub points: Vec<(usize, &'a Point)>,
+}
+
+/// Where a track changed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// Index of the track.
+    #[serde(skip)]
+    pub track: usize,
+    /// Index of the first run after it.
+    #[serde(skip)]
+    pub run: usize,
+    /// Mesh, method and level of the series.
+    pub series: String,
+    /// What changed: `seconds`, `bytes`, `status`, `hausdorff`, `mean`, `spheres`, `topology` or `result`.
+    pub what: &'static str,
+    /// The value before; of seconds and memory the last one.
+    pub from: Value,
+    /// The value after; of seconds and memory the newest one.
+    pub to: Value,
+    /// After over before: of levels for seconds and memory, of values for errors.
+    pub ratio: Option<f64>,
+    /// The last run of the track before it.
+    pub last_before: RunName,
+    /// The first run after it.
+    pub first_after: RunName,
+    /// Whether it is for the worse: slower, larger, less accurate; a result or its topology lost.
+    pub worse: bool,
+    /// Whether most series moved alike.
+    pub shared: bool,
+    /// Whether the newest run brought it to light.
+    pub news: bool,
+}
+
+/// What the runs of a history show.
+#[derive(Clone, Debug, Serialize)]
+pub struct Findings<'a> {
+    /// The runs, the oldest first.
+    pub runs: Vec<RunName>,
+    #[serde(skip)]
+    tracks: Vec<Track<'a>>,
+    /// Number of changes that the newest run brought for the worse.
+    pub regressions: usize,
+    /// Change points of seconds and memory, the newest first.
+    pub change_points: Vec<Change>,
+    /// Differences of exact values, the newest first.
+    pub changes: Vec<Change>,
+}
+
+/// The noisy quantities.
+const NOISY: [(&str, fn(&Point) -> Option<f64>); 2] =
+    [("seconds", |point| point.seconds), ("bytes", |point| point.bytes.map(|bytes| bytes as f64))];
+
+/// The exact quantities.
+const EXACT: [(&str, fn(&Point) -> Value); 6] = [
+    ("status", |point| json!(point.status.to_string())),
+    ("topology", |point| {
+        point.topology.map_or(Value::Null, |t| json!(if t { "right" } else { "wrong" }))
+    }),
+    ("hausdorff", |point| json!(point.hausdorff)),
+    ("mean", |point| json!(point.mean)),
+    ("spheres", |point| json!(point.spheres)),
+    ("result", |point| json!(point.result)),
+];
+
+impl<'a> Findings<'a> {
+    /// What some runs show, the oldest first. `least_step` is the least change of seconds and memory, as a share.
+    pub fn of(runs: &'a [Run], least_step: f64) -> Self {
+        let mut tracks: BTreeMap<_, Track<'a>> = BTreeMap::new();
+        for (index, run) in runs.iter().enumerate() {
+            for point in &run.series {
+                let setting = [run.machine.as_str(), run.conditions.as_str()];
+                let series = (&point.mesh, &point.method, &point.level);
+                let track = tracks.entry((series, setting, run.meshes.get(&point.mesh)));
+                let track = track.or_insert_with(|| Track { setting, points: vec![] });
+                track.points.push((index, point));
+            }
+        }
+        let names =
+            runs.iter().map(|run| RunName { date: run.date.clone(), commit: run.commit.clone() });
+        let mut findings = Self {
+            runs: names.collect(),
+            tracks: tracks.into_values().collect(),
+            regressions: 0,
+            change_points: vec![],
+            changes: vec![],
+        };
+        for track in 0..findings.tracks.len() {
+            for quantity in NOISY {
+                let found = findings.steps(track, quantity, least_step);
+                findings.change_points.extend(found);
+            }
+            let found = findings.differences(track);
+            findings.changes.extend(found);
+        }
+        for changes in [&mut findings.change_points, &mut findings.changes] {
+            // Stable: within a run the order of the series remains.
+            changes.sort_by_key(|change| std::cmp::Reverse(change.run));
+        }
+        findings.regressions = findings.news().count();
+        findings
+    }
+
+    /// The changes for the worse that the newest run brought to light.
+    pub fn news(&self) -> impl Iterator<Item = &Change> {
+        let all = self.change_points.iter().chain(&self.changes);
+        all.filter(|change| change.news && change.worse && !change.shared)
+    }
+
+    /// The change points of a noisy quantity.
+    fn steps(
+        &self,
+        track: usize,
+        (what, of): (&'static str, fn(&Point) -> Option<f64>),
+        least_step: f64,
+    ) -> Vec<Change> {
+        let measured = measured(&self.tracks[track], of);
+        let values: Vec<f64> = measured.iter().map(|(_, value)| *value).collect();
+        let Some(&(newest, last)) = measured.last() else { return vec![] };
+        let found = change_points(&values, least_step);
+        // A change point is news on one run alone: where it was not found without that run.
+        let is_newest = newest + 1 == self.runs.len() && !found.is_empty();
+        let earlier = match is_newest {
+            true => change_points(&values[..values.len() - 1], least_step),
+            false => vec![],
+        };
+        let was_found = |step: &ChangePoint| {
+            earlier.iter().any(|other| {
+                other.at.abs_diff(step.at) <= SAME_PLACE
+                    && (other.ratio > 1.0) == (step.ratio > 1.0)
+            })
+        };
+        let change = |step: ChangePoint| Change {
+            from: json!(values[step.at - 1]),
+            to: json!(last),
+            ratio: Some(step.ratio),
+            worse: step.ratio > 1.0,
+            shared: self.is_shared(track, of, measured[step.at].0, step.ratio),
+            news: is_newest && !was_found(&step),
+            ..self.change(track, what, [measured[step.at - 1].0, measured[step.at].0])
+        };
+        found.into_iter().map(change).collect()
+    }
+
+    /// Whether the series that ran with this one moved alike at a run, by at least half as much in the median. All are
+    /// compared, not only those with a change point of their own: some are found a few runs later.
+    fn is_shared(
+        &self,
+        track: usize,
+        of: fn(&Point) -> Option<f64>,
+        run: usize,
+        ratio: f64,
+    ) -> bool {
+        const AROUND: usize = 10;
+        const FEWEST: usize = 3;
+        let setting = self.tracks[track].setting;
+        let shift = |other: &Track<'_>| {
+            let measured = measured(other, of);
+            let at = measured.partition_point(|(index, _)| *index < run);
+            let (before, after) = measured.split_at(at);
+            let level = |some: &[(usize, f64)]| {
+                let values: Vec<f64> = some.iter().map(|(_, value)| value.ln()).collect();
+                median(&values).filter(|_| values.len() >= FEWEST)
+            };
+            let before = level(&before[before.len().saturating_sub(AROUND)..])?;
+            Some(level(&after[..after.len().min(AROUND)])? - before)
+        };
+        let alike = self.tracks.iter().filter(|other| other.setting == setting);
+        let shifts: Vec<f64> = alike.filter_map(shift).collect();
+        let needed = 0.5 * ratio.ln();
+        let moved = |shift: f64| shift * needed > 0.0 && shift.abs() >= needed.abs();
+        shifts.len() > FEWEST && median(&shifts).is_some_and(moved)
+    }
+
+    /// The differences of exact quantities between neighbouring runs.
+    fn differences(&self, track: usize) -> Vec<Change> {
+        let mut found = vec![];
+        for pair in self.tracks[track].points.windows(2) {
+            let [(before, old), (after, new)] = [pair[0], pair[1]];
+            for (what, of) in EXACT {
+                let (from, to) = (of(old), of(new));
+                if from == to {
+                    continue;
+                }
+                let ratio = from.as_f64().zip(to.as_f64()).map(|(from, to)| to / from);
+                let worse = match what {
+                    "status" => old.status.is_ok() && !new.status.is_ok(),
+                    "topology" => old.topology == Some(true) && new.topology == Some(false),
+                    "hausdorff" | "mean" => ratio.is_some_and(|ratio| ratio > 1.0 + LEAST_RISE),
+                    _ => false,
+                };
+                let news = after + 1 == self.runs.len();
+                let change = self.change(track, what, [before, after]);
+                found.push(Change { from, to, ratio, worse, news, ..change });
+            }
+        }
+        found
+    }
+
+    /// A change of a track between two runs, of which nothing else is known yet.
+    fn change(&self, track: usize, what: &'static str, [before, after]: [usize; 2]) -> Change {
+        Change {
+            track,
+            run: after,
+            series: self.tracks[track].name(),
+            what,
+            from: Value::Null,
+            to: Value::Null,
+            ratio: None,
+            last_before: self.runs[before].clone(),
+            first_after: self.runs[after].clone(),
+            worse: false,
+            shared: false,
+            news: false,
+        }
+    }
+}
+
+impl Track<'_> {
+    /// Mesh, method and level.
+    fn name(&self) -> String {
+        let named = |(_, point): &(usize, &Point)| {
+            format!("{} · {} · {}", point.mesh, point.method, point.level)
+        };
+        self.points.first().map(named).unwrap_or_default()
+    }
+}
+
+/// The positive values of a quantity by run.
+fn measured(track: &Track<'_>, of: fn(&Point) -> Option<f64>) -> Vec<(usize, f64)> {
+    let points = track.points.iter();
+    points.filter_map(|&(run, p)| Some((run, of(p).filter(|value| *value > 0.0)?))).collect()
+}

@@ -15,6 +15,8 @@ mod papers;
 mod reference;
 mod results;
 
+pub(crate) use self::html::table as html_table;
+
 use crate::comparison::Comparison;
 use crate::extras::Extra;
 use crate::header::{Header, RunNote};

@@ -1,0 +1,270 @@
+//! The file of one run: what one build measured in one study on one machine.
+//!
+//! A run is `DATE-COMMIT.json` in the folder of the history. It is written once. A damaged file is reported, left out,
+//! and never replaced.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use serde::{Deserialize, Serialize};
+
+use super::change_points::median;
+use crate::comparison::row_name;
+use crate::record::{Machine, Record, Stages, Status};
+use crate::text::printable;
+
+/// Why a run cannot be stored, or a history cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum HistoryError {
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The file of a run is not as it was written.
+    #[error("{}: {message}; restore the file, or remove it", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        message: String,
+    },
+    /// The run is there already, with other results.
+    #[error("{}: the history has this run with other content; remove the file to replace it", .0.display())]
+    Taken(PathBuf),
+    /// The commit is no hash.
+    #[error("--commit {0}: expected 8 to 64 hexadecimal digits, as printed by git rev-parse HEAD")]
+    Commit(String),
+    /// The date is none.
+    #[error("--date {0}: expected YYYY-MM-DD or YYYY-MM-DDTHH:MM:SS with any time zone")]
+    Date(String),
+    /// The records are of more than one machine or study.
+    #[error("{item}: {what} differs from the other records; a run is one study on one machine")]
+    Mixed {
+        /// Mesh and method of the record.
+        item: String,
+        /// What differs.
+        what: &'static str,
+    },
+    /// There is nothing to store.
+    #[error("no record: a run needs the results of `medial compare`")]
+    Empty,
+}
+
+/// What one build measured in one study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Date of the commit, ISO 8601. Runs are sorted by it.
+    pub date: String,
+    /// Hash of the commit.
+    pub commit: String,
+    /// Version of the program.
+    pub version: String,
+    /// Where it ran.
+    pub machine: String,
+    /// What results depend on beside mesh, method and level: sampling, samples, seeds, threads.
+    pub conditions: String,
+    /// First digits of the hash of each mesh.
+    pub meshes: BTreeMap<String, String>,
+    /// The measured items, sorted by mesh, method and level.
+    pub series: Vec<Point>,
+}
+
+/// One item of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Name of the mesh.
+    pub mesh: String,
+    /// The method with its parameters, or the name that it was given.
+    pub method: String,
+    /// The requested level.
+    pub level: String,
+    /// What became of it.
+    pub status: Status,
+    /// CPU seconds of the method without shared substrates, median over the repetitions. For the initial medial mesh,
+    /// whose work the substrates are, with them.
+    pub seconds: Option<f64>,
+    /// Peak memory.
+    pub bytes: Option<u64>,
+    /// Two-sided Hausdorff error, a fraction of the diagonal.
+    pub hausdorff: Option<f64>,
+    /// Mean error, a fraction of the diagonal.
+    pub mean: Option<f64>,
+    /// Spheres of the result.
+    pub spheres: Option<u64>,
+    /// Whether the Betti numbers are those of the solid.
+    pub topology: Option<bool>,
+    /// First digits of the result's hash.
+    pub result: Option<String>,
+}
+
+impl Run {
+    /// The run that some records are of. Of several records of one item the last one counts, of several builds the one
+    /// that ran last.
+    ///
+    /// # Errors
+    /// When there is no record, the records are of several machines or studies, or commit or date are malformed.
+    pub fn of_records(records: &[Record], commit: &str, date: &str) -> Result<Self, HistoryError> {
+        if !(8..=64).contains(&commit.len()) || !commit.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return Err(HistoryError::Commit(commit.to_owned()));
+        }
+        // The date is sorted as text and is part of a file name.
+        let is_day = |day: &str| {
+            day.bytes().enumerate().all(|(k, byte)| match k {
+                4 | 7 => byte == b'-',
+                _ => byte.is_ascii_digit(),
+            })
+        };
+        let is_plain = date.bytes().all(|b| b.is_ascii_alphanumeric() || b"-+:.".contains(&b));
+        if !date.get(..10).is_some_and(is_day) || !is_plain {
+            return Err(HistoryError::Date(date.to_owned()));
+        }
+        let last = records.last().ok_or(HistoryError::Empty)?;
+        let mut run = Self {
+            date: date.to_owned(),
+            commit: commit.to_ascii_lowercase(),
+            version: printable(&last.version),
+            machine: machine(&last.machine),
+            conditions: conditions(last),
+            meshes: BTreeMap::new(),
+            series: vec![],
+        };
+        let mut series = BTreeMap::new();
+        for record in records.iter().filter(|record| record.binary_hash == last.binary_hash) {
+            let point = Point::of(record);
+            // A run that ended before its input was read has no hash.
+            let hash = record.mesh_hash.as_deref().map(first_digits);
+            let known =
+                hash.clone().map(|hash| run.meshes.entry(point.mesh.clone()).or_insert(hash));
+            let differs = [
+                ("the machine", machine(&record.machine) != run.machine),
+                ("sampling, dual, samples, seeds or threads", conditions(record) != run.conditions),
+                ("the content of the mesh", known.map(|known| known.clone()) != hash),
+            ];
+            if let Some((what, _)) = differs.into_iter().find(|(_, differs)| *differs) {
+                let item = format!("{}, {}", point.mesh, point.method);
+                return Err(HistoryError::Mixed { item, what });
+            }
+            let key = (point.mesh.clone(), point.method.clone(), point.level.clone());
+            series.insert(key, point);
+        }
+        run.series = series.into_values().collect();
+        Ok(run)
+    }
+
+    fn file_name(&self) -> String {
+        format!("{}-{}.json", &self.date[..10], &self.commit[..8])
+    }
+
+    /// Stores the run in the folder of a history, which is created where it is missing: its file, and whether it is
+    /// new. The same content again is no error.
+    ///
+    /// # Errors
+    /// When the folder cannot be written, or has another run of this date and commit.
+    pub fn add_to(&self, folder: &Path) -> Result<(PathBuf, bool), HistoryError> {
+        let path = folder.join(self.file_name());
+        let failed = |source| HistoryError::Io { path: path.clone(), source };
+        fs::create_dir_all(folder).map_err(failed)?;
+        let text = serde_json::to_string(self).map_err(|e| failed(e.into()))? + "\n";
+        match fs::read_to_string(&path) {
+            Ok(old) if old == text => return Ok((path, false)),
+            Ok(_) => return Err(HistoryError::Taken(path)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(failed(error)),
+        }
+        medial::write_atomically(&path, |out| out.write_all(text.as_bytes())).map_err(failed)?;
+        Ok((path, true))
+    }
+
+    fn read(path: &Path) -> Result<Self, HistoryError> {
+        let failed = |source| HistoryError::Io { path: path.to_owned(), source };
+        let damaged = |message| HistoryError::Damaged { path: path.to_owned(), message };
+        let text = fs::read_to_string(path).map_err(failed)?;
+        let run: Self = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
+        let is_named = run.date.len() >= 10 && run.commit.len() >= 8;
+        if !is_named || path.file_name().is_none_or(|name| *name != *run.file_name()) {
+            return Err(damaged("date and commit are not those of its name".to_owned()));
+        }
+        Ok(run)
+    }
+}
+
+/// The runs of a folder, the oldest first, and the files that are damaged.
+///
+/// # Errors
+/// When the folder cannot be listed.
+pub fn read_runs(folder: &Path) -> Result<(Vec<Run>, Vec<HistoryError>), HistoryError> {
+    let failed = |source| HistoryError::Io { path: folder.to_owned(), source };
+    let entries = fs::read_dir(folder).map_err(failed)?.collect::<Result<Vec<_>, _>>();
+    let mut paths: Vec<PathBuf> = entries.map_err(failed)?.iter().map(fs::DirEntry::path).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
+    paths.sort();
+    let (mut runs, mut damaged) = (vec![], vec![]);
+    for path in paths {
+        match Run::read(&path) {
+            Ok(run) => runs.push(run),
+            Err(error) => damaged.push(error),
+        }
+    }
+    runs.sort_by(|a, b| a.date.cmp(&b.date));
+    Ok((runs, damaged))
+}
+
+impl Point {
+    fn of(record: &Record) -> Self {
+        let evaluation = record.evaluate.as_ref();
+        let own = |stages: &Stages| match record.simplify.method.as_str() {
+            "initial" => stages.total,
+            _ => stages.prepare + stages.simplify,
+        };
+        let repetitions: Vec<f64> =
+            record.repetitions.iter().map(|r| own(&r.cpu_seconds)).collect();
+        let seconds = median(&repetitions).or(record.simplify.cpu_seconds.as_ref().map(own));
+        Self {
+            mesh: printable(&record.mesh),
+            method: printable(&row_name(record)),
+            level: record.simplify.level.to_string(),
+            status: record.status,
+            seconds: seconds.filter(|_| record.status.has_result()).and_then(|s| rounded(s, 4)),
+            bytes: record.simplify.peak_bytes,
+            hausdorff: evaluation.and_then(|e| rounded(e.distances.hausdorff, 6)),
+            mean: evaluation.and_then(|e| rounded(e.distances.mean, 6)),
+            spheres: record.simplify.spheres.map(|spheres| spheres as u64),
+            topology: evaluation.and_then(|e| Some(e.betti == e.expected_betti?)),
+            result: record.result_hash.as_deref().map(first_digits),
+        }
+    }
+}
+
+/// A finite number with so many significant digits, which is what makes the files small.
+fn rounded(value: f64, digits: usize) -> Option<f64> {
+    format!("{:.*e}", digits - 1, value).parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+fn first_digits(hash: &str) -> String {
+    hash.chars().take(12).collect()
+}
+
+/// The machine, its memory to the gigabyte: the kernel's own share differs from boot to boot.
+fn machine(machine: &Machine) -> String {
+    let gigabytes = (machine.memory as f64 / f64::from(1 << 30)).round();
+    let Machine { cpu, cores, os, .. } = machine;
+    printable(&format!("{cpu}, {cores} cores, {gigabytes} GB, {os}"))
+}
+
+fn conditions(record: &Record) -> String {
+    let given = record.conditions.clone().unwrap_or_default();
+    let seeds: Vec<String> = record.seeds.iter().map(|(of, seed)| format!("{of} {seed}")).collect();
+    let threads = record.simplify.threads.map_or("unknown".to_owned(), |n| n.to_string());
+    printable(&format!(
+        "sampling {}; dual {}; samples {}; seeds {}; threads {threads}",
+        given.sampling,
+        given.dual,
+        given.samples,
+        seeds.join(", ")
+    ))
+}
