@@ -1,10 +1,8 @@
 //! Samplings: exact counts, distribution by area, spacing, determinism.
 
-mod surface_shapes;
-
+use crate::shapes::*;
 use medial::Vec3;
 use medial::surface::{InsideTest, Sampling, Side, TriMesh, sample};
-use surface_shapes::*;
 
 const UNIFORM: Sampling = Sampling::AreaUniform { count: 20_000, seed: 5 };
 const BLUE: Sampling = Sampling::BlueNoise { count: 2_000, seed: 5 };

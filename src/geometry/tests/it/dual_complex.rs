@@ -9,8 +9,7 @@ use medial_geometry::{DualComplex, Regular, Sphere, TriangulationError, UnionBou
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-mod balls;
-use balls::{as_set, ball, checked, unit};
+use crate::balls::{as_set, ball, checked, unit};
 
 fn random_balls(rng: &mut Pcg64, n: usize) -> Vec<Sphere> {
     let largest = [0.3, 0.6, 1.0][rng.random_range(0..3usize)];

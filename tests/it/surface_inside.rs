@@ -1,13 +1,11 @@
 //! The inside test against closed forms and against the generalised winding number.
 
-mod surface_shapes;
-
 use std::f64::consts::PI;
 
+use crate::shapes::*;
 use medial::Vec3;
 use medial::surface::{InsideTest, Side, TriMesh};
 use proptest::prelude::*;
-use surface_shapes::*;
 
 /// The generalised winding number: the sum of solid angles over `4 pi`
 /// (A. van Oosterom, J. Strackee, 10.1109/TBME.1983.325207).

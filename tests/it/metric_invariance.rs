@@ -4,9 +4,7 @@
 //! of the file. Certified intervals depend on the coordinate axes; but what they hold does not, so the
 //! intervals of both have a value in common, at every tolerance.
 
-#[path = "surface_shapes/mod.rs"]
-mod shapes;
-
+use crate::shapes;
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere, betti, euler};
 use medial::metrics::{

@@ -1,8 +1,6 @@
 //! Samples that are added until the Voronoi medial mesh is right.
 
-#[path = "surface_shapes/mod.rs"]
-mod shapes;
-
+use crate::shapes;
 use medial::Vec3;
 use medial::complex::{DualTriangulation, betti};
 use medial::metrics::JudgeOptions;

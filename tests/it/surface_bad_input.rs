@@ -1,17 +1,15 @@
 //! Files that are wrong, cut off, altered at random or greedy: a result or a typed error, always,
 //! at once, and with bounded memory.
 
-mod surface_shapes;
-
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::LazyLock;
 
+use crate::shapes::*;
 use medial::Vec3;
 use medial::surface::{self, Fault, Format, Loaded, Repair};
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use surface_shapes::*;
 
 /// Counts what the current thread holds, and the most it ever held.
 struct Counting;

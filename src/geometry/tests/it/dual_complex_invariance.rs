@@ -6,8 +6,7 @@ use medial_geometry::{DualComplex, Regular, Sphere, UnionBoundary, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-mod balls;
-use balls::{as_set, checked, unit};
+use crate::balls::{as_set, checked, unit};
 
 /// Simplices as sets of balls by position, so that numbering does not matter.
 fn geometric(balls: &[Sphere]) -> BTreeSet<Vec<[u64; 4]>> {

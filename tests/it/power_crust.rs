@@ -1,12 +1,11 @@
 //! Power crusts of sampled surfaces whose topology and distance are known.
 
+use crate::shapes;
 use medial::Vec3;
 use medial::geometry::{PowerCrust, Sphere};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{self, Folds, Sampling, TriMesh, contract_short_edges};
 use proptest::prelude::*;
-
-mod surface_shapes;
 
 const COINCIDENT: f64 = 1e-6;
 
@@ -31,7 +30,7 @@ fn crust(mesh: &TriMesh, samples: usize, exact: impl Fn(Vec3) -> f64) -> (TriMes
 
 #[test]
 fn the_crust_of_a_sphere_comes_nearer_as_samples_come_closer() {
-    let ball = surface_shapes::sphere(5);
+    let ball = shapes::sphere(5);
     let radius = ball.vertices[0].length();
     let mut last = f64::INFINITY;
     for samples in [200, 800, 3200] {
@@ -47,7 +46,7 @@ fn the_crust_of_a_sphere_comes_nearer_as_samples_come_closer() {
 
 #[test]
 fn the_crust_of_a_torus_is_a_torus() {
-    let torus = surface_shapes::torus(96, 192);
+    let torus = shapes::torus(96, 192);
     // Its radii, from the largest extents.
     let (lo, hi) = torus.bounding_box().unwrap();
     let extent = hi - lo;
@@ -109,9 +108,9 @@ fn balls_that_cannot_be_are_refused_and_none_is_no_surface() {
 
 #[test]
 fn specks_go_and_what_is_larger_stays() {
-    let ball = surface_shapes::sphere(2);
-    let speck = surface_shapes::moved(surface_shapes::sphere(1), |p| 1e-9 * p + 5.0 * Vec3::X);
-    let both = surface_shapes::joined(&[ball.clone(), speck]);
+    let ball = shapes::sphere(2);
+    let speck = shapes::moved(shapes::sphere(1), |p| 1e-9 * p + 5.0 * Vec3::X);
+    let both = shapes::joined(&[ball.clone(), speck]);
     let limits = vec![1e-6; both.vertices.len()];
     let whole = contract_short_edges(&both, &limits, Folds::Ignored);
     assert_eq!((whole.dropped, whole.mesh), (1, ball));

@@ -1,11 +1,9 @@
 //! From faces in any order and orientation to solids: orientation, cavities, invariants.
 
-mod surface_shapes;
-
+use crate::shapes::*;
 use medial::Vec3;
 use medial::surface::{self, Fault, Format, Loaded, Repair, TriMesh};
 use proptest::prelude::*;
-use surface_shapes::*;
 
 fn read(mesh: &TriMesh) -> Loaded {
     surface::read_bytes(to_off(mesh).as_bytes(), Format::Off).unwrap()
