@@ -40,14 +40,10 @@ pub enum Verb {
     Simplify(cmd::simplify::Arguments),
     /// Measure a medial mesh from anywhere against a surface.
     Evaluate(cmd::evaluate::Arguments),
-    /// Say what published medial meshes hold, against their surfaces, in one table.
-    Verify(cmd::verify::Arguments),
     /// Make a surface from a medial mesh: the boundary of its union, or the power crust.
     Reconstruct(cmd::reconstruct::Arguments),
     /// Draw a surface, its medial meshes, or their reconstructions by error, as PNG.
     Render(cmd::render::Arguments),
-    /// Triangulate an array of points: Delaunay, or regular with weights.
-    Triangulate(cmd::triangulate::Arguments),
     /// Repair a surface: fill its holes, keep its largest part.
     Repair(cmd::repair::Arguments),
     /// Convert between surface formats, or between medial mesh formats.
@@ -58,33 +54,14 @@ pub enum Verb {
     Check(cmd::check::Arguments),
     /// List or write the built-in shapes; fetch published meshes and keep them by name.
     Datasets(cmd::datasets::Arguments),
-    /// Repeat tables and figures of the papers, published values beside ours.
-    Paper(cmd::paper::Arguments),
-    /// Measure decimated surfaces, as a baseline beside the methods of a report.
-    Baseline(cmd::baseline::Arguments),
-    /// Run methods on noisy surfaces, and measure against the clean ones.
-    Stability(cmd::stability::Arguments),
-    /// Measure computed axes against known ones at finer and finer resolutions, and fit the orders.
-    Convergence(cmd::convergence::Arguments),
     /// Say what became worse between two sets of results, or two builds that it runs in turn.
     Diff(cmd::diff::Arguments),
     /// Rebuild the report of a folder of results.
     Report(cmd::report::Arguments),
     /// Keep the results of each night, and find the nights and commits of steps.
     History(cmd::history::Arguments),
-    /// Say what this machine lacks for oracles and baselines.
-    Doctor(cmd::doctor::Arguments),
-    /// Write the items of a study into a folder, for many processes on any number of hosts.
-    Plan(cmd::plan::Arguments),
-    /// Run one item of a comparison, and print its records; or items of a planned folder.
-    RunItem(cmd::run_item::Arguments),
-    /// Gather what was run of a planned folder, or results that others submit.
-    Collect(cmd::collect::Arguments),
-    /// Give what is missing of a planned folder to a batch engine.
-    Submit(cmd::submit::Arguments),
-    /// Pack a folder of results into an archive, for others to collect.
-    SubmitResults(cmd::submit_results::Arguments),
     /// Print shell completions.
+    #[command(hide = true)]
     Completions(cmd::completions::Arguments),
     /// Serve items on standard input: what `compare` starts.
     #[command(hide = true)]
@@ -189,29 +166,17 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Axis(arguments) => cmd::axis::run(&arguments, global),
         Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global, registry),
         Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
-        Verb::Verify(arguments) => cmd::verify::run(&arguments, global),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Render(arguments) => cmd::render::run(&arguments, global),
-        Verb::Triangulate(arguments) => cmd::triangulate::run(&arguments, global),
         Verb::Repair(arguments) => cmd::repair::run(&arguments, global),
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
         Verb::Methods(arguments) => cmd::methods::run(&arguments, global, registry),
         Verb::Check(arguments) => cmd::check::run(&arguments, global, registry),
         Verb::Datasets(arguments) => cmd::datasets::run(&arguments, global),
-        Verb::Paper(arguments) => cmd::paper::run(&arguments, global, registry),
-        Verb::Baseline(arguments) => cmd::baseline::run(&arguments, global, registry),
-        Verb::Stability(arguments) => cmd::stability::run(&arguments, global, registry),
-        Verb::Convergence(arguments) => cmd::convergence::run(&arguments, global, registry),
         Verb::Diff(arguments) => cmd::diff::run(&arguments, global, registry),
         Verb::Report(arguments) => cmd::report::run(&arguments, global, registry),
         Verb::History(arguments) => cmd::history::run(&arguments, global),
-        Verb::Doctor(arguments) => cmd::doctor::run(&arguments, global),
         Verb::Completions(arguments) => cmd::completions::run(&arguments, &mut command()),
-        Verb::RunItem(arguments) => cmd::run_item::run(&arguments, global, registry),
-        Verb::Plan(arguments) => cmd::plan::run(&arguments, global, registry),
-        Verb::Collect(arguments) => cmd::collect::run(&arguments, global, registry),
-        Verb::Submit(arguments) => cmd::submit::run(&arguments, global),
-        Verb::SubmitResults(arguments) => cmd::submit_results::run(&arguments, global),
         Verb::Worker(arguments) => cmd::worker::run(&arguments, registry),
     }
 }

@@ -3,10 +3,7 @@
 use std::process::ExitCode;
 
 use crate::run::public::PublicError;
-use crate::run::{
-    GatherError, InputError, ParcelError, PlanError, PlannedError, RunError, Source, StoreError,
-    StudyError,
-};
+use crate::run::{InputError, PlanError, RunError, Source, StoreError, StudyError};
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,30 +90,6 @@ impl From<PlanError> for Failure {
         match error {
             PlanError::Run(error) => error.into(),
             PlanError::Store(error) => error.into(),
-        }
-    }
-}
-
-impl From<ParcelError> for Failure {
-    fn from(error: ParcelError) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<PlannedError> for Failure {
-    fn from(error: PlannedError) -> Self {
-        match error {
-            PlannedError::NoSuchItem { .. } | PlannedError::Study(_) => Self::usage(error),
-            _ => Self::input(error),
-        }
-    }
-}
-
-impl From<GatherError> for Failure {
-    fn from(error: GatherError) -> Self {
-        match error {
-            GatherError::Planned(error) => error.into(),
-            GatherError::Store(error) => error.into(),
         }
     }
 }

@@ -6,7 +6,7 @@ use medial::complex::collapse::Hierarchy;
 use medial::complex::{self, LoadedMa, Radii, ReadOptions};
 use medial::surface::{self, Format};
 use medial_bench::plugin;
-use medial_bench::run::{Study, parse_matrix};
+use medial_bench::run::Study;
 use medial_reports::parse_records;
 
 /// Larger meshes are not put to checks that take longer than reading.
@@ -79,15 +79,6 @@ pub(crate) fn medial_obj(bytes: &[u8]) {
             medial(&loaded);
         }
     }
-}
-
-pub(crate) fn npy(bytes: &[u8]) {
-    let Ok(matrix) = parse_matrix(bytes) else { return };
-    let sum: f64 = (0..matrix.rows().min(SMALL))
-        .flat_map(|row| (0..matrix.columns().min(SMALL)).map(move |column| (row, column)))
-        .map(|(row, column)| matrix.at(row, column))
-        .sum();
-    std::hint::black_box(sum);
 }
 
 pub(crate) fn hierarchy(bytes: &[u8]) {

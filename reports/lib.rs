@@ -18,7 +18,6 @@
 //! | `terminal` | the summary in plain text |
 //! | `papers` | BibTeX and the text on the methods, for papers |
 //! | `pictures` | which results are shown beside each other |
-//! | [`published`] | tables and figures of the papers as data, and ours beside them |
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
 //! | `page` | the self-contained `index.html` |
 //! | `write` | [`write_report`], all of it into one folder |
@@ -38,7 +37,6 @@ mod page;
 mod papers;
 mod pictures;
 mod plots;
-pub mod published;
 mod purpose;
 mod record;
 pub mod render;

@@ -10,7 +10,6 @@ use medial_reports::measured_rows;
 use serde::Serialize;
 
 use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument, judge_options};
-use crate::cmd::compat::CompatArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
 use crate::output::{counted, note, print_json, print_line};
@@ -34,8 +33,6 @@ pub struct Arguments {
     certify: Option<f64>,
     #[command(flatten)]
     measure: MeasureArguments,
-    #[command(flatten)]
-    compat: CompatArguments,
 }
 
 /// Runs the verb.
@@ -52,8 +49,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
     let (loaded, fit) = medial_mesh_for(&arguments.axis, &shape, &arguments.fitting)?;
     let LoadedMa { mesh, notes, mut warnings, .. } = loaded;
-    let Arguments { seed, measure, .. } = arguments;
-    let compat = arguments.compat.measure(&input, &mesh, measure.samples, *seed)?;
     line.at("preparing the surface");
     let judge =
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
@@ -83,10 +78,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     warnings.extend(input.report.warnings);
     if global.json {
-        print_json(&compat.beside(&Evaluated { evaluation: &evaluation, fit }), &warnings);
+        print_json(&Evaluated { evaluation: &evaluation, fit }, &warnings);
     } else {
         print_evaluation(&evaluation);
-        compat.print();
         for warning in evaluation.warnings.iter().chain(&warnings) {
             print_line(&format!("  warning: {warning}"));
         }

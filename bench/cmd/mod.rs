@@ -1,35 +1,22 @@
 //! The verbs of the command, one file each. They share nothing but the layers below them.
 
 pub mod axis;
-pub mod baseline;
 pub mod check;
-pub mod collect;
 pub mod compare;
-mod compat;
 pub mod completions;
-pub mod convergence;
 pub mod convert;
 pub mod datasets;
 pub mod diff;
-pub mod doctor;
 pub mod evaluate;
-pub mod hierarchy;
+mod hierarchy;
 pub mod history;
 pub mod info;
 pub mod methods;
-pub mod paper;
 mod pictures;
-pub mod plan;
 pub mod reconstruct;
 pub mod render;
 pub mod repair;
 pub mod report;
-pub mod run_item;
 pub mod simplify;
-pub mod stability;
-pub mod submit;
-pub mod submit_results;
-pub mod triangulate;
-pub mod verify;
-pub mod voxels;
+mod voxels;
 pub mod worker;

@@ -2,7 +2,6 @@
 //!
 //! - `.ply`: a point for each voxel, `x y z` its centre, then `distance`, `flux` and the indices
 //!   `i j k` in the lattice.
-//! - `.npy`: an array of float64, a row `x, y, z, distance, flux, i, j, k` for each voxel.
 //! - `.csv`: the same with a heading.
 //!
 //! Lengths are in the units of the surface. The result's JSON has the lattice: its lower corner,
@@ -17,9 +16,8 @@ use serde_json::json;
 
 use crate::exit::Failure;
 use crate::files::{check_extension, check_folder, extension};
-use crate::run::write_npy_header;
 
-const EXTENSIONS: [&str; 3] = ["ply", "npy", "csv"];
+const EXTENSIONS: [&str; 2] = ["ply", "csv"];
 const COLUMNS: [&str; 8] = ["x", "y", "z", "distance", "flux", "i", "j", "k"];
 
 /// Refuses a file that could not be written, before anything is computed.
@@ -39,7 +37,6 @@ pub fn write(path: &Path, voxels: &LatticeVoxels, shape: &Shape) -> Result<(), F
     let rows = rows(voxels, shape);
     let write = |out: &mut dyn Write| match extension(path).as_str() {
         "ply" => ply(out, &rows),
-        "npy" => npy(out, &rows),
         _ => csv(out, &rows),
     };
     medial::write_atomically(path, |out| write(out))
@@ -79,11 +76,6 @@ fn ply(out: &mut dyn Write, rows: &[[f64; 8]]) -> io::Result<()> {
         row[5..].iter().try_for_each(|&index| out.write_all(&(index as u32).to_le_bytes()))?;
     }
     Ok(())
-}
-
-fn npy(out: &mut dyn Write, rows: &[[f64; 8]]) -> io::Result<()> {
-    write_npy_header(out, "<f8", [rows.len(), COLUMNS.len()])?;
-    rows.iter().flatten().try_for_each(|value| out.write_all(&value.to_le_bytes()))
 }
 
 fn csv(out: &mut dyn Write, rows: &[[f64; 8]]) -> io::Result<()> {

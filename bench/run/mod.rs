@@ -14,8 +14,6 @@
 //! | `ending`, `supervise`, `plan` | limits, ends, lists of items |
 //! | `store` | the folder of results |
 //! | `alternate` | two builds that take turns |
-//! | `planned` | items as files, for many processes on many hosts |
-//! | `parcel` | results from another machine |
 //! | `public` | published meshes, fetched and kept by name |
 
 mod alternate;
@@ -25,18 +23,13 @@ mod bounds;
 mod ending;
 mod given;
 mod item;
-mod npy;
-mod npy_header;
-mod parcel;
 mod plan;
-mod planned;
 mod progress;
 mod protocol;
 mod provenance;
 pub mod public;
 pub mod record;
 mod registry;
-mod reproduce;
 mod scene;
 mod search;
 mod serve;
@@ -54,22 +47,12 @@ pub use answer::{Fault, LevelRun, Times, answer};
 pub use axis_file::{AxisError, AxisOptions, FitBy, RadiiFrom, percent, read_axis};
 pub use given::{GIVEN, Given};
 pub use item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
-pub use npy::{
-    Matrix, NpyError, NpyErrorKind, parse_matrix, read_matrix, write_cells, write_npy_header,
-};
-pub use npy_header::HeaderError;
-pub use parcel::{Opened, Packed, ParcelError, Rejudged, Surfaces, open, pack, rejudge};
 pub use plan::{PlanError, Tally, count, missing, refused_params, run_items};
-pub use planned::{
-    Division, GatherError, Gathered, Plan, Planned, PlannedError, check_travels, done_file, gather,
-    keep_done, not_done, read_done, write_plan,
-};
 pub use progress::{Progress, Verbosity};
 pub use protocol::CheckItem;
 pub use provenance::{Provenance, hex, hex_digest, peak_bytes, shell_line};
 pub use record::Kept;
 pub use registry::{Entry, INITIAL, Registry, RegistryError};
-pub use reproduce::Reproducer;
 pub use scene::Scene;
 pub use search::{Found, Probe, Search};
 pub use serve::serve;

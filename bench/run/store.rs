@@ -8,13 +8,11 @@ use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
-use std::time::Duration;
 
 use medial_reports::{Journal, JournalError, Record, Status, Target, read_records};
 use serde::{Deserialize, Serialize};
 
 use super::Item;
-use super::planned::PLAN;
 
 /// Name of the append-only list of records of a comparison.
 pub const RESULTS: &str = "results.jsonl";
@@ -22,8 +20,6 @@ pub const RESULTS: &str = "results.jsonl";
 pub const AXES: &str = "axes";
 /// Name of the file that names the process that holds a store.
 const LOCK: &str = ".lock";
-/// No file is written for longer than this, whatever the clocks of two hosts differ by.
-const ABANDONED: Duration = Duration::from_secs(24 * 3600);
 
 /// A folder of results that this process may add to.
 pub struct Store {
@@ -124,9 +120,7 @@ impl Store {
                 path.display()
             ));
         }
-        // In a planned folder other processes write without a lock: only what is old is nobody's.
-        let age = if dir.join(PLAN).exists() { ABANDONED } else { Duration::ZERO };
-        remove_temporaries(dir, age);
+        remove_temporaries(dir);
         let known = read_known(&path).map_err(failed(&path))?;
         let journal = Journal::open(&path)?;
         Ok(Self {
@@ -380,21 +374,17 @@ fn remove_artifacts(dir: &Path, journal: &Path) {
 }
 
 /// Removes temporary files that this program left behind, only in the folders that it writes to. The
-/// lock is held, so none of this age is in use.
-fn remove_temporaries(dir: &Path, age: Duration) {
+/// lock is held, so none is in use.
+fn remove_temporaries(dir: &Path) {
     let mut folders = vec![dir.to_owned(), dir.join("tables"), dir.join("plots")];
-    for results in [AXES, "stability"] {
-        let meshes = fs::read_dir(dir.join(results)).into_iter().flatten().flatten();
-        folders.push(dir.join(results));
-        folders.extend(meshes.map(|entry| entry.path()).filter(|path| path.is_dir()));
-    }
+    let meshes = fs::read_dir(dir.join(AXES)).into_iter().flatten().flatten();
+    folders.push(dir.join(AXES));
+    folders.extend(meshes.map(|entry| entry.path()).filter(|path| path.is_dir()));
     let entries = folders.iter().flat_map(fs::read_dir).flatten().flatten();
     for entry in entries {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        let written = || entry.metadata().and_then(|file| file.modified()).ok()?.elapsed().ok();
-        let old = || age.is_zero() || written().is_some_and(|since| since >= age);
-        if name.starts_with(".medial-") && name.ends_with(".tmp") && old() {
+        if name.starts_with(".medial-") && name.ends_with(".tmp") {
             let _ = fs::remove_file(entry.path());
         }
     }

@@ -164,38 +164,3 @@ fn absurd_requests_are_refused_at_once() {
         assert!(code == expected && stderr.contains(part), "{arguments:?}: {code}, {stderr}");
     }
 }
-
-#[test]
-fn published_tables_are_repeated_or_say_what_is_missing() {
-    let (code, list, _) = run(&["paper"]);
-    assert_eq!(code, 0);
-    insta::assert_snapshot!("paper_list", list);
-
-    let folder = tempfile::tempdir().unwrap();
-    let report = folder.path().join("paper.md");
-    let arguments = ["paper", "qmat-figure-15", "--samples", "500", "-o", text_path(&report)];
-    let (code, object) = json(&arguments);
-    assert_eq!(code, 0);
-    let exhibit = &object["exhibits"][0];
-    assert_eq!(exhibit["rows"][0]["ours"]["spheres"], 1.0);
-    assert_eq!(exhibit["verdicts"][0]["holds"], true);
-    let text = fs::read_to_string(&report).unwrap();
-    assert!(text.contains("| Sphere | builtin:sphere:16 | 7,156 |"), "{text}");
-
-    let empty = text_path(folder.path());
-    let (code, stdout, _) = run(&["paper", "qmat-table-2", "--meshes", empty, "--quiet"]);
-    assert_eq!(code, 5);
-    assert!(stdout.contains("bear.off is not there: see --meshes"), "{stdout}");
-    assert_eq!(run(&["paper", "nothing"]).0, 2);
-}
-
-#[test]
-fn published_noise_can_be_measured_against_the_clean_surface() {
-    let (code, object) = json(&["paper", "chazal-noise", "--samples", "200", "--quiet"]);
-    assert_eq!(code, 0, "{object}");
-    for row in object["exhibits"][0]["rows"].as_array().expect("rows") {
-        let ours = |key: &str| row["ours"][key].as_f64().expect("measured");
-        // The axis of a noisy surface is another, and a filter keeps what noise moves little.
-        assert!(0.0 < ours("to") && ours("to") < ours("whole_to"), "{row}");
-    }
-}

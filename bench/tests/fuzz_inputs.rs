@@ -110,11 +110,6 @@ fn targets(folder: &Path) -> Vec<Target> {
     let medial_mesh: Vec<&str> = medial_mesh.iter().map(String::as_str).collect();
     let medial_mesh = reading(&medial_mesh);
     targets.push(Target { extension: "ma", content: ma, commands: medial_mesh });
-    targets.push(Target {
-        extension: "npy",
-        content: points(400),
-        commands: reading(&["triangulate {}"]),
-    });
     let hierarchy = "simplify builtin:box:8 -m pmat --spheres 9 -q --save-hierarchy {}";
     targets.push(Target {
         extension: "levels",
@@ -138,20 +133,6 @@ fn ascii_stl(off: &str) -> String {
         text += "endloop\nendfacet\n";
     }
     text + "endsolid s\n"
-}
-
-/// An array of points, half of them on a lattice.
-fn points(count: usize) -> Vec<u8> {
-    let mut random = Random(1);
-    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({count}, 3), }}");
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((118_u16).to_le_bytes());
-    bytes.extend(format!("{header:<117}\n").bytes());
-    for k in 0..3 * count {
-        let x = random.below(if k < 3 * count / 2 { 5 } else { 1 << 40 }) as f64;
-        bytes.extend(x.to_le_bytes());
-    }
-    bytes
 }
 
 /// One kind of damage.

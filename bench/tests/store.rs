@@ -231,47 +231,6 @@ fn a_small_item_after_a_large_one_shows_its_own_memory() {
 }
 
 #[test]
-fn an_item_is_run_from_its_file_and_only_once_into_a_folder() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (file, out) = (dir.path().join("item.json"), dir.path().join("out"));
-    fs::write(&file, "{}").expect("written");
-    let output = run(MEDIAL, &["run-item", text(&file)]);
-    assert!(code(&output) == 1 && stderr(&output).contains("item.json"), "{}", stderr(&output));
-    let hash = {
-        let (_, object) = compare(&["builtin:box:8", "--methods", "qmat", "--spheres", "9"], &out);
-        assert_eq!(run_and_found(&object), (1, 0));
-        records(&out)[0]["binary_hash"].as_str().expect("a hash").to_owned()
-    };
-    let item = serde_json::json!({
-        "scene": {
-            "mesh": "box-8", "source": { "built_in": { "id": "box", "resolution": 8 } },
-            "hash": null, "sampling": "vertices", "dual": "fan",
-            "measure": { "samples": 200, "volume_depth": 5, "seed": 0 },
-        },
-        "method": { "id": "qmat", "params": {} },
-        "levels": [{ "spheres": 30 }, { "spheres": 20 }],
-        "seed": 0, "repeat": 1, "threads": 2,
-        "limits": { "seconds": 60.0, "bytes": 1_000_000_000_u64 },
-        "binary": hash,
-    });
-    fs::write(&file, item.to_string()).expect("written");
-    let item_out = dir.path().join("item-out");
-    let words = ["run-item", text(&file), "--quiet", "--out", text(&item_out)];
-    let (first, second) = (run(MEDIAL, &words), run(MEDIAL, &words));
-    assert_eq!((code(&first), code(&second)), (0, 0), "{}", stderr(&first));
-    assert_eq!(first.stdout, second.stdout, "the second call runs nothing");
-    assert_eq!(String::from_utf8_lossy(&first.stdout).lines().count(), 2);
-    let alone = run(MEDIAL, &["run-item", text(&file), "--quiet"]);
-    let lines = String::from_utf8_lossy(&alone.stdout).into_owned();
-    let alone = lines.lines().map(|line| serde_json::from_str(line).expect("a record")).collect();
-    let mut kept = records(&item_out);
-    kept.iter_mut().for_each(|record| {
-        record.as_object_mut().expect("an object").remove("artifact");
-    });
-    assert_eq!(without_timings(alone), without_timings(kept));
-}
-
-#[test]
 fn a_study_is_a_file_and_lies_beside_its_results() {
     let dir = tempfile::tempdir().expect("a folder");
     let (file, out) = (dir.path().join("study.toml"), dir.path().join("out"));

@@ -5,7 +5,6 @@
 mod ascent;
 mod axis_distance;
 mod certificate;
-pub mod compat;
 mod counts;
 mod envelope;
 mod evaluation;

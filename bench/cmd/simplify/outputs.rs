@@ -26,7 +26,7 @@ pub struct Outputs {
     /// Write all levels into a file, for `--hierarchy`; for methods that have them.
     #[arg(long, value_name = "FILE")]
     save_hierarchy: Option<PathBuf>,
-    /// Write the voxels with their distance and flux (.ply, .npy, .csv), for methods on a lattice.
+    /// Write the voxels with their distance and flux (.ply, .csv), for methods on a lattice.
     #[arg(long, value_name = "FILE")]
     voxels: Option<PathBuf>,
     /// Write the power crust of the poles that are left (.ply, .off, .obj), for methods that prune
