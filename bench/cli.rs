@@ -30,15 +30,15 @@ pub struct Cli {
 /// The verbs.
 #[derive(Debug, Subcommand)]
 pub enum Verb {
-    /// Run methods on meshes, measure, and write tables, plots and a page.
+    /// Run methods on meshes, measure the results, write tables, plots and a page.
     Compare(cmd::compare::Arguments),
-    /// Say what a mesh is: counts, defects, topology, repairs.
+    /// Print counts, defects and topology of a mesh.
     Info(cmd::info::Arguments),
     /// Compute the initial Voronoi medial mesh.
     Axis(cmd::axis::Arguments),
     /// Simplify the medial axis of one mesh by one method.
     Simplify(cmd::simplify::Arguments),
-    /// Measure a medial mesh from anywhere against a surface.
+    /// Measure medial meshes from anywhere against a surface.
     Evaluate(cmd::evaluate::Arguments),
     /// Make a surface from a medial mesh: the boundary of its union, or the power crust.
     Reconstruct(cmd::reconstruct::Arguments),
@@ -50,15 +50,15 @@ pub enum Verb {
     Convert(cmd::convert::Arguments),
     /// List the methods, or describe one.
     Methods(cmd::methods::Arguments),
-    /// Put methods, your own too, to the conformance corpus, and say what fails.
+    /// Run the conformance tests on methods, external ones too.
     Check(cmd::check::Arguments),
-    /// List or write the built-in shapes; fetch published meshes and keep them by name.
+    /// List, write and fetch meshes.
     Datasets(cmd::datasets::Arguments),
-    /// Say what became worse between two sets of results, or two builds that it runs in turn.
+    /// Find regressions between two stores of results, or two builds that run in turn.
     Diff(cmd::diff::Arguments),
-    /// Rebuild the report of a folder of results.
+    /// Rebuild the report of a store of results.
     Report(cmd::report::Arguments),
-    /// Keep the results of each night, and find the nights and commits of steps.
+    /// Find change points over many runs.
     History(cmd::history::Arguments),
     /// Print shell completions.
     #[command(hide = true)]

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use medial::complex::collapse::Hierarchy;
 use medial::complex::{self, LoadedMa, Radii, ReadOptions};
 use medial::surface::{self, Format};
 use medial_bench::plugin;
@@ -79,17 +78,6 @@ pub(crate) fn medial_obj(bytes: &[u8]) {
             medial(&loaded);
         }
     }
-}
-
-pub(crate) fn hierarchy(bytes: &[u8]) {
-    let Ok((hierarchy, label)) = Hierarchy::parse(bytes, "x.json") else { return };
-    for stage in [0, hierarchy.last_stage() / 2, hierarchy.last_stage()] {
-        assert_eq!(hierarchy.stage(stage).to_mesh().check(), Ok(()));
-    }
-    let mut written = Vec::new();
-    hierarchy.write_to(&mut written, &label).expect("a hierarchy can be written");
-    let again = Hierarchy::parse(&written, "x.json").expect("a written hierarchy can be read");
-    assert_eq!(again, (hierarchy, label));
 }
 
 pub(crate) fn study(bytes: &[u8]) {

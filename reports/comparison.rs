@@ -28,8 +28,6 @@ pub(crate) struct Comparison<'a> {
     pub(crate) entries: Vec<Entry<'a>>,
     /// Records that a later one of the same item replaced.
     pub(crate) superseded: usize,
-    /// The keys behind [`Comparison::series`], in that order.
-    keys: Vec<SeriesKey<'a>>,
 }
 
 /// One record and where it belongs: indices into the lists of [`Comparison`].
@@ -137,14 +135,7 @@ impl<'a> Comparison<'a> {
             levels,
             superseded,
             entries,
-            keys: series_keys.0,
         }
-    }
-
-    /// The series that a record belongs to.
-    pub(crate) fn series_of(&self, record: &Record) -> Option<usize> {
-        let key = SeriesKey::of(record);
-        self.keys.iter().position(|other| *other == key)
     }
 
     /// The entries of one mesh, by level and series.
@@ -297,8 +288,6 @@ struct SeriesKey<'a> {
     dual: &'a str,
     samples: usize,
     threads: Option<usize>,
-    /// The archive that it came in, where it was made elsewhere.
-    archive: Option<&'a str>,
 }
 
 impl<'a> SeriesKey<'a> {
@@ -322,7 +311,6 @@ impl<'a> SeriesKey<'a> {
             dual: conditions.map_or("", |c| &c.dual),
             samples: conditions.map_or(0, |c| c.samples),
             threads: simplify.threads,
-            archive: record.origin.as_ref().map(|origin| origin.archive.as_str()),
         }
     }
 
@@ -350,12 +338,7 @@ fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
 
 impl SeriesKey<'_> {
     fn name(&self) -> String {
-        let name = match self.variant {
-            Some(variant) => variant.to_owned(),
-            None => self.method_and_params(),
-        };
-        // Its seconds are of another machine, and it is another's word.
-        if self.archive.is_some() { name + " (submitted)" } else { name }
+        self.variant.map_or_else(|| self.method_and_params(), str::to_owned)
     }
 
     fn method_and_params(&self) -> String {
@@ -363,7 +346,7 @@ impl SeriesKey<'_> {
     }
 
     /// What tells rows of one name apart, in words.
-    fn conditions(&self) -> [String; 9] {
+    fn conditions(&self) -> [String; 8] {
         let short = |hash: &str| -> String { hash.chars().take(8).collect() };
         [
             self.method_and_params(),
@@ -374,7 +357,6 @@ impl SeriesKey<'_> {
             self.threads.map_or_else(String::new, |threads| format!("{threads} threads")),
             format!("build {}", short(self.build)),
             format!("plug-in {}", short(self.plugin.unwrap_or("none"))),
-            format!("archive {}", short(self.archive.unwrap_or("none"))),
         ]
     }
 }

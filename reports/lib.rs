@@ -9,32 +9,26 @@
 //! | `metric` | the columns: name, unit, direction, definition |
 //! | `summary` | means over meshes at equal numbers of spheres |
 //! | `purpose` | which method for which purpose, method against method |
-//! | `convergence` | how computed axes come near to known ones: orders, tables, plots |
 //! | `scaling` | how time and memory grow with the input |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures as SVG |
-//! | `extras` | baselines, stability under noise, oracles: from files of their own |
 //! | [`history`] | one file for each night, steps over many nights |
 //! | `terminal` | the summary in plain text |
-//! | `papers` | BibTeX and the text on the methods, for papers |
 //! | `pictures` | which results are shown beside each other |
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
 //! | `page` | the self-contained `index.html` |
 //! | `write` | [`write_report`], all of it into one folder |
 
 mod comparison;
-mod convergence;
 pub mod diff;
 mod equal_error;
 mod error;
-mod extras;
 mod header;
 pub mod history;
 mod journal;
 mod metric;
 mod native;
 mod page;
-mod papers;
 mod pictures;
 mod plots;
 mod purpose;
@@ -48,14 +42,7 @@ mod text;
 mod view3d;
 mod write;
 
-pub use convergence::{
-    AxisSet, ConvergenceFit, ConvergenceRecord, ConvergenceReport, FAR, Measure, Order,
-    convergence_report, fitted_order,
-};
 pub use error::ReportError;
-pub use extras::{
-    AxisShift, BASELINES, Baseline, NoiseRecord, ORACLES, STABILITY, read_lines, write_lines,
-};
 pub use header::{Header, MethodNote, RunNote};
 pub use journal::{
     BadLine, Journal, JournalError, Journaled, parse_records, read_records, write_records,
@@ -63,8 +50,7 @@ pub use journal::{
 pub use metric::{Better, METRICS, Metric, measured_rows};
 pub use pictures::{PictureStrip, picture_strips};
 pub use record::{
-    Conditions, Initial, Machine, Origin, OwnSeconds, Record, Repetition, Simplify, Stages, Status,
-    Target, Trust, UnionTopology,
+    Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status, Target,
 };
 pub use terminal::summary_text;
 pub use text::{file_stem, printable};

@@ -139,9 +139,6 @@ pub struct Record {
     /// SHA-256 of the resulting medial mesh: equal results are equal here.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub result_hash: Option<String>,
-    /// Betti numbers of the union of the result's primitives, where they were asked.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub union: Option<UnionTopology>,
     /// Every seed by its purpose, such as `sampling`, `method`, `evaluation`.
     #[serde(default)]
     pub seeds: BTreeMap<String, u64>,
@@ -160,40 +157,9 @@ pub struct Record {
     /// Version of the program.
     #[serde(default)]
     pub version: String,
-    /// How the record came here, where it was made on another machine.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub origin: Option<Origin>,
     /// Path of the resulting `.ma` file relative to the folder of the results, with `/`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub artifact: Option<String>,
-}
-
-/// How a record that was made elsewhere came into a folder of results.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Origin {
-    /// What is known of it here.
-    pub trust: Trust,
-    /// SHA-256 of the archive that it came in.
-    pub archive: String,
-}
-
-/// How far a submitted result was checked. Its seconds are another machine's in any case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Trust {
-    /// Its medial mesh was measured again here, with the same outcome.
-    ReJudged,
-    /// Nothing of it was measured here.
-    AsSubmitted,
-}
-
-impl fmt::Display for Trust {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::ReJudged => "re-judged",
-            Self::AsSubmitted => "as submitted",
-        })
-    }
 }
 
 /// The `simplify` object: one method at one level.
@@ -314,13 +280,6 @@ pub struct Conditions {
     /// Hash of the declaration and the files of a plug-in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingerprint: Option<String>,
-}
-
-/// Topology of a union of spheres, cones and slabs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct UnionTopology {
-    /// Betti numbers; `None` where they could not be computed.
-    pub betti: Option<[u64; 3]>,
 }
 
 /// Seconds by stage.

@@ -10,12 +10,10 @@ use base64::prelude::BASE64_STANDARD;
 use crate::comparison::Comparison;
 use crate::equal_error::{by_bound, equal_error_table};
 use crate::error::ReportError;
-use crate::extras::extras;
 use crate::header::Header;
 use crate::journal::replace_file;
 use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, MeshView, Page};
-use crate::papers::{BIBTEX, LATEX, TEXT, papers};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
 use crate::plots::{
     Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot, scaling_plots,
@@ -29,11 +27,8 @@ use crate::text::file_stems;
 use crate::view3d::text_of;
 
 /// Writes the report of some records into a folder, which is created where it is missing:
-/// `results.csv`, `tables/*.md`, `tables/*.tex`, `tables/methods.*`, `plots/*.svg`, `header.json` and
+/// `results.csv`, `tables/*.md`, `tables/*.tex`, `plots/*.svg`, `header.json` and
 /// `index.html`. Returns the paths that were written, `index.html` last.
-///
-/// What stands in the folder in [`BASELINES`](crate::BASELINES), [`STABILITY`](crate::STABILITY) and
-/// [`ORACLES`](crate::ORACLES) is shown beside the comparison; these files are read, never written.
 ///
 /// Each file is written under a temporary name and renamed. The same records and header give the
 /// same bytes. Files in `tables/` and `plots/` that an earlier report left there under a name
@@ -93,13 +88,6 @@ pub fn write_report(
     for plot in overview_plots.iter().chain(&native_plots) {
         files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
     }
-    let extras = extras(dir, &comparison, &summaries)?;
-    for extra in &extras {
-        files.write_tables(extra.stem, extra.title, &extra.tables)?;
-        for plot in extra.plots.iter().chain(extra.mesh_plots.iter().map(|(_, plot)| plot)) {
-            files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
-        }
-    }
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     let has_plots = stems.len() <= MOST_PLOTTED;
     let pictures = strips(&comparison);
@@ -120,13 +108,6 @@ pub fn write_report(
         }
         meshes.push(part);
     }
-    let papers = papers(header, &comparison);
-    if let Some(papers) = &papers {
-        let texts = [(BIBTEX, &papers.bibtex), (TEXT, &papers.text), (LATEX, &papers.latex)];
-        for (name, text) in texts {
-            files.write(name, text.as_bytes())?;
-        }
-    }
     let header_json =
         serde_json::to_vec_pretty(header).map_err(|error| ReportError::header(&error))?;
     files.write("header.json", &header_json)?;
@@ -144,8 +125,6 @@ pub fn write_report(
         meshes: &meshes,
         summary_tables: &summary_tables,
         has_equal_error: !bounds.is_empty(),
-        extras: &extras,
-        papers: papers.as_ref(),
     };
     files.write("index.html", page.to_html().as_bytes())?;
     Ok(files.written)

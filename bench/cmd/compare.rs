@@ -13,9 +13,8 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::run::{
-    AXES, Given, Here, Item, Kept, PlanError, Progress, Provenance, RESULTS, Registry, RunError,
-    Source, Store, Study, StudyMethod, Supervisor, Tally, count, missing, refused_params,
-    run_items,
+    AXES, Given, Here, Item, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Source,
+    Store, Study, StudyMethod, Supervisor, Tally, count, missing, refused_params, run_items,
 };
 
 /// Arguments of `compare`.
@@ -130,10 +129,9 @@ pub fn run(
         report::write_study(&arguments.out, &study, arguments.study.as_deref())?;
     }
     let mut progress = Progress::new(global.progress(), left.len());
-    let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Kept]| {
+    let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Record]| {
         tally.run += kept.len();
-        let records: Vec<&Record> = kept.iter().map(|kept| &kept.record).collect();
-        store.keep(&records)
+        store.keep(kept)
     });
     drop(progress);
     drop(supervisor);

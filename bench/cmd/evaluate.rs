@@ -1,44 +1,50 @@
-//! `medial evaluate MESH X.ma`: every metric of a medial mesh from anywhere.
+//! `medial evaluate MESH X.ma [Y.ma ...]`: every metric of medial meshes from anywhere.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use medial::complex::LoadedMa;
-use medial::metrics::{Certificate, Evaluation, JudgeOptions, MetricError, Witness, WitnessSide};
-use medial::shape::{Fit, ShapeOptions};
+use medial::metrics::{
+    Certificate, Evaluation, Judge, JudgeOptions, MetricError, Witness, WitnessSide,
+};
+use medial::shape::{Fit, Shape, ShapeOptions};
 use medial_reports::measured_rows;
 use serde::Serialize;
+use serde_json::json;
 
 use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument, judge_options};
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
-use crate::output::{counted, note, print_json, print_line};
+use crate::output::{counted, note, print_error, print_json, print_line};
 use crate::run::{Input, Source, StageLine};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
+    /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Medial mesh (.ma and its dialects, or .ply or .obj with radii), in the units of the surface unless
-    /// `--fit` finds others.
-    axis: PathBuf,
+    /// Medial meshes (.ma and its dialects, or .ply or .obj with radii), in the units of the surface
+    /// unless `--fit` finds others. Several files give one table.
+    #[arg(required = true, value_name = "X.ma")]
+    axes: Vec<PathBuf>,
     #[command(flatten)]
     fitting: AxisArguments,
     /// Seed of the samples.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Enclose the Hausdorff distance in an interval at most so wide, as a fraction of the diagonal.
+    /// Enclose the Hausdorff distance in an interval of at most this width, as a fraction of the
+    /// diagonal.
     #[arg(long, value_name = "TOL")]
     certify: Option<f64>,
     #[command(flatten)]
     measure: MeasureArguments,
 }
 
-/// Runs the verb.
+/// Runs the verb. With several files, a file that cannot be read is reported and the others are
+/// evaluated.
 ///
 /// # Errors
-/// When the surface or the medial mesh is refused.
+/// When the surface or the only medial mesh is refused.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let options = judge_options(&arguments.measure, JudgeOptions::default(), arguments.seed)?;
@@ -47,58 +53,175 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let input = Input::load(&source)?;
     let shape =
         input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
-    let (loaded, fit) = medial_mesh_for(&arguments.axis, &shape, &arguments.fitting)?;
-    let LoadedMa { mesh, notes, mut warnings, .. } = loaded;
     line.at("preparing the surface");
     let judge =
         shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
+    let mut rows = Vec::new();
+    for path in &arguments.axes {
+        let row = evaluate(path, arguments, (&shape, &judge), &line);
+        rows.push(row.map_err(|error| match error {
+            Refusal::Failure(failure) => failure,
+            Refusal::Metric(error @ (MetricError::Tolerance(_) | MetricError::TooFine { .. })) => {
+                Failure::usage(format!("--certify: {error}"))
+            }
+            Refusal::Metric(error @ (MetricError::NoArea | MetricError::NoVolume(_))) => {
+                Failure::of(&source, error)
+            }
+            Refusal::Metric(error) => Failure::input(format!("{}: {error}", path.display())),
+        }));
+    }
+    drop(line);
+    let warnings = &input.report.warnings;
+    if rows.len() == 1 {
+        let row = rows.remove(0)?;
+        print_one(&row, warnings, global);
+        return Ok(Exit::Done);
+    }
+    let refused = rows.iter().filter(|row| row.is_err()).count();
+    print_table(&arguments.axes, &rows, warnings, global);
+    Ok(match refused {
+        0 => Exit::Done,
+        _ if refused == rows.len() => Exit::Input,
+        _ => Exit::SomeFailed,
+    })
+}
+
+/// One medial mesh against the surface.
+#[derive(Serialize)]
+struct Evaluated {
+    #[serde(flatten)]
+    evaluation: Evaluation,
+    /// The change of units that came first, where `--fit` found one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fit: Option<Fit>,
+    /// How the file was read: in no JSON, because no number depends on it.
+    #[serde(skip)]
+    notes: Vec<String>,
+    /// Defects of the file.
+    #[serde(skip)]
+    defects: Vec<String>,
+}
+
+/// Why a medial mesh has no evaluation.
+enum Refusal {
+    Failure(Failure),
+    Metric(MetricError),
+}
+
+impl From<MetricError> for Refusal {
+    fn from(error: MetricError) -> Self {
+        Self::Metric(error)
+    }
+}
+
+fn evaluate(
+    path: &Path,
+    arguments: &Arguments,
+    (shape, judge): (&Shape, &Judge),
+    line: &StageLine,
+) -> Result<Evaluated, Refusal> {
+    line.at(format!("measuring {}", path.display()));
+    let (loaded, fit) =
+        medial_mesh_for(path, shape, &arguments.fitting).map_err(Refusal::Failure)?;
+    let LoadedMa { mesh, notes, warnings: defects, .. } = loaded;
     let to_normal = shape.normalisation();
     let mesh = mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
-    let refused = |error: MetricError| match error {
-        MetricError::Tolerance(_) | MetricError::TooFine { .. } => {
-            Failure::usage(format!("--certify: {error}"))
-        }
-        MetricError::NoArea | MetricError::NoVolume(_) => Failure::of(&source, error),
-        _ => Failure::input(format!("{}: {error}", arguments.axis.display())),
-    };
-    if arguments.certify.is_some() {
-        line.at("certifying the Hausdorff distance");
-    }
     let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
-    let mut certified = certified.transpose().map_err(refused)?;
+    let mut certified = certified.transpose()?;
     if let Some(Certificate { witness, .. }) = &mut certified {
         witness.point = to_normal.backward(witness.point);
     }
-    line.at("measuring");
-    let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(refused)? };
-    drop(line);
-    // No number depends on how a file writes its mesh, so the answer does not either.
-    for line in &notes {
-        note(global, &format!("{}: {line}", arguments.axis.display()));
-    }
-    warnings.extend(input.report.warnings);
-    if global.json {
-        print_json(&Evaluated { evaluation: &evaluation, fit }, &warnings);
-    } else {
-        print_evaluation(&evaluation);
-        for warning in evaluation.warnings.iter().chain(&warnings) {
-            print_line(&format!("  warning: {warning}"));
-        }
-    }
-    Ok(Exit::Done)
+    let evaluation = Evaluation { certified, ..judge.evaluate(&mesh)? };
+    Ok(Evaluated { evaluation, fit, notes, defects })
 }
 
-/// An evaluation and the change of units that it was made after.
-#[derive(Serialize)]
-struct Evaluated<'a> {
-    #[serde(flatten)]
-    evaluation: &'a Evaluation,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    fit: Option<Fit>,
+fn print_one(row: &Evaluated, warnings: &[String], global: &Global) {
+    for line in &row.notes {
+        note(global, line);
+    }
+    let warnings = [&row.defects[..], warnings].concat();
+    if global.json {
+        print_json(row, &warnings);
+        return;
+    }
+    print_evaluation(&row.evaluation);
+    for warning in row.evaluation.warnings.iter().chain(&warnings) {
+        print_line(&format!("  warning: {warning}"));
+    }
+}
+
+/// The evaluations next to each other: a row for each metric, a column for each file.
+fn print_table(
+    files: &[PathBuf],
+    rows: &[Result<Evaluated, Failure>],
+    warnings: &[String],
+    global: &Global,
+) {
+    let refused =
+        files.iter().zip(rows).filter_map(|(file, row)| Some((file, row.as_ref().err()?)));
+    for (_, failure) in refused {
+        print_error(&format!("medial: {}", failure.message));
+    }
+    if global.json {
+        let files: Vec<_> = (files.iter().zip(rows))
+            .map(|(file, row)| match row {
+                Ok(row) => {
+                    let mut object = json!(row);
+                    object["file"] = json!(file);
+                    if let Some(all) = object["warnings"].as_array_mut() {
+                        all.extend(row.defects.iter().map(|defect| json!(defect)));
+                    }
+                    object
+                }
+                Err(failure) => json!({ "file": file, "refused": failure.message }),
+            })
+            .collect();
+        print_json(&json!({ "files": files }), warnings);
+        return;
+    }
+    let (mut heads, mut evaluations) = (vec![String::new()], Vec::new());
+    for (file, row) in files.iter().zip(rows) {
+        if let Ok(row) = row {
+            heads.push(file.file_name().unwrap_or_default().to_string_lossy().into_owned());
+            evaluations.push(&row.evaluation);
+        }
+    }
+    let row = |title: &str, cell: &dyn Fn(&Evaluation) -> String| -> Vec<String> {
+        let cells = evaluations.iter().map(|evaluation| cell(evaluation));
+        std::iter::once(title.to_owned()).chain(cells).collect()
+    };
+    let mut table = vec![
+        heads,
+        row("spheres", &|e| e.counts.spheres.to_string()),
+        row("edges", &|e| e.counts.edges.to_string()),
+        row("faces", &|e| e.counts.faces.to_string()),
+        row("Betti numbers", &|e| format!("{:?}", e.betti)),
+    ];
+    table.extend(measured_rows(&evaluations).into_iter().map(|(metric, mut values)| {
+        values.insert(0, metric);
+        values
+    }));
+    let widths: Vec<usize> = (0..table[0].len())
+        .map(|column| table.iter().map(|row| row[column].chars().count()).max().unwrap_or(0))
+        .collect();
+    for row in &table {
+        let mut line = format!("{:<width$}", row[0], width = widths[0]);
+        for (cell, width) in row.iter().zip(&widths).skip(1) {
+            line.push_str(&format!("  {cell:>width$}"));
+        }
+        print_line(line.trim_end());
+    }
+    for (file, row) in files.iter().zip(rows) {
+        let Ok(row) = row else { continue };
+        for warning in row.evaluation.warnings.iter().chain(&row.defects) {
+            print_line(&format!("warning: {}: {warning}", file.display()));
+        }
+    }
+    warnings.iter().for_each(|warning| print_line(&format!("warning: {warning}")));
 }
 
 /// Prints every metric, lengths in percent of the diagonal.
-pub fn print_evaluation(evaluation: &Evaluation) {
+fn print_evaluation(evaluation: &Evaluation) {
     let counts = &evaluation.counts;
     print_line(&format!(
         "{}, {} ({} without a face), {}",

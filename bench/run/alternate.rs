@@ -9,8 +9,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use medial_reports::Record;
+
 use super::plan::{PlanError, finished};
-use super::record::Kept;
 use super::store::{Failures, Store};
 use super::supervise::{Supervisor, merge};
 use super::{Item, Progress, Provenance, hex_digest};
@@ -86,7 +87,7 @@ pub struct Contender<'a> {
 }
 
 /// An item that is under way on both sides.
-type Running<'i> = (&'i Item, [Vec<Kept>; 2]);
+type Running<'i> = (&'i Item, [Vec<Record>; 2]);
 
 /// Runs on both sides what either lacks, mesh by mesh, all repetitions in turn, and keeps the records.
 ///
@@ -100,7 +101,7 @@ pub fn run_alternately(
     for scene in items.chunk_by(|a, b| a.scene == b.scene) {
         let mut running: Vec<Running<'_>> = Vec::new();
         for item in scene {
-            progress.at(&format!("{}: {}", item.scene.label(), item.method.label()));
+            progress.at(&format!("{}: {}", item.scene.mesh, item.method.label()));
             let mut kept = [vec![], vec![]];
             for side in order(running.len()) {
                 let Contender { build, supervisor, .. } = &mut contenders[side];
@@ -115,8 +116,7 @@ pub fn run_alternately(
         }
         for (_, kept) in running {
             for (kept, contender) in kept.into_iter().zip(contenders.iter_mut()) {
-                let records: Vec<_> = finished(kept).into_iter().map(|kept| kept.record).collect();
-                contender.store.keep(&records)?;
+                contender.store.keep(&finished(kept))?;
             }
         }
     }
@@ -143,15 +143,14 @@ fn repeat(
 ) -> Result<(), PlanError> {
     contenders.iter_mut().for_each(|contender| contender.supervisor.renew());
     for (place, (item, kept)) in running.iter_mut().enumerate() {
-        let (scene, method) = (item.scene.label(), item.method.label());
+        let (scene, method) = (&item.scene.mesh, item.method.label());
         progress.at(&format!("{scene}: {method}, repetition {turn} of {}", item.repeat));
         for side in order(place + turn) {
-            let has_result = kept[side].iter().any(|k| k.record.status.has_result());
+            let has_result = kept[side].iter().any(|r| r.status.has_result());
             if turn <= item.repeat && has_result {
                 let Contender { build, supervisor, .. } = &mut contenders[side];
                 let again = supervisor.again(&build.own(item))?;
-                let mut records: Vec<_> = kept[side].iter_mut().map(|k| &mut k.record).collect();
-                merge(&mut records, turn, again);
+                merge(&mut kept[side], turn, again);
             }
         }
         progress.done();

@@ -49,13 +49,6 @@ pub struct SceneSpec {
     pub source: Source,
     /// SHA-256 of the input's file; `None` for a built-in shape, which the program's hash decides.
     pub hash: Option<String>,
-    /// Factor on all coordinates, which makes the input one in another unit of length.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub scaled: Option<f64>,
-    /// Displacements of the vertices that make another input of it, which results are measured
-    /// against.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub displaced: Option<Noise>,
     /// Displacements of the vertices of which results are measured against the input without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<Noise>,
@@ -98,10 +91,6 @@ pub struct Measure {
     pub volume_depth: u32,
     /// Seed of every sample.
     pub seed: u64,
-    /// Spacing of the balls that stand for the primitives where the Betti numbers of the union are
-    /// asked, as a fraction of the diagonal.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub union_spacing: Option<f64>,
     /// Width of the certified interval of the Hausdorff distance, a fraction of the diagonal, where
     /// one is asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -156,10 +145,9 @@ impl Item {
             Source::File(_) | Source::Cached { .. } => None,
             built_in @ Source::BuiltIn { .. } => Some(built_in),
         };
-        let SceneSpec { mesh, hash, scaled, displaced, noise, sampling, dual, measure, .. } =
-            &self.scene;
+        let SceneSpec { mesh, hash, noise, sampling, dual, measure, .. } = &self.scene;
         let MethodSpec { id, name, fingerprint, .. } = &self.method;
-        let scene = (mesh, source, hash, scaled, displaced, noise, sampling, dual, measure);
+        let scene = (mesh, source, hash, noise, sampling, dual, measure);
         let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.binary);
         let common = serde_json::to_string(&rest).expect("plain data");
         let key = |level: &Target| {
@@ -171,16 +159,6 @@ impl Item {
 }
 
 impl SceneSpec {
-    /// The input for people: its name, with the noise where there is any.
-    pub fn label(&self) -> String {
-        match self.noise {
-            Some(Noise { eta, seed }) if eta > 0.0 => {
-                format!("{}, noise {eta}, seed {seed}", self.mesh)
-            }
-            _ => self.mesh.clone(),
-        }
-    }
-
     /// How the substrates are built.
     pub fn shape_options(&self) -> ShapeOptions {
         ShapeOptions { sampling: self.sampling, dual: self.dual.into() }
@@ -208,7 +186,7 @@ impl Measure {
 impl From<JudgeOptions> for Measure {
     fn from(options: JudgeOptions) -> Self {
         let JudgeOptions { samples, volume_depth, seed } = options;
-        Self { samples, volume_depth, seed, union_spacing: None, certify: None }
+        Self { samples, volume_depth, seed, certify: None }
     }
 }
 
@@ -249,8 +227,6 @@ mod tests {
                 mesh: "bear".into(),
                 source: Source::File(PathBuf::from("bear.off")),
                 hash: Some("12ab".into()),
-                scaled: None,
-                displaced: None,
                 noise: None,
                 sampling: Sampling::default(),
                 dual: Dual::Fan,
@@ -288,10 +264,9 @@ mod tests {
         for change in same {
             assert_eq!(key(change), plain);
         }
-        let other: [fn(&mut Item); 11] = [
+        let other: [fn(&mut Item); 10] = [
             |i| i.scene.mesh = "bear-2".into(),
             |i| i.scene.hash = Some("12ac".into()),
-            |i| i.scene.scaled = Some(1000.0),
             |i| i.scene.noise = Some(Noise { eta: 0.01, seed: 1 }),
             |i| i.scene.dual = Dual::Delaunay,
             |i| i.scene.measure.samples += 1,
@@ -306,7 +281,7 @@ mod tests {
         keys.extend(item().keys().into_iter().skip(1));
         keys.sort_unstable();
         keys.dedup();
-        assert_eq!(keys.len(), 14);
+        assert_eq!(keys.len(), 13);
     }
 
     #[test]

@@ -51,7 +51,6 @@ pub use plan::{PlanError, Tally, count, missing, refused_params, run_items};
 pub use progress::{Progress, Verbosity};
 pub use protocol::CheckItem;
 pub use provenance::{Provenance, hex, hex_digest, peak_bytes, shell_line};
-pub use record::Kept;
 pub use registry::{Entry, INITIAL, Registry, RegistryError};
 pub use scene::Scene;
 pub use search::{Found, Probe, Search};

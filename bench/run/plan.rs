@@ -2,7 +2,7 @@
 
 use medial_reports::{Record, Status};
 
-use super::record::{Kept, median};
+use super::record::median;
 use super::store::{Failures, Store, StoreError};
 use super::supervise::{RunError, Supervisor, merge};
 use super::{Item, MethodSpec, Progress};
@@ -28,7 +28,7 @@ pub enum PlanError {
 }
 
 /// Takes the records of an item as soon as they are complete.
-pub type Keep<'a> = dyn FnMut(&Item, &[Kept]) -> Result<(), StoreError> + 'a;
+pub type Keep<'a> = dyn FnMut(&Item, &[Record]) -> Result<(), StoreError> + 'a;
 
 /// The items with the levels that are missing in a store, and what was found there.
 pub fn missing(items: &[Item], store: &Store, failures: Failures) -> (Vec<Item>, Tally) {
@@ -77,12 +77,13 @@ pub fn run_items(
     keep: &mut Keep<'_>,
 ) -> Result<(), PlanError> {
     for scene in items.chunk_by(|a, b| a.scene == b.scene) {
-        let mut waiting: Vec<(&Item, Vec<Kept>)> = Vec::new();
+        let mut waiting: Vec<(&Item, Vec<Record>)> = Vec::new();
         for item in scene {
-            progress.at(&format!("{}: {}", item.scene.label(), item.method.label()));
+            progress.at(&format!("{}: {}", item.scene.mesh, item.method.label()));
             let kept = supervisor.run(item)?;
-            let records: Vec<&Record> = kept.iter().map(|kept| &kept.record).collect();
-            failures(&records).iter().for_each(|remark| progress.remark(remark));
+            failures(&kept.iter().collect::<Vec<_>>())
+                .iter()
+                .for_each(|remark| progress.remark(remark));
             if item.repeat <= 1 {
                 keep(item, &finished(kept))?;
             } else {
@@ -93,17 +94,15 @@ pub fn run_items(
         let turns = waiting.iter().map(|(item, _)| item.repeat).max().unwrap_or(1);
         for turn in 2..=turns {
             for (item, kept) in &mut waiting {
-                if turn <= item.repeat && kept.iter().any(|k| k.record.status.has_result()) {
+                if turn <= item.repeat && kept.iter().any(|r| r.status.has_result()) {
                     progress.at(&format!(
                         "{}: {}, repetition {turn} of {}",
-                        item.scene.label(),
+                        item.scene.mesh,
                         item.method.label(),
                         item.repeat
                     ));
                     let again = supervisor.again(item)?;
-                    let mut records: Vec<&mut Record> =
-                        kept.iter_mut().map(|kept| &mut kept.record).collect();
-                    merge(&mut records, turn, again);
+                    merge(kept, turn, again);
                 }
             }
         }
@@ -115,8 +114,8 @@ pub fn run_items(
 }
 
 /// The records, with their seconds replaced by those of the median repetition.
-pub(super) fn finished(mut kept: Vec<Kept>) -> Vec<Kept> {
-    for Kept { record, .. } in &mut kept {
+pub(super) fn finished(mut kept: Vec<Record>) -> Vec<Record> {
+    for record in &mut kept {
         if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
             record.simplify.seconds = Some(seconds);
             record.simplify.cpu_seconds = median(&record.repetitions, |r| r.cpu_seconds);

@@ -6,12 +6,12 @@
 use std::io::{self, Read, Write};
 use std::path::PathBuf;
 
-use medial_reports::{Repetition, Target};
+use medial_reports::{Record, Repetition, Target};
 use serde::{Deserialize, Serialize};
 
 use crate::check::Outcome;
 
-use super::{Fault, Item, Kept, Limits, MethodSpec, Provenance};
+use super::{Fault, Item, Limits, MethodSpec, Provenance};
 
 /// The record separator of ASCII, with which no printed text begins.
 const MARK: u8 = 0x1e;
@@ -96,7 +96,7 @@ pub enum Event {
     /// The method does not take its parameters: why.
     WrongParameter(String),
     /// The record of a level.
-    Record(Box<Kept>),
+    Record(Box<Record>),
     /// The times of a repetition of a level, and a hash of its result.
     Repeated(Target, Result<(Repetition, String), Fault>),
     /// A case of the conformance corpus has reached this step.

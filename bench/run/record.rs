@@ -4,10 +4,7 @@ use std::path::Path;
 
 use medial::complex;
 use medial::simplifier::Simplified;
-use medial_reports::{
-    AxisShift, Conditions, Record, Repetition, Simplify, Stages, Status, Target, file_stem,
-};
-use serde::{Deserialize, Serialize};
+use medial_reports::{Conditions, Record, Repetition, Simplify, Stages, Status, Target, file_stem};
 
 use crate::plugin::{self, ProgramPeak};
 
@@ -16,25 +13,6 @@ use super::{Fault, GIVEN, Item, LevelRun, Provenance, Scene, Times, Verdict};
 /// Largest relative difference between the number of spheres and the requested number at which a
 /// result still counts as having that number.
 const COUNT_TOLERANCE: f64 = 0.02;
-
-/// A record, with additional figures for a noisy input.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Kept {
-    /// The record.
-    pub record: Record,
-    /// Comparison with the input without noise.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub noise: Option<NoisePart>,
-}
-
-/// How a noisy run differs from the one without noise.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct NoisePart {
-    /// Spheres of the noisy initial medial mesh over those of the clean one.
-    pub growth: Option<f64>,
-    /// Distances to the method's own result without noise.
-    pub shift: Option<AxisShift>,
-}
 
 /// The record of a level that was not run, or did not finish.
 pub fn failure_record(
@@ -67,14 +45,12 @@ pub fn failure_record(
         initial: None,
         conditions: Some(conditions(item)),
         result_hash: None,
-        union: None,
         seeds: seeds.map(|(purpose, seed)| (purpose.to_owned(), seed)).into(),
         repetitions: vec![],
         machine: provenance.machine.clone(),
         binary_hash: item.binary.clone(),
         command: provenance.command.clone(),
         version: provenance.version.clone(),
-        origin: None,
         artifact: None,
     }
 }
@@ -124,9 +100,8 @@ pub fn record(
         // The program ran while this process held its input, so both peaks add up.
         record.simplify.peak_bytes = Some(run.times.peak_bytes + bytes);
     }
-    if let Some(Verdict { evaluation, seconds, union, hash }) = verdict {
+    if let Some(Verdict { evaluation, seconds, hash }) = verdict {
         record.result_hash = Some(hash);
-        record.union = union;
         match evaluation {
             Some(Ok(evaluation)) => {
                 // The level found by a search was run again: only the error of this run counts.

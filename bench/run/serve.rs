@@ -15,7 +15,7 @@ use std::time::Duration;
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MethodInfo, RunContext, Simplification, SimplifyError};
-use medial_reports::Status;
+use medial_reports::{Record, Status};
 
 use crate::check::{self, Outcome, Subject};
 use crate::plugin::SCRATCH;
@@ -25,8 +25,8 @@ use super::answer::panic_message;
 use super::bounds::Bounds;
 use super::given;
 use super::protocol::{CheckItem, Event, Request, send};
-use super::record::{Kept, NoisePart, failure_record, record, repetition};
-use super::scene::{Scene, reference_key};
+use super::record::{failure_record, record, repetition};
+use super::scene::Scene;
 use super::verdict::{judge, mesh_hash};
 use super::{
     Entry, Fault, GIVEN, Input, Item, LevelRun, MethodSpec, Provenance, Registry, Source, answer,
@@ -120,27 +120,26 @@ fn run(
     let runs = answer_item(registry, item, scene, scene.shape());
     send(&Event::Measuring)?;
     let verdicts = judge(scene, &runs);
-    let noise = noise_parts(registry, scene, item, &runs);
-    for ((run, verdict), noise) in runs.iter().zip(verdicts).zip(noise) {
+    for (run, verdict) in runs.iter().zip(verdicts) {
         let record = record(item, scene, run, verdict, provenance, axes);
-        let kept = Kept { record, noise };
-        let kept = if survives_json(&kept) { kept } else { unreadable(item, run, provenance) };
-        send(&Event::Record(Box::new(kept)))?;
+        let record =
+            if survives_json(&record) { record } else { unreadable(item, run, provenance) };
+        send(&Event::Record(Box::new(record)))?;
     }
     Ok(())
 }
 
 /// Whether a record reads back as it is: JSON has no infinity and no NaN, and writes `null`.
-fn survives_json(kept: &Kept) -> bool {
-    let text = serde_json::to_string(kept).unwrap_or_default();
-    serde_json::from_str::<Kept>(&text).is_ok_and(|back| back == *kept)
+fn survives_json(record: &Record) -> bool {
+    let text = serde_json::to_string(record).unwrap_or_default();
+    serde_json::from_str::<Record>(&text).is_ok_and(|back| back == *record)
 }
 
 /// The record that replaces one that cannot be read back.
-fn unreadable(item: &Item, run: &LevelRun, provenance: &Provenance) -> Kept {
+fn unreadable(item: &Item, run: &LevelRun, provenance: &Provenance) -> Record {
     let reason = "a number of its record is not finite".to_owned();
     let fault = Fault { status: Status::InvalidOutput, reason };
-    Kept { record: failure_record(item, run.level, &fault, provenance), noise: None }
+    failure_record(item, run.level, &fault, provenance)
 }
 
 fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Result<()> {
@@ -264,39 +263,6 @@ fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, St
         return Err(format!("{label}: {what} has changed since the run was planned"));
     }
     Ok(entry)
-}
-
-/// Compares noisy results with those without noise, which are computed if they are missing; `None` for
-/// items without noise.
-fn noise_parts(
-    registry: &Registry,
-    scene: &mut Scene,
-    item: &Item,
-    runs: &[LevelRun],
-) -> Vec<Option<NoisePart>> {
-    let Some(noise) = item.scene.noise else { return vec![None; runs.len()] };
-    let key = |level| reference_key(&item.method, item.seed, level);
-    let results = |runs: &[LevelRun]| -> Vec<_> {
-        let results = runs.iter().filter_map(|run| Some((run.level, run.outcome.as_ref().ok()?)));
-        results.map(|(level, result)| (key(level), result.mesh.clone())).collect()
-    };
-    if noise.eta == 0.0 {
-        results(runs).into_iter().for_each(|(key, mesh)| scene.remember(key, mesh));
-        return vec![Some(NoisePart { growth: Some(1.0), shift: None }); runs.len()];
-    }
-    if runs.iter().any(|run| run.outcome.is_ok() && scene.reference(&key(run.level)).is_none()) {
-        let clean = scene.clean().expect("there is noise");
-        let clean = results(&answer_item(registry, item, scene, clean));
-        clean.into_iter().for_each(|(key, mesh)| scene.remember(key, mesh));
-    }
-    let part = |run: &LevelRun| {
-        let reference = scene.reference(&key(run.level));
-        let shift = run.outcome.as_ref().ok().zip(reference);
-        let shift =
-            shift.and_then(|(result, clean)| scene.shift(&scene.carried(&result.mesh), clean));
-        Some(NoisePart { growth: scene.growth(), shift })
-    };
-    runs.iter().map(part).collect()
 }
 
 impl Fault {

@@ -9,7 +9,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Component, Path, PathBuf};
 
-use medial_reports::{Journal, JournalError, Record, Status, Target, read_records};
+use medial_reports::{Journal, JournalError, Status, Target, read_records};
 use serde::{Deserialize, Serialize};
 
 use super::Item;
@@ -181,29 +181,6 @@ impl Store {
         Ok(self.journal.append_lines(lines)?)
     }
 
-    /// Whether a record that another process made of this item says more than what is here: there is none of its key,
-    /// or one that has to be run again, or a failure where it is none.
-    pub fn wants(&self, item: &Item, record: &Record) -> bool {
-        let Some(known) = self.known.get(&record.key) else { return true };
-        let new = Known::of(record);
-        let incomplete = |known: &Known| known.is_incomplete(item, Failures::Kept);
-        (incomplete(known) && !incomplete(&new))
-            || (known.status.is_failure() && !new.status.is_failure())
-    }
-
-    /// Adds records that other processes made, and knows them from then on.
-    ///
-    /// # Errors
-    /// When they cannot be written.
-    pub fn take(&mut self, records: &[Record]) -> Result<(), StoreError> {
-        if records.is_empty() {
-            return Ok(());
-        }
-        self.keep(records)?;
-        self.known.extend(records.iter().map(|record| (record.key.clone(), Known::of(record))));
-        Ok(())
-    }
-
     /// Removes the page, which no longer matches the records.
     fn withdraw_page(&mut self) -> Result<(), StoreError> {
         if !self.page_withdrawn {
@@ -232,16 +209,6 @@ impl From<bool> for Failures {
 }
 
 impl Known {
-    fn of(record: &Record) -> Self {
-        let limits = record.conditions.as_ref();
-        Self {
-            status: record.status,
-            repetitions: record.repetitions.len(),
-            seconds_limit: limits.map_or(0.0, |limits| limits.seconds_limit),
-            bytes_limit: limits.map_or(0, |limits| limits.bytes_limit),
-        }
-    }
-
     fn is_incomplete(&self, item: &Item, failures: Failures) -> bool {
         match self.status {
             Status::TimedOut if item.limits.seconds > self.seconds_limit => true,
@@ -348,13 +315,7 @@ fn read_known(path: &Path) -> io::Result<HashMap<String, Known>> {
 }
 
 fn stub(line: &[u8]) -> Option<Stub> {
-    /// A line of another journal than that of a comparison holds its record one level deeper.
-    #[derive(Deserialize)]
-    struct Nested {
-        record: Stub,
-    }
-    let nested = || serde_json::from_slice::<Nested>(line).ok().map(|nested| nested.record);
-    let stub = serde_json::from_slice::<Stub>(line).ok().or_else(nested);
+    let stub = serde_json::from_slice::<Stub>(line).ok();
     stub.filter(|stub| !stub.key.is_empty())
 }
 
@@ -377,8 +338,8 @@ fn remove_artifacts(dir: &Path, journal: &Path) {
 /// lock is held, so none is in use.
 fn remove_temporaries(dir: &Path) {
     let mut folders = vec![dir.to_owned(), dir.join("tables"), dir.join("plots")];
-    let meshes = fs::read_dir(dir.join(AXES)).into_iter().flatten().flatten();
     folders.push(dir.join(AXES));
+    let meshes = fs::read_dir(dir.join(AXES)).into_iter().flatten().flatten();
     folders.extend(meshes.map(|entry| entry.path()).filter(|path| path.is_dir()));
     let entries = folders.iter().flat_map(fs::read_dir).flatten().flatten();
     for entry in entries {

@@ -12,7 +12,7 @@ use crate::check::Outcome;
 
 use super::ending::{self, LOOK_AGAIN, Stage};
 use super::protocol::{CheckItem, Event, Request};
-use super::record::{Kept, failure_record};
+use super::record::failure_record;
 use super::worker::{Said, Worker, WorkerOptions};
 use super::{Fault, Item, Provenance, SceneSpec};
 
@@ -106,13 +106,13 @@ impl<'a> Supervisor<'a> {
     ///
     /// # Errors
     /// When the user interrupts, or no worker can be started.
-    pub fn run(&mut self, item: &Item) -> Result<Vec<Kept>, RunError> {
-        let mut kept: Vec<Kept> = Vec::new();
+    pub fn run(&mut self, item: &Item) -> Result<Vec<Record>, RunError> {
+        let mut kept: Vec<Record> = Vec::new();
         let mut groups = vec![item.levels.clone()];
         while let Some(levels) = groups.pop() {
             let part = Item { levels, ..item.clone() };
             let (attempt, told) = self.attempt(&part)?;
-            let untold = |level: &&Target| told.iter().all(|k| k.record.simplify.level != **level);
+            let untold = |level: &&Target| told.iter().all(|k| k.simplify.level != **level);
             let missing: Vec<Target> = part.levels.iter().filter(untold).copied().collect();
             kept.extend(told);
             let mut fail = |levels: &[Target], fault: &Fault| {
@@ -147,7 +147,7 @@ impl<'a> Supervisor<'a> {
                 }
             }
         }
-        let place = |kept: &Kept| item.levels.iter().position(|&l| l == kept.record.simplify.level);
+        let place = |kept: &Record| item.levels.iter().position(|&l| l == kept.simplify.level);
         kept.sort_by_key(place);
         Ok(kept)
     }
@@ -212,16 +212,14 @@ impl<'a> Supervisor<'a> {
         Ok(outcome)
     }
 
-    fn failed(&self, item: &Item, level: Target, fault: &Fault) -> Kept {
-        let noise =
-            item.scene.noise.map(|_| super::record::NoisePart { growth: None, shift: None });
+    fn failed(&self, item: &Item, level: Target, fault: &Fault) -> Record {
         let mut record = failure_record(item, level, fault, &self.provenance);
         let ready = self.input.as_ref().filter(|(scene, _)| *scene == item.scene);
         record.mesh_hash = ready.map(|(_, hash)| hash.clone()).or(record.mesh_hash);
-        Kept { record, noise }
+        record
     }
 
-    fn attempt(&mut self, item: &Item) -> Result<(Attempt, Vec<Kept>), RunError> {
+    fn attempt(&mut self, item: &Item) -> Result<(Attempt, Vec<Record>), RunError> {
         if let Some((scene, fault)) = &self.lost
             && *scene == item.scene
         {
@@ -236,7 +234,7 @@ impl<'a> Supervisor<'a> {
             }
         })?;
         // A method that panicked may have left locks and caches in any state.
-        if told.iter().any(|kept| kept.record.status == Status::Panicked) {
+        if told.iter().any(|kept| kept.status == Status::Panicked) {
             self.worker = None;
         }
         Ok((attempt, told))
@@ -331,7 +329,7 @@ impl<'a> Supervisor<'a> {
 
 /// Adds a repetition to the records of an item. One that ended otherwise than the first makes the
 /// record say so: a method that sometimes breaks is broken.
-pub fn merge(records: &mut [&mut Record], repetition: usize, again: Result<Vec<Repeated>, Fault>) {
+pub fn merge(records: &mut [Record], repetition: usize, again: Result<Vec<Repeated>, Fault>) {
     for record in records {
         let level = record.simplify.level;
         let again = match &again {

@@ -3,9 +3,8 @@
 use std::time::Instant;
 
 use medial::complex::MedialMesh;
-use medial::metrics::{Evaluation, MetricError, union_betti};
+use medial::metrics::{Evaluation, MetricError};
 use medial::shape::Shape;
-use medial_reports::UnionTopology;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
@@ -44,8 +43,6 @@ pub struct Verdict {
     pub evaluation: Option<Result<Evaluation, MetricError>>,
     /// Wall-clock seconds of the evaluation.
     pub seconds: f64,
-    /// Topology of the union, if requested.
-    pub union: Option<UnionTopology>,
     /// SHA-256 of the result.
     pub hash: String,
 }
@@ -76,8 +73,7 @@ fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
         Ok(Evaluation { certified, ..scene.judge.evaluate(&mesh)? })
     });
     let seconds = begun.elapsed().as_secs_f64();
-    let union = |spacing| UnionTopology { betti: union_betti(&mesh, spacing).ok() };
-    Verdict { evaluation, seconds, union: measure.union_spacing.map(union), hash }
+    Verdict { evaluation, seconds, hash }
 }
 
 /// SHA-256 of spheres, edges and faces: equal for equal meshes only.

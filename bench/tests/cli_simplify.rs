@@ -63,101 +63,70 @@ fn a_wrong_topology_is_said() {
 }
 
 #[test]
-fn hierarchies_are_saved_and_taken_from_a_file() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
-    let (all, computed, loaded) = (at("all.hierarchy"), at("computed.ma"), at("loaded.ma"));
-    let pmat =
-        |mesh: &str, more: &[&str]| json(&[&["simplify", mesh, "-m", "pmat"], more].concat());
-    let mesh = "builtin:torus:20";
-    assert_eq!(pmat(mesh, &["--save-hierarchy", &all]).0, 0);
-    for level in [["--spheres", "40"], ["--level", "1.5"], ["--max-error", "0.05"]] {
-        let level = [&level[..], &["--samples", "500"]].concat();
-        let first = pmat(mesh, &[&level[..], &["-o", &computed]].concat());
-        let again = pmat(mesh, &[&level[..], &["-o", &loaded, "--hierarchy", &all]].concat());
-        assert_eq!((first.0, again.0), (0, 0), "{again:?}");
-        assert_eq!(first.1["native_level"], again.1["native_level"]);
-        assert_eq!(first.1["diagnostics"], again.1["diagnostics"]);
-        assert_eq!(fs::read(&computed).expect("written"), fs::read(&loaded).expect("written"));
-        // Nothing was built for it; a search still measures against the surface.
-        assert_eq!(again.1["substrates"], serde_json::json!({}), "{again:?}");
-    }
-    let other = at("other.hierarchy");
-    let given = ["--initial", &computed, "--spheres", "5"];
-    assert_eq!(pmat(mesh, &[&given[..], &["--save-hierarchy", &other]].concat()).0, 0);
-    assert_eq!(pmat(mesh, &[&given[..], &["--hierarchy", &other]].concat()).0, 0);
-    let cut = at("cut.hierarchy");
-    let bytes = fs::read(&all).expect("written");
-    fs::write(&cut, &bytes[..bytes.len() - 7]).expect("written");
-    let cases: [(&str, &[&str], i32, &str); 8] = [
-        (
-            "builtin:torus:21",
-            &["--hierarchy", &all],
-            1,
-            "all.hierarchy: it was made from another surface",
-        ),
-        (
-            mesh,
-            &["--hierarchy", &all, "--sampling", "blue:300"],
-            1,
-            "with --sampling vertices, not blue:300",
-        ),
-        (mesh, &["--hierarchy", &all, "--initial", &computed], 1, "without --initial"),
-        (mesh, &["--hierarchy", &other], 1, "made with --initial"),
-        (mesh, &["--hierarchy", &cut], 1, "cut.hierarchy: not a file of a hierarchy: EOF"),
-        (mesh, &["--hierarchy", &computed], 1, "not a file of a hierarchy"),
-        (mesh, &["--hierarchy", "no-such-file"], 1, "no-such-file"),
-        (mesh, &["--save-hierarchy", "no/such/folder/x"], 1, "there is no folder"),
-    ];
-    for (mesh, more, expected, part) in cases {
-        let (code, object) = pmat(mesh, more);
-        let error = object["error"].as_str().expect("an error");
-        assert!(code == expected && error.contains(part), "{more:?}: {code}, {error}");
-    }
-    let (code, _, stderr) = run(&["simplify", mesh, "-m", "qmat", "--save-hierarchy", &all]);
-    assert!(code == 2 && stderr.contains("no hierarchy"), "{code}, {stderr}");
-    assert_eq!(fs::read(&all).expect("untouched"), bytes);
-}
-
-#[test]
-fn voxels_are_written_in_two_formats() {
+fn voxels_are_written_as_a_table() {
     let dir = tempfile::tempdir().expect("a folder");
     let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
     let aof = |more: &[&str]| {
         json(&[&["simplify", "builtin:plate", "-m", "aof", "--spheres", "200"], more].concat())
     };
-    let (ply, csv) = (at("v.ply"), at("v.csv"));
-    for file in [&ply, &csv] {
-        let (code, object) = aof(&["--voxels", file]);
-        assert_eq!(code, 0, "{object}");
-        let voxels = &object["voxels"];
-        assert_eq!(voxels["count"], 200);
-        assert_eq!(voxels["betti"], serde_json::json!([1, 0, 0]));
-    }
-    let read = |path: &str| fs::read(path).expect("written");
-    let text = String::from_utf8(read(&csv)).expect("UTF-8");
+    let (code, object) = aof(&["--voxels", &at("v.csv")]);
+    assert_eq!(code, 0, "{object}");
+    assert_eq!(object["voxels"]["count"], 200);
+    assert_eq!(object["voxels"]["betti"], serde_json::json!([1, 0, 0]));
+    let text = fs::read_to_string(at("v.csv")).expect("written");
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("x,y,z,distance,flux,i,j,k"));
-    let rows: Vec<Vec<f64>> = lines
-        .map(|line| line.split(',').map(|word| word.parse().expect("a number")).collect())
-        .collect();
-    assert_eq!(rows.len(), 200);
-    let numbers = |bytes: &[u8]| -> Vec<f64> {
-        let number = |b: &[u8]| f64::from_le_bytes(b.try_into().expect("eight bytes"));
-        bytes.chunks_exact(8).map(number).collect()
-    };
-    // The same numbers in both.
-    let ply = read(&ply);
-    let body = &ply[ply.len() - 200 * 52..];
-    assert!(ply[..ply.len() - body.len()].ends_with(b"end_header\n"));
-    for (row, expected) in body.chunks_exact(52).zip(&rows) {
-        assert_eq!(numbers(&row[..40]), expected[..5]);
+    let side = object["voxels"]["side"].as_f64().expect("a length");
+    let mut rows = 0;
+    for line in lines {
+        let row: Vec<f64> = line.split(',').map(|word| word.parse().expect("a number")).collect();
+        for axis in 0..3 {
+            // The centre is half a voxel above the lower corner of its cell.
+            let origin = object["voxels"]["origin"][axis].as_f64().expect("a coordinate");
+            let expected = origin + side * (row[5 + axis] + 0.5);
+            assert!((row[axis] - expected).abs() < 1e-9, "{line}");
+        }
+        rows += 1;
     }
+    assert_eq!(rows, 200);
     let (code, object) = aof(&["--voxels", &at("v.txt")]);
     assert!(code == 1 && object["error"].as_str().is_some_and(|e| e.contains(".csv")), "{object}");
     let (code, _, stderr) =
-        run(&["simplify", "builtin:box", "-m", "qmat", "--voxels", &at("v.ply")]);
+        run(&["simplify", "builtin:box", "-m", "qmat", "--voxels", &at("v.csv")]);
     assert!(code == 2 && stderr.contains("no voxels"), "{stderr}");
+}
+
+#[test]
+fn several_files_give_one_table() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let (fine, coarse, bad) = (at("fine.ma"), at("coarse.ma"), at("bad.ma"));
+    for (file, spheres) in [(&fine, "40"), (&coarse, "10")] {
+        let words = ["simplify", "builtin:box:8", "-m", "qmat", "--spheres", spheres, "-o", file];
+        assert_eq!(run(&words).0, 0);
+    }
+    let evaluate = ["evaluate", "builtin:box:8", "--samples", "500"];
+    let alone = |file: &str| json(&[&evaluate[..], &[file]].concat()).1;
+    let (code, both) = json(&[&evaluate[..], &[&fine, &coarse]].concat());
+    assert_eq!(code, 0, "{both}");
+    for (row, file) in [&fine, &coarse].into_iter().enumerate() {
+        let row = &both["files"][row];
+        assert_eq!(row["file"], file.as_str());
+        assert_eq!(row["hausdorff"], alone(file)["hausdorff"], "the same as alone");
+    }
+    let (code, stdout, _) = run(&[&evaluate[..], &[&fine, &coarse]].concat());
+    assert_eq!(code, 0);
+    let line = |name: &str| stdout.lines().find(|l| l.starts_with(name)).expect("a row").to_owned();
+    assert!(line("spheres").ends_with("40         10"), "{stdout}");
+    assert!(stdout.lines().next().is_some_and(|head| head.ends_with("fine.ma  coarse.ma")));
+
+    // A file that cannot be read is reported, and the others are evaluated.
+    fs::write(&bad, "1 0 0\nv 0 0\n").expect("written");
+    let (code, object) = json(&[&evaluate[..], &[&bad, &coarse]].concat());
+    assert_eq!(code, 3, "{object}");
+    assert!(object["files"][0]["refused"].as_str().is_some_and(|why| why.contains("bad.ma")));
+    assert!(object["files"][1]["hausdorff"].is_f64());
+    assert_eq!(json(&[&evaluate[..], &[&bad, &bad]].concat()).0, 1);
 }
 
 #[test]

@@ -110,12 +110,6 @@ fn targets(folder: &Path) -> Vec<Target> {
     let medial_mesh: Vec<&str> = medial_mesh.iter().map(String::as_str).collect();
     let medial_mesh = reading(&medial_mesh);
     targets.push(Target { extension: "ma", content: ma, commands: medial_mesh });
-    let hierarchy = "simplify builtin:box:8 -m pmat --spheres 9 -q --save-hierarchy {}";
-    targets.push(Target {
-        extension: "levels",
-        content: make(hierarchy, &at("box.levels")),
-        commands: reading(&["simplify builtin:box:8 -m pmat --spheres 9 -q --hierarchy {}"]),
-    });
     targets
 }
 

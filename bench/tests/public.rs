@@ -296,30 +296,6 @@ fn sets_are_compared_under_their_names() {
         records.iter().map(|r| [r["mesh"].as_str(), r["dataset"].as_str()]).collect();
     let public = ["ball", "rod-thin", "ring"].map(|name| [Some(name), Some("public")]);
     assert_eq!(told, [&public[..], &[[Some("sphere"), Some("builtin")]]].concat());
-
-    // The same as a study, planned: the meshes travel, and their names with them.
-    let study = "meshes = ['dataset:ring']\ndataset = 'deb:balls'\nspheres = [10]\ncounts_only = true\n\
-                 samples = 200\n[[method]]\nid = 'qmat'\n";
-    fs::write(machine.at("study.toml"), study).expect("written");
-    assert_eq!(machine.run(&["plan", "study.toml", "-o", "planned"]).0, 0);
-    fs::remove_dir_all(machine.at("cache")).expect("removed");
-    for number in ["0", "1", "2"] {
-        let (code, _, stderr) = machine.run(&["run-item", "planned", "--number", number, "-q"]);
-        assert_eq!(code, 0, "{stderr}");
-    }
-    let (code, _, stderr) = machine.run(&["collect", "planned"]);
-    assert_eq!(code, 0, "{stderr}");
-    let mut told: Vec<_> = read(&machine.at("planned/results.jsonl"))
-        .iter()
-        .map(|r| format!("{} {}", r["mesh"], r["dataset"]))
-        .collect();
-    told.sort();
-    // With nothing in the cache: the study in the folder names what came along.
-    let study = fs::read_to_string(machine.at("planned/study.toml")).expect("a study");
-    assert!(study.matches("meshes/").count() >= 3 && !study.contains("dataset:ring"), "{study}");
-    let pictures = fs::read_dir(machine.at("planned/pictures")).expect("a folder");
-    assert!(pictures.count() >= 3, "the report has its pictures");
-    assert_eq!(told, ["\"ball\" \"public\"", "\"ring\" \"public\"", "\"rod-thin\" \"public\""]);
 }
 
 #[test]

@@ -37,8 +37,8 @@ pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
 /// Whether nothing deterministic differs: most pairs, told without taking them apart.
 fn alike(old: &Record, new: &Record) -> bool {
     let (a, b) = (&old.simplify, &new.simplify);
-    (old.status, &old.evaluate, old.initial, &old.result_hash, old.union)
-        == (new.status, &new.evaluate, new.initial, &new.result_hash, new.union)
+    (old.status, &old.evaluate, old.initial, &old.result_hash)
+        == (new.status, &new.evaluate, new.initial, &new.result_hash)
         && (a.reached, a.native_level, a.spheres, a.edges, a.faces)
             == (b.reached, b.native_level, b.spheres, b.edges, b.faces)
         && (&a.diagnostics, &a.warnings) == (&b.diagnostics, &b.warnings)
@@ -128,7 +128,6 @@ fn facts(record: &Record) -> BTreeMap<String, Value> {
         ("simplify.diagnostics", plain(serde_json::to_value(&simplify.diagnostics))),
         ("evaluate", plain(serde_json::to_value(&record.evaluate))),
         ("initial", plain(serde_json::to_value(record.initial))),
-        ("union", plain(serde_json::to_value(record.union))),
     ];
     for (key, value) in whole {
         take_apart(key, value, &mut facts);

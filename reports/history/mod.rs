@@ -10,7 +10,6 @@
 mod change_points;
 mod report;
 mod run;
-mod student;
 
 use std::collections::BTreeMap;
 
@@ -21,7 +20,6 @@ pub use change_points::{ChangePoint, change_points};
 pub use run::{HistoryError, Point, Run, read_runs};
 
 use change_points::median;
-pub(crate) use student::beyond;
 
 /// A change point that is found one run later may lie this many runs beside its earlier place.
 const SAME_PLACE: usize = 3;

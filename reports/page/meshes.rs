@@ -64,8 +64,6 @@ fn inside(page: &Page<'_>, mesh: usize, part: &MeshPart) -> String {
         html.push_str("<p class=\"notice bad\">Nothing was measured on this mesh.</p>\n");
     } else {
         html.push_str(&html::plots(&part.plots));
-        let extras = page.extras.iter().flat_map(|extra| &extra.mesh_plots);
-        html.push_str(&html::plots(extras.filter(|(of, _)| *of == mesh).map(|(_, plot)| plot)));
     }
     html.push_str(&html::table(&part.table));
     html.push_str(&format!(

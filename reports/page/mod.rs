@@ -6,21 +6,17 @@
 //! questions about points of the plots.
 
 mod details;
-mod extras;
 mod html;
 mod meshes;
 mod overview;
 pub(crate) mod packed;
-mod papers;
 mod reference;
 mod results;
 
 pub(crate) use self::html::table as html_table;
 
 use crate::comparison::Comparison;
-use crate::extras::Extra;
 use crate::header::{Header, RunNote};
-use crate::papers::Papers;
 use crate::plots::Plot;
 use crate::record::Machine;
 use crate::summary::CountSummary;
@@ -44,9 +40,6 @@ pub(crate) struct Page<'a> {
     pub(crate) summary_tables: &'a [Table],
     /// Whether the first of them is that of equal errors.
     pub(crate) has_equal_error: bool,
-    pub(crate) extras: &'a [Extra],
-    /// What a paper takes over.
-    pub(crate) papers: Option<&'a Papers>,
 }
 
 /// What the page shows of one mesh.
@@ -89,14 +82,12 @@ impl Page<'_> {
             html.push_str(&overview::section(self));
         }
         if !self.comparison.entries.is_empty() {
-            html.push_str(&extras::sections(self));
             html.push_str(&results::section(self));
             html.push_str(&meshes::section(self));
         }
         html.push_str(&reference::warnings(self));
         html.push_str(&reference::methods(self.header, self.comparison));
         html.push_str(reference::definitions().as_str());
-        html.push_str(&papers::section(self));
         html.push_str(&reference::files(self));
         html.push_str("</main>\n");
         if self.meshes.iter().any(|mesh| mesh.view.is_some()) {
@@ -106,12 +97,11 @@ impl Page<'_> {
             ));
         }
         html.push_str(&format!(
-            "<script>\n\"use strict\";\n{}{}{}{}{}{}</script>\n</body>\n</html>\n",
+            "<script>\n\"use strict\";\n{}{}{}{}{}</script>\n</body>\n</html>\n",
             include_str!("packed.js"),
             include_str!("table.js"),
             include_str!("plots.js"),
             include_str!("view3d.js"),
-            include_str!("papers.js"),
             include_str!("script.js")
         ));
         html
@@ -151,18 +141,12 @@ impl Page<'_> {
         if comparison.measured() > 0 {
             html.push_str("<a href=\"#overview\">Overview</a>");
         }
-        for extra in self.extras {
-            html.push_str(&format!("<a href=\"#{}\">{}</a>", extra.stem, extra.title));
-        }
         if !comparison.entries.is_empty() {
             html.push_str(
                 "<a href=\"#results\">Results</a><a href=\"#meshes\">Meshes, pictures</a>",
             );
         }
         html.push_str("<a href=\"#definitions\">Definitions</a>");
-        if self.papers.is_some() {
-            html.push_str("<a href=\"#papers\">For papers</a>");
-        }
         html.push_str("<a href=\"#files\">Files</a></nav>\n");
         html.push_str("</header>\n");
         html

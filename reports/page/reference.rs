@@ -147,21 +147,11 @@ pub(crate) fn files(page: &Page<'_>) -> String {
             escape_html(path)
         )
     };
-    let papers = match page.papers {
-        Some(_) => format!(
-            "<li>{}, {}, {}: the text on the methods and their BibTeX</li>\n",
-            link(crate::papers::TEXT),
-            link(crate::papers::LATEX),
-            link(crate::papers::BIBTEX)
-        ),
-        None => String::new(),
-    };
     format!(
         "<section id=\"files\">\n<h2>Files</h2>\n<ul>\n\
          <li>{}: the records, one JSON object on each line</li>\n\
          <li>{}: every number of every record, one row for each</li>\n\
          <li>{}, {}: means over meshes; <code>tables/mesh-…</code> for each of {}</li>\n\
-         {papers}\
          <li><code>plots/</code>: {} as SVG</li>\n</ul>\n</section>\n",
         link("results.jsonl"),
         link("results.csv"),

@@ -2,8 +2,6 @@
 
 mod axis;
 mod bars;
-mod convergence;
-mod extras;
 mod figure;
 mod palette;
 mod points;
@@ -25,10 +23,7 @@ use self::bars::Bars;
 use self::figure::{Curve, Figure};
 use self::points::{Drawing, Origin};
 
-pub(crate) use self::convergence::{ConvergenceCurve, against_edge_length};
-pub(crate) use self::extras::{NoiseCurve, against_noise, against_numbers};
-pub(crate) use self::figure::FONTS;
-pub(crate) use self::palette::{BASELINE, style};
+pub(crate) use self::palette::style;
 pub(crate) use self::scaling::scaling_plots;
 
 /// Why a plot could not be drawn.

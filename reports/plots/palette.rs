@@ -60,18 +60,9 @@ const MARKERS: [Marker; 11] = [
     Marker::Lozenge,
 ];
 
-/// The series of what is no method: drawn in grey ink and dashed.
-pub(crate) const BASELINE: usize = usize::MAX;
-
-/// Ink of the baseline: neither a method's colour nor the background's, on light and dark pages.
-const BASELINE_INK: RGBColor = RGBColor(0x5A, 0x5E, 0x66);
-
 /// Colour and marker of a series. Twelve colours and eleven markers repeat together only after
 /// 132 series.
 pub(crate) fn style(series: usize) -> (RGBColor, Marker) {
-    if series == BASELINE {
-        return (BASELINE_INK, Marker::Plus);
-    }
     (COLOURS[series % COLOURS.len()], MARKERS[series % MARKERS.len()])
 }
 

@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 
 use crate::plots::axis::Axis;
 use crate::plots::figure::{Curve, Figure};
-use crate::plots::palette::BASELINE;
 use crate::text::significant;
 
 /// What is known of a point beside where it lies.
@@ -115,7 +114,7 @@ fn rounded(value: f64) -> f64 {
 
 /// The name of a series in the drawing.
 pub(crate) fn series_key(series: usize) -> String {
-    if series == BASELINE { "baseline".to_owned() } else { series.to_string() }
+    series.to_string()
 }
 
 /// No text of a figure holds this character: control characters are not printable.

@@ -195,7 +195,6 @@ fn provenance() -> Vec<Column> {
         column("warnings", |r| Some(warnings(r).join("; "))),
         column("repetitions", |r| serde_json::to_string(&r.repetitions).ok()),
         column("seeds", |r| serde_json::to_string(&r.seeds).ok()),
-        column("origin", |r| r.origin.as_ref().map(|origin| origin.trust.to_string())),
         column("artifact", |r| r.artifact.clone()),
         column("cpu", |r| Some(r.machine.cpu.clone())),
         column("cores", |r| Some(r.machine.cores.to_string())),

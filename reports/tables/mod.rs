@@ -7,7 +7,7 @@ mod per_mesh;
 mod summary;
 
 pub(crate) use self::csv::{to_csv, warnings};
-pub(crate) use self::latex::{escape as escape_latex, to_latex};
+pub(crate) use self::latex::to_latex;
 pub(crate) use self::markdown::{escape as escape_markdown, to_markdown};
 pub(crate) use self::per_mesh::{Best, mesh_table, remark, topology_verdict};
 pub(crate) use self::summary::summary_tables;

@@ -64,7 +64,7 @@ pub(crate) fn remark(entry: &Entry<'_>) -> String {
     if let (crate::Target::Spheres(_), false) = (record.simplify.level, entry.comparable()) {
         return "another number of spheres: not compared".to_owned();
     }
-    record.origin.as_ref().map_or_else(String::new, |origin| origin.trust.to_string())
+    String::new()
 }
 
 /// The table of one mesh. `how` tells the command line and version that made it.

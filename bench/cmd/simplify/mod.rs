@@ -9,16 +9,11 @@ use clap::Args;
 use medial::complex::{self, MedialMesh};
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
-use medial::simplifier::{
-    Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError,
-};
-use medial_methods::pmat;
+use medial::simplifier::{Level, Params, RunContext, Simplification, SimplifyError};
 use medial_methods::tam_heidrich::PartInfo;
 use medial_reports::{Simplify, Status};
 
-use super::hierarchy::{self, Loaded, Origin};
 use super::methods::method;
-use super::voxels;
 use crate::args::{
     AxisArguments, Global, MeasureArguments, MeshArgument, SubstrateArguments, params,
     shape_options,
@@ -57,10 +52,6 @@ pub struct Arguments {
     /// Start from this medial mesh instead of the Voronoi one.
     #[arg(long, value_name = "Y.ma")]
     initial: Option<PathBuf>,
-    /// Take the level from a file of `--save-hierarchy`, made from the same mesh by the same method,
-    /// instead of computing it.
-    #[arg(long, value_name = "FILE")]
-    hierarchy: Option<PathBuf>,
     #[command(flatten)]
     fitting: AxisArguments,
     #[command(flatten)]
@@ -81,7 +72,6 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let method = entry.method();
     let options = shape_options(&arguments.substrate)?;
     bound::check(arguments)?;
-    check_hierarchy(arguments, method)?;
     arguments.outputs.check(method)?;
     let line = StageLine::new(global.stages());
     line.at("reading");
@@ -94,11 +84,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         shape = shape.with_initial(&initial);
     }
     let params = params(&arguments.set)?;
-    let origin =
-        Origin::new(&arguments.method, &params, &input, &shape, arguments.initial.as_deref());
-    let loaded = arguments.hierarchy.as_deref();
-    let loaded = loaded.map(|path| hierarchy::load(path, &origin, &shape)).transpose()?;
-    let start = Start { entry, params, shape: &shape, loaded };
+    let start = Start { entry, params, shape: &shape };
     let (run, search) = simplify(arguments, &start, &input, &line)?;
     let mut simplify = describe(arguments, &start, &run);
     let simplified = run.outcome.map_err(|fault| failure(&source, fault))?;
@@ -106,7 +92,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     simplify.warnings.extend(shape.sampling_warning().map(str::to_owned));
     simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
     line.at("writing");
-    arguments.outputs.write(&simplified, &shape, &origin)?;
+    arguments.outputs.write(&simplified, &shape)?;
     drop(line);
     if global.json {
         let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
@@ -118,7 +104,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
             object["parts"] = in_input_units(parts, &shape).map_err(Failure::input)?;
         }
         if let Some(voxels) = extras.get() {
-            object["voxels"] = voxels::describe(voxels, &shape);
+            object["voxels"] = outputs::describe_voxels(voxels, &shape);
         }
         print_json(&object, &warnings);
     } else {
@@ -155,21 +141,11 @@ fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde
     serde_json::to_value(parts.iter().map(carried).collect::<Vec<_>>())
 }
 
-fn check_hierarchy(arguments: &Arguments, method: &dyn MedialSimplifier) -> Result<(), Failure> {
-    let info = method.info();
-    if arguments.hierarchy.is_some() && !info.has_extra(pmat::HIERARCHY) {
-        let message = format!("--hierarchy: {} has no hierarchy of levels", info.id);
-        return Err(Failure::usage(message));
-    }
-    Ok(())
-}
-
 /// What a method starts from.
 struct Start<'a> {
     entry: &'a Entry,
     params: Params,
     shape: &'a Shape,
-    loaded: Option<Loaded>,
 }
 
 impl<'a> Start<'a> {
@@ -179,20 +155,12 @@ impl<'a> Start<'a> {
         view: &'v Shape,
         run: &RunContext,
     ) -> Result<Box<dyn Simplification + 'v>, SimplifyError> {
-        let Self { entry, params, loaded, .. } = self;
-        let method = entry.method();
-        match loaded {
-            Some(loaded) => loaded.resume(method, params),
-            None => method.prepare(view, params, run),
-        }
+        self.entry.method().prepare(view, &self.params, run)
     }
 
     /// Number of spheres that the method starts from.
     fn spheres(&self) -> Result<usize, SimplifyError> {
-        Ok(match &self.loaded {
-            Some(loaded) => loaded.hierarchy.initial().spheres.len(),
-            None => self.shape.initial()?.spheres.len(),
-        })
+        Ok(self.shape.initial()?.spheres.len())
     }
 }
 
@@ -226,10 +194,7 @@ fn simplify(
             line.at(format!("simplifying to {level} by {}", arguments.method));
         },
     );
-    let mut run = runs.pop().ok_or_else(|| Failure::input("no level was run"))?;
-    if let Some(loaded) = &start.loaded {
-        run.times.prepare += loaded.read;
-    }
+    let run = runs.pop().ok_or_else(|| Failure::input("no level was run"))?;
     Ok((run, search))
 }
 

@@ -1,19 +1,18 @@
 //! The files that `simplify` writes: what can be refused before the work, and the writing.
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use medial::complex::{self, collapse::Hierarchy};
+use medial::complex;
 use medial::shape::Shape;
 use medial::simplifier::{MedialSimplifier, Simplified};
 use medial::surface::{self, TriMesh};
 use medial_methods::aof::{self, LatticeVoxels};
-use medial_methods::pmat;
 use medial_methods::tam_heidrich::{self, OuterPoles, RemainingPoles};
+use serde_json::json;
 
-use crate::cmd::hierarchy::{self, Origin};
 use crate::cmd::reconstruct::COINCIDENT;
-use crate::cmd::voxels;
 use crate::exit::Failure;
 use crate::files::{SURFACES, check_extension, check_folder, check_output};
 
@@ -23,10 +22,7 @@ pub struct Outputs {
     /// The result (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Write all levels into a file, for `--hierarchy`; for methods that have them.
-    #[arg(long, value_name = "FILE")]
-    save_hierarchy: Option<PathBuf>,
-    /// Write the voxels with their distance and flux (.ply, .csv), for methods on a lattice.
+    /// Write the voxels with their distance and flux (.csv), for methods on a lattice.
     #[arg(long, value_name = "FILE")]
     voxels: Option<PathBuf>,
     /// Write the power crust of the poles that are left (.ply, .off, .obj), for methods that prune
@@ -59,13 +55,10 @@ impl Outputs {
             false => Err(Failure::usage(format!("{option}: {} has no {what}", info.id))),
         };
         check_output(self.output.as_deref())?;
-        if let Some(path) = &self.save_hierarchy {
-            needs("--save-hierarchy", pmat::HIERARCHY, "hierarchy of levels")?;
-            check_folder(path)?;
-        }
         if let Some(path) = &self.voxels {
             needs("--voxels", aof::VOXELS, "voxels")?;
-            voxels::check(path)?;
+            check_extension(path, &["csv"])?;
+            check_folder(path)?;
         }
         if let Some(path) = &self.power_crust {
             needs("--power-crust", tam_heidrich::POLES, "poles")?;
@@ -75,17 +68,12 @@ impl Outputs {
         Ok(())
     }
 
-    /// Writes what was asked for; `origin` says what a hierarchy is of.
+    /// Writes the requested files.
     ///
     /// # Errors
     /// When the poles have no power crust, and then nothing is written, or when a file cannot be
     /// written.
-    pub fn write(
-        &self,
-        result: &Simplified,
-        shape: &Shape,
-        origin: &Origin,
-    ) -> Result<(), Failure> {
+    pub fn write(&self, result: &Simplified, shape: &Shape) -> Result<(), Failure> {
         // Before anything is written: whether there is a crust shows only when it is made.
         let crust = match (&self.power_crust, result.extras.get()) {
             (Some(path), Some(poles)) => Some((path, self.crust(path, poles, shape)?)),
@@ -96,11 +84,8 @@ impl Outputs {
             let mesh = result.mesh.transformed(back.diagonal, |p| back.backward(p));
             complex::write(path, &mesh).map_err(Failure::input)?;
         }
-        if let (Some(path), Some(all)) = (&self.save_hierarchy, result.extras.get::<Hierarchy>()) {
-            hierarchy::save(path, all, origin)?;
-        }
         if let (Some(path), Some(voxels)) = (&self.voxels, result.extras.get::<LatticeVoxels>()) {
-            voxels::write(path, voxels, shape)?;
+            write_voxels(path, voxels, shape)?;
         }
         if let Some((path, crust)) = crust {
             surface::write(path, &crust).map_err(Failure::input)?;
@@ -134,7 +119,6 @@ impl Outputs {
     pub fn written(&self) -> Vec<String> {
         let files = [
             (&self.output, ""),
-            (&self.save_hierarchy, " with all levels"),
             (&self.voxels, ", a point for each voxel"),
             (&self.power_crust, ", the power crust of the poles that are left"),
         ];
@@ -143,4 +127,33 @@ impl Outputs {
         });
         written.collect()
     }
+}
+
+/// Writes a line for each voxel: its centre and distance in the units of the surface, its flux, and
+/// its indices in the lattice.
+fn write_voxels(path: &Path, voxels: &LatticeVoxels, shape: &Shape) -> Result<(), Failure> {
+    let back = shape.normalisation();
+    let write = |out: &mut dyn Write| -> io::Result<()> {
+        writeln!(out, "x,y,z,distance,flux,i,j,k")?;
+        for voxel in &voxels.voxels {
+            let [x, y, z] = back.backward(voxels.centre(voxel)).to_array();
+            let ([i, j, k], distance) = (voxel.place, voxel.distance * back.diagonal);
+            writeln!(out, "{x},{y},{z},{distance},{},{i},{j},{k}", voxel.flux)?;
+        }
+        Ok(())
+    };
+    medial::write_atomically(path, |out| write(out))
+        .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}
+
+/// The lattice of the voxels, for the JSON of the result.
+pub(super) fn describe_voxels(voxels: &LatticeVoxels, shape: &Shape) -> serde_json::Value {
+    let back = shape.normalisation();
+    json!({
+        "count": voxels.voxels.len(),
+        "origin": back.backward(voxels.origin).to_array(),
+        "side": voxels.side * back.diagonal,
+        "size": voxels.size,
+        "betti": voxels.betti(),
+    })
 }

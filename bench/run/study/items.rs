@@ -119,8 +119,6 @@ impl Study {
                 mesh,
                 source: source.clone(),
                 hash,
-                scaled: None,
-                displaced: None,
                 noise: None,
                 sampling: self.sampling,
                 dual: self.dual,
@@ -140,7 +138,6 @@ impl Study {
             samples: self.samples,
             volume_depth: VOLUME_DEPTH,
             seed: self.seed,
-            union_spacing: None,
             certify: self.certify,
         }
     }

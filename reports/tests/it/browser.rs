@@ -406,28 +406,6 @@ fn check_views(browser: &mut Browser) {
     browser.value("document.querySelectorAll('details.mesh')[1].open = false");
 }
 
-/// A button copies its text, or selects it where the browser lets no page copy.
-fn check_papers(browser: &mut Browser) {
-    browser.value("window.paste = [...document.querySelectorAll('.paste')].pop()");
-    assert_eq!(browser.value("paste.querySelector('button').hidden"), false);
-    let at = browser.centre("paste.querySelector('button')");
-    browser.mouse("mousePressed", at);
-    browser.mouse("mouseReleased", at);
-    browser.until("paste.querySelector('output').textContent !== ''");
-    if browser.text("paste.querySelector('output').textContent").starts_with("Selected") {
-        let selected = browser.text("getSelection().toString()");
-        assert!(selected.starts_with("@article{qmat,") && selected.contains("@misc{medial,"));
-    }
-    // And where there is nothing to copy with.
-    browser.value(
-        "{ Object.defineProperty(navigator, 'clipboard', {value: undefined}); \
-         paste.querySelector('button').click(); }",
-    );
-    browser.until("paste.querySelector('output').textContent.startsWith('Selected')");
-    let selected = browser.text("getSelection().toString()");
-    assert!(selected.starts_with("@article{qmat,") && selected.contains("@misc{medial,"));
-}
-
 #[test]
 fn the_page_answers_from_disk() {
     let folder = tempfile::tempdir().unwrap();
@@ -444,7 +422,6 @@ fn the_page_answers_from_disk() {
     check_sticky(&mut browser);
     check_plots(&mut browser);
     check_views(&mut browser);
-    check_papers(&mut browser);
 
     let mut requests = 0;
     for event in &browser.events {

@@ -3,9 +3,7 @@
 mod browser;
 mod common;
 mod diff;
-mod extras;
 mod history;
 mod journal;
-mod papers;
 mod report;
 mod scaling;
