@@ -20,9 +20,7 @@ use std::collections::HashMap;
 use medial::Vec3;
 use medial::surface::TriMesh;
 
-use crate::blocks::split;
-use crate::fields::{Field, project};
-use crate::manifold::{euler, first_defect};
+use crate::solids::split;
 
 /// Rounds of step 4; the triangles hardly change after that.
 const ROUNDS: usize = 15;
@@ -193,4 +191,150 @@ pub(crate) fn slide(
             .map(|(&v, (sum, count))| project(field, v.lerp(sum / count, 0.5)));
         *vertices = moved.collect();
     }
+}
+
+// Implicit functions: negative inside, with their gradients.
+
+/// A function whose zero set is a smooth closed surface.
+pub(crate) trait Field {
+    /// Value and gradient at a point.
+    fn at(&self, p: Vec3) -> (f64, Vec3);
+}
+
+/// A part of a blended shape, by its exact signed distance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Part {
+    /// All points within `radius` of the segment `ab`.
+    Tube { a: Vec3, b: Vec3, radius: f64 },
+    /// A torus in a plane `z = const`.
+    Torus { centre: Vec3, major: f64, minor: f64 },
+}
+
+impl Part {
+    fn distance(&self, p: Vec3) -> (f64, Vec3) {
+        match *self {
+            Self::Tube { a, b, radius } => {
+                let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+                let from_axis = p - a.lerp(b, t);
+                (from_axis.length() - radius, from_axis.normalize_or_zero())
+            }
+            Self::Torus { centre, major, minor } => {
+                let q = p - centre;
+                let radial = Vec3::new(q.x, q.y, 0.0).normalize_or_zero();
+                let from_axis = q - radial * major;
+                (from_axis.length() - minor, from_axis.normalize_or_zero())
+            }
+        }
+    }
+}
+
+/// The union of parts with smooth seams: `f = -log(sum exp(-k d_i)) / k`.
+///
+/// The gradient is a weighted mean of unit vectors, so `|f(p) - f(q)| <= |p - q|`. The union is
+/// the plain one where a single part is near, and thicker by up to `log(n) / k` where `n` meet.
+#[derive(Clone, Debug)]
+pub(crate) struct Blend {
+    pub(crate) parts: Vec<Part>,
+    /// The sharpness `k`, an inverse length.
+    pub(crate) sharpness: f64,
+}
+
+impl Field for Blend {
+    fn at(&self, p: Vec3) -> (f64, Vec3) {
+        let distances: Vec<(f64, Vec3)> = self.parts.iter().map(|part| part.distance(p)).collect();
+        let nearest = distances.iter().map(|d| d.0).fold(f64::INFINITY, f64::min);
+        let (mut sum, mut gradient) = (0.0, Vec3::ZERO);
+        for (distance, direction) in distances {
+            // Relative to the nearest part, so that nothing overflows or vanishes altogether.
+            let weight = (-self.sharpness * (distance - nearest)).exp();
+            sum += weight;
+            gradient += direction * weight;
+        }
+        (nearest - sum.ln() / self.sharpness, gradient / sum)
+    }
+}
+
+/// The ellipsoid with these semi-axes: `|p / s|^2 - 1`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ellipsoid(pub(crate) Vec3);
+
+impl Field for Ellipsoid {
+    fn at(&self, p: Vec3) -> (f64, Vec3) {
+        let scaled = p / self.0;
+        (scaled.length_squared() - 1.0, 2.0 * scaled / self.0)
+    }
+}
+
+/// The point of the surface reached from a point near it, by Newton steps along the gradient.
+pub(crate) fn project(field: &impl Field, mut p: Vec3) -> Vec3 {
+    const STEPS: usize = 40;
+    let (mut value, mut gradient) = field.at(p);
+    for _ in 0..STEPS {
+        let next = p - gradient * (value / gradient.length_squared());
+        let (next_value, next_gradient) = field.at(next);
+        // Steps end where rounding does: when the value no longer falls.
+        if next_value.is_nan() || next_value.abs() >= value.abs() {
+            break;
+        }
+        (p, value, gradient) = (next, next_value, next_gradient);
+    }
+    p
+}
+
+// Whether a triangle mesh is the oriented boundary of a solid, combinatorially.
+
+/// What keeps a mesh from being a closed, oriented 2-manifold; `None` when nothing does.
+///
+/// Every directed edge must have exactly one opposite, every vertex a single fan of triangles.
+/// Cost `O(F log F)`.
+pub(crate) fn first_defect(mesh: &TriMesh) -> Option<String> {
+    let mut directed: Vec<[u32; 2]> = mesh.faces.iter().flat_map(directed_edges).collect();
+    directed.sort_unstable();
+    if let Some(pair) = directed.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Some(format!("directed edge {:?} stands twice", pair[0]));
+    }
+    if let Some(edge) = directed.iter().find(|[a, b]| directed.binary_search(&[*b, *a]).is_err()) {
+        return Some(format!("edge {edge:?} has no opposite"));
+    }
+    if let Some([a, _]) = directed.iter().find(|[a, b]| a == b) {
+        return Some(format!("a face names vertex {a} twice"));
+    }
+    vertex_without_single_fan(mesh)
+}
+
+fn directed_edges(&[a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+fn vertex_without_single_fan(mesh: &TriMesh) -> Option<String> {
+    // For the corner `a` of a face `abc`, the fan goes on from `b` to `c`.
+    let mut links: Vec<[u32; 3]> =
+        mesh.faces.iter().flat_map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]).collect();
+    links.sort_unstable();
+    let mut start = 0;
+    for vertex in 0..mesh.vertices.len() as u32 {
+        let end = start + links[start..].partition_point(|link| link[0] == vertex);
+        let fan = &links[start..end];
+        let Some(&[_, first, _]) = fan.first() else {
+            return Some(format!("vertex {vertex} belongs to no face"));
+        };
+        let next = |at: u32| fan.binary_search_by_key(&at, |link| link[1]).map(|i| fan[i][2]);
+        let mut at = first;
+        for step in 1..=fan.len() {
+            at = match next(at) {
+                Ok(next) => next,
+                Err(_) => return Some(format!("the fan of vertex {vertex} is open")),
+            };
+            if at == first && step < fan.len() {
+                return Some(format!("vertex {vertex} has more than one fan"));
+            }
+        }
+        start = end;
+    }
+    None
+}
+
+/// Euler number of a closed triangle mesh, `V - E + F` with `E = 3 F / 2`.
+pub(crate) fn euler(mesh: &TriMesh) -> i64 {
+    mesh.vertices.len() as i64 - mesh.faces.len() as i64 / 2
 }

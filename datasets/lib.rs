@@ -13,30 +13,18 @@
 //! ```
 
 mod axes;
-mod blocks;
 mod catalogue;
-mod curves;
-mod dropped;
-mod fields;
-mod geodesic;
 mod implicit;
-mod manifold;
 mod noise;
-mod planar;
 mod profiles;
 pub mod published;
-mod revolved;
 mod shapes;
-mod strips;
-mod torus;
+mod solids;
 
 pub use axes::KnownAxis;
 pub use catalogue::{BuiltIn, MAX_RESOLUTION, catalogue, find};
 pub use noise::{NoiseError, NoiseKind, add_noise, noisy};
 
-#[cfg(test)]
-#[allow(clippy::print_stdout)]
-mod spikes_tests;
 #[cfg(test)]
 mod tests;
 

@@ -1,15 +1,18 @@
 //! Declared noise.
 
+use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::str::FromStr;
 
 use medial::Vec3;
+use medial::geometry::predicates::projection_axis;
+use medial::geometry::triangles_meet;
 use medial::surface::{Normalisation, TriMesh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use crate::dropped::without_share;
+use crate::implicit::first_defect;
 
 /// What noise does to a mesh, and what its magnitude is a fraction of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -173,4 +176,232 @@ fn vertex_normals(mesh: &TriMesh) -> Vec<Vec3> {
         }
     }
     sums.into_iter().map(Vec3::normalize_or_zero).collect()
+}
+
+// Surfaces with samples missing: vertices merged into neighbours, while the surface stays embedded.
+//
+// The link condition is that of T. K. Dey, H. Edelsbrunner, S. Guha, D. V. Nekhayev, *Topology preserving edge
+// contraction*, Publications de l'Institut Mathématique 66 (1999).
+
+/// A face may turn by 60 degrees.
+const LEAST_COSINE: f64 = 0.5;
+/// Sine of the smallest angle that a new face may have: 5 degrees.
+const LEAST_SINE: f64 = 0.087;
+
+/// The mesh without a share of its vertices; see [`crate::noisy`].
+pub(crate) fn without_share(mesh: &TriMesh, share: f64, seed: u64) -> Result<TriMesh, NoiseError> {
+    let vertices = mesh.vertices.len();
+    let asked = (share * vertices as f64).round() as usize;
+    if asked == 0 {
+        return Ok(mesh.clone());
+    }
+    if let Some(defect) = first_defect(mesh) {
+        return Err(NoiseError::NotManifold(defect));
+    }
+    let mut surface = Surface::new(mesh);
+    let mut waiting = VecDeque::from(shuffled(vertices, seed));
+    // Ends when every vertex that waits was refused since the last one that went.
+    let (mut dropped, mut refused) = (0, 0);
+    while dropped < asked && refused < waiting.len() {
+        let Some(vertex) = waiting.pop_front() else { break };
+        if surface.drop_vertex(vertex) {
+            (dropped, refused) = (dropped + 1, 0);
+        } else {
+            waiting.push_back(vertex);
+            refused += 1;
+        }
+    }
+    if dropped < asked {
+        return Err(NoiseError::TooFew { asked, dropped, vertices });
+    }
+    Ok(surface.into_mesh())
+}
+
+fn shuffled(count: usize, seed: u64) -> Vec<u32> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut order: Vec<u32> = (0..count as u32).collect();
+    for i in (1..count).rev() {
+        order.swap(i, random.random_range(0..=i));
+    }
+    order
+}
+
+/// A closed surface in the making; faces that are gone are `None`.
+struct Surface {
+    vertices: Vec<Vec3>,
+    faces: Vec<Option<[u32; 3]>>,
+    /// The faces of each vertex, and of vertices that are gone none.
+    stars: Vec<Vec<u32>>,
+    grid: Grid,
+}
+
+impl Surface {
+    fn new(mesh: &TriMesh) -> Self {
+        let mut surface = Self {
+            vertices: mesh.vertices.clone(),
+            faces: Vec::new(),
+            stars: vec![Vec::new(); mesh.vertices.len()],
+            grid: Grid { spacing: mean_edge(mesh), faces: HashMap::new() },
+        };
+        mesh.faces.iter().for_each(|&face| surface.add(face));
+        surface
+    }
+
+    fn places(&self, face: [u32; 3]) -> [Vec3; 3] {
+        face.map(|v| self.vertices[v as usize])
+    }
+
+    fn add(&mut self, face: [u32; 3]) {
+        let id = self.faces.len() as u32;
+        self.faces.push(Some(face));
+        face.iter().for_each(|&v| self.stars[v as usize].push(id));
+        self.grid.insert(id, self.places(face));
+    }
+
+    fn remove(&mut self, id: u32) {
+        let face = self.faces[id as usize].take().expect("a face that is there");
+        face.iter().for_each(|&v| self.stars[v as usize].retain(|&other| other != id));
+    }
+
+    fn star(&self, v: u32) -> Vec<[u32; 3]> {
+        let face = |&id: &u32| self.faces[id as usize].expect("a face that is there");
+        self.stars[v as usize].iter().map(face).collect()
+    }
+
+    fn neighbours(&self, v: u32) -> Vec<u32> {
+        let mut all: Vec<u32> =
+            self.star(v).into_flattened().into_iter().filter(|&u| u != v).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Merges a vertex into the neighbour that sweeps the least volume, if there is one that may.
+    fn drop_vertex(&mut self, v: u32) -> bool {
+        let star = self.star(v);
+        let mut choices: Vec<(f64, u32, Vec<[u32; 3]>)> = Vec::new();
+        for into in self.neighbours(v) {
+            let kept = star.iter().filter(|face| !face.contains(&into));
+            let moved: Vec<[u32; 3]> =
+                kept.map(|face| face.map(|u| if u == v { into } else { u })).collect();
+            choices.push((self.swept(v, &moved), into, moved));
+        }
+        choices.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let fitting = choices.into_iter().find(|(_, into, moved)| {
+            self.keeps_topology(v, *into)
+                && self.keeps_shape(v, *into, moved)
+                && !self.crosses(v, moved)
+        });
+        let Some((_, _, moved)) = fitting else { return false };
+        for id in self.stars[v as usize].clone() {
+            self.remove(id);
+        }
+        moved.into_iter().for_each(|face| self.add(face));
+        true
+    }
+
+    /// Volume between a vertex and the faces that would replace its star.
+    fn swept(&self, v: u32, moved: &[[u32; 3]]) -> f64 {
+        let apex = self.vertices[v as usize];
+        let volume = |&face: &[u32; 3]| {
+            let [a, b, c] = self.places(face).map(|p| p - apex);
+            a.dot(b.cross(c)).abs()
+        };
+        moved.iter().map(volume).sum()
+    }
+
+    /// The link condition: the two vertices have no common neighbour but the two across their edge.
+    fn keeps_topology(&self, v: u32, into: u32) -> bool {
+        let others = self.neighbours(into);
+        let common = self.neighbours(v).iter().filter(|u| others.binary_search(u).is_ok()).count();
+        let tetrahedron = [v, into].iter().all(|&u| self.stars[u as usize].len() == 3);
+        common == 2 && !tetrahedron
+    }
+
+    /// Whether no face turns too far or becomes too thin.
+    fn keeps_shape(&self, v: u32, into: u32, moved: &[[u32; 3]]) -> bool {
+        moved.iter().all(|&face| {
+            let before = face.map(|u| if u == into { v } else { u });
+            let (new, old) = (self.places(face), self.places(before));
+            let turned = normal(new).dot(normal(old)) < LEAST_COSINE;
+            !turned && smallest_sine(new) >= LEAST_SINE && projection_axis(new).is_some()
+        })
+    }
+
+    /// Whether a face that would replace the star of `v` meets another one outside common corners and edges.
+    fn crosses(&self, v: u32, moved: &[[u32; 3]]) -> bool {
+        moved.iter().enumerate().any(|(i, &face)| {
+            let places = self.places(face);
+            let meets = |other: [u32; 3]| triangles_meet(face, places, other, self.places(other));
+            let alive = |id: u32| self.faces[id as usize].filter(|other| !other.contains(&v));
+            moved[..i].iter().any(|&other| meets(other))
+                || self.grid.near(places).into_iter().filter_map(alive).any(meets)
+        })
+    }
+
+    /// What is left, in the old order.
+    fn into_mesh(self) -> TriMesh {
+        let Self { vertices, faces, stars, .. } = self;
+        let mut new_id = vec![u32::MAX; vertices.len()];
+        let mut mesh = TriMesh::default();
+        for (v, star) in stars.iter().enumerate().filter(|(_, star)| !star.is_empty()) {
+            debug_assert!(star.len() >= 3, "a closed fan");
+            new_id[v] = mesh.vertices.len() as u32;
+            mesh.vertices.push(vertices[v]);
+        }
+        mesh.faces = faces.into_iter().flatten().map(|f| f.map(|v| new_id[v as usize])).collect();
+        mesh
+    }
+}
+
+fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+/// Sine of the smallest angle: twice the area over the two longer sides.
+fn smallest_sine([a, b, c]: [Vec3; 3]) -> f64 {
+    let mut sides = [a.distance(b), b.distance(c), c.distance(a)];
+    sides.sort_by(f64::total_cmp);
+    (b - a).cross(c - a).length() / (sides[1] * sides[2])
+}
+
+fn mean_edge(mesh: &TriMesh) -> f64 {
+    let perimeter = |face| {
+        let [a, b, c]: [Vec3; 3] = mesh.triangle(face);
+        a.distance(b) + b.distance(c) + c.distance(a)
+    };
+    (0..mesh.faces.len()).map(perimeter).sum::<f64>() / (3 * mesh.faces.len()) as f64
+}
+
+/// Faces by the cubes that their boxes overlap. Faces that are gone stay in it.
+struct Grid {
+    spacing: f64,
+    faces: HashMap<[i64; 3], Vec<u32>>,
+}
+
+impl Grid {
+    fn insert(&mut self, id: u32, triangle: [Vec3; 3]) {
+        for cube in self.cubes(triangle) {
+            self.faces.entry(cube).or_default().push(id);
+        }
+    }
+
+    /// Faces that share a cube with the triangle, ascending.
+    fn near(&self, triangle: [Vec3; 3]) -> Vec<u32> {
+        let cubes = self.cubes(triangle);
+        let mut ids: Vec<u32> =
+            cubes.iter().filter_map(|cube| self.faces.get(cube)).flatten().copied().collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    }
+
+    fn cubes(&self, [a, b, c]: [Vec3; 3]) -> Vec<[i64; 3]> {
+        let cube = |p: Vec3| (p / self.spacing).floor().to_array().map(|x| x as i64);
+        let (low, high) = (cube(a.min(b).min(c)), cube(a.max(b).max(c)));
+        let range = |axis: usize| low[axis]..=high[axis];
+        range(0)
+            .flat_map(|i| range(1).flat_map(move |j| range(2).map(move |k| [i, j, k])))
+            .collect()
+    }
 }

@@ -5,15 +5,12 @@ use std::f64::consts::TAU;
 use medial::Vec3;
 use medial::surface::TriMesh;
 
-use crate::blocks::{boundary, divided};
-use crate::curves::Curve;
-use crate::fields::{Blend, Ellipsoid, Part};
-use crate::geodesic::{frequency, joined, mapped, reversed, unit_sphere};
-use crate::implicit::{polygonise, slide};
-use crate::profiles::{Elbow, Frustum, Rib};
-use crate::revolved::{Piece, Ring, SECTORS, cap, mirrored, parts, rings, surface};
-use crate::strips::{across_elbow, around_hole, strip, triangle};
-use crate::torus as torus_grid;
+use crate::implicit::{Blend, Ellipsoid, Part, polygonise, slide};
+use crate::profiles::{Elbow, Frustum, Rib, across_elbow, around_hole, flat_triangle, strip};
+use crate::solids::{
+    Curve, Piece, Ring, SECTORS, boundary, cap, divided, frequency, joined, mapped, mirrored,
+    parts, reversed, rings, surface, torus_grid, unit_sphere,
+};
 
 /// Semi-axes of the ellipsoid.
 pub(crate) const ELLIPSOID: Vec3 = Vec3::new(1.0, 0.7, 0.45);
@@ -289,8 +286,7 @@ pub(crate) fn pair(edge: f64) -> TriMesh {
 
 pub(crate) fn torus(edge: f64) -> TriMesh {
     let (major, minor) = TORUS;
-    let tau = std::f64::consts::TAU;
-    torus_grid::torus(major, minor, parts(tau * major, edge, 8), parts(tau * minor, edge, 6))
+    torus_grid(major, minor, parts(TAU * major, edge, 8), parts(TAU * minor, edge, 6))
 }
 
 pub(crate) fn hollow_sphere(edge: f64) -> TriMesh {
@@ -302,7 +298,7 @@ pub(crate) fn wedge(edge: f64) -> TriMesh {
     let Vec3 { x: half, y: half_length, z: height } = WEDGE;
     // The base is shorter than the other sides: parts of about `edge` in their mean.
     let mean_side = (2.0 * half + 2.0 * half.hypot(height)) / 3.0;
-    triangle(half, height, parts(mean_side, edge, 2)).prism(0.0, half_length, edge)
+    flat_triangle(half, height, parts(mean_side, edge, 2)).prism(0.0, half_length, edge)
 }
 
 pub(crate) fn fillet(edge: f64) -> TriMesh {

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from . import _medial
-from ._arrays import FloatArray, IndexArray, floats, indices, truths
-from ._calls import Progress, call, path_text, real, whole
+from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, path_text, real, truths, whole
 from .errors import InputError, ParameterError
 from .evaluation import Evaluation
 from .mesh import Mesh

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from . import _plugins
-from ._calls import path_text
+from ._arguments import path_text
 from ._command import STARTED_BY
 from .errors import FailedError, InputError, ParameterError
 from .mesh import Mesh

@@ -7,8 +7,7 @@ import os
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _medial
-from ._arrays import FloatArray, IndexArray, floats, indices
-from ._calls import Progress, call, path_text, whole
+from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, path_text, whole
 from .errors import InputError, ParameterError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from . import _medial
-from ._arrays import BoolArray, FloatArray, IndexArray, floats
+from ._arguments import BoolArray, FloatArray, IndexArray, floats
 from .axis import MedialAxis
 from .errors import ParameterError
 

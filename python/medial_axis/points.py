@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from . import _medial
-from ._arrays import FloatArray, IndexArray, floats
-from ._calls import Progress, call
+from ._arguments import FloatArray, IndexArray, Progress, call, floats
 from .axis import MedialAxis
 from .errors import InputError
 from .mesh import Mesh

@@ -16,11 +16,11 @@ use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::arrays::{Once, of_points, of_rows, points, triangles};
-use crate::error::{Failure, Kind};
+use crate::calls::{
+    Call, Failure, Kind, Monitor, Once, long, of_points, of_rows, points, triangles,
+};
 use crate::method::Method;
 use crate::surface::{Surface, shape_options};
-use crate::work::{Call, Monitor, long};
 
 /// A medial mesh in input units, and the shape that it is of, where that is known.
 #[pyclass(frozen, module = "medial_axis._medial")]
@@ -106,7 +106,7 @@ impl Axis {
         edges: PyReadonlyArray2<'_, u32>,
         faces: PyReadonlyArray2<'_, u32>,
     ) -> PyResult<Self> {
-        let (centres, radii) = (points(&centres)?, crate::arrays::numbers(&radii)?);
+        let (centres, radii) = (points(&centres)?, crate::calls::numbers(&radii)?);
         if centres.rows().len() != radii.rows().len() {
             let (n, m) = (centres.rows().len(), radii.rows().len());
             return Err(Failure::input(format!("{n} centres, but {m} radii")).into());

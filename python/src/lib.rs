@@ -1,26 +1,32 @@
-//! The part of the Python package `medialaxis` that is Rust: thin objects around the library, for `medial_axis/*.py`,
-//! which has the documentation and the types that users meet.
+//! The Rust part of the Python package `medialaxis`: thin objects around the library, for `medial_axis/*.py`, which has
+//! the documentation and the types that users meet.
 //!
-//! | file | holds |
+//! | file | content |
 //! |---|---|
+//! | `lib` | the module; the command `medial`, which loads Python classes; triangulations of points |
 //! | `surface` | a closed surface with its substrates, each built once |
 //! | `axis` | a medial mesh, in the units of its surface |
-//! | `geometry` | triangulations of points |
 //! | `method` | a Python class as a `MedialSimplifier` |
-//! | `command` | the command `medial`, which loads such classes |
-//! | `work` | long calls: without the interpreter's lock, with progress, ended by Ctrl-C |
-//! | `arrays`, `error` | numpy arrays and exceptions |
+//! | `calls` | long calls, numpy arrays, exceptions |
 
-mod arrays;
 mod axis;
-mod command;
-mod error;
-mod geometry;
+mod calls;
 mod method;
 mod surface;
-mod work;
 
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use medial::geometry::delaunay::Delaunay;
+use medial::geometry::regular::Regular;
+use medial::geometry::triangulation::Triangulation;
+use medial_bench::host::Host;
+use medial_bench::main_hosted;
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+
+use crate::calls::{Call, Failure, long, numbers, of_rows, points};
+use crate::method::Classes;
 
 /// Filled by name, so that `_medial.pyi` can be read beside it.
 #[pymodule]
@@ -30,8 +36,66 @@ fn _medial(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<axis::Axis>()?;
     module.add_class::<method::ShapeHandle>()?;
     module.add_class::<method::RunHandle>()?;
-    module.add_function(wrap_pyfunction!(geometry::triangulate, module)?)?;
+    module.add_function(wrap_pyfunction!(triangulate, module)?)?;
     module.add_function(wrap_pyfunction!(method::methods, module)?)?;
-    module.add_function(wrap_pyfunction!(command::run_command, module)?)?;
+    module.add_function(wrap_pyfunction!(run_command, module)?)?;
     Ok(())
+}
+
+/// Runs the command and gives its exit code. `program` with `arguments` starts it again; `code` is the file of this
+/// module.
+#[pyfunction]
+fn run_command(
+    py: Python<'_>,
+    program: PathBuf,
+    arguments: Vec<OsString>,
+    code: PathBuf,
+    words: Vec<OsString>,
+) -> u8 {
+    let host = Host { program, arguments, code, words };
+    py.detach(|| main_hosted(medial_methods::registry(), host, Box::new(Classes)) as u8)
+}
+
+/// Finite cells, hidden points, and pairs of a repeated point with the one that it repeats.
+type Arrays<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+
+/// The Delaunay triangulation of points, or the regular one where they have weights.
+#[pyfunction]
+fn triangulate<'py>(
+    py: Python<'py>,
+    sites: PyReadonlyArray2<'py, f64>,
+    weights: Option<PyReadonlyArray1<'py, f64>>,
+    call: Call,
+) -> PyResult<Arrays<'py>> {
+    let sites = points(&sites)?;
+    let weights = weights.as_ref().map(numbers).transpose()?;
+    let (triangulation, hidden, repeated) = long(py, &call, move |_, monitor| {
+        monitor.at("triangulating");
+        let made = match &weights {
+            None => {
+                let made = Delaunay::new(sites.rows())?;
+                let repeated = made.duplicates().to_vec();
+                (made.into_triangulation(), vec![], repeated)
+            }
+            Some(weights) => {
+                let made = Regular::new(sites.rows(), weights.rows())?;
+                let (hidden, repeated) = (made.hidden().to_vec(), made.duplicates().to_vec());
+                (made.into_triangulation(), hidden, repeated)
+            }
+        };
+        Ok::<_, Failure>(made)
+    })?;
+    let hidden = of_rows(py, hidden.iter().map(|vertex| [vertex.0]))?;
+    let repeated = of_rows(py, repeated.iter().map(|(vertex, of)| [vertex.0, of.0]))?;
+    Ok((cells(py, &triangulation)?, hidden.into_any(), repeated.into_any()))
+}
+
+fn cells<'py>(py: Python<'py>, triangulation: &Triangulation) -> PyResult<Bound<'py, PyAny>> {
+    // One vector of the right size: there are seven cells for each point.
+    let mut flat = Vec::with_capacity(4 * triangulation.finite_cell_count());
+    flat.extend(
+        triangulation.finite_cells().flat_map(|cell| triangulation.vertices(cell).map(|v| v.0)),
+    );
+    let rows = flat.len() / 4;
+    Ok(PyArray1::from_vec(py, flat).reshape([rows, 4])?.into_any())
 }

@@ -20,9 +20,8 @@ use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde::Deserialize;
 
-use crate::arrays::{of_points, of_rows, points};
 use crate::axis::Axis;
-use crate::error::{Failure, Kind};
+use crate::calls::{Failure, Kind, of_points, of_rows, points};
 
 /// The module that stands between a class and this file.
 const BETWEEN: &str = "medial_axis._plugins";

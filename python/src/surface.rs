@@ -13,10 +13,8 @@ use medial_bench::run::{AxisOptions, Dual, Input, Source, read_axis};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays::{Once, of_points, of_rows, points, triangles};
 use crate::axis::Axis;
-use crate::error::{Failure, Kind};
-use crate::work::{Call, long};
+use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triangles};
 
 /// A surface that bounds a solid, in its own units.
 #[pyclass(frozen, module = "medial_axis._medial")]

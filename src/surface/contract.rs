@@ -16,7 +16,6 @@ use std::collections::BinaryHeap;
 
 use super::mesh::TriMesh;
 use crate::Vec3;
-use crate::geometry::PowerCrust;
 
 /// The result of contracting the short edges of a surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -279,33 +278,4 @@ impl<'a> Shrinking<'a> {
         let faces = (0..).zip(self.faces.iter().copied()).filter_map(alive).collect();
         TriMesh { vertices, faces }
     }
-}
-
-// The power crust as a surface.
-
-impl From<&PowerCrust> for TriMesh {
-    /// The crust as triangles, on all of its corners.
-    fn from(crust: &PowerCrust) -> Self {
-        Self { vertices: crust.corners().to_vec(), faces: crust.triangles() }
-    }
-}
-
-/// A power crust as triangles, with corners at one position merged along the edges between them.
-///
-/// Corners nearer than `coincident`, in the unit of the balls, are at one position; above the level of
-/// rounding, which flat groups of balls amplify to some 1e-8 of the diagonal, any value well below
-/// the distance of samples will do. `O(n log n)`.
-pub fn crust_surface(crust: &PowerCrust, coincident: f64) -> Contraction {
-    crust_surface_while(crust, coincident, || true).expect("nobody stops it")
-}
-
-/// [`crust_surface`] for as long as `go_on` says so, which is asked every few thousand edges;
-/// `None` if it was stopped.
-pub fn crust_surface_while(
-    crust: &PowerCrust,
-    coincident: f64,
-    go_on: impl FnMut() -> bool,
-) -> Option<Contraction> {
-    let limits = vec![coincident; crust.corners().len()];
-    contract_short_edges_while(&crust.into(), &limits, Folds::Ignored, go_on)
 }

@@ -1,0 +1,416 @@
+//! Triangle meshes of solids: grid blocks, geodesic spheres, surfaces of revolution, tubes about curves, tori.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use medial::Vec3;
+use medial::surface::TriMesh;
+
+use crate::shapes::capsule_of;
+
+// Surfaces of unions of grid blocks: everything with flat sides and right angles.
+
+/// Grid coordinates along one axis: the breaks, and even divisions of about `edge` between them.
+pub(crate) fn divided(breaks: &[f64], edge: f64) -> Vec<f64> {
+    let mut ticks = vec![breaks[0]];
+    for pair in breaks.windows(2) {
+        let n = parts(pair[1] - pair[0], edge, 1);
+        // The weighted sum meets both breaks exactly.
+        ticks.extend((1..=n).map(|k| {
+            let t = f64::from(k) / f64::from(n);
+            pair[0] * (1.0 - t) + pair[1] * t
+        }));
+    }
+    ticks
+}
+
+/// The boundary of the blocks whose centre is `solid`, on the grid of the given coordinates,
+/// oriented outward, each vertex carried through `place`.
+///
+/// Two blocks may not meet in an edge or a corner alone.
+pub(crate) fn boundary(
+    ticks: &[Vec<f64>; 3],
+    solid: impl Fn(Vec3) -> bool,
+    place: impl Fn(Vec3) -> Vec3,
+) -> TriMesh {
+    let mut builder = Builder { ticks, place, mesh: TriMesh::default(), ids: HashMap::new() };
+    let cells = [0, 1, 2].map(|axis| ticks[axis].len() as i64 - 1);
+    let filled = |cell: [i64; 3]| {
+        let inside = (0..3).all(|axis| (0..cells[axis]).contains(&cell[axis]));
+        inside && {
+            let middle = [0, 1, 2].map(|axis| {
+                let i = cell[axis] as usize;
+                (ticks[axis][i] + ticks[axis][i + 1]) / 2.0
+            });
+            solid(Vec3::from(middle))
+        }
+    };
+    for i in 0..cells[0] {
+        for j in 0..cells[1] {
+            for k in (0..cells[2]).filter(|&k| filled([i, j, k])) {
+                for (axis, step) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
+                    let mut beyond = [i, j, k];
+                    beyond[axis] += step;
+                    if !filled(beyond) {
+                        builder.side([i, j, k].map(|n| n as usize), axis, step > 0);
+                    }
+                }
+            }
+        }
+    }
+    builder.mesh
+}
+
+struct Builder<'a, P> {
+    ticks: &'a [Vec<f64>; 3],
+    place: P,
+    mesh: TriMesh,
+    ids: HashMap<[usize; 3], u32>,
+}
+
+impl<P: Fn(Vec3) -> Vec3> Builder<'_, P> {
+    /// The side of a block across `axis`, above or below, as two triangles.
+    fn side(&mut self, cell: [usize; 3], axis: usize, above: bool) {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut corner = |du: usize, dv: usize| {
+            let mut node = cell;
+            node[axis] += usize::from(above);
+            node[u] += du;
+            node[v] += dv;
+            self.vertex(node)
+        };
+        let mut quad = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+        if !above {
+            quad.swap(1, 3);
+        }
+        split(&mut self.mesh, quad);
+    }
+
+    fn vertex(&mut self, node: [usize; 3]) -> u32 {
+        let Self { ticks, place, mesh, ids } = self;
+        *ids.entry(node).or_insert_with(|| {
+            let at = [0, 1, 2].map(|axis| ticks[axis][node[axis]]);
+            mesh.vertices.push(place(Vec3::from(at)));
+            mesh.vertices.len() as u32 - 1
+        })
+    }
+}
+
+/// Adds a quadrilateral as two triangles, cut along its shorter diagonal.
+pub(crate) fn split(mesh: &mut TriMesh, [a, b, c, d]: [u32; 4]) {
+    let length = |p: u32, q: u32| mesh.vertices[p as usize].distance(mesh.vertices[q as usize]);
+    // A hair's breadth in favour of `ac`, so that rounding does not choose between equals.
+    if length(a, c) <= length(b, d) * (1.0 + 1e-9) {
+        mesh.faces.extend([[a, b, c], [a, c, d]]);
+    } else {
+        mesh.faces.extend([[a, b, d], [b, c, d]]);
+    }
+}
+
+// Geodesic spheres: the faces of an icosahedron, divided and pushed out to the sphere.
+
+/// Average edge of a geodesic unit sphere times its frequency.
+const EDGE_TIMES_FREQUENCY: f64 = 1.15;
+
+/// The frequency at which a sphere of this radius has edges of about `edge`.
+pub(crate) fn frequency(radius: f64, edge: f64) -> u32 {
+    (EDGE_TIMES_FREQUENCY * radius / edge).round().max(1.0) as u32
+}
+
+/// The unit sphere with every edge of the icosahedron divided into `frequency` parts:
+/// `10 frequency^2 + 2` vertices. Oriented outward.
+pub(crate) fn unit_sphere(frequency: u32) -> TriMesh {
+    let (corners, base) = icosahedron();
+    let mut mesh = TriMesh::default();
+    // By the icosahedron's corners and their weights, so that neighbouring faces agree exactly.
+    let mut ids: HashMap<[(u32, u32); 3], u32> = HashMap::new();
+    for face in base {
+        let mut vertex = |i: u32, j: u32| {
+            let weights = [frequency - i - j, i, j];
+            let mut key = [0, 1, 2].map(|k| (if weights[k] > 0 { face[k] } else { 0 }, weights[k]));
+            key.sort_unstable();
+            *ids.entry(key).or_insert_with(|| {
+                let sum: Vec3 = key.iter().map(|&(k, w)| corners[k as usize] * f64::from(w)).sum();
+                mesh.vertices.push(sum.normalize());
+                mesh.vertices.len() as u32 - 1
+            })
+        };
+        for i in 0..frequency {
+            for j in 0..frequency - i {
+                let up = [vertex(i, j), vertex(i + 1, j), vertex(i, j + 1)];
+                mesh.faces.push(up);
+                if i + j + 2 <= frequency {
+                    mesh.faces.push([up[1], vertex(i + 1, j + 1), up[2]]);
+                }
+            }
+        }
+    }
+    mesh
+}
+
+/// Twelve unit corners and twenty faces, counter-clockwise from outside.
+fn icosahedron() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let golden = (1.0 + 5f64.sqrt()) / 2.0;
+    let mut corners = Vec::new();
+    for turn in 0..3 {
+        for (a, b) in [(1.0, golden), (1.0, -golden), (-1.0, golden), (-1.0, -golden)] {
+            let mut p = [0.0; 3];
+            (p[(turn + 1) % 3], p[(turn + 2) % 3]) = (a, b);
+            corners.push(Vec3::from(p).normalize());
+        }
+    }
+    // Neighbouring corners are 2 apart before scaling, all others at least 2 golden.
+    let edge = 2.0 / (1.0 + golden * golden).sqrt();
+    let near = |a: usize, b: usize| corners[a].distance(corners[b]) < 1.2 * edge;
+    let mut faces = Vec::new();
+    for a in 0..12 {
+        for b in (a + 1..12).filter(|&b| near(a, b)) {
+            for c in (b + 1..12).filter(|&c| near(a, c) && near(b, c)) {
+                let outward = corners[a].dot(corners[b].cross(corners[c])) > 0.0;
+                let [a, b, c] = [a, b, c].map(|corner| corner as u32);
+                faces.push(if outward { [a, b, c] } else { [a, c, b] });
+            }
+        }
+    }
+    (corners, faces)
+}
+
+/// The mesh with every vertex moved by `map`.
+pub(crate) fn mapped(mut mesh: TriMesh, map: impl Fn(Vec3) -> Vec3) -> TriMesh {
+    mesh.vertices.iter_mut().for_each(|v| *v = map(*v));
+    mesh
+}
+
+/// The mesh with every face turned over.
+pub(crate) fn reversed(mut mesh: TriMesh) -> TriMesh {
+    mesh.faces.iter_mut().for_each(|face| face.swap(1, 2));
+    mesh
+}
+
+/// Two meshes as one.
+pub(crate) fn joined(mut first: TriMesh, second: TriMesh) -> TriMesh {
+    let offset = first.vertices.len() as u32;
+    first.vertices.extend(second.vertices);
+    first.faces.extend(second.faces.into_iter().map(|face| face.map(|v| v + offset)));
+    first
+}
+
+// Surfaces of revolution about the z axis, from pole to pole, with rings that grow in step with
+// their radius so that triangles keep their shape.
+
+/// Vertices that each ring of a cap has more than the one above it.
+pub(crate) const SECTORS: u32 = 5;
+
+/// A circle of vertices about the z axis, or a pole when `count` is 1.
+#[derive(Clone, Copy)]
+pub(crate) struct Ring {
+    pub(crate) count: u32,
+    pub(crate) radius: f64,
+    pub(crate) z: f64,
+}
+
+/// The closed surface through rings given from the top pole to the bottom pole.
+pub(crate) fn surface(rings: &[Ring]) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    let mut above: Option<(Ring, u32)> = None;
+    for &ring in rings {
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend((0..ring.count).map(|i| point(ring, i)));
+        if let Some((upper, first_upper)) = above {
+            connect(&mut mesh.faces, (upper.count, first_upper), (ring.count, first));
+        }
+        above = Some((ring, first));
+    }
+    mesh
+}
+
+fn point(ring: Ring, i: u32) -> Vec3 {
+    if ring.count == 1 {
+        return Vec3::new(0.0, 0.0, ring.z);
+    }
+    let (sin, cos) = (TAU * f64::from(i) / f64::from(ring.count)).sin_cos();
+    Vec3::new(ring.radius * cos, ring.radius * sin, ring.z)
+}
+
+/// The strip between two rings, each given by its count and first vertex: always the next vertex
+/// of the ring that lags behind, in angle.
+fn connect(faces: &mut Vec<[u32; 3]>, upper: (u32, u32), lower: (u32, u32)) {
+    let at = |(count, first): (u32, u32), i: u32| first + i % count;
+    // A pole has no side of its own: its ring does not advance.
+    let sides = |count: u32| if count == 1 { 0 } else { count };
+    let (upper_sides, lower_sides) = (sides(upper.0), sides(lower.0));
+    let (mut i, mut j) = (0, 0);
+    while i < upper_sides || j < lower_sides {
+        let lower_lags =
+            (u64::from(j) + 1) * u64::from(upper.0) <= (u64::from(i) + 1) * u64::from(lower.0);
+        if i == upper_sides || (j < lower_sides && lower_lags) {
+            faces.push([at(upper, i), at(lower, j), at(lower, j + 1)]);
+            j += 1;
+        } else {
+            faces.push([at(upper, i), at(lower, j), at(upper, i + 1)]);
+            i += 1;
+        }
+    }
+}
+
+/// A cap of `steps` rings from a pole outward; `profile` gives radius and z at `t` in 0..=1.
+pub(crate) fn cap(steps: u32, profile: impl Fn(f64) -> (f64, f64)) -> Vec<Ring> {
+    let ring = |k: u32| {
+        let (radius, z) = profile(f64::from(k) / f64::from(steps));
+        Ring { count: if k == 0 { 1 } else { SECTORS * k }, radius, z }
+    };
+    (0..=steps).map(ring).collect()
+}
+
+/// The rings of a solid that is symmetric about `z = 0`: the cap on top, a cylinder of `stacks`
+/// equal parts below it down to its mirror image, and the mirrored cap.
+pub(crate) fn mirrored(top: &[Ring], stacks: u32) -> Vec<Ring> {
+    let rim = top[top.len() - 1];
+    let between = (1..stacks).map(|k| {
+        let z = rim.z * (1.0 - 2.0 * f64::from(k) / f64::from(stacks));
+        Ring { z, ..rim }
+    });
+    let bottom = top.iter().rev().map(|&ring| Ring { z: -ring.z, ..ring });
+    top.iter().copied().chain(between).chain(bottom).collect()
+}
+
+/// A part of a profile, which is divided evenly.
+#[derive(Clone, Copy)]
+pub(crate) enum Piece {
+    /// A segment; both ends as radius and z.
+    Line { from: (f64, f64), to: (f64, f64) },
+    /// An arc about `(0, z)`; the angles are those to the z axis.
+    Zone { z: f64, radius: f64, from: f64, to: f64 },
+}
+
+impl Piece {
+    /// The segments between corners.
+    pub(crate) fn between(corners: &[(f64, f64)]) -> Vec<Self> {
+        corners.windows(2).map(|pair| Self::Line { from: pair[0], to: pair[1] }).collect()
+    }
+
+    /// Radius and z at a share of the way.
+    pub(crate) fn at(&self, t: f64) -> (f64, f64) {
+        match *self {
+            Self::Line { from, to } => {
+                (from.0 * (1.0 - t) + to.0 * t, from.1 * (1.0 - t) + to.1 * t)
+            }
+            Self::Zone { z, radius, from, to } => {
+                let (sin, cos) = (from * (1.0 - t) + to * t).sin_cos();
+                (radius * sin, z + radius * cos)
+            }
+        }
+    }
+
+    fn length(&self) -> f64 {
+        match *self {
+            Self::Line { from, to } => (to.0 - from.0).hypot(to.1 - from.1),
+            Self::Zone { radius, from, to, .. } => radius * (to - from),
+        }
+    }
+}
+
+/// The rings of a profile from pole to pole with edges of about `edge`: pieces in equal parts, and vertices of a
+/// ring in step with its radius.
+pub(crate) fn rings(pieces: &[Piece], edge: f64) -> Vec<Ring> {
+    let mut points = vec![pieces[0].at(0.0)];
+    for piece in pieces {
+        let n = parts(piece.length(), edge, 1);
+        points.extend((1..=n).map(|k| piece.at(f64::from(k) / f64::from(n))));
+    }
+    let last = points.len() - 1;
+    let ring = |(i, (radius, z)): (usize, (f64, f64))| match i {
+        // A pole is a pole, whatever the sine of pi is.
+        _ if i == 0 || i == last => Ring { count: 1, radius: 0.0, z },
+        _ => Ring { count: SECTORS * parts(TAU * radius / f64::from(SECTORS), edge, 1), radius, z },
+    };
+    points.into_iter().enumerate().map(ring).collect()
+}
+
+/// The number of equal parts of about `edge` in `length`, at least `least`.
+pub(crate) fn parts(length: f64, edge: f64, least: u32) -> u32 {
+    ((length / edge).round() as u32).max(least)
+}
+
+// Tubes about curves.
+
+/// A smooth curve, by its place and derivative at a parameter.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Curve {
+    pub(crate) start: f64,
+    pub(crate) end: f64,
+    pub(crate) place: fn(f64) -> Vec3,
+    pub(crate) derivative: fn(f64) -> Vec3,
+}
+
+/// Steps in which arc length is summed. Vertices lie on the tube whatever its error: it decides only how even
+/// the sections are.
+const LENGTH_STEPS: u32 = 4000;
+
+impl Curve {
+    fn parameter(&self, step: f64) -> f64 {
+        let t = step / f64::from(LENGTH_STEPS);
+        self.start * (1.0 - t) + self.end * t
+    }
+
+    /// Arc length from the start to each step, by the midpoint rule.
+    fn lengths(&self) -> Vec<f64> {
+        let width = (self.end - self.start) / f64::from(LENGTH_STEPS);
+        let mut sum = 0.0;
+        let mut lengths = vec![0.0];
+        for step in 0..LENGTH_STEPS {
+            sum += width * (self.derivative)(self.parameter(f64::from(step) + 0.5)).length();
+            lengths.push(sum);
+        }
+        lengths
+    }
+
+    /// The points within `radius` of the curve: a capsule bent along it. Sections stay in the planes normal to
+    /// the curve, turned so that one of their axes is normal to z.
+    ///
+    /// The curve is nowhere parallel to z; else its sections would have no such axis.
+    pub(crate) fn tube(&self, radius: f64, edge: f64) -> TriMesh {
+        let lengths = self.lengths();
+        let half = lengths[lengths.len() - 1] / 2.0;
+        mapped(capsule_of(half, radius, edge), |p| {
+            let along = p.z.clamp(-half, half);
+            let at = self.at_length(&lengths, along + half);
+            let tangent = (self.derivative)(at).normalize();
+            let level = tangent.cross(Vec3::Z).normalize();
+            let rest = tangent.cross(level);
+            (self.place)(at) + tangent * (p.z - along) + level * p.x + rest * p.y
+        })
+    }
+
+    /// The parameter at an arc length.
+    fn at_length(&self, lengths: &[f64], length: f64) -> f64 {
+        let after = lengths.partition_point(|&l| l <= length).clamp(1, lengths.len() - 1);
+        let (low, high) = (lengths[after - 1], lengths[after]);
+        let part = ((length - low) / (high - low)).clamp(0.0, 1.0);
+        self.parameter(after as f64 - 1.0 + part)
+    }
+}
+
+// The torus on a regular grid.
+
+/// A torus about the z axis: `around` sections of `across` vertices each, oriented outward.
+pub(crate) fn torus_grid(major: f64, minor: f64, around: u32, across: u32) -> TriMesh {
+    let angle = |i: u32, n: u32| (TAU * f64::from(i) / f64::from(n)).sin_cos();
+    let mut mesh = TriMesh::default();
+    for i in 0..around {
+        let (sin_u, cos_u) = angle(i, around);
+        for j in 0..across {
+            let (sin_v, cos_v) = angle(j, across);
+            let radius = major + minor * cos_v;
+            mesh.vertices.push(Vec3::new(radius * cos_u, radius * sin_u, minor * sin_v));
+        }
+    }
+    let id = |i: u32, j: u32| (i % around) * across + j % across;
+    for i in 0..around {
+        for j in 0..across {
+            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
+            mesh.faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    mesh
+}

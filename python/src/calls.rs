@@ -1,0 +1,385 @@
+//! Calls from Python: long calls, numpy arrays, exceptions.
+//!
+//! Long work runs in a thread of its own without the interpreter's lock. The calling thread waits for it and checks
+//! every [`PATIENCE`] for Ctrl-C and progress, so that both arrive during steps that know nothing of them. An
+//! interrupted call ends at once. The work is told to stop and ends at its next step; until then it continues in the
+//! background, and its result is dropped.
+//!
+//! `medial_axis/_arguments.py` has checked kind and shape of arrays and made them contiguous; here they are borrowed. An
+//! array that a thread reads stays alive as long as that thread ([`Held`]).
+
+#![allow(unsafe_code)] // Memory that numpy owns cannot be borrowed without.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use medial::Vec3;
+use medial::complex::{ComplexError, ContourError, MaError, UnionError};
+use medial::geometry::triangulation::TriangulationError;
+use medial::metrics::MetricError;
+use medial::shape::ShapeError;
+use medial::simplifier::{Progress, RunContext, SimplifyError};
+use medial::surface::{BvhError, SurfaceError};
+use medial_bench::run::{Fault, InputError};
+use medial_reports::Status;
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+
+/// How long Ctrl-C and progress may wait.
+const PATIENCE: Duration = Duration::from_millis(40);
+
+/// As that of the main thread of a program: recursion is never deep, but inputs are anything.
+const STACK_BYTES: usize = 8 << 20;
+
+/// More threads than this serve nobody.
+const MOST_THREADS: usize = 1024;
+
+/// What the work tells the thread that waits.
+#[derive(Clone, Default)]
+pub struct Monitor {
+    now: Arc<Mutex<Now>>,
+}
+
+#[derive(Default)]
+struct Now {
+    stage: &'static str,
+    steps: Option<Progress>,
+    is_new: bool,
+}
+
+impl Monitor {
+    /// Names what is being done from now on.
+    pub fn at(&self, stage: &'static str) {
+        *self.locked() = Now { stage, steps: None, is_new: true };
+    }
+
+    fn steps(&self, steps: Progress) {
+        let mut now = self.locked();
+        (now.steps, now.is_new) = (Some(steps), true);
+    }
+
+    /// The stage and the share of it that is done, if there is news.
+    fn news(&self) -> Option<(&'static str, Option<f64>)> {
+        let mut now = self.locked();
+        if !std::mem::take(&mut now.is_new) {
+            return None;
+        }
+        // Some stages do not know how many steps there will be.
+        let known = now.steps.filter(|steps| steps.total > 0 && steps.total < usize::MAX);
+        Some((now.stage, known.map(|steps| (steps.done as f64 / steps.total as f64).min(1.0))))
+    }
+
+    fn locked(&self) -> std::sync::MutexGuard<'_, Now> {
+        self.now.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// How a long call is made: of the tuple that `medial_axis/_arguments.py` has checked.
+pub struct Call {
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Threads of a pool of its own; all processors together with other calls unless given.
+    pub threads: Option<usize>,
+    /// Called with a stage and the share of it that is done.
+    pub progress: Option<Py<PyAny>>,
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Call {
+    type Error = PyErr;
+
+    fn extract(tuple: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let (seed, threads, progress) = tuple.extract()?;
+        Ok(Self { seed, threads, progress })
+    }
+}
+
+/// Does some work; see the head of this file.
+///
+/// # Errors
+/// Those of the work; what a progress function raises; `KeyboardInterrupt`.
+pub fn long<T: Send + 'static>(
+    py: Python<'_>,
+    call: &Call,
+    work: impl FnOnce(&RunContext, &Monitor) -> Result<T, Failure> + Send + 'static,
+) -> PyResult<T> {
+    let pool = call.threads.map(pool).transpose()?;
+    let monitor = Monitor::default();
+    let (told, steps) = (monitor.clone(), monitor.clone());
+    let run = RunContext::with_seed(call.seed).on_progress(move |progress| steps.steps(progress));
+    let cancel = run.cancel_flag();
+    let (sender, mut receiver) = mpsc::sync_channel(1);
+    let all = move || {
+        let guarded = || catch_unwind(AssertUnwindSafe(|| work(&run, &told)));
+        let outcome = match pool {
+            Some(pool) => pool.install(guarded),
+            None => guarded(),
+        };
+        // Nobody listens after an interrupt.
+        let _ = sender.send(outcome.unwrap_or_else(|panic| Err(of_panic(panic.as_ref()))));
+    };
+    thread::Builder::new().name("medial".to_owned()).stack_size(STACK_BYTES).spawn(all).map_err(
+        |error| Failure::new(Kind::Failed, format!("no thread can be started: {error}")),
+    )?;
+    // Whatever ends this call early ends the work.
+    let given_up = |error: PyErr| {
+        cancel.store(true, Ordering::Relaxed);
+        error
+    };
+    loop {
+        // Handed over and back, since a receiver is of one thread at a time.
+        let (given_back, received) = py.detach(move || {
+            let received = receiver.recv_timeout(PATIENCE);
+            (receiver, received)
+        });
+        receiver = given_back;
+        match received {
+            Ok(outcome) => return Ok(outcome?),
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(Failure::new(Kind::Internal, "the work ended without a result").into());
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        py.check_signals().map_err(given_up)?;
+        if let (Some(progress), Some(news)) = (&call.progress, monitor.news()) {
+            progress.call1(py, news).map_err(given_up)?;
+        }
+    }
+}
+
+fn pool(threads: usize) -> Result<rayon::ThreadPool, Failure> {
+    if !(1..=MOST_THREADS).contains(&threads) {
+        let message = format!("threads = {threads}: ask for 1 to {MOST_THREADS}");
+        return Err(Failure::parameter(message));
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| Failure::new(Kind::Failed, format!("threads = {threads}: {error}")))
+}
+
+fn of_panic(panic: &(dyn std::any::Any + Send)) -> Failure {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    Failure::of_panic(text.unwrap_or("panicked without a message"))
+}
+
+// Exceptions, with the messages of the command.
+
+/// The exceptions of `medial_axis/errors.py`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// What was given is wrong: a file, an array, a surface that bounds no solid.
+    Input,
+    /// A parameter or a level is wrong.
+    Parameter,
+    /// The method does not do this.
+    Unsupported,
+    /// The method could not do it.
+    Failed,
+    /// It was told to stop.
+    Cancelled,
+    /// A broken invariant: a fault of this program.
+    Internal,
+}
+
+/// Why a call gives no result.
+#[derive(Debug)]
+pub struct Failure {
+    kind: Kind,
+    message: String,
+}
+
+impl Failure {
+    /// A failure of a kind.
+    pub fn new(kind: Kind, message: impl ToString) -> Self {
+        Self { kind, message: message.to_string() }
+    }
+
+    /// A failure of [`Kind::Input`].
+    pub fn input(message: impl ToString) -> Self {
+        Self::new(Kind::Input, message)
+    }
+
+    /// A failure of [`Kind::Parameter`].
+    pub fn parameter(message: impl ToString) -> Self {
+        Self::new(Kind::Parameter, message)
+    }
+
+    /// The failure that the runner has told.
+    pub fn of_fault(fault: Fault) -> Self {
+        let kind = match fault.status {
+            Status::Unsupported => Kind::Unsupported,
+            Status::Refused => Kind::Parameter,
+            Status::Panicked => return Self::of_panic(&fault.reason),
+            _ => Kind::Failed,
+        };
+        Self::new(kind, fault.reason)
+    }
+
+    /// The failure that a panic is.
+    pub fn of_panic(message: &str) -> Self {
+        let advice = "this is a fault of medialaxis: please report it with the input";
+        Self::new(Kind::Internal, format!("{message}; {advice}"))
+    }
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        let name = match failure.kind {
+            Kind::Input => "InputError",
+            Kind::Parameter => "ParameterError",
+            Kind::Unsupported => "UnsupportedError",
+            Kind::Failed => "FailedError",
+            Kind::Cancelled => "CancelledError",
+            Kind::Internal => "InternalError",
+        };
+        Python::attach(|py| {
+            let class = py.import("medial_axis.errors").and_then(|module| module.getattr(name));
+            match class.and_then(|class| Ok(class.cast_into::<PyType>()?)) {
+                Ok(class) => Self::from_type(class, failure.message),
+                Err(error) => error,
+            }
+        })
+    }
+}
+
+impl From<SimplifyError> for Failure {
+    fn from(error: SimplifyError) -> Self {
+        let kind = match &error {
+            SimplifyError::Unsupported { .. } => Kind::Unsupported,
+            SimplifyError::Parameter(_) | SimplifyError::Level(_) => Kind::Parameter,
+            SimplifyError::Shape(_) => Kind::Input,
+            SimplifyError::Cancelled => Kind::Cancelled,
+            _ => Kind::Failed,
+        };
+        Self::new(kind, error)
+    }
+}
+
+/// Errors that are always about what was given.
+macro_rules! about_input {
+    ($($error:ty),+) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::input(error)
+            }
+        })+
+    };
+}
+
+about_input!(
+    BvhError,
+    ComplexError,
+    ContourError,
+    InputError,
+    MaError,
+    MetricError,
+    ShapeError,
+    SurfaceError,
+    TriangulationError,
+    UnionError
+);
+
+// Arrays.
+
+/// Rows of an array, which live as long as this does, on whichever thread.
+pub struct Held<T: 'static> {
+    rows: *const T,
+    len: usize,
+    _array: Py<PyAny>,
+}
+
+// Safety: the rows are only read, and numpy keeps them where they are while a reference exists.
+unsafe impl<T: Sync> Send for Held<T> {}
+unsafe impl<T: Sync> Sync for Held<T> {}
+
+impl<T> Held<T> {
+    /// The rows.
+    pub fn rows(&self) -> &[T] {
+        // Safety: pointer and length come from a contiguous array that `_array` keeps alive.
+        unsafe { std::slice::from_raw_parts(self.rows, self.len) }
+    }
+}
+
+/// The rows of an n x 3 array as points.
+///
+/// # Errors
+/// When the array is not contiguous or has another shape.
+pub fn points(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Held<Vec3>> {
+    triples(array)
+}
+
+/// The rows of an n x 3 array as triangles.
+///
+/// # Errors
+/// As [`points`].
+pub fn triangles(array: &PyReadonlyArray2<'_, u32>) -> PyResult<Held<[u32; 3]>> {
+    triples(array)
+}
+
+/// An n x 3 array as `Row`, which has to be three `T` in memory.
+fn triples<T: Element, Row>(array: &PyReadonlyArray2<'_, T>) -> PyResult<Held<Row>> {
+    const { assert!(size_of::<Row>() == 3 * size_of::<T>() && align_of::<Row>() == align_of::<T>()) };
+    let slice = array.as_slice()?;
+    if array.as_array().ncols() != 3 {
+        return Err(Failure::input("an array without three columns").into());
+    }
+    Ok(Held {
+        rows: slice.as_ptr().cast(),
+        len: slice.len() / 3,
+        _array: array.as_any().clone().unbind(),
+    })
+}
+
+/// The numbers of an array.
+///
+/// # Errors
+/// When the array is not contiguous.
+pub fn numbers(array: &PyReadonlyArray1<'_, f64>) -> PyResult<Held<f64>> {
+    let slice = array.as_slice()?;
+    Ok(Held { rows: slice.as_ptr(), len: slice.len(), _array: array.as_any().clone().unbind() })
+}
+
+/// A new array of points, n x 3.
+pub fn of_points<'py>(
+    py: Python<'py>,
+    points: impl ExactSizeIterator<Item = Vec3>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    of_rows(py, points.map(|point| point.to_array()))
+}
+
+/// A new array with these rows.
+pub fn of_rows<'py, T: Element + Copy, const N: usize>(
+    py: Python<'py>,
+    rows: impl ExactSizeIterator<Item = [T; N]>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let count = rows.len();
+    let flat: Vec<T> = rows.flatten().collect();
+    PyArray1::from_vec(py, flat).reshape([count, N])
+}
+
+/// An array that is made when it is first asked for; it cannot be written to, since others see it too.
+#[derive(Default)]
+pub struct Once(OnceLock<Py<PyAny>>);
+
+impl Once {
+    /// The array.
+    ///
+    /// # Errors
+    /// When there is no memory for it.
+    pub fn get<'py, A>(
+        &self,
+        py: Python<'py>,
+        make: impl FnOnce() -> PyResult<Bound<'py, A>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if let Some(known) = self.0.get() {
+            return Ok(known.bind(py).clone());
+        }
+        let made = make()?.into_any();
+        made.getattr("flags")?.setattr("writeable", false)?;
+        Ok(self.0.get_or_init(|| made.unbind()).bind(py).clone())
+    }
+}
