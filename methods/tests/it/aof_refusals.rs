@@ -5,9 +5,7 @@ use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, SimplifyEr
 use medial::surface::TriMesh;
 use medial_methods::aof;
 
-mod aof_solids;
-
-use aof_solids::{HALF, built_in, cuboid, shape_of, simplified};
+use crate::aof_solids::{HALF, built_in, cuboid, shape_of, simplified};
 
 #[test]
 fn bad_input_is_refused_and_says_what_would_work() {

@@ -12,9 +12,7 @@ use medial_methods::aof::{
 };
 use medial_methods::aof::{NearSet, NearbyTriangles};
 
-mod aof_solids;
-
-use aof_solids::{HALF, built_in, bytes_of, cuboid, shape_of, simplified, solid};
+use crate::aof_solids::{HALF, built_in, bytes_of, cuboid, shape_of, simplified, solid};
 
 fn params(variant: Variant) -> AofParams {
     AofParams { variant, ..AofParams::default() }

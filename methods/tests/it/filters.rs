@@ -1,9 +1,7 @@
 //! The variants of the angle filter and of the lambda-medial axis: thresholds on boxes and plates,
 //! incidence, topology, scale.
 
-mod common;
-
-use common::{ANGLE, LAMBDA, at, built_in, levels, params, shape_of};
+use crate::common::{ANGLE, LAMBDA, at, built_in, levels, params, shape_of};
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::geometry::enclosing_ball;

@@ -6,9 +6,7 @@ use medial::simplifier::{Level, Params, Simplified, SimplifyError};
 use medial::surface::TriMesh;
 use medial_methods::aof::{AofParams, LatticeVoxels, Wanted};
 
-mod aof_solids;
-
-use aof_solids::{built_in, bytes_of, shape_of, simplified, solid};
+use crate::aof_solids::{built_in, bytes_of, shape_of, simplified, solid};
 
 /// A ball with a thin rod, closed: a limb that no Betti number tells of.
 fn lollipop(rod: f64) -> TriMesh {

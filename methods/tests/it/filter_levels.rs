@@ -1,9 +1,7 @@
 //! Which levels the variants of the angle filter and of the lambda-medial axis answer, and by what they meet a
 //! number of spheres.
 
-mod common;
-
-use common::{ANGLE, LAMBDA, at, built_in, levels, shape_of};
+use crate::common::{ANGLE, LAMBDA, at, built_in, levels, shape_of};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Simplified, SimplifyError};
 use medial::surface;
