@@ -1,4 +1,4 @@
-//! Queries a second: closest points on a mesh, inside tests, winding numbers, signed distances, and
+//! Queries a second: closest points on a mesh, inside tests, signed distances, and
 //! distances to a union of medial primitives, also of one whose balls nearly coincide.
 
 mod bumpy_torus;
@@ -11,8 +11,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion};
 use medial::geometry::Sphere;
-use medial::surface::{GeneralisedWinding, InsideTest};
-use medial::surface::{SignedDistance, TriangleBvh, WindingTree};
+use medial::surface::{InsideTest, SignedDistance, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -78,12 +77,8 @@ fn cloud() -> MedialMesh {
 
 fn sidedness(criterion: &mut Criterion) {
     let mesh = bumpy_torus::mesh(224, 224);
-    let mut holed = mesh.clone();
-    holed.faces.drain(1000..1100);
     let (tree, inside) =
         (TriangleBvh::new(&mesh).expect("the torus has faces"), InsideTest::new(&mesh));
-    let expansions = WindingTree::new(&mesh).expect("the torus has faces");
-    let boundary = GeneralisedWinding::new(&holed);
     let mut rng = Pcg64::seed_from_u64(4);
     let half = Vec3::new(1.4, 1.4, 0.4);
     let points: Vec<Vec3> = (0..20_000)
@@ -95,20 +90,10 @@ fn sidedness(criterion: &mut Criterion) {
     group.bench_function("inside test", |b| {
         b.iter(|| one.install(|| inside.sides(black_box(&points))));
     });
-    group.bench_function("winding number, holes", |b| {
-        b.iter(|| one.install(|| boundary.numbers(black_box(&points))));
-    });
     group.bench_function("signed distance", |b| {
         let distance = SignedDistance::closed(&tree, &inside);
         b.iter(|| one.install(|| distance.batch(black_box(&points))));
     });
-    group.throughput(Throughput::Elements(points.len() as u64 / 10));
-    for tolerance in [0.1, WindingTree::TOLERANCE] {
-        let tree = expansions.clone().with_tolerance(tolerance);
-        group.bench_function(BenchmarkId::new("winding number, expansions", tolerance), |b| {
-            b.iter(|| one.install(|| tree.winding_number_batch(black_box(&points[..2_000]))));
-        });
-    }
     group.finish();
 }
 

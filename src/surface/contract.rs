@@ -16,6 +16,7 @@ use std::collections::BinaryHeap;
 
 use super::mesh::TriMesh;
 use crate::Vec3;
+use crate::geometry::PowerCrust;
 
 /// The result of contracting the short edges of a surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -194,10 +195,8 @@ impl<'a> Shrinking<'a> {
             return None;
         }
         let length = self.point(a).distance(self.point(b));
-        let reach = |gone: u32, stays: u32| {
-            f64::max(self.reach[stays as usize], self.reach[gone as usize] + length)
-        };
-        let (into_a, into_b) = (reach(b, a), reach(a, b));
+        let [reach_a, reach_b] = [a, b].map(|v| self.reach[v as usize]);
+        let (into_a, into_b) = (reach_a.max(reach_b + length), reach_b.max(reach_a + length));
         let mut ways = [(into_a, b, a), (into_b, a, b)];
         if into_b < into_a || (into_b == into_a && b < a) {
             ways.reverse();
@@ -219,14 +218,15 @@ impl<'a> Shrinking<'a> {
                 if face.contains(&stays) {
                     return false;
                 }
-                let normal = |face: [u32; 3]| {
-                    let [p, q, r] = face.map(|v| self.point(v));
-                    (q - p).cross(r - p)
-                };
-                let before = normal(face);
-                let after = normal(face.map(|v| if v == gone { stays } else { v }));
+                let before = self.doubled_area(face);
+                let after = self.doubled_area(face.map(|v| if v == gone { stays } else { v }));
                 before.dot(after) < MIN_COSINE * before.length() * after.length()
             })
+    }
+
+    fn doubled_area(&self, face: [u32; 3]) -> Vec3 {
+        let [p, q, r] = face.map(|v| self.point(v));
+        (q - p).cross(r - p)
     }
 
     fn remove(&mut self, gone: u32, stays: u32) {
@@ -272,10 +272,38 @@ impl<'a> Shrinking<'a> {
             vertices.push(self.points[v]);
             debug_assert!(star.len() > 2, "a closed manifold");
         }
-        let alive = |(f, face): (u32, [u32; 3])| {
-            self.stars[face[0] as usize].contains(&f).then(|| face.map(|v| name[v as usize]))
-        };
-        let faces = (0..).zip(self.faces.iter().copied()).filter_map(alive).collect();
+        let faces = (0..).zip(&self.faces);
+        let alive = faces.filter(|(f, face)| self.stars[face[0] as usize].contains(f));
+        let faces = alive.map(|(_, face)| face.map(|v| name[v as usize])).collect();
         TriMesh { vertices, faces }
     }
+}
+
+// The power crust as a surface.
+
+impl From<&PowerCrust> for TriMesh {
+    /// The crust as triangles, on all of its corners.
+    fn from(crust: &PowerCrust) -> Self {
+        Self { vertices: crust.corners().to_vec(), faces: crust.triangles() }
+    }
+}
+
+/// A power crust as triangles, with corners at one position merged along the edges between them.
+///
+/// Corners nearer than `coincident`, in the unit of the balls, are at one position; above the level of
+/// rounding, which flat groups of balls amplify to some 1e-8 of the diagonal, any value well below
+/// the distance of samples will do. `O(n log n)`.
+pub fn crust_surface(crust: &PowerCrust, coincident: f64) -> Contraction {
+    crust_surface_while(crust, coincident, || true).expect("nobody stops it")
+}
+
+/// [`crust_surface`] for as long as `go_on` says so, which is asked every few thousand edges;
+/// `None` if it was stopped.
+pub fn crust_surface_while(
+    crust: &PowerCrust,
+    coincident: f64,
+    go_on: impl FnMut() -> bool,
+) -> Option<Contraction> {
+    let limits = vec![coincident; crust.corners().len()];
+    contract_short_edges_while(&crust.into(), &limits, Folds::Ignored, go_on)
 }

@@ -21,8 +21,8 @@
 
 use std::ops::ControlFlow;
 
-use super::mesh::TriMesh;
-use super::unit::Unit;
+use super::closest::TriangleBvh;
+use super::mesh::{TriMesh, Unit};
 use crate::Vec3;
 use crate::geometry::predicates::{Point2, Sign, orient2d, orient3d, project, projection_axis};
 use crate::geometry::trees::{Bounds, Plan, Tree, WideTree, in_morton_order};
@@ -131,32 +131,23 @@ impl InsideTest {
 
     /// Reports every face that is above the scaled point `p`, or holds it.
     #[inline]
-    pub(super) fn crossings(&self, p: Vec3, report: impl FnMut(u32, Crossing) -> ControlFlow<()>) {
-        // Below everything a closed surface is crossed as often upward as downward.
-        if p.z >= self.bounds.lo.z {
-            self.crossings_from_below(p, report);
-        }
-    }
-
-    /// The same, also for points below a surface that is not closed.
-    #[inline]
-    pub(super) fn crossings_from_below(
+    pub(super) fn crossings(
         &self,
         p: Vec3,
         mut report: impl FnMut(u32, Crossing) -> ControlFlow<()>,
     ) {
+        // Below everything a closed surface is crossed as often upward as downward.
         let Bounds { lo, hi } = self.bounds;
-        if !(lo.x <= p.x && p.x <= hi.x && lo.y <= p.y && p.y <= hi.y && p.z <= hi.z) {
+        if !(p.cmpge(lo).all() && p.cmple(hi).all()) {
             return;
         }
-        let in_column = |lo: Vec3, hi: Vec3| {
-            (lo.x <= p.x) & (p.x <= hi.x) & (lo.y <= p.y) & (p.y <= hi.y) & (p.z <= hi.z)
-        };
         self.tree.above(p, |places| {
             places.into_iter().try_for_each(|place| {
                 let triangle = self.triangles[place as usize];
                 let Bounds { lo, hi } = Bounds::of_points(triangle);
-                if !in_column(lo, hi) {
+                // Without branches: a box of the tree holds four triangles, and most miss.
+                let is_beside = (p.x < lo.x) | (hi.x < p.x) | (p.y < lo.y) | (hi.y < p.y);
+                if is_beside | (hi.z < p.z) {
                     return ControlFlow::Continue(());
                 }
                 match crossing(triangle, lo.z, p) {
@@ -209,7 +200,7 @@ fn crossed_by_column([a, b, c]: [Vec3; 3], p: Vec3) -> i32 {
 
 /// Sign of `orient2d(a, b, p)` for `p` moved by `(e, e^2)`; zero only if `a = b`.
 #[inline]
-pub(super) fn perturbed_turn(a: Point2, b: Point2, p: Point2) -> Sign {
+fn perturbed_turn(a: Point2, b: Point2, p: Point2) -> Sign {
     match orient2d(a, b, p) {
         Sign::Zero if a[1] != b[1] => Sign::of(a[1] - b[1]),
         Sign::Zero => Sign::of(b[0] - a[0]),
@@ -242,16 +233,72 @@ fn contains(triangle: [Vec3; 3], p: Vec3) -> bool {
 
 /// The lexicographically smallest corner: an end of a collapsed triangle.
 fn lo_end([a, b, c]: [Vec3; 3]) -> Vec3 {
-    let less = |p: Vec3, q: Vec3| if lexicographic(q, p).is_lt() { q } else { p };
-    less(less(a, b), c)
+    [b, c].into_iter().fold(a, |p, q| if lexicographic(q, p).is_lt() { q } else { p })
 }
 
 /// The lexicographically largest corner: the other end.
 fn hi_end([a, b, c]: [Vec3; 3]) -> Vec3 {
-    let more = |p: Vec3, q: Vec3| if lexicographic(q, p).is_gt() { q } else { p };
-    more(more(a, b), c)
+    [b, c].into_iter().fold(a, |p, q| if lexicographic(q, p).is_gt() { q } else { p })
 }
 
 fn lexicographic(p: Vec3, q: Vec3) -> std::cmp::Ordering {
     p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z))
+}
+
+/// Signed distances of points to one surface: negative inside, zero on it, positive outside, in the
+/// unit of the surface.
+///
+/// The side is never read off the closest feature's normal, which is wrong for surfaces that cross or overlap themselves
+/// and needs care at edges and vertices (J. A. Baerentzen, H. Aanaes, *Signed distance computation using the angle weighted
+/// pseudonormal*, 2005, doi:10.1109/TVCG.2005.49), but off the exact winding number of [`InsideTest`]. Overlapping parts are
+/// inside, cavities outside.
+///
+/// ```
+/// use medial::Vec3;
+/// use medial::surface::{SignedDistance, TriangleBvh};
+/// use medial::surface::{InsideTest, TriMesh};
+///
+/// let tetrahedron = TriMesh {
+///     vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
+///     faces: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+/// };
+/// let (tree, inside) = (TriangleBvh::new(&tetrahedron)?, InsideTest::new(&tetrahedron));
+/// let distance = SignedDistance::closed(&tree, &inside);
+/// assert_eq!(distance.at(Vec3::splat(0.125)), -0.125);
+/// assert_eq!(distance.at(Vec3::new(0.25, 0.25, -2.0)), 2.0);
+/// assert_eq!(distance.at(Vec3::new(0.25, 0.25, 0.0)), 0.0);
+/// # Ok::<(), medial::surface::BvhError>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct SignedDistance<'a> {
+    tree: &'a TriangleBvh,
+    inside: &'a InsideTest,
+}
+
+impl<'a> SignedDistance<'a> {
+    /// For a closed, consistently oriented surface, of which both have to be made.
+    pub fn closed(tree: &'a TriangleBvh, inside: &'a InsideTest) -> Self {
+        Self { tree, inside }
+    }
+
+    /// The signed distance of `p`. A query that is not finite gets a distance that is not.
+    pub fn at(&self, p: Vec3) -> f64 {
+        self.signed(p, self.tree.closest(p).distance)
+    }
+
+    /// [`at`](Self::at) for many points, in their order, in parallel. The same values for any
+    /// number of threads.
+    pub fn batch(&self, points: &[Vec3]) -> Vec<f64> {
+        self.tree.distance_batch_with(points, |p, distance| self.signed(p, distance))
+    }
+
+    #[inline]
+    fn signed(&self, p: Vec3, distance: f64) -> f64 {
+        match self.inside.side(p) {
+            // From zero, so that no zero is negative.
+            Side::Inside => 0.0 - distance,
+            Side::On => 0.0,
+            Side::Outside => distance,
+        }
+    }
 }

@@ -1,16 +1,18 @@
-//! Repairs on demand: small components dropped, touching parts separated, holes filled.
+//! Repairs on demand: drop small components, separate touching parts, fill holes.
 
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::f64::consts::PI;
 use std::path::Path;
 
 use super::check::orient_and_examine;
-use super::error::Fault;
-use super::holes;
+use super::read::PolygonSoup;
+use super::read::content;
 use super::repair::repair;
-use super::report::Repair;
-use super::separate::separate;
-use super::soup::PolygonSoup;
+use super::report::{Fault, Repair, VertexName};
 use super::topology::Topology;
-use super::{Format, Loaded, SurfaceError, TriMesh, accept, examine, in_file, read};
+use super::{Format, Loaded, SurfaceError, TriMesh, accept, examine, in_file};
+use crate::Vec3;
+use crate::geometry::DisjointSets;
 
 /// Which parts of a surface are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,11 +49,9 @@ pub struct MendOptions {
 /// That of [`read`](super::read) twice, and `O(n^3)` for a hole of `n` edges.
 pub fn mend(path: impl AsRef<Path>, options: MendOptions) -> Result<Loaded, SurfaceError> {
     let path = path.as_ref();
-    let mended = || -> Result<Loaded, Fault> {
-        let format = Format::of(path)?;
-        mended(&read::content(path)?, format, options)
-    };
-    mended().map_err(|fault| in_file(path, fault))
+    Format::of(path)
+        .and_then(|format| mended(&content(path)?, format, options))
+        .map_err(|fault| in_file(path, fault))
 }
 
 /// [`mend`] for the content of a file.
@@ -95,11 +95,9 @@ fn mended(bytes: &[u8], format: Format, options: MendOptions) -> Result<Loaded, 
         repairs.extend(separate(&mut vertices, &mut faces));
     }
     if options.fill_holes {
-        repairs.extend(holes::fill(&vertices, &mut faces)?);
+        repairs.extend(fill(&vertices, &mut faces)?);
     }
-    let mut soup = PolygonSoup { vertices, ..PolygonSoup::default() };
-    soup.corners = faces.as_flattened().to_vec();
-    soup.ends = (1..=faces.len() as u32).map(|face| 3 * face).collect();
+    let soup = PolygonSoup::of_triangles(&vertices, &faces)?;
     let mut loaded = accept(orient_and_examine(repair(soup)?))?;
     repairs.append(&mut loaded.report.repairs);
     loaded.report.repairs = repairs;
@@ -124,4 +122,319 @@ fn keep_largest(mesh: &mut TriMesh) -> Option<Repair> {
     let dropped =
         Repair::DroppedComponents { components: components - 1, faces: all - mesh.faces.len() };
     (components > 1).then_some(dropped)
+}
+
+// Closes holes of a surface by triangles between their vertices; no vertex is moved or added.
+//
+// * G. Barequet, M. Sharir: *Filling gaps in the boundary of a polyhedron*, Computer Aided
+//   Geometric Design 12 (1995), <https://doi.org/10.1016/0167-8396(94)00011-G>: the triangulation
+//   of a loop of least weight, by dynamic programming over its chains.
+// * P. Liepa: *Filling holes in meshes*, SGP 2003, <https://doi.org/10.2312/SGP/SGP03/200-206>:
+//   the weight of a triangulation is its largest dihedral angle, the surface around it included,
+//   then its area; section 3.
+//
+// 1. Edges with one face are chained to loops, against the direction of their faces.
+// 2. `W(i, k)` is the least weight of a triangulation of the chain from corner `i` to corner `k`. It
+//    follows from shorter chains, so these come first:
+//    `W(i, k) = min over m of W(i, m) + W(m, k) + triangle (i, m, k)`.
+// 3. The triangles are read off backwards, from the whole loop to shorter chains.
+//
+// # Deviations from the papers
+//
+// - An existing edge of the surface is not used as a chord: it would get more than two faces.
+// - The filling is neither refined nor smoothed, because that would add and move vertices.
+//
+// # Cost
+// `O(n^3)` time and `O(n^2)` memory for a loop of `n` edges, so that long loops are refused.
+
+/// Number of edges of the longest loop that is filled.
+const MAX_EDGES: usize = 500;
+
+/// Closes all holes of consistently oriented faces; returns one repair for each hole.
+///
+/// # Errors
+/// When a loop is too long, meets itself, or has no triangulation with new edges alone. Then nothing
+/// is changed.
+pub(super) fn fill(vertices: &[Vec3], faces: &mut Vec<[u32; 3]>) -> Result<Vec<Repair>, Fault> {
+    let rim = Rim::new(faces);
+    let mut repairs = Vec::new();
+    let mut added: Vec<[u32; 3]> = Vec::new();
+    let mut edges = rim.edges;
+    for corners in loops(vertices, &rim.next)? {
+        let first = named(vertices, corners[0]);
+        if corners.len() > MAX_EDGES {
+            let (edges, most) = (corners.len(), MAX_EDGES);
+            return Err(Fault::LongHole { edges, most, first });
+        }
+        let patch = Patch::new(vertices, faces, &rim.face_at, &corners, &edges).triangles();
+        let patch = patch.ok_or(Fault::TangledHole { first })?;
+        for &[a, b, c] in &patch {
+            edges.extend(sides(&[a, b, c]).map(ascending));
+        }
+        repairs.push(Repair::FilledHole { edges: corners.len(), triangles: patch.len() });
+        added.extend(patch);
+    }
+    faces.extend(added);
+    Ok(repairs)
+}
+
+fn sides(&[a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+fn ascending([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+fn named(vertices: &[Vec3], vertex: u32) -> VertexName {
+    VertexName { index: vertex as usize, position: vertices[vertex as usize] }
+}
+
+/// The edges with one face.
+struct Rim {
+    /// For each start of such an edge, against its face's direction, the ends.
+    next: HashMap<u32, Vec<u32>>,
+    /// The face at each of them.
+    face_at: HashMap<[u32; 2], u32>,
+    /// All edges of the surface, as ascending pairs.
+    edges: HashSet<[u32; 2]>,
+}
+
+impl Rim {
+    fn new(faces: &[[u32; 3]]) -> Self {
+        let mut uses: HashMap<[u32; 2], u32> = HashMap::new();
+        for side in faces.iter().flat_map(sides) {
+            *uses.entry(ascending(side)).or_default() += 1;
+        }
+        let (mut next, mut face_at) = (HashMap::<u32, Vec<u32>>::new(), HashMap::new());
+        for (index, face) in (0..).zip(faces) {
+            for [a, b] in sides(face).into_iter().filter(|&side| uses[&ascending(side)] == 1) {
+                next.entry(b).or_default().push(a);
+                face_at.insert([b, a], index);
+            }
+        }
+        Self { next, face_at, edges: uses.into_keys().collect() }
+    }
+}
+
+/// Step 1: the loops, each from its lowest vertex, in the order of these.
+fn loops(vertices: &[Vec3], next: &HashMap<u32, Vec<u32>>) -> Result<Vec<Vec<u32>>, Fault> {
+    let mut starts: Vec<u32> = next.keys().copied().collect();
+    starts.sort_unstable();
+    let mut seen = HashSet::new();
+    let mut loops = Vec::new();
+    for start in starts {
+        if !seen.insert(start) {
+            continue;
+        }
+        let mut corners = vec![start];
+        loop {
+            let last = corners[corners.len() - 1];
+            let tangled = Err(Fault::TangledHole { first: named(vertices, last) });
+            let &[after] = next.get(&last).map_or(&[][..], Vec::as_slice) else {
+                return tangled;
+            };
+            if after == start {
+                break;
+            }
+            if !seen.insert(after) {
+                return tangled;
+            }
+            corners.push(after);
+        }
+        loops.push(corners);
+    }
+    Ok(loops)
+}
+
+/// Largest dihedral angle, then area: less is better.
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
+struct Weight {
+    angle: f64,
+    area: f64,
+}
+
+/// The best triangulation of a chain: its weight, and the third corner of the triangle at its chord.
+#[derive(Clone, Copy)]
+struct Best {
+    weight: Weight,
+    middle: usize,
+}
+
+/// A loop with what surrounds it.
+struct Patch<'a> {
+    corners: &'a [u32],
+    /// Positions of the corners, in a unit in which nothing overflows.
+    points: Vec<Vec3>,
+    /// Unit normal of the surface beside the edge from each corner to the next.
+    beside: Vec<Vec3>,
+    edges: &'a HashSet<[u32; 2]>,
+    /// `W(i, k)` at `i n + k`; `None` where there is no triangulation.
+    best: Vec<Option<Best>>,
+}
+
+impl<'a> Patch<'a> {
+    fn new(
+        vertices: &[Vec3],
+        faces: &[[u32; 3]],
+        face_at: &HashMap<[u32; 2], u32>,
+        corners: &'a [u32],
+        edges: &'a HashSet<[u32; 2]>,
+    ) -> Self {
+        let n = corners.len();
+        let origin = vertices[corners[0] as usize];
+        let reach = corners.iter().map(|&v| (vertices[v as usize] - origin).abs().max_element());
+        let reach = reach.fold(0.0, f64::max);
+        let scaled = |v: u32| (vertices[v as usize] - origin) / reach;
+        let points = corners.iter().map(|&v| scaled(v)).collect();
+        let faces_at = (0..n).map(|i| face_at[&[corners[i], corners[(i + 1) % n]]]);
+        let beside = faces_at.map(|face| normal(faces[face as usize].map(scaled))).collect();
+        Self { corners, points, beside, edges, best: vec![None; n * n] }
+    }
+
+    /// Steps 2 and 3.
+    fn triangles(mut self) -> Option<Vec<[u32; 3]>> {
+        let n = self.corners.len();
+        for length in 2..n {
+            for i in 0..n - length {
+                self.best[i * n + i + length] = self.best_of(i, i + length);
+            }
+        }
+        let mut triangles = Vec::with_capacity(n.saturating_sub(2));
+        let mut open = vec![(0, n - 1)];
+        while let Some((i, k)) = open.pop() {
+            if k - i < 2 {
+                continue;
+            }
+            let middle = self.best[i * n + k]?.middle;
+            triangles.push([i, middle, k].map(|corner| self.corners[corner]));
+            open.extend([(i, middle), (middle, k)]);
+        }
+        Some(triangles)
+    }
+
+    /// Step 2 for one chain.
+    fn best_of(&self, i: usize, k: usize) -> Option<Best> {
+        let n = self.corners.len();
+        let whole = i == 0 && k == n - 1;
+        if !whole && self.edges.contains(&ascending([self.corners[i], self.corners[k]])) {
+            return None;
+        }
+        let mut best: Option<Best> = None;
+        for middle in i + 1..k {
+            let triangle = [i, middle, k].map(|corner| self.points[corner]);
+            let own = normal(triangle);
+            let (Some(low), Some(high)) = (self.chain(i, middle), self.chain(middle, k)) else {
+                continue;
+            };
+            let mut angle = low.0.angle.max(high.0.angle);
+            angle = angle.max(between(own, low.1)).max(between(own, high.1));
+            if whole {
+                angle = angle.max(between(own, self.beside[n - 1]));
+            }
+            let [a, b, c] = triangle;
+            let area = low.0.area + high.0.area + (b - a).cross(c - a).length() * 0.5;
+            let weight = Weight { angle, area };
+            if best.is_none_or(|best| weight < best.weight) {
+                best = Some(Best { weight, middle });
+            }
+        }
+        best
+    }
+
+    /// The weight of a chain and the normal beside its chord: of the surface, or of the triangle.
+    fn chain(&self, i: usize, k: usize) -> Option<(Weight, Vec3)> {
+        if k == i + 1 {
+            return Some((Weight { angle: 0.0, area: 0.0 }, self.beside[i]));
+        }
+        let Best { weight, middle } = self.best[i * self.corners.len() + k]?;
+        Some((weight, normal([i, middle, k].map(|corner| self.points[corner]))))
+    }
+}
+
+fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+/// The angle between two faces, 0 where they are one plane; a face without area fits nowhere.
+fn between(a: Vec3, b: Vec3) -> f64 {
+    if a == Vec3::ZERO || b == Vec3::ZERO { PI } else { a.dot(b).clamp(-1.0, 1.0).acos() }
+}
+
+// Parts that touch in a vertex, taken apart; the only repair that moves a vertex.
+//
+// At such a vertex the faces form several fans. The flattest fan keeps the vertex. Each other one
+// gets a vertex of its own, at [`STEP`] of the way to the mean of its rim: towards its own part, so
+// that two tips no longer touch. The flattest fan stays because it cannot move like this: the mean of
+// a flat fan's rim may be the vertex itself.
+//
+// # Cost
+// `O(F log F)` for `F` faces.
+
+/// Share of the way to the mean of its rim by which a tip is drawn back.
+const STEP: f64 = 1e-3;
+
+/// Corners (`3 face + k`) of the faces that hang together around one vertex.
+type Fan = Vec<usize>;
+
+/// Gives each fan of faces a vertex of its own.
+pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Option<Repair> {
+    let (mut touching, mut largest_move) = (0, 0.0_f64);
+    for (vertex, mut fans) in fans(vertices.len(), faces).into_iter().enumerate() {
+        if fans.len() < 2 {
+            continue;
+        }
+        touching += 1;
+        let tip = vertices[vertex];
+        let rims = fans.values().map(|fan| rim_mean(vertices, faces, fan));
+        let targets: Vec<Vec3> = rims.map(|rim| tip * (1.0 - STEP) + rim * STEP).collect();
+        let heights: Vec<f64> = targets.iter().map(|&at| tip.distance_squared(at)).collect();
+        let flattest = (0..fans.len()).min_by(|&a, &b| heights[a].total_cmp(&heights[b]));
+        for (k, fan) in fans.values_mut().enumerate().filter(|&(k, _)| Some(k) != flattest) {
+            let own = vertices.len() as u32;
+            largest_move = largest_move.max(tip.distance(targets[k]));
+            vertices.push(targets[k]);
+            fan.iter().for_each(|&corner| faces.as_flattened_mut()[corner] = own);
+        }
+    }
+    (touching > 0).then_some(Repair::SeparatedVertices { vertices: touching, largest_move })
+}
+
+/// For each vertex its fans, by their first corner.
+fn fans(vertices: usize, faces: &[[u32; 3]]) -> Vec<BTreeMap<u32, Fan>> {
+    let mut joined = DisjointSets::singletons(3 * faces.len());
+    // Both ends of each side with the corners there, so that equal sides stand together.
+    let mut sides: Vec<([u32; 2], [u32; 2])> = Vec::with_capacity(3 * faces.len());
+    for (face, corners) in (0..).zip(faces) {
+        for k in 0..3 {
+            let next = (k + 1) % 3;
+            let ends = [(corners[k], 3 * face + k as u32), (corners[next], 3 * face + next as u32)];
+            let [low, high] = if ends[0] < ends[1] { ends } else { [ends[1], ends[0]] };
+            sides.push(([low.0, high.0], [low.1, high.1]));
+        }
+    }
+    sides.sort_unstable();
+    for pair in sides.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        for end in 0..2 {
+            joined.join(pair[0].1[end], pair[1].1[end]);
+        }
+    }
+    let mut fans = vec![BTreeMap::<u32, Fan>::new(); vertices];
+    for (corner, &vertex) in faces.as_flattened().iter().enumerate() {
+        let fan = fans[vertex as usize].entry(joined.find(corner as u32)).or_default();
+        fan.push(corner);
+    }
+    fans
+}
+
+/// Mean of the vertices across from the fan's own.
+fn rim_mean(vertices: &[Vec3], faces: &[[u32; 3]], fan: &Fan) -> Vec3 {
+    // Each is divided first: the sum of coordinates near the end of the range would overflow.
+    let share = 0.5 / fan.len() as f64;
+    let others = |&corner: &usize| {
+        let [first, face] = [corner % 3, corner / 3];
+        let at = |k: usize| vertices[faces[face][(first + k) % 3] as usize] * share;
+        at(1) + at(2)
+    };
+    fan.iter().map(others).sum()
 }

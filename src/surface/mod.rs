@@ -10,51 +10,35 @@
 //! Every sign that a decision depends on is computed exactly.
 
 mod check;
+mod closest;
 mod contract;
-mod eliminate;
-mod error;
-mod holes;
 mod inside;
-mod intersect;
 mod mend;
 mod mesh;
-mod nesting;
-mod orient;
 pub(crate) mod ply;
-mod power_crust;
 mod read;
 mod repair;
 mod report;
 mod sample;
-mod separate;
-mod signed_distance;
-mod soup;
 mod topology;
-mod triangles;
-mod triangulate;
-mod unit;
-mod winding;
-mod write;
 
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::Vec3;
-pub use contract::{Contraction, Folds, contract_short_edges, contract_short_edges_while};
 
-pub use error::{Fault, Place, SurfaceError, VertexName};
-pub use inside::{InsideTest, Side};
+pub use closest::{BvhError, Closest, Feature, TriangleBvh};
+pub use contract::{
+    Contraction, Folds, contract_short_edges, contract_short_edges_while, crust_surface,
+    crust_surface_while,
+};
+pub use inside::{InsideTest, Side, SignedDistance};
 pub use mend::{Components, MendOptions, mend, mend_bytes};
-pub use mesh::{Normalisation, TriMesh};
-pub use power_crust::{crust_surface, crust_surface_while};
+pub use mesh::{Normalisation, TriMesh, write};
 pub use read::Format;
-pub use report::{Repair, SurfaceReport};
+pub use report::{Fault, Place, Repair, SurfaceError, SurfaceReport, VertexName};
 pub use sample::{ParseSamplingError, Sampling, sample, sample_with_faces};
-pub use signed_distance::SignedDistance;
-pub use triangles::{BvhError, Closest, Feature, TriangleBvh, Winding, WindingTree};
-pub use winding::GeneralisedWinding;
-pub use write::write;
 
 /// A surface that bounds a solid: closed, manifold, oriented outward, with positive volume.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,7 +159,7 @@ pub fn inspect_bytes(bytes: &[u8], format: Format) -> Result<Inspection, Surface
 /// # Ok::<(), surface::SurfaceError>(())
 /// ```
 pub fn read_triangles(vertices: &[Vec3], faces: &[[u32; 3]]) -> Result<Loaded, SurfaceError> {
-    let soup = soup::PolygonSoup::of_triangles(vertices, faces)?;
+    let soup = read::PolygonSoup::of_triangles(vertices, faces)?;
     Ok(accept(check::orient_and_examine(repair::repair(soup)?))?)
 }
 

@@ -13,7 +13,7 @@ use ply_rs_bw::ply::{
     ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
-use super::error::{Fault, Place};
+use super::report::{Fault, Place};
 
 /// The values of one row that matter here, each 0 where the header does not declare it.
 #[derive(Default)]
@@ -70,7 +70,7 @@ pub(crate) struct Ply<'a> {
     encoding: Encoding,
     rows: &'a [u8],
     /// Number of the first line of the rows.
-    line: usize,
+    pub line: usize,
 }
 
 /// Reads the header of a PLY file.

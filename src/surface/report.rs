@@ -1,10 +1,320 @@
-//! Findings and repairs as data.
+//! Findings about a surface as data: faults that name the file and the offending element, repairs, figures.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::counted;
+use crate::Vec3;
+
+/// A surface that could not be read or may not be used, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceError {
+    /// The file, where there is one.
+    pub file: Option<PathBuf>,
+    /// The defect.
+    pub fault: Fault,
+}
+
+impl fmt::Display for SurfaceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(file) = &self.file {
+            write!(f, "{}: ", file.display())?;
+        }
+        self.fault.fmt(f)
+    }
+}
+
+impl std::error::Error for SurfaceError {}
+
+impl From<Fault> for SurfaceError {
+    fn from(fault: Fault) -> Self {
+        Self { file: None, fault }
+    }
+}
+
+/// A number with its noun, such as `1 vertex` or `3 faces`.
+pub(super) fn counted(number: usize, noun: &str) -> String {
+    match (number, noun) {
+        (1, _) => format!("1 {noun}"),
+        (_, "vertex") => format!("{number} vertices"),
+        _ => format!("{number} {noun}s"),
+    }
+}
+
+/// Where in a file something is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Line of a text file, counted from 1.
+    Line(usize),
+    /// Element of a binary file, counted from 0, such as `vertex 17`.
+    Element(&'static str, usize),
+    /// The end of the file.
+    End,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Element(kind, index) => write!(f, "{kind} {index}"),
+            Self::End => write!(f, "end of file"),
+        }
+    }
+}
+
+/// A place in front of a sentence that names the element, so that binary files do not say it twice.
+fn before(at: &Place) -> String {
+    match at {
+        Place::Element(..) => String::new(),
+        place => format!("{place}: "),
+    }
+}
+
+/// A vertex as the user can find it: by number and by position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexName {
+    /// Index in the order of the file (or of the mesh that was validated), counted from 0.
+    pub index: usize,
+    /// Position in the unit of the file.
+    pub position: Vec3,
+}
+
+impl fmt::Display for VertexName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Vec3 { x, y, z } = self.position;
+        write!(f, "vertex {} ({x:?}, {y:?}, {z:?})", self.index)
+    }
+}
+
+/// A defect of a surface. Elements are counted from 0, lines from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// The file could not be opened, read or written.
+    #[error("{0}")]
+    Io(String),
+    /// The extension names no format that is known here.
+    #[error("unknown extension {extension:?}; use .off, .obj, .ply or .stl")]
+    UnknownFormat {
+        /// The extension, without the dot.
+        extension: String,
+    },
+    /// The format is known, but not this variant or not in this direction.
+    #[error("{0}")]
+    Unsupported(String),
+    /// Something else stands where the format demands a certain thing.
+    #[error("{at}: expected {expected}, found {found}")]
+    Syntax {
+        /// Where.
+        at: Place,
+        /// What belongs there.
+        expected: String,
+        /// What is there, shortened.
+        found: String,
+    },
+    /// The header announces more than the file holds, or less.
+    #[error("the header announces {announced} {what}, but the file holds {holds}")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// As many as the header says.
+        announced: u64,
+        /// What there is or room for, in words.
+        holds: String,
+    },
+    /// A coordinate is not a number or infinite.
+    #[error("{}vertex {vertex} has the coordinate {value}, which is not finite", before(.at))]
+    Coordinate {
+        /// Where.
+        at: Place,
+        /// Index of the vertex.
+        vertex: usize,
+        /// The offending value.
+        value: f64,
+    },
+    /// A face names a vertex that does not exist.
+    #[error("{}face {face} names the vertex {index} of {}", before(.at), counted(*.vertices, "vertex"))]
+    Index {
+        /// Where.
+        at: Place,
+        /// Index of the face.
+        face: usize,
+        /// The vertex as the file writes it (OBJ counts from 1 and backwards from -1).
+        index: i64,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A face with fewer than three corners.
+    #[error("{}face {face} has {}; three are the least", before(.at), counted(*.corners, "corner"))]
+    TooFewCorners {
+        /// Where.
+        at: Place,
+        /// Index of the face.
+        face: usize,
+        /// Number of its corners.
+        corners: usize,
+    },
+    /// A polygon so intricate that cutting it into triangles takes too long.
+    #[error(
+        "{}face {face} with {corners} corners is too intricate to triangulate; \
+         export the surface as triangles",
+        before(.at)
+    )]
+    Polygon {
+        /// Where.
+        at: Place,
+        /// Index of the face.
+        face: usize,
+        /// Number of its corners.
+        corners: usize,
+    },
+    /// More elements than 32-bit indices can name.
+    #[error("{count} {what} are more than 32-bit indices can name")]
+    TooLarge {
+        /// What is counted.
+        what: &'static str,
+        /// How many there are.
+        count: u64,
+    },
+    /// Points without a surface.
+    #[error("no face among {}; a closed surface is needed, not a point set", counted(*.vertices, "vertex"))]
+    NoFaces {
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// Every face has corners at the same position.
+    #[error(
+        "no face is left of {}: each has corners at the same position; if that is not meant, the \
+         surface is too small for its distance from the origin: move it there before writing it",
+        counted(*.faces, "face")
+    )]
+    Collapsed {
+        /// Number of faces.
+        faces: usize,
+    },
+    /// The bounding box has no size, or one that overflows or has lost digits to underflow.
+    #[error(
+        "the bounding box has the diagonal {diagonal:?}; move and scale the surface to about 1"
+    )]
+    Extent {
+        /// Its diagonal, in the unit of the file.
+        diagonal: f64,
+    },
+    /// Edges with one face only.
+    #[error(
+        "the surface is open: {} with one face only, the first from {} to {}; fill its holes \
+         (`medial repair --fill-holes`)",
+        counted(*.edges, "edge"), .first[0], .first[1]
+    )]
+    Open {
+        /// Number of boundary edges.
+        edges: usize,
+        /// The first of them.
+        first: [VertexName; 2],
+    },
+    /// A hole that is too long to be filled.
+    #[error("the hole at {first} has {edges} edges, and holes of up to {most} are filled")]
+    LongHole {
+        /// Number of edges around it.
+        edges: usize,
+        /// The longest that would be filled.
+        most: usize,
+        /// The vertex around it with the lowest index.
+        first: VertexName,
+    },
+    /// A hole that no triangles close.
+    #[error(
+        "the hole at {first} meets itself or an inner wall, or only edges that are there already \
+         would close it"
+    )]
+    TangledHole {
+        /// A vertex around it.
+        first: VertexName,
+    },
+    /// Edges with more than two faces.
+    #[error(
+        "the surface is not manifold: {} with more than two faces, the first ({faces} faces) \
+         from {} to {}; inner walls and doubled parts have to go, and which they are only its maker knows",
+        counted(*.edges, "edge"), .first[0], .first[1]
+    )]
+    NonManifoldEdge {
+        /// Number of such edges.
+        edges: usize,
+        /// The first of them.
+        first: [VertexName; 2],
+        /// Number of faces of the first.
+        faces: usize,
+    },
+    /// Vertices whose faces form more than one fan.
+    #[error(
+        "the surface is not manifold: {} where parts touch in a point, the first is {first}; \
+         separate the parts (`medial repair --separate`)",
+        counted(*.vertices, "vertex")
+    )]
+    NonManifoldVertex {
+        /// Number of such vertices.
+        vertices: usize,
+        /// The first of them.
+        first: VertexName,
+    },
+    /// One-sided, such as a Klein bottle.
+    #[error("the component of face {face} is one-sided; no orientation of its faces is consistent")]
+    NonOrientable {
+        /// A face where the two orientations meet.
+        face: usize,
+    },
+    /// A component whose two sides coincide.
+    #[error(
+        "the component of face {face} ({}) encloses no volume; \
+         leave it out (`medial repair --components largest`) or give it thickness",
+        counted(*.faces, "face")
+    )]
+    ZeroVolume {
+        /// Its first face.
+        face: usize,
+        /// Number of its faces.
+        faces: usize,
+    },
+    /// So many components around one another that it takes too long to tell solid from cavity.
+    #[error("{components} components lie too densely around one another to tell their nesting")]
+    TooManyNested {
+        /// Number of components.
+        components: usize,
+    },
+    /// Only from [`crate::surface::validate`]: a face that names a vertex twice.
+    #[error("face {face} names a vertex twice")]
+    RepeatedCorner {
+        /// Index of the face.
+        face: usize,
+    },
+    /// Only from [`crate::surface::validate`]: two faces with the same vertices.
+    #[error("faces {first} and {second} have the same three vertices")]
+    DuplicateFace {
+        /// The smaller index.
+        first: usize,
+        /// The larger one.
+        second: usize,
+    },
+    /// Only from [`crate::surface::validate`]: a vertex without a face.
+    #[error("vertex {vertex} belongs to no face")]
+    Unreferenced {
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// Only from [`crate::surface::validate`]: neighbours that disagree about inside and outside.
+    #[error("face {face} and a neighbour of it are oriented against each other")]
+    Inconsistent {
+        /// Index of the face.
+        face: usize,
+    },
+    /// Only from [`crate::surface::validate`]: an outer shell that points inward, or a cavity
+    /// that points outward.
+    #[error("the component of face {face} is oriented the wrong way")]
+    WrongWay {
+        /// Its first face.
+        face: usize,
+    },
+}
 
 /// The properties of a surface: the answer of `medial info`.
 ///

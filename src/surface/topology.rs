@@ -1,10 +1,18 @@
-//! Adjacency of a triangle mesh, without coordinates.
+//! Adjacency of a triangle mesh, the orientation of its faces, and the nesting of its components.
 //!
 //! Half-edge `3 f + k` runs from corner `k` of face `f` to the next corner. Two half-edges between
 //! the same vertices are neighbours if no third one is; they agree on the orientation if they run
 //! in opposite directions.
 
+use std::ops::ControlFlow;
+
+use super::check::Intersections;
+use super::inside::{Crossing, InsideTest};
+use super::mesh::Unit;
+use super::report::Repair;
+use crate::Vec3;
 use crate::geometry::DisjointSets;
+use crate::sum::Sum;
 
 /// Adjacency, defects and components of a triangle mesh, whatever its defects.
 #[derive(Debug)]
@@ -180,6 +188,299 @@ fn corner_at(faces: &[[u32; 3]], half_edge: u32, vertex: u32) -> u32 {
     let start = ends(faces, half_edge).0 == vertex;
     let (face, k) = (half_edge / 3, half_edge % 3);
     if start { half_edge } else { 3 * face + (k + 1) % 3 }
+}
+
+// Turns faces so that every shell looks away from the solid: outer shells outward, shells of
+// cavities inward.
+//
+// 1. Within a component all faces follow the first one (breadth over common edges).
+// 2. A component is turned by the sign of the volume it encloses. A volume within its own
+//    rounding error counts as none and is refused.
+// 3. A component is a cavity if it lies in an odd number of others (see [`super::nesting`]).
+
+/// How a component is oriented, and how it should be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shell {
+    /// Signed volume in scaled units; positive if the faces look outward.
+    pub volume: f64,
+    /// Bound on the rounding error of `volume`.
+    pub rounding: f64,
+    /// Number of components around it.
+    pub depth: usize,
+}
+
+impl Shell {
+    /// Whether it bounds a hole in the solid.
+    pub fn is_cavity(&self) -> bool {
+        self.depth % 2 == 1
+    }
+
+    /// Whether its two sides coincide, as far as doubles can tell.
+    pub fn is_flat(&self) -> bool {
+        self.volume.abs() <= self.rounding
+    }
+
+    /// Whether its faces look away from the solid.
+    pub fn is_right(&self) -> bool {
+        (self.volume > 0.0) != self.is_cavity()
+    }
+}
+
+/// Volume and depth of every component of a closed, consistently oriented surface.
+pub(super) fn shells(
+    unit: Unit,
+    points: &[Vec3],
+    faces: &[[u32; 3]],
+    topology: &Topology,
+    intersections: &Intersections,
+) -> Result<Vec<Shell>, TooManyNested> {
+    let mut shells = volumes(points, faces, topology);
+    let parts = Parts { unit, points, faces, component: &topology.component };
+    let depths = depths(&parts, &topology.first_face, &intersections.components)?;
+    for (shell, depth) in shells.iter_mut().zip(depths) {
+        shell.depth = depth;
+    }
+    Ok(shells)
+}
+
+/// Exchanges two corners of the faces that are marked.
+pub(super) fn turn_over(faces: &mut [[u32; 3]], marked: impl Iterator<Item = bool>) {
+    for (face, _) in faces.iter_mut().zip(marked).filter(|(_, marked)| *marked) {
+        face.swap(1, 2);
+    }
+}
+
+/// What turning faces amounts to: `turned` marks faces that disagreed with the first face of
+/// their component, `wrong` the components that were turned as a whole afterwards.
+pub(super) fn repairs(
+    turned: &[bool],
+    wrong: &[bool],
+    shells: &[Shell],
+    component: &[u32],
+) -> Vec<Repair> {
+    // By component: faces that were turned, and faces in all. Unclosed surfaces have no shells.
+    let components = component.iter().max().map_or(0, |&c| c as usize + 1);
+    let mut faces = vec![[0; 2]; components];
+    for (&turned, &component) in turned.iter().zip(component) {
+        faces[component as usize][0] += usize::from(turned);
+        faces[component as usize][1] += 1;
+    }
+    let (mut reoriented, mut outward, mut inward) = (0, 0, 0);
+    for (index, &[turned, all]) in faces.iter().enumerate() {
+        let whole = wrong.get(index).is_some_and(|&w| w);
+        match (turned, whole) {
+            (0, false) => {}
+            (0, true) if shells[index].is_cavity() => inward += 1,
+            (0, true) => outward += 1,
+            (_, false) => reoriented += turned,
+            (_, true) => reoriented += all - turned,
+        }
+    }
+    let all = [
+        Repair::ReorientedFaces { faces: reoriented },
+        Repair::TurnedOutward { components: outward },
+        Repair::TurnedInward { components: inward },
+    ];
+    all.into_iter().filter(|r| r.count() > 0).collect()
+}
+
+fn volumes(points: &[Vec3], faces: &[[u32; 3]], topology: &Topology) -> Vec<Shell> {
+    let origins: Vec<Vec3> =
+        topology.first_face.iter().map(|&face| points[faces[face as usize][0] as usize]).collect();
+    let mut sums = vec![Sum::default(); origins.len()];
+    let mut sizes = vec![0.0; origins.len()];
+    for (face, &component) in faces.iter().zip(&topology.component) {
+        let component = component as usize;
+        // From a vertex of the component itself: far from the origin nothing cancels then.
+        let [a, b, c] = face.map(|v| points[v as usize] - origins[component]);
+        sums[component].add(a.dot(b.cross(c)));
+        sizes[component] += a.length() * b.length() * c.length();
+    }
+    sums.iter()
+        .zip(sizes)
+        .map(|(sum, size)| Shell {
+            volume: sum.value() / 6.0,
+            // Each determinant is off by at most some 10 roundings of the product of lengths.
+            rounding: 16.0 * f64::EPSILON * size / 6.0,
+            depth: 0,
+        })
+        .collect()
+}
+
+// For each component of a surface the number of components around it.
+//
+// Component A lies in component B
+// - if the two do not meet, and B winds around a vertex of A (then around all of them);
+// - if they touch, no vertex of A is outside B, no vertex of B strictly inside A, and a vertex of
+//   A is strictly inside B. Where all vertices of A lie on B, the centres of the faces of A vote.
+//
+// Components that meet in any other way overlap, and neither lies in the other.
+
+/// A closed surface in components.
+pub(super) struct Parts<'a> {
+    pub unit: Unit,
+    /// Vertices in scaled units.
+    pub points: &'a [Vec3],
+    pub faces: &'a [[u32; 3]],
+    /// Component of each face.
+    pub component: &'a [u32],
+}
+
+/// The work for a nesting this deep would grow with the square of the number of components.
+#[derive(Debug)]
+pub(super) struct TooManyNested;
+
+/// For each component the number of others it lies in. `meeting` lists the pairs of components
+/// that touch or overlap, sorted.
+pub(super) fn depths(
+    parts: &Parts<'_>,
+    first_face: &[u32],
+    meeting: &[[u32; 2]],
+) -> Result<Vec<usize>, TooManyNested> {
+    let mut depths = vec![0; first_face.len()];
+    if depths.len() > 1 {
+        let mut budget = Budget { left: 30_000_000 + 100 * parts.faces.len() };
+        count_separate(parts, first_face, meeting, &mut depths, &mut budget)?;
+        count_touching(parts, meeting, &mut depths, &mut budget)?;
+    }
+    Ok(depths)
+}
+
+/// Steps of work that may still be done.
+struct Budget {
+    left: usize,
+}
+
+impl Budget {
+    fn spend(&mut self, steps: usize) -> Result<(), TooManyNested> {
+        self.left = self.left.checked_sub(steps).ok_or(TooManyNested)?;
+        Ok(())
+    }
+}
+
+/// Components around each one that they do not meet: one ray for each component, crossing all.
+fn count_separate(
+    parts: &Parts<'_>,
+    first_face: &[u32],
+    meeting: &[[u32; 2]],
+    depths: &mut [usize],
+    budget: &mut Budget,
+) -> Result<(), TooManyNested> {
+    let test = InsideTest::of_scaled(parts.unit, parts.points, parts.faces);
+    // Winding around one point by component, and the components it was counted for.
+    let mut winding = vec![0; depths.len()];
+    let mut crossed = Vec::new();
+    for (own, &face) in (0..).zip(first_face) {
+        let point = parts.points[parts.faces[face as usize][0] as usize];
+        test.crossings(point, |face, crossing| {
+            // The point lies on its own component and on some that meet it; these do not count.
+            if let Crossing::Above(sign) = crossing {
+                let other = parts.component[face as usize];
+                winding[other as usize] += sign;
+                crossed.push(other);
+            }
+            ControlFlow::Continue(())
+        });
+        budget.spend(crossed.len())?;
+        crossed.sort_unstable();
+        crossed.dedup();
+        for other in crossed.drain(..) {
+            let around = std::mem::take(&mut winding[other as usize]) != 0;
+            let meets = meeting.binary_search(&[own.min(other), own.max(other)]).is_ok();
+            if around && other != own && !meets {
+                depths[own as usize] += 1;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// One component by itself.
+struct Part {
+    vertices: Vec<Vec3>,
+    /// Of the faces, rounded.
+    centres: Vec<Vec3>,
+    lo: Vec3,
+    hi: Vec3,
+    test: InsideTest,
+}
+
+impl Part {
+    fn new(parts: &Parts<'_>, faces: &[[u32; 3]]) -> Self {
+        let mut corners: Vec<u32> = faces.as_flattened().to_vec();
+        corners.sort_unstable();
+        corners.dedup();
+        let vertices: Vec<Vec3> = corners.into_iter().map(|v| parts.points[v as usize]).collect();
+        let corners = faces.iter().map(|face| face.map(|v| parts.points[v as usize]));
+        let centres = corners.map(|[a, b, c]| 0.5 * (a + 0.5 * (b + c))).collect();
+        let lo = vertices.iter().fold(Vec3::INFINITY, |lo, &v| lo.min(v));
+        let hi = vertices.iter().fold(Vec3::NEG_INFINITY, |hi, &v| hi.max(v));
+        let test = InsideTest::of_scaled(parts.unit, parts.points, faces);
+        Self { vertices, centres, lo, hi, test }
+    }
+
+    /// How many of the points are strictly inside, and how many outside; counts no further than
+    /// to the first one outside if that `decides`.
+    fn count(
+        &self,
+        points: &[Vec3],
+        decides: bool,
+        budget: &mut Budget,
+    ) -> Result<(usize, usize), TooManyNested> {
+        let (mut inside, mut outside) = (0, 0);
+        for &point in points {
+            // A query costs about as much as ten crossings.
+            budget.spend(10)?;
+            match self.test.winding_of_scaled(point) {
+                Some(0) => outside += 1,
+                Some(_) => inside += 1,
+                None => {}
+            }
+            if decides && outside > 0 {
+                break;
+            }
+        }
+        Ok((inside, outside))
+    }
+}
+
+/// Components around each one that they touch.
+fn count_touching(
+    parts: &Parts<'_>,
+    meeting: &[[u32; 2]],
+    depths: &mut [usize],
+    budget: &mut Budget,
+) -> Result<(), TooManyNested> {
+    let mut faces: Vec<Vec<[u32; 3]>> = vec![Vec::new(); depths.len()];
+    for (&face, &component) in parts.faces.iter().zip(parts.component) {
+        faces[component as usize].push(face);
+    }
+    let mut cache: Vec<Option<Part>> = (0..depths.len()).map(|_| None).collect();
+    for &[a, b] in meeting {
+        for i in [a, b].map(|i| i as usize) {
+            cache[i].get_or_insert_with(|| Part::new(parts, &faces[i]));
+        }
+        if let (Some(first), Some(second)) = (&cache[a as usize], &cache[b as usize]) {
+            depths[a as usize] += usize::from(lies_in(first, second, budget)?);
+            depths[b as usize] += usize::from(lies_in(second, first, budget)?);
+        }
+    }
+    Ok(())
+}
+
+fn lies_in(inner: &Part, outer: &Part, budget: &mut Budget) -> Result<bool, TooManyNested> {
+    if !(inner.lo.cmpge(outer.lo).all() && inner.hi.cmple(outer.hi).all()) {
+        return Ok(false);
+    }
+    let (strictly, out) = outer.count(&inner.vertices, true, budget)?;
+    if out > 0 || inner.count(&outer.vertices, false, budget)?.0 > 0 {
+        return Ok(false);
+    }
+    if strictly > 0 {
+        return Ok(true);
+    }
+    let (inside, outside) = outer.count(&inner.centres, false, budget)?;
+    Ok(inside > outside)
 }
 
 #[cfg(test)]

@@ -504,9 +504,9 @@ impl Records {
             notes.push("a list of spheres without edges and faces".to_owned());
         }
         // libmat counts edges and faces of its own lists instead of the lines; its flags tell its files.
-        let all_have = |kind: usize, words: usize| self.words[kind][words] as u64 == found[kind];
-        let miscounts = self.normals > 0
-            || (found[EDGE] > 0 && all_have(SPHERE, 2) && all_have(EDGE, 2) && all_have(FACE, 1));
+        let with_its_flags = [self.words[SPHERE][2], self.words[EDGE][2], self.words[FACE][1]];
+        let is_libmat = found[EDGE] > 0 && with_its_flags.map(|count| count as u64) == found;
+        let miscounts = self.normals > 0 || is_libmat;
         for kind in [SPHERE, EDGE, FACE] {
             let (what, announced, found) = (KINDS[kind], self.announced[kind], found[kind]);
             if found == announced || self.layout == Layout::Bare {
@@ -700,8 +700,8 @@ pub fn parse_obj(
 
 /// The vertices that a line names, out of those above it.
 fn obj_indices(words: Words<'_>, vertices: usize) -> Result<Vec<u32>, MaError> {
-    let line = words.line;
-    let index = |word: &str| {
+    let mut indices = Vec::new();
+    for word in words.rest {
         // Behind a slash stand texture coordinates and normals.
         let number = word.split('/').next().and_then(|text| text.parse::<i64>().ok());
         let from_zero = number.and_then(|number| match number {
@@ -710,13 +710,14 @@ fn obj_indices(words: Words<'_>, vertices: usize) -> Result<Vec<u32>, MaError> {
             _ => (vertices as i64).checked_add(number),
         });
         let index = from_zero.filter(|&index| index < vertices as i64);
-        index.and_then(|index| u32::try_from(index).ok()).ok_or_else(|| {
-            let found = shortened(word);
-            let why = "is not one of the";
-            line.malformed(format!("{found:?} {why} {vertices} vertices above, counted from 1"))
-        })
-    };
-    words.rest.map(index).collect()
+        let Some(index) = index.and_then(|index| u32::try_from(index).ok()) else {
+            let (found, why) = (shortened(word), "is not one of the");
+            let why = format!("{found:?} {why} {vertices} vertices above, counted from 1");
+            return Err(words.line.malformed(why));
+        };
+        indices.push(index);
+    }
+    Ok(indices)
 }
 
 /// A few spheres of radius 0 are a medial mesh of little use; at least this many are the vertices of a surface.

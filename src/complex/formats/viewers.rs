@@ -176,8 +176,8 @@ fn indices<const N: usize>(
     spheres: usize,
     at: &Place,
 ) -> Result<[u32; N], MaErrorKind> {
-    let is_index = |number: &&f64| (0.0..spheres as f64).contains(*number) && number.fract() == 0.0;
-    if let Some(number) = numbers.iter().find(|number| !is_index(number)) {
+    let range = 0.0..spheres as f64;
+    if let Some(number) = numbers.iter().find(|x| !range.contains(*x) || x.fract() != 0.0) {
         let why = format!("{at}: {number} is not one of the {spheres} spheres; indices start at 0");
         return Err(MaErrorKind::Malformed(why));
     }
@@ -254,9 +254,8 @@ pub(super) fn write_vtp(out: &mut dyn Write, mesh: &MedialMesh, look: &Look) -> 
         array(out, "Float64", name, 1, values.iter().flat_map(|v| v.to_le_bytes()))?;
     }
     writeln!(out, "</PointData>\n<CellData>\n</CellData>\n<Points>")?;
-    let coordinates = |Sphere { centre, .. }: &Sphere| centre.to_array();
-    let coordinates = mesh.spheres.iter().flat_map(coordinates).flat_map(f64::to_le_bytes);
-    array(out, "Float64", "Points", 3, coordinates)?;
+    let coordinates = mesh.spheres.iter().flat_map(|sphere| sphere.centre.to_array());
+    array(out, "Float64", "Points", 3, coordinates.flat_map(f64::to_le_bytes))?;
     writeln!(out, "</Points>")?;
     let points: Vec<[u32; 1]> = points.into_iter().map(|v| [v]).collect();
     cells(out, "Verts", &points)?;

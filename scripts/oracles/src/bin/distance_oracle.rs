@@ -14,7 +14,7 @@
 //! ```
 //!
 //! Modes: `closest` (points inside), `inside` (points of the box), `inside-hard` (degenerate
-//! ones), and without a counterpart `winding` and `signed` (points of the box). `FILE` holds little-endian numbers: the counts of vertices, faces and queries of one kind
+//! ones), and without a counterpart `signed` (points of the box). `FILE` holds little-endian numbers: the counts of vertices, faces and queries of one kind
 //! (u64), vertices (3 f64), faces (3 u32), the three kinds of queries (3 f64). Answers are x, y, z
 //! and distance of the closest point, or one of 1, 0, -1 for inside, on, outside.
 #![allow(clippy::print_stdout)]
@@ -26,8 +26,7 @@ use std::error::Error;
 use std::io::Write as _;
 
 use medial::Vec3;
-use medial::surface::{self, InsideTest, Side, TriMesh};
-use medial::surface::{SignedDistance, TriangleBvh, WindingTree};
+use medial::surface::{self, InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -175,11 +174,6 @@ fn run(task: &Task, mode: &str, answers: &str) -> Result<(), Box<dyn Error>> {
                 Side::Outside => -1.0,
             };
             sides.iter().map(value).collect()
-        }
-        "winding" => {
-            let tree = WindingTree::new(&task.mesh)?;
-            built = cpu_seconds();
-            tree.winding_number_batch(queries)
         }
         "signed" => {
             let (tree, inside) = (TriangleBvh::new(&task.mesh)?, InsideTest::new(&task.mesh));
