@@ -9,14 +9,14 @@ use std::ops::Deref;
 use rayon::prelude::*;
 
 use super::Sphere;
-use super::predicates::{
-    Filter, MAX_COORDINATE, Sign, Site, Unweighted, circumsphere, lexicographic,
-};
 use super::triangulation::{
     CellId, Facet, Triangulated, Triangulation, TriangulationError, VertexId, Violation,
     triangulate,
 };
 use crate::Vec3;
+use crate::predicates::{
+    Filter, MAX_COORDINATE, Sign, Site, Unweighted, circumsphere, lexicographic,
+};
 
 /// The Delaunay triangulation of points in space.
 ///

@@ -38,7 +38,6 @@
 //! # Ok::<(), medial_geometry::TriangulationError>(())
 //! ```
 
-mod cone;
 pub mod delaunay;
 mod disjoint;
 pub mod dual_complex;
@@ -46,30 +45,26 @@ mod enclosing;
 pub mod hash;
 pub mod planar_frame;
 pub mod poles;
-pub mod power_crust;
 pub mod predicates;
 pub mod regular;
-mod separation;
-mod slab;
 mod sphere;
-mod tangent_planes;
 pub mod trees;
 mod triangles_meet;
 pub mod triangulation;
 pub mod union_boundary;
 
-pub use cone::Cone;
+pub use crate::poles::PowerCrust;
+pub use crate::sphere::Cone;
+pub use crate::sphere::separation_angle;
+pub use crate::sphere::{ConeFrame, SlabPlanes};
+pub use crate::sphere::{Slab, SlabFace};
 pub use delaunay::Delaunay;
 pub use disjoint::DisjointSets;
 pub use dual_complex::DualComplex;
 pub use enclosing::enclosing_ball;
 pub use poles::{PolarBall, Pole, Poles, SamplePoles};
-pub use power_crust::PowerCrust;
 pub use regular::Regular;
-pub use separation::separation_angle;
-pub use slab::{Slab, SlabFace};
 pub use sphere::{HullFoot, Sphere};
-pub use tangent_planes::{ConeFrame, SlabPlanes};
 pub use triangles_meet::{TriangleTree, triangles_meet};
 pub use triangulation::{CellId, TriangulationError, VertexId};
 pub use union_boundary::{MergedVertices, UnionBoundary, UnionVertex};

@@ -17,11 +17,8 @@
 //! the tier, exact zeros (cospherical points) cost no more than other values, and nothing overflows
 //! or underflows.
 
-use super::differences::{
-    Differences, Grid, differences, highest_bit, lowest_bit, to_i128, to_wide, widen,
-};
-use super::wide::Wide;
-use super::{Sign, axes, narrow};
+use crate::predicates::integers::Wide;
+use crate::predicates::{Sign, integers};
 
 /// `a.x b.y - b.x a.y`, of twice the width.
 #[inline]
@@ -33,7 +30,7 @@ pub(super) fn minor<const D: usize, const D2: usize>(
 }
 
 #[inline]
-pub(super) fn det3<const D: usize, const D2: usize, const D3: usize>(
+fn det3<const D: usize, const D2: usize, const D3: usize>(
     [a, b, c]: &[[Wide<D>; 3]; 3],
 ) -> Wide<D3> {
     let bc: Wide<D2> = minor(b, c);
@@ -51,13 +48,13 @@ pub(super) fn orient3d(
     grid: Option<Grid>,
 ) -> Sign {
     if let Some(grid) = grid {
-        return narrow::det3_sign(&grid.differences([b, c, d], a));
+        return integers::det3_sign(&grid.differences([b, c, d], a));
     }
     match differences([b, c, d], a, i32::MAX).0 {
-        Differences::One(d) => narrow::det3_sign(&d),
+        Differences::One(d) => integers::det3_sign(&d),
         Differences::Two(d) => det3::<2, 4, 6>(&widen(&d)).sign(),
         Differences::Any(wide) => {
-            axes::orient3d([b, c, d], a).unwrap_or_else(|| det3::<20, 40, 60>(&wide).sign())
+            orient3d_scaled([b, c, d], a).unwrap_or_else(|| det3::<20, 40, 60>(&wide).sign())
         }
     }
 }
@@ -91,13 +88,7 @@ fn in_sphere_det<const D: usize, const D2: usize, const D3: usize, const D5: usi
 
 /// The sign of the determinant of four differences with their lifts; `R = D3 + L`.
 #[inline]
-pub(super) fn lifted_det<
-    const D: usize,
-    const D2: usize,
-    const D3: usize,
-    const L: usize,
-    const R: usize,
->(
+fn lifted_det<const D: usize, const D2: usize, const D3: usize, const L: usize, const R: usize>(
     [a, b, c, d]: &[[Wide<D>; 3]; 4],
     lifts: &[Wide<L>; 4],
 ) -> Sign {
@@ -123,12 +114,12 @@ pub(super) fn lifted_det<
 /// if known.
 pub(super) fn in_sphere(p: [&[f64; 3]; 4], e: &[f64; 3], grid: Option<Grid>) -> Sign {
     if let Some(grid) = grid {
-        return narrow::lifted_sign(&grid.differences(p, e), &[0; 4]);
+        return integers::lifted_sign(&grid.differences(p, e), &[0; 4]);
     }
     match differences(p, e, i32::MAX).0 {
-        Differences::One(d) => narrow::lifted_sign(&d, &[0; 4]),
+        Differences::One(d) => integers::lifted_sign(&d, &[0; 4]),
         Differences::Two(d) => in_sphere_det::<2, 4, 6, 10>(&widen(&d), &[Wide::ZERO; 4]),
-        Differences::Any(d) => axes::in_sphere(p, e)
+        Differences::Any(d) => in_sphere_scaled(p, e)
             .unwrap_or_else(|| in_sphere_det::<20, 40, 60, 100>(&d, &[Wide::ZERO; 4])),
     }
 }
@@ -154,7 +145,7 @@ pub(super) fn power_test(p: [(&[f64; 3], f64); 4], e: (&[f64; 3], f64)) -> Sign 
     let offset40 = |w: f64| to_wide::<40>(e.1, unit).sub(to_wide(w, unit));
     // The limits leave room in a lift for three squares, a difference of weights and the sign.
     match d {
-        Differences::One(d) if below(122) => narrow::lifted_sign(&d, &weights.map(offset)),
+        Differences::One(d) if below(122) => integers::lifted_sign(&d, &weights.map(offset)),
         Differences::One(d) if below(250) => {
             let d = d.map(|p| p.map(|x| Wide::from_i128(x.into())));
             in_sphere_det::<2, 4, 6, 10>(&d, &weights.map(offset4))
@@ -227,4 +218,341 @@ fn scale_by_power(mut x: f64, mut e: i32) -> f64 {
         e -= step;
     }
     x
+}
+
+// Exact differences of coordinates as integers: in one word if they fit, else in two or in twenty.
+
+/// A double as `mantissa * 2^exponent`.
+#[derive(Clone, Copy)]
+struct Parts {
+    mantissa: u64,
+    exponent: i32,
+    negative: bool,
+}
+
+#[inline]
+fn parts(x: f64) -> Parts {
+    let bits = x.to_bits();
+    let biased = (bits >> 52) as i32 & 0x7ff;
+    let fraction = bits & ((1 << 52) - 1);
+    // Subnormal numbers have no implicit bit, and the exponent of the smallest normal ones.
+    let implicit = u64::from(biased != 0) << 52;
+    Parts {
+        mantissa: fraction | implicit,
+        exponent: biased.max(1) - 1075,
+        negative: (bits >> 63) != 0,
+    }
+}
+
+/// The exponent of the lowest set bit of `x`; `i32::MAX` for zero.
+#[inline]
+pub(crate) fn lowest_bit(x: f64) -> i32 {
+    let p = parts(x);
+    if p.mantissa == 0 { i32::MAX } else { p.exponent + p.mantissa.trailing_zeros() as i32 }
+}
+
+/// One more than the exponent of the highest set bit of `x`; `i32::MIN` for zero.
+#[inline]
+pub(crate) fn highest_bit(x: f64) -> i32 {
+    let p = parts(x);
+    if p.mantissa == 0 { i32::MIN } else { p.exponent + 64 - p.mantissa.leading_zeros() as i32 }
+}
+
+/// `x / 2^quantum` as an integer; needs `|x| < 2^(quantum + 127)` and `quantum <= lowest_bit(x)`.
+#[inline]
+fn to_i128(x: f64, quantum: i32) -> i128 {
+    let p = parts(x);
+    let shift = p.exponent - quantum;
+    let magnitude = if p.mantissa == 0 {
+        0
+    } else if shift >= 0 {
+        i128::from(p.mantissa) << shift
+    } else {
+        i128::from(p.mantissa >> -shift)
+    };
+    if p.negative { -magnitude } else { magnitude }
+}
+
+/// `x / 2^quantum` for any exponents.
+pub(super) fn to_wide<const N: usize>(x: f64, quantum: i32) -> Wide<N> {
+    let p = parts(x);
+    let shift = p.exponent - quantum;
+    if p.mantissa == 0 {
+        Wide::ZERO
+    } else if shift >= 0 {
+        Wide::from_shifted(p.mantissa, shift as u32, p.negative)
+    } else {
+        Wide::from_shifted(p.mantissa >> -shift, 0, p.negative)
+    }
+}
+
+/// Differences of `K` points to an origin as integers, in the narrowest tier that holds them.
+pub(super) enum Differences<const K: usize> {
+    One([[i64; 3]; K]),
+    Two([[i128; 3]; K]),
+    Any([[Wide<20>; 3]; K]),
+}
+
+/// A grid on which differences fit one word: coordinates are multiples of `1 / scale`, a power of
+/// two.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    scale: f64,
+}
+
+impl Grid {
+    /// The grid of coordinates that are multiples of `2^quantum` and below `2^top`, if differences
+    /// on it are narrow.
+    pub(super) fn new(quantum: i32, top: i32) -> Option<Self> {
+        let narrow = top - quantum < integers::BITS && (-960..=960).contains(&quantum);
+        narrow.then(|| Self { scale: f64::from_bits(((1023 - quantum) as u64) << 52) })
+    }
+
+    #[inline(always)]
+    pub(super) fn differences<const K: usize>(
+        self,
+        points: [&[f64; 3]; K],
+        origin: &[f64; 3],
+    ) -> [[i64; 3]; K] {
+        let mut d = [[0; 3]; K];
+        // Both conversions are exact: a power of two times a multiple of its reciprocal.
+        for k in 0..3 {
+            let o = (origin[k] * self.scale) as i64;
+            for i in 0..K {
+                d[i][k] = (points[i][k] * self.scale) as i64 - o;
+            }
+        }
+        d
+    }
+}
+
+/// Differences as integers, and their quantum, computed through doubles; `None` if a difference is
+/// rounded or they span too many bits.
+///
+/// The usual case: the differences of neighbouring points are exact as doubles.
+#[inline]
+fn close_differences<const K: usize>(
+    points: [&[f64; 3]; K],
+    origin: &[f64; 3],
+) -> Option<([[i64; 3]; K], i32)> {
+    let mut d = [[0.0; 3]; K];
+    let mut reach = 0.0f64;
+    let mut exact = true;
+    for i in 0..K {
+        for k in 0..3 {
+            let (a, b) = (points[i][k], origin[k]);
+            let difference = a - b;
+            // Knuth's error term of a sum, which is zero exactly if nothing was rounded.
+            let virtual_b = a - difference;
+            let virtual_a = difference + virtual_b;
+            exact &= (a - virtual_a) + (virtual_b - b) == 0.0;
+            reach = reach.max(difference.abs());
+            d[i][k] = difference;
+        }
+    }
+    let quantum = highest_bit(reach).saturating_sub(integers::BITS - 1);
+    if !exact || !(-960..=960).contains(&quantum) {
+        return None;
+    }
+    let scale = f64::from_bits(((1023 - quantum) as u64) << 52);
+    let mut integers = [[0; 3]; K];
+    for i in 0..K {
+        for k in 0..3 {
+            let scaled = d[i][k] * scale;
+            integers[i][k] = scaled as i64;
+            // Beside a huge difference a tiny one underflows to 0, which is an integer, too.
+            exact &= integers[i][k] as f64 == scaled && (scaled == 0.0) == (d[i][k] == 0.0);
+        }
+    }
+    exact.then_some((integers, quantum))
+}
+
+/// The common quantum of the points and their differences to `origin` in units of it.
+///
+/// `quantum_cap` is an upper bound on the quantum, from weights; `i32::MAX` without.
+pub(super) fn differences<const K: usize>(
+    points: [&[f64; 3]; K],
+    origin: &[f64; 3],
+    quantum_cap: i32,
+) -> (Differences<K>, i32) {
+    if let Some((d, quantum)) = close_differences(points, origin)
+        && quantum <= quantum_cap
+    {
+        return (Differences::One(d), quantum);
+    }
+    let mut quantum = quantum_cap;
+    let mut top = i32::MIN;
+    for p in points.iter().chain([&origin]) {
+        for &x in p.iter() {
+            quantum = quantum.min(lowest_bit(x));
+            top = top.max(highest_bit(x));
+        }
+    }
+    if top == i32::MIN {
+        return (Differences::One([[0; 3]; K]), quantum.min(0));
+    }
+    if let Some(grid) = Grid::new(quantum, top) {
+        return (Differences::One(grid.differences(points, origin)), quantum);
+    }
+    let bits = top - quantum;
+    // A difference has one bit more, and its sign another: i128 holds up to here.
+    if bits > 125 {
+        let o = origin.map(|x| to_wide::<20>(x, quantum));
+        let d = points.map(|p| [0, 1, 2].map(|k| to_wide::<20>(p[k], quantum).sub(o[k])));
+        return (Differences::Any(d), quantum);
+    }
+    let o = origin.map(|x| to_i128(x, quantum));
+    let mut wide = [[0i128; 3]; K];
+    let mut reach = 0u128;
+    for i in 0..K {
+        for k in 0..3 {
+            wide[i][k] = to_i128(points[i][k], quantum) - o[k];
+            reach |= wide[i][k].unsigned_abs();
+        }
+    }
+    // Coordinates may be long and their differences short.
+    if reach >> integers::BITS == 0 {
+        (Differences::One(wide.map(|p| p.map(|x| x as i64))), quantum)
+    } else {
+        (Differences::Two(wide), quantum)
+    }
+}
+
+#[inline]
+pub(super) fn widen<const K: usize, const N: usize>(d: &[[i128; 3]; K]) -> [[Wide<N>; 3]; K] {
+    d.map(|p| p.map(Wide::from_i128))
+}
+
+// The exact stage for axes of very different extents, such as a solid flattened to `1e-100`.
+//
+// With one common quantum such coordinates span hundreds of bits, although those of each axis do
+// not. A determinant keeps its sign when an axis is scaled by a power of two. So does the lifted
+// determinant, provided that the lifts are still summed in a common unit: only they become long.
+//
+// 1. Each axis is scaled so that its largest coordinate is in `[1/2, 1)`.
+// 2. Differences, minors and `3 x 3` determinants are those of the first two tiers.
+// 3. The lift of a point is the sum of its squared differences, each shifted by twice the exponent
+//    of its axis.
+
+/// The largest shifts for the two widths of a lift, with room for the bits of three squares and a
+/// sign.
+const SHORT_SHIFT: i32 = 14 * 64 - 256;
+const LONG_SHIFT: i32 = 44 * 64 - 256;
+
+/// Below this exponent a scaled bit could underflow.
+const LOWEST: i32 = -1000;
+
+/// Differences on scaled axes, and the exponent of each axis.
+struct Scaled<const K: usize> {
+    differences: Differences<K>,
+    exponents: [i32; 3],
+}
+
+/// Step 1; `None` where the coordinates of one axis span too many bits by themselves.
+fn scaled<const K: usize>(points: [&[f64; 3]; K], origin: &[f64; 3]) -> Option<Scaled<K>> {
+    let (mut factors, mut exponents) = ([1.0; 3], [0; 3]);
+    for k in 0..3 {
+        let on_axis = || points.iter().chain([&origin]).map(|p| p[k]);
+        let top = on_axis().map(highest_bit).max().unwrap_or(i32::MIN);
+        let low = on_axis().map(lowest_bit).min().unwrap_or(i32::MAX);
+        if top == i32::MIN {
+            continue;
+        }
+        exponents[k] = top.max(LOWEST);
+        // The scaled coordinates must be exact, so their lowest bit must not underflow.
+        if low - exponents[k] < LOWEST {
+            return None;
+        }
+        factors[k] = f64::from_bits(((1023 - exponents[k]) as u64) << 52);
+    }
+    let scale = |p: &[f64; 3]| [0, 1, 2].map(|k| p[k] * factors[k]);
+    let (points, origin) = (points.map(scale), scale(origin));
+    let differences = differences(points.each_ref(), &origin, i32::MAX).0;
+    Some(Scaled { differences, exponents })
+}
+
+/// The sign of `det(b - a, c - a, d - a)`, where the differences are narrow on scaled axes.
+fn orient3d_scaled(p: [&[f64; 3]; 3], origin: &[f64; 3]) -> Option<Sign> {
+    match scaled(p, origin)?.differences {
+        Differences::One(d) => Some(integers::det3_sign(&d)),
+        Differences::Two(d) => Some(det3::<2, 4, 6>(&widen(&d)).sign()),
+        Differences::Any(_) => None,
+    }
+}
+
+/// The in-sphere test, where the differences are narrow on scaled axes.
+fn in_sphere_scaled(p: [&[f64; 3]; 4], e: &[f64; 3]) -> Option<Sign> {
+    let Scaled { differences, exponents } = scaled(p, e)?;
+    let least = exponents.into_iter().min().unwrap_or(0);
+    let shifts = exponents.map(|exponent| 2 * (exponent - least));
+    let longest = shifts.into_iter().max().unwrap_or(0);
+    let one = |d: &[[i64; 3]; 4]| d.map(|p| p.map(|x| Wide::<1>::from_i128(x.into())));
+    match differences {
+        Differences::One(d) if longest <= SHORT_SHIFT => {
+            Some(lifted_det_scaled::<1, 2, 3, 14, 17>(&one(&d), shifts))
+        }
+        Differences::One(d) if longest <= LONG_SHIFT => {
+            Some(lifted_det_scaled::<1, 2, 3, 44, 47>(&one(&d), shifts))
+        }
+        Differences::Two(d) if longest <= SHORT_SHIFT => {
+            Some(lifted_det_scaled::<2, 4, 6, 14, 20>(&widen(&d), shifts))
+        }
+        Differences::Two(d) if longest <= LONG_SHIFT => {
+            Some(lifted_det_scaled::<2, 4, 6, 44, 50>(&widen(&d), shifts))
+        }
+        _ => None,
+    }
+}
+
+/// Steps 2 and 3 with differences of `D` words and lifts of `L`; `R = D3 + L`.
+fn lifted_det_scaled<
+    const D: usize,
+    const D2: usize,
+    const D3: usize,
+    const L: usize,
+    const R: usize,
+>(
+    d: &[[Wide<D>; 3]; 4],
+    shifts: [i32; 3],
+) -> Sign {
+    let lift = |p: &[Wide<D>; 3]| {
+        (0..3).fold(Wide::<L>::ZERO, |sum, k| {
+            let square: Wide<D2> = p[k].mul(p[k]);
+            sum.add(square.extended::<L>().shifted(shifts[k] as u32))
+        })
+    };
+    lifted_det::<D, D2, D3, L, R>(d, &d.each_ref().map(lift))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Small integers, so that many determinants are zero, and any numbers.
+    fn points() -> impl Strategy<Value = [[f64; 3]; 5]> {
+        let whole = prop::array::uniform5(prop::array::uniform3(-3..4i32))
+            .prop_map(|points| points.map(|p| p.map(f64::from)));
+        prop_oneof![whole, prop::array::uniform5(prop::array::uniform3(-1.0..1.0f64))]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2_000))]
+
+        #[test]
+        fn scaled_axes_agree_with_the_widest_tier(
+            p in points(), e in prop::array::uniform3(-900..180i32),
+        ) {
+            let scale = e.map(|e| f64::powi(2.0, e));
+            let flat = p.map(|p| [0, 1, 2].map(|k| p[k] * scale[k]));
+            let [a, b, c, d, e] = flat.each_ref();
+            // Scaling keeps the sign of an orientation; equal weights lead past this file.
+            let [p0, p1, p2, p3, _] = p.each_ref();
+            let known = super::orient3d(p0, p1, p2, p3, None);
+            prop_assert_eq!(orient3d_scaled([b, c, d], a), Some(known));
+            let widest = super::power_test([a, b, c, d].map(|p| (p, 0.0)), (e, 0.0));
+            prop_assert_eq!(in_sphere_scaled([a, b, c, d], e), Some(widest));
+        }
+    }
 }

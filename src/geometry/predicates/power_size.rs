@@ -29,11 +29,11 @@
 //! by their *reach* `|d|^2 + |w_0 - w|`. The filter never decides when a difference is so short that
 //! products may underflow, or when a product overflows.
 
-use super::power_exact::{
-    self, EdgeClearance, EdgeSize, TetrahedronSize, TriangleClearance, TriangleSize,
-    VertexClearance,
+use crate::predicates::exact::{
+    Differences, differences, highest_bit, lowest_bit, minor, to_wide, widen,
 };
-use super::{Sign, Site};
+use crate::predicates::integers::Wide;
+use crate::predicates::{Sign, Site};
 
 const U: f64 = f64::EPSILON / 2.0;
 
@@ -97,7 +97,7 @@ pub(crate) fn tetrahedron_size([o, a, b, c]: [&Site; 4]) -> Sign {
     let product = x.square * y.square * z.square;
     let error = 34.0 * U * (6.0 * (px + py + pz) + 8.0 * product * o.w.abs());
     decided(value, error, [&x, &y, &z])
-        .unwrap_or_else(|| power_exact::sign::<TetrahedronSize, 3>(o, [a, b, c]))
+        .unwrap_or_else(|| exact_sign::<TetrahedronSize, 3>(o, [a, b, c]))
 }
 
 /// The size of a triangle that is not degenerate.
@@ -111,8 +111,7 @@ pub(crate) fn triangle_size([o, a, b]: [&Site; 3]) -> Sign {
         - 4.0 * nu * o.w;
     let terms = x.reach * x.reach * y.square + y.reach * y.reach * x.square;
     let error = 26.0 * U * (2.0 * terms + 8.0 * x.square * y.square * o.w.abs());
-    decided(value, error, [&x, &y])
-        .unwrap_or_else(|| power_exact::sign::<TriangleSize, 2>(o, [a, b]))
+    decided(value, error, [&x, &y]).unwrap_or_else(|| exact_sign::<TriangleSize, 2>(o, [a, b]))
 }
 
 /// The size of an edge.
@@ -121,7 +120,7 @@ pub(crate) fn edge_size([o, a]: [&Site; 2]) -> Sign {
     let x = see(o, a);
     let value = x.lift * x.lift - 4.0 * x.square * o.w;
     let error = 18.0 * U * (x.reach * x.reach + 4.0 * x.square * o.w.abs());
-    decided(value, error, [&x]).unwrap_or_else(|| power_exact::sign::<EdgeSize, 1>(o, [a]))
+    decided(value, error, [&x]).unwrap_or_else(|| exact_sign::<EdgeSize, 1>(o, [a]))
 }
 
 /// The clearance of a triangle that is not degenerate.
@@ -137,7 +136,7 @@ pub(crate) fn triangle_clearance([o, a, b]: [&Site; 3], v: &Site) -> Sign {
         + x.reach * y.square * (x.square * z.square).sqrt()
         + y.reach * x.square * (y.square * z.square).sqrt();
     decided(value, 26.0 * U * 2.0 * terms, [&x, &y, &z])
-        .unwrap_or_else(|| power_exact::sign::<TriangleClearance, 3>(o, [a, b, v]))
+        .unwrap_or_else(|| exact_sign::<TriangleClearance, 3>(o, [a, b, v]))
 }
 
 /// The clearance of an edge.
@@ -147,7 +146,7 @@ pub(crate) fn edge_clearance([o, a]: [&Site; 2], v: &Site) -> Sign {
     let value = z.lift * x.square - x.lift * dot(&x.d, &z.d);
     let terms = z.reach * x.square + x.reach * (x.square * z.square).sqrt();
     decided(value, 17.0 * U * terms, [&x, &z])
-        .unwrap_or_else(|| power_exact::sign::<EdgeClearance, 2>(o, [a, v]))
+        .unwrap_or_else(|| exact_sign::<EdgeClearance, 2>(o, [a, v]))
 }
 
 /// The clearance of a vertex.
@@ -155,9 +154,426 @@ pub(crate) fn edge_clearance([o, a]: [&Site; 2], v: &Site) -> Sign {
 pub(crate) fn vertex_clearance(o: &Site, v: &Site) -> Sign {
     let z = see(o, v);
     decided(z.lift, 9.0 * U * z.reach, [&z])
-        .unwrap_or_else(|| power_exact::sign::<VertexClearance, 1>(o, [v]))
+        .unwrap_or_else(|| exact_sign::<VertexClearance, 1>(o, [v]))
+}
+
+// The exact stage of [`super::power_size`]: its polynomials in fixed-width integers.
+//
+// Tiers as in [`super::exact`]. The size of a tetrahedron, the longest value (degree 8), takes 8, 16
+// or 160 words. In the first two tiers weights have at most 122 and 250 bits in units of the squared
+// quantum. So a lift has at most 125 and 254 bits, and no sum below reaches its sign bit.
+
+/// A polynomial in `K` differences `d` to an origin of weight `w`, and the lifts `l`. The widths
+/// are in words, named by degree.
+trait Form<const K: usize> {
+    fn sign<
+        const D: usize,
+        const D2: usize,
+        const D3: usize,
+        const D4: usize,
+        const D6: usize,
+        const D8: usize,
+    >(
+        d: &[[Wide<D>; 3]; K],
+        l: &[Wide<D2>; K],
+        w: Wide<D2>,
+    ) -> Sign;
+}
+
+/// The sign of a form of the differences of `others` to `origin`.
+#[cold]
+#[inline(never)]
+fn exact_sign<F: Form<K>, const K: usize>(origin: &Site, others: [&Site; K]) -> Sign {
+    let weights = others.map(|s| s.w);
+    let (mut cap, mut top) = (lowest_bit(origin.w), highest_bit(origin.w));
+    for w in weights {
+        cap = cap.min(lowest_bit(w));
+        top = top.max(highest_bit(w));
+    }
+    // Weights are integers in units of the squared quantum.
+    let cap = if cap == i32::MAX { cap } else { cap.div_euclid(2) };
+    let (d, quantum) = differences(others.map(|s| &s.p), &origin.p, cap);
+    let unit = 2 * quantum;
+    let below = |limit: i32| top == i32::MIN || top - unit <= limit;
+    let w = (origin.w, weights);
+    match d {
+        Differences::One(d) if below(122) => {
+            evaluate::<F, K, 1, 2, 3, 4, 6, 8>(&lengthen(&d), w, unit)
+        }
+        Differences::One(d) if below(250) => {
+            evaluate::<F, K, 2, 4, 6, 8, 12, 16>(&lengthen(&d), w, unit)
+        }
+        Differences::Two(d) if below(250) => {
+            evaluate::<F, K, 2, 4, 6, 8, 12, 16>(&widen(&d), w, unit)
+        }
+        Differences::One(d) => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&lengthen(&d), w, unit),
+        Differences::Two(d) => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&widen(&d), w, unit),
+        Differences::Any(d) => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&d, w, unit),
+    }
+}
+
+fn lengthen<const K: usize, const N: usize>(d: &[[i64; 3]; K]) -> [[Wide<N>; 3]; K] {
+    d.map(|p| p.map(|x| Wide::from_i128(x.into())))
+}
+
+fn evaluate<
+    F: Form<K>,
+    const K: usize,
+    const D: usize,
+    const D2: usize,
+    const D3: usize,
+    const D4: usize,
+    const D6: usize,
+    const D8: usize,
+>(
+    d: &[[Wide<D>; 3]; K],
+    (w, weights): (f64, [f64; K]),
+    unit: i32,
+) -> Sign {
+    let w: Wide<D2> = to_wide(w, unit);
+    let mut l = [w; K];
+    for i in 0..K {
+        l[i] = dot_wide::<D, D2>(&d[i], &d[i]).add(w).sub(to_wide(weights[i], unit));
+    }
+    F::sign::<D, D2, D3, D4, D6, D8>(d, &l, w)
+}
+
+#[inline]
+fn dot_wide<const D: usize, const D2: usize>(a: &[Wide<D>; 3], b: &[Wide<D>; 3]) -> Wide<D2> {
+    a[0].mul::<D, D2>(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
+}
+
+#[inline]
+fn cross_wide<const D: usize, const D2: usize>(
+    a: &[Wide<D>; 3],
+    b: &[Wide<D>; 3],
+) -> [Wide<D2>; 3] {
+    [[1, 2], [2, 0], [0, 1]].map(|[y, z]| minor(&[a[y], a[z], a[y]], &[b[y], b[z], b[y]]))
+}
+
+#[inline]
+fn twice<const N: usize>(a: Wide<N>) -> Wide<N> {
+    a.add(a)
+}
+
+struct TetrahedronSize;
+
+impl Form<3> for TetrahedronSize {
+    fn sign<
+        const D: usize,
+        const D2: usize,
+        const D3: usize,
+        const D4: usize,
+        const D6: usize,
+        const D8: usize,
+    >(
+        [a, b, c]: &[[Wide<D>; 3]; 3],
+        l: &[Wide<D2>; 3],
+        w: Wide<D2>,
+    ) -> Sign {
+        let normals: [[Wide<D2>; 3]; 3] = [cross_wide(b, c), cross_wide(c, a), cross_wide(a, b)];
+        let n: [Wide<D4>; 3] = [0, 1, 2].map(|k| {
+            let term = |i: usize| normals[i][k].mul::<D2, D4>(l[i]);
+            term(0).add(term(1)).add(term(2))
+        });
+        let n2: Wide<D8> = dot_wide(&n, &n);
+        let row = |k: usize| normals[0][k].mul::<D, D3>(a[k]);
+        let det = row(0).add(row(1)).add(row(2));
+        let det2: Wide<D6> = det.mul(det);
+        n2.sub(det2.mul(twice(twice(w)))).sign()
+    }
+}
+
+struct TriangleSize;
+
+impl Form<2> for TriangleSize {
+    fn sign<
+        const D: usize,
+        const D2: usize,
+        const D3: usize,
+        const D4: usize,
+        const D6: usize,
+        const D8: usize,
+    >(
+        [a, b]: &[[Wide<D>; 3]; 2],
+        [l, m]: &[Wide<D2>; 2],
+        w: Wide<D2>,
+    ) -> Sign {
+        let (aa, bb, ab): (Wide<D2>, Wide<D2>, Wide<D2>) =
+            (dot_wide(a, a), dot_wide(b, b), dot_wide(a, b));
+        let nu: Wide<D4> = aa.mul::<D2, D4>(bb).sub(ab.mul(ab));
+        let squares: Wide<D6> =
+            l.mul::<D2, D4>(*l).mul::<D2, D6>(bb).add(m.mul::<D2, D4>(*m).mul(aa));
+        let mixed: Wide<D6> = l.mul::<D2, D4>(*m).mul(ab);
+        squares.sub(twice(mixed)).sub(nu.mul(twice(twice(w)))).sign()
+    }
+}
+
+struct EdgeSize;
+
+impl Form<1> for EdgeSize {
+    fn sign<
+        const D: usize,
+        const D2: usize,
+        const D3: usize,
+        const D4: usize,
+        const D6: usize,
+        const D8: usize,
+    >(
+        [a]: &[[Wide<D>; 3]; 1],
+        [l]: &[Wide<D2>; 1],
+        w: Wide<D2>,
+    ) -> Sign {
+        let aa: Wide<D2> = dot_wide(a, a);
+        l.mul::<D2, D4>(*l).sub(aa.mul(twice(twice(w)))).sign()
+    }
+}
+
+struct TriangleClearance;
+
+impl Form<3> for TriangleClearance {
+    fn sign<
+        const D: usize,
+        const D2: usize,
+        const D3: usize,
+        const D4: usize,
+        const D6: usize,
+        const D8: usize,
+    >(
+        [a, b, v]: &[[Wide<D>; 3]; 3],
+        [l, m, lv]: &[Wide<D2>; 3],
+        _: Wide<D2>,
+    ) -> Sign {
+        let (aa, bb, ab): (Wide<D2>, Wide<D2>, Wide<D2>) =
+            (dot_wide(a, a), dot_wide(b, b), dot_wide(a, b));
+        let (av, bv): (Wide<D2>, Wide<D2>) = (dot_wide(a, v), dot_wide(b, v));
+        let nu: Wide<D4> = aa.mul::<D2, D4>(bb).sub(ab.mul(ab));
+        let along_a: Wide<D4> = l.mul::<D2, D4>(bb).sub(m.mul(ab));
+        let along_b: Wide<D4> = m.mul::<D2, D4>(aa).sub(l.mul(ab));
+        nu.mul::<D2, D6>(*lv).sub(along_a.mul(av)).sub(along_b.mul(bv)).sign()
+    }
+}
+
+struct EdgeClearance;
+
+impl Form<2> for EdgeClearance {
+    fn sign<
+        const D: usize,
+        const D2: usize,
+        const D3: usize,
+        const D4: usize,
+        const D6: usize,
+        const D8: usize,
+    >(
+        [a, v]: &[[Wide<D>; 3]; 2],
+        [l, lv]: &[Wide<D2>; 2],
+        _: Wide<D2>,
+    ) -> Sign {
+        let (aa, av): (Wide<D2>, Wide<D2>) = (dot_wide(a, a), dot_wide(a, v));
+        lv.mul::<D2, D4>(aa).sub(l.mul(av)).sign()
+    }
+}
+
+struct VertexClearance;
+
+impl Form<1> for VertexClearance {
+    fn sign<
+        const D: usize,
+        const D2: usize,
+        const D3: usize,
+        const D4: usize,
+        const D6: usize,
+        const D8: usize,
+    >(
+        _: &[[Wide<D>; 3]; 1],
+        [lv]: &[Wide<D2>; 1],
+        _: Wide<D2>,
+    ) -> Sign {
+        lv.sign()
+    }
 }
 
 #[cfg(test)]
-#[path = "power_size_tests.rs"]
-mod tests;
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Laplace expansion of a determinant of small integers.
+    fn determinant(m: &[Vec<i128>]) -> i128 {
+        if m.is_empty() {
+            return 1;
+        }
+        (0..m.len())
+            .map(|k| {
+                let minor: Vec<Vec<i128>> = m[1..]
+                    .iter()
+                    .map(|row| row.iter().enumerate().filter(|e| e.0 != k).map(|e| *e.1).collect())
+                    .collect();
+                let sign = if k % 2 == 0 { 1 } else { -1 };
+                if m[0][k] == 0 { 0 } else { sign * m[0][k] * determinant(&minor) }
+            })
+            .sum()
+    }
+
+    type IntegerSite = ([i32; 3], i32);
+
+    fn entry(a: IntegerSite, b: IntegerSite) -> i128 {
+        let squares = [0, 1, 2].map(|k| i128::from(a.0[k] - b.0[k]).pow(2));
+        squares.iter().sum::<i128>() - i128::from(a.1) - i128::from(b.1)
+    }
+
+    /// The bordered matrix of a simplex.
+    fn bordered(s: &[IntegerSite]) -> Vec<Vec<i128>> {
+        let mut rows = vec![std::iter::once(0).chain(s.iter().map(|_| 1)).collect::<Vec<_>>()];
+        rows.extend(
+            s.iter().map(|&a| std::iter::once(1).chain(s.iter().map(|&b| entry(a, b))).collect()),
+        );
+        rows
+    }
+
+    /// The size; `None` for a degenerate simplex.
+    fn oracle_size(s: &[IntegerSite]) -> Option<Sign> {
+        let matrix = bordered(s);
+        let whole = determinant(&matrix);
+        let inner: Vec<Vec<i128>> = matrix[1..].iter().map(|row| row[1..].to_vec()).collect();
+        // -2 rho^2 = det D / det of the bordered matrix.
+        (whole != 0).then(|| Sign::of(-((determinant(&inner) * whole).signum() as f64)))
+    }
+
+    /// The clearance from `v`.
+    fn oracle_clearance(s: &[IntegerSite], v: IntegerSite) -> Option<Sign> {
+        let matrix = bordered(s);
+        let whole = determinant(&matrix);
+        // The unknowns (-2 rho^2, x) against the row (1, D_v): |o - v|^2 - w_v - rho^2.
+        let row: Vec<i128> = std::iter::once(1).chain(s.iter().map(|&a| entry(a, v))).collect();
+        let numerator: i128 = (0..matrix.len())
+            .map(|k| {
+                let mut replaced = matrix.clone();
+                for (i, r) in replaced.iter_mut().enumerate() {
+                    r[k] = i128::from(i == 0);
+                }
+                row[k] * determinant(&replaced)
+            })
+            .sum();
+        (whole != 0).then(|| Sign::of((numerator * whole.signum()).signum() as f64))
+    }
+
+    /// Where integers go: in units of `scale`, moved by `shift`; both leave the signs as they are.
+    fn placed((p, w): IntegerSite, scale: f64, shift: f64) -> Site {
+        Site { p: p.map(|x| (f64::from(x) + shift) * scale), w: f64::from(w) * scale * scale }
+    }
+
+    /// All signs of a list of five sites: sizes of tetrahedron, triangle, edge, and clearances.
+    fn signs(s: &[Site; 5]) -> [Sign; 6] {
+        let [a, b, c, d, e] = s;
+        [
+            tetrahedron_size([a, b, c, d]),
+            triangle_size([a, b, c]),
+            edge_size([a, b]),
+            triangle_clearance([a, b, c], e),
+            edge_clearance([a, b], e),
+            vertex_clearance(a, e),
+        ]
+    }
+
+    fn exact_signs(s: &[Site; 5]) -> [Sign; 6] {
+        let [a, b, c, d, e] = s;
+        [
+            exact_sign::<TetrahedronSize, 3>(a, [b, c, d]),
+            exact_sign::<TriangleSize, 2>(a, [b, c]),
+            exact_sign::<EdgeSize, 1>(a, [b]),
+            exact_sign::<TriangleClearance, 3>(a, [b, c, e]),
+            exact_sign::<EdgeClearance, 2>(a, [b, e]),
+            exact_sign::<VertexClearance, 1>(a, [e]),
+        ]
+    }
+
+    fn integer_site() -> impl Strategy<Value = IntegerSite> {
+        (prop::array::uniform3(-4..5i32), -3..20i32)
+    }
+
+    fn wild_site() -> impl Strategy<Value = Site> {
+        let p = prop_oneof![
+            prop::array::uniform3(-4..5i32).prop_map(|p| p.map(f64::from)),
+            prop::array::uniform3(-1.0..1.0f64),
+            (prop::array::uniform3(-4..5i32), -70..-20i32)
+                .prop_map(|(p, e)| p.map(|x| f64::from(x) + 2f64.powi(e))),
+            (prop::array::uniform3(-1.0..1.0f64), -120..60i32)
+                .prop_map(|(p, e)| p.map(|x| x * 2f64.powi(e))),
+        ];
+        let w = prop_oneof![
+            (-3..20i32).prop_map(f64::from),
+            (0.0..2.0f64).prop_map(|r| r * r),
+            (0.0..2.0f64, -400..100i32).prop_map(|(w, e)| w * 2f64.powi(e)),
+        ];
+        (p, w).prop_map(|(p, w)| Site { p, w })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn integers_agree_with_bordered_determinants(s in prop::array::uniform5(integer_site())) {
+            let oracle = [
+                oracle_size(&s[..4]),
+                oracle_size(&s[..3]),
+                oracle_size(&s[..2]),
+                oracle_clearance(&s[..3], s[4]),
+                oracle_clearance(&s[..2], s[4]),
+                oracle_clearance(&s[..1], s[4]),
+            ];
+            // Exact doubles near one and near 2^40; then such that filters must fail.
+            for (scale, shift) in [(1.0, 0.0), (0.25, 3e12), (f64::powi(2.0, 90), 0.0), (f64::powi(2.0, -150), 1.0)] {
+                let moved = s.map(|s| placed(s, scale, shift));
+                for (found, expected) in
+                    [signs(&moved), exact_signs(&moved)].iter().flat_map(|f| f.iter().zip(&oracle))
+                {
+                    if let Some(expected) = expected {
+                        prop_assert_eq!(found, expected);
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn filters_agree_with_the_exact_stage(s in prop::array::uniform5(wild_site())) {
+            prop_assert_eq!(signs(&s), exact_signs(&s));
+            // The other tiers: the same simplex beside a bit that widens the grid, in a weight that
+            // no sign depends on, is covered by the wild exponents; powers of two change nothing.
+            let larger = s.map(|s| Site { p: s.p.map(|x| x * 1024.0), w: s.w * 1048576.0 });
+            prop_assert_eq!(exact_signs(&larger), exact_signs(&s));
+        }
+
+        #[test]
+        fn the_origin_of_the_call_does_not_matter(s in prop::array::uniform5(wild_site())) {
+            let [a, b, c, d, e] = &s;
+            prop_assert_eq!(edge_size([a, b]), edge_size([b, a]));
+            prop_assert_eq!(triangle_size([a, b, c]), triangle_size([c, a, b]));
+            prop_assert_eq!(tetrahedron_size([a, b, c, d]), tetrahedron_size([d, b, a, c]));
+            if a.p != b.p {
+                prop_assert_eq!(edge_clearance([a, b], e), edge_clearance([b, a], e));
+            }
+            let [p, q, r] = [a, b, c].map(|s| crate::Vec3::from_array(s.p));
+            if !crate::predicates::collinear(p, q, r) {
+                prop_assert_eq!(triangle_clearance([a, b, c], e), triangle_clearance([b, c, a], e));
+            }
+        }
+    }
+
+    #[test]
+    fn nearly_touching_balls_are_told_apart() {
+        // Two unit balls at distance 2 touch; one bit further apart they do not.
+        let at = |x: f64| Site { p: [x, 0.0, 0.0], w: 1.0 };
+        assert_eq!(edge_size([&at(0.0), &at(2.0)]), Sign::Zero);
+        assert_eq!(edge_size([&at(0.0), &at(2.0f64.next_up())]), Sign::Positive);
+        assert_eq!(edge_size([&at(0.0), &at(2.0f64.next_down())]), Sign::Negative);
+        // The widest tier.
+        let far = Site { p: [1e57, 1.0, 0.0], w: 5e-324 };
+        assert_eq!(edge_size([&far, &at(-1.0)]), Sign::Positive);
+        assert_eq!(
+            vertex_clearance(&at(0.0), &Site { p: [0.0; 3], w: 1.0f64.next_up() }),
+            Sign::Negative
+        );
+    }
+}

@@ -2,9 +2,8 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::build::MAX_DEPTH;
-use super::{Node, Tree};
 use crate::Vec3;
+use crate::trees::{Bounds, MAX_DEPTH, Node, Plan, Tree};
 
 /// A search in a tree for the least of some measure.
 pub trait Search {
@@ -132,6 +131,117 @@ impl Tree {
             } else if visit(first..first + node.count as usize).is_break() {
                 return;
             }
+        }
+    }
+}
+
+// Points in a tree: the nearest one, and those within a distance.
+
+/// A tree over points.
+///
+/// ```
+/// use medial_geometry::{Vec3, trees::PointTree};
+///
+/// let points: Vec<Vec3> = (0..100).map(|k| Vec3::new(k as f64, (k * k % 7) as f64, 0.0)).collect();
+/// let tree = PointTree::new(&points);
+/// let (id, squared) = tree.nearest(Vec3::new(41.2, 1.0, 0.0)).expect("there are points");
+/// assert_eq!(points[id as usize], Vec3::new(41.0, 1.0, 0.0));
+/// assert!((squared.sqrt() - 0.2).abs() < 1e-12);
+/// let mut near = tree.within(Vec3::new(41.2, 1.0, 0.0), 1.5 * 1.5); // the distance squared
+/// near.sort_unstable();
+/// assert_eq!(near, [41, 42]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct PointTree {
+    tree: Tree,
+    /// In leaf order.
+    points: Vec<Vec3>,
+}
+
+impl PointTree {
+    /// A tree over points, in any unit. `O(n log n)`.
+    pub fn new(points: &[Vec3]) -> Self {
+        let items: Vec<_> = points.iter().map(|&p| (Bounds::of_points([p]), 0.0)).collect();
+        let tree = Tree::build(&items, Plan { max_leaf: 8, group: 1, padding: 0.0 });
+        let points = tree.order().iter().map(|&id| points[id as usize]).collect();
+        Self { tree, points }
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// The index of the nearest point, the smallest of equally near ones, and its squared distance;
+    /// `None` without points, or where no distance can be squared.
+    pub fn nearest(&self, query: Vec3) -> Option<(u32, f64)> {
+        let (mut squared, mut id) = (f64::INFINITY, u32::MAX);
+        self.tree.search_around(query, squared, |places| {
+            for place in places {
+                let found = (self.points[place].distance_squared(query), self.tree.order()[place]);
+                if found < (squared, id) {
+                    (squared, id) = found;
+                }
+            }
+            squared
+        });
+        // Infinite without points; and among infinite distances no point is the nearest.
+        squared.is_finite().then_some((id, squared))
+    }
+
+    /// The indices of the points whose squared distance is at most `squared`, in the order of the
+    /// tree: for the points within 1.5, `squared` is `1.5 * 1.5`.
+    pub fn within(&self, query: Vec3, squared: f64) -> Vec<u32> {
+        let mut found = Vec::new();
+        let is_near = |_: usize, node: &Node| node.bounds.distance_squared(query) <= squared;
+        self.tree.descend(is_near, |places| {
+            let near = places.filter(|&k| self.points[k].distance_squared(query) <= squared);
+            found.extend(near.map(|k| self.tree.order()[k]));
+            ControlFlow::Continue(())
+        });
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn nothing_is_near_what_is_not_finite() {
+        let tree = PointTree::new(&[Vec3::ZERO, Vec3::X]);
+        for query in [Vec3::INFINITY, Vec3::NAN, Vec3::splat(1e200)] {
+            assert_eq!(tree.nearest(query), None);
+        }
+        assert_eq!(PointTree::new(&[]).nearest(Vec3::ZERO), None);
+    }
+
+    proptest! {
+        #[test]
+        fn answers_are_those_of_looking_at_all(
+            points in prop::collection::vec(prop::array::uniform3(-9_i8..9), 1..200),
+            query in prop::array::uniform3(-12.0_f64..12.0),
+            reach in 0.0_f64..12.0,
+        ) {
+            // On a small lattice: repeated points, and equal distances.
+            let points: Vec<Vec3> =
+                points.into_iter().map(|p| Vec3::from_array(p.map(f64::from))).collect();
+            let (tree, query) = (PointTree::new(&points), Vec3::from_array(query).round());
+            let far = |id: u32| points[id as usize].distance_squared(query);
+            let ids = || 0..points.len() as u32;
+            let nearest = ids().min_by(|&i, &j| far(i).total_cmp(&far(j)).then(i.cmp(&j)));
+            prop_assert_eq!(tree.nearest(query), nearest.map(|id| (id, far(id))));
+            let mut within = tree.within(query, reach);
+            within.sort_unstable();
+            let expected: Vec<u32> = ids().filter(|&id| far(id) <= reach).collect();
+            prop_assert_eq!(within, expected);
         }
     }
 }

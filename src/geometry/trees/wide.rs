@@ -13,10 +13,9 @@ use std::ops::{ControlFlow, Range};
 
 use wide::f32x4;
 
-use super::super::planar_frame::power_of_two_below;
-use super::build::MAX_DEPTH;
-use super::{Bounds, Tree};
-use crate::Vec3;
+use crate::planar_frame::power_of_two_below;
+use crate::trees::{Bounds, MAX_DEPTH, Tree};
+use crate::{Cone, SlabFace, Vec3};
 
 /// Bound on the error of distances in single precision, to boxes and to triangles. The longest
 /// computation, for a triangle, has less than 25 roundings of 2^-24 each.
@@ -119,7 +118,7 @@ impl WideTree {
         tree: &Tree,
         frame: Bounds,
         least: f64,
-        mut each: impl FnMut(&[&super::Node]),
+        mut each: impl FnMut(&[&crate::trees::Node]),
     ) -> Self {
         let frame = Frame::new(frame);
         let least = least / frame.scale;
@@ -137,7 +136,7 @@ impl WideTree {
     }
 
     /// The node of the binary tree that a leaf was.
-    pub(super) fn source(&self, leaf: usize) -> usize {
+    fn source(&self, leaf: usize) -> usize {
         self.sources[leaf] as usize
     }
 
@@ -155,7 +154,7 @@ impl WideTree {
         tree: &Tree,
         index: usize,
         least: f64,
-        each: &mut impl FnMut(&[&super::Node]),
+        each: &mut impl FnMut(&[&crate::trees::Node]),
     ) -> u32 {
         let node = &tree.nodes[index];
         if node.count > 0 || (node.bounds.hi - node.bounds.lo).max_element() < least {
@@ -333,4 +332,226 @@ fn descendants(tree: &Tree, index: usize) -> Vec<usize> {
         children.splice(largest..=largest, pair(children[largest]));
     }
     children
+}
+
+// A wide tree over balls: each node has a box of centres, and the largest and the smallest radius
+// below it.
+
+/// The distance to the boundaries of hulls of balls that a search minimises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// Negative inside.
+    Signed,
+    /// Its absolute value.
+    Unsigned,
+}
+
+impl Measure {
+    /// This measure of some signed distances.
+    #[inline]
+    pub fn of(self, signed: Lanes) -> Lanes {
+        match self {
+            Self::Signed => signed,
+            Self::Unsigned => signed.abs(),
+        }
+    }
+}
+
+/// A tree over boxes of centres, with radii.
+#[derive(Clone, Debug)]
+pub struct ReachTree {
+    wide: WideTree,
+    /// For each node the largest and the smallest radius below its children.
+    radii: Vec<[Lanes; 2]>,
+}
+
+/// Single precision does not separate centres closer together than this, in half sides of the frame:
+/// they form one leaf, in which the binary tree is searched.
+const CLUSTER: f64 = 1e-5;
+
+impl ReachTree {
+    /// Collapses a tree over boxes of centres whose reaches are radii. All balls are within `frame`.
+    pub fn new(tree: &Tree, frame: Bounds) -> Self {
+        let mut radii = Vec::new();
+        let mut each = |children: &[&super::Node]| {
+            radii.push([0, 1].map(|k| {
+                let mut of = [0.0; 4];
+                for (radius, child) in of.iter_mut().zip(children) {
+                    *radius = if k == 0 { child.reach } else { child.least_reach };
+                }
+                of
+            }));
+        };
+        let wide = WideTree::within(tree, frame, CLUSTER, &mut each);
+        let scale = wide.frame().scale;
+        let scaled = |of: [f64; 4]| Lanes::from(of.map(|radius| (radius * scale) as f32));
+        Self { wide, radii: radii.into_iter().map(|pair| pair.map(scaled)).collect() }
+    }
+
+    /// The tree over the boxes alone.
+    pub fn wide(&self) -> &WideTree {
+        &self.wide
+    }
+
+    /// The node of the binary tree in which to search a leaf that is too narrow for single precision
+    /// and has more than `max_items` primitives; `None` for every other leaf.
+    pub fn cluster(&self, leaf: usize, tree: &Tree, max_items: usize) -> Option<u32> {
+        let node = self.wide.source(leaf);
+        let Bounds { lo, hi } = tree.nodes[node].bounds;
+        let close = (hi - lo).max_element() * self.wide.frame().scale < CLUSTER;
+        (close && self.wide.leaves()[leaf].len() > max_items).then_some(node as u32)
+    }
+
+    /// Shows the leaves within a limit, roughly from near to far. `visit` gets the leaf and the
+    /// limit, and returns the new one. Limits are those of [`Query::signed_limit`].
+    #[inline]
+    pub fn search(
+        &self,
+        query: &Query,
+        measure: Measure,
+        limit: f32,
+        visit: impl FnMut(usize, f32) -> f32,
+    ) {
+        let bounds = |place: usize| {
+            let (node, [largest, smallest]) = (self.wide.node(place), &self.radii[place]);
+            let outside = node.distance_squared(query).sqrt() - *largest;
+            match measure {
+                Measure::Signed => outside,
+                // Each hull holds its largest ball, whose centre is in the box.
+                Measure::Unsigned => {
+                    outside.fast_max(*smallest - node.farthest_squared(query).sqrt())
+                }
+            }
+        };
+        self.wide.search(limit, bounds, visit);
+    }
+}
+
+// Four hulls of balls measured together in single precision, to select those worth measuring in
+// double precision.
+//
+// However steep a hull is, the error is that of the coordinates and radii: the distance is a
+// minimum over interpolated spheres, so an error of the minimiser counts in second order only.
+
+/// Up to four cones, in the [`Frame`] of a wide tree. Lanes without a cone are infinitely far.
+#[derive(Clone, Copy, Debug)]
+pub struct ConeBlock {
+    start: [Lanes; 3],
+    axis: [Lanes; 3],
+    length: Lanes,
+    radius: Lanes,
+    slope: Lanes,
+    lead: Lanes,
+}
+
+/// The values of up to four items in single precision, and `absent` for the others.
+fn lanes<T>(items: &[T], absent: f32, value: impl Fn(&T) -> f64) -> Lanes {
+    let of = |k: usize| items.get(k).map_or(absent, |item| value(item) as f32);
+    Lanes::from([of(0), of(1), of(2), of(3)])
+}
+
+#[inline]
+fn dot(u: &[Lanes; 3], v: &[Lanes; 3]) -> Lanes {
+    u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+}
+
+impl ConeBlock {
+    /// Up to four cones; any others are ignored.
+    pub fn new(cones: &[Cone], frame: &Frame) -> Self {
+        let s = frame.scale;
+        Self {
+            start: [0, 1, 2].map(|k| lanes(cones, 0.0, |c| frame.forward(c.start())[k])),
+            axis: [0, 1, 2].map(|k| lanes(cones, 0.0, |c| c.axis()[k])),
+            length: lanes(cones, 0.0, |c| c.length() * s),
+            radius: lanes(cones, f32::NEG_INFINITY, |c| c.radius() * s),
+            slope: lanes(cones, 0.0, Cone::slope),
+            lead: lanes(cones, 0.0, Cone::lead),
+        }
+    }
+
+    /// The signed distances.
+    #[inline]
+    pub fn signed(&self, query: &Query) -> Lanes {
+        let w = [0, 1, 2].map(|k| query.p[k] - self.start[k]);
+        let xi = dot(&w, &self.axis);
+        // Not |w|² - xi², which cancels near the axis.
+        let across = [0, 1, 2].map(|k| w[k] - xi * self.axis[k]);
+        let y_squared = dot(&across, &across);
+        let tau = (xi + y_squared.sqrt() * self.lead).fast_max(Lanes::ZERO).fast_min(self.length);
+        let off = xi - tau;
+        (off * off + y_squared).sqrt() - (self.radius + tau * self.slope)
+    }
+}
+
+/// Up to four faces of slabs, in the [`Frame`] of a wide tree. Lanes without a face are infinitely
+/// far.
+#[derive(Clone, Copy, Debug)]
+pub struct FaceBlock {
+    origin: [Lanes; 3],
+    x: [Lanes; 3],
+    y: [Lanes; 3],
+    normal: [Lanes; 3],
+    radius: Lanes,
+    gradient: [Lanes; 2],
+    lead: Lanes,
+    rise: Lanes,
+    /// Unit normals, inward, of the sides from the first and to the second corner of the base.
+    sides: [[Lanes; 2]; 2],
+    /// Distance of the origin inward from the second of them.
+    offset: Lanes,
+}
+
+impl FaceBlock {
+    /// Up to four faces; any others are ignored.
+    pub fn new(faces: &[SlabFace], frame: &Frame) -> Self {
+        let s = frame.scale;
+        let inward = |run: fn(&SlabFace) -> f64, turn: f64| {
+            let unit = move |f: &SlabFace| {
+                let (run, height) = (run(f), f.frame().apex[1]);
+                let length = run.hypot(height);
+                [turn * height / length, -turn * run / length]
+            };
+            [0, 1].map(|k| lanes(faces, 0.0, |f| unit(f)[k]))
+        };
+        let left = inward(|f| f.frame().apex[0], 1.0);
+        let right = inward(|f| f.frame().apex[0] - f.frame().length, -1.0);
+        Self {
+            origin: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| frame.forward(f.frame().origin)[k])),
+            x: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame().x[k])),
+            y: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame().y[k])),
+            normal: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame().normal[k])),
+            radius: lanes(faces, f32::NEG_INFINITY, |f| f.radius() * s),
+            gradient: [0, 1].map(|k| lanes(faces, 0.0, |f| f.gradient()[k])),
+            lead: lanes(faces, 0.0, SlabFace::lead),
+            rise: lanes(faces, 0.0, |f| 1.0 / f.lead()),
+            sides: [left, right],
+            offset: lanes(faces, 0.0, |f| {
+                let [cx, cy] = f.frame().apex;
+                f.frame().length * s * (cy / (cx - f.frame().length).hypot(cy))
+            }),
+        }
+    }
+
+    /// The signed distances; infinite where the face certainly has none and the cones of its sides
+    /// decide.
+    #[inline]
+    pub fn signed(&self, query: &Query) -> Lanes {
+        let w = [0, 1, 2].map(|k| query.p[k] - self.origin[k]);
+        let (x, y) = (dot(&w, &self.x), dot(&w, &self.y));
+        let height = dot(&w, &self.normal).abs();
+        let [gx, gy] = self.gradient;
+        let ahead = height * self.lead;
+        let (cx, cy) = (x + ahead * gx, y + ahead * gy);
+        // On a steep face the best centre is far from the foot of the query, and its error grows with
+        // that distance.
+        let blur = Lanes::splat(query.blur()) * (Lanes::ONE + self.lead + ahead);
+        let [left, right] = &self.sides;
+        let least = cy
+            .fast_min(left[0] * cx + left[1] * cy)
+            .fast_min(right[0] * cx + right[1] * cy + self.offset);
+        let outside = least.simd_lt(-blur);
+        // In closed form: the distance to the best centre minus the radius there.
+        let signed = height * self.rise - (self.radius + gx * x + gy * y);
+        outside.bitselect(Lanes::splat(f32::INFINITY), signed)
+    }
 }

@@ -23,12 +23,13 @@
 //! the facet is in conflict with it exactly if it is with the finite neighbour: the neighbour's
 //! sphere meets that plane in the circle of the facet, and both are perturbed alike.
 
-use super::Division;
-use super::cells::{Cell, FRONTIER, Face, INFINITE, OPPOSITE};
-use super::error::TriangulationError;
-use super::stellate::{ABSENT, TABLE};
-use super::zone::{Candidate, FOREIGN, UNKNOWN, Wall};
-use crate::predicates::{Filter, Metric, Sign, Site, approximate_orientation, sites_collinear};
+use crate::predicates::{
+    Filter, Metric, Sign, Site, UNDERFLOW, approximate_orientation, in_conflict_given,
+    sites_collinear,
+};
+use crate::triangulation::{
+    Cell, Division, FRONTIER, Face, INFINITE, MAX_CELLS, OPPOSITE, TriangulationError, UNUSED,
+};
 
 /// Rounding can make an approximate walk cycle; after this many steps the exact walk takes over.
 const MAX_ROUNDED_STEPS: usize = 256;
@@ -58,9 +59,9 @@ pub(super) struct Builder<'s, M> {
     pub(super) last: u32,
     pub(super) zone: Vec<u32>,
     pub(super) walls: Vec<Wall>,
-    pub(super) front: Vec<Candidate>,
+    front: Vec<Candidate>,
     pub(super) local: Vec<u8>,
-    pub(super) rim: [u32; TABLE + 1],
+    rim: [u32; TABLE + 1],
     pub(super) table: Box<[Face; TABLE * TABLE]>,
     pub(super) edges: Vec<(u64, Face)>,
     metric: std::marker::PhantomData<fn() -> M>,
@@ -286,4 +287,335 @@ pub(super) fn bring_independent_to_front(
     sites.swap(4, fourth);
     ids.swap(3, fourth - 1);
     Ok(())
+}
+
+// Step 3 of the construction (`build.rs`): the conflict zone of a site, and its walls.
+
+/// Mark of a cell that the growing conflict zone has not met.
+pub(super) const UNKNOWN: u8 = 0;
+/// Mark of a cell that was tested, or is about to be: bit 0.
+const TESTED: u8 = 1;
+/// Mark of a cell in conflict: bit 1, always together with that of [`TESTED`].
+const CONFLICT: u8 = 3;
+
+/// Mark of the frontier: bit 2, together with that of [`TESTED`] so that it is never tested.
+const FOREIGN: u8 = 5;
+
+/// A facet of the boundary of the conflict zone: its vertices, counter-clockwise from outside, and
+/// the facet as a face of the cell outside.
+#[derive(Clone, Copy)]
+pub(super) struct Wall {
+    pub(super) v: [u32; 3],
+    pub(super) outside: Face,
+    /// The vertices' numbers among the vertices of all walls.
+    pub(super) local: [u8; 3],
+}
+
+/// A cell beside the conflict zone, with the determinant that decides whether it joins the zone
+/// and the error bound of that determinant.
+#[derive(Clone, Copy)]
+struct Candidate {
+    pub(super) cell: u32,
+    pub(super) det: f64,
+    pub(super) bound: f64,
+}
+
+impl<M: Metric> Builder<'_, M> {
+    #[inline(always)]
+    pub(super) fn conflicts(&self, cell: u32, vertex: u32) -> bool {
+        let site = &self.sites[vertex as usize];
+        let (det, bound) = determinant::<M>(&self.cells, self.sites, cell, site);
+        let candidate = Candidate { cell, det, bound };
+        conflicts_given::<M>(self.filter, &self.cells, self.sites, site, candidate)
+    }
+
+    /// Marks and lists the cells in conflict with the site.
+    ///
+    /// Breadth first: the unknown neighbours of a whole generation are collected, then tested in one
+    /// batch, so no test waits for the result of another. Returns false, with no cell marked, if the
+    /// zone reaches the frontier.
+    pub(super) fn find_conflict_zone(&mut self, vertex: u32, seed: u32) -> bool {
+        self.zone.clear();
+        self.zone.push(seed);
+        self.state[seed as usize] = CONFLICT;
+        let mut generation = 0;
+        while generation < self.zone.len() {
+            let Some(front) = self.collect_front(generation) else {
+                self.forget_zone();
+                return false;
+            };
+            generation = self.zone.len();
+            self.test_front(vertex, front);
+        }
+        true
+    }
+
+    /// Resets the marks of the zone and of its neighbours.
+    pub(super) fn forget_zone(&mut self) {
+        let Self { cells, state, zone, .. } = self;
+        for &c in zone.iter() {
+            state[c as usize] = UNKNOWN;
+            for n in cells[c as usize].n {
+                state[n.cell() as usize] = UNKNOWN;
+            }
+        }
+        // The loop may have erased it as a neighbour of the zone.
+        state[FRONTIER as usize] = FOREIGN;
+    }
+
+    /// Collects the unknown neighbours of the zone from `generation` on; returns their number, or
+    /// `None` if the frontier is a neighbour.
+    ///
+    /// Branch-free: every neighbour is written, but the count moves past unknown ones only. The
+    /// branch would be unpredictable, and a misprediction costs more than the write.
+    fn collect_front(&mut self, generation: usize) -> Option<usize> {
+        let Self { cells, state, zone, front, .. } = self;
+        // Room for all four neighbours of each cell, since known ones are written as well.
+        let room = 4 * (zone.len() - generation);
+        if front.len() < room {
+            front.resize(room, Candidate { cell: 0, det: 0.0, bound: 0.0 });
+        }
+        let (mut count, mut met) = (0, UNKNOWN);
+        for &c in &zone[generation..] {
+            for n in cells[c as usize].n {
+                let known = &mut state[n.cell() as usize];
+                met |= *known;
+                front[count].cell = n.cell();
+                count += usize::from(*known == UNKNOWN);
+                *known |= TESTED;
+            }
+        }
+        // Only the frontier has bit 2; the TESTED bit is common.
+        (met & FOREIGN & !TESTED == 0).then_some(count)
+    }
+
+    /// Tests the first `count` candidates and appends those in conflict to the zone.
+    fn test_front(&mut self, vertex: u32, count: usize) {
+        let Self { cells, sites, state, zone, front, filter, .. } = self;
+        let site = &sites[vertex as usize];
+        let front = &mut front[..count];
+        // Two determinants at a time fill the lanes of the vector unit.
+        let mut pairs = front.chunks_exact_mut(2);
+        for pair in &mut pairs {
+            let finite = |i: usize| sites_of(sites, finite_side(cells, pair[i].cell));
+            let [first, second] = Filter::lifted_determinants::<M>([finite(0), finite(1)], site);
+            (pair[0].det, pair[0].bound) = first;
+            (pair[1].det, pair[1].bound) = second;
+        }
+        for candidate in pairs.into_remainder() {
+            (candidate.det, candidate.bound) = determinant::<M>(cells, sites, candidate.cell, site);
+        }
+        // Branch-free append, as in `collect_front`.
+        let mut size = zone.len();
+        zone.resize(size + count, 0);
+        for &candidate in front.iter() {
+            let Candidate { cell, det, bound } = candidate;
+            // The usual case inline; the call is for doubtful signs and infinite cells.
+            let decided = det.abs() > bound + UNDERFLOW && !cells[cell as usize].is_infinite();
+            let conflict = if decided {
+                det > 0.0
+            } else {
+                conflicts_given::<M>(*filter, cells, sites, site, candidate)
+            };
+            zone[size] = cell;
+            size += usize::from(conflict);
+            state[cell as usize] |= u8::from(conflict) * CONFLICT;
+        }
+        zone.truncate(size);
+    }
+
+    /// Lists the facets between the conflict zone and the cells around it.
+    fn collect_walls(&mut self) {
+        let Self { cells, state, zone, walls, .. } = self;
+        let room = 4 * zone.len();
+        walls.clear();
+        walls.resize(room, Wall { v: [0; 3], outside: Face::NONE, local: [ABSENT; 3] });
+        let mut count = 0;
+        for &c in zone.iter() {
+            let cell = &cells[c as usize];
+            for i in 0..4 {
+                let outside = cell.n[i];
+                let [a, b, c] = OPPOSITE[i];
+                walls[count] =
+                    Wall { v: [cell.v[a], cell.v[b], cell.v[c]], outside, local: [ABSENT; 3] };
+                // Tested and not in conflict: outside. Branch-free, as in `collect_front`.
+                count += usize::from(state[outside.cell() as usize] == TESTED);
+            }
+        }
+        walls.truncate(count);
+    }
+}
+
+/// The vertices of the finite cell whose orthosphere decides about conflict: the cell itself, or
+/// the finite neighbour of an infinite cell.
+#[inline(always)]
+fn finite_side(cells: &[Cell], cell: u32) -> [u32; 4] {
+    let record = &cells[cell as usize];
+    if record.is_infinite() { cells[record.n[3].cell() as usize].v } else { record.v }
+}
+
+#[inline(always)]
+fn sites_of(sites: &[Site], [a, b, c, d]: [u32; 4]) -> [&Site; 4] {
+    [&sites[a as usize], &sites[b as usize], &sites[c as usize], &sites[d as usize]]
+}
+
+/// The determinant that decides whether a site is in conflict with a cell, and its error bound.
+#[inline(always)]
+fn determinant<M: Metric>(cells: &[Cell], sites: &[Site], cell: u32, site: &Site) -> (f64, f64) {
+    Filter::lifted_determinant::<M>(sites_of(sites, finite_side(cells, cell)), site)
+}
+
+/// Whether a site is in conflict with a cell, see the head of `build.rs`; `det` and `bound` come
+/// from [`determinant`].
+#[inline(always)]
+fn conflicts_given<M: Metric>(
+    filter: Filter,
+    cells: &[Cell],
+    sites: &[Site],
+    site: &Site,
+    Candidate { cell, det, bound }: Candidate,
+) -> bool {
+    let v = cells[cell as usize].v;
+    if v[3] == INFINITE {
+        let [a, b, c] = [&sites[v[0] as usize], &sites[v[1] as usize], &sites[v[2] as usize]];
+        match filter.orient3d(&a.p, &b.p, &c.p, &site.p) {
+            Sign::Positive => return true,
+            Sign::Negative => return false,
+            // In the plane of the facet: the finite neighbour decides.
+            Sign::Zero => {}
+        }
+    }
+    let finite = sites_of(sites, finite_side(cells, cell));
+    in_conflict_given::<M>(filter, det, bound, finite, site)
+}
+
+// Step 4 of the construction (`build.rs`): the conflict zone is replaced by a cone.
+
+/// Local number of a vertex that is not on the boundary of the conflict zone.
+const ABSENT: u8 = u8::MAX;
+
+/// Boundaries of up to this many vertices are linked through a square table.
+const TABLE: usize = 64;
+
+impl<M: Metric> Builder<'_, M> {
+    /// Replaces the conflict zone by the cone of its walls from the site.
+    fn stellate(&mut self, vertex: u32) -> Result<(), TriangulationError> {
+        self.allocate()?;
+        let Self { cells, state, zone, walls, .. } = self;
+        for (wall, &id) in walls.iter_mut().zip(zone.iter()) {
+            // The vertex at infinity goes last; a rotation keeps the orientation.
+            if wall.v[0] == INFINITE {
+                wall.v.rotate_left(1);
+            } else if wall.v[1] == INFINITE {
+                wall.v.rotate_right(1);
+            }
+            let [a, b, c] = wall.v;
+            let outside = wall.outside;
+            cells[id as usize] = Cell { v: [vertex, a, b, c], n: [outside; 4] };
+            state[id as usize] = UNKNOWN;
+            cells[outside.cell() as usize].n[outside.index()] = Face::new(id, 0);
+            // Each tested cell outside the zone is behind a wall, so this resets all their marks.
+            state[outside.cell() as usize] = UNKNOWN;
+        }
+        // The next site is close on the curve, so the walk to it starts at a new cell.
+        self.last = self.zone[self.walls.len() - 1];
+        for &id in &self.zone[self.walls.len()..] {
+            self.cells[id as usize].v[0] = UNUSED;
+            self.state[id as usize] = UNKNOWN;
+            self.free.push(id);
+        }
+        // The walls are a triangulated sphere: by Euler's relation it has two more vertices than
+        // half its triangles.
+        if self.walls.len() / 2 + 2 <= TABLE {
+            self.link_by_table();
+        } else {
+            self.link_by_hashing();
+        }
+        Ok(())
+    }
+
+    /// Extends the zone by records until there is one for each wall.
+    fn allocate(&mut self) -> Result<(), TriangulationError> {
+        while self.zone.len() < self.walls.len() {
+            let id = if let Some(id) = self.free.pop() {
+                id
+            } else if self.cells.len() < MAX_CELLS {
+                self.state.push(UNKNOWN);
+                self.cells.push(Cell { v: [UNUSED; 4], n: [Face::NONE; 4] });
+                self.cells.len() as u32 - 1
+            } else {
+                let points = self.sites.len() - 1;
+                return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
+            };
+            self.zone.push(id);
+        }
+        Ok(())
+    }
+
+    /// Links new cells with each other: two share a facet where their walls share an edge, and
+    /// each directed edge belongs to one wall.
+    ///
+    /// The vertices of the walls are numbered, and a table indexed by pairs of numbers is filled,
+    /// then read. It need not be cleared: the walls form a closed surface, so every edge that is
+    /// read was written just before.
+    fn link_by_table(&mut self) {
+        let Self { walls, local, rim, table, cells, zone, .. } = self;
+        // Numbers are below TABLE, so the remainder changes nothing; it spares the bounds check.
+        let at = |a: u8, b: u8| (usize::from(a) * TABLE + usize::from(b)) % (TABLE * TABLE);
+        let mut count = 0;
+        for (wall, &id) in walls.iter_mut().zip(zone.iter()) {
+            for (v, number) in wall.v.into_iter().zip(&mut wall.local) {
+                let known = &mut local[v as usize];
+                let fresh = *known == ABSENT;
+                *known = if fresh { count as u8 } else { *known };
+                *number = *known;
+                // Branch-free: a vertex that is not fresh is overwritten by the next one.
+                rim[count] = v;
+                count += usize::from(fresh);
+            }
+            let [a, b, c] = wall.local;
+            table[at(b, c)] = Face::new(id, 1);
+            table[at(c, a)] = Face::new(id, 2);
+            table[at(a, b)] = Face::new(id, 3);
+        }
+        for (wall, &id) in walls.iter().zip(zone.iter()) {
+            let [a, b, c] = wall.local;
+            let n = &mut cells[id as usize].n;
+            n[1] = table[at(c, b)];
+            n[2] = table[at(a, c)];
+            n[3] = table[at(b, a)];
+        }
+        for &v in &rim[..count] {
+            local[v as usize] = ABSENT;
+        }
+    }
+
+    /// The same for large conflict zones, through a hash table of undirected edges.
+    fn link_by_hashing(&mut self) {
+        let Self { walls, edges, cells, zone, .. } = self;
+        // At most half full: there are three edges for every two walls.
+        let size = (3 * walls.len()).next_power_of_two();
+        edges.clear();
+        edges.resize(size, (0, Face::NONE));
+        for (wall, &id) in walls.iter().zip(zone.iter()) {
+            let [a, b, c] = wall.v;
+            for (i, (x, y)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
+                let face = Face::new(id, i + 1);
+                // Never zero, the mark of a free slot, since the ends differ.
+                let key = u64::from(x.min(y)) << 32 | u64::from(x.max(y));
+                // Fibonacci hashing with linear probing: the upper half depends on both ends.
+                let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize % size;
+                while edges[slot].0 != 0 && edges[slot].0 != key {
+                    slot = (slot + 1) % size;
+                }
+                if edges[slot].0 == 0 {
+                    edges[slot] = (key, face);
+                } else {
+                    let twin = edges[slot].1;
+                    cells[face.cell() as usize].n[face.index()] = twin;
+                    cells[twin.cell() as usize].n[twin.index()] = face;
+                }
+            }
+        }
+    }
 }

@@ -22,11 +22,11 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::build::{Builder, Outcome};
-use super::cells::{Cell, FRONTIER, Face, MAX_CELLS, UNUSED};
-use super::error::TriangulationError;
-use super::zone::UNKNOWN;
 use crate::Vec3;
 use crate::predicates::{Metric, Site};
+use crate::triangulation::TriangulationError;
+use crate::triangulation::build::UNKNOWN;
+use crate::triangulation::{Cell, FRONTIER, Face, MAX_CELLS, UNUSED};
 
 /// Every cut is tried on about this many sites.
 const TRIED_SITES: usize = 512;

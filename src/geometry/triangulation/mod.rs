@@ -10,27 +10,17 @@
 //! the input alone, not on the number of threads that build it.
 
 mod build;
-mod cells;
-mod check;
 mod divide;
-mod error;
-mod freeze;
 mod order;
 mod query;
-mod stellate;
-#[cfg(test)]
-mod tests;
-mod zone;
-
-use cells::Cell;
-pub use check::Violation;
-pub use error::TriangulationError;
-pub use query::{EdgeRing, Facet};
 
 use rayon::prelude::*;
 
-use super::predicates::{Filter, Metric, Site, highest_bit, lowest_bit};
-use build::Builder;
+use crate::Vec3;
+use crate::predicates::{Filter, MAX_COORDINATE, Metric, Site, highest_bit, lowest_bit};
+use crate::triangulation::build::Builder;
+
+pub use crate::triangulation::query::{EdgeRing, Facet, Violation};
 
 /// A vertex: the index of an input point, or the vertex at infinity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -105,8 +95,8 @@ fn triangulate_dividing<M: Metric>(
     sites: &[Site],
     division: Division,
 ) -> Result<Triangulated, TriangulationError> {
-    if sites.len() >= cells::MAX_CELLS {
-        return Err(TriangulationError::TooLarge { points: sites.len(), limit: cells::MAX_CELLS });
+    if sites.len() >= MAX_CELLS {
+        return Err(TriangulationError::TooLarge { points: sites.len(), limit: MAX_CELLS });
     }
     let order::Order { inserted: mut ids, rounds, repeated, along_curve } =
         order::insertion_order(sites);
@@ -121,7 +111,7 @@ fn triangulate_dividing<M: Metric>(
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
     build::bring_independent_to_front(&mut ordered, &mut ids)?;
     let cells = Builder::<M>::build(&ordered, &rounds, division, filter)?.cells;
-    let triangulation = freeze::freeze(cells, &ids, &along_curve);
+    let triangulation = order::freeze(cells, &ids, &along_curve);
     Ok(Triangulated { triangulation, repeated, filter })
 }
 
@@ -141,4 +131,258 @@ fn filter_of<M: Metric>(sites: &[Site]) -> Filter {
     let widest = |a: (i32, i32), b: (i32, i32)| (a.0.min(b.0), a.1.max(b.1));
     let (quantum, top) = sites.par_iter().map(bits).reduce(|| (i32::MAX, i32::MIN), widest);
     Filter::of_grid(quantum, top)
+}
+
+// Why points cannot be triangulated.
+
+/// Why points have no triangulation.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TriangulationError {
+    /// A coordinate is infinite or not a number.
+    #[error("point {index} has a coordinate that is not finite: {point}")]
+    NotFinite {
+        /// Index of the first such point.
+        index: usize,
+        /// The point.
+        point: Vec3,
+    },
+    /// A coordinate is so large that products of coordinates overflow.
+    #[error(
+        "point {index} ({point}) exceeds {MAX_COORDINATE:e} in absolute value, \
+         beyond which products of coordinates overflow: scale the points down"
+    )]
+    OutOfRange {
+        /// Index of the first such point.
+        index: usize,
+        /// The point.
+        point: Vec3,
+    },
+    /// A weight is infinite, not a number, or beyond the square of the largest coordinate.
+    #[error("point {index} has the unusable weight {weight:e}")]
+    Weight {
+        /// Index of the first such point.
+        index: usize,
+        /// Its weight.
+        weight: f64,
+    },
+    /// A ball's radius is negative, infinite, or not a number.
+    #[error("ball {index} has the unusable radius {radius:e}")]
+    Radius {
+        /// Index of the first such ball.
+        index: usize,
+        /// Its radius.
+        radius: f64,
+    },
+    /// There is not one weight for each point.
+    #[error("{points} points but {weights} weights")]
+    WeightCount {
+        /// Number of points.
+        points: usize,
+        /// Number of weights.
+        weights: usize,
+    },
+    /// Fewer than four distinct points.
+    #[error("{distinct} distinct points among {points}: a tetrahedron needs four")]
+    TooFewPoints {
+        /// Number of points given.
+        points: usize,
+        /// Number of distinct positions among them.
+        distinct: usize,
+    },
+    /// All points lie on one line.
+    #[error("all {distinct} distinct points lie on one line: there is no tetrahedron")]
+    Collinear {
+        /// Number of distinct positions.
+        distinct: usize,
+    },
+    /// All points lie in one plane. Triangulations of the plane are not offered here;
+    /// [`DualComplex::of_balls`](crate::DualComplex::of_balls) takes flat input, and fewer points,
+    /// too.
+    #[error("all {distinct} distinct points lie in one plane: there is no tetrahedron")]
+    Coplanar {
+        /// Number of distinct positions.
+        distinct: usize,
+    },
+    /// More points or cells than 32-bit ids can name.
+    #[error("{points} points need more than {limit} cells, the most that 32-bit ids can name")]
+    TooLarge {
+        /// Number of points given.
+        points: usize,
+        /// Largest number of cells.
+        limit: usize,
+    },
+}
+
+// Cells as flat records, four vertices and four neighbours, 32 bytes.
+
+/// The vertex at infinity while a triangulation is built; sites count from one.
+pub(super) const INFINITE: u32 = 0;
+
+/// The first vertex of a record that no cell uses.
+const UNUSED: u32 = u32::MAX;
+
+/// The record that stands for all cells of other parts, see [`crate::triangulation::build::Builder`].
+const FRONTIER: u32 = 0;
+
+/// The most cells that a [`Face`] can name: two of its 32 bits hold the index of the vertex.
+const MAX_CELLS: usize = 1 << 30;
+
+/// For each vertex of a positive cell the opposite facet, counter-clockwise from outside the cell.
+///
+/// `(v[i], v[f[0]], v[f[1]], v[f[2]])` with `f = OPPOSITE[i]` is an even permutation of the cell.
+const OPPOSITE: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// A facet as seen from one of its cells: the cell and the index of the opposite vertex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Face(pub(super) u32);
+
+impl Face {
+    const NONE: Self = Self(u32::MAX);
+
+    #[inline(always)]
+    pub(super) fn new(cell: u32, index: usize) -> Self {
+        Self(cell << 2 | index as u32)
+    }
+
+    #[inline(always)]
+    pub(super) fn cell(self) -> u32 {
+        self.0 >> 2
+    }
+
+    /// The same facet after all cells were renumbered by an offset.
+    #[inline(always)]
+    pub(super) fn moved(self, offset: u32) -> Self {
+        Self(self.0.wrapping_add(offset << 2))
+    }
+
+    #[inline(always)]
+    pub(super) fn index(self) -> usize {
+        (self.0 & 3) as usize
+    }
+}
+
+/// A positively oriented cell. An infinite cell has [`INFINITE`] as its last vertex; with any point
+/// beyond its finite facet in that place it is positively oriented too.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+pub(super) struct Cell {
+    pub(super) v: [u32; 4],
+    /// Facet `i`, opposite to vertex `i`, as seen from the neighbour.
+    pub(super) n: [Face; 4],
+}
+
+impl Cell {
+    /// The record of the frontier: unused, and infinite.
+    const FRONTIER: Self = Self { v: [UNUSED, INFINITE, INFINITE, INFINITE], n: [Face::NONE; 4] };
+
+    #[inline(always)]
+    pub(super) fn is_infinite(&self) -> bool {
+        self.v[3] == INFINITE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::LazyLock;
+
+    use proptest::prelude::*;
+    use rayon::{ThreadPool, ThreadPoolBuilder};
+
+    use super::*;
+    use crate::Vec3;
+    use crate::predicates::{Unweighted, Weighted};
+
+    /// Cells as sorted quadruples of input points.
+    fn cell_set(t: &Triangulation) -> Vec<[VertexId; 4]> {
+        let sorted = |cell| {
+            let mut v = t.vertices(cell);
+            v.sort_unstable();
+            v
+        };
+        let mut cells: Vec<_> = t.cells().map(sorted).collect();
+        cells.sort_unstable();
+        cells
+    }
+
+    /// Rounds of so many sites are divided, however many of them have to be deferred.
+    fn always_from(smallest: u32) -> Division {
+        Division { smallest, most_deferred: (1, 1) }
+    }
+
+    /// Divided on one thread, which grows one part behind the other, and on two, side by side.
+    fn divided<M: Metric>(
+        sites: &[Site],
+        smallest: u32,
+    ) -> [Result<Triangulated, TriangulationError>; 2] {
+        static POOLS: LazyLock<[ThreadPool; 2]> = LazyLock::new(|| {
+            [1, 2].map(|n| ThreadPoolBuilder::new().num_threads(n).build().unwrap())
+        });
+        POOLS
+            .each_ref()
+            .map(|pool| pool.install(|| triangulate_dividing::<M>(sites, always_from(smallest))))
+    }
+
+    fn agrees<M: Metric>(sites: &[Site]) -> Result<(), TestCaseError> {
+        let undivided = triangulate_dividing::<M>(sites, always_from(u32::MAX));
+        for smallest in [1, 16, 64] {
+            let [one, two] = divided::<M>(sites, smallest);
+            prop_assert_eq!(one.is_ok(), two.is_ok());
+            if let (Ok(one), Ok(two)) = (&one, &two) {
+                let bytes = |t: &Triangulation| -> Vec<_> {
+                    t.records().iter().map(|cell| (cell.v, cell.n)).collect()
+                };
+                prop_assert_eq!(bytes(&one.triangulation), bytes(&two.triangulation));
+                prop_assert_eq!(&one.triangulation.incident, &two.triangulation.incident);
+            }
+            match (&undivided, one) {
+                (Ok(whole), Ok(divided)) => {
+                    let t = divided.triangulation;
+                    prop_assert_eq!(t.check_combinatorics(), Ok(()));
+                    prop_assert_eq!(t.check_regularity::<M>(sites, divided.filter), Ok(()));
+                    prop_assert_eq!(cell_set(&t), cell_set(&whole.triangulation));
+                    prop_assert_eq!(&divided.repeated, &whole.repeated);
+                }
+                (Err(whole), Err(divided)) => prop_assert_eq!(whole, &divided),
+                (whole, divided) => {
+                    let (whole, divided) = (whole.is_ok(), divided.is_ok());
+                    prop_assert!(false, "undivided: {}, divided: {}", whole, divided);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Random points, and the same on a coarse grid, on a sphere, in two planes, in distant clusters.
+    fn points() -> impl Strategy<Value = Vec<Vec3>> {
+        let point = prop::array::uniform3(-1.0..1.0f64).prop_map(Vec3::from_array);
+        (prop::collection::vec(point, 8..900), 0..5).prop_map(|(points, kind)| {
+            let place = |(i, p): (usize, &Vec3)| match kind {
+                0 => *p,
+                1 => (4.0 * *p).round(),
+                2 => p.normalize_or(Vec3::X),
+                3 => Vec3::new((9.0 * p.x).round(), (9.0 * p.y).round(), f64::from(i as u32 % 2)),
+                _ => *p * 1e-3 + Vec3::splat(f64::from(i as u32 % 3)),
+            };
+            points.iter().enumerate().map(place).collect()
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(96))]
+
+        #[test]
+        fn divided_rounds_give_the_same_cells(points in points()) {
+            let sites: Vec<Site> = points.iter().map(|p| Site { p: p.to_array(), w: 0.0 }).collect();
+            agrees::<Unweighted>(&sites)?;
+        }
+
+        #[test]
+        fn divided_rounds_give_the_same_weighted_cells(
+            points in points(),
+            weights in prop::collection::vec(0.0..0.3f64, 900),
+        ) {
+            let sites = points.iter().zip(weights).map(|(p, w)| Site { p: p.to_array(), w });
+            agrees::<Weighted>(&sites.collect::<Vec<_>>())?;
+        }
+    }
 }
