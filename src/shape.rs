@@ -5,34 +5,33 @@
 //! substrates that the method used, and a filter does not look free beside a method that starts
 //! from the mesh. [`Shape::view`] opens a fresh view on the same store.
 
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock};
-
-use crate::Vec3;
-use crate::complex::{CellSpheres, DualTriangulation, MedialMesh, VoronoiFacets};
-use crate::geometry::Delaunay;
-use crate::surface::TriangleBvh;
-use crate::surface::{InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh};
-
-mod contacts;
-mod error;
-mod growing;
-mod inner_balls;
-mod power_crust;
+mod balls;
 mod refined;
 mod similarity;
-mod substrate;
-mod substrates;
 
-pub use contacts::ContactSets;
-pub use error::ShapeError;
-pub use inner_balls::InnerBalls;
-pub use power_crust::PolarBalls;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::Hash;
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use serde::{Deserialize, Serialize};
+
+use crate::Vec3;
+use crate::complex::{
+    CellSpheres, ComplexError, DualTriangulation, MedialMesh, VoronoiFacets, voronoi_medial_mesh,
+};
+use crate::diagnostics::Diagnostics;
+use crate::geometry::{Delaunay, TriangulationError};
+use crate::heap::{Usage, usage_apart, usage_of};
+use crate::metrics::{Judge, JudgeOptions, Truth};
+use crate::surface::{
+    BvhError, InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, TriangleBvh, sample,
+};
+
+pub use balls::{ContactSets, InnerBalls, PolarBalls};
 pub use refined::{BOUND, ENOUGH, MOST_TIMES, ROUNDS, Refined, Refinement};
 pub use similarity::{Fit, FitSource, Similarity};
-pub use substrate::{Cost, Substrate};
-
-use substrate::{Cache, Use};
 
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
 ///
@@ -243,5 +242,395 @@ impl Shape {
         let mut all = self.used.lock().expect("no panic while held");
         // The first use tells whether it was built here.
         all.entry(substrate).or_insert(used);
+    }
+}
+
+/// Why a substrate could not be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    /// The bounding box is empty, flat to a point, or not finite.
+    #[error("the surface has no extent: its bounding-box diagonal is zero or not finite")]
+    Extent,
+    /// The samples cannot be triangulated.
+    #[error("triangulating the boundary samples: {0}")]
+    Triangulation(#[from] TriangulationError),
+    /// The surface has no bounding-volume tree.
+    #[error("the surface: {0}")]
+    Tree(#[from] BvhError),
+    /// The medial mesh to start from has no sphere.
+    #[error("the initial medial mesh has no sphere")]
+    EmptyInitial,
+    /// The medial mesh to start from is not valid in units of the surface's diagonal.
+    #[error("the initial medial mesh, divided by the diagonal of the surface: {0}")]
+    Initial(ComplexError),
+    /// The inside of the shape holds no Voronoi vertex.
+    #[error(
+        "the initial medial mesh is empty: no circumcentre of the samples lies inside the surface; \
+         sample more densely, for example --sampling blue:20000"
+    )]
+    EmptyMedialMesh,
+    /// The inside of the shape holds Voronoi vertices, but all too close to the surface.
+    #[error(
+        "the initial medial mesh is empty: the circumcentres inside the surface ({centres}) are \
+         all within a billionth of its diagonal of it; what is so thin or small beside the whole \
+         cannot be resolved: put parts that are far apart into files of their own"
+    )]
+    BelowResolution {
+        /// Number of these circumcentres.
+        centres: usize,
+    },
+}
+
+impl ShapeError {
+    pub(super) fn of_nothing_inside(cells: &CellSpheres) -> Self {
+        match cells.in_guard_band {
+            0 => Self::EmptyMedialMesh,
+            centres => Self::BelowResolution { centres },
+        }
+    }
+}
+
+// Substrates by name, their costs, and the place where they are kept.
+
+/// A substrate that methods share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Substrate {
+    /// Boundary samples.
+    Samples,
+    /// Delaunay triangulation of the samples.
+    Delaunay,
+    /// Circumspheres of the cells, each classified as inside or outside.
+    Inside,
+    /// Voronoi facets inside.
+    Facets,
+    /// Voronoi medial mesh.
+    MedialMesh,
+    /// Poles of the samples, and the polar balls inside.
+    Poles,
+    /// Bounding-volume tree of the surface.
+    SurfaceTree,
+    /// Inside test of the surface.
+    InsideTest,
+    /// Contact points of a medial mesh that came without them.
+    Contacts,
+}
+
+impl Substrate {
+    /// Name in records.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Samples => "samples",
+            Self::Delaunay => "delaunay",
+            Self::Inside => "inside",
+            Self::Facets => "facets",
+            Self::MedialMesh => "medial_mesh",
+            Self::Poles => "poles",
+            Self::SurfaceTree => "surface_tree",
+            Self::InsideTest => "inside_test",
+            Self::Contacts => "contacts",
+        }
+    }
+}
+
+/// The cost of a piece of work, such as building a substrate, when it was done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Seconds of the whole process on all processors.
+    pub cpu_seconds: f64,
+    /// Bytes of the heap; 0 in a program that does not count them (see [`crate::heap`]).
+    #[serde(default)]
+    pub usage: Usage,
+}
+
+impl Cost {
+    /// Does `work` and says what it cost.
+    pub fn of<T>(work: impl FnOnce() -> T) -> (T, Self) {
+        Self::clocked(|| usage_of(work))
+    }
+
+    /// As [`Cost::of`], for a substrate: what it needs while it is built counts as its own, not as
+    /// that of the work that asked for it.
+    fn of_substrate<T>(work: impl FnOnce() -> T) -> (T, Self) {
+        Self::clocked(|| usage_apart(work))
+    }
+
+    fn clocked<T>(work: impl FnOnce() -> (T, Usage)) -> (T, Self) {
+        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let (value, usage) = work();
+        let (seconds, cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        (value, Self { seconds, cpu_seconds, usage })
+    }
+}
+
+impl std::ops::AddAssign for Cost {
+    fn add_assign(&mut self, other: Self) {
+        self.seconds += other.seconds;
+        self.cpu_seconds += other.cpu_seconds;
+        // The other work was done on top of what this one had left.
+        let peak = self.usage.held_bytes + other.usage.peak_bytes;
+        self.usage.peak_bytes = self.usage.peak_bytes.max(peak);
+        self.usage.held_bytes += other.usage.held_bytes;
+    }
+}
+
+/// The facts that a view remembers of a substrate.
+#[derive(Clone, Copy)]
+pub(super) struct Use {
+    pub cost: Cost,
+    /// Whether it was built through this view, rather than found.
+    pub built_here: bool,
+}
+
+/// Values that are built once for each key, with what building them cost.
+pub(super) struct Cache<K, T> {
+    /// Whether what building needs of the heap is part of the work that asked for it.
+    is_of_asker: bool,
+    /// Looked up by key only, never iterated.
+    slots: Mutex<HashMap<K, Arc<Slot<T>>>>,
+}
+
+type Slot<T> = OnceLock<(Result<T, ShapeError>, Cost)>;
+
+impl<K, T> Default for Cache<K, T> {
+    fn default() -> Self {
+        Self { is_of_asker: false, slots: Mutex::default() }
+    }
+}
+
+impl<K, T> Cache<K, T> {
+    /// A cache of what is no substrate that methods share, but one method's own work.
+    pub fn of_asker() -> Self {
+        Self { is_of_asker: true, ..Self::default() }
+    }
+}
+
+impl<K: Eq + Hash, T: Clone> Cache<K, T> {
+    /// The value for a key; a second asker waits for the first.
+    pub fn get(
+        &self,
+        key: K,
+        build: impl FnOnce() -> Result<T, ShapeError>,
+    ) -> (Result<T, ShapeError>, Use) {
+        let slot =
+            Arc::clone(self.slots.lock().expect("no panic while held").entry(key).or_default());
+        let mut built_here = false;
+        let (value, cost) = slot
+            .get_or_init(|| {
+                built_here = true;
+                if self.is_of_asker { Cost::of(build) } else { Cost::of_substrate(build) }
+            })
+            .clone();
+        (value, Use { cost, built_here })
+    }
+}
+
+// The substrates of a shape, each built once, on demand.
+
+impl Shape {
+    /// The boundary samples of the shape's own sampling.
+    pub fn samples(&self) -> Arc<[Vec3]> {
+        self.samples_by(&self.store.options.sampling)
+    }
+
+    /// Boundary samples by another sampling. [`Sampling::Auto`] costs several medial meshes, which
+    /// count as the cost of the samples.
+    pub fn samples_by(&self, sampling: &Sampling) -> Arc<[Vec3]> {
+        let refined = match sampling {
+            Sampling::Auto => self.surface_tree().ok().zip(Some(self.inside_test())),
+            _ => None,
+        };
+        let built = self.store.samples.get(*sampling, || {
+            let refined = refined.and_then(|(tree, inside)| self.refined(&tree, &inside));
+            Ok(refined.unwrap_or_else(|| sample(&self.store.mesh, sampling).into()))
+        });
+        self.take(Substrate::Samples, built).expect("sampling cannot fail")
+    }
+
+    /// The samples of [`Sampling::Auto`]; none where the vertices do not span space, which
+    /// triangulating them reports.
+    fn refined(&self, tree: &TriangleBvh, inside: &InsideTest) -> Option<Arc<[Vec3]>> {
+        let expected = self.expected_betti();
+        let (mesh, dual) = (&self.store.mesh, self.store.options.dual);
+        let refined = Refinement { mesh, tree, inside, expected, dual }.run().ok()?;
+        if let Some(warning) = refined.warning() {
+            // The first: another view that builds the same samples says the same.
+            let _ = self.store.unmended.set(warning);
+        }
+        Some(refined.samples.into())
+    }
+
+    /// What is wrong with the medial mesh of the samples all the same, where [`Sampling::Auto`] reached
+    /// one of its limits; once they are built.
+    pub fn sampling_warning(&self) -> Option<&str> {
+        self.store.unmended.get().map(String::as_str)
+    }
+
+    /// The Delaunay triangulation of the boundary samples.
+    ///
+    /// # Errors
+    /// When the samples do not span space.
+    pub fn delaunay(&self) -> Result<Arc<Delaunay>, ShapeError> {
+        let samples = self.samples();
+        let built = self.store.delaunay.get(self.store.options.sampling, || {
+            Delaunay::new(&samples).map(Arc::new).map_err(ShapeError::from)
+        });
+        self.take(Substrate::Delaunay, built)
+    }
+
+    /// The circumspheres of the Delaunay cells and which of them are centred inside.
+    ///
+    /// # Errors
+    /// When the samples do not span space.
+    pub fn cells(&self) -> Result<Arc<CellSpheres>, ShapeError> {
+        let delaunay = self.delaunay()?;
+        let tree = self.surface_tree()?;
+        let inside = self.inside_test();
+        let built = self.store.cells.get(self.store.options.sampling, || {
+            Ok(Arc::new(CellSpheres::classify(&delaunay, &inside, &tree)))
+        });
+        self.take(Substrate::Inside, built)
+    }
+
+    /// The Voronoi facets all of whose vertices are inside.
+    ///
+    /// # Errors
+    /// When the samples do not span space.
+    pub fn facets(&self) -> Result<Arc<VoronoiFacets>, ShapeError> {
+        let delaunay = self.delaunay()?;
+        let cells = self.cells()?;
+        let built = self.store.facets.get(self.store.options.sampling, || {
+            Ok(Arc::new(VoronoiFacets::new(&delaunay, &cells)))
+        });
+        self.take(Substrate::Facets, built)
+    }
+
+    /// The Voronoi medial mesh, in normalised units, with contact points.
+    ///
+    /// # Errors
+    /// When the samples do not span space, or no circumcentre lies inside the surface.
+    pub fn voronoi(&self) -> Result<Arc<MedialMesh>, ShapeError> {
+        let delaunay = self.delaunay()?;
+        let cells = self.cells()?;
+        let facets = self.facets()?;
+        let options = &self.store.options;
+        let built = self.store.medial.get(options.sampling, || {
+            let samples = self.samples();
+            let mesh = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, options.dual);
+            if mesh.spheres.is_empty() {
+                return Err(ShapeError::of_nothing_inside(&cells));
+            }
+            Ok(Arc::new(mesh))
+        });
+        self.take(Substrate::MedialMesh, built)
+    }
+
+    /// The balls whose union stands for the shape, in normalised units: the spheres of the given
+    /// medial mesh, or the inner polar balls of the samples.
+    ///
+    /// # Errors
+    /// When the samples do not span space, or no pole lies inside the surface; when the given mesh has
+    /// no sphere or is not valid.
+    pub fn inner_balls(&self) -> Result<Arc<InnerBalls>, ShapeError> {
+        if let Some(given) = &self.given {
+            return given.as_ref().map(|m| Arc::new(InnerBalls::of_mesh(m))).map_err(Clone::clone);
+        }
+        let delaunay = self.delaunay()?;
+        let cells = self.cells()?;
+        let built = self.store.balls.get(self.store.options.sampling, || {
+            let balls = InnerBalls::of_poles(&delaunay, &cells, &self.samples());
+            if balls.spheres.is_empty() {
+                return Err(ShapeError::of_nothing_inside(&cells));
+            }
+            Ok(Arc::new(balls))
+        });
+        self.take(Substrate::Poles, built)
+    }
+
+    /// The medial mesh that every simplifier of this shape starts from, in normalised units: the
+    /// given one, or the Voronoi medial mesh.
+    ///
+    /// # Errors
+    /// As [`Shape::voronoi`]; when the given mesh has no sphere or is not valid.
+    pub fn initial(&self) -> Result<Arc<MedialMesh>, ShapeError> {
+        match &self.given {
+            Some(given) => given.clone(),
+            None => self.voronoi(),
+        }
+    }
+
+    /// Whether [`Shape::initial`] is a given mesh, which need not be part of a Voronoi diagram.
+    pub fn has_given_initial(&self) -> bool {
+        self.given.is_some()
+    }
+
+    /// The contact points of each sphere of a medial mesh of this shape: those that it carries, or
+    /// the samples nearest to the centre, to within a thousandth, where they are within
+    /// `(1 + 1e-3) r`; which is then said in `diagnostics`.
+    ///
+    /// # Errors
+    /// Never at present; reserved for samplings that can fail.
+    pub fn contacts(
+        &self,
+        mesh: &MedialMesh,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<ContactSets, ShapeError> {
+        if let Some(known) = &mesh.contacts {
+            return Ok(ContactSets::known(known));
+        }
+        let samples = self.samples();
+        let (sets, cost) = Cost::of(|| ContactSets::search(mesh, &samples));
+        self.note(Substrate::Contacts, Use { cost, built_here: true });
+        let empty = sets.empty_sets();
+        diagnostics.warn(format!(
+            "the initial medial mesh has no contact points: they were taken to be the samples \
+             nearest to a centre, to within 0.1 % ({empty} spheres have fewer than two)"
+        ));
+        Ok(sets)
+    }
+
+    /// The bounding-volume tree of the surface.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn surface_tree(&self) -> Result<Arc<TriangleBvh>, ShapeError> {
+        let built = self
+            .store
+            .of_surface
+            .tree
+            .get((), || Ok(Arc::new(TriangleBvh::new(&self.store.mesh)?)));
+        self.take(Substrate::SurfaceTree, built)
+    }
+
+    /// The inside test of the surface.
+    pub fn inside_test(&self) -> Arc<InsideTest> {
+        let built = self
+            .store
+            .of_surface
+            .inside
+            .get((), || Ok(Arc::new(InsideTest::new(&self.store.mesh))));
+        self.take(Substrate::InsideTest, built).expect("a test of any mesh can be built")
+    }
+
+    /// A judge of medial meshes of this shape. `axis` is its exactly known medial axis, in input
+    /// units. What the judge needs counts as nobody's use.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub fn judge(
+        &self,
+        axis: Option<&MedialMesh>,
+        options: JudgeOptions,
+    ) -> Result<Judge, ShapeError> {
+        let normal = self.store.normalisation;
+        let truth = Truth {
+            betti: self.expected_betti(),
+            axis: axis.map(|a| a.transformed(1.0 / normal.diagonal, |p| normal.forward(p))),
+            diagonal: normal.diagonal,
+        };
+        let unseen = self.view();
+        let (tree, inside) = (unseen.surface_tree()?, unseen.inside_test());
+        Ok(Judge::new(self.mesh().clone(), tree, inside, truth, options))
     }
 }

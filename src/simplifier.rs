@@ -4,27 +4,24 @@
 //! [`Simplification::at`] returns any number of levels, so that filters rank once and methods that
 //! collapse edges continue from finer levels.
 
-use std::fmt;
+mod info;
 
+use std::any::{Any, TypeId, type_name};
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::complex::MedialMesh;
-use crate::shape::Shape;
-
-mod chain;
-mod extras;
-mod info;
-mod method;
-mod params;
-mod run;
+use crate::complex::{ComplexError, MedialMesh};
+use crate::shape::{Shape, ShapeError};
 
 pub use crate::diagnostics::Diagnostics;
-pub use chain::Chain;
-pub use extras::Extras;
-pub use info::{Capability, MethodInfo, NativeLevel, ParamInfo, Presentation, Registered};
-pub use method::{Method, Prepare, Simple, simple};
-pub use params::{NoParams, ParamFields, Params};
-pub use run::{Progress, RunContext, SimplifyError};
+pub use info::{
+    Capability, MethodInfo, NativeLevel, NoParams, ParamFields, ParamInfo, Params, Presentation,
+    Registered,
+};
 
 /// A method that simplifies the medial axis of a shape.
 ///
@@ -150,5 +147,418 @@ impl Simplified {
     pub fn new(mesh: MedialMesh, asked: Level) -> Self {
         let (diagnostics, extras) = (Diagnostics::default(), Extras::default());
         Self { mesh, asked, native_level: None, diagnostics, extras }
+    }
+}
+
+// Methods made of a description and one function.
+
+/// The function of a [`Method`]: prepares one shape with typed parameters.
+///
+/// It does all work that does not depend on the level; see [`MedialSimplifier::prepare`].
+pub type Prepare<P> =
+    for<'s> fn(&'s Shape, P, &RunContext) -> Result<Box<dyn Simplification + 's>, SimplifyError>;
+
+/// A method made of its description and one function: all that most methods need.
+///
+/// `P` is the struct of its parameters, usually declared with [`parameters!`](crate::parameters).
+/// The user's settings become a `P` here, and nowhere else, before the function is called;
+/// [`NoParams`] is for methods without parameters. [`simple`] is shorter still.
+pub struct Method<P> {
+    info: MethodInfo,
+    prepare: Prepare<P>,
+}
+
+impl<P> Method<P> {
+    /// A method.
+    pub fn new(info: MethodInfo, prepare: Prepare<P>) -> Self {
+        Self { info, prepare }
+    }
+}
+
+impl<P: DeserializeOwned> MedialSimplifier for Method<P> {
+    fn info(&self) -> &MethodInfo {
+        &self.info
+    }
+
+    fn prepare<'s>(
+        &self,
+        shape: &'s Shape,
+        params: &Params,
+        run: &RunContext,
+    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+        (self.prepare)(shape, params.typed()?, run)
+    }
+}
+
+impl<P> Clone for Method<P> {
+    fn clone(&self) -> Self {
+        Self { info: self.info.clone(), prepare: self.prepare }
+    }
+}
+
+impl<P> fmt::Debug for Method<P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Method").field("info", &self.info).finish_non_exhaustive()
+    }
+}
+
+/// A method whose only level is a number of spheres, computed by one function without parameters.
+pub struct Simple<F> {
+    info: MethodInfo,
+    function: F,
+}
+
+/// The smallest method: `function` returns the medial mesh of a shape with at most a number of
+/// spheres, at least 1. See [`MedialSimplifier`] for an example.
+pub fn simple<F>(info: MethodInfo, function: F) -> Simple<F>
+where
+    F: Fn(&Shape, usize) -> Result<MedialMesh, SimplifyError> + Clone + Send + Sync + 'static,
+{
+    Simple { info, function }
+}
+
+impl<F> MedialSimplifier for Simple<F>
+where
+    F: Fn(&Shape, usize) -> Result<MedialMesh, SimplifyError> + Clone + Send + Sync + 'static,
+{
+    fn info(&self) -> &MethodInfo {
+        &self.info
+    }
+
+    fn prepare<'s>(
+        &self,
+        shape: &'s Shape,
+        params: &Params,
+        _run: &RunContext,
+    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+        let NoParams {} = params.typed()?;
+        let function = self.function.clone();
+        Ok(Box::new(move |level: Level| match level {
+            Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
+            Level::Spheres(count) => Ok(Simplified::new(function(shape, count)?, level)),
+            _ => Err(SimplifyError::unsupported("ask for a number of spheres")),
+        }))
+    }
+}
+
+// The context of a run, and its errors.
+
+/// What surrounds a run: seed, cancellation, progress. The number of threads is that of the
+/// rayon pool in which the method is called.
+#[derive(Clone, Default)]
+pub struct RunContext {
+    /// Seed of every random choice.
+    pub seed: u64,
+    cancelled: Arc<AtomicBool>,
+    progress: Option<Arc<dyn Fn(Progress) + Send + Sync>>,
+}
+
+/// A step towards the end of the current stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Steps done.
+    pub done: usize,
+    /// Steps in all.
+    pub total: usize,
+}
+
+impl RunContext {
+    /// A context with a seed, never cancelled, that reports to nobody.
+    pub fn with_seed(seed: u64) -> Self {
+        Self { seed, ..Self::default() }
+    }
+
+    /// The same context, reporting to `progress`.
+    pub fn on_progress(mut self, progress: impl Fn(Progress) + Send + Sync + 'static) -> Self {
+        self.progress = Some(Arc::new(progress));
+        self
+    }
+
+    /// The flag that cancels the run once it is set.
+    pub fn cancel_flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.cancelled)
+    }
+
+    /// Whether the run was cancelled: for work that only waits, and has no progress to report.
+    pub fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// Reports progress and asks whether to go on. Called every few thousand steps.
+    ///
+    /// # Errors
+    /// [`SimplifyError::Cancelled`] once the flag is set.
+    pub fn step(&self, done: usize, total: usize) -> Result<(), SimplifyError> {
+        if let Some(progress) = &self.progress {
+            progress(Progress { done, total });
+        }
+        if self.is_cancelled() {
+            return Err(SimplifyError::Cancelled);
+        }
+        Ok(())
+    }
+}
+
+/// Why a method gave no result.
+#[derive(Debug, thiserror::Error)]
+pub enum SimplifyError {
+    /// The method does not do this: an answer, not a failure.
+    #[error("unsupported: {why}")]
+    Unsupported {
+        /// What it does not do, and what it does instead.
+        why: String,
+    },
+    /// A parameter is unknown, of the wrong type or out of range.
+    #[error("parameter: {0}")]
+    Parameter(String),
+    /// A level is out of range.
+    #[error("level: {0}")]
+    Level(String),
+    /// A substrate could not be built for this shape.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// The method returned something that is no valid complex.
+    #[error("invalid output: {0}")]
+    InvalidOutput(String),
+    /// A hierarchy cannot be built, or is not one of the method that was asked to go on from it.
+    #[error("hierarchy: {0}")]
+    Hierarchy(String),
+    /// The method could not do it, and says why in its own words.
+    #[error("failed: {0}")]
+    Failed(String),
+    /// The method's program was ended by a signal.
+    #[error("crashed: {0}")]
+    Crashed(String),
+    /// The run was cancelled.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl SimplifyError {
+    /// [`SimplifyError::Unsupported`] with what the method does not do, and what it does instead.
+    pub fn unsupported(why: impl Into<String>) -> Self {
+        Self::Unsupported { why: why.into() }
+    }
+}
+
+impl From<ComplexError> for SimplifyError {
+    fn from(error: ComplexError) -> Self {
+        Self::InvalidOutput(error.to_string())
+    }
+}
+
+// One method after another: a filter first, then a collapse of its result.
+
+/// Parameter that sets the first method's own level.
+const LEVEL: &str = "level";
+/// Its word for the published level.
+const PUBLISHED: &str = "published";
+/// What stands before the parameters of the first method.
+const FIRST: &str = "first.";
+
+/// Two methods as one: the second starts from the result of the first at one level, and returns all
+/// levels, each after a preparation of its own.
+pub struct Chain {
+    first: Arc<dyn MedialSimplifier>,
+    filter: Level,
+    then: Arc<dyn MedialSimplifier>,
+    info: MethodInfo,
+}
+
+impl Chain {
+    /// `first` at the level that the parameter `level` sets, by default `filter`; then `then`.
+    ///
+    /// The id is `FIRST+THEN`. The parameters are those of `then`, and those of `first` with `first.`
+    /// before their names.
+    pub fn new(
+        first: Arc<dyn MedialSimplifier>,
+        filter: Level,
+        then: Arc<dyn MedialSimplifier>,
+    ) -> Self {
+        let (a, b) = (first.info(), then.info());
+        let unit = a.native.as_ref().map_or("none".into(), |native| native.unit.clone());
+        let default = match filter {
+            Level::Native(value) => value.to_string(),
+            _ => PUBLISHED.to_owned(),
+        };
+        let level = ParamInfo::new(LEVEL, default, unit, format!("level of {} first", a.id));
+        let info = MethodInfo::new(
+            format!("{}+{}", a.id, b.id),
+            format!("Chain: {}, then {}", a.title, b.title),
+        )
+        .citation(format!("{}; {}", a.citation, b.citation))
+        .summary(format!("The result of {} is the initial medial mesh of {}.", a.id, b.id))
+        .published(b.published.clone())
+        .param(level)
+        .params(a.params.iter().map(|param: &ParamInfo| ParamInfo {
+            name: format!("{FIRST}{}", param.name).into(),
+            ..param.clone()
+        }))
+        .params(b.params.iter().cloned());
+        let (native, extras) = (b.native.clone(), b.extras.clone());
+        let info = MethodInfo { native, extras, ..info };
+        Self { first, filter, then, info }
+    }
+
+    /// The level of the first method, its parameters, and those of the second.
+    fn split(&self, params: &Params) -> Result<(Level, Params, Params), SimplifyError> {
+        let first = self.first.info();
+        let mut level = self.filter;
+        let (mut of_first, mut of_then) = (Params::none(), Params::none());
+        for (key, value) in &params.0 {
+            if let Some(key) = key.strip_prefix(FIRST) {
+                of_first.0.insert(key.to_owned(), value.clone());
+            } else if key == LEVEL {
+                level = match (value.as_f64(), value.as_str()) {
+                    (Some(number), _) => Level::Native(number),
+                    (_, Some(PUBLISHED)) => Level::Published,
+                    _ => {
+                        let id = &first.id;
+                        let why = format!("{LEVEL} = {value}: a level of {id}, or `{PUBLISHED}`");
+                        return Err(SimplifyError::Parameter(why));
+                    }
+                };
+            } else {
+                of_then.0.insert(key.clone(), value.clone());
+            }
+        }
+        Ok((level, of_first, of_then))
+    }
+}
+
+impl MedialSimplifier for Chain {
+    fn info(&self) -> &MethodInfo {
+        &self.info
+    }
+
+    fn prepare<'s>(
+        &self,
+        shape: &'s Shape,
+        params: &Params,
+        run: &RunContext,
+    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+        let (level, of_first, params) = self.split(params)?;
+        let filtered = self.first.prepare(shape, &of_first, run)?.at(level)?;
+        let Simplified { mesh, diagnostics, .. } = filtered;
+        let remark = format!(
+            "{} at {level} left {} spheres to start from",
+            self.first.info().id,
+            mesh.spheres.len()
+        );
+        let mut remarks = diagnostics.warnings;
+        remarks.push(remark);
+        Ok(Box::new(Started {
+            shape: shape.starting_from(Arc::new(mesh))?,
+            then: Arc::clone(&self.then),
+            params,
+            run: run.clone(),
+            remarks,
+        }))
+    }
+}
+
+/// The second method on what the first one left.
+struct Started {
+    shape: Shape,
+    then: Arc<dyn MedialSimplifier>,
+    params: Params,
+    run: RunContext,
+    remarks: Vec<String>,
+}
+
+impl Simplification for Started {
+    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        let prepared = self.then.prepare(&self.shape, &self.params, &self.run);
+        let mut simplified = prepared?.at(level)?;
+        simplified.diagnostics.warnings.splice(0..0, self.remarks.iter().cloned());
+        Ok(simplified)
+    }
+}
+
+// What only some methods give, kept by type.
+
+/// What a method gives beside the medial mesh: at most one value of each type.
+///
+/// A method that has voxels, named parts or a hierarchy defines their type, or takes one that
+/// exists, and announces it in [`MethodInfo::extras`](MethodInfo::extras). Whoever knows the
+/// type can ask for it; everybody else passes it on. Clones share the values.
+///
+/// ```
+/// use medial::simplifier::Extras;
+///
+/// struct Seams(Vec<[u32; 2]>);
+/// let extras = Extras::with(Seams(vec![[0, 1]]));
+/// assert_eq!(extras.get::<Seams>().map(|seams| seams.0.len()), Some(1));
+/// assert!(extras.get::<String>().is_none());
+/// ```
+#[derive(Clone, Default)]
+pub struct Extras {
+    /// In the order of insertion. A handful at most: a map would cost more than the search.
+    entries: Vec<Entry>,
+}
+
+#[derive(Clone)]
+struct Entry {
+    key: TypeId,
+    name: &'static str,
+    value: Arc<dyn Any + Send + Sync>,
+}
+
+impl Extras {
+    /// One value.
+    pub fn with<T: Any + Send + Sync>(value: T) -> Self {
+        let mut extras = Self::default();
+        extras.insert(value);
+        extras
+    }
+
+    /// Adds a value in place of an earlier one of the same type.
+    pub fn insert<T: Any + Send + Sync>(&mut self, value: T) {
+        self.insert_shared(Arc::new(value));
+    }
+
+    /// As [`Extras::insert`], for a value that others hold too. It is found as a `T`.
+    pub fn insert_shared<T: Any + Send + Sync>(&mut self, value: Arc<T>) {
+        let key = TypeId::of::<T>();
+        self.entries.retain(|entry| entry.key != key);
+        self.entries.push(Entry { key, name: type_name::<T>(), value });
+    }
+
+    /// The value of a type, if there is one.
+    pub fn get<T: Any + Send + Sync>(&self) -> Option<&T> {
+        self.find::<T>().and_then(|value| value.downcast_ref())
+    }
+
+    /// The value of a type to hold on to, if there is one.
+    pub fn get_shared<T: Any + Send + Sync>(&self) -> Option<Arc<T>> {
+        self.find::<T>().and_then(|value| Arc::clone(value).downcast().ok())
+    }
+
+    fn find<T: Any>(&self) -> Option<&Arc<dyn Any + Send + Sync>> {
+        let key = TypeId::of::<T>();
+        self.entries.iter().find(|entry| entry.key == key).map(|entry| &entry.value)
+    }
+}
+
+impl fmt::Debug for Extras {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.entries.iter().map(|entry| entry.name)).finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_found_by_its_type_and_replaced_by_a_later_one() {
+        let mut extras = Extras::with(1_u32);
+        extras.insert_shared(Arc::new("two".to_owned()));
+        assert_eq!(extras.get::<u32>(), Some(&1));
+        extras.insert(3_u32);
+        let copy = extras.clone();
+        assert_eq!((copy.get::<u32>(), copy.get::<u64>()), (Some(&3), None));
+        assert_eq!(copy.get_shared::<String>().as_deref().map(String::as_str), Some("two"));
+        assert_eq!(format!("{copy:?}"), r#"{"alloc::string::String", "u32"}"#);
     }
 }

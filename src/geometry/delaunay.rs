@@ -237,15 +237,18 @@ impl Deref for Delaunay {
 
 /// Sites of weight zero, or the reason why a point cannot be one.
 pub(super) fn admissible_sites(points: &[Vec3]) -> Result<Vec<Site>, TriangulationError> {
-    let site = |(index, &point): (usize, &Vec3)| {
-        if !point.is_finite() {
-            return Err(TriangulationError::NotFinite { index, point });
-        }
-        if point.abs().max_element() > MAX_COORDINATE {
-            return Err(TriangulationError::OutOfRange { index, point });
-        }
-        // Adding zero makes -0.0 the same position as 0.0.
-        Ok(Site { p: (point + Vec3::ZERO).to_array(), w: 0.0 })
-    };
-    points.iter().enumerate().map(site).collect()
+    points
+        .iter()
+        .enumerate()
+        .map(|(index, &point): (usize, &Vec3)| {
+            if !point.is_finite() {
+                return Err(TriangulationError::NotFinite { index, point });
+            }
+            if point.abs().max_element() > MAX_COORDINATE {
+                return Err(TriangulationError::OutOfRange { index, point });
+            }
+            // Adding zero makes -0.0 the same position as 0.0.
+            Ok(Site { p: (point + Vec3::ZERO).to_array(), w: 0.0 })
+        })
+        .collect()
 }

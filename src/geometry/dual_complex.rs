@@ -277,9 +277,9 @@ fn sites<const N: usize>(regular: &Regular, v: [VertexId; N]) -> [&Site; N] {
 /// Step 1: for each finite cell whether it is in the complex.
 fn tetrahedra(regular: &Regular) -> Vec<bool> {
     let cells = (0..regular.finite_cell_count() as u32).into_par_iter().with_min_len(GRAIN);
-    let member =
-        |c| tetrahedron_size(sites(regular, regular.vertices(CellId(c)))) != Sign::Positive;
-    cells.map(member).collect()
+    cells
+        .map(|c| tetrahedron_size(sites(regular, regular.vertices(CellId(c)))) != Sign::Positive)
+        .collect()
 }
 
 /// Step 2: two bits for each facet of each cell, the same from both sides.
@@ -304,16 +304,17 @@ fn triangles(regular: &Regular, cells: &[bool]) -> Vec<u8> {
         })
     };
     let own: Vec<u8> = ids().map(first).collect();
-    let both = |c: u32| {
-        let cell = CellId(c);
-        let facets = (0..4).map(|opposite| Facet { cell, opposite });
-        facets.fold(own[cell.index()], |bits, facet| {
-            let mirror = regular.mirror(facet);
-            let seen = own[mirror.cell.index()] >> (2 * mirror.opposite) & 3;
-            bits | seen << (2 * facet.opposite)
+    ids()
+        .map(|c: u32| {
+            let cell = CellId(c);
+            let facets = (0..4).map(|opposite| Facet { cell, opposite });
+            facets.fold(own[cell.index()], |bits, facet| {
+                let mirror = regular.mirror(facet);
+                let seen = own[mirror.cell.index()] >> (2 * mirror.opposite) & 3;
+                bits | seen << (2 * facet.opposite)
+            })
         })
-    };
-    ids().map(both).collect()
+        .collect()
 }
 
 /// Whether a triangle without cofaces in the complex is in it.
@@ -396,10 +397,9 @@ fn edge_class(
         let v = regular.vertices(cell);
         (0..4).filter(move |&k| !ends.contains(&v[k])).map(move |k| (k, v[k]))
     };
-    let has_triangle = |&c: &CellId| {
+    if ring.iter().any(|&c: &CellId| {
         facets[c.index()] != 0 && others(c).any(|(k, _)| facets[c.index()] >> (2 * k) & 3 != 0)
-    };
-    if ring.iter().any(has_triangle) {
+    }) {
         return Class::Regular as u8;
     }
     let edge = sites(regular, ends);
@@ -429,11 +429,12 @@ fn vertices(regular: &Regular, cells: &[bool], edges: &[u16]) -> Vec<u8> {
             *class = (*class).min(Class::Regular as u8);
         }
     }
-    let is_candidate = |v: usize| {
-        let id = VertexId(v as u32);
-        class[v] == 0 && regular.is_vertex(id) && regular.site(id).w >= 0.0
-    };
-    let isolated: Vec<bool> = (0..class.len()).map(is_candidate).collect();
+    let isolated: Vec<bool> = (0..class.len())
+        .map(|v: usize| {
+            let id = VertexId(v as u32);
+            class[v] == 0 && regular.is_vertex(id) && regular.site(id).w >= 0.0
+        })
+        .collect();
     if isolated.contains(&true) {
         let mut clear = isolated;
         for v in attached(regular, &clear) {
@@ -449,16 +450,17 @@ fn vertices(regular: &Regular, cells: &[bool], edges: &[u16]) -> Vec<u8> {
 /// The given vertices that are attached to a neighbour, in unspecified order, with repetitions.
 fn attached(regular: &Regular, isolated: &[bool]) -> Vec<u32> {
     let cells = (0..regular.finite_cell_count() as u32).into_par_iter().with_min_len(GRAIN);
-    let of_cell = |c| {
-        let v = regular.vertices(CellId(c));
-        let pairs = PAIRS.into_iter().flat_map(|(i, j)| [(i, j), (j, i)]);
-        pairs.filter_map(move |(i, j)| {
-            let negative = isolated[v[i].index()]
-                && vertex_clearance(regular.site(v[i]), regular.site(v[j])) == Sign::Negative;
-            negative.then_some(v[i].0)
+    cells
+        .flat_map_iter(|c| {
+            let v = regular.vertices(CellId(c));
+            let pairs = PAIRS.into_iter().flat_map(|(i, j)| [(i, j), (j, i)]);
+            pairs.filter_map(move |(i, j)| {
+                let negative = isolated[v[i].index()]
+                    && vertex_clearance(regular.site(v[i]), regular.site(v[j])) == Sign::Negative;
+                negative.then_some(v[i].0)
+            })
         })
-    };
-    cells.flat_map_iter(of_cell).collect()
+        .collect()
 }
 
 // Regular triangulations of balls whose centres need not span space.

@@ -42,7 +42,6 @@ pub mod delaunay;
 mod disjoint;
 pub mod dual_complex;
 mod enclosing;
-pub mod hash;
 pub mod planar_frame;
 pub mod poles;
 pub mod predicates;
@@ -53,18 +52,26 @@ mod triangles_meet;
 pub mod triangulation;
 pub mod union_boundary;
 
-pub use crate::poles::PowerCrust;
-pub use crate::sphere::Cone;
-pub use crate::sphere::separation_angle;
-pub use crate::sphere::{ConeFrame, SlabPlanes};
-pub use crate::sphere::{Slab, SlabFace};
+/// A hash of numbers, the same on every machine.
+pub mod hash {
+    /// The finaliser of SplitMix64, whose high and low bits both mix: G. L. Steele, D. Lea, C. H. Flood:
+    /// *Fast splittable pseudorandom number generators*, OOPSLA 2014, doi:10.1145/2660193.2660195.
+    #[inline]
+    pub fn splitmix(number: u64) -> u64 {
+        let mut z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+}
+
 pub use delaunay::Delaunay;
 pub use disjoint::DisjointSets;
 pub use dual_complex::DualComplex;
 pub use enclosing::enclosing_ball;
-pub use poles::{PolarBall, Pole, Poles, SamplePoles};
+pub use poles::{PolarBall, Pole, Poles, PowerCrust, SamplePoles};
 pub use regular::Regular;
-pub use sphere::{HullFoot, Sphere};
+pub use sphere::{Cone, ConeFrame, HullFoot, Slab, SlabFace, SlabPlanes, Sphere, separation_angle};
 pub use triangles_meet::{TriangleTree, triangles_meet};
 pub use triangulation::{CellId, TriangulationError, VertexId};
 pub use union_boundary::{MergedVertices, UnionBoundary, UnionVertex};

@@ -189,11 +189,12 @@ fn polar_balls(
         }
     }
     let cells = delaunay.finite_cells().filter(|c| is_pole[c.index()]);
-    let ball = |cell: CellId| {
-        let samples = delaunay.vertices(cell).map(|v| v.0);
-        Some(PolarBall { cell, sphere: spheres[cell.index()]?, samples })
-    };
-    cells.filter_map(ball).collect()
+    cells
+        .filter_map(|cell: CellId| {
+            let samples = delaunay.vertices(cell).map(|v| v.0);
+            Some(PolarBall { cell, sphere: spheres[cell.index()]?, samples })
+        })
+        .collect()
 }
 
 // The power crust: the surface between the power cells of inner and of outer balls.
@@ -315,14 +316,18 @@ impl PowerCrust {
             }
             start.push(rings.len() as u32);
         }
-        let corner = |&cell: &CellId| {
-            // Inner balls are inside the box, so never on the hull: no cell here is infinite. Only
-            // nearly coplanar balls have an orthocentre that is not representable.
-            let mean =
-                || regular.vertices(cell).map(|v| regular.point(v)).iter().sum::<Vec3>() / 4.0;
-            regular.orthosphere(cell).map_or_else(mean, |(centre, _)| centre)
-        };
-        let corners = cells.par_iter().with_min_len(1 << 10).map(corner).collect();
+        let corners = cells
+            .par_iter()
+            .with_min_len(1 << 10)
+            .map(|&cell: &CellId| {
+                // Inner balls are inside the box, so never on the hull: no cell here is infinite. Only
+                // nearly coplanar balls have an orthocentre that is not representable.
+                regular.orthosphere(cell).map_or_else(
+                    || regular.vertices(cell).map(|v| regular.point(v)).iter().sum::<Vec3>() / 4.0,
+                    |(centre, _)| centre,
+                )
+            })
+            .collect();
         Self { corners, start, rings, balls: facets.iter().map(|f| f.0).collect() }
     }
 

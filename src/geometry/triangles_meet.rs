@@ -65,17 +65,19 @@ impl TriangleTree {
         mut visit: impl FnMut(u32, [Vec3; 3]) -> ControlFlow<()>,
     ) {
         let own = Bounds::of_points(triangle);
-        let overlaps = |_: usize, node: &Node| node.bounds.overlaps(&own);
-        self.tree.descend(overlaps, |places: Range<usize>| {
-            places.into_iter().try_for_each(|place| {
-                let (id, other) = self.at(place);
-                if own.overlaps(&Bounds::of_points(other)) {
-                    visit(id, other)
-                } else {
-                    ControlFlow::Continue(())
-                }
-            })
-        });
+        self.tree.descend(
+            |_: usize, node: &Node| node.bounds.overlaps(&own),
+            |places: Range<usize>| {
+                places.into_iter().try_for_each(|place| {
+                    let (id, other) = self.at(place);
+                    if own.overlaps(&Bounds::of_points(other)) {
+                        visit(id, other)
+                    } else {
+                        ControlFlow::Continue(())
+                    }
+                })
+            },
+        );
     }
 }
 

@@ -75,13 +75,16 @@ impl UnionBoundary {
     pub fn new(complex: &DualComplex<'_>) -> Self {
         let (facets, sides) = facets_with_vertices(complex);
         let regular = complex.regular();
-        let meet = |&facet: &Facet| {
-            let triangle = regular.facet_vertices(facet);
-            let meeting = Meeting::of(triangle.map(|v| regular.site(v)));
-            let (position, balls) = (meeting.position(), triangle.map(|v| v.0));
-            (UnionVertex { position, balls, facet }, meeting.sine2, meeting.height2 < 0.0)
-        };
-        let found: Vec<_> = facets.par_iter().with_min_len(1 << 10).map(meet).collect();
+        let found: Vec<_> = facets
+            .par_iter()
+            .with_min_len(1 << 10)
+            .map(|&facet: &Facet| {
+                let triangle = regular.facet_vertices(facet);
+                let meeting = Meeting::of(triangle.map(|v| regular.site(v)));
+                let (position, balls) = (meeting.position(), triangle.map(|v| v.0));
+                (UnionVertex { position, balls, facet }, meeting.sine2, meeting.height2 < 0.0)
+            })
+            .collect();
         Self {
             vertices: found.iter().map(|f| f.0).collect(),
             quality: found.iter().map(|f| f.1).collect(),
@@ -183,16 +186,18 @@ impl Meeting {
 /// `sides` holds for each facet with a vertex on the side of its cell the index of the vertex.
 pub(super) fn coincident(complex: &DualComplex<'_>, mut sides: Vec<(Facet, u32)>) -> Vec<[u32; 2]> {
     let cells = (0..complex.regular().finite_cell_count() as u32).into_par_iter();
-    let of_cell = |walls: &mut Vec<Wall>, cell| {
-        let mut points = Vec::new();
-        for (edge, _) in complex.edges_of(CellId(cell)).filter(|e| e.1 == Class::Regular) {
-            find_walls(complex, edge, walls);
-            points.extend(arcs(complex, walls).filter(|&[a, b]| is_point(complex, a, b)));
-        }
-        points
-    };
-    let points: Vec<[Facet; 2]> =
-        cells.with_min_len(1 << 10).map_init(Vec::new, of_cell).flatten_iter().collect();
+    let points: Vec<[Facet; 2]> = cells
+        .with_min_len(1 << 10)
+        .map_init(Vec::new, |walls: &mut Vec<Wall>, cell| {
+            let mut points = Vec::new();
+            for (edge, _) in complex.edges_of(CellId(cell)).filter(|e| e.1 == Class::Regular) {
+                find_walls(complex, edge, walls);
+                points.extend(arcs(complex, walls).filter(|&[a, b]| is_point(complex, a, b)));
+            }
+            points
+        })
+        .flatten_iter()
+        .collect();
     if points.is_empty() {
         return Vec::new();
     }
@@ -233,10 +238,11 @@ fn find_walls(complex: &DualComplex<'_>, (cell, i, j): CellEdge, walls: &mut Vec
     for (k, &cell) in ring.iter().enumerate() {
         let next = ring[(k + 1) % ring.len()];
         let v = regular.vertices(cell);
-        let leads_on = |opposite: &usize| {
+        let Some(opposite) = (0..4).find(|opposite: &usize| {
             !ends.contains(&v[*opposite]) && regular.neighbours(cell)[*opposite] == next
+        }) else {
+            continue;
         };
-        let Some(opposite) = (0..4).find(leads_on) else { continue };
         let before = Facet { cell, opposite };
         if complex.facet_class(before).is_some() {
             walls.push(Wall { before, after: regular.mirror(before) });

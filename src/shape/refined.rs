@@ -30,7 +30,6 @@
 
 use std::sync::Arc;
 
-use super::growing::Growing;
 use crate::Vec3;
 use crate::complex::{
     CellSpheres, DualTriangulation, MedialMesh, MedialUnion, VoronoiFacets, betti,
@@ -38,8 +37,7 @@ use crate::complex::{
 };
 use crate::geometry::trees::PointTree;
 use crate::geometry::{Delaunay, TriangulationError};
-use crate::surface::TriangleBvh;
-use crate::surface::{InsideTest, Sampling, Side, TriMesh, sample};
+use crate::surface::{InsideTest, Sampling, Side, TriMesh, TriangleBvh, sample};
 
 /// The error that is allowed, as a fraction of the bounding box's diagonal.
 pub const BOUND: f64 = 0.01;
@@ -218,8 +216,9 @@ impl Refinement<'_> {
             let depth = if is_out { -closest.distance } else { closest.distance };
             let reach = radius - depth;
             largest = largest.max(reach);
-            let leaves = |share: f64| is_out && closest.distance > share * radius;
-            if reach > BOUND || pierced.is_some_and(leaves) {
+            if reach > BOUND
+                || pierced.is_some_and(|share: f64| is_out && closest.distance > share * radius)
+            {
                 places.push(Place { point: closest.point, clear: reach.min(radius) });
             }
         }
@@ -281,8 +280,9 @@ impl Refinement<'_> {
             }
             if distance(point) < CLEAR * clear {
                 let around = directions().map(|d| self.tree.closest(point + clear * d).point);
-                let farther = |a: &Vec3, b: &Vec3| distance(*a).total_cmp(&distance(*b));
-                point = around.max_by(farther).unwrap_or(point);
+                point = around
+                    .max_by(|a: &Vec3, b: &Vec3| distance(*a).total_cmp(&distance(*b)))
+                    .unwrap_or(point);
             }
             if distance(point).min(new.distance(point)) > CLEAR * clear {
                 new.push(point);
@@ -308,10 +308,13 @@ impl Refinement<'_> {
         let middles = (0..self.mesh.faces.len()).map(|face| {
             let [a, b, c] = self.mesh.triangle(face);
             let sides = [(a, b), (b, c), (c, a)];
-            let longest = |x: &&(Vec3, Vec3), y: &&(Vec3, Vec3)| {
-                x.0.distance_squared(x.1).total_cmp(&y.0.distance_squared(y.1))
-            };
-            let (p, q) = sides.iter().max_by(longest).copied().unwrap_or((a, b));
+            let (p, q) = sides
+                .iter()
+                .max_by(|x: &&(Vec3, Vec3), y: &&(Vec3, Vec3)| {
+                    x.0.distance_squared(x.1).total_cmp(&y.0.distance_squared(y.1))
+                })
+                .copied()
+                .unwrap_or((a, b));
             (p.midpoint(q), (a + b + c) / 3.0)
         });
         let mut taken: std::collections::BTreeSet<[u64; 3]> = samples.iter().map(bits).collect();
@@ -376,4 +379,67 @@ fn directions() -> impl Iterator<Item = Vec3> {
         };
         corner.normalize()
     })
+}
+
+// Nearest-point queries on a growing set of points.
+
+/// A growing set of points: trees over consecutive runs, each run longer than the next, and a tail that
+/// is searched linearly.
+#[derive(Default)]
+pub(super) struct Growing {
+    /// In the order in which they came.
+    pub points: Vec<Vec3>,
+    trees: Vec<PointTree>,
+}
+
+/// Up to this many points a linear search is cheaper than a tree.
+const TAIL: usize = 64;
+
+impl Growing {
+    fn in_trees(&self) -> usize {
+        self.trees.iter().map(PointTree::len).sum()
+    }
+
+    /// Adds a point. Costs `O(log^2 n)` on average.
+    pub fn push(&mut self, point: Vec3) {
+        self.points.push(point);
+        let mut first = self.in_trees();
+        if self.points.len() - first < TAIL {
+            return;
+        }
+        while let Some(last) = self.trees.pop_if(|last| last.len() <= self.points.len() - first) {
+            first -= last.len();
+        }
+        self.trees.push(PointTree::new(&self.points[first..]));
+    }
+
+    /// The distance of the nearest point, infinite without any.
+    pub fn distance(&self, p: Vec3) -> f64 {
+        let near = self.trees.iter().filter_map(|tree| Some(tree.nearest(p)?.1));
+        let tail = self.points[self.in_trees()..].iter().map(|q| q.distance_squared(p));
+        near.chain(tail).fold(f64::INFINITY, f64::min).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+
+    #[test]
+    fn the_nearest_of_all_so_far() {
+        let mut rng = Pcg64::seed_from_u64(5);
+        let mut point = || Vec3::new(rng.random(), rng.random(), rng.random());
+        let mut growing = Growing::default();
+        assert_eq!(growing.distance(Vec3::ZERO), f64::INFINITY);
+        for _ in 0..700 {
+            growing.push(point());
+            let query = point();
+            let all = growing.points.iter().map(|p| p.distance_squared(query));
+            assert_eq!(growing.distance(query), all.fold(f64::INFINITY, f64::min).sqrt());
+        }
+        assert!(growing.trees.len() > 1 && growing.trees.len() < 8);
+    }
 }

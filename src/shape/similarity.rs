@@ -243,9 +243,13 @@ impl Surface {
     /// Spheres of a file, evenly taken, in normalised coordinates as if the file were in input units.
     fn spheres(&self, mesh: &MedialMesh) -> Vec<Sphere> {
         let every = mesh.spheres.len().div_ceil(SPHERES).max(1);
-        let normal =
-            |s: &Sphere| Sphere::new(self.units.forward(s.centre), s.radius / self.units.diagonal);
-        mesh.spheres.iter().step_by(every).map(normal).collect()
+        mesh.spheres
+            .iter()
+            .step_by(every)
+            .map(|s: &Sphere| {
+                Sphere::new(self.units.forward(s.centre), s.radius / self.units.diagonal)
+            })
+            .collect()
     }
 
     /// The units of the surface first, then the conventions of tools.
@@ -386,14 +390,18 @@ mod tests {
 
     /// A block of 3 by 2 by 1 somewhere, and its initial medial mesh.
     fn block() -> (Shape, MedialMesh) {
-        let corner = |i: u32| {
-            let bit = |k: u32| f64::from(i >> k & 1);
-            Vec3::new(5.0 + 3.0 * bit(0), -4.0 + 2.0 * bit(1), 1.0 + bit(2))
-        };
         let quads =
             [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let mesh = TriMesh { vertices: (0..8).map(corner).collect(), faces };
+        let mesh = TriMesh {
+            vertices: (0..8)
+                .map(|i: u32| {
+                    let bit = |k: u32| f64::from(i >> k & 1);
+                    Vec3::new(5.0 + 3.0 * bit(0), -4.0 + 2.0 * bit(1), 1.0 + bit(2))
+                })
+                .collect(),
+            faces,
+        };
         let report = validate(&mesh).unwrap();
         let sampling = "uniform:4000".parse().unwrap();
         let options = ShapeOptions { sampling, ..ShapeOptions::default() };

@@ -2,9 +2,10 @@
 
 use std::borrow::Cow;
 
-use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
-use super::{Level, MedialSimplifier};
+use crate::simplifier::{Level, MedialSimplifier, SimplifyError};
 
 /// Text of a method's description: a literal in code, owned where it was read from a file.
 type Text = Cow<'static, str>;
@@ -35,18 +36,18 @@ pub struct MethodInfo {
     pub summary: Text,
     /// The method's own level, where it has a scalar one.
     pub native: Option<NativeLevel>,
-    /// Whether [`at`](super::Simplification::at) continues from the previous level. It is then called
+    /// Whether [`at`](crate::simplifier::Simplification::at) continues from the previous level. It is then called
     /// from fine to coarse, with levels of one kind after one preparation, and the seconds of a level
     /// are those of all calls up to it. The seconds of other methods are those of each call alone.
     pub incremental: bool,
-    /// Whether there is one result for each shape, at [`Level::Published`](super::Level::Published)
+    /// Whether there is one result for each shape, at [`Level::Published`](crate::simplifier::Level::Published)
     /// alone.
     pub fixed: bool,
-    /// What [`Level::Published`](super::Level::Published) means here.
+    /// What [`Level::Published`](crate::simplifier::Level::Published) means here.
     pub published: Text,
     /// Parameters, in the order of the paper.
     pub params: Vec<ParamInfo>,
-    /// What the results carry in [`Extras`](super::Extras).
+    /// What the results carry in [`Extras`](crate::simplifier::Extras).
     pub extras: Vec<Capability>,
 }
 
@@ -234,4 +235,151 @@ impl Registered {
         self.presentation.on_request = true;
         self
     }
+}
+
+// Parameters of a method: as the user gives them, and as the method's own struct.
+
+/// Parameters as given by the user, not yet typed: a JSON object.
+///
+/// Each method turns them into its own struct (`Default` = the paper's values, unknown keys
+/// refused) by [`Params::typed`]; this is the one place where the type is erased.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Params(pub serde_json::Map<String, serde_json::Value>);
+
+impl Params {
+    /// No parameter set: the paper's values.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// Sets one parameter from text: a JSON scalar where the text is one, else a string.
+    pub fn set(&mut self, key: &str, value: &str) {
+        let value = serde_json::from_str(value).unwrap_or_else(|_| value.into());
+        self.0.insert(key.to_owned(), value);
+    }
+
+    /// The method's own parameter struct.
+    ///
+    /// # Errors
+    /// [`SimplifyError::Parameter`] with serde's message when a key is unknown or a value is of
+    /// the wrong type; it names the key.
+    pub fn typed<T: DeserializeOwned>(&self) -> Result<T, SimplifyError> {
+        let parse = |map: &serde_json::Map<String, serde_json::Value>| {
+            serde_json::from_value::<T>(serde_json::Value::Object(map.clone()))
+                .map_err(|error| error.to_string())
+        };
+        parse(&self.0).map_err(|message| {
+            // Serde does not say which key a wrong value belongs to: the one that fails alone too.
+            let named = match self.0.iter().find(|&(key, value): &(&String, &serde_json::Value)| {
+                let alone = serde_json::Map::from_iter([(key.clone(), value.clone())]);
+                parse(&alone).is_err_and(|error| error == message)
+            }) {
+                Some((key, value)) => format!("{key} = {value}: {message}"),
+                None => message,
+            };
+            SimplifyError::Parameter(named)
+        })
+    }
+}
+
+/// The parameters of a method that has none: every key is refused.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoParams {}
+
+/// A struct of parameters that describes its fields; [`parameters!`](crate::parameters) implements
+/// it.
+pub trait ParamFields: Default + Serialize + DeserializeOwned {
+    /// Name, unit and help of each field, in the order of declaration.
+    const FIELDS: &'static [(&'static str, &'static str, &'static str)];
+
+    /// The parameters with their defaults, for [`MethodInfo::params`](crate::simplifier::MethodInfo::params).
+    fn describe() -> Vec<ParamInfo> {
+        let defaults = serde_json::to_value(Self::default()).expect("parameters are plain data");
+        Self::FIELDS
+            .iter()
+            .map(|&(name, unit, help): &(&'static str, &'static str, &'static str)| {
+                ParamInfo::new(name, as_written(&defaults[name]), unit, help.trim_start())
+            })
+            .collect()
+    }
+}
+
+/// A value in the form that `--set` reads.
+fn as_written(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::String(text) => text.clone(),
+        serde_json::Value::Array(values) => {
+            values.iter().map(as_written).collect::<Vec<_>>().join(",")
+        }
+        value => value.to_string(),
+    }
+}
+
+/// Declares the parameters of a method once: the struct, its defaults, its keys, and its
+/// documentation.
+///
+/// Each field has its help as doc comment, then name, type, default and unit (or the list of
+/// allowed words). Unknown keys are rejected. A field can have serde attributes.
+///
+/// ```
+/// use medial::simplifier::{ParamFields, Params};
+///
+/// medial::parameters! {
+///     /// Parameters of an example.
+///     #[derive(Clone, Copy, Debug)]
+///     pub struct ExampleParams {
+///         /// Spheres below this radius are removed.
+///         least: f64 = 0.25, "fraction of the diagonal";
+///         /// How often all spheres shrink.
+///         rounds: usize = 3, "rounds";
+///     }
+/// }
+///
+/// let described = ExampleParams::describe();
+/// assert_eq!((&*described[0].name, &*described[0].default), ("least", "0.25"));
+/// assert_eq!(described[1].help, "How often all spheres shrink.");
+/// let mut params = Params::none();
+/// params.set("rounds", "5");
+/// assert_eq!(params.typed::<ExampleParams>()?.rounds, 5);
+/// params.set("round", "5");
+/// assert!(params.typed::<ExampleParams>().is_err());
+/// # Ok::<(), medial::simplifier::SimplifyError>(())
+/// ```
+#[macro_export]
+macro_rules! parameters {
+    (
+        $(#[$about:meta])*
+        pub struct $name:ident {
+            $(
+                $(#[doc = $help:literal])+
+                $(#[serde($($serde:tt)*)])*
+                $field:ident: $type:ty = $default:expr, $unit:expr;
+            )+
+        }
+    ) => {
+        $(#[$about])*
+        #[derive($crate::serde::Serialize, $crate::serde::Deserialize)]
+        #[serde(crate = "medial::serde", default, deny_unknown_fields)]
+        pub struct $name {
+            $(
+                $(#[doc = $help])+
+                #[doc = concat!("\n\nUnit or values: ", $unit, ".")]
+                $(#[serde($($serde)*)])*
+                pub $field: $type,
+            )+
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)+ }
+            }
+        }
+
+        impl $crate::simplifier::ParamFields for $name {
+            const FIELDS: &'static [(&'static str, &'static str, &'static str)] =
+                &[$((stringify!($field), $unit, concat!($($help),+)),)+];
+        }
+    };
 }

@@ -140,12 +140,13 @@ pub(super) fn power_test(p: [(&[f64; 3], f64); 4], e: (&[f64; 3], f64)) -> Sign 
     let (d, quantum) = differences(p.map(|q| q.0), e.0, cap);
     let unit = 2 * quantum;
     let below = |limit: i32| top == i32::MIN || top - unit <= limit;
-    let offset = |w: f64| to_i128(e.1, unit) - to_i128(w, unit);
     let offset4 = |w: f64| to_wide::<4>(e.1, unit).sub(to_wide(w, unit));
     let offset40 = |w: f64| to_wide::<40>(e.1, unit).sub(to_wide(w, unit));
     // The limits leave room in a lift for three squares, a difference of weights and the sign.
     match d {
-        Differences::One(d) if below(122) => integers::lifted_sign(&d, &weights.map(offset)),
+        Differences::One(d) if below(122) => {
+            integers::lifted_sign(&d, &weights.map(|w: f64| to_i128(e.1, unit) - to_i128(w, unit)))
+        }
         Differences::One(d) if below(250) => {
             let d = d.map(|p| p.map(|x| Wide::from_i128(x.into())));
             in_sphere_det::<2, 4, 6, 10>(&d, &weights.map(offset4))
@@ -515,13 +516,15 @@ fn lifted_det_scaled<
     d: &[[Wide<D>; 3]; 4],
     shifts: [i32; 3],
 ) -> Sign {
-    let lift = |p: &[Wide<D>; 3]| {
-        (0..3).fold(Wide::<L>::ZERO, |sum, k| {
-            let square: Wide<D2> = p[k].mul(p[k]);
-            sum.add(square.extended::<L>().shifted(shifts[k] as u32))
-        })
-    };
-    lifted_det::<D, D2, D3, L, R>(d, &d.each_ref().map(lift))
+    lifted_det::<D, D2, D3, L, R>(
+        d,
+        &d.each_ref().map(|p: &[Wide<D>; 3]| {
+            (0..3).fold(Wide::<L>::ZERO, |sum, k| {
+                let square: Wide<D2> = p[k].mul(p[k]);
+                sum.add(square.extended::<L>().shifted(shifts[k] as u32))
+            })
+        }),
+    )
 }
 
 #[cfg(test)]

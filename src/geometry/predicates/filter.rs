@@ -247,15 +247,14 @@ fn precise_power_test<M: Metric>(cell: [&Site; 4], e: &Site, grid: Option<Grid>)
 fn permanent_bound<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
     let (det, _) = Filter::lifted_determinant::<M>(cell, e);
     let p = cell.map(|s| sub(&s.p, &e.p).map(f64::abs));
-    let lift = |i: usize| {
-        let weight = if M::WEIGHTED { (e.w - cell[i].w).abs() } else { 0.0 };
-        p[i].iter().map(|x| x * x).sum::<f64>() + weight
-    };
     let minor = |i: usize, j: usize| p[i][0] * p[j][1] + p[j][0] * p[i][1];
     let triple = |i: usize, j: usize, k: usize| {
         p[i][2] * minor(j, k) + p[j][2] * minor(i, k) + p[k][2] * minor(i, j)
     };
-    let lifts = [0, 1, 2, 3].map(lift);
+    let lifts = [0, 1, 2, 3].map(|i: usize| {
+        let weight = if M::WEIGHTED { (e.w - cell[i].w).abs() } else { 0.0 };
+        p[i].iter().map(|x| x * x).sum::<f64>() + weight
+    });
     let permanent = lifts[0] * triple(1, 2, 3)
         + lifts[1] * triple(0, 2, 3)
         + lifts[2] * triple(0, 1, 3)

@@ -154,7 +154,7 @@ fn subtract_from(high: &mut [u64], other: &[u64]) {
 //
 // Tier 1 decides almost every call of the exact stage, and samples of spheres and grids make many
 // calls per point. So the formula is written out here, which is faster than the general integers of
-// [`super::wide`].
+// [`Wide`].
 
 /// Differences stay below two to this power.
 pub(super) const BITS: i32 = 61;

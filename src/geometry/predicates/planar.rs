@@ -92,8 +92,7 @@ mod tests {
             let d: [i64; 3] = std::array::from_fn(|k| {
                 a[k] + weights[0] * (b[k] - a[k]) + weights[1] * (c[k] - a[k]) + step[k]
             });
-            let row = |p: [i64; 3]| -> [i128; 3] { std::array::from_fn(|k| i128::from(p[k] - d[k])) };
-            let [x, y, z] = [a, b, c].map(row);
+            let [x, y, z] = [a, b, c].map(|p: [i64; 3]| -> [i128; 3] { std::array::from_fn(|k| i128::from(p[k] - d[k])) });
             let det = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
                 + x[2] * (y[0] * z[1] - y[1] * z[0]);
             let float = |p: [i64; 3]| Vec3::from_array(p.map(|v| v as f64 * 2_f64.powi(-24)));

@@ -157,7 +157,7 @@ pub(crate) fn vertex_clearance(o: &Site, v: &Site) -> Sign {
         .unwrap_or_else(|| exact_sign::<VertexClearance, 1>(o, [v]))
 }
 
-// The exact stage of [`super::power_size`]: its polynomials in fixed-width integers.
+// The exact stage: the same polynomials in fixed-width integers.
 //
 // Tiers as in [`super::exact`]. The size of a tetrahedron, the longest value (degree 8), takes 8, 16
 // or 160 words. In the first two tiers weights have at most 122 and 250 bits in units of the squared

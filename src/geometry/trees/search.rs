@@ -198,12 +198,14 @@ impl PointTree {
     /// tree: for the points within 1.5, `squared` is `1.5 * 1.5`.
     pub fn within(&self, query: Vec3, squared: f64) -> Vec<u32> {
         let mut found = Vec::new();
-        let is_near = |_: usize, node: &Node| node.bounds.distance_squared(query) <= squared;
-        self.tree.descend(is_near, |places| {
-            let near = places.filter(|&k| self.points[k].distance_squared(query) <= squared);
-            found.extend(near.map(|k| self.tree.order()[k]));
-            ControlFlow::Continue(())
-        });
+        self.tree.descend(
+            |_: usize, node: &Node| node.bounds.distance_squared(query) <= squared,
+            |places| {
+                let near = places.filter(|&k| self.points[k].distance_squared(query) <= squared);
+                found.extend(near.map(|k| self.tree.order()[k]));
+                ControlFlow::Continue(())
+            },
+        );
         found
     }
 }

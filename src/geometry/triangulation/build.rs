@@ -289,7 +289,7 @@ pub(super) fn bring_independent_to_front(
     Ok(())
 }
 
-// Step 3 of the construction (`build.rs`): the conflict zone of a site, and its walls.
+// Step 3: the conflict zone of a site, and its walls.
 
 /// Mark of a cell that the growing conflict zone has not met.
 pub(super) const UNKNOWN: u8 = 0;
@@ -489,7 +489,7 @@ fn conflicts_given<M: Metric>(
     in_conflict_given::<M>(filter, det, bound, finite, site)
 }
 
-// Step 4 of the construction (`build.rs`): the conflict zone is replaced by a cone.
+// Step 4: the conflict zone is replaced by a cone.
 
 /// Local number of a vertex that is not on the boundary of the conflict zone.
 const ABSENT: u8 = u8::MAX;

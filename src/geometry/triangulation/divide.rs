@@ -155,8 +155,11 @@ impl<'s, M: Metric> Builder<'s, M> {
         let sites = &self.sites[range.start as usize..range.end as usize];
         let stride = sites.len().div_ceil(SAMPLED_SITES);
         let at = DIRECTIONS.map(|direction| {
-            let height = |s: &Site| direction.dot(Vec3::from_array(s.p));
-            let mut heights: Vec<f64> = sites.iter().step_by(stride).map(height).collect();
+            let mut heights: Vec<f64> = sites
+                .iter()
+                .step_by(stride)
+                .map(|s: &Site| direction.dot(Vec3::from_array(s.p)))
+                .collect();
             let middle = heights.len() / 2;
             *heights.select_nth_unstable_by(middle, f64::total_cmp).1
         });
@@ -176,8 +179,10 @@ impl<'s, M: Metric> Builder<'s, M> {
             return 0;
         }
         let parts = |point: &dyn Fn(usize) -> Vec3| {
-            let bit = |(i, cut): (usize, &Cut)| u32::from(cut.is_below(point(i))) << i;
-            cuts.iter().enumerate().map(bit).sum::<u32>()
+            cuts.iter()
+                .enumerate()
+                .map(|(i, cut): (usize, &Cut)| u32::from(cut.is_below(point(i))) << i)
+                .sum::<u32>()
         };
         let side = parts(&|_| Vec3::from_array(self.sites[vertex as usize].p));
         let (mut all, mut any) = (u32::MAX, 0);
@@ -200,8 +205,8 @@ impl<'s, M: Metric> Builder<'s, M> {
         let (places, counts) = self.places(cut);
         let parts = [0, 1].map(|part| {
             let position = |v: u32| Vec3::from_array(self.sites[v as usize].p);
-            let here = |v: &u32| cut.is_below(position(*v)) == (part == 0);
-            let sites: Vec<u32> = range.clone().filter(here).collect();
+            let sites: Vec<u32> =
+                range.clone().filter(|v: &u32| cut.is_below(position(*v)) == (part == 0)).collect();
             let mut builder = Self::new(self.sites, self.filter, 0);
             let hints = self.hints(part, &sites, &places);
             builder.last = counts[part].min(1);
@@ -219,14 +224,16 @@ impl<'s, M: Metric> Builder<'s, M> {
     /// The place of every cell, and how many there are in each part.
     fn places(&self, cut: Cut) -> (Vec<Place>, [u32; 2]) {
         let cells = &self.cells;
-        let part_of = |c: usize| {
-            if cells[c].v[0] == UNUSED {
-                return Place::NOWHERE;
-            }
-            let centre = cut.centre.of(decisive(cells, c as u32), self.sites);
-            Place::new(usize::from(!cut.is_below(centre)), 0)
-        };
-        let mut places: Vec<Place> = (0..cells.len()).into_par_iter().map(part_of).collect();
+        let mut places: Vec<Place> = (0..cells.len())
+            .into_par_iter()
+            .map(|c: usize| {
+                if cells[c].v[0] == UNUSED {
+                    return Place::NOWHERE;
+                }
+                let centre = cut.centre.of(decisive(cells, c as u32), self.sites);
+                Place::new(usize::from(!cut.is_below(centre)), 0)
+            })
+            .collect();
         // Numbered in sequence, so the records do not depend on threads; from 1, after the frontier.
         let mut counts = [0; 2];
         for place in places.iter_mut().filter(|p| **p != Place::NOWHERE) {
@@ -240,12 +247,15 @@ impl<'s, M: Metric> Builder<'s, M> {
     /// For each run of [`HINT_STRIDE`] sites of a part, a record of the part near the first of
     /// them, or the frontier.
     fn hints(&mut self, part: usize, sites: &[u32], places: &[Place]) -> Vec<u32> {
-        let hint = |&vertex: &u32| {
-            self.last = self.walk_approximately(vertex);
-            let place = places[self.last as usize];
-            if place.part() == part { place.record() } else { FRONTIER }
-        };
-        sites.iter().step_by(HINT_STRIDE).map(hint).collect()
+        sites
+            .iter()
+            .step_by(HINT_STRIDE)
+            .map(|&vertex: &u32| {
+                self.last = self.walk_approximately(vertex);
+                let place = places[self.last as usize];
+                if place.part() == part { place.record() } else { FRONTIER }
+            })
+            .collect()
     }
 
     /// Step 3 of the head, once the second part follows the first; returns the deferred sites.
@@ -305,11 +315,12 @@ impl<M: Metric> Part<'_, M> {
         let offset = cells.len() as u32 - 1;
         let id = |id: u32| if id == FRONTIER { id } else { id + offset };
         let face = |face: Face| if face.cell() == FRONTIER { face } else { face.moved(offset) };
-        let moved = |&Cell { v, n: [a, b, c, d] }: &Cell| {
-            let n = [face(a), face(b), face(c), face(d)];
-            Cell { v, n }
-        };
-        cells.par_extend(builder.cells[1..].par_iter().map(moved));
+        cells.par_extend(builder.cells[1..].par_iter().map(
+            |&Cell { v, n: [a, b, c, d] }: &Cell| {
+                let n = [face(a), face(b), face(c), face(d)];
+                Cell { v, n }
+            },
+        ));
         builder.cells = cells;
         builder.state = std::mem::take(&mut first.builder.state);
         builder.state.resize(builder.cells.len(), UNKNOWN);

@@ -119,21 +119,23 @@ fn triangulate_dividing<M: Metric>(
 fn filter_of<M: Metric>(sites: &[Site]) -> Filter {
     // Only differences of weights matter.
     let weights_differ = sites.iter().any(|s| s.w != sites[0].w);
-    let bits = |s: &Site| {
-        let mut quantum = s.p.map(lowest_bit).into_iter().min().unwrap_or(i32::MAX);
-        let top = s.p.map(highest_bit).into_iter().max().unwrap_or(i32::MIN);
-        if M::WEIGHTED && weights_differ && s.w != 0.0 {
-            // A weight is a squared length: its exponent counts half.
-            quantum = quantum.min(lowest_bit(s.w).div_euclid(2));
-        }
-        (quantum, top)
-    };
-    let widest = |a: (i32, i32), b: (i32, i32)| (a.0.min(b.0), a.1.max(b.1));
-    let (quantum, top) = sites.par_iter().map(bits).reduce(|| (i32::MAX, i32::MIN), widest);
+    let (quantum, top) = sites
+        .par_iter()
+        .map(|s: &Site| {
+            let mut quantum = s.p.map(lowest_bit).into_iter().min().unwrap_or(i32::MAX);
+            let top = s.p.map(highest_bit).into_iter().max().unwrap_or(i32::MIN);
+            if M::WEIGHTED && weights_differ && s.w != 0.0 {
+                // A weight is a squared length: its exponent counts half.
+                quantum = quantum.min(lowest_bit(s.w).div_euclid(2));
+            }
+            (quantum, top)
+        })
+        .reduce(
+            || (i32::MAX, i32::MIN),
+            |a: (i32, i32), b: (i32, i32)| (a.0.min(b.0), a.1.max(b.1)),
+        );
     Filter::of_grid(quantum, top)
 }
-
-// Why points cannot be triangulated.
 
 /// Why points have no triangulation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -294,12 +296,14 @@ mod tests {
 
     /// Cells as sorted quadruples of input points.
     fn cell_set(t: &Triangulation) -> Vec<[VertexId; 4]> {
-        let sorted = |cell| {
-            let mut v = t.vertices(cell);
-            v.sort_unstable();
-            v
-        };
-        let mut cells: Vec<_> = t.cells().map(sorted).collect();
+        let mut cells: Vec<_> = t
+            .cells()
+            .map(|cell| {
+                let mut v = t.vertices(cell);
+                v.sort_unstable();
+                v
+            })
+            .collect();
         cells.sort_unstable();
         cells
     }
@@ -356,14 +360,19 @@ mod tests {
     fn points() -> impl Strategy<Value = Vec<Vec3>> {
         let point = prop::array::uniform3(-1.0..1.0f64).prop_map(Vec3::from_array);
         (prop::collection::vec(point, 8..900), 0..5).prop_map(|(points, kind)| {
-            let place = |(i, p): (usize, &Vec3)| match kind {
-                0 => *p,
-                1 => (4.0 * *p).round(),
-                2 => p.normalize_or(Vec3::X),
-                3 => Vec3::new((9.0 * p.x).round(), (9.0 * p.y).round(), f64::from(i as u32 % 2)),
-                _ => *p * 1e-3 + Vec3::splat(f64::from(i as u32 % 3)),
-            };
-            points.iter().enumerate().map(place).collect()
+            points
+                .iter()
+                .enumerate()
+                .map(|(i, p): (usize, &Vec3)| match kind {
+                    0 => *p,
+                    1 => (4.0 * *p).round(),
+                    2 => p.normalize_or(Vec3::X),
+                    3 => {
+                        Vec3::new((9.0 * p.x).round(), (9.0 * p.y).round(), f64::from(i as u32 % 2))
+                    }
+                    _ => *p * 1e-3 + Vec3::splat(f64::from(i as u32 % 3)),
+                })
+                .collect()
         })
     }
 

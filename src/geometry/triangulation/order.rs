@@ -121,8 +121,8 @@ fn hilbert_sort(sites: &[Site], indices: &mut [u32]) {
         return;
     }
     // The index breaks ties, so that the unstable parallel sort has one result.
-    let key = |&i: &u32| (grid.index(&sites[i as usize]), i);
-    let mut keyed: Vec<(u64, u32)> = indices.par_iter().map(key).collect();
+    let mut keyed: Vec<(u64, u32)> =
+        indices.par_iter().map(|&i: &u32| (grid.index(&sites[i as usize]), i)).collect();
     keyed.par_sort_unstable();
     for (slot, &(_, i)) in indices.iter_mut().zip(&keyed) {
         *slot = i;
@@ -286,9 +286,9 @@ struct FinalOrder {
 
 fn order_along_curve(cells: &[Cell], ids: &[u32], along_curve: &[u32]) -> FinalOrder {
     let curve: Vec<u32> = ids.iter().map(|&id| along_curve[id as usize]).collect();
-    let on_curve = |&site: &u32| curve[site as usize - 1];
     let points = along_curve.len();
-    let first = |sites: &[u32]| sites.iter().map(on_curve).min().unwrap_or(0);
+    let first =
+        |sites: &[u32]| sites.iter().map(|&site: &u32| curve[site as usize - 1]).min().unwrap_or(0);
     // Three ranges of keys in one counting sort: finite cells, infinite cells, unused records.
     let key = |cell: &Cell| match (cell.v[0], cell.is_infinite()) {
         (UNUSED, _) => 2 * points as u32,

@@ -108,8 +108,7 @@ fn expected_error(points: &[Vec3]) -> Option<TriangulationError> {
     }
     // Integer or exactly scaled lines here have exact cross products.
     let (a, b) = (distinct[0], distinct[1]);
-    let on_line = |&c: &Vec3| medial_geometry::predicates::collinear(a, b, c);
-    Some(if distinct.iter().all(on_line) {
+    Some(if distinct.iter().all(|&c: &Vec3| medial_geometry::predicates::collinear(a, b, c)) {
         TriangulationError::Collinear { distinct: n }
     } else {
         TriangulationError::Coplanar { distinct: n }
@@ -203,8 +202,10 @@ fn a_lattice_is_cut_into_positive_cells() {
 fn surfaces_with_cospherical_points_are_valid() {
     for scale in [1.0 / 128.0, 0.01] {
         let side = 21;
-        let on_surface = |p: &Vec3| p.to_array().iter().any(|&x| x == 0.0 || x == 20.0 * scale);
-        let points: Vec<_> = lattice(side, scale).into_iter().filter(on_surface).collect();
+        let points: Vec<_> = lattice(side, scale)
+            .into_iter()
+            .filter(|p: &Vec3| p.to_array().iter().any(|&x| x == 0.0 || x == 20.0 * scale))
+            .collect();
         check(&points);
     }
     let mut rng = Pcg64::seed_from_u64(3);

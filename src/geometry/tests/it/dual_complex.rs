@@ -3,13 +3,39 @@
 
 use std::collections::BTreeSet;
 
-use medial_geometry::Vec3;
-use medial_geometry::dual_complex::Class;
-use medial_geometry::{DualComplex, Regular, Sphere, TriangulationError, UnionBoundary, VertexId};
+use medial_geometry::dual_complex::{Class, Simplices};
+use medial_geometry::{
+    DualComplex, Regular, Sphere, TriangulationError, UnionBoundary, Vec3, VertexId,
+};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::balls::{as_set, ball, checked, unit};
+/// Their dual complex, checked.
+fn checked(balls: &[Sphere]) -> DualComplex<'static> {
+    let complex = DualComplex::of_balls(balls).expect("admissible balls");
+    complex.check().expect("a simplicial complex with consistent classes");
+    assert_eq!(complex.ball_count(), balls.len());
+    complex
+}
+
+/// A ball.
+fn ball(x: f64, y: f64, z: f64, r: f64) -> Sphere {
+    Sphere::new(Vec3::new(x, y, z), r)
+}
+
+/// A point of the cube from -1 to 1.
+fn unit(rng: &mut Pcg64) -> Vec3 {
+    let mut x = || rng.random_range(-1.0..1.0);
+    Vec3::new(x(), x(), x())
+}
+
+fn as_set(s: &Simplices) -> BTreeSet<Vec<usize>> {
+    fn own<const N: usize>(list: &[[u32; N]]) -> impl Iterator<Item = Vec<usize>> + '_ {
+        list.iter().map(|s| s.iter().map(|&i| i as usize).collect())
+    }
+    let vertices = s.vertices.iter().map(|&v| vec![v as usize]);
+    vertices.chain(own(&s.edges)).chain(own(&s.triangles)).chain(own(&s.tetrahedra)).collect()
+}
 
 fn random_balls(rng: &mut Pcg64, n: usize) -> Vec<Sphere> {
     let largest = [0.3, 0.6, 1.0][rng.random_range(0..3usize)];
@@ -64,11 +90,13 @@ fn subsets(n: usize, k: usize) -> Vec<Vec<usize>> {
         return vec![vec![]];
     }
     let smaller = subsets(n, k - 1);
-    let longer = |s: Vec<usize>| {
-        let start = s.last().map_or(0, |l| l + 1);
-        (start..n).map(move |i| [s.clone(), vec![i]].concat())
-    };
-    smaller.into_iter().flat_map(longer).collect()
+    smaller
+        .into_iter()
+        .flat_map(|s: Vec<usize>| {
+            let start = s.last().map_or(0, |l| l + 1);
+            (start..n).map(move |i| [s.clone(), vec![i]].concat())
+        })
+        .collect()
 }
 
 /// The dual complex: a simplex is in it if no ball at all has a smaller power at its orthocentre
@@ -249,11 +277,12 @@ fn three_balls_have_the_arrangement_s_complex() {
 #[test]
 fn balls_in_a_plane_may_leave_holes() {
     let grid = |r: f64, tilt: Vec3| {
-        let at = |i: u32| {
-            let (x, y) = (f64::from(i % 4), f64::from(i / 4));
-            Sphere::new(Vec3::new(6.0 * x, 8.0 * y, 0.0) + tilt * x, r)
-        };
-        let balls: Vec<_> = (0..16).map(at).collect();
+        let balls: Vec<_> = (0..16)
+            .map(|i: u32| {
+                let (x, y) = (f64::from(i % 4), f64::from(i / 4));
+                Sphere::new(Vec3::new(6.0 * x, 8.0 * y, 0.0) + tilt * x, r)
+            })
+            .collect();
         let complex = checked(&balls);
         (complex.betti(), UnionBoundary::new(&complex).merge(|_| None).points().len())
     };
@@ -282,8 +311,8 @@ fn unusable_balls_are_named() {
 
 /// Betti numbers and the number of distinct boundary vertices of equal balls on a 3 x 3 x 3 lattice.
 fn lattice(weight: f64) -> ([u64; 3], usize) {
-    let point = |i: u32| Vec3::from([i % 3, i / 3 % 3, i / 9].map(f64::from));
-    let points: Vec<_> = (0..27).map(point).collect();
+    let points: Vec<_> =
+        (0..27).map(|i: u32| Vec3::from([i % 3, i / 3 % 3, i / 9].map(f64::from))).collect();
     let regular = Regular::new(&points, &[weight; 27]).expect("spans space");
     let complex = DualComplex::new(&regular);
     complex.check().expect("a complex");
@@ -331,4 +360,110 @@ fn rings_and_shells_have_their_loops_and_voids() {
     assert_eq!(checked(&more).betti(), [2, 0, 1]);
     more.push(ball(0.0, 0.0, 0.0, 0.9));
     assert_eq!(checked(&more).betti(), [1, 0, 0]);
+}
+
+// Changes that change nothing.
+
+/// Simplices as sets of balls by position, so that numbering does not matter.
+fn geometric(balls: &[Sphere]) -> BTreeSet<Vec<[u64; 4]>> {
+    let simplices = as_set(&checked(balls).simplices());
+    simplices
+        .into_iter()
+        .map(|s: Vec<usize>| {
+            let mut keys: Vec<_> = s
+                .into_iter()
+                .map(|i: usize| {
+                    let b = balls[i];
+                    [b.centre.x, b.centre.y, b.centre.z, b.radius].map(|x| (x + 0.0).to_bits())
+                })
+                .collect();
+            keys.sort_unstable();
+            keys
+        })
+        .collect()
+}
+
+#[test]
+fn order_scale_and_translation_do_not_matter() {
+    let mut rng = Pcg64::seed_from_u64(24);
+    for round in 0..60 {
+        let n = rng.random_range(1..60);
+        let dyadic = |x: f64, steps: f64| (x * steps).round() / steps;
+        let steps = [2.0, 64.0, 1048576.0][round % 3];
+        let balls: Vec<_> = (0..n)
+            .map(|_| {
+                let c = unit(&mut rng).to_array().map(|x| dyadic(x, steps));
+                Sphere::new(Vec3::from(c), dyadic(rng.random_range(0.0..0.8), steps))
+            })
+            .collect();
+        let mut shuffled = balls.clone();
+        for i in (1..n).rev() {
+            shuffled.swap(i, rng.random_range(0..=i));
+        }
+        assert_eq!(geometric(&balls), geometric(&shuffled));
+        let expected = checked(&balls).simplices();
+        for scale in [f64::powi(2.0, 40), f64::powi(2.0, -40)] {
+            let scaled: Vec<_> =
+                balls.iter().map(|b| Sphere::new(b.centre * scale, b.radius * scale)).collect();
+            assert_eq!(checked(&scaled).simplices(), expected);
+        }
+        let moved: Vec<_> = balls
+            .iter()
+            .map(|b| Sphere::new(b.centre + Vec3::new(1024.0, -65536.0, 2.0), b.radius))
+            .collect();
+        assert_eq!(checked(&moved).simplices(), expected);
+    }
+}
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let mut rng = Pcg64::seed_from_u64(27);
+    let balls: Vec<_> =
+        (0..6_000).map(|_| Sphere::new(unit(&mut rng), rng.random_range(0.0..0.15))).collect();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let complex = checked(&balls);
+            let classes: Vec<_> = complex.edges().collect();
+            let boundary = UnionBoundary::new(&complex);
+            (complex.simplices(), classes, boundary.vertices().to_vec(), boundary.merge(|_| None))
+        })
+    };
+    let alone = with(1);
+    assert!(alone == with(2) && alone == with(5));
+}
+
+// ---------------------------------------------------------------------------------------------
+// Exact coincidence.
+
+#[test]
+fn balls_through_one_point_have_one_vertex_there() {
+    let mut rng = Pcg64::seed_from_u64(28);
+    let (mut met, mut joined) = (0, 0);
+    for _ in 0..300 {
+        // Integer centres in the half-space x > 0, spheres through the origin: it is on the boundary.
+        let n = rng.random_range(4..14);
+        let mut side = |from: i32| f64::from(rng.random_range(from..7));
+        let points: Vec<Vec3> = (0..n).map(|_| Vec3::new(side(1), side(-6), side(-6))).collect();
+        let weights: Vec<f64> = points.iter().map(|p| p.length_squared()).collect();
+        let Ok(regular) = Regular::new(&points, &weights) else { continue };
+        let complex = DualComplex::new(&regular);
+        complex.check().expect("a complex");
+        assert_eq!(complex.betti()[0], 1);
+        let boundary = UnionBoundary::new(&complex);
+        let merged = boundary.merge(|_| None);
+        let at = |i: usize| boundary.vertices()[i].position;
+        // Flat triangles place their points badly: those of the origin within this.
+        let here: BTreeSet<u32> = (0..boundary.vertices().len())
+            .filter(|&i| at(i).length() < 1e-4)
+            .map(|i| merged.point_of()[i])
+            .collect();
+        assert!(here.len() <= 1, "{points:?}");
+        met += here.len();
+        for &[a, b] in boundary.coincident() {
+            joined += 1;
+            assert!(at(a as usize).distance(at(b as usize)) < 1e-4, "{points:?}");
+        }
+    }
+    assert!(met > 200 && joined > 300, "{met} {joined}");
 }

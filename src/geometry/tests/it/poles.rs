@@ -27,8 +27,7 @@ fn voronoi_vertices(samples: &[Vec3]) -> Vec<Vec<Vec3>> {
         if orient3d(p[0], p[1], p[2], p[3]) == Sign::Negative {
             p.swap(0, 1);
         }
-        let inside = |s: &Vec3| in_sphere(p[0], p[1], p[2], p[3], *s) == Sign::Positive;
-        if !samples.iter().any(inside) {
+        if !samples.iter().any(|s: &Vec3| in_sphere(p[0], p[1], p[2], p[3], *s) == Sign::Positive) {
             let (centre, _) = circumsphere(p).expect("in general position");
             for i in q {
                 of_sample[i].push(centre);
@@ -46,8 +45,7 @@ fn hull_direction(samples: &[Vec3], at: usize) -> Option<Vec3> {
     for i in (0..n).filter(|&i| i != at) {
         for j in (0..n).filter(|&j| j != at && j != i) {
             let [p, q, r] = [at, i, j].map(|k| samples[k]);
-            let above = |s: &Vec3| orient3d(p, q, r, *s) == Sign::Positive;
-            if !samples.iter().any(above) {
+            if !samples.iter().any(|s: &Vec3| orient3d(p, q, r, *s) == Sign::Positive) {
                 sum += (q - p).cross(r - p).normalize();
                 found = true;
             }
@@ -213,16 +211,15 @@ fn polar_balls_of_an_ellipsoid_meet_in_samples() {
     let mut rng = Pcg64::seed_from_u64(26);
     let samples: Vec<Vec3> = (0..3_000).map(|_| unit(&mut rng).normalize() * axes).collect();
     let delaunay = Delaunay::new(&samples).expect("spans space");
-    let is_inside =
-        |cell| delaunay.circumsphere(cell).is_some_and(|(c, _)| (c / axes).length() < 1.0);
-    let inner = Poles::new(&delaunay).inner_balls(is_inside);
+    let inner = Poles::new(&delaunay).inner_balls(|cell| {
+        delaunay.circumsphere(cell).is_some_and(|(c, _)| (c / axes).length() < 1.0)
+    });
     let balls: Vec<_> = inner.iter().map(|b| b.sphere).collect();
     let complex = checked(&balls);
     let boundary = UnionBoundary::new(&complex);
     let near = |p: Vec3| samples.iter().position(|s| s.distance(p) < 1e-7);
     let merged = boundary.merge(|v| near(v.position).map(|sample| sample as u32));
-    let at_sample = |p: &&Vec3| near(**p).is_some();
-    let keyed = merged.points().iter().filter(at_sample).count();
+    let keyed = merged.points().iter().filter(|p: &&Vec3| near(**p).is_some()).count();
     assert_eq!(boundary.clamped(), 0);
     // Three polar balls and more meet in most of the samples, and nearly all groups are there.
     assert!(keyed > samples.len() * 2 / 3, "{keyed}");

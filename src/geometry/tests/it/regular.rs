@@ -16,14 +16,13 @@ fn check(points: &[Vec3], weights: &[f64]) -> Regular {
 
 /// Cells as sorted quadruples of positions and weights.
 fn cell_set(r: &Regular) -> Vec<[[u64; 4]; 4]> {
-    let key = |v: VertexId| {
-        let p = r.point(v);
-        [p.x, p.y, p.z, r.weight(v)].map(f64::to_bits)
-    };
     let mut cells: Vec<_> = r
         .finite_cells()
         .map(|c| {
-            let mut v = r.vertices(c).map(key);
+            let mut v = r.vertices(c).map(|v: VertexId| {
+                let p = r.point(v);
+                [p.x, p.y, p.z, r.weight(v)].map(f64::to_bits)
+            });
             v.sort_unstable();
             v
         })
