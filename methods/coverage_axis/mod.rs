@@ -42,33 +42,30 @@
 //!   optimum. Smallest covers are not unique, so the spheres are others; their number is the same where
 //!   the search ends with a proof, which the counts `cover_bound` and `spheres` tell.
 
-mod candidates;
 mod connect;
 mod coverage;
 mod exact;
-mod greedy;
-mod params;
-mod reduce;
 #[cfg(test)]
 mod tests;
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
+use coverage::{Coverage, Score};
+use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, ParamFields, Params,
     RunContext, Simplification, Simplified, SimplifyError,
 };
+use medial::surface::{Sampling, Side, sample};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
 
 use crate::size_search::{Knob, Probe, SizeSearch};
-
-pub use params::{Candidates, Connection, CoverageAxisParams, Penalty, Select, Size};
-
-use candidates::Instance;
-use coverage::Coverage;
-use greedy::Score;
-use params::DILATIONS;
+use crate::within::within;
 
 /// Spheres that the authors' scripts choose at most.
 const PUBLISHED_PICKS: usize = 100;
@@ -257,7 +254,7 @@ impl Axis {
         diagnostics: &mut Diagnostics,
     ) -> Result<Vec<u32>, SimplifyError> {
         let spheres = &self.instance.spheres;
-        let picks = greedy::choose(spheres, coverage, &self.score, most, &self.run)?;
+        let picks = coverage::choose(spheres, coverage, &self.score, most, &self.run)?;
         diagnostics.count("uncoverable_samples", picks.uncoverable);
         diagnostics.count("uncovered_samples", picks.uncovered);
         if picks.uncovered > 0 {
@@ -336,4 +333,190 @@ fn warn_of_uncoverable(uncoverable: usize, diagnostics: &mut Diagnostics) {
              denser samples of the shape would cover them"
         ));
     }
+}
+
+// ----------------------------------------------------------------------------
+// The parameters of Coverage Axis and Coverage Axis++.
+
+medial::parameters! {
+    /// Parameters of Coverage Axis and Coverage Axis++; the defaults are those of the scripts of
+    /// Coverage Axis++ for meshes.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct CoverageAxisParams {
+        /// Choose by score, as Coverage Axis++, or a smallest cover by branch and bound, as Coverage
+        /// Axis.
+        select: Select = Select::Greedy, "greedy or exact";
+        /// The candidates: all inner Voronoi vertices, the inner poles, or random inner points.
+        candidates: Candidates = Candidates::Voronoi, "voronoi, poles or random";
+        /// `delta`, by which balls are inflated before they cover, where no native level is requested.
+        dilation: f64 = 0.02, "fraction of the longest side";
+        /// Area-uniform samples to be covered; the script of Coverage Axis has 2000.
+        samples: usize = 1500, "samples";
+        /// Points drawn in the bounding box for candidates=random, of which those inside are kept.
+        points: usize = 500_000, "points";
+        /// `omega_u`, weight of the distance to the nearest chosen sphere.
+        uniformity: f64 = 1.0, "pure number";
+        /// `omega_c`, weight of the penalty of small radii.
+        centrality: f64 = 1.0, "pure number";
+        /// Penalty of small radii: 0.1 max r / r, as the scripts call it, or 1 / r standardised.
+        penalty: Penalty = Penalty::Ratio, "ratio or stand";
+        /// Most spheres chosen where no number is requested; the scripts have 100, as the published
+        /// level.
+        max_iter: usize = 1000, "spheres";
+        /// Meet a number of spheres by the first ones chosen, or by a search on the dilation.
+        size: Size = Size::Picks, "picks or dilation";
+        /// Connect by geodesic regions on the initial medial mesh, or by collapses that spare the
+        /// chosen spheres.
+        connection: Connection = Connection::Geodesic, "geodesic or qmat";
+        /// Limit of branch and bound for select=exact; results that it ends are repeatable.
+        nodes: usize = 10_000, "nodes";
+        /// Limit of branch and bound for select=exact; results that it ends need not be repeatable.
+        time_limit: f64 = 240.0, "seconds, 0 for none";
+    }
+}
+
+/// How spheres are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Select {
+    /// One after the other by score: Coverage Axis++.
+    Greedy,
+    /// A smallest set that covers: Coverage Axis.
+    Exact,
+}
+
+/// The spheres among which some are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Candidates {
+    /// The spheres of the initial medial mesh: all inner Voronoi vertices.
+    Voronoi,
+    /// The inner polar balls of the samples of the shape.
+    Poles,
+    /// Random points inside, with their distance to the surface.
+    Random,
+}
+
+/// The penalty of small radii.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Penalty {
+    /// `0.1 max r / r`: `penalty=''` in the authors' function, as all their scripts call it.
+    Ratio,
+    /// `1 / r`, standardised: `penalty='stand'`, the default of their function.
+    Stand,
+}
+
+/// How a number of spheres is met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// The first spheres that the greedy choice takes; the exact choice has no order, and searches on
+    /// the dilation.
+    Picks,
+    /// A search on the dilation, until so many cover everything.
+    Dilation,
+}
+
+/// How the spheres chosen are connected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Connection {
+    /// By geodesic Voronoi regions on the initial medial mesh.
+    Geodesic,
+    /// By Q-MAT's collapses of the initial medial mesh, which spare the spheres chosen.
+    Qmat,
+}
+
+/// Dilations that mean something, in longest sides.
+const DILATIONS: RangeInclusive<f64> = 1e-4..=1.0;
+
+impl CoverageAxisParams {
+    fn validate(self) -> Result<Self, SimplifyError> {
+        within("dilation", self.dilation, DILATIONS)?;
+        within("uniformity", self.uniformity, 0.0..=1e6)?;
+        within("centrality", self.centrality, 0.0..=1e6)?;
+        within("time_limit", self.time_limit, 0.0..=1e6)?;
+        // A row of bits for each candidate: as many samples as memory bears for a large shape.
+        within("samples", self.samples as f64, 1.0..=100_000.0)?;
+        within("points", self.points as f64, 1.0..=10_000_000.0)?;
+        within("max_iter", self.max_iter as f64, 1.0..=1e9)?;
+        within("nodes", self.nodes as f64, 1.0..=1e9)?;
+        Ok(self)
+    }
+}
+
+// ----------------------------------------------------------------------------
+// The samples to be covered, and the spheres that may cover them.
+
+/// Balls below this radius, in diagonals, are dropped: their penalty would be without bound.
+const LEAST_RADIUS: f64 = 1e-9;
+
+/// Keeps the random points apart from the samples, which come of the same seed.
+const STREAM: u64 = 0x636f_7665_7261_6765;
+
+/// What a cover is made of, in normalised units.
+struct Instance {
+    /// Samples of the surface.
+    pub samples: Vec<Vec3>,
+    /// Candidates.
+    pub spheres: Vec<Sphere>,
+    /// The vertices of the initial medial mesh that they are, where they are such.
+    pub vertices: Option<Vec<u32>>,
+    /// How many balls were too small to be candidates.
+    pub too_small: usize,
+    /// The longest side of the bounding box: the unit of the dilation.
+    pub side: f64,
+}
+
+impl Instance {
+    /// Draws the samples and collects the candidates of a shape.
+    ///
+    /// # Errors
+    /// When the initial medial mesh cannot be built, or no random point is inside.
+    pub fn new(
+        shape: &Shape,
+        params: &CoverageAxisParams,
+        seed: u64,
+    ) -> Result<Self, SimplifyError> {
+        let sampling = Sampling::AreaUniform { count: params.samples, seed };
+        let samples = sample(shape.mesh(), &sampling);
+        let (low, high) = shape.mesh().bounding_box().unwrap_or_default();
+        let side = (high - low).max_element();
+        let all = match params.candidates {
+            Candidates::Voronoi => shape.initial()?.spheres.clone(),
+            Candidates::Poles => shape.inner_balls()?.spheres.clone(),
+            Candidates::Random => random(shape, (low, high), params.points, seed)?,
+        };
+        let is_large = |&place: &u32| all[place as usize].radius >= LEAST_RADIUS;
+        let places: Vec<u32> = (0..all.len() as u32).filter(is_large).collect();
+        let spheres: Vec<Sphere> = places.iter().map(|&place| all[place as usize]).collect();
+        let (all, too_small) = (all.len(), all.len() - spheres.len());
+        if spheres.is_empty() {
+            return Err(SimplifyError::unsupported(format!(
+                "none of {all} candidates inside has a radius of {LEAST_RADIUS} diagonals or more"
+            )));
+        }
+        let vertices = (params.candidates == Candidates::Voronoi).then_some(places);
+        Ok(Self { samples, spheres, vertices, too_small, side })
+    }
+}
+
+/// Points inside, of so many in the bounding box, with their distances to the surface.
+fn random(
+    shape: &Shape,
+    (low, high): (Vec3, Vec3),
+    points: usize,
+    seed: u64,
+) -> Result<Vec<Sphere>, SimplifyError> {
+    let mut random = Pcg64::seed_from_u64(seed ^ STREAM);
+    let mut points: Vec<Vec3> = (0..points)
+        .map(|_| low + (high - low) * Vec3::new(random.random(), random.random(), random.random()))
+        .collect();
+    let sides = shape.inside_test().sides(&points);
+    let mut side = sides.iter();
+    points.retain(|_| side.next() == Some(&Side::Inside));
+    let tree = shape.surface_tree()?;
+    let distances = tree.distance_batch(&points);
+    Ok(points.iter().zip(distances).map(|(&p, r)| Sphere::new(p, r)).collect())
 }

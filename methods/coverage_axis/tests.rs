@@ -1,15 +1,14 @@
 //! The choice and the connection against their definitions.
 
-use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::shape::ShapeOptions;
-use medial::surface::{self, TriMesh};
+use medial::surface::TriMesh;
+use medial::{Vec3, surface};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::coverage::ones;
+use super::coverage::{Picks, ones};
 use super::exact::Cover;
-use super::greedy::Picks;
 use super::*;
 
 /// The published parameters, without a limit that depends on the clock.
@@ -37,7 +36,7 @@ fn choose(
     limit: usize,
 ) -> Picks {
     let score = Score::new(spheres, params);
-    greedy::choose(spheres, coverage, &score, limit, &RunContext::default()).unwrap()
+    coverage::choose(spheres, coverage, &score, limit, &RunContext::default()).unwrap()
 }
 
 fn exact_cover(coverage: &Coverage) -> Cover {
@@ -178,7 +177,7 @@ fn an_exact_cover_has_no_more_balls_than_a_greedy_one() {
         let cover = exact_cover(&coverage);
         assert_covers(&coverage, &cover.chosen);
         let greedy = choose(&balls, &coverage, &published(), 1000).chosen.len();
-        let reduced = reduce::reduce(&coverage);
+        let reduced = exact::reduce(&coverage);
         let largest = exact::largest_first(&reduced).len() + reduced.forced.len();
         let fewest = cover.chosen.len();
         assert_eq!(cover.bound, fewest);

@@ -13,7 +13,7 @@ fn sphere(x: f64, radius: f64) -> Sphere {
 }
 
 fn steps(mesh: &MedialMesh) -> Vec<Step> {
-    contract::contract(mesh, &RunContext::default()).expect("not cancelled")
+    contract(mesh, &RunContext::default()).expect("not cancelled")
 }
 
 fn levels(mesh: &MedialMesh) -> Levels {

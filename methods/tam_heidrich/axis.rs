@@ -1,17 +1,18 @@
 //! Steps 1 and 2: the axis to be pruned, and the volume that each of its simplices represents.
 
 use medial::Vec3;
-use medial::complex::{Contacts, Incidence, MedialMesh, UnionAxis, betti};
+use medial::complex::collapse::CollapseComplex;
+use medial::complex::{CellSpheres, Contacts, Incidence, MedialMesh, Sphere, UnionAxis, betti};
+use medial::geometry::predicates::{Sign, orient3d};
+use medial::geometry::{CellId, Delaunay, PolarBall, Poles, PowerCrust, UnionVertex};
 use medial::metrics::enclosed_volume;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
-use medial::surface::TriangleBvh;
+use medial::surface::{Side, TriangleBvh};
+use rayon::prelude::*;
 
-use super::crust::AxisPoles;
-use super::duplicates::{DistinctBalls, tetrahedron};
-use super::fins::without_fins;
-use super::merge;
-use super::params::{AxisChoice, TamHeidrichParams};
+use super::parts::without_fins;
+use super::{AxisChoice, TamHeidrichParams};
 use crate::perturb::perturbed;
 
 /// A medial mesh with everything that pruning needs.
@@ -135,7 +136,7 @@ fn of_union(
     let is_fin = fins_of(&whole, &union, &at);
     let (finless, first_into, fins_left) = without_fins(&whole, &is_fin);
     run.step(0, 1)?;
-    let (mesh, into) = merge::merged(&finless, params.merge, run)?;
+    let (mesh, into) = merged(&finless, params.merge, run)?;
     let mut axis = Axis::of_mesh(mesh);
     // The first vertices of the axis are centres of balls.
     let on_axis = || union.balls().iter().zip(&first_into).map(|(&b, &v)| (b, into[v as usize]));
@@ -182,4 +183,335 @@ fn fins_of(mesh: &MedialMesh, union: &UnionAxis, at: &[Option<u32>]) -> Vec<bool
 fn volumes(contacts: &Contacts, poles: impl Iterator<Item = usize>) -> Vec<f64> {
     let corners = |pole: usize| contacts.of_sphere[pole].map(|s| contacts.samples[s as usize]);
     poles.map(|pole| tetrahedron(corners(pole))).collect()
+}
+
+// ----------------------------------------------------------------------------
+// The last step of the paper's pipeline, section 5: the poles that are left, for the power crust.
+//
+// 1. An inner pole is left if its polar ball is on the remaining axis. A pole whose ball is hidden by
+//    another is on no part, so it is not left.
+// 2. For objects with sharp corners the outer poles of removed features go too. An outer pole is
+//    that of a removed feature if no inner polar ball that is left touches any of its samples.
+// 3. The power crust of both ([`medial::geometry::PowerCrust`]). The balls are the polar balls as they
+//    are, neither moved nor grown.
+
+/// The poles that pruning left, in normalised units.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RemainingPoles {
+    /// Inner polar balls on the remaining parts.
+    pub inner: Vec<Sphere>,
+    /// For each sample of the shape whether one of them touches it.
+    pub is_touched: Vec<bool>,
+}
+
+/// The outer poles that the power crust takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OuterPoles {
+    /// All of the samples: what the paper does for most objects.
+    All,
+    /// Without those of removed features: what it offers for objects with sharp corners.
+    OfRemaining,
+}
+
+/// Corners of a box so far out, in diagonals, are added to the samples, so that no pole is at infinity.
+const BOX: f64 = 2.5;
+
+impl RemainingPoles {
+    /// The power crust of the poles that are left, of the shape that was pruned.
+    ///
+    /// # Errors
+    /// When the samples or the poles have no triangulation.
+    pub fn power_crust(&self, shape: &Shape, outer: OuterPoles) -> Result<PowerCrust, ShapeError> {
+        Ok(PowerCrust::new(&self.inner, &self.outer(shape, outer)?)?)
+    }
+
+    /// Outer polar balls of the samples of the shape that was pruned. Costs a triangulation.
+    ///
+    /// # Errors
+    /// When the samples have no triangulation.
+    pub fn outer(&self, shape: &Shape, which: OuterPoles) -> Result<Vec<Sphere>, ShapeError> {
+        let is_of_remaining = |ball: &PolarBall| {
+            let mut samples = ball.samples.iter().map(|&s| s as usize);
+            samples.any(|s| self.is_touched.get(s).copied().unwrap_or(false))
+        };
+        let mut balls = outer_balls(shape)?;
+        balls.retain(|ball| which == OuterPoles::All || is_of_remaining(ball));
+        Ok(balls.into_iter().map(|ball| ball.sphere).collect())
+    }
+}
+
+fn outer_balls(shape: &Shape) -> Result<Vec<PolarBall>, ShapeError> {
+    let mut points = shape.samples().to_vec();
+    let side = |k: usize| if k & 1 == 1 { BOX } else { -BOX };
+    points.extend((0..8).map(|k| Vec3::new(side(k), side(k >> 1), side(k >> 2))));
+    let samples = points.len() - 8;
+    let mut balls = Poles::new(&Delaunay::new(&points)?).balls().to_vec();
+    // Poles of the corners alone are of no sample.
+    balls.retain(|ball| ball.samples.iter().any(|&s| (s as usize) < samples));
+    let centres: Vec<Vec3> = balls.iter().map(|ball| ball.sphere.centre).collect();
+    let mut sides = shape.inside_test().sides(&centres).into_iter();
+    balls.retain(|_| sides.next() != Some(Side::Inside));
+    Ok(balls)
+}
+
+/// The inner poles of an axis before pruning.
+#[derive(Default)]
+pub(super) struct AxisPoles {
+    /// For each polar ball its sphere of the axis, and the samples that it touches.
+    inner: Vec<(Sphere, u32, Vec<u32>)>,
+    samples: usize,
+}
+
+impl AxisPoles {
+    /// Those of `samples` samples; `on_axis` has the balls of `poles` that are on the axis, with the
+    /// spheres of the axis that they are.
+    pub(super) fn of(
+        samples: usize,
+        poles: &DistinctBalls,
+        on_axis: impl Iterator<Item = (u32, u32)>,
+    ) -> Self {
+        let inner = on_axis.map(|(ball, sphere)| {
+            (poles.balls[ball as usize], sphere, poles.samples_of(ball).to_vec())
+        });
+        Self { inner: inner.collect(), samples }
+    }
+
+    /// The poles left when these spheres of the axis are left.
+    pub(super) fn remaining(&self, sphere_kept: &[bool]) -> RemainingPoles {
+        let (mut inner, mut is_touched) = (Vec::new(), vec![false; self.samples]);
+        for (ball, _, samples) in self.inner.iter().filter(|i| sphere_kept[i.1 as usize]) {
+            inner.push(*ball);
+            samples.iter().for_each(|&s| is_touched[s as usize] = true);
+        }
+        RemainingPoles { inner, is_touched }
+    }
+}
+
+// ----------------------------------------------------------------------------
+// Step 1, section 3: merges vertices of the axis that are still nearly at one position.
+//
+// Several polar balls pass through one sample, so that the boundary of their perturbed union has several
+// corners there, and the axis several vertices where the exact one has one. Those are merged by their
+// distance. On a box sampled on a grid the distances have a gap, on curved shapes there is none.
+//
+// 1. Take the edges not longer than `merge` times the smaller radius of their ends, the shortest first.
+// 2. Contract each to its first end, centres of balls being first, if that keeps the homotopy type
+//    ([`CollapseComplex::keeps_homotopy`]).
+// 3. From 1 on until none can be.
+//
+// A sliver whose short side is contracted leaves an edge, which stays as a curve where nothing else has it.
+
+/// The mesh with duplicate vertices merged, and for each sphere of `mesh` the one that it went into.
+pub(super) fn merged(
+    mesh: &MedialMesh,
+    merge: f64,
+    run: &RunContext,
+) -> Result<(MedialMesh, Vec<u32>), SimplifyError> {
+    let mut complex = CollapseComplex::from_mesh(mesh);
+    let mut into: Vec<u32> = (0..mesh.spheres.len() as u32).collect();
+    let mut done = 0;
+    // Spheres at which something changed in the pass before: elsewhere the answers are the same.
+    let mut changed: Vec<u32> = complex.vertices().collect();
+    while !changed.is_empty() {
+        let edges = short_edges(&complex, &changed, merge);
+        changed.clear();
+        for [kept, removed] in edges {
+            let is_edge = complex.is_alive(kept)
+                && complex.is_alive(removed)
+                && complex.neighbours(removed).contains(&kept);
+            if is_edge && complex.keeps_homotopy(kept, removed) {
+                let sphere = complex.sphere(kept);
+                complex.collapse(kept, removed, sphere);
+                into[removed as usize] = kept;
+                changed.push(kept);
+                changed.extend(complex.neighbours(kept));
+                done += 1;
+                if done % 4096 == 0 {
+                    run.step(done, mesh.spheres.len())?;
+                }
+            }
+        }
+        changed.retain(|&v| complex.is_alive(v));
+        changed.sort_unstable();
+        changed.dedup();
+    }
+    let mut number = vec![u32::MAX; mesh.spheres.len()];
+    complex.vertices().zip(0..).for_each(|(old, new)| number[old as usize] = new);
+    // Spheres merge into smaller ids, so that one ascending pass resolves every chain.
+    for v in 0..into.len() {
+        into[v] = if into[v] == v as u32 { number[v] } else { into[into[v] as usize] };
+    }
+    Ok((complex.to_mesh(), into))
+}
+
+/// The short edges at some spheres as ascending pairs, the shortest first.
+fn short_edges(complex: &CollapseComplex, at: &[u32], merge: f64) -> Vec<[u32; 2]> {
+    let of_sphere = |&v: &u32| {
+        let a = complex.sphere(v);
+        let lengths = complex.neighbours(v).iter().map(move |&w| {
+            let b = complex.sphere(w);
+            (a.centre.distance(b.centre), merge * a.radius.min(b.radius), w)
+        });
+        let short = lengths.filter(|&(length, most, _)| length <= most);
+        // The bits of numbers that are not negative are in their order.
+        short.map(move |(length, _, w)| (length.to_bits(), [v.min(w), v.max(w)]))
+    };
+    let mut short: Vec<(u64, [u32; 2])> =
+        at.par_iter().with_min_len(1 << 10).flat_map_iter(of_sphere).collect();
+    short.par_sort_unstable();
+    short.dedup();
+    short.into_iter().map(|s| s.1).collect()
+}
+
+// ----------------------------------------------------------------------------
+// Step 1, section 3: duplicates, recognised by their samples.
+//
+// 1. *Poles.* The inner pole of a sample is its farthest Voronoi vertex inside. Vertices that are
+//    equally far, up to rounding, all are poles: on a grid every sample has several, and which one
+//    rounding prefers would tear the ends of sheets.
+// 2. *Balls.* More than four cospherical samples give several Delaunay tetrahedra with one circumcentre,
+//    and as many polar balls. Tetrahedra that share a triangle and have the same circumcentre, up to
+//    rounding, are one pole: one ball, with all their samples, and with the volume of all.
+// 3. *Corners.* Polar balls meet in samples, so that many corners of their union are one sample. A corner
+//    is at a sample if its three balls have that in common, on its side of the plane of their
+//    centres ([`shared_sample`]).
+
+/// Polar balls, each once.
+#[derive(Default)]
+pub(super) struct DistinctBalls {
+    pub(super) balls: Vec<Sphere>,
+    /// For each ball all samples that it passes through; none where there are no samples.
+    samples: Vec<Vec<u32>>,
+    /// For each ball the volume of its tetrahedra.
+    pub(super) volumes: Vec<f64>,
+}
+
+/// Circumcentres closer than this share of the radius count as one, and radii as equal: above rounding,
+/// which flat tetrahedra amplify, and far below the distance of samples.
+const COINCIDENT: f64 = 1e-7;
+
+impl DistinctBalls {
+    /// Those of the samples of a shape.
+    pub(super) fn of_samples(shape: &Shape) -> Result<Self, ShapeError> {
+        let (delaunay, cells) = (shape.delaunay()?, shape.cells()?);
+        let spheres = cells.circumspheres();
+        let is_pole = poles(&delaunay, &cells);
+        let mut found = Self::default();
+        let mut is_done = vec![false; spheres.len()];
+        for first in delaunay.finite_cells().filter(|c| is_pole[c.index()]) {
+            let Some(ball) = spheres[first.index()].filter(|_| !is_done[first.index()]) else {
+                continue;
+            };
+            let (mut samples, mut volume) = (Vec::new(), 0.0);
+            let mut group = vec![first];
+            is_done[first.index()] = true;
+            while let Some(cell) = group.pop() {
+                let corners = delaunay.vertices(cell);
+                samples.extend(corners.map(|v| v.0));
+                volume += tetrahedron(corners.map(|v| delaunay.point(v)));
+                for other in delaunay.neighbours(cell) {
+                    let same = !delaunay.is_infinite(other)
+                        && !is_done[other.index()]
+                        && spheres[other.index()].is_some_and(|s| coincide(s, ball));
+                    if same {
+                        is_done[other.index()] = true;
+                        group.push(other);
+                    }
+                }
+            }
+            samples.sort_unstable();
+            samples.dedup();
+            found.balls.push(ball);
+            found.samples.push(samples);
+            found.volumes.push(volume);
+        }
+        if found.balls.is_empty() {
+            // Says why.
+            shape.inner_balls()?;
+        }
+        Ok(found)
+    }
+
+    /// Balls of which no samples are known.
+    pub(super) fn given(balls: &[Sphere]) -> Self {
+        let (samples, volumes) = (vec![Vec::new(); balls.len()], vec![0.0; balls.len()]);
+        Self { balls: balls.to_vec(), samples, volumes }
+    }
+
+    /// The samples that a ball passes through.
+    pub(super) fn samples_of(&self, ball: u32) -> &[u32] {
+        &self.samples[ball as usize]
+    }
+
+    /// For each corner of the union of the balls, moved and grown to `moved`, its sample.
+    pub(super) fn samples_of_corners(
+        &self,
+        shape: &Shape,
+        moved: &[Sphere],
+        union: &UnionAxis,
+    ) -> Vec<Option<u32>> {
+        let positions = shape.samples();
+        let at = |vertex| {
+            shared_sample(
+                vertex,
+                |ball| moved[ball as usize].centre,
+                |ball| &self.samples[ball as usize],
+                |sample| positions[sample as usize],
+            )
+        };
+        union.corners().iter().map(at).collect()
+    }
+}
+
+/// The sample in which the three polar balls of a vertex meet on its side of their centres' plane:
+/// a key for `UnionBoundary::merge`. `None` if they have no sample in common there.
+///
+/// `centre` gives the centre of a ball, `samples` the samples that it passes through, and `position` that of
+/// a sample. Balls that were grown no longer pass through their samples.
+fn shared_sample<S: AsRef<[u32]>>(
+    vertex: &UnionVertex,
+    centre: impl Fn(u32) -> Vec3,
+    samples: impl Fn(u32) -> S,
+    position: impl Fn(u32) -> Vec3,
+) -> Option<u32> {
+    let lists = vertex.balls.map(&samples);
+    let [a, b, c] = lists.each_ref().map(AsRef::as_ref);
+    let [p, q, r] = vertex.balls.map(centre);
+    let distance = |s: &u32| position(*s).distance_squared(vertex.position);
+    a.iter()
+        .copied()
+        .filter(|s| b.contains(s) && c.contains(s))
+        // Three spheres meet in a point and its mirror image, so the side tells which.
+        .filter(|&s| orient3d(p, q, r, position(s)) != Sign::Negative)
+        .min_by(|s, t| distance(s).total_cmp(&distance(t)).then(s.cmp(t)))
+}
+
+/// For each finite cell whether it is an inner pole: no Voronoi vertex inside is farther from one of its
+/// samples.
+fn poles(delaunay: &Delaunay, cells: &CellSpheres) -> Vec<bool> {
+    let spheres = cells.circumspheres();
+    let inside = |c: &CellId| cells.is_inside(*c);
+    let radius = |c: CellId| spheres[c.index()].map_or(0.0, |s| s.radius);
+    let mut farthest = vec![0.0_f64; delaunay.point_count()];
+    for cell in delaunay.finite_cells().filter(inside) {
+        for v in delaunay.vertices(cell) {
+            farthest[v.index()] = farthest[v.index()].max(radius(cell));
+        }
+    }
+    let mut is_pole = vec![false; spheres.len()];
+    for cell in delaunay.finite_cells().filter(inside) {
+        let enough = radius(cell) * (1.0 + COINCIDENT);
+        is_pole[cell.index()] =
+            delaunay.vertices(cell).iter().any(|v| farthest[v.index()] <= enough);
+    }
+    is_pole
+}
+
+fn coincide(a: Sphere, b: Sphere) -> bool {
+    a.centre.distance(b.centre) <= COINCIDENT * a.radius.min(b.radius)
+}
+
+/// The volume of a tetrahedron.
+pub(super) fn tetrahedron([a, b, c, d]: [Vec3; 4]) -> f64 {
+    (b - a).dot((c - a).cross(d - a)).abs() / 6.0
 }

@@ -21,11 +21,13 @@
 //!    own. With counters of parts at each edge and vertex, the test of step 3 is a comparison, and a
 //!    removal is linear in the size of the part.
 
-use medial::complex::MedialMesh;
+use std::collections::VecDeque;
+
+use medial::complex::{Incidence, MedialMesh};
 use medial::geometry::DisjointSets;
 
 use super::axis::Axis;
-use super::kept::kept_part;
+use super::kept_part;
 
 /// The remaining part of an axis.
 #[derive(Clone)]
@@ -302,4 +304,264 @@ fn grown(remaining: &Remaining<'_>) -> (Vec<usize>, Vec<u32>) {
         *place += 1;
     }
     (start, faces)
+}
+
+// ----------------------------------------------------------------------------
+// Step 1, section 3: facets between duplicate corners.
+//
+// The axis of the perturbed balls has a *fin* between any two corners that are one sample: a facet that
+// crosses a sheet or, where three sheets meet, reaches from the seam to the outside. If the two corners
+// were one point, there would be no fin. Fins are removed by elementary collapses, as far as that keeps
+// the homotopy type:
+//
+// 1. A triangle of a fin goes with an edge that nothing else has.
+// 2. An edge that lost its last triangle goes with an end that no other edge has. What is left of the
+//    sphere there, the volume of its tetrahedra, goes to the other end.
+
+/// The mesh without the triangles that `is_fin` names, as far as they can go; for each sphere of
+/// `mesh` the one that it went into; and how many of these triangles are left.
+pub(super) fn without_fins(mesh: &MedialMesh, is_fin: &[bool]) -> (MedialMesh, Vec<u32>, usize) {
+    let incidence = Incidence::of(mesh);
+    let mut shrinking = Shrinking::new(mesh, &incidence);
+    let free = (0..mesh.edges.len()).filter(|&e| incidence.faces_at()[e] == 1);
+    let mut open: Vec<usize> = free.rev().collect();
+    let mut bare = Vec::new();
+    while let Some(edge) = open.pop() {
+        let face = shrinking.face_xor[edge] as usize;
+        if shrinking.faces_at[edge] == 1 && is_fin[face] {
+            shrinking.remove_face(face, edge, &mut open, &mut bare);
+        }
+    }
+    let mut into: Vec<u32> = (0..mesh.spheres.len() as u32).collect();
+    bare.sort_unstable();
+    for edge in bare {
+        shrinking.remove_curve(edge, &mut into);
+    }
+    let left = (0..mesh.faces.len()).filter(|&f| is_fin[f] && shrinking.face_kept[f]).count();
+    let mut number = vec![u32::MAX; into.len()];
+    let kept = (0..into.len()).filter(|&v| into[v] == v as u32);
+    kept.zip(0..).for_each(|(old, new)| number[old] = new);
+    let last = |mut v: u32| {
+        while into[v as usize] != v {
+            v = into[v as usize];
+        }
+        number[v as usize]
+    };
+    let into_new = (0..into.len() as u32).map(last).collect();
+    let sphere_kept: Vec<bool> = number.iter().map(|&n| n != u32::MAX).collect();
+    let Shrinking { edge_kept, face_kept, .. } = &shrinking;
+    (kept_part(mesh, &sphere_kept, edge_kept, face_kept), into_new, left)
+}
+
+/// A mesh during collapses.
+struct Shrinking<'a> {
+    mesh: &'a MedialMesh,
+    incidence: &'a Incidence,
+    face_kept: Vec<bool>,
+    edge_kept: Vec<bool>,
+    /// For each edge the number of its triangles, and their exclusive or.
+    faces_at: Vec<u32>,
+    face_xor: Vec<u32>,
+    /// The same for each sphere and its edges.
+    edges_at: Vec<u32>,
+    edge_xor: Vec<u32>,
+    /// Edges that had triangles, and have none any more.
+    is_bare: Vec<bool>,
+}
+
+impl<'a> Shrinking<'a> {
+    fn new(mesh: &'a MedialMesh, incidence: &'a Incidence) -> Self {
+        let mut face_xor = vec![0; mesh.edges.len()];
+        for (face, edges) in (0..).zip(incidence.face_edges()) {
+            edges.iter().for_each(|&edge| face_xor[edge as usize] ^= face);
+        }
+        let (mut edges_at, mut edge_xor) =
+            (vec![0; mesh.spheres.len()], vec![0; mesh.spheres.len()]);
+        for (edge, ends) in (0..).zip(&mesh.edges) {
+            for &v in ends {
+                edges_at[v as usize] += 1;
+                edge_xor[v as usize] ^= edge;
+            }
+        }
+        Self {
+            mesh,
+            incidence,
+            face_kept: vec![true; mesh.faces.len()],
+            edge_kept: vec![true; mesh.edges.len()],
+            faces_at: incidence.faces_at().to_vec(),
+            face_xor,
+            edges_at,
+            edge_xor,
+            is_bare: vec![false; mesh.edges.len()],
+        }
+    }
+
+    /// Collapse 1. Edges with one triangle left are noted in `open`, those with none in `bare`.
+    fn remove_face(
+        &mut self,
+        face: usize,
+        free: usize,
+        open: &mut Vec<usize>,
+        bare: &mut Vec<usize>,
+    ) {
+        self.face_kept[face] = false;
+        for edge in self.incidence.face_edges()[face].map(|e| e as usize) {
+            self.faces_at[edge] -= 1;
+            self.face_xor[edge] ^= face as u32;
+            match self.faces_at[edge] {
+                _ if edge == free => self.remove_edge(edge),
+                0 => {
+                    self.is_bare[edge] = true;
+                    bare.push(edge);
+                }
+                1 => open.push(edge),
+                _ => {}
+            }
+        }
+    }
+
+    fn remove_edge(&mut self, edge: usize) {
+        self.edge_kept[edge] = false;
+        for v in self.mesh.edges[edge].map(|v| v as usize) {
+            self.edges_at[v] -= 1;
+            self.edge_xor[v] ^= edge as u32;
+        }
+    }
+
+    /// Collapse 2, from an edge on as far as it goes.
+    fn remove_curve(&mut self, edge: usize, into: &mut [u32]) {
+        let mut next = Some(edge);
+        while let Some(edge) = next.take().filter(|&e| self.edge_kept[e] && self.is_bare[e]) {
+            let [a, b] = self.mesh.edges[edge];
+            // The larger end first: balls have the smaller ids.
+            let ends = [(b, a), (a, b)];
+            let free = ends.into_iter().find(|&(v, _)| self.edges_at[v as usize] == 1);
+            let Some((gone, stays)) = free else { return };
+            self.remove_edge(edge);
+            into[gone as usize] = stays;
+            if self.edges_at[stays as usize] == 1 {
+                next = Some(self.edge_xor[stays as usize] as usize);
+            }
+        }
+    }
+}
+
+// ----------------------------------------------------------------------------
+// The topology graph of section 4.3, and the levels of section 4.1.
+//
+// 1. *Contact curves* are the edges and vertices that two pieces or more have, pieces being the parts and
+//    the curves, that is, connected edges without triangles. Connected ones are one *node*.
+// 2. The graph is bipartite, of pieces and nodes, so that a part may touch any number of nodes.
+// 3. The paper's test: a part may go if it is a leaf, that is, if it touches one node. With two or
+//    more it lies on a cycle or holds the rest together, with none it is a component.
+//
+// A part that can go by `parts.rs` is a leaf: where `H_1` and `H_0` of the closure and its contact
+// set vanish, the contact set is connected. The converse is false. A leaf that touches its node along
+// two curves, which are connected elsewhere, or that has a hole, can hold a loop. The graph does not
+// decide here; it counts these cases.
+
+/// Nodes and pieces of one decomposition.
+pub(super) struct Graph {
+    /// Number of nodes.
+    pub(super) nodes: usize,
+    /// Number of independent cycles.
+    pub(super) loops: usize,
+    /// For each part whether it touches exactly one node.
+    pub(super) is_leaf: Vec<bool>,
+}
+
+impl Graph {
+    /// The graph of parts, none of which was removed since. Cost `O(n log n)`.
+    pub(super) fn of(parts: &Parts, remaining: &Remaining<'_>) -> Self {
+        let axis = remaining.axis;
+        let whole = &axis.mesh;
+        let mut nodes = DisjointSets::singletons(whole.spheres.len());
+        let mut curves = DisjointSets::singletons(whole.spheres.len());
+        for (edge, &[a, b]) in whole.edges.iter().enumerate() {
+            if parts.at_edge[edge].count > 1 {
+                nodes.join(a, b);
+            }
+            if axis.incidence.faces_at()[edge] == 0 {
+                curves.join(a, b);
+            }
+        }
+        // Pieces: the parts, then the curves by their smallest sphere.
+        let mut pairs: Vec<u64> = Vec::new();
+        let mut touch = |piece: usize, v: u32| {
+            if parts.at_sphere[v as usize].count > 1 {
+                pairs.push((piece as u64) << 32 | u64::from(nodes.find(v)));
+            }
+        };
+        for part in 0..parts.len() {
+            let corners = parts.faces(part).iter().flat_map(|&f| whole.faces[f as usize]);
+            corners.for_each(|v| touch(part, v));
+        }
+        for v in (0..axis.on_curve.len() as u32).filter(|&v| axis.on_curve[v as usize]) {
+            touch(parts.len() + curves.find(v) as usize, v);
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut is_leaf = vec![false; parts.len()];
+        for of_piece in pairs.chunk_by(|a, b| a >> 32 == b >> 32) {
+            if let Some(leaf) = is_leaf.get_mut((of_piece[0] >> 32) as usize) {
+                *leaf = of_piece.len() == 1;
+            }
+        }
+        let (nodes, loops) = cycle_rank(&pairs);
+        Self { nodes, loops, is_leaf }
+    }
+}
+
+/// The nodes of a bipartite graph and its independent cycles, from its edges in order.
+fn cycle_rank(pairs: &[u64]) -> (usize, usize) {
+    let pieces = pairs.chunk_by(|a, b| a >> 32 == b >> 32);
+    let mut nodes: Vec<u32> = pairs.iter().map(|&pair| pair as u32).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let mut sets = DisjointSets::singletons(pieces.clone().count() + nodes.len());
+    let first_node = pieces.clone().count();
+    let mut loops = 0;
+    for (piece, of_piece) in pieces.enumerate() {
+        for &pair in of_piece {
+            let node = nodes.partition_point(|&n| n < pair as u32);
+            loops += usize::from(!sets.join(piece as u32, (first_node + node) as u32));
+        }
+    }
+    (nodes.len(), loops)
+}
+
+/// For each part its level: 1 at a free edge, one more than that of the lowest part beside it over
+/// an edge; 0 where no part of level 1 can be reached.
+pub(super) fn levels(parts: &Parts, remaining: &Remaining<'_>) -> Vec<u32> {
+    let face_edges = remaining.axis.incidence.face_edges();
+    let mut parts_of_edge: Vec<(u32, u32)> = Vec::new();
+    for part in 0..parts.len() {
+        let edges = parts.faces(part).iter().flat_map(|&f| face_edges[f as usize]);
+        let shared = edges.filter(|&e| parts.at_edge[e as usize].count > 1);
+        parts_of_edge.extend(shared.map(|e| (e, part as u32)));
+    }
+    parts_of_edge.sort_unstable();
+    parts_of_edge.dedup();
+    let mut edges_of_part: Vec<Vec<u32>> = vec![Vec::new(); parts.len()];
+    let by_edge: Vec<&[(u32, u32)]> = parts_of_edge.chunk_by(|a, b| a.0 == b.0).collect();
+    for (edge, of_edge) in by_edge.iter().enumerate() {
+        of_edge.iter().for_each(|&(_, part)| edges_of_part[part as usize].push(edge as u32));
+    }
+    let mut level: Vec<u32> = parts.free.iter().map(|&free| u32::from(free)).collect();
+    let mut queue: VecDeque<usize> = (0..parts.len()).filter(|&p| parts.free[p]).collect();
+    let mut crossed = vec![false; by_edge.len()];
+    while let Some(part) = queue.pop_front() {
+        for &edge in &edges_of_part[part] {
+            if std::mem::replace(&mut crossed[edge as usize], true) {
+                continue;
+            }
+            for &(_, other) in by_edge[edge as usize] {
+                if level[other as usize] == 0 {
+                    level[other as usize] = level[part] + 1;
+                    queue.push_back(other as usize);
+                }
+            }
+        }
+    }
+    level
 }

@@ -8,9 +8,8 @@
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
 use super::axis::Axis;
-use super::graph::Graph;
-use super::params::{Checked, TamHeidrichParams};
-use super::parts::{Parts, Remaining};
+use super::parts::{Graph, Parts, Remaining};
+use super::{Checked, TamHeidrichParams};
 
 /// The threshold of a round.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,11 +9,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::TamHeidrichParams;
-use super::axis::Axis;
-use super::fins::without_fins;
-use super::graph::{Graph, levels};
-use super::merge;
-use super::parts::{Parts, Remaining};
+use super::axis::{Axis, merged};
+use super::parts::{Graph, Parts, Remaining, levels, without_fins};
 
 fn complex(n: usize, edges: Vec<[u32; 2]>, faces: Vec<[u32; 3]>) -> MedialMesh {
     let spheres = (0..n).map(|i| Sphere::new(Vec3::splat(i as f64), 1.0)).collect();
@@ -194,7 +191,7 @@ fn merging_duplicate_vertices_keeps_the_topology() {
             .collect();
         let whole = UnionAxis::of_balls(&balls).expect("balls").mesh();
         for merge in [0.0, 0.03, 0.1, 0.5] {
-            let (mesh, into) = merge::merged(&whole, merge, &RunContext::default()).expect("run");
+            let (mesh, into) = merged(&whole, merge, &RunContext::default()).expect("run");
             mesh.check().expect("a valid complex");
             assert_eq!(betti(&mesh), betti(&whole), "{balls:?}");
             // Each sphere that is left is the first of those that went into it.

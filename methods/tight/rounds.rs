@@ -11,18 +11,20 @@
 //!
 //! What is returned is the state of the least measured error.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use medial::Vec3;
 use medial::complex::MedialMesh;
 use medial::metrics::{Peak, PeakSearch};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
-use super::descent::{Descent, Objective};
-use super::goal::{ASIDE, Goal, Interior, Points, Sample, refused};
-use super::insert::swapped;
-use super::params::TightParams;
-use super::rows::{held_from, uncovered, union_of};
+use super::TightParams;
+use super::collapse::{Guard, Still, clamp};
+use super::goal::{
+    ASIDE, Goal, Held, Interior, Points, Residuals, Row, Sample, held_from, places, refused,
+    residuals, uncovered, union_of, vertices,
+};
+use super::start::swapped;
 
 /// Powers and steps before the first round.
 const WARM: [(f64, usize); 2] = [(4.0, 9), (8.0, 14)];
@@ -253,4 +255,494 @@ impl Witnesses<'_> {
         let new = points.into_iter().filter(|p| self.seen.insert(cube(p)));
         new.take(WITNESSES).collect()
     }
+}
+
+// ----------------------------------------------------------------------------
+// Levenberg-Marquardt on all spheres at once, for sums of powers of the residuals.
+//
+// Minimises `sum_i w_i (x_i^p + mean x_i^2)` with `x = |error| / scale`. The second derivative of a power
+// keeps its factor `p - 1`, so a step is Newton's for residuals that are linear in the spheres.
+
+/// Largest step of a sphere.
+const LONGEST: f64 = 0.02;
+
+/// Least radius.
+pub(super) const LEAST_RADIUS: f64 = 1e-5;
+
+/// Damping before the first step, a share of the diagonal.
+const FIRST_DAMPING: f64 = 1e-2;
+
+/// What holds a fixed sphere, times the mean of the diagonal.
+const STIFF: f64 = 1e12;
+
+/// Steps that are refused one after the other before the descent ends.
+const REFUSED: usize = 4;
+
+/// A step that lessens the objective by a smaller share is the last.
+const SMALL: f64 = 1e-3;
+
+/// From this power on, balls may protrude by this share of the scale.
+const HIGH: f64 = 4.0;
+const TOLERATED: f64 = 0.1;
+
+/// What is minimised.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Objective {
+    /// Exponent, at least 2.
+    pub power: f64,
+    /// Weight of the squares beside it.
+    pub mean: f64,
+    /// Error that counts as 1.
+    pub scale: f64,
+}
+
+impl Objective {
+    /// A power alone.
+    pub fn power(power: f64, scale: f64) -> Self {
+        Self { power, mean: 0.0, scale }
+    }
+
+    fn value(&self, rows: &[Row]) -> f64 {
+        let Self { power, mean, scale } = *self;
+        let one = |row: &Row| {
+            let x = row.error.abs() / scale;
+            row.weight * (x.powf(power) + mean * x * x)
+        };
+        rows.iter().filter(|row| self.counts(row)).map(one).sum()
+    }
+
+    /// How far a ball may protrude: what hardly counts at a high power need not be looked for.
+    fn tolerance(&self) -> f64 {
+        if self.power >= HIGH { TOLERATED * self.scale } else { 0.0 }
+    }
+
+    fn counts(&self, row: &Row) -> bool {
+        !row.protrudes || row.error > self.tolerance()
+    }
+
+    /// First derivative by the error over the error, and second derivative.
+    fn derivatives(&self, row: &Row) -> (f64, f64) {
+        let Self { power, mean, scale } = *self;
+        let x = row.error.abs() / scale;
+        let steep = power * x.powf(power - 2.0);
+        let unit = row.weight / (scale * scale);
+        (unit * (steep + 2.0 * mean), unit * (steep * (power - 1.0) + 2.0 * mean))
+    }
+}
+
+/// What is around a part of a mesh; empty if there is nothing else.
+#[derive(Default)]
+pub(super) struct Rest {
+    /// Spheres of the part that do not move.
+    pub fixed: Vec<bool>,
+    /// For each sample the distance of what is not in the part.
+    pub limits: Vec<f64>,
+    /// Faces that are not in the part.
+    pub still: Still,
+}
+
+/// A medial mesh of fixed connectivity whose spheres move.
+pub(super) struct Descent<'a> {
+    pub goal: &'a Goal,
+    pub points: Points,
+    pub mesh: MedialMesh,
+    pub residuals: Residuals,
+    held: Vec<Held>,
+    /// Spheres that do not move; empty if all do.
+    fixed: Vec<bool>,
+    /// For each sample the distance of what is not in the mesh; empty if there is nothing else.
+    limits: Vec<f64>,
+    guard: Guard,
+    pattern: Pattern,
+    damping: f64,
+}
+
+impl<'a> Descent<'a> {
+    /// Evaluates the residuals of a mesh, whose centres outside of the solid are first moved to the surface.
+    /// Left to the first step, that jump would be in every trial, however small the step.
+    ///
+    /// # Errors
+    /// When the mesh has no union.
+    pub fn new(goal: &'a Goal, points: Points, mesh: MedialMesh) -> Result<Self, SimplifyError> {
+        Self::of_part(goal, points, mesh, Rest::default(), 1.0)
+    }
+
+    /// As [`new`](Self::new), for a part of a mesh, which is a `share` of the whole.
+    pub fn of_part(
+        goal: &'a Goal,
+        points: Points,
+        mut mesh: MedialMesh,
+        rest: Rest,
+        share: f64,
+    ) -> Result<Self, SimplifyError> {
+        let Rest { fixed, limits, still } = rest;
+        clamp(&mut mesh, goal);
+        let mut held = places(&mesh, share);
+        let residuals = residuals(&mesh, goal, &points, &limits, &[], 0.0, &mut held)?;
+        let pattern = Pattern::new(mesh.spheres.len(), &mesh.edges);
+        let guard = Guard::new(&mesh, still);
+        let damping = FIRST_DAMPING;
+        Ok(Self { goal, points, mesh, residuals, held, fixed, limits, guard, pattern, damping })
+    }
+
+    /// The largest error of a residual.
+    pub fn largest(&self) -> f64 {
+        let errors = self.residuals.rows.iter().map(|row| row.error.abs());
+        errors.fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// The value of an objective.
+    pub fn value(&self, objective: &Objective) -> f64 {
+        objective.value(&self.residuals.rows)
+    }
+
+    /// Takes at most so many steps, each of which lessens the objective.
+    ///
+    /// # Errors
+    /// When the run is cancelled.
+    pub fn run(
+        &mut self,
+        objective: Objective,
+        steps: usize,
+        run: &RunContext,
+    ) -> Result<(), SimplifyError> {
+        let tolerance = objective.tolerance();
+        self.residuals.rows.retain(|row| objective.counts(row));
+        let mut value = self.value(&objective);
+        let (mut done, mut refused, mut growth) = (0, 0, 2.0);
+        let (mut normal, mut downhill) = self.assemble(&objective);
+        while done < steps && refused < REFUSED {
+            run.step(done, steps)?;
+            let Some((trial, expected)) = self.trial(&normal, &downhill) else {
+                self.damping *= 10.0;
+                refused += 1;
+                continue;
+            };
+            let Self { goal, points, limits, held, residuals: Residuals { nearest, .. }, .. } =
+                self;
+            let found = residuals(&trial, goal, points, limits, nearest, tolerance, held)?;
+            let lower = objective.value(&found.rows);
+            // A value that is not a number is not lower, so such a step is refused.
+            if lower < value {
+                let is_small = value - lower < SMALL * value;
+                // Nielsen 1999: the better the model foretold it, the longer the next step.
+                let told = ((value - lower) / expected).clamp(0.0, 1.0);
+                self.damping *= (1.0 - (2.0 * told - 1.0).powi(3)).max(0.2);
+                growth = 2.0;
+                (self.mesh, self.residuals, value) = (trial, found, lower);
+                self.damping = self.damping.max(1e-9);
+                (done, refused) = (done + 1, 0);
+                if is_small {
+                    break;
+                }
+                if done < steps {
+                    (normal, downhill) = self.assemble(&objective);
+                }
+            } else {
+                self.damping *= growth;
+                growth *= 2.0;
+                refused += 1;
+            }
+        }
+        self.damping = self.damping.clamp(1e-6, 1.0);
+        Ok(())
+    }
+
+    /// The normal equations of the residuals, and minus their gradient.
+    fn assemble(&self, objective: &Objective) -> (Normal, Vec<[f64; 4]>) {
+        let mut normal = Normal::zero(&self.pattern);
+        let mut downhill = vec![[0.0; 4]; self.mesh.spheres.len()];
+        for row in &self.residuals.rows {
+            let (first, second) = objective.derivatives(row);
+            let (corners, count) = vertices(&self.mesh, row.primitive);
+            for i in 0..count {
+                let (v, a) = (corners[i] as usize, row.weights[i]);
+                // A foot on a side of a slab has a weight of zero.
+                if a == 0.0 {
+                    continue;
+                }
+                let slope = first * row.error * a;
+                for (entry, d) in downhill[v].iter_mut().zip(row.direction) {
+                    *entry -= slope * d;
+                }
+                for j in i..count {
+                    let scale = second * a * row.weights[j];
+                    if scale != 0.0 {
+                        let pattern = &self.pattern;
+                        normal.add(pattern, corners[i], corners[j], scale, &row.direction);
+                    }
+                }
+            }
+        }
+        (normal, downhill)
+    }
+
+    /// The mesh after a damped step, kept within its limits, and by how much the model lessens the objective;
+    /// `None` if there is no step.
+    fn trial(&self, normal: &Normal, downhill: &[[f64; 4]]) -> Option<(MedialMesh, f64)> {
+        let spheres = self.mesh.spheres.len();
+        let mut trace = 0.0;
+        let mut extra: Vec<[f64; 4]> = (0..spheres as u32)
+            .map(|v| {
+                let diagonal = normal.diagonal(&self.pattern, v);
+                trace += diagonal.iter().sum::<f64>();
+                diagonal.map(|entry| self.damping * entry)
+            })
+            .collect();
+        // Spheres that serve no sample have no equation of their own.
+        let mean = trace / (4 * spheres) as f64;
+        let least = 1e-6 * mean + f64::MIN_POSITIVE;
+        extra.iter_mut().flatten().for_each(|entry| *entry += least);
+        let fixed = |v: usize| self.fixed.get(v).copied().unwrap_or(false);
+        for (_, extra) in extra.iter_mut().enumerate().filter(|&(v, _)| fixed(v)) {
+            *extra = [STIFF * mean; 4];
+        }
+        let step = normal.solve(&self.pattern, &extra, downhill)?;
+        let expected = (step.iter().flatten())
+            .zip(downhill.iter().flatten().zip(extra.iter().flatten()))
+            .map(|(h, (down, extra))| 0.5 * h * (down + extra * h))
+            .sum();
+        let mut trial = self.mesh.clone();
+        let moving = trial.spheres.iter_mut().zip(step).enumerate().filter(|&(v, _)| !fixed(v));
+        for (_, (sphere, [x, y, z, r])) in moving {
+            let length = (x * x + y * y + z * z + r * r).sqrt();
+            let share = if length > LONGEST { LONGEST / length } else { 1.0 };
+            sphere.centre += share * Vec3::new(x, y, z);
+            sphere.radius = (sphere.radius + share * r).max(LEAST_RADIUS);
+        }
+        self.guard.hold(&self.mesh, &mut trial, self.goal);
+        trial.check().is_ok().then_some((trial, expected))
+    }
+}
+
+// ----------------------------------------------------------------------------
+// The normal equations: a sparse symmetric matrix of 4 x 4 blocks, and its Cholesky factorisation.
+//
+// One block row for each sphere `(x, y, z, r)`, one block for each sphere and each edge of the medial
+// mesh. Spheres are eliminated in the order of least degree, which keeps the fill of such complexes,
+// sheets and curves, small.
+//
+// By hand because the only kept crate with a sparse Cholesky of a free licence (`faer`) brings some 140
+// others, and because blocks of four make the code short: no entry is looked up on its own.
+
+/// A 4 x 4 block, by rows.
+pub(super) type Block = [[f64; 4]; 4];
+
+const ZERO: Block = [[0.0; 4]; 4];
+
+/// Where the blocks of the factor are: found once for each connectivity.
+#[derive(Clone, Debug)]
+pub(super) struct Pattern {
+    /// The vertex that is eliminated at each step.
+    order: Vec<u32>,
+    /// The step at which each vertex is eliminated.
+    step: Vec<u32>,
+    /// For each step the later steps with a block in its column, ascending.
+    columns: Vec<Vec<u32>>,
+}
+
+impl Pattern {
+    /// The pattern of a graph. Cost: the fill, times its logarithm.
+    pub fn new(vertices: usize, edges: &[[u32; 2]]) -> Self {
+        let mut around = vec![BTreeSet::new(); vertices];
+        for &[a, b] in edges {
+            around[a as usize].insert(b);
+            around[b as usize].insert(a);
+        }
+        let mut queue: BTreeSet<(usize, u32)> =
+            (0..vertices as u32).map(|v| (around[v as usize].len(), v)).collect();
+        let mut order = Vec::with_capacity(vertices);
+        let mut fill = Vec::with_capacity(vertices);
+        while let Some((_, v)) = queue.pop_first() {
+            let link = std::mem::take(&mut around[v as usize]);
+            // What was adjacent to an eliminated vertex becomes adjacent to each other.
+            for &w in &link {
+                let set = &mut around[w as usize];
+                queue.remove(&(set.len(), w));
+                set.remove(&v);
+                set.extend(link.iter().filter(|&&other| other != w));
+                queue.insert((set.len(), w));
+            }
+            order.push(v);
+            fill.push(link);
+        }
+        let mut step = vec![0; vertices];
+        for (k, &v) in (0..).zip(&order) {
+            step[v as usize] = k;
+        }
+        let columns = fill.iter().map(|link| {
+            let mut column: Vec<u32> = link.iter().map(|&w| step[w as usize]).collect();
+            column.sort_unstable();
+            column
+        });
+        let columns = columns.collect();
+        Self { order, step, columns }
+    }
+}
+
+/// A symmetric matrix with a pattern.
+pub(super) struct Normal {
+    diagonal: Vec<Block>,
+    below: Vec<Vec<Block>>,
+}
+
+impl Normal {
+    /// The zero matrix.
+    pub fn zero(pattern: &Pattern) -> Self {
+        let below = pattern.columns.iter().map(|column| vec![ZERO; column.len()]).collect();
+        Self { diagonal: vec![ZERO; pattern.order.len()], below }
+    }
+
+    /// Adds `scale * direction directionᵀ` to the block of two vertices that are equal or adjacent.
+    /// Of two different vertices one order is enough.
+    #[inline]
+    pub fn add(&mut self, pattern: &Pattern, v: u32, w: u32, scale: f64, direction: &[f64; 4]) {
+        let [i, j] = [v, w].map(|v| pattern.step[v as usize]);
+        let block = if i == j {
+            &mut self.diagonal[i as usize]
+        } else {
+            let (i, j) = (i.min(j) as usize, i.max(j));
+            let place = pattern.columns[i].binary_search(&j).expect("the two are adjacent");
+            &mut self.below[i][place]
+        };
+        // Symmetric blocks: the transposed one is the same.
+        add_product(block, scale, direction);
+    }
+
+    /// The diagonal entries of a vertex.
+    pub fn diagonal(&self, pattern: &Pattern, v: u32) -> [f64; 4] {
+        let block = &self.diagonal[pattern.step[v as usize] as usize];
+        [0, 1, 2, 3].map(|k| block[k][k])
+    }
+
+    /// The solution `x` of `(A + diag(extra)) x = b`, each by vertex; `None` if the matrix is not
+    /// positive definite.
+    pub fn solve(
+        &self,
+        pattern: &Pattern,
+        extra: &[[f64; 4]],
+        b: &[[f64; 4]],
+    ) -> Option<Vec<[f64; 4]>> {
+        let steps = pattern.order.len();
+        let (mut diagonal, mut below) = (self.diagonal.clone(), self.below.clone());
+        for (k, &v) in pattern.order.iter().enumerate() {
+            for (c, extra) in extra[v as usize].iter().enumerate() {
+                diagonal[k][c][c] += extra;
+            }
+        }
+        for k in 0..steps {
+            let lower = cholesky(&diagonal[k])?;
+            diagonal[k] = lower;
+            let mut panel = std::mem::take(&mut below[k]);
+            panel.iter_mut().for_each(|block| *block = divided(block, &lower));
+            let rows = &pattern.columns[k];
+            for (p, &i) in rows.iter().enumerate() {
+                subtract_product(&mut diagonal[i as usize], &panel[p], &panel[p]);
+                let column = &pattern.columns[i as usize];
+                // Both lists ascend, and the column of `i` has every later row of this one.
+                let mut place = 0;
+                for (q, &j) in rows.iter().enumerate().skip(p + 1) {
+                    while column[place] != j {
+                        place += 1;
+                    }
+                    subtract_product(&mut below[i as usize][place], &panel[q], &panel[p]);
+                }
+            }
+            below[k] = panel;
+        }
+        let mut x: Vec<[f64; 4]> = pattern.order.iter().map(|&v| b[v as usize]).collect();
+        for k in 0..steps {
+            x[k] = forward(&diagonal[k], x[k]);
+            let known = x[k];
+            for (&i, block) in pattern.columns[k].iter().zip(&below[k]) {
+                for (value, row) in x[i as usize].iter_mut().zip(block) {
+                    *value -= dot(row, &known);
+                }
+            }
+        }
+        for k in (0..steps).rev() {
+            let mut value = x[k];
+            for (&i, block) in pattern.columns[k].iter().zip(&below[k]) {
+                for (row, known) in block.iter().zip(x[i as usize]) {
+                    for (value, entry) in value.iter_mut().zip(row) {
+                        *value -= entry * known;
+                    }
+                }
+            }
+            x[k] = backward(&diagonal[k], value);
+        }
+        let mut solution = vec![[0.0; 4]; steps];
+        for (k, &v) in pattern.order.iter().enumerate() {
+            solution[v as usize] = x[k];
+        }
+        Some(solution)
+    }
+}
+
+/// `block += scale * direction directionᵀ`.
+#[inline]
+pub(super) fn add_product(block: &mut Block, scale: f64, direction: &[f64; 4]) {
+    for (line, x) in block.iter_mut().zip(direction) {
+        for (entry, y) in line.iter_mut().zip(direction) {
+            *entry += scale * x * y;
+        }
+    }
+}
+
+/// The lower triangular factor of a block, or `None` if it is not positive definite.
+pub(super) fn cholesky(block: &Block) -> Option<Block> {
+    let mut lower = ZERO;
+    for i in 0..4 {
+        for j in 0..=i {
+            let rest = block[i][j] - (0..j).map(|k| lower[i][k] * lower[j][k]).sum::<f64>();
+            if i != j {
+                lower[i][j] = rest / lower[j][j];
+            } else if rest > 0.0 {
+                lower[i][i] = rest.sqrt();
+            } else {
+                return None;
+            }
+        }
+    }
+    Some(lower)
+}
+
+/// `B L⁻ᵀ`.
+fn divided(block: &Block, lower: &Block) -> Block {
+    block.map(|row| forward(lower, row))
+}
+
+/// `target -= A Bᵀ`.
+#[inline]
+fn subtract_product(target: &mut Block, a: &Block, b: &Block) {
+    for (row, a) in target.iter_mut().zip(a) {
+        for (entry, b) in row.iter_mut().zip(b) {
+            *entry -= dot(a, b);
+        }
+    }
+}
+
+#[inline]
+fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+}
+
+/// The solution of `L x = b`.
+#[inline]
+pub(super) fn forward(lower: &Block, mut b: [f64; 4]) -> [f64; 4] {
+    for i in 0..4 {
+        let known: f64 = (0..i).map(|k| lower[i][k] * b[k]).sum();
+        b[i] = (b[i] - known) / lower[i][i];
+    }
+    b
+}
+
+/// The solution of `Lᵀ x = b`.
+#[inline]
+pub(super) fn backward(lower: &Block, mut b: [f64; 4]) -> [f64; 4] {
+    for i in (0..4).rev() {
+        let known: f64 = (i + 1..4).map(|k| lower[k][i] * b[k]).sum();
+        b[i] = (b[i] - known) / lower[i][i];
+    }
+    b
 }

@@ -6,15 +6,10 @@ use medial::simplifier::{Level, Params, RunContext, SimplifyError};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::descent::{Descent, Objective};
-use super::goal::Goal;
-use super::guard::{Guard, Still};
-use super::insert::swapped;
-use super::normal::{Normal, Pattern};
-use super::patch::Patch;
-use super::rows::{Row, vertices};
-use super::sheets::Sheets;
-use super::start::joined;
+use super::collapse::{Guard, Patch, Still};
+use super::goal::{Goal, Row, vertices};
+use super::rounds::{Descent, Normal, Objective, Pattern};
+use super::start::{Sheets, joined, swapped};
 
 fn shape(id: &str, resolution: u32) -> Shape {
     let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);

@@ -74,19 +74,10 @@
 //! Betti numbers that differ from the solid's are for the judge to tell, and not mended. CGAL's manual does not
 //! recommend more than 300 spheres, nor CAD models.
 
-mod cluster;
-mod connect;
-mod correct;
-mod energy;
-mod nearest_point;
-mod neighbours;
-mod params;
 mod points;
 mod refit;
-mod residuals;
 mod sampling;
 mod shrinking_ball;
-mod split;
 #[cfg(test)]
 mod tests;
 
@@ -95,12 +86,12 @@ use medial::simplifier::{
     Diagnostics, Level, Method, MethodInfo, ParamFields, RunContext, Simplification, Simplified,
     SimplifyError,
 };
+use points::{Locality, SurfacePoints};
+use rayon::prelude::*;
+use sampling::{Ended, NONE, Solid, Tally, VariationalSampling};
+use serde::{Deserialize, Serialize};
 
-pub use params::{Connect, Contact, Points, Refit, VmasParams};
-
-use correct::Solid;
-use points::SurfacePoints;
-use sampling::{Ended, Tally, VariationalSampling};
+use crate::within::within;
 
 /// Spheres of [`Level::Published`]: CGAL's default.
 const PUBLISHED: usize = 100;
@@ -109,7 +100,7 @@ const PUBLISHED: usize = 100;
 const SAMPLES_PER_SPHERE: usize = 100;
 
 /// Most samples that a number of spheres asks for by itself: memory and time stay bounded.
-const MOST_SAMPLES: usize = 100_000;
+const MOST_DEFAULT_SAMPLES: usize = 100_000;
 
 /// The source as BibTeX.
 const BIBTEX: &str = "\
@@ -198,7 +189,7 @@ impl Prepared<'_> {
             Points::Vertices => SurfacePoints::of_vertices(mesh),
             Points::Samples => {
                 let count = spheres.saturating_mul(SAMPLES_PER_SPHERE);
-                let count = count.min(MOST_SAMPLES).max(samples);
+                let count = count.min(MOST_DEFAULT_SAMPLES).max(samples);
                 SurfacePoints::of_samples(mesh, count, self.run.seed, neighbours)
             }
         };
@@ -254,4 +245,158 @@ impl Tally {
         // Counts are whole numbers: billionths of a squared diagonal.
         diagnostics.count("total_error_in_billionths", (self.total_error * 1e9).round() as usize);
     }
+}
+
+// ----------------------------------------------------------------------------
+// The parameters of VMAS.
+
+medial::parameters! {
+    /// Parameters of VMAS; the defaults are CGAL's, with the refit that minimises the energy as
+    /// written.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct VmasParams {
+        /// Surface points: area-uniform samples (CGAL), or the vertices of the mesh (the authors).
+        points: Points = Points::Samples, "samples or vertices";
+        /// Smallest number of samples; 100 for each sphere if that is more, up to 100000.
+        samples: usize = 20_000, "samples";
+        /// Nearest samples that a sample is adjacent to, itself included.
+        neighbours: usize = 10, "samples";
+        /// Weight of the Euclidean part of the energy, above 0 and at most 1; with a small one,
+        /// spheres reach into features.
+        lambda: f64 = 0.2, "pure number";
+        /// The refit minimises the energy as written, or as both published programs do: lambda
+        /// squared, plane distances summed before they are squared.
+        refit: Refit = Refit::Energy, "energy or published";
+        /// A shrinking ball touches surface points, or the mesh: exact, but slower.
+        contact: Contact = Contact::Samples, "samples or mesh";
+        /// Faces: all triples of spheres adjacent in pairs (published), or only where three clusters
+        /// meet.
+        connect: Connect = Connect::Cliques, "cliques or faces";
+        /// Largest number of rounds.
+        iterations: usize = 1_000, "rounds";
+    }
+}
+
+/// What the surface is to the method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Points {
+    /// Area-uniform samples, each adjacent to its nearest ones (CGAL).
+    Samples,
+    /// The vertices of the mesh, adjacent along its edges (the authors).
+    Vertices,
+}
+
+/// What the refit minimises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Refit {
+    /// The energy that clustering and errors use.
+    Energy,
+    /// That of both published programs: `lambda` squared, plane distances summed before they are squared.
+    Published,
+}
+
+/// What a shrinking ball may touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Contact {
+    /// The surface points.
+    Samples,
+    /// The triangles of the surface.
+    Mesh,
+}
+
+/// Which triangles of adjacent spheres are faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Connect {
+    /// All three spheres that are adjacent in pairs.
+    Cliques,
+    /// Those whose clusters meet: three mutually adjacent surface points, one of each.
+    Faces,
+}
+
+/// Memory and time stay bounded.
+const MOST_SAMPLES: usize = 1_000_000;
+
+impl VmasParams {
+    fn validate(self) -> Result<Self, SimplifyError> {
+        within("samples", self.samples, 100..=MOST_SAMPLES)?;
+        within("neighbours", self.neighbours, 2..=100)?;
+        // Without the Euclidean part, two parallel planes leave a sphere undetermined.
+        within("lambda", self.lambda, 1e-6..=1.0)?;
+        within("iterations", self.iterations, 1..=100_000)?;
+        Ok(self)
+    }
+}
+
+// ----------------------------------------------------------------------------
+// The complex: spheres are joined where their clusters are adjacent.
+
+/// The pairs of spheres of which some points are adjacent, ascending, in ascending order.
+fn edges(points: &SurfacePoints, labels: &[u32]) -> Vec<[u32; 2]> {
+    let joined = |&[v, w]: &[u32; 2]| {
+        let (a, b) = (labels[v as usize], labels[w as usize]);
+        (a != b && a != NONE && b != NONE).then(|| [a.min(b), a.max(b)])
+    };
+    let mut edges: Vec<[u32; 2]> = points.links.par_iter().filter_map(joined).collect();
+    edges.par_sort_unstable();
+    edges.dedup();
+    edges
+}
+
+/// The faces on these edges.
+fn faces(
+    points: &SurfacePoints,
+    labels: &[u32],
+    edges: &[[u32; 2]],
+    connect: Connect,
+) -> Vec<[u32; 3]> {
+    match (connect, &points.local) {
+        (Connect::Cliques, _) => triangles(edges),
+        (Connect::Faces, Locality::Faces(faces)) => of_labels(faces, labels),
+        (Connect::Faces, Locality::Nearest { .. }) => {
+            // Links within a cluster are in no triangle of three labels.
+            let differ = |&&[v, w]: &&[u32; 2]| labels[v as usize] != labels[w as usize];
+            let between: Vec<[u32; 2]> = points.links.iter().filter(differ).copied().collect();
+            of_labels(&triangles(&between), labels)
+        }
+    }
+}
+
+/// The triangles of a graph whose edges are ascending pairs in ascending order.
+fn triangles(edges: &[[u32; 2]]) -> Vec<[u32; 3]> {
+    let later = |a: u32| {
+        let from = edges.partition_point(|edge| edge[0] < a);
+        let to = edges.partition_point(|edge| edge[0] <= a);
+        edges[from..to].iter().map(|edge| edge[1])
+    };
+    let on_edge = |&[a, b]: &[u32; 2]| {
+        let (mut of_a, mut of_b) = (later(a).peekable(), later(b).peekable());
+        let mut found = Vec::new();
+        while let (Some(&c), Some(&d)) = (of_a.peek(), of_b.peek()) {
+            if c == d {
+                found.push([a, b, c]);
+            }
+            // Both advance where they agree.
+            of_a.next_if(|&c| c <= d);
+            of_b.next_if(|&d| d <= c);
+        }
+        found
+    };
+    edges.par_iter().flat_map_iter(on_edge).collect()
+}
+
+/// The labels of point triples with three different ones, ascending, in ascending order.
+fn of_labels(triples: &[[u32; 3]], labels: &[u32]) -> Vec<[u32; 3]> {
+    let labelled = |triple: &[u32; 3]| {
+        let mut face = triple.map(|v| labels[v as usize]);
+        face.sort_unstable();
+        (face[0] < face[1] && face[1] < face[2] && face[2] != NONE).then_some(face)
+    };
+    let mut faces: Vec<[u32; 3]> = triples.iter().filter_map(labelled).collect();
+    faces.sort_unstable();
+    faces.dedup();
+    faces
 }

@@ -1,19 +1,19 @@
 //! The rounds of cluster, refit, correct and split.
 
-use medial::complex::{MedialMesh, Sphere};
-use medial::simplifier::{RunContext, SimplifyError};
-use rayon::prelude::*;
+use std::sync::Arc;
 
-use super::cluster::{Clusters, NONE, assign, drop_small};
-use super::connect::{edges, faces};
-use super::correct::Solid;
-use super::energy::Energy;
-use super::params::{Connect, Points, VmasParams};
-use super::points::SurfacePoints;
-use super::refit::refit;
-use super::residuals::Residuals;
-use super::shrinking_ball::{Ball, End};
-use super::split::{misfits, to_split};
+use medial::Vec3;
+use medial::complex::{MedialMesh, Sphere};
+use medial::shape::{Shape, ShapeError};
+use medial::simplifier::{RunContext, SimplifyError};
+use medial::surface::{InsideTest, Side, TriangleBvh};
+use rayon::prelude::*;
+use wide::f64x4;
+
+use super::points::{GROUP, SurfacePoints, area_vector};
+use super::refit::{Residuals, refit};
+use super::shrinking_ball::{Ball, End, Touched, shrinking_ball};
+use super::{Connect, Points, VmasParams, edges, faces};
 
 /// A round whose total error changes by less than this is at rest; a fraction of the squared longest side.
 const AT_REST: f64 = 1e-5;
@@ -189,4 +189,341 @@ fn largest_ball(points: &SurfacePoints, solid: &Solid<'_>) -> Option<Ball> {
         (0..points.len()).into_par_iter().map(|v| solid.ball_at(points, v)).collect();
     let balls = balls.into_iter().flatten().rev();
     balls.max_by(|a, b| a.sphere.radius.total_cmp(&b.sphere.radius))
+}
+
+// ----------------------------------------------------------------------------
+// Step 1: every surface point goes to the sphere with the least error.
+//
+// The search is exhaustive by definition. Most spheres are left out all the same, because
+// `e_v(s) >= lambda d^2` where the point is `d` outside the sphere, and `e_v(s) >= (1 + lambda) d^2` where it is
+// `d` inside: there every plane distance `n . (v - c)` is at most `|v - c| < r`. The error of any one
+// sphere bounds the least error, and the sphere of the round before is seldom a bad one.
+
+/// The label of a point without a sphere.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Relative and absolute excess of a bound over its rounding error; lengths are at most about 1.
+const SLACK: (f64, f64) = (1.0 + 1e-9, 1e-12);
+
+/// The points of each sphere, ascending.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Clusters {
+    start: Vec<u32>,
+    members: Vec<u32>,
+}
+
+/// Gives every point the label of the sphere with the least error, the smallest of equal ones. Labels from
+/// before are where the search starts; the answer does not depend on them.
+pub(super) fn assign(
+    points: &SurfacePoints,
+    energy: Energy,
+    spheres: &[Sphere],
+    labels: &mut [u32],
+) {
+    let search = || (Vec::new(), Lanes::default());
+    labels.par_chunks_mut(GROUP).zip(&points.groups).enumerate().for_each_init(
+        search,
+        |(near, lanes), (place, (labels, group))| {
+            let first = place * GROUP;
+            let worst = bound(points, energy, spheres, first, labels);
+            candidates(group, worst, energy.lambda, spheres, near);
+            lanes.fill(spheres, near);
+            for (v, label) in (first..).zip(labels) {
+                *label = energy.least(points, v, lanes);
+            }
+        },
+    );
+}
+
+/// An upper bound of the least errors of a group.
+fn bound(
+    points: &SurfacePoints,
+    energy: Energy,
+    spheres: &[Sphere],
+    first: usize,
+    labels: &[u32],
+) -> f64 {
+    // A point without a label is near one that has one.
+    let mut guess = 0;
+    let mut worst = 0.0_f64;
+    for (v, &label) in (first..).zip(labels) {
+        guess = if label == NONE { guess } else { label };
+        worst = worst.max(energy.at(points, v, &spheres[guess as usize]));
+    }
+    worst
+}
+
+/// The spheres that may have an error of at most `worst` at a point of the group, ascending.
+fn candidates(group: &Sphere, worst: f64, lambda: f64, spheres: &[Sphere], near: &mut Vec<u32>) {
+    let reach = |weight: f64| (worst / weight).sqrt() * SLACK.0 + SLACK.1 + group.radius;
+    let (outside, inside) = (reach(lambda), reach(1.0 + lambda));
+    near.clear();
+    for (id, sphere) in (0..).zip(spheres) {
+        let distance = group.centre.distance(sphere.centre) - sphere.radius;
+        if distance <= outside && -distance <= inside {
+            near.push(id);
+        }
+    }
+}
+
+impl Clusters {
+    /// Sorts the points by label; those without one are in no cluster.
+    pub fn of_labels(labels: &[u32], spheres: usize) -> Self {
+        let mut start = vec![0; spheres + 1];
+        let labelled = || (0..).zip(labels).filter(|&(_, &label)| label != NONE);
+        labelled().for_each(|(_, &label)| start[label as usize + 1] += 1);
+        for sphere in 0..spheres {
+            start[sphere + 1] += start[sphere];
+        }
+        let mut next = start.clone();
+        let mut members = vec![0; start[spheres] as usize];
+        for (v, &label) in labelled() {
+            members[next[label as usize] as usize] = v;
+            next[label as usize] += 1;
+        }
+        Self { start, members }
+    }
+
+    /// The points of a sphere, ascending.
+    pub fn of(&self, sphere: usize) -> &[u32] {
+        &self.members[self.start[sphere] as usize..self.start[sphere + 1] as usize]
+    }
+}
+
+/// Drops the spheres with fewer than `least` points, whose points stay without a label in this round; the
+/// largest cluster stays whatever its size. Returns the clusters that are left.
+pub(super) fn drop_small(spheres: &mut Vec<Sphere>, labels: &mut [u32], least: usize) -> Clusters {
+    let clusters = Clusters::of_labels(labels, spheres.len());
+    let size = |s: usize| clusters.of(s).len();
+    let largest = (0..spheres.len()).rev().max_by_key(|&s| size(s));
+    let keeps = |s: usize| size(s) >= least || Some(s) == largest;
+    if (0..spheres.len()).all(keeps) {
+        return clusters;
+    }
+    let mut renamed = vec![NONE; spheres.len()];
+    let kept: Vec<usize> = (0..spheres.len()).filter(|&s| keeps(s)).collect();
+    (0..).zip(&kept).for_each(|(new, &old)| renamed[old] = new);
+    for label in labels.iter_mut().filter(|label| **label != NONE) {
+        *label = renamed[*label as usize];
+    }
+    *spheres = kept.iter().map(|&s| spheres[s]).collect();
+    Clusters::of_labels(labels, spheres.len())
+}
+
+// ----------------------------------------------------------------------------
+// Steps 4 and 5: the errors of the clusters, and which spheres are split.
+
+/// Share of the spheres that are split in a round, and their number at most.
+const SHARE: f64 = 0.2;
+const MOST: usize = 10;
+
+/// How well a sphere fits its cluster.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Misfit {
+    /// `E_s`: the errors of the cluster over its area, in squared diagonals.
+    pub mean: f64,
+    /// The point with the largest error, the smallest id of equal ones.
+    pub worst: u32,
+}
+
+/// The misfit of every sphere; no cluster is empty.
+pub(super) fn misfits(
+    points: &SurfacePoints,
+    energy: Energy,
+    spheres: &[Sphere],
+    clusters: &Clusters,
+) -> Vec<Misfit> {
+    let of_sphere = |(s, sphere): (usize, &Sphere)| {
+        let cluster = clusters.of(s);
+        let (mut sum, mut area) = (0.0, 0.0);
+        let (mut largest, mut worst) = (f64::NEG_INFINITY, cluster[0]);
+        for &v in cluster {
+            let a = points.areas[v as usize];
+            let error = a * energy.at(points, v as usize, sphere);
+            sum += error;
+            area += a;
+            if error > largest {
+                (largest, worst) = (error, v);
+            }
+        }
+        Misfit { mean: sum / area, worst }
+    };
+    spheres.par_iter().enumerate().map(of_sphere).collect()
+}
+
+/// The spheres to split, those with the largest errors first: at most so many as are missing, and none of
+/// which a neighbour is split. `edges` are pairs of adjacent spheres.
+pub(super) fn to_split(misfits: &[Misfit], edges: &[[u32; 2]], missing: usize) -> Vec<u32> {
+    let spheres = misfits.len();
+    let most = ((SHARE * spheres as f64).ceil() as usize).min(MOST).min(missing);
+    let mut neighbours = vec![Vec::new(); spheres];
+    for &[a, b] in edges {
+        neighbours[a as usize].push(b);
+        neighbours[b as usize].push(a);
+    }
+    let mut order: Vec<u32> = (0..spheres as u32).collect();
+    order.sort_unstable_by(|&a, &b| {
+        misfits[b as usize].mean.total_cmp(&misfits[a as usize].mean).then(a.cmp(&b))
+    });
+    let mut blocked = vec![false; spheres];
+    let mut split = Vec::new();
+    for sphere in order {
+        if split.len() == most {
+            break;
+        }
+        if !blocked[sphere as usize] {
+            neighbours[sphere as usize].iter().for_each(|&other| blocked[other as usize] = true);
+            split.push(sphere);
+        }
+    }
+    split
+}
+
+// ----------------------------------------------------------------------------
+// The error of a sphere at a surface point, one at a time and four at a time.
+//
+// `err_v(s) = a_v e_v(s)` with
+// `e_v(s) = sum_f w_f (n_f . (v - c) - r)^2 + lambda (|v - c| - r)^2`, where `w_f` is the share of the
+// plane `f` in the area of `v`. Which sphere has the least error does not depend on `a_v`.
+
+/// The energy of the paper.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Energy {
+    /// Weight of the Euclidean part.
+    pub lambda: f64,
+}
+
+/// Spheres in lanes of four.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lanes {
+    /// Centre and radius.
+    spheres: Vec<[f64x4; 4]>,
+    ids: Vec<f64x4>,
+}
+
+/// Radius in a lane without a sphere: its error is larger than every other.
+const NO_SPHERE: f64 = 1e100;
+
+impl Energy {
+    /// `e_v(s)`: the error of a sphere at a point for each unit of the point's area.
+    pub fn at(self, points: &SurfacePoints, v: usize, s: &Sphere) -> f64 {
+        let u = points.positions[v] - s.centre;
+        let mut planar = 0.0;
+        for plane in points.planes(v) {
+            let distance = plane.normal.dot(u) - s.radius;
+            planar += plane.share * distance * distance;
+        }
+        let distance = u.length() - s.radius;
+        planar + self.lambda * (distance * distance)
+    }
+
+    /// The sphere with the least error at a point, the smallest id of equal ones; the operations are
+    /// those of [`Energy::at`] in the same order, so that the errors are the same bits.
+    pub fn least(self, points: &SurfacePoints, v: usize, lanes: &Lanes) -> u32 {
+        let p = points.positions[v].to_array().map(f64x4::splat);
+        let lambda = f64x4::splat(self.lambda);
+        let (mut least, mut who) = (f64x4::splat(f64::INFINITY), f64x4::splat(0.0));
+        for ([x, y, z, radius], &ids) in lanes.spheres.iter().zip(&lanes.ids) {
+            let u = [p[0] - *x, p[1] - *y, p[2] - *z];
+            let mut planar = f64x4::splat(0.0);
+            for plane in points.planes(v) {
+                let n = plane.normal.to_array().map(f64x4::splat);
+                let distance = n[0] * u[0] + n[1] * u[1] + n[2] * u[2] - *radius;
+                planar += f64x4::splat(plane.share) * distance * distance;
+            }
+            let distance = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).sqrt() - *radius;
+            let error = planar + lambda * (distance * distance);
+            // Ids ascend in each lane: the first of equal errors stays.
+            let less = error.simd_lt(least);
+            least = less.bitselect(error, least);
+            who = less.bitselect(ids, who);
+        }
+        let in_lanes = least.to_array().into_iter().zip(who.to_array());
+        let best = in_lanes.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        best.map_or(0, |(_, id)| id as u32)
+    }
+}
+
+impl Lanes {
+    /// Spheres `ids` of all, in ascending order.
+    pub fn fill(&mut self, spheres: &[Sphere], ids: &[u32]) {
+        self.spheres.clear();
+        self.ids.clear();
+        for four in ids.chunks(4) {
+            let lane = |value: &dyn Fn(&Sphere) -> f64, none: f64| {
+                f64x4::new(
+                    [0, 1, 2, 3]
+                        .map(|k| four.get(k).map_or(none, |&s| value(&spheres[s as usize]))),
+                )
+            };
+            self.spheres.push([
+                lane(&|s| s.centre.x, 0.0),
+                lane(&|s| s.centre.y, 0.0),
+                lane(&|s| s.centre.z, 0.0),
+                lane(&|s| s.radius, NO_SPHERE),
+            ]);
+            self.ids.push(f64x4::new(
+                [0, 1, 2, 3].map(|k| four.get(k).map_or(f64::MAX, |&s| f64::from(s))),
+            ));
+        }
+    }
+}
+
+// ----------------------------------------------------------------------------
+// Step 3: a fitted centre is pushed back to the medial axis.
+
+/// A centre nearer to the surface than this gives no direction; a fraction of the diagonal.
+const ON_THE_SURFACE: f64 = 1e-12;
+
+/// The solid that spheres are corrected in.
+pub(super) struct Solid<'s> {
+    shape: &'s Shape,
+    pub tree: Arc<TriangleBvh>,
+    inside: Arc<InsideTest>,
+    /// The longest side of the bounding box, in diagonals.
+    pub side: f64,
+    touches_mesh: bool,
+}
+
+impl<'s> Solid<'s> {
+    /// # Errors
+    /// When the surface has no face.
+    pub fn new(shape: &'s Shape, touches_mesh: bool) -> Result<Self, ShapeError> {
+        let (tree, inside) = (shape.surface_tree()?, shape.inside_test());
+        let side = shape.mesh().bounding_box().map_or(1.0, |(lo, hi)| (hi - lo).max_element());
+        Ok(Self { shape, tree, inside, side, touches_mesh })
+    }
+
+    fn touched<'a>(&'a self, points: &'a SurfacePoints) -> Touched<'a> {
+        if self.touches_mesh { Touched::Mesh(&self.tree) } else { Touched::Points(&points.nearest) }
+    }
+
+    /// The medial ball of a surface point; `None` where the faces around a vertex cancel.
+    pub fn ball_at(&self, points: &SurfacePoints, v: usize) -> Option<Ball> {
+        let (p, n) = (points.positions[v], points.normals[v]);
+        let ball = || shrinking_ball(p, n, self.side, self.touched(points));
+        (n != Vec3::ZERO).then(ball).filter(is_medial)
+    }
+
+    /// The medial ball of the surface point nearest to a fitted centre; `None` where there is none. The fitted
+    /// radius has no part in it.
+    pub fn corrected(&self, points: &SurfacePoints, fitted: Vec3) -> Option<Ball> {
+        if !fitted.is_finite() {
+            return None;
+        }
+        let closest = self.tree.closest(fitted);
+        let outward = if closest.distance > ON_THE_SURFACE {
+            let away = (closest.point - fitted) / closest.distance;
+            if self.inside.side(fitted) == Side::Outside { -away } else { away }
+        } else {
+            area_vector(self.shape.mesh(), closest.face as usize).try_normalize()?
+        };
+        let ball = shrinking_ball(closest.point, outward, self.side, self.touched(points));
+        is_medial(&ball).then_some(ball)
+    }
+}
+
+/// Whether a ball has two contacts: one that never shrank is as large as it began.
+fn is_medial(ball: &Ball) -> bool {
+    ball.steps > 0 && ball.sphere.centre.is_finite()
 }

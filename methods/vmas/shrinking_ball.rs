@@ -13,7 +13,7 @@ use medial::Vec3;
 use medial::complex::Sphere;
 use medial::surface::TriangleBvh;
 
-use super::nearest_point::PointGroups;
+use super::points::PointGroups;
 
 /// Steps at most.
 const STEPS: usize = 30;

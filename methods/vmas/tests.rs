@@ -9,16 +9,12 @@ use medial::surface::TriMesh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::cluster::{Clusters, NONE, assign, drop_small};
-use super::connect::{edges, faces};
-use super::energy::Energy;
-use super::params::{Connect, Refit};
 use super::points::{Locality, Oriented, SurfacePoints};
-use super::refit::refit;
-use super::residuals::Residuals;
-use super::sampling::Ended;
-use super::split::{Misfit, misfits, to_split};
-use super::{VmasParams, explain};
+use super::refit::{Residuals, refit};
+use super::sampling::{
+    Clusters, Ended, Energy, Misfit, NONE, assign, drop_small, misfits, to_split,
+};
+use super::{Connect, Refit, VmasParams, edges, explain, faces};
 
 const ENERGY: Energy = Energy { lambda: 0.2 };
 

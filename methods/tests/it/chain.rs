@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use medial::Vec3;
 use medial::complex::{DualTriangulation, MedialMesh, betti};
-use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, Params, RunContext};
-use medial::surface::{self, TriMesh};
+use medial::metrics::JudgeOptions;
+use medial::shape::{Shape, ShapeOptions, Substrate};
+use medial::simplifier::{Level, MedialSimplifier, Params, Registered, RunContext, Simplified};
+use medial::surface::TriMesh;
+use medial::{Vec3, surface};
 use medial_datasets::{add_noise, catalogue, find};
+use medial_methods::registry;
 use proptest::prelude::*;
 
 fn shape_of(mesh: &TriMesh, dual: DualTriangulation) -> Shape {
@@ -115,5 +117,60 @@ proptest! {
             mesh.faces.iter().map(|face| face.map(|v| renamed[v as usize])).collect();
         faces.sort_unstable();
         assert_carried(&mesh, &TriMesh { vertices, faces }, 1.0, |p| p);
+    }
+}
+
+// ----------------------------------------------------------------------------
+// Results of searches do not depend on earlier levels.
+
+fn built_in(id: &str) -> Shape {
+    let built_in = medial_datasets::find(id).expect("in the catalogue");
+    let mesh = built_in.mesh(built_in.default_resolution);
+    let report = surface::validate(&mesh).expect("a solid");
+    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+fn answers(method: &dyn MedialSimplifier, shape: &Shape, counts: &[usize]) -> Vec<Simplified> {
+    let run = RunContext::default();
+    let mut prepared = method.prepare(shape, &Params::none(), &run).expect("prepared");
+    counts.iter().map(|&count| prepared.at(Level::Spheres(count)).expect("a count")).collect()
+}
+
+#[test]
+fn answers_do_not_depend_on_earlier_ones() {
+    for id in ["sat", "aof"] {
+        let method = medial_methods::find(id).expect("registered");
+        for shape in ["bracket", "plate", "pair"] {
+            let shape = built_in(shape);
+            let counts = [150, 1000, 400, 30, 150];
+            for (count, after) in counts.iter().zip(answers(method.as_ref(), &shape, &counts)) {
+                let alone = answers(method.as_ref(), &shape, &[*count]).remove(0);
+                let name = format!("{id} on {} at {count}", shape.name());
+                assert_eq!(after.mesh, alone.mesh, "{name}");
+                assert_eq!(after.native_level, alone.native_level, "{name}");
+                assert_eq!(after.diagnostics, alone.diagnostics, "{name}");
+            }
+        }
+    }
+}
+
+// ----------------------------------------------------------------------------
+// The substrates that methods use of a shape. The requirements on every method are in the corpus of
+// `medial check` (`bench/check`).
+
+#[test]
+fn every_method_pays_for_the_inside_test_and_the_judge_for_nothing() {
+    let solid = medial_datasets::find("capsule").expect("in the catalogue");
+    let mesh = solid.mesh(solid.default_resolution);
+    let report = surface::validate(&mesh).expect("built-in shapes are solids");
+    let shape = Shape::new("capsule", &mesh, report, ShapeOptions::default()).expect("an extent");
+    shape.judge(None, JudgeOptions::default()).expect("a judge");
+    assert!(shape.used().is_empty());
+    let usual = registry().into_iter().filter(|entry| !entry.presentation.on_request);
+    for Registered { method, .. } in usual {
+        let view = shape.view();
+        method.prepare(&view, &Params::none(), &RunContext::default()).expect("prepared");
+        let paid = view.used().iter().any(|(substrate, _)| *substrate == Substrate::InsideTest);
+        assert!(paid, "{}", method.info().id);
     }
 }
