@@ -16,7 +16,7 @@ use crate::shapes::{
     PLATE_HALF, RIB, RIB_HALF, ROD_APEX, ROD_HALF, ROD_RADIUS, ROUNDING, TORUS, TUBE, TUBE_RADIUS,
     WEDGE, coil_centre, coil_length,
 };
-use crate::solids::{Curve, unit_sphere};
+use crate::solids::{Curve, sin_cos_of_part, unit_sphere};
 
 /// The medial axis of a built-in shape, known without sampling, in the shape's own coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,26 +57,30 @@ pub(crate) fn sphere() -> KnownAxis {
 pub(crate) fn ellipsoid() -> KnownAxis {
     let Vec3 { x: a, y: b, z: c } = ELLIPSOID;
     let (u, v) = (a * a - c * c, b * b - c * c);
-    let on_axis = |x: f64, y: f64| {
-        Sphere::new(Vec3::new(x, y, 0.0), c * (1.0 - x * x / u - y * y / v).sqrt())
-    };
     let (vertices, faces) = disc();
     let spheres = vertices.iter().map(|&[s, t]| {
         // Rings at equal angles of the surface: closer towards the rim, where the radius falls
         // ever more steeply.
         let rho = s.hypot(t);
         let stretch = if rho > 0.0 { (FRAC_PI_2 * rho).sin() / rho } else { 0.0 };
-        on_axis(s * stretch * u / a, t * stretch * v / b)
+        ellipsoid_sphere(s * stretch * u / a, t * stretch * v / b)
     });
     let mut axis = known(spheres.collect(), vec![], faces, 0.0);
     // The radius is concave, so that it is nearly farthest from linear halfway between vertices.
     let sagging = axis.mesh.edges.iter().map(|edge| {
         let [p, q] = edge.map(|sphere| axis.mesh.spheres[sphere as usize]);
         let middle = p.lerp(q, 0.5);
-        on_axis(middle.centre.x, middle.centre.y).radius - middle.radius
+        ellipsoid_sphere(middle.centre.x, middle.centre.y).radius - middle.radius
     });
     axis.tolerance = 2.0 * sagging.fold(0.0, f64::max) + sagitta(u / a, DISC_SECTORS * DISC_RINGS);
     axis
+}
+
+/// The medial sphere of the ellipsoid at a point of its plane.
+fn ellipsoid_sphere(x: f64, y: f64) -> Sphere {
+    let Vec3 { x: a, y: b, z: c } = ELLIPSOID;
+    let (u, v) = (a * a - c * c, b * b - c * c);
+    Sphere::new(Vec3::new(x, y, 0.0), c * (1.0 - x * x / u - y * y / v).sqrt())
 }
 
 /// How far a regular polygon of `sides` inscribed in a circle stays away from it.
@@ -86,29 +90,36 @@ pub(crate) fn sagitta(radius: f64, sides: u32) -> f64 {
 
 /// The unit disc in concentric rings: the vertices and triangles, the centre being vertex 0.
 fn disc() -> (Vec<[f64; 2]>, Vec<[u32; 3]>) {
-    let count = |ring: u32| if ring == 0 { 1 } else { DISC_SECTORS * ring };
-    let first = |ring: u32| if ring == 0 { 0 } else { 1 + DISC_SECTORS * ring * (ring - 1) / 2 };
-    let mut vertices = Vec::new();
+    let mut vertices = vec![[0.0, 0.0]];
     let mut faces = Vec::new();
-    for ring in 0..=DISC_RINGS {
+    for ring in 1..=DISC_RINGS {
         let radius = f64::from(ring) / f64::from(DISC_RINGS);
-        vertices.extend((0..count(ring)).map(|i| {
-            let (sin, cos) = (TAU * f64::from(i) / f64::from(count(ring))).sin_cos();
+        let count = DISC_SECTORS * ring;
+        vertices.extend((0..count).map(|i| {
+            let (sin, cos) = sin_cos_of_part(i, count);
             [radius * cos, radius * sin]
         }));
-        let inner = |i: u32| first(ring - 1) + i % count(ring - 1);
-        let outer = |i: u32| first(ring) + i % count(ring);
-        for i in 0..if ring == 0 { 0 } else { count(ring) } {
+        for i in 0..count {
             // In each sector the inner ring has one vertex less.
             let (sector, step) = (i / ring, i % ring);
             let below = sector * (ring - 1) + step;
-            faces.push([inner(below), outer(i), outer(i + 1)]);
+            let [a, b] = [i, i + 1].map(|i| disc_vertex(ring, i));
+            let [c, d] = [below, below + 1].map(|i| disc_vertex(ring - 1, i));
+            faces.push([c, a, b]);
             if step + 1 < ring {
-                faces.push([inner(below), outer(i + 1), inner(below + 1)]);
+                faces.push([c, b, d]);
             }
         }
     }
     (vertices, faces)
+}
+
+/// The vertex `i`, counted around, of a ring of the disc; ring 0 is the centre.
+fn disc_vertex(ring: u32, i: u32) -> u32 {
+    match ring {
+        0 => 0,
+        _ => 1 + DISC_SECTORS * ring * (ring - 1) / 2 + i % (DISC_SECTORS * ring),
+    }
 }
 
 /// The 13 sheets of a box with half sides `A > B > C`, from the core outward: the rectangle
@@ -120,10 +131,10 @@ fn box_axis(half: Vec3, grown: f64) -> KnownAxis {
         let centre = Vec3::new(x * (half.x - half.z), y * (half.y - half.z), 0.0);
         Sphere::new(centre, half.z + grown)
     });
-    let corners = |z: f64| {
+    let [bottom, top] = [-1.0, 1.0].map(|z| {
         signs.map(|[x, y]| Sphere::new(Vec3::new(x * half.x, y * half.y, z * half.z), grown))
-    };
-    let spheres = [inner, corners(-1.0), corners(1.0)].concat();
+    });
+    let spheres = [inner, bottom, top].concat();
     let mut faces = vec![[0, 1, 2], [0, 2, 3]];
     for i in 0..4 {
         let j = (i + 1) % 4;
@@ -150,15 +161,16 @@ pub(crate) fn rounded_box() -> KnownAxis {
 }
 
 pub(crate) fn capsule() -> KnownAxis {
-    let end = |z: f64| Sphere::new(Vec3::new(0.0, 0.0, z), ROD_RADIUS);
-    known(vec![end(-ROD_HALF), end(ROD_HALF)], vec![[0, 1]], vec![], 0.0)
+    let ends = [-ROD_HALF, ROD_HALF].map(|z| Sphere::new(Vec3::new(0.0, 0.0, z), ROD_RADIUS));
+    known(ends.to_vec(), vec![[0, 1]], vec![], 0.0)
 }
 
 pub(crate) fn pair() -> KnownAxis {
     let (ball, radius) = PAIR_BALL;
     let (centre, half, capsule_radius) = PAIR_CAPSULE;
-    let end = |z: f64| Sphere::new(centre + Vec3::new(0.0, 0.0, z), capsule_radius);
-    known(vec![Sphere::new(ball, radius), end(-half), end(half)], vec![[1, 2]], vec![], 0.0)
+    let [low, high] =
+        [-half, half].map(|z| Sphere::new(centre + Vec3::new(0.0, 0.0, z), capsule_radius));
+    known(vec![Sphere::new(ball, radius), low, high], vec![[1, 2]], vec![], 0.0)
 }
 
 /// The axis of the cylinder and, at each end, a cone out to the crease.
@@ -197,7 +209,7 @@ pub(crate) fn rod() -> KnownAxis {
 pub(crate) fn torus() -> KnownAxis {
     let (major, minor) = TORUS;
     let spheres = (0..CIRCLE_EDGES).map(|i| {
-        let (sin, cos) = (TAU * f64::from(i) / f64::from(CIRCLE_EDGES)).sin_cos();
+        let (sin, cos) = sin_cos_of_part(i, CIRCLE_EDGES);
         Sphere::new(Vec3::new(major * cos, major * sin, 0.0), minor)
     });
     let edges = (0..CIRCLE_EDGES).map(|i| [i, (i + 1) % CIRCLE_EDGES]).collect();
@@ -209,8 +221,8 @@ pub(crate) fn torus() -> KnownAxis {
 pub(crate) fn coil() -> KnownAxis {
     let (radius, pitch, turns, pipe) = COIL;
     let (length, last) = (coil_length(), 2 * CIRCLE_EDGES);
-    let at = |i: u32| coil_centre(length * (f64::from(i) / f64::from(last) - 0.5));
-    let spheres = (0..=last).map(|i| Sphere::new(at(i), pipe)).collect();
+    let along = (0..=last).map(|i| length * (f64::from(i) / f64::from(last) - 0.5));
+    let spheres = along.map(|along| Sphere::new(coil_centre(along), pipe)).collect();
     let edges = (0..last).map(|i| [i, i + 1]).collect();
     // The circle that osculates the helix has the radius R + (P / 2 pi)^2 / R.
     let rise = pitch / TAU;
@@ -283,17 +295,17 @@ pub(crate) fn holed_plate() -> KnownAxis {
     // The rings of the middle sheet, then those of both faces: of the rectangle, and of the circle.
     let rings = [(&level, 0.0, c), (&creases, -c, 0.0), (&creases, c, 0.0)];
     let spheres = rings.iter().flat_map(|&(lines, y, radius)| {
-        let ring = move |end: usize| lines.iter().map(move |line| (line[end], y, radius));
-        ring(0).chain(ring(1))
+        [0, 1].into_iter().flat_map(move |end| lines.iter().map(move |line| (line[end], y, radius)))
     });
     let spheres = spheres.map(|([x, z], y, radius)| Sphere::new(Vec3::new(x, y, z), radius));
     let sides = level.len() as u32;
     let mut faces = Vec::new();
     for (from, to) in [(0, 1), (0, 2), (0, 4), (1, 3), (1, 5)] {
         for i in 0..sides {
-            let at = |ring: u32, i: u32| ring * sides + i % sides;
-            faces.push([at(from, i), at(from, i + 1), at(to, i + 1)]);
-            faces.push([at(from, i), at(to, i + 1), at(to, i)]);
+            let next = (i + 1) % sides;
+            let [a, b] = [i, next].map(|i| from * sides + i);
+            let [c, d] = [i, next].map(|i| to * sides + i);
+            faces.extend([[a, b, d], [a, d, c]]);
         }
     }
     // A triangle to each upright edge.
@@ -304,24 +316,22 @@ pub(crate) fn holed_plate() -> KnownAxis {
 
 /// The balls along the segment of their centres; radii are linear between neighbours.
 pub(crate) fn chain() -> KnownAxis {
-    let ball = |&(z, radius): &(f64, f64)| Sphere::new(Vec3::new(0.0, 0.0, z), radius);
-    let spheres: Vec<Sphere> = CHAIN.iter().map(ball).collect();
+    let spheres = CHAIN.map(|(z, radius)| Sphere::new(Vec3::new(0.0, 0.0, z), radius)).to_vec();
     let edges = (1..spheres.len() as u32).map(|i| [i - 1, i]).collect();
     known(spheres, edges, vec![], 0.0)
 }
 
 /// The centre curve: its curvature is below one over the tube's radius, and it stays away from itself.
 pub(crate) fn tube() -> KnownAxis {
-    let curve = TUBE;
-    let Curve { start, end, .. } = curve;
+    let Curve { start, end, place, .. } = TUBE;
     let parts = 2 * CIRCLE_EDGES;
-    let at = |share: f64| (curve.place)(start + (end - start) * share);
-    let share = |i: u32, offset: f64| (f64::from(i) + offset) / f64::from(parts);
-    let spheres = (0..=parts).map(|i| Sphere::new(at(share(i, 0.0)), TUBE_RADIUS)).collect();
+    // The ends of the parts and, between them, their middles.
+    let shares = (0..=2 * parts).map(|i| f64::from(i) / f64::from(2 * parts));
+    let points: Vec<Vec3> = shares.map(|share| place(start + (end - start) * share)).collect();
+    let spheres = points.iter().step_by(2).map(|&point| Sphere::new(point, TUBE_RADIUS)).collect();
     let edges = (0..parts).map(|i| [i, i + 1]).collect();
-    let sagging = (0..parts)
-        .map(|i| at(share(i, 0.5)).distance(at(share(i, 0.0)).midpoint(at(share(i, 1.0)))))
-        .fold(0.0, f64::max);
+    let chords = points.windows(3).step_by(2);
+    let sagging = chords.map(|p| p[1].distance(p[0].midpoint(p[2]))).fold(0.0, f64::max);
     known(spheres, edges, vec![], 2.0 * sagging)
 }
 
@@ -457,10 +467,9 @@ impl Profile {
             for (k, pair) in (0_u32..).zip(knots.windows(2)) {
                 let share = (f64::from(k) + 0.5) / f64::from(self.parts(branch));
                 let (truth, [a, b]) = (self.knot(branch, share), [pair[0], pair[1]]);
-                let off = |of: fn(&Knot) -> DVec2| of(&truth).distance(of(&a).midpoint(of(&b)));
-                let places =
-                    [off(|knot| knot.at), off(|knot| knot.feet[0]), off(|knot| knot.feet[1])];
-                let place = places.into_iter().fold(0.0, f64::max);
+                let off = [truth, a, b].map(|knot| [knot.at, knot.feet[0], knot.feet[1]]);
+                let off = [0, 1, 2].map(|i| off[0][i].distance(off[1][i].midpoint(off[2][i])));
+                let place = off.into_iter().fold(0.0, f64::max);
                 largest = largest.max(place + (truth.radius - (a.radius + b.radius) / 2.0).abs());
             }
         }
@@ -480,20 +489,19 @@ impl Profile {
                 knots.iter().all(|knot| knot.radius < half),
                 "a profile thicker than its prism"
             );
-            let mut at = |side: f64, p: DVec2, radius: f64| {
-                let y = middle + side * (half - radius);
-                builder.vertex(Sphere::new(Vec3::new(p.x, y, p.y), radius))
-            };
             let mut quads = Vec::new();
             for pair in knots.windows(2) {
                 let [a, b] = [pair[0], pair[1]];
-                let mut axis = |side| [at(side, a.at, a.radius), at(side, b.at, b.radius)];
-                let ([low_a, low_b], [high_a, high_b]) = (axis(-1.0), axis(1.0));
+                let caps = [(middle, -half), (middle, half)];
+                let [[low_a, low_b], [high_a, high_b]] = caps.map(|cap| {
+                    [builder.roof(cap, a.at, a.radius), builder.roof(cap, b.at, b.radius)]
+                });
                 quads.push([low_a, low_b, high_b, high_a]);
-                for (side, [on_a, on_b]) in [(-1.0, [low_a, low_b]), (1.0, [high_a, high_b])] {
+                for (cap, [on_a, on_b]) in caps.into_iter().zip([[low_a, low_b], [high_a, high_b]])
+                {
                     for foot in 0..2 {
-                        let (foot_a, foot_b) =
-                            (at(side, a.feet[foot], 0.0), at(side, b.feet[foot], 0.0));
+                        let foot_a = builder.roof(cap, a.feet[foot], 0.0);
+                        let foot_b = builder.roof(cap, b.feet[foot], 0.0);
                         quads.push([on_a, on_b, foot_b, foot_a]);
                     }
                 }
@@ -570,10 +578,18 @@ impl Builder {
             self.edges.push([*a, *b]);
             return;
         }
-        let at = |circle: &[u32], i: usize| circle[i % circle.len()];
+        // A point is a circle of one vertex.
         for i in 0..SECTORS as usize {
-            self.quad([at(a, i), at(b, i), at(b, i + 1), at(a, i + 1)]);
+            let [p, q] = [i, i + 1].map(|i| a[i % a.len()]);
+            let [r, s] = [i, i + 1].map(|i| b[i % b.len()]);
+            self.quad([p, r, s, q]);
         }
+    }
+
+    /// A vertex of a prism below the cap at distance `half` from its middle, `half` being negative for the lower one.
+    fn roof(&mut self, (middle, half): (f64, f64), p: DVec2, radius: f64) -> u32 {
+        let y = middle + half.signum() * (half.abs() - radius);
+        self.vertex(Sphere::new(Vec3::new(p.x, y, p.y), radius))
     }
 
     fn finish(self, tolerance: f64) -> KnownAxis {

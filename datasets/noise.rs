@@ -141,8 +141,7 @@ pub fn add_noise(mesh: &TriMesh, eta: f64, seed: u64) -> TriMesh {
 /// A point uniform in the unit ball: the first of points uniform in the cube around it that hits.
 fn in_unit_ball(random: &mut Pcg64) -> Vec3 {
     loop {
-        let mut coordinate = || random.random_range(-1.0..1.0);
-        let point = Vec3::new(coordinate(), coordinate(), coordinate());
+        let point = Vec3::from([(); 3].map(|()| random.random_range(-1.0..1.0)));
         if point.length_squared() <= 1.0 {
             return point;
         }
@@ -264,8 +263,8 @@ impl Surface {
     }
 
     fn star(&self, v: u32) -> Vec<[u32; 3]> {
-        let face = |&id: &u32| self.faces[id as usize].expect("a face that is there");
-        self.stars[v as usize].iter().map(face).collect()
+        let faces = self.stars[v as usize].iter().map(|&id| self.faces[id as usize]);
+        faces.map(|face| face.expect("a star holds faces that are there")).collect()
     }
 
     fn neighbours(&self, v: u32) -> Vec<u32> {
@@ -303,11 +302,8 @@ impl Surface {
     /// Volume between a vertex and the faces that would replace its star.
     fn swept(&self, v: u32, moved: &[[u32; 3]]) -> f64 {
         let apex = self.vertices[v as usize];
-        let volume = |&face: &[u32; 3]| {
-            let [a, b, c] = self.places(face).map(|p| p - apex);
-            a.dot(b.cross(c)).abs()
-        };
-        moved.iter().map(volume).sum()
+        let corners = moved.iter().map(|&face| self.places(face).map(|p| p - apex));
+        corners.map(|[a, b, c]| a.dot(b.cross(c)).abs()).sum()
     }
 
     /// The link condition: the two vertices have no common neighbour but the two across their edge.
@@ -328,14 +324,18 @@ impl Surface {
         })
     }
 
+    fn meets(&self, face: [u32; 3], other: [u32; 3]) -> bool {
+        triangles_meet(face, self.places(face), other, self.places(other))
+    }
+
     /// Whether a face that would replace the star of `v` meets another one outside common corners and edges.
     fn crosses(&self, v: u32, moved: &[[u32; 3]]) -> bool {
         moved.iter().enumerate().any(|(i, &face)| {
-            let places = self.places(face);
-            let meets = |other: [u32; 3]| triangles_meet(face, places, other, self.places(other));
-            let alive = |id: u32| self.faces[id as usize].filter(|other| !other.contains(&v));
-            moved[..i].iter().any(|&other| meets(other))
-                || self.grid.near(places).into_iter().filter_map(alive).any(meets)
+            // The grid still lists faces that are gone, and the star goes with `v`.
+            let near = self.grid.near(self.places(face)).into_iter();
+            let near = near.filter_map(|id| self.faces[id as usize]);
+            let near = near.filter(|other| !other.contains(&v));
+            moved[..i].iter().copied().chain(near).any(|other| self.meets(face, other))
         })
     }
 
@@ -366,11 +366,11 @@ fn smallest_sine([a, b, c]: [Vec3; 3]) -> f64 {
 }
 
 fn mean_edge(mesh: &TriMesh) -> f64 {
-    let perimeter = |face| {
+    let perimeters = (0..mesh.faces.len()).map(|face| {
         let [a, b, c]: [Vec3; 3] = mesh.triangle(face);
         a.distance(b) + b.distance(c) + c.distance(a)
-    };
-    (0..mesh.faces.len()).map(perimeter).sum::<f64>() / (3 * mesh.faces.len()) as f64
+    });
+    perimeters.sum::<f64>() / (3 * mesh.faces.len()) as f64
 }
 
 /// Faces by the cubes that their boxes overlap. Faces that are gone stay in it.
@@ -397,11 +397,14 @@ impl Grid {
     }
 
     fn cubes(&self, [a, b, c]: [Vec3; 3]) -> Vec<[i64; 3]> {
-        let cube = |p: Vec3| (p / self.spacing).floor().to_array().map(|x| x as i64);
-        let (low, high) = (cube(a.min(b).min(c)), cube(a.max(b).max(c)));
-        let range = |axis: usize| low[axis]..=high[axis];
-        range(0)
-            .flat_map(|i| range(1).flat_map(move |j| range(2).map(move |k| [i, j, k])))
-            .collect()
+        let [low, high] = [a.min(b).min(c), a.max(b).max(c)]
+            .map(|p| (p / self.spacing).floor().to_array().map(|x| x as i64));
+        let mut cubes = Vec::new();
+        for i in low[0]..=high[0] {
+            for j in low[1]..=high[1] {
+                cubes.extend((low[2]..=high[2]).map(|k| [i, j, k]));
+            }
+        }
+        cubes
     }
 }

@@ -106,12 +106,11 @@ impl Elbow {
     /// The same with the leg at `outer` and the foot towards the axis of revolution: `x` becomes `outer - x`.
     pub(crate) fn mirrored(&self, outer: f64) -> Profile {
         let mut profile = self.profile();
-        let across = |p: DVec2| point(outer - p.x, p.y);
-        profile.nodes.iter_mut().for_each(|node| *node = across(*node));
+        profile.nodes.iter_mut().for_each(|node| node.x = outer - node.x);
         for site in &mut profile.sites {
             match site {
-                Site::Line { at, inward } => (*at, inward.x) = (across(*at), -inward.x),
-                Site::Round { centre, .. } => *centre = across(*centre),
+                Site::Line { at, inward } => (at.x, inward.x) = (outer - at.x, -inward.x),
+                Site::Round { centre, .. } => centre.x = outer - centre.x,
             }
         }
         profile
@@ -138,7 +137,6 @@ impl Rib {
     pub(crate) fn profile(&self) -> Profile {
         let Self { half, plate: t, half_rib: w, height } = *self;
         let junction = (w * w + t * t) / (2.0 * t);
-        let corner = |x: f64| Site::Round { centre: point(x, t), radius: 0.0 };
         let [below, top, centre]: [usize; 3] = [0, 1, 2];
         let mut sites = vec![
             Site::line(point(0.0, 0.0), point(1.0, 0.0)),
@@ -150,7 +148,7 @@ impl Rib {
             let (site, node) = (sites.len(), nodes.len());
             let [reflex, above, flank, end] = [0, 1, 2, 3].map(|i| site + i);
             sites.extend([
-                corner(side * w),
+                Site::Round { centre: point(side * w, t), radius: 0.0 },
                 Site::Line { at: point(0.0, t), inward: point(0.0, -1.0) },
                 Site::Line { at: point(side * w, 0.0), inward: point(-side, 0.0) },
                 Site::Line { at: point(side * half, 0.0), inward: point(-side, 0.0) },
@@ -247,7 +245,8 @@ pub(crate) fn strip(lines: &[Across], layers: u32, closed: bool) -> Flat {
 /// The triangle with base `2 half` on `z = 0` and its apex at `height`, its sides in `n` parts each.
 pub(crate) fn flat_triangle(half: f64, height: f64, n: u32) -> Flat {
     let mut mesh = TriMesh::default();
-    let first = |row: u32| row * (n + 1) - row * row.saturating_sub(1) / 2;
+    // First vertices of this row and of the one below.
+    let (mut first, mut first_below) = (0, 0);
     for row in 0..=n {
         let up = f64::from(row) / f64::from(n);
         mesh.vertices.extend((0..=n - row).map(|i| {
@@ -256,12 +255,13 @@ pub(crate) fn flat_triangle(half: f64, height: f64, n: u32) -> Flat {
             Vec3::new(half * across / f64::from(n), 0.0, height * up)
         }));
         for i in 0..if row == 0 { 0 } else { n - row + 1 } {
-            let (below, above) = (first(row - 1) + i, first(row) + i);
+            let (below, above) = (first_below + i, first + i);
             mesh.faces.push([below, below + 1, above]);
             if i < n - row {
                 mesh.faces.push([below + 1, above + 1, above]);
             }
         }
+        (first_below, first) = (first, mesh.vertices.len() as u32);
     }
     Flat(mesh)
 }
@@ -281,12 +281,25 @@ pub(crate) fn around_hole(radius: f64, half: [f64; 2], sides: [u32; 2]) -> Vec<A
         (PI - corner, PI + corner, [-x, z], [-x, -z], sides[0]),
         (PI + corner, 2.0 * PI - corner, [-x, -z], [x, -z], sides[1]),
     ];
-    let line = |(from, to, start, end, n): (f64, f64, [f64; 2], [f64; 2], u32), i: u32| {
-        let t = f64::from(i) / f64::from(n);
-        let (sin, cos) = (from * (1.0 - t) + to * t).sin_cos();
-        [[0, 1].map(|axis| start[axis] * (1.0 - t) + end[axis] * t), [radius * cos, radius * sin]]
-    };
-    quarters.into_iter().flat_map(|side| (0..side.4).map(move |i| line(side, i))).collect()
+    let mut lines = Vec::new();
+    for (from, to, start, end, n) in quarters {
+        for i in 0..n {
+            let t = f64::from(i) / f64::from(n);
+            let (sin, cos) = between(from, to, t).sin_cos();
+            let outer = [0, 1].map(|axis| between(start[axis], end[axis], t));
+            lines.push([outer, [radius * cos, radius * sin]]);
+        }
+    }
+    lines
+}
+
+/// The weighted sum meets both ends exactly.
+fn between(a: f64, b: f64, t: f64) -> f64 {
+    a * (1.0 - t) + b * t
+}
+
+fn share(i: u32, n: u32) -> f64 {
+    f64::from(i) / f64::from(n)
 }
 
 /// Lines across an elbow with a fillet, from the top of its leg to the end of its foot.
@@ -296,10 +309,8 @@ pub(crate) fn across_elbow(elbow: &Elbow, edge: f64) -> Vec<Across> {
     let quarter = std::f64::consts::FRAC_PI_2;
     // The outer sides of the corner are longer than half the fillet: parts of about `edge` between both.
     let n = parts((centre.x + quarter * fillet / 2.0) / 2.0, edge, 1);
-    let share = |i: u32, n: u32| f64::from(i) / f64::from(n);
     let upright = parts(height - centre.y, edge, 1);
     let flat = parts(length - centre.x, edge, 1);
-    let between = |a: f64, b: f64, t: f64| a * (1.0 - t) + b * t;
     let leg_lines = (0..upright).map(|i| {
         let z = between(height, centre.y, share(i, upright));
         [[0.0, z], [leg, z]]
@@ -357,8 +368,8 @@ impl Flat {
         let sides = flat.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let mut directed: Vec<[u32; 2]> = sides.collect();
         directed.sort_unstable();
-        let lone = |&&[a, b]: &&[u32; 2]| directed.binary_search(&[b, a]).is_err();
-        let edges: Vec<[u32; 2]> = directed.iter().filter(lone).copied().collect();
+        let mut edges = directed.clone();
+        edges.retain(|&[a, b]| directed.binary_search(&[b, a]).is_err());
         let mut on_it = vec![false; flat.vertices.len()];
         edges.as_flattened().iter().for_each(|&v| on_it[v as usize] = true);
         Boundary { edges, on_it }

@@ -118,12 +118,10 @@ impl Catalogue {
         let mut packages = BTreeSet::new();
         for Package { id, version, .. } in &self.packages {
             let (client, name) = id.split_once(':').unwrap_or_default();
-            // The client would take a name that begins with a hyphen for an option.
-            let usable = |word: &str| !word.is_empty() && !word.starts_with('-');
             let fetched = ["deb", "npm", "pypi"].contains(&client);
             if !(fetched || client == "file")
-                || !usable(name)
-                || !version.as_deref().map_or(!fetched, usable)
+                || !is_usable(name)
+                || !version.as_deref().map_or(!fetched, is_usable)
             {
                 return Err(format!("package {id}: unusable client, name or version"));
             }
@@ -149,13 +147,17 @@ impl Catalogue {
     }
 }
 
+/// Whether a client takes the word for a name: one that begins with a hyphen would be an option.
+fn is_usable(word: &str) -> bool {
+    !word.is_empty() && !word.starts_with('-')
+}
+
 /// Whether a text can name a mesh and its file: lower-case letters, digits, `.`, `_`, `-`, beginning with a letter or
 /// digit.
 pub fn is_name(text: &str) -> bool {
-    let is_plain = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit();
     (1..=100).contains(&text.len())
-        && text.bytes().next().is_some_and(is_plain)
-        && text.bytes().all(|byte| is_plain(byte) || b"._-".contains(&byte))
+        && !text.starts_with(['.', '_', '-'])
+        && text.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b"._-".contains(&b))
 }
 
 impl Published {

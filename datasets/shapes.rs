@@ -370,8 +370,9 @@ pub(crate) fn double_torus(edge: f64) -> TriMesh {
 }
 
 pub(crate) fn double_torus_field() -> Blend {
-    let ring = |x: f64| Part::Torus { centre: Vec3::new(x, 0.0, 0.0), major: 0.7, minor: 0.25 };
-    Blend { parts: vec![ring(-0.8), ring(0.8)], sharpness: 20.0 }
+    let centres = [-0.8, 0.8].map(|x| Vec3::new(x, 0.0, 0.0));
+    let rings = centres.map(|centre| Part::Torus { centre, major: 0.7, minor: 0.25 });
+    Blend { parts: rings.to_vec(), sharpness: 20.0 }
 }
 
 pub(crate) fn frame(edge: f64) -> TriMesh {
@@ -391,21 +392,15 @@ pub(crate) fn blob(edge: f64) -> TriMesh {
 }
 
 pub(crate) fn blob_field() -> Blend {
-    let tube = |a: [f64; 3], b: [f64; 3], radius: f64| Part::Tube {
-        a: Vec3::from(a),
-        b: Vec3::from(b),
-        radius,
-    };
-    Blend {
-        parts: vec![
-            tube([-0.5, 0.0, 0.0], [0.45, 0.05, 0.05], 0.32),
-            tube([0.75, 0.05, 0.38], [0.95, 0.05, 0.42], 0.24),
-            tube([-0.75, 0.0, 0.1], [-1.25, 0.1, 0.42], 0.14),
-            tube([0.4, 0.25, -0.1], [0.55, 0.42, -0.65], 0.15),
-            tube([0.4, -0.2, -0.1], [0.65, -0.38, -0.62], 0.15),
-            tube([-0.5, 0.25, -0.1], [-0.6, 0.4, -0.66], 0.16),
-            tube([-0.5, -0.25, -0.1], [-0.42, -0.42, -0.64], 0.16),
-        ],
-        sharpness: 14.0,
-    }
+    let tubes = [
+        ([-0.5, 0.0, 0.0], [0.45, 0.05, 0.05], 0.32),
+        ([0.75, 0.05, 0.38], [0.95, 0.05, 0.42], 0.24),
+        ([-0.75, 0.0, 0.1], [-1.25, 0.1, 0.42], 0.14),
+        ([0.4, 0.25, -0.1], [0.55, 0.42, -0.65], 0.15),
+        ([0.4, -0.2, -0.1], [0.65, -0.38, -0.62], 0.15),
+        ([-0.5, 0.25, -0.1], [-0.6, 0.4, -0.66], 0.16),
+        ([-0.5, -0.25, -0.1], [-0.42, -0.42, -0.64], 0.16),
+    ];
+    let tubes = tubes.map(|(a, b, radius)| Part::Tube { a: a.into(), b: b.into(), radius });
+    Blend { parts: tubes.to_vec(), sharpness: 14.0 }
 }

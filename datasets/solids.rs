@@ -35,23 +35,13 @@ pub(crate) fn boundary(
 ) -> TriMesh {
     let mut builder = Builder { ticks, place, mesh: TriMesh::default(), ids: HashMap::new() };
     let cells = [0, 1, 2].map(|axis| ticks[axis].len() as i64 - 1);
-    let filled = |cell: [i64; 3]| {
-        let inside = (0..3).all(|axis| (0..cells[axis]).contains(&cell[axis]));
-        inside && {
-            let middle = [0, 1, 2].map(|axis| {
-                let i = cell[axis] as usize;
-                (ticks[axis][i] + ticks[axis][i + 1]) / 2.0
-            });
-            solid(Vec3::from(middle))
-        }
-    };
     for i in 0..cells[0] {
         for j in 0..cells[1] {
-            for k in (0..cells[2]).filter(|&k| filled([i, j, k])) {
+            for k in (0..cells[2]).filter(|&k| is_filled(ticks, &solid, [i, j, k])) {
                 for (axis, step) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
                     let mut beyond = [i, j, k];
                     beyond[axis] += step;
-                    if !filled(beyond) {
+                    if !is_filled(ticks, &solid, beyond) {
                         builder.side([i, j, k].map(|n| n as usize), axis, step > 0);
                     }
                 }
@@ -59,6 +49,16 @@ pub(crate) fn boundary(
         }
     }
     builder.mesh
+}
+
+/// Whether a block of the grid, which may be outside it, is solid.
+fn is_filled(ticks: &[Vec<f64>; 3], solid: &impl Fn(Vec3) -> bool, cell: [i64; 3]) -> bool {
+    let inside = (0..3).all(|axis| (0..ticks[axis].len() as i64 - 1).contains(&cell[axis]));
+    inside
+        && solid(Vec3::from([0, 1, 2].map(|axis| {
+            let i = cell[axis] as usize;
+            (ticks[axis][i] + ticks[axis][i + 1]) / 2.0
+        })))
 }
 
 struct Builder<'a, P> {
@@ -72,14 +72,13 @@ impl<P: Fn(Vec3) -> Vec3> Builder<'_, P> {
     /// The side of a block across `axis`, above or below, as two triangles.
     fn side(&mut self, cell: [usize; 3], axis: usize, above: bool) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut corner = |du: usize, dv: usize| {
+        let mut quad = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(du, dv)| {
             let mut node = cell;
             node[axis] += usize::from(above);
             node[u] += du;
             node[v] += dv;
             self.vertex(node)
-        };
-        let mut quad = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+        });
         if !above {
             quad.swap(1, 3);
         }
@@ -98,9 +97,9 @@ impl<P: Fn(Vec3) -> Vec3> Builder<'_, P> {
 
 /// Adds a quadrilateral as two triangles, cut along its shorter diagonal.
 pub(crate) fn split(mesh: &mut TriMesh, [a, b, c, d]: [u32; 4]) {
-    let length = |p: u32, q: u32| mesh.vertices[p as usize].distance(mesh.vertices[q as usize]);
+    let [p, q, r, s] = [a, b, c, d].map(|v| mesh.vertices[v as usize]);
     // A hair's breadth in favour of `ac`, so that rounding does not choose between equals.
-    if length(a, c) <= length(b, d) * (1.0 + 1e-9) {
+    if p.distance(r) <= q.distance(s) * (1.0 + 1e-9) {
         mesh.faces.extend([[a, b, c], [a, c, d]]);
     } else {
         mesh.faces.extend([[a, b, d], [b, c, d]]);
@@ -228,38 +227,40 @@ fn point(ring: Ring, i: u32) -> Vec3 {
     if ring.count == 1 {
         return Vec3::new(0.0, 0.0, ring.z);
     }
-    let (sin, cos) = (TAU * f64::from(i) / f64::from(ring.count)).sin_cos();
+    let (sin, cos) = sin_cos_of_part(i, ring.count);
     Vec3::new(ring.radius * cos, ring.radius * sin, ring.z)
 }
 
 /// The strip between two rings, each given by its count and first vertex: always the next vertex
 /// of the ring that lags behind, in angle.
 fn connect(faces: &mut Vec<[u32; 3]>, upper: (u32, u32), lower: (u32, u32)) {
-    let at = |(count, first): (u32, u32), i: u32| first + i % count;
     // A pole has no side of its own: its ring does not advance.
-    let sides = |count: u32| if count == 1 { 0 } else { count };
-    let (upper_sides, lower_sides) = (sides(upper.0), sides(lower.0));
+    let [upper_sides, lower_sides] = [upper.0, lower.0].map(|n| if n == 1 { 0 } else { n });
     let (mut i, mut j) = (0, 0);
     while i < upper_sides || j < lower_sides {
         let lower_lags =
             (u64::from(j) + 1) * u64::from(upper.0) <= (u64::from(i) + 1) * u64::from(lower.0);
         if i == upper_sides || (j < lower_sides && lower_lags) {
-            faces.push([at(upper, i), at(lower, j), at(lower, j + 1)]);
+            faces.push([around(upper, i), around(lower, j), around(lower, j + 1)]);
             j += 1;
         } else {
-            faces.push([at(upper, i), at(lower, j), at(upper, i + 1)]);
+            faces.push([around(upper, i), around(lower, j), around(upper, i + 1)]);
             i += 1;
         }
     }
 }
 
+fn around((count, first): (u32, u32), i: u32) -> u32 {
+    first + i % count
+}
+
 /// A cap of `steps` rings from a pole outward; `profile` gives radius and z at `t` in 0..=1.
 pub(crate) fn cap(steps: u32, profile: impl Fn(f64) -> (f64, f64)) -> Vec<Ring> {
-    let ring = |k: u32| {
+    let rings = (0..=steps).map(|k| {
         let (radius, z) = profile(f64::from(k) / f64::from(steps));
         Ring { count: if k == 0 { 1 } else { SECTORS * k }, radius, z }
-    };
-    (0..=steps).map(ring).collect()
+    });
+    rings.collect()
 }
 
 /// The rings of a solid that is symmetric about `z = 0`: the cap on top, a cylinder of `stacks`
@@ -319,12 +320,17 @@ pub(crate) fn rings(pieces: &[Piece], edge: f64) -> Vec<Ring> {
         points.extend((1..=n).map(|k| piece.at(f64::from(k) / f64::from(n))));
     }
     let last = points.len() - 1;
-    let ring = |(i, (radius, z)): (usize, (f64, f64))| match i {
+    let rings = points.into_iter().enumerate().map(|(i, (radius, z))| match i {
         // A pole is a pole, whatever the sine of pi is.
         _ if i == 0 || i == last => Ring { count: 1, radius: 0.0, z },
         _ => Ring { count: SECTORS * parts(TAU * radius / f64::from(SECTORS), edge, 1), radius, z },
-    };
-    points.into_iter().enumerate().map(ring).collect()
+    });
+    rings.collect()
+}
+
+/// Sine and cosine of `i` of `n` equal parts of a full turn.
+pub(crate) fn sin_cos_of_part(i: u32, n: u32) -> (f64, f64) {
+    (TAU * f64::from(i) / f64::from(n)).sin_cos()
 }
 
 /// The number of equal parts of about `edge` in `length`, at least `least`.
@@ -395,20 +401,20 @@ impl Curve {
 
 /// A torus about the z axis: `around` sections of `across` vertices each, oriented outward.
 pub(crate) fn torus_grid(major: f64, minor: f64, around: u32, across: u32) -> TriMesh {
-    let angle = |i: u32, n: u32| (TAU * f64::from(i) / f64::from(n)).sin_cos();
     let mut mesh = TriMesh::default();
     for i in 0..around {
-        let (sin_u, cos_u) = angle(i, around);
+        let (sin_u, cos_u) = sin_cos_of_part(i, around);
         for j in 0..across {
-            let (sin_v, cos_v) = angle(j, across);
+            let (sin_v, cos_v) = sin_cos_of_part(j, across);
             let radius = major + minor * cos_v;
             mesh.vertices.push(Vec3::new(radius * cos_u, radius * sin_u, minor * sin_v));
         }
     }
-    let id = |i: u32, j: u32| (i % around) * across + j % across;
     for i in 0..around {
         for j in 0..across {
-            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
+            let [here, beyond] = [i, (i + 1) % around].map(|i| i * across);
+            let next = (j + 1) % across;
+            let [a, b, c, d] = [here + j, beyond + j, beyond + next, here + next];
             mesh.faces.extend([[a, b, c], [a, c, d]]);
         }
     }

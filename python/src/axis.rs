@@ -140,8 +140,9 @@ impl Axis {
 
     #[getter]
     fn radii<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let radii = || self.mesh.spheres.iter().map(|sphere| sphere.radius);
-        self.radii.get(py, || Ok(PyArray1::from_iter(py, radii())))
+        self.radii.get(py, || {
+            Ok(PyArray1::from_iter(py, self.mesh.spheres.iter().map(|sphere| sphere.radius)))
+        })
     }
 
     #[getter]
@@ -264,8 +265,8 @@ impl Axis {
             let union = MedialUnion::new(&mesh)?;
             let (low, high) = union.bounding_box();
             let corners = TriMesh { vertices: vec![low, high], faces: vec![] };
-            let of_balls = || Normalisation::of(&corners).map(|units| units.diagonal);
-            let diagonal = diagonal.or_else(of_balls).ok_or_else(|| {
+            let of_balls = Normalisation::of(&corners).map(|units| units.diagonal);
+            let diagonal = diagonal.or(of_balls).ok_or_else(|| {
                 Failure::input("the spheres have no extent, or one that is not finite")
             })?;
             let made = fitting_surface(&mesh, &union, diagonal, tolerance)?.made.mesh;
@@ -304,8 +305,14 @@ impl Run {
         };
         monitor.at("simplifying");
         let view = self.start.view();
-        let prepare = || self.method.get().prepare(&view, &self.params, context);
-        let mut runs = answer(&view, self.method.get().info(), prepare, &[level], |_| {});
+        let method = self.method.get();
+        let mut runs = answer(
+            &view,
+            method.info(),
+            || method.prepare(&view, &self.params, context),
+            &[level],
+            |_| {},
+        );
         let run = runs.pop().expect("one level was asked");
         let simplified = run.outcome.map_err(Failure::of_fault)?;
         let facts = facts(&simplified, &run.times, level, search);

@@ -133,18 +133,16 @@ impl ClassMethod {
 
 impl From<Described> for MethodInfo {
     fn from(described: Described) -> Self {
-        let level = |level: DescribedLevel| match level.larger_is_coarser {
-            true => NativeLevel::larger_is_coarser(level.name, level.unit),
-            false => NativeLevel::larger_is_finer(level.name, level.unit),
-        };
-        let param = |param: DescribedParam| {
-            ParamInfo::new(param.name, param.default, param.unit, param.help)
-        };
+        let params = described.params.into_iter();
         let info = Self::new(described.id, described.title)
             .citation(described.citation)
             .summary(described.summary)
-            .params(described.params.into_iter().map(param));
-        let (native, incremental) = (described.native.map(level), described.incremental);
+            .params(params.map(|p| ParamInfo::new(p.name, p.default, p.unit, p.help)));
+        let native = described.native.map(|level| match level.larger_is_coarser {
+            true => NativeLevel::larger_is_coarser(level.name, level.unit),
+            false => NativeLevel::larger_is_finer(level.name, level.unit),
+        });
+        let incremental = described.incremental;
         let info = Self { native, incremental, ..info };
         match described.published {
             Some(published) => info.published(published),
@@ -216,18 +214,15 @@ struct Answer {
 /// An exception of a class as the error of a method.
 fn of_exception(error: PyErr) -> SimplifyError {
     Python::attach(|py| {
-        let is = |name: &str| {
-            let class = py.import("medial_axis.errors").and_then(|module| module.getattr(name));
-            class.is_ok_and(|class| error.is_instance(py, &class))
-        };
         let message = error.value(py).to_string();
-        if is("UnsupportedError") {
+        if is_error(py, &error, "UnsupportedError") {
             return SimplifyError::unsupported(message);
         }
-        if is("ParameterError") {
+        if is_error(py, &error, "ParameterError") {
             return SimplifyError::Parameter(message);
         }
-        if is("CancelledError") || error.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py)
+        if is_error(py, &error, "CancelledError")
+            || error.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py)
         {
             return SimplifyError::Cancelled;
         }
@@ -238,6 +233,12 @@ fn of_exception(error: PyErr) -> SimplifyError {
     })
 }
 
+/// Whether an exception is of this class of `medial_axis/errors.py`.
+fn is_error(py: Python<'_>, error: &PyErr, name: &str) -> bool {
+    let class = py.import("medial_axis.errors").and_then(|module| module.getattr(name));
+    class.is_ok_and(|class| error.is_instance(py, &class))
+}
+
 /// Loads the classes of a file.
 pub struct Classes;
 
@@ -245,12 +246,12 @@ impl ScriptLoader for Classes {
     fn load(&self, path: &Path) -> Result<Vec<Registered>, String> {
         Python::attach(|py| {
             let classes = py.import(BETWEEN)?.call_method1("load", (path,))?;
-            let method = |class: PyResult<Bound<'_, PyAny>>| {
+            let methods = classes.try_iter()?.map(|class| {
                 let method = ClassMethod::new(&class?)?;
                 let presentation = method.presentation.clone();
                 Ok(Registered { method: Box::new(method), presentation })
-            };
-            classes.try_iter()?.map(method).collect::<PyResult<Vec<_>>>()
+            });
+            methods.collect::<PyResult<Vec<_>>>()
         })
         .map_err(|error: PyErr| match of_exception(error) {
             SimplifyError::Failed(why) | SimplifyError::Parameter(why) => why,
