@@ -108,9 +108,8 @@ for name in $names; do
             # A surface to compare with, from our own routes: the boundary of the union.
             "$medial" --quiet reconstruct "$work/axis.ma" --mesh "$work/mesh.off" --tolerance 0.03 \
                 -o "$work/other.off" >/dev/null
-            echo '{"tool": "union", "surfaces": [{"file": "other.off", "numbers": 1}]}' >"$work/list.json"
-            "$medial" --json baseline "$work/mesh.off" --surfaces "$work/list.json" --samples 200000 \
-                --out "$work/baseline" >"$work/baseline.json"
+            # A surface is evaluated as a medial mesh with radii of zero.
+            "$medial" --json evaluate "$work/mesh.off" "$work/other.off" --samples 200000 >"$work/baseline.json"
             diagonal=$("$medial" --json info "$work/mesh.off" |
                 python3 -c 'import json, sys; print(1e-4 * json.load(sys.stdin)["diagonal"])')
             "$work/hausdorff_cgal" "$work/mesh.off" "$work/other.off" "$diagonal" >"$work/hausdorff.txt"
