@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Target;
 
-use crate::record::{Record, Status};
+use crate::record::Record;
 use crate::text::{grouped, printable};
 
 /// Largest relative difference between the spheres reached and the spheres asked at which two
@@ -151,17 +151,6 @@ impl<'a> Comparison<'a> {
             Target::Spheres(count) => Some((index, *count)),
             _ => None,
         })
-    }
-
-    /// How many entries there are of each status that occurs.
-    pub(crate) fn statuses(&self) -> Vec<(Status, usize)> {
-        Status::ALL
-            .into_iter()
-            .map(|status| {
-                (status, self.entries.iter().filter(|entry| entry.record.status == status).count())
-            })
-            .filter(|&(_, count)| count > 0)
-            .collect()
     }
 
     /// Number of entries with a measured result.

@@ -89,6 +89,23 @@ impl Header {
         self.methods.iter().find(|note| note.id == method)?.native.clone()
     }
 
+    /// BibTeX of the methods with these ids and of the program, each entry once.
+    pub(crate) fn bibtex(&self, methods: &[&str]) -> String {
+        let notes = self.methods.iter().filter(|note| methods.contains(&note.id.as_str()));
+        let mut entries: Vec<String> = Vec::new();
+        for entry in notes.map(|note| note.bibtex.trim()).filter(|entry| !entry.is_empty()) {
+            if !entries.iter().any(|known| known == entry) {
+                entries.push(entry.to_owned());
+            }
+        }
+        let version = self.runs.last().map_or("", |run| &run.version);
+        entries.push(format!(
+            "@misc{{medial,\n  title = {{medial: a reference harness for simplifying the 3D medial \
+             axis transform}},\n  note = {{Version {version}}}\n}}"
+        ));
+        entries.join("\n\n") + "\n"
+    }
+
     /// How the files were made: a sentence that stands in each of them.
     pub(crate) fn how(&self) -> String {
         let Some(run) = self.runs.last() else { return "Made by medial.".to_owned() };

@@ -1,37 +1,36 @@
-//! Result records, and what is made of them: tables, plots, the page.
+//! Result records and reports: tables, plots, the page.
 //!
 //! | module | holds |
 //! |---|---|
 //! | `record` | [`Record`], one line of `results.jsonl` |
 //! | `journal` | reading and appending those lines |
-//! | [`diff`] | an older and a newer set of records: what became worse |
+//! | [`diff`] | an older and a newer set of records, and the regressions between them |
 //! | `comparison` | records arranged by mesh, method and level |
 //! | `metric` | the columns: name, unit, direction, definition |
-//! | `summary` | means over meshes at equal numbers of spheres |
-//! | `purpose` | which method for which purpose, method against method |
-//! | `scaling` | how time and memory grow with the input |
+//! | `summary` | means over meshes at equal numbers of spheres and at native levels |
+//! | `answers` | which method for which purpose, at equal counts and equal errors |
+//! | `scaling` | growth of time and memory with the input |
 //! | `tables` | CSV, Markdown, LaTeX |
-//! | `plots` | figures as SVG |
-//! | [`history`] | one file for each night, steps over many nights |
+//! | `plots` | figures, and their SVG |
+//! | [`history`] | one file for each run, change points over many runs |
 //! | `terminal` | the summary in plain text |
-//! | `pictures` | which results are shown beside each other |
+//! | `pictures` | which results are shown next to each other |
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
+//! | `view3d` | geometry of the 3D views |
 //! | `page` | the self-contained `index.html` |
 //! | `write` | [`write_report`], all of it into one folder |
 
+mod answers;
 mod comparison;
 pub mod diff;
-mod equal_error;
 mod error;
 mod header;
 pub mod history;
 mod journal;
 mod metric;
-mod native;
 mod page;
 mod pictures;
 mod plots;
-mod purpose;
 mod record;
 pub mod render;
 mod scaling;

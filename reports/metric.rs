@@ -139,6 +139,15 @@ impl Metric {
         }
     }
 
+    /// How the page writes its values.
+    pub(crate) fn digits(&self) -> &'static str {
+        match self.digits {
+            Digits::Significant => "significant",
+            Digits::Tenths => "tenths",
+            Digits::Count => "count",
+        }
+    }
+
     /// Name, unit and arrow: `Hausdorff (%) ↓`.
     pub(crate) fn heading(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };

@@ -1,16 +1,16 @@
 //! Which results are shown beside each other as pictures.
 //!
 //! For each mesh one strip: the results of all methods at the number of spheres that the answers of
-//! [`purpose`](crate::purpose) are for, with the given files at theirs, and a 3D view of the same. Drawing needs the surfaces and the medial meshes, which are not in the
+//! [`answers`](crate::answers) are for, with the given files at theirs, and a 3D view of the same. Drawing needs the surfaces and the medial meshes, which are not in the
 //! records: it is for the caller, with [`strip`](crate::render::strip).
 
 use std::collections::BTreeMap;
 
 use medial::geometry::hash::splitmix;
 
+use crate::answers::usual_level;
 use crate::comparison::{Comparison, reached};
 use crate::metric::HAUSDORFF;
-use crate::purpose::usual_level;
 use crate::record::{Record, Status};
 use crate::text::{counted, file_stems, significant};
 

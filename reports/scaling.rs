@@ -1,8 +1,9 @@
 //! How time and memory grow with the input: one power law for each method, from its own records
 //! alone.
 
+use crate::answers::usual_level;
 use crate::comparison::{Comparison, Entry};
-use crate::purpose::usual_level;
+use crate::plots::{Curve, Figure, Point, Scale};
 use crate::tables::{Cell, Column, Row, Table};
 use crate::text::{counted, grouped, significant};
 
@@ -171,6 +172,53 @@ fn row(comparison: &Comparison<'_>, growth: &Growth) -> Row {
         cells.extend([exponent, Cell::optional(factor), Cell::new(points.len().to_string())]);
     }
     Row { cells, starts_group: false }
+}
+
+/// Costs against sizes: one point for each mesh and method, with the line of its power law where there is one.
+pub(crate) fn scaling_figures(comparison: &Comparison<'_>, scaling: &Scaling) -> Vec<Figure> {
+    type Cost = fn(&Growth) -> &Vec<(f64, f64)>;
+    let kinds: [(&str, &str, &str, Cost); 2] = [
+        ("overview-scaling", "CPU time", "CPU time (s)", |growth| &growth.seconds),
+        ("overview-scaling-memory", "Peak memory", "peak memory (MB)", |growth| &growth.megabytes),
+    ];
+    let figure = |(stem, what, axis, cost): (&str, &str, &str, Cost)| {
+        let curve = |growth: &Growth| {
+            let points = cost(growth);
+            let name = comparison.series[growth.series].clone();
+            let law = power_law(points).ok();
+            let exponent = law.map_or(String::new(), |law| format!(" x^{:.2}", law.exponent));
+            let ends = points.first().zip(points.last());
+            let line = law.zip(ends).map(|(law, (first, last))| {
+                [first.0, last.0].map(|size| (size, law.at(size))).to_vec()
+            });
+            let point = |&(x, y): &(f64, f64)| Point {
+                spheres: Some(scaling.spheres as f64),
+                ..Point::at(x, y)
+            };
+            Curve {
+                series: growth.series,
+                label: format!("{name}{exponent}, n={}", points.len()),
+                name,
+                of: "one mesh".to_owned(),
+                points: points.iter().map(point).collect(),
+                // Points alone where no law holds.
+                line: Some(line.unwrap_or_default()),
+                dashed: false,
+            }
+        };
+        let to = counted(scaling.spheres, "sphere", "spheres");
+        let figure = Figure {
+            stem: stem.to_owned(),
+            title: format!("{what} against input size, to {to}; one point a mesh"),
+            x: ("spheres of the initial medial mesh".to_owned(), Scale::Log),
+            y: (axis.to_owned(), Scale::Log),
+            curves: scaling.rows.iter().map(curve).collect(),
+            front: false,
+            leading: false,
+        };
+        figure.with_points()
+    };
+    kinds.into_iter().filter_map(figure).collect()
 }
 
 #[cfg(test)]

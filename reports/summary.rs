@@ -12,12 +12,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::comparison::{Comparison, Entry};
-use crate::metric::{COMPARED, HAUSDORFF, Mean, Metric};
-use crate::record::Status;
-
-/// Error bounds, in % of the diagonal, for which the fewest spheres are told.
-pub(crate) const ERROR_BOUNDS: [f64; 4] = [2.0, 1.0, 0.5, 0.2];
+use crate::comparison::{Comparison, Entry, level_label, reached};
+use crate::metric::{COMPARED, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
+use crate::plots::{Curve, Figure, Scale, native_points};
+use crate::record::{Status, Target};
+use crate::tables::{Cell, Column, Row, Table};
+use crate::text::{counted, file_stems, grouped, significant};
 
 /// The method that others are put in relation to, where it ran with its defaults.
 const REFERENCE: &str = "qmat";
@@ -279,146 +279,264 @@ pub(crate) fn pick(metric: &Metric, a: f64, b: f64) -> f64 {
     if metric.better.prefers(b, a) { b } else { a }
 }
 
-/// The area under a series' curve of Hausdorff error against spheres, both as logarithms, over the
-/// whole range of counts, told as the error of the level line with the same area: in % of the diagonal.
-/// `None` where the series has no mean at some count, or there is only one.
-pub(crate) fn curve_level(summaries: &[CountSummary], series: usize) -> Option<f64> {
-    let point = |summary: &CountSummary| {
-        let row = summary.rows.iter().find(|row| row.series == series)?;
-        Some(((summary.count as f64).ln(), row.mean(&HAUSDORFF)?.max(1e-6).ln()))
+/// One method at levels of its own.
+pub(crate) struct NativeCurve {
+    pub(crate) series: usize,
+    /// Meshes that all means are over.
+    pub(crate) over: usize,
+    /// Meshes that it was asked for at such levels.
+    pub(crate) asked: usize,
+    /// From fine to coarse.
+    pub(crate) points: Vec<NativePoint>,
+}
+
+/// Means at one level.
+pub(crate) struct NativePoint {
+    pub(crate) level: Target,
+    /// Geometric means: spheres, errors in % of the diagonal, seconds.
+    pub(crate) spheres: f64,
+    pub(crate) hausdorff: f64,
+    pub(crate) mean: f64,
+    pub(crate) seconds: f64,
+    /// Results with the solid's Betti numbers, of those where both are known.
+    pub(crate) topology: (usize, usize),
+}
+
+/// The curves of all series that ran at levels of their own, the published one included.
+pub(crate) fn native_curves(comparison: &Comparison<'_>) -> Vec<NativeCurve> {
+    (0..comparison.series.len()).filter_map(|series| native_curve(comparison, series)).collect()
+}
+
+fn native_curve(comparison: &Comparison<'_>, series: usize) -> Option<NativeCurve> {
+    let is_own =
+        |level: usize| matches!(comparison.levels[level], Target::Native(_) | Target::Published);
+    let own: Vec<&Entry<'_>> =
+        comparison.entries.iter().filter(|e| e.series == series && is_own(e.level)).collect();
+    let set = OwnSet::of(own.iter().map(|entry| (entry.level, entry.mesh, entry.measured())));
+    let mut points = Vec::new();
+    for &level in &set.levels {
+        let kept: Vec<&Entry<'_>> = own
+            .iter()
+            .copied()
+            .filter(|entry| entry.level == level && set.meshes.contains(&entry.mesh))
+            .collect();
+        points.extend(native_point(comparison.levels[level], &kept));
+    }
+    points.sort_by(|a, b| b.spheres.total_cmp(&a.spheres));
+    let (over, asked) = (set.meshes.len(), set.asked);
+    (!points.is_empty()).then_some(NativeCurve { series, over, asked, points })
+}
+
+fn native_point(level: Target, entries: &[&Entry<'_>]) -> Option<NativePoint> {
+    let mean = |of: &dyn Fn(&Entry<'_>) -> Option<f64>| {
+        let values: Option<Vec<f64>> = entries.iter().map(|entry| of(entry)).collect();
+        Mean::Geometric { floor: 1e-6 }.of(&values?)
     };
-    let points: Vec<(f64, f64)> = summaries.iter().map(point).collect::<Option<_>>()?;
-    let width = points.first()?.0 - points.last()?.0;
-    let trapezium = |pair: &[(f64, f64)]| (pair[0].0 - pair[1].0) * (pair[0].1 + pair[1].1) / 2.0;
-    let area: f64 = points.windows(2).map(trapezium).sum();
-    (width > 0.0).then(|| (area / width).exp())
+    Some(NativePoint {
+        level,
+        spheres: mean(&|entry| reached(entry.record).map(|spheres| spheres as f64))?,
+        hausdorff: mean(&|entry| HAUSDORFF.of(entry.record))?,
+        mean: mean(&|entry| MEAN_ERROR.of(entry.record))?,
+        seconds: mean(&|entry| TOTAL_SECONDS.of(entry.record))?,
+        topology: topology(entries),
+    })
 }
 
-/// The fewest spheres at which a series stayed within an error bound.
-pub(crate) struct Fewest {
-    /// Median over the meshes, where a mesh that never got there counts as infinitely many.
-    /// `None` where the median mesh never got there.
-    pub(crate) median: Option<usize>,
-    /// Meshes that got there.
-    pub(crate) meshes: usize,
-    /// Meshes that the series was asked for.
-    pub(crate) of: usize,
-}
-
-/// The fewest spheres of a series for a Hausdorff error of at most `bound` % of the diagonal,
-/// among the levels that were run.
-pub(crate) fn fewest_spheres(comparison: &Comparison<'_>, series: usize, bound: f64) -> Fewest {
-    let mut fewest: Vec<Option<usize>> = Vec::new();
-    for mesh in 0..comparison.meshes.len() {
-        let entries: Vec<_> =
-            comparison.of_mesh(mesh).filter(|entry| entry.series == series).collect();
-        if entries.is_empty() {
-            continue;
-        }
-        let within = entries.iter().filter(|entry| {
-            entry.measured() && HAUSDORFF.of(entry.record).is_some_and(|error| error <= bound)
-        });
-        fewest.push(within.filter_map(|entry| crate::comparison::reached(entry.record)).min());
-    }
-    fewest.sort_by_key(|count| count.unwrap_or(usize::MAX));
-    let middle = fewest.len().saturating_sub(1) / 2;
-    Fewest {
-        // The upper median: at least half of the meshes are within.
-        median: fewest.get(fewest.len() / 2).or_else(|| fewest.get(middle)).copied().flatten(),
-        meshes: fewest.iter().flatten().count(),
-        of: fewest.len(),
-    }
-}
-
-/// One sentence for each number of spheres: who has the lowest error in relation to the reference,
-/// on how many meshes, at what time.
-pub(crate) fn headlines(comparison: &Comparison<'_>, summaries: &[CountSummary]) -> Vec<String> {
-    let Some(reference) = reference(comparison) else { return Vec::new() };
-    summaries.iter().filter_map(|summary| headline(comparison, reference, summary)).collect()
-}
-
-fn headline(
+/// The table of all methods at levels of their own.
+pub(crate) fn native_table(
     comparison: &Comparison<'_>,
-    reference: usize,
-    summary: &CountSummary,
-) -> Option<String> {
-    let name = |series: usize| comparison.series[series].as_str();
-    // A method that shares few meshes with the reference has not shown what it can do on the rest.
-    let mut ranked: Vec<(Ratio, &SeriesSummary)> = summary
-        .rows
-        .iter()
-        .filter_map(|row| Some((row.ratio.filter(|r| 2 * r.meshes >= summary.meshes)?, row)))
-        .collect();
-    ranked.sort_by(|a, b| a.0.value.total_cmp(&b.0.value).then(a.1.series.cmp(&b.1.series)));
-    let &(ratio, row) = ranked.first()?;
-    let spheres = crate::text::counted(summary.count, "sphere", "spheres");
-    let told = |ratio: Ratio, row: &SeriesSummary| {
-        let times = match row.series == reference {
-            true => "the reference".to_owned(),
-            false => {
-                let value = crate::text::significant(ratio.value, 3);
-                format!("{value} times the error of {}", name(reference))
+    curves: &[NativeCurve],
+    axis: &dyn Fn(&str) -> Option<String>,
+    how: &str,
+) -> Table {
+    let rows = curves.iter().flat_map(|curve| {
+        let method = comparison.methods[curve.series];
+        let axis = axis(method);
+        curve.points.iter().enumerate().map(move |(index, point)| {
+            let level = match (point.level, &axis) {
+                (Target::Native(value), Some(axis)) => format!("{value} {axis}"),
+                (level, _) => level_label(level),
+            };
+            let (right, known) = point.topology;
+            Row {
+                cells: vec![
+                    Cell::new(comparison.series[curve.series].as_str()),
+                    Cell::new(level),
+                    Cell::new(format!("{} of {}", curve.over, curve.asked)),
+                    Cell::new(grouped(point.spheres.round() as u64)),
+                    Cell::new(significant(point.hausdorff, 3)),
+                    Cell::new(significant(point.mean, 3)),
+                    Cell::new(significant(point.seconds, 3)),
+                    Cell::optional((known > 0).then(|| format!("{right} of {known}"))),
+                ],
+                starts_group: index == 0,
             }
-        };
-        let meshes = crate::text::counted(ratio.meshes, "mesh", "meshes");
-        format!("{} ({times}, on {meshes})", name(row.series))
-    };
-    let mut text = format!("{spheres}: lowest Hausdorff error by {}", told(ratio, row));
-    if let Some(seconds) = row.mean(&crate::metric::TOTAL_SECONDS) {
-        text.push_str(&format!(", {} s", crate::text::significant(seconds, 3)));
+        })
+    });
+    Table {
+        caption: "Every method at levels of its own".to_owned(),
+        notes: vec![
+            how.to_owned(),
+            "Geometric means over one set of meshes for each method: those with a result at all \
+             its levels. The level is the method's own scalar, with its name and unit. Spheres are \
+             what the level leaves; compare errors at equal numbers of them. Lengths in % of the \
+             bounding-box diagonal."
+                .to_owned(),
+        ],
+        rows: rows.collect(),
+        columns: vec![
+            Column::text("method"),
+            Column::text("level"),
+            Column::text("means over"),
+            Column::number("spheres"),
+            Column::number(HAUSDORFF.heading()),
+            Column::number(MEAN_ERROR.heading()),
+            Column::number("total (s)"),
+            Column::text("topology right"),
+        ],
     }
-    match ranked.get(1) {
-        Some(&(next, other)) => text.push_str(&format!("; then {}", told(next, other))),
-        None => text.push_str("; nothing to compare it with"),
-    }
-    text.push('.');
-    Some(text)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// One series whose mean Hausdorff error is known at some counts.
-    fn curve(errors: &[(usize, Option<f64>)]) -> Vec<CountSummary> {
-        let summary = |&(count, error): &(usize, Option<f64>)| CountSummary {
-            count,
-            meshes: 1,
-            rows: vec![SeriesSummary {
-                series: 0,
-                over: usize::from(error.is_some()),
-                asked: 1,
-                reached: 1,
-                missed: 0,
-                failed: 0,
-                unsupported: 0,
-                means: COMPARED
-                    .map(|metric| error.filter(|_| metric.key == HAUSDORFF.key).map(|e| (e, 1))),
-                ratio: None,
-                stages: None,
-                topology: (0, 0),
-            }],
+/// One figure for each method with a scalar of its own: its errors against that scalar.
+pub(crate) fn native_figures(
+    comparison: &Comparison<'_>,
+    natives: &[NativeCurve],
+    axis: &dyn Fn(&str) -> Option<String>,
+) -> Vec<Figure> {
+    let stems = file_stems(comparison.series.iter().map(String::as_str));
+    let figure = |native: &NativeCurve| {
+        let mut points = native_points(comparison, native, |point| match point.level {
+            Target::Native(value) => Some((value, point.hausdorff)),
+            _ => None,
+        });
+        let ends = points.iter().map(|point| (point.x, point.x));
+        let (least, most) = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        let is_log = least > 0.0 && most > 20.0 * least;
+        // Tags a tenth of the axis apart do not cover each other.
+        let place = |x: f64| match is_log {
+            true => (x / least).ln() / (most / least).ln(),
+            false => (x - least) / (most - least),
         };
-        errors.iter().map(summary).collect()
-    }
+        let mut last = f64::NEG_INFINITY;
+        for point in &mut points {
+            if (place(point.x) - last).abs() >= 0.125 {
+                point.tag = point.spheres.map(|spheres| grouped(spheres.round() as u64));
+                last = place(point.x);
+            }
+        }
+        let name = comparison.series[native.series].clone();
+        let title = format!("{name}: Hausdorff error against its native level");
+        let native_axis = axis(comparison.methods[native.series]);
+        (points.len() > 1).then(|| Figure {
+            stem: format!("overview-level-{}", stems[native.series]),
+            title,
+            x: (
+                native_axis.unwrap_or_else(|| "native level".to_owned()),
+                if is_log { Scale::Log } else { Scale::Linear },
+            ),
+            y: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),
+            curves: vec![Curve {
+                series: native.series,
+                label: format!("spheres, over {}", counted(native.over, "mesh", "meshes")),
+                name,
+                of: "mean".to_owned(),
+                points,
+                line: None,
+                dashed: true,
+            }],
+            front: false,
+            leading: false,
+        })
+    };
+    natives.iter().filter_map(figure).collect()
+}
 
-    #[test]
-    fn the_level_of_a_curve_is_that_of_the_same_area() {
-        let level = |errors: &[(usize, Option<f64>)]| curve_level(&curve(errors), 0);
-        let close =
-            |a: Option<f64>, b: f64| assert!((a.unwrap() / b - 1.0).abs() < 1e-12, "{a:?} {b}");
-        let constant = [1000, 500, 100].map(|count| (count, Some(0.7)));
-        close(level(&constant), 0.7);
-        // A power law is a straight line: the geometric mean of its ends, whatever lies between.
-        let power = |count: usize| (count, Some(40.0 * (count as f64).powf(-0.8)));
-        let ends = (power(1000).1.unwrap() * power(50).1.unwrap()).sqrt();
-        close(level(&[1000, 50].map(power)), ends);
-        close(level(&[1000, 700, 90, 50].map(power)), ends);
-        // A rise over the last third: half of its logarithm there.
-        let steps = [(800, Some(1.0)), (400, Some(1.0)), (200, Some(1.0)), (100, Some(16.0))];
-        close(level(&steps), 16_f64.powf(0.5 / 3.0));
-        assert_eq!(level(&[(1000, Some(1.0)), (500, None), (100, Some(2.0))]), None);
-        assert_eq!(level(&[(1000, Some(1.0))]), None);
-        assert_eq!(level(&[]), None);
+/// The means of all methods at each number of spheres.
+pub(crate) fn means_table(
+    comparison: &Comparison<'_>,
+    summaries: &[CountSummary],
+    how: &str,
+) -> Table {
+    let mut columns =
+        vec![Column::number("spheres"), Column::text("method"), Column::text("means over")];
+    let yardstick = reference(comparison).map(|series| comparison.series[series].as_str());
+    columns.extend([
+        Column::number(format!("Hausdorff ÷ {}", yardstick.unwrap_or("reference"))),
+        Column::text("on"),
+    ]);
+    columns.extend(COMPARED.iter().map(|metric| Column::number(metric.heading())));
+    columns.extend(["substrate (s)", "prepare (s)", "simplify (s)"].map(Column::number));
+    columns.extend([Column::text("topology right"), Column::text("without a result")]);
+    let mut rows = Vec::new();
+    for summary in summaries {
+        for (index, row) in summary.rows.iter().enumerate() {
+            rows.push(Row { cells: cells(comparison, summary, row), starts_group: index == 0 });
+        }
     }
+    Table {
+        caption: "Means over meshes at equal numbers of spheres".to_owned(),
+        notes: vec![
+            how.to_owned(),
+            "Geometric means of errors and total time, arithmetic means of angles, shares, spikes \
+             and stages. Each method is averaged over one set of meshes of its own for all counts: \
+             those on which it reached every count that it reached on enough of them. Means over \
+             all meshes read beside each other; in parentheses are those over fewer, with their number \
+             where some of the set have no such value, as an angle where there is no triangle. Across \
+             different sets, compare the ratio: the geometric mean of the Hausdorff errors in \
+             relation to the named method's, on the meshes where both reached the count."
+                .to_owned(),
+            "Lengths in % of the bounding-box diagonal; seconds of wall clock. Arrows: which way \
+             is better. Bold: best of the means over all meshes."
+                .to_owned(),
+        ],
+        columns,
+        rows,
+    }
+}
+
+fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummary) -> Vec<Cell> {
+    let is_whole = summary.is_whole(row);
+    let framed = |text: String| if is_whole { text } else { format!("({text})") };
+    let mut cells = vec![
+        Cell::new(grouped(summary.count as u64)),
+        Cell::new(comparison.series[row.series].as_str()),
+        Cell::new(format!("{} of {}", row.over, row.asked)),
+        Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3))),
+        Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes"))),
+    ];
+    cells.extend(COMPARED.iter().map(|metric| {
+        let Some(mean) = row.mean(metric) else { return Cell::optional(None) };
+        let (text, over) = (metric.format_mean(mean), row.over(metric));
+        let is_whole = summary.is_whole_of(row, metric);
+        let best =
+            is_whole && best(summary, metric).is_some_and(|best| metric.format_mean(best) == text);
+        let text = match is_whole {
+            true => text,
+            false if over == row.over => format!("({text})"),
+            false => format!("({text}; {over})"),
+        };
+        Cell { text, best }
+    }));
+    match row.stages {
+        Some(stages) => {
+            cells.extend(stages.map(|seconds| Cell::new(framed(significant(seconds, 3)))));
+        }
+        None => cells.extend([(); 3].map(|()| Cell::optional(None))),
+    }
+    let (right, known) = row.topology;
+    cells.push(Cell::optional((known > 0).then(|| format!("{right} of {known}"))));
+    cells.push(Cell::new(without_result(row)));
+    cells
+}
+
+/// What became of the meshes that are in no mean.
+pub(crate) fn without_result(row: &SeriesSummary) -> String {
+    let parts =
+        [(row.failed, "failed"), (row.unsupported, "unsupported"), (row.missed, "other count")];
+    let parts: Vec<String> = parts
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
 }

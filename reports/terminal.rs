@@ -2,12 +2,11 @@
 
 use std::fmt::Write as _;
 
+use crate::answers::{BoundSummary, by_bound};
 use crate::comparison::Comparison;
-use crate::equal_error::{BoundSummary, by_bound};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Metric, TOTAL_SECONDS};
-use crate::native::native_curves;
 use crate::record::Record;
-use crate::summary::{CountSummary, SeriesSummary, by_count};
+use crate::summary::{CountSummary, SeriesSummary, by_count, native_curves};
 use crate::text::printable;
 
 /// The columns behind the name of the method: title and width.

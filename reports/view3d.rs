@@ -22,7 +22,7 @@ use medial::complex::{MedialMesh, MedialUnion};
 use medial::surface::TriMesh;
 use serde::Serialize;
 
-use crate::page::packed::pack;
+use crate::page::pack;
 use crate::render::{Camera, ColourMap, Errors, Scale};
 
 /// A surface is refined up to edges of this share of its diagonal, as long as it has at most so many

@@ -7,27 +7,23 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 
+use crate::answers::{by_bound, equal_error_figure, equal_error_table, purpose_table, wins_table};
 use crate::comparison::Comparison;
-use crate::equal_error::{by_bound, equal_error_table};
 use crate::error::ReportError;
 use crate::header::Header;
 use crate::journal::replace_file;
-use crate::native::{native_curves, native_table};
 use crate::page::{MeshPart, MeshView, Page};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
-use crate::plots::{
-    Plot, equal_error_plot, mean_plots, mesh_plots, native_plots, profile_plot, scaling_plots,
-};
-use crate::purpose::{error_profiles, purpose_table, wins_table};
+use crate::plots::{Figure, mean_figures, mesh_figures};
 use crate::record::Record;
-use crate::scaling::{scaling, scaling_table};
-use crate::summary::by_count;
-use crate::tables::{Table, mesh_table, summary_tables, to_csv, to_latex, to_markdown};
+use crate::scaling::{scaling, scaling_figures, scaling_table};
+use crate::summary::{by_count, means_table, native_curves, native_figures, native_table};
+use crate::tables::{Table, mesh_table, to_csv, to_latex, to_markdown};
 use crate::text::file_stems;
 use crate::view3d::text_of;
 
 /// Writes the report of some records into a folder, which is created where it is missing:
-/// `results.csv`, `tables/*.md`, `tables/*.tex`, `plots/*.svg`, `header.json` and
+/// `results.csv`, `tables/*.md`, `tables/*.tex`, `tables/methods.*`, `plots/*.svg`, `header.json` and
 /// `index.html`. Returns the paths that were written, `index.html` last.
 ///
 /// Each file is written under a temporary name and renamed. The same records and header give the
@@ -46,48 +42,42 @@ pub fn write_report(
     header: &Header,
 ) -> Result<Vec<PathBuf>, ReportError> {
     let comparison = Comparison::new(records);
-    let summaries = by_count(&comparison);
+    let is_one = comparison.meshes.len() == 1;
+    let (summaries, bounds) = (by_count(&comparison), by_bound(&comparison));
+    let (natives, scaling) = (native_curves(&comparison), scaling(&comparison));
     let how = header.how();
-    let mut files = Files { dir, written: Vec::new() };
-
-    files.write("results.csv", &to_csv(&comparison).map_err(|error| ReportError::csv(&error))?)?;
-    let (natives, bounds) = (native_curves(&comparison), by_bound(&comparison));
     let axis = |method: &str| header.native_axis(method);
-    let mut summary_tables = summary_tables(&comparison, &summaries, &how);
-    // The most telling one first.
-    summary_tables.splice(0..0, equal_error_table(&comparison, &bounds, &how));
+    let mut files = Files { dir, written: Vec::new() };
+    files.write("results.csv", &to_csv(&comparison).map_err(|error| ReportError::csv(&error))?)?;
+
+    let answers = purpose_table(&comparison, &how);
+    let wins = wins_table(&comparison, &how).filter(|_| !is_one);
+    let equal_error = equal_error_table(&comparison, &bounds, &how);
+    let mut means = vec![means_table(&comparison, &summaries, &how)];
     if !natives.is_empty() {
-        summary_tables.push(native_table(&comparison, &natives, &axis, &how));
+        means.push(native_table(&comparison, &natives, &axis, &how));
     }
-    files.write_tables("summary", "Summary", &summary_tables)?;
+    means.retain(|table| !table.rows.is_empty());
+    let growth = scaling.as_ref().map(|scaling| scaling_table(&comparison, scaling, &how));
+    let purposes: Vec<Table> = answers.iter().chain(&wins).cloned().collect();
+    let all_means: Vec<Table> = equal_error.iter().chain(&means).cloned().collect();
+    let growths: Vec<Table> = growth.into_iter().collect();
+    for (stem, title, tables) in [
+        ("summary", "Summary", &all_means),
+        ("overview-purpose", "Which method?", &purposes),
+        ("overview-scaling", "Time and memory against input size", &growths),
+    ] {
+        if stem == "summary" || !tables.is_empty() {
+            files.write_tables(stem, title, tables)?;
+        }
+    }
 
-    let purposes: Vec<Table> = (purpose_table(&comparison, &how).into_iter())
-        .chain(wins_table(&comparison, &how))
-        .collect();
-    if !purposes.is_empty() {
-        files.write_tables("overview-purpose", "Which one for me", &purposes)?;
-    }
+    let mut figures = mean_figures(&comparison, &summaries, &natives);
+    figures.extend(equal_error_figure(&comparison, &bounds));
+    figures.extend(scaling.iter().flat_map(|scaling| scaling_figures(&comparison, scaling)));
+    figures.extend(native_figures(&comparison, &natives, &axis));
+    files.write_plots(&figures)?;
 
-    let scaling = scaling(&comparison);
-    let scaling_table = scaling.as_ref().map(|scaling| scaling_table(&comparison, scaling, &how));
-    if let Some(table) = &scaling_table {
-        let title = "Time and memory against input size";
-        files.write_tables("overview-scaling", title, std::slice::from_ref(table))?;
-    }
-
-    let mut overview_plots: Vec<Plot> =
-        equal_error_plot(&comparison, &bounds)?.into_iter().collect();
-    if let Some((spheres, profiles)) = error_profiles(&comparison) {
-        overview_plots.extend(profile_plot(&comparison, spheres, &profiles)?);
-    }
-    overview_plots.extend(mean_plots(&comparison, &summaries, &natives)?);
-    if let Some(scaling) = &scaling {
-        overview_plots.extend(scaling_plots(&comparison, scaling)?);
-    }
-    let native_plots = native_plots(&comparison, &natives, &axis)?;
-    for plot in overview_plots.iter().chain(&native_plots) {
-        files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
-    }
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     let has_plots = stems.len() <= MOST_PLOTTED;
     let pictures = strips(&comparison);
@@ -95,18 +85,20 @@ pub fn write_report(
     let mut meshes = Vec::new();
     for (mesh, stem) in stems.into_iter().enumerate() {
         let part = MeshPart {
-            table: mesh_table(&comparison, mesh, &how),
-            plots: if has_plots { mesh_plots(&comparison, mesh, &stem)? } else { vec![] },
+            figures: if has_plots { mesh_figures(&comparison, mesh, &stem) } else { vec![] },
             picture: picture(dir, pictures.get(&mesh), &mut room),
             view: view(dir, pictures.get(&mesh), &mut room_3d),
             stem,
         };
+        let table = mesh_table(&comparison, mesh, &how);
         let name = format!("mesh-{}", part.stem);
-        files.write_tables(&name, &comparison.meshes[mesh], std::slice::from_ref(&part.table))?;
-        for plot in &part.plots {
-            files.write(&format!("plots/{}.svg", plot.stem), plot.svg.as_bytes())?;
-        }
+        files.write_tables(&name, &comparison.meshes[mesh], std::slice::from_ref(&table))?;
+        files.write_plots(&part.figures)?;
         meshes.push(part);
+    }
+    let bibtex = header.bibtex(&comparison.methods);
+    if !comparison.entries.is_empty() {
+        files.write(BIBTEX, bibtex.as_bytes())?;
     }
     let header_json =
         serde_json::to_vec_pretty(header).map_err(|error| ReportError::header(&error))?;
@@ -114,21 +106,27 @@ pub fn write_report(
     let shown = pictures.values().flat_map(|strip| [strip.file.clone(), strip.view_file()]);
     let shown = shown.map(|file| dir.join(file)).collect();
     files.remove_stale(shown)?;
+    let sections = [
+        ("equal-error", "Equal error", equal_error.into_iter().collect()),
+        ("means", if is_one { "All methods" } else { "Means over meshes" }, means),
+        ("wins", "Method against method", wins.into_iter().collect()),
+        ("scaling", "Time and memory against input size", growths),
+    ];
     let page = Page {
         header,
         comparison: &comparison,
-        summaries: &summaries,
-        purposes: &purposes,
-        scaling: scaling_table.as_ref(),
-        overview_plots: &overview_plots,
-        native_plots: &native_plots,
+        answers,
+        sections: sections.into_iter().filter(|section| !section.2.is_empty()).collect(),
+        figures: &figures,
         meshes: &meshes,
-        summary_tables: &summary_tables,
-        has_equal_error: !bounds.is_empty(),
+        bibtex: &bibtex,
     };
     files.write("index.html", page.to_html().as_bytes())?;
     Ok(files.written)
 }
+
+/// BibTeX of the methods that ran and of the program.
+pub(crate) const BIBTEX: &str = "tables/methods.bib";
 
 /// Of more meshes none has plots of its own: they would be thousands of files that nobody opens.
 pub(crate) const MOST_PLOTTED: usize = 100;
@@ -198,6 +196,15 @@ impl Files<'_> {
         }
     }
 
+    fn write_plots(&mut self, figures: &[Figure]) -> Result<(), ReportError> {
+        for figure in figures {
+            if let Some(svg) = figure.to_svg()? {
+                self.write(&format!("plots/{}.svg", figure.stem), svg.as_bytes())?;
+            }
+        }
+        Ok(())
+    }
+
     /// The same tables as Markdown and as LaTeX.
     fn write_tables(
         &mut self,
@@ -205,7 +212,7 @@ impl Files<'_> {
         title: &str,
         tables: &[Table],
     ) -> Result<(), ReportError> {
-        let mut markdown = format!("# {}\n\n", crate::tables::escape_markdown(title));
+        let mut markdown = format!("# {}\n\n", crate::tables::escape(title));
         let mut latex = String::new();
         for (index, table) in tables.iter().enumerate() {
             if index > 0 {

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::{Change, Diff, ItemName, Meaning, Timing, Unlike};
-use crate::tables::{Cell, Column, Row, Table, escape_markdown, to_markdown};
+use crate::tables::{Cell, Column, Row, Table, escape, to_markdown};
 use crate::text::{counted, significant};
 
 /// Rows of a table of changes; the JSON has all.
@@ -31,7 +31,7 @@ pub(super) fn markdown(diff: &Diff) -> String {
         text.push('\n');
     }
     for why in &diff.untimed {
-        text.push_str(&format!("Not compared: {}.\n\n", escape_markdown(why)));
+        text.push_str(&format!("Not compared: {}.\n\n", escape(why)));
     }
     for (names, what) in [(&diff.missing, "only in the older"), (&diff.added, "only in the newer")]
     {
@@ -65,13 +65,10 @@ fn sides(diff: &Diff) -> String {
             let short = set.iter().map(|text| text.chars().take(length).collect::<String>());
             short.collect::<Vec<_>>().join(", ")
         };
-        let name = escape_markdown(&side.name);
-        let machines = escape_markdown(&all(&side.machines, usize::MAX));
+        let name = escape(&side.name);
+        let machines = escape(&all(&side.machines, usize::MAX));
         let (versions, builds) = (all(&side.versions, usize::MAX), all(&side.builds, 12));
-        format!(
-            "- {which}: {name}, version {}, build {builds}, on {machines}",
-            escape_markdown(&versions)
-        )
+        format!("- {which}: {name}, version {}, build {builds}, on {machines}", escape(&versions))
     });
     lines.collect::<Vec<_>>().join("\n")
 }
@@ -170,7 +167,7 @@ fn listed(names: &[ItemName]) -> String {
     if names.len() > MOST_NAMES {
         all.push(format!("and {} more", names.len() - MOST_NAMES));
     }
-    escape_markdown(&all.join(", "))
+    escape(&all.join(", "))
 }
 
 /// Why results cannot be compared, each reason once.
@@ -182,7 +179,7 @@ fn unlike(unlike: &[Unlike]) -> String {
         let names: Vec<ItemName> =
             unlike.iter().filter(|u| u.why == *why).map(|u| u.item.clone()).collect();
         let count = results(names.len(), "not compared");
-        format!("{count} ({}): {}.\n\n", escape_markdown(why), listed(&names))
+        format!("{count} ({}): {}.\n\n", escape(why), listed(&names))
     };
     reasons.iter().map(line).collect()
 }

@@ -1,8 +1,7 @@
 //! The findings as Markdown for terminals, and as a page.
 
 use super::{Change, Findings, NOISY, Track, measured};
-use crate::page::html_table;
-use crate::tables::{Cell, Column, Row, Table, to_markdown};
+use crate::tables::{Cell, Column, Row, Table, to_html, to_markdown};
 use crate::text::{counted, escape_html, significant};
 
 /// More rows of one kind are counted, not listed: the JSON has them all.
@@ -27,7 +26,7 @@ impl Findings<'_> {
 
     /// The findings as a page without a script. `remarks`, such as damaged files, stand above them.
     pub fn to_html(&self, remarks: &[String]) -> String {
-        let style = include_str!("../page/style.css");
+        let style = include_str!("../page/page.css");
         let class = if self.regressions > 0 { "worse" } else { "notice" };
         let mut html = format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -44,7 +43,7 @@ impl Findings<'_> {
             let notes = table.notes.iter().map(|note| format!("<p>{}</p>\n", escape_html(note)));
             let notes = notes.collect::<String>();
             html.push_str(&format!("<h2>{}</h2>\n{notes}", escape_html(&table.caption)));
-            html.push_str(&html_table(&table));
+            html.push_str(&to_html(&table));
         }
         html.push_str(
             "<h2>All series</h2>\n<p>Each line shows the runs of a series on one machine from left to right, on a \

@@ -1,54 +1,51 @@
 //! `index.html`: one page that holds everything and opens without a network.
 //!
-//! Plots are inline SVG, the style sheet and the script are our own. Without the script the page
-//! still shows everything but what stands in it compressed: rows and meshes beyond the first ones,
-//! which the files beside it hold as well. The script sorts, filters, opens details, and answers
-//! questions about points of the plots.
+//! Rust writes data, the static files of this folder draw them. The page holds two documents: the
+//! small one is plain JSON with everything but the records; the large one, with a column for each
+//! number of the records and the plots of each mesh, is gzip in Base64. Libraries are packed alike.
 
-mod details;
-mod html;
-mod meshes;
-mod overview;
-pub(crate) mod packed;
-mod reference;
-mod results;
+mod records;
 
-pub(crate) use self::html::table as html_table;
+use std::collections::BTreeMap;
+use std::io::Write;
 
-use crate::comparison::Comparison;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use serde_json::{Value, json};
+
+use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, RunNote};
-use crate::plots::Plot;
-use crate::record::Machine;
-use crate::summary::CountSummary;
-use crate::tables::Table;
-use crate::text::{counted, escape_html};
+use crate::metric::{BELOW_30, COMPARED, EPSILON, SPHERES_ONLY};
+use crate::plots::{FONTS, Figure, symbol};
+use crate::record::{Machine, Status};
+use crate::tables::{Cell, Column, Row, Table, warnings};
+use crate::text::{betti, counted, escape_html, grouped, printable};
+use crate::write::BIBTEX;
 
 /// Everything that the page is made of.
 pub(crate) struct Page<'a> {
     pub(crate) header: &'a Header,
     pub(crate) comparison: &'a Comparison<'a>,
-    pub(crate) summaries: &'a [CountSummary],
-    /// Which method for which purpose, and method against method.
-    pub(crate) purposes: &'a [Table],
-    /// How time and memory grow with the input.
-    pub(crate) scaling: Option<&'a Table>,
-    pub(crate) overview_plots: &'a [Plot],
-    /// One for each method with a scalar of its own.
-    pub(crate) native_plots: &'a [Plot],
+    /// Which method for which purpose.
+    pub(crate) answers: Option<Table>,
+    /// Folded sections of tables: id, title, tables.
+    pub(crate) sections: Vec<(&'static str, &'static str, Vec<Table>)>,
+    /// Figures over all meshes.
+    pub(crate) figures: &'a [Figure],
     /// In the order of the meshes.
     pub(crate) meshes: &'a [MeshPart],
-    pub(crate) summary_tables: &'a [Table],
-    /// Whether the first of them is that of equal errors.
-    pub(crate) has_equal_error: bool,
+    /// Of the methods that ran and of the program.
+    pub(crate) bibtex: &'a str,
 }
 
 /// What the page shows of one mesh.
 pub(crate) struct MeshPart {
     /// Name of its files.
     pub(crate) stem: String,
-    pub(crate) table: Table,
-    pub(crate) plots: Vec<Plot>,
-    /// The address of a picture of its results, and what it shows.
+    pub(crate) figures: Vec<Figure>,
+    /// The address of a picture of its results, and its description.
     pub(crate) picture: Option<(String, String)>,
     pub(crate) view: Option<MeshView>,
 }
@@ -62,60 +59,157 @@ pub(crate) struct MeshView {
     pub(crate) text: Option<String>,
 }
 
+/// Bytes as gzip in Base64.
+pub(crate) fn pack(bytes: &[u8]) -> String {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    // Writing to a vector never fails.
+    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());
+    BASE64_STANDARD.encode(packed.unwrap_or_default())
+}
+
+/// An element with a packed text, which a browser skips until the script reads it.
+fn packed(id: &str, text: &str) -> String {
+    let text = pack(text.as_bytes());
+    format!("<script type=\"text/plain\" id=\"{id}\">{text}</script>\n")
+}
+
+/// JSON that may stand in an element `script`: no text can end the element or begin a comment, and
+/// no direction mark reorders what is shown.
+fn embedded(value: &Value) -> String {
+    printable(&value.to_string().replace('<', "\\u003c"))
+}
+
 impl Page<'_> {
     /// The page as HTML.
     pub(crate) fn to_html(&self) -> String {
-        let title = self.title();
-        let mut html = String::new();
-        html.push_str("<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-        html.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
-        html.push_str("<meta name=\"color-scheme\" content=\"light dark\">\n");
-        html.push_str(&format!("<title>{}</title>\n", escape_html(title)));
-        html.push_str(&format!(
-            "<style>\n{}</style>\n</head>\n<body>\n",
-            include_str!("style.css")
-        ));
-        html.push_str(&self.head(title));
-        html.push_str("<main>\n");
-        html.push_str(&self.notices());
-        if self.comparison.measured() > 0 {
-            html.push_str(&overview::section(self));
+        let title = match self.header.title.as_str() {
+            "" => "Simplification of the medial axis: comparison",
+            title => title,
+        };
+        let mut library = packed("bulk", &embedded(&self.bulk()));
+        library.push_str(&packed("d3", include_str!("vendor/d3.min.js")));
+        library.push_str(&packed("plot", include_str!("vendor/plot.umd.min.js")));
+        let views: Vec<&MeshView> =
+            self.meshes.iter().filter_map(|mesh| mesh.view.as_ref()).collect();
+        if !views.is_empty() {
+            library.push_str(&packed("three", include_str!("vendor/three.module.min.js")));
+            library.push_str(&packed("controls", include_str!("vendor/OrbitControls.js")));
         }
-        if !self.comparison.entries.is_empty() {
-            html.push_str(&results::section(self));
-            html.push_str(&meshes::section(self));
-        }
-        html.push_str(&reference::warnings(self));
-        html.push_str(&reference::methods(self.header, self.comparison));
-        html.push_str(reference::definitions().as_str());
-        html.push_str(&reference::files(self));
-        html.push_str("</main>\n");
-        if self.meshes.iter().any(|mesh| mesh.view.is_some()) {
-            html.push_str(&packed::packed(
-                Some("three"),
-                include_str!("vendor/three.module.min.js"),
+        for view in views {
+            let Some(text) = &view.text else { continue };
+            let name = escape_html(&view.name);
+            library.push_str(&format!(
+                "<script type=\"text/plain\" class=\"view\" id=\"view-{name}\">{text}</script>\n"
             ));
         }
-        html.push_str(&format!(
-            "<script>\n\"use strict\";\n{}{}{}{}{}</script>\n</body>\n</html>\n",
-            include_str!("packed.js"),
+        let script = [
+            include_str!("page.js"),
             include_str!("table.js"),
             include_str!("plots.js"),
             include_str!("view3d.js"),
-            include_str!("script.js")
-        ));
-        html
-    }
-
-    fn title(&self) -> &str {
-        match self.header.title.as_str() {
-            "" => "Simplification of the medial axis: comparison",
-            title => title,
+            "start();\n",
+        ];
+        // The parts of the template in their order: no value can be taken for a place of another.
+        let parts = [
+            ("{title}", escape_html(title)),
+            ("{style}", include_str!("page.css").to_owned()),
+            ("{title}", escape_html(title)),
+            ("{report}", embedded(&self.report())),
+            ("{packed}", library),
+            ("{script}", script.concat()),
+        ];
+        let mut rest = include_str!("page.html");
+        let mut html = String::new();
+        for (place, text) in parts {
+            let (before, after) = rest.split_once(place).expect("the template has each place");
+            html.push_str(before);
+            html.push_str(&text);
+            rest = after;
         }
+        html + rest
     }
 
-    /// Title, what was run, and the way to the sections.
-    fn head(&self, title: &str) -> String {
+    /// The large document: the records as columns, and the plots of each mesh.
+    fn bulk(&self) -> Value {
+        let count = self.comparison.entries.len();
+        let is_shown = count > 0 && count <= records::MOST;
+        let figures = self.meshes.iter().map(|mesh| figures(&mesh.figures));
+        json!({
+            "rows": if is_shown { count } else { 0 },
+            "columns": if is_shown { records::all_columns(self.comparison) } else { Default::default() },
+            "figures": figures.collect::<Vec<_>>(),
+        })
+    }
+
+    /// The small document.
+    fn report(&self) -> Value {
+        let (header, comparison) = (self.header, self.comparison);
+        let is_one = comparison.meshes.len() == 1;
+        let series = comparison.series.iter().enumerate().map(|(index, name)| {
+            let (colour, symbol, hollow) = symbol(index);
+            json!({"name": name, "colour": colour, "symbol": symbol, "hollow": hollow})
+        });
+        let metrics = COMPARED.iter().map(|metric| {
+            let rare = [&EPSILON, &SPHERES_ONLY, &BELOW_30].iter().any(|rare| rare.key == metric.key);
+            json!({"key": metric.key, "title": metric.heading(), "digits": metric.digits(), "shown": !rare})
+        });
+        let mut sections: Vec<Value> = Vec::new();
+        for (id, title, tables) in &self.sections {
+            let tables: Vec<Table> = tables.iter().map(without_command).collect();
+            sections.push(json!({"id": id, "title": title, "tables": tables}));
+        }
+        if let Some(table) = self.failures() {
+            let title = table.caption.clone();
+            sections.push(json!({"id": "failures", "title": title, "tables": [table]}));
+        }
+        let methods = header
+            .methods
+            .iter()
+            .filter(|note| comparison.methods.contains(&note.id.as_str()))
+            .map(|note| {
+                json!({
+                    "id": note.id, "title": note.title, "summary": note.summary, "home": note.home,
+                    "published": note.published.trim_end_matches('.'), "citation": note.citation,
+                })
+            });
+        let runs = &header.runs;
+        let command = runs.last().map(|run| &run.command).filter(|command| !command.is_empty());
+        let answers = self.answers.as_ref().map(|table| match is_one {
+            // Shares and counts of meshes say nothing about one mesh.
+            true => Table { notes: vec![], ..table.clone() }
+                .without(&["meshes", "better, equal, worse"]),
+            false => without_command(table),
+        });
+        json!({
+            "facts": self.facts(),
+            "command": command,
+            "earlier": runs.split_last().map_or(&[][..], |(_, earlier)| earlier).iter().map(earlier).collect::<Vec<_>>(),
+            "study": header.study,
+            "alert": self.alert(),
+            "notices": header.notes.iter().cloned().chain(comparison.cautions()).collect::<Vec<_>>(),
+            "series": series.collect::<Vec<_>>(),
+            "levels": comparison.levels.iter().map(|&level| level_label(level)).collect::<Vec<_>>(),
+            "metrics": metrics.collect::<Vec<_>>(),
+            "meshes": (0..self.meshes.len()).map(|mesh| self.mesh(mesh)).collect::<Vec<_>>(),
+            "answers": answers,
+            "figures": if is_one { vec![] } else { figures(self.figures) },
+            "sections": sections,
+            "warnings": self.warnings(),
+            "methods": methods.collect::<Vec<_>>(),
+            "definitions": definitions(),
+            "papers": (!comparison.entries.is_empty()).then(|| papers(self.bibtex)),
+            "files": self.files(),
+            "too_many": (comparison.entries.len() > records::MOST).then(|| format!(
+                "{} results are too many for a table on a page. results.csv holds every number, and \
+                 each mesh has a table in tables/.",
+                grouped(comparison.entries.len() as u64)
+            )),
+            "units": UNITS,
+        })
+    }
+
+    /// Counts of methods, meshes and levels, date, version and machine.
+    fn facts(&self) -> Vec<String> {
         let comparison = self.comparison;
         let mut facts = vec![format!(
             "{} on {} at {}",
@@ -130,86 +224,250 @@ impl Page<'_> {
         );
         let recorded = || comparison.entries.first().map(|entry| &entry.record.machine);
         let machine = run.and_then(|run| run.machine.as_ref()).or_else(recorded);
-        let machine = machine.map(Machine::to_string);
-        facts.extend(machine.filter(|text| !text.is_empty()));
-        let facts: Vec<String> =
-            facts.iter().map(|fact| format!("<li>{}</li>", escape_html(fact))).collect();
-        let mut html = format!("<header>\n<h1>{}</h1>\n", escape_html(title));
-        html.push_str(&format!("<ul class=\"facts\">{}</ul>\n", facts.concat()));
-        html.push_str(&self.how());
-        html.push_str("<nav>");
-        if comparison.measured() > 0 {
-            html.push_str("<a href=\"#overview\">Overview</a>");
-        }
-        if !comparison.entries.is_empty() {
-            html.push_str(
-                "<a href=\"#results\">Results</a><a href=\"#meshes\">Meshes, pictures</a>",
-            );
-        }
-        html.push_str("<a href=\"#definitions\">Definitions</a>");
-        html.push_str("<a href=\"#files\">Files</a></nav>\n");
-        html.push_str("</header>\n");
-        html
+        facts.extend(machine.map(Machine::to_string).filter(|text| !text.is_empty()));
+        facts
     }
 
-    /// The commands that made the records, the last one in sight, and the study.
-    fn how(&self) -> String {
-        let mut html = String::new();
-        let runs = &self.header.runs;
-        if let Some(run) = runs.last().filter(|run| !run.command.is_empty()) {
-            let command = escape_html(&run.command);
-            html.push_str(&format!("<pre class=\"command\"><code>{command}</code></pre>\n"));
-        }
-        if let [earlier @ .., _] = runs.as_slice()
-            && !earlier.is_empty()
-        {
-            let line = |run: &RunNote| {
-                let date = run.date.as_deref().unwrap_or("no date");
-                let build: String = run.binary_hash.chars().take(8).collect();
-                let what =
-                    format!("{date}, medial {} (build {build}): {}", run.version, run.command);
-                format!("<li><code>{}</code></li>", escape_html(&what))
-            };
-            let lines: String = earlier.iter().map(line).collect();
-            html.push_str(&format!(
-                "<details><summary>{} that added records</summary><ul>{lines}</ul></details>\n",
-                counted(earlier.len(), "earlier run", "earlier runs")
-            ));
-        }
-        if let Some(study) = &self.header.study {
-            let study = study.lines().map(escape_html).collect::<Vec<_>>().join("\n");
-            html.push_str(&format!(
-                "<details><summary>The study that was asked last</summary>\
-                 <pre class=\"command\"><code>{study}</code></pre></details>\n"
-            ));
-        }
-        html
+    /// Why there is no number on the page.
+    fn alert(&self) -> Option<String> {
+        let runs = self.comparison.entries.len();
+        (self.comparison.measured() == 0).then(|| match runs {
+            0 => "Nothing was measured: there is no record.".to_owned(),
+            runs => format!(
+                "Nothing was measured: none of the {} led to a result that was evaluated.",
+                counted(runs, "run", "runs")
+            ),
+        })
     }
 
-    /// What must be read first: that nothing was measured, failures, cautions.
-    fn notices(&self) -> String {
-        let mut html = String::new();
-        let comparison = self.comparison;
-        if comparison.measured() == 0 {
-            let why = if comparison.entries.is_empty() {
-                "There is no record.".to_owned()
-            } else {
-                format!(
-                    "None of the {} led to a result that was evaluated; the reasons stand below.",
-                    counted(comparison.entries.len(), "run", "runs")
-                )
+    fn mesh(&self, index: usize) -> Value {
+        let (comparison, part) = (self.comparison, &self.meshes[index]);
+        let entries = || comparison.of_mesh(index);
+        let missing = entries().filter(|entry| !entry.record.status.has_result()).count();
+        let mut brief = counted(entries().count(), "run", "runs");
+        if missing > 0 {
+            brief.push_str(&format!(", {missing} without a result"));
+        }
+        let initial = entries().find_map(|entry| entry.record.initial);
+        let initial = initial.map_or(vec![], |initial| {
+            let known = |numbers: Option<[u64; 3]>| numbers.map_or("unknown".to_owned(), betti);
+            let [spheres, edges, faces] =
+                [initial.spheres, initial.edges, initial.faces].map(grouped);
+            let wrong = initial.betti.zip(initial.expected_betti).filter(|(a, b)| a != b).is_some();
+            let mut facts = vec![
+                json!([
+                    "initial medial mesh",
+                    format!("{spheres} spheres, {edges} edges, {faces} faces")
+                ]),
+                json!(["its Betti numbers", known(initial.betti)]),
+                json!(["Betti numbers of the solid", known(initial.expected_betti)]),
+            ];
+            if wrong {
+                let verdict = "wrong before any simplification: methods that start here inherit it";
+                facts.push(json!(["topology", verdict, true]));
+            }
+            facts
+        });
+        let view = part.view.as_ref();
+        json!({
+            "name": comparison.meshes[index],
+            "stem": part.stem,
+            "brief": brief,
+            "measured": entries().any(|entry| entry.measured()),
+            "picture": part.picture.as_ref().map(|picture| &picture.0),
+            "words": part.picture.as_ref().map(|picture| &picture.1),
+            "view": view.map(|view| json!({"name": view.name, "file": format!("./{}", view.file)})),
+            "initial": initial,
+        })
+    }
+
+    /// Runs without the requested result, grouped by method, status and reason.
+    fn failures(&self) -> Option<Table> {
+        let mut groups: BTreeMap<(usize, Status, &str), Vec<String>> = BTreeMap::new();
+        for entry in self.comparison.entries.iter().filter(|entry| !entry.record.status.is_ok()) {
+            let reason = match entry.record.status {
+                // Each such reason has its own number: one row for all of them.
+                Status::OtherCount => "another number of spheres than requested: not compared",
+                Status::BoundMissed => "no level that was tried keeps the error",
+                _ => entry.record.reason.as_deref().unwrap_or("no reason was recorded"),
             };
-            html.push_str(&format!(
-                "<p class=\"notice bad\" role=\"alert\"><strong>Nothing was measured.</strong> {}</p>\n",
-                escape_html(&why)
-            ));
+            let level = level_label(entry.record.simplify.level);
+            let places = groups.entry((entry.series, entry.record.status, reason)).or_default();
+            places.push(format!("{} ({level})", self.comparison.meshes[entry.mesh]));
         }
-        let cautions = self.header.notes.iter().cloned().chain(comparison.cautions());
-        let cautions: Vec<String> =
-            cautions.map(|note| format!("<li>{}</li>", escape_html(&note))).collect();
-        if !cautions.is_empty() {
-            html.push_str(&format!("<ul class=\"notice\">{}</ul>\n", cautions.concat()));
+        let runs: usize = groups.values().map(Vec::len).sum();
+        let row =
+            |((series, status, reason), places): (&(usize, Status, &str), &Vec<String>)| Row {
+                cells: vec![
+                    Cell::new(self.comparison.series[*series].as_str()),
+                    Cell::new(status.to_string()),
+                    Cell::new(*reason),
+                    Cell::new(places.len().to_string()),
+                    Cell::new(abridged(places)),
+                ],
+                starts_group: false,
+            };
+        (runs > 0).then(|| Table {
+            caption: format!(
+                "{} of {} without the requested result",
+                grouped(runs as u64),
+                counted(self.comparison.entries.len(), "run", "runs")
+            ),
+            notes: vec![],
+            columns: vec![
+                Column::text("method"),
+                Column::text("status"),
+                Column::text("reason"),
+                Column::number("runs"),
+                Column::text("meshes (requested)"),
+            ],
+            rows: groups.iter().map(row).collect(),
+        })
+    }
+
+    /// Every warning once, with the results that it came with.
+    fn warnings(&self) -> Vec<[String; 2]> {
+        let mut groups: Vec<(&str, Vec<String>)> = Vec::new();
+        for entry in &self.comparison.entries {
+            for warning in warnings(entry.record) {
+                let place = format!(
+                    "{} on {} ({})",
+                    self.comparison.series[entry.series],
+                    self.comparison.meshes[entry.mesh],
+                    level_label(entry.record.simplify.level)
+                );
+                match groups.iter_mut().find(|(known, _)| *known == warning) {
+                    Some((_, places)) => places.push(place),
+                    None => groups.push((warning, vec![place])),
+                }
+            }
         }
-        html
+        groups.iter().map(|(warning, places)| [(*warning).to_owned(), abridged(places)]).collect()
+    }
+
+    /// The files next to the page and their content.
+    fn files(&self) -> Vec<[String; 2]> {
+        let mut files = vec![
+            ["results.jsonl", "the records, one JSON object on each line"],
+            ["results.csv", "every number of every record, one row for each"],
+        ];
+        if !self.sections.is_empty() {
+            files.push(["tables/summary.md", "means over meshes; further tables next to it"]);
+            files.push(["tables/summary.tex", "the same as LaTeX"]);
+        }
+        files.iter().map(|file| file.map(str::to_owned)).collect()
+    }
+}
+
+/// Units and the meaning of bold, below the table of results.
+const UNITS: &str = "Lengths in % of the bounding-box diagonal of the input; seconds of wall clock, \
+    shared substrates included. Arrows: which way is better. Bold: best for this mesh at this number \
+    of spheres, among results that reached it to within 2 %. results.csv holds every recorded number.";
+
+/// The page's head shows the command once for all tables: it is the first note of each.
+fn without_command(table: &Table) -> Table {
+    let mut table = table.clone();
+    table.notes.drain(..table.notes.len().min(1));
+    table
+}
+
+fn figures(figures: &[Figure]) -> Vec<Value> {
+    figures.iter().map(Figure::to_json).collect()
+}
+
+fn earlier(run: &RunNote) -> String {
+    let date = run.date.as_deref().unwrap_or("no date");
+    let build: String = run.binary_hash.chars().take(8).collect();
+    format!("{date}, medial {} (build {build}): {}", run.version, run.command)
+}
+
+/// The first few of a list; the table of results holds them all.
+fn abridged(items: &[String]) -> String {
+    const SHOWN: usize = 6;
+    let mut text = items.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    if items.len() > SHOWN {
+        text.push_str(&format!(" and {} more", items.len() - SHOWN));
+    }
+    text
+}
+
+/// Texts to copy into a paper: title, file, text.
+fn papers(bibtex: &str) -> Value {
+    let about = format!(
+        "plots/ holds all plots as SVG, lettered in {FONTS}; tables/ holds all tables as LaTeX for \
+         \\input. They need no package; booktabs gives finer rules, graphicx shrinks wide tables to \
+         the width of the text. A plot as PDF: rsvg-convert -f pdf -o x.pdf plots/x.svg (librsvg)."
+    );
+    let title = "BibTeX of the methods and the program";
+    json!({"about": about, "texts": [[title, format!("./{BIBTEX}"), bibtex]]})
+}
+
+/// The meaning of each column.
+fn definitions() -> Vec<[String; 2]> {
+    let general = [
+        [
+            "requested, spheres",
+            "The requested number of spheres, and the number of the result. Results compare at equal \
+             numbers, reached to within 2 %.",
+        ],
+        [
+            "%",
+            "Lengths are percentages of the diagonal of the input's bounding box; results.jsonl and \
+             results.csv hold them as fractions.",
+        ],
+        [
+            "substrate, prepare, simplify",
+            "The stages of the time. Substrates are the parts that methods share (samples, Delaunay \
+             triangulation, inside test, initial medial mesh): they count for each method that uses \
+             them, whichever method built them first. Then the method's work for all levels, then \
+             its work for this level.",
+        ],
+        [
+            "Betti",
+            "Betti numbers over Z2 of the medial mesh: components, independent loops, enclosed \
+             bubbles. A medial axis has those of its solid: components, total genus, cavities.",
+        ],
+        [
+            "status",
+            "ok; other count: a result with another number of spheres; unsupported: the method does \
+             not do this, which is no failure; refused: the input was not accepted; failed, panicked, \
+             timed out, out of memory: the run ended so; invalid output: the output is no medial \
+             mesh.",
+        ],
+    ];
+    let metrics = COMPARED.iter().map(|metric| {
+        let means = metric.mean.word();
+        [metric.heading(), format!("{} Means over meshes are {means}.", metric.definition)]
+    });
+    metrics.chain(general.map(|pair| pair.map(str::to_owned))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read;
+
+    use flate2::read::GzDecoder;
+
+    use super::*;
+
+    #[test]
+    fn packed_texts_come_back_and_are_the_same_each_time() {
+        let text = "</script><b>\u{e9}".repeat(100);
+        let element = packed("rows", &text);
+        assert_eq!(element, packed("rows", &text));
+        assert!(element.len() < text.len(), "{element}");
+        let inside = element.split_once('>').unwrap().1.strip_suffix("</script>\n").unwrap();
+        let bytes = BASE64_STANDARD.decode(inside).unwrap();
+        let mut back = String::new();
+        GzDecoder::new(bytes.as_slice()).read_to_string(&mut back).unwrap();
+        assert_eq!(back, text);
+    }
+
+    #[test]
+    fn no_text_can_leave_its_script() {
+        let text = embedded(&json!({"reason": "</script><!--\u{202e}\n"}));
+        assert!(!text.contains(['<', '\u{202e}', '\n']), "{text}");
+        let back: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(back["reason"], "</script><!--\u{fffd}\n");
     }
 }

@@ -1,42 +1,46 @@
 // The table of all results. Only the rows near those in sight stand in the document: laying out a
 // table costs far more than choosing and ordering its rows.
-(async () => {
-  const table = document.querySelector("table.sortable");
-  const form = document.querySelector("form.filters");
-  if (!table || !form) return;
-  const FACETS = ["mesh", "method", "asked", "status"];
+const resultsOf = (bulk) => {
   const CHUNK = 250;
-  const box = table.parentElement;
-  const body = table.tBodies[0];
-  const heads = [...table.tHead.rows[0].cells];
-  // Rows of the document have an element; those that come packed have what filters and columns ask for, and get
-  // their element when they come into sight.
-  const packed = document.getElementById("rows");
-  const rows = [...body.querySelectorAll("tr")].map((element) => ({ element }));
-  if (packed) {
-    for (const [facets, values, html] of JSON.parse(await page.unpack(packed))) rows.push({ facets, values, html });
-  }
-  const numbers = new Map();
-  const parser = document.createElement("template");
-  const elementOf = (index) => {
-    const row = rows[index];
-    if (!row.element) {
-      parser.innerHTML = row.html;
-      row.element = parser.content.firstElementChild;
-    }
-    numbers.set(row.element, index);
-    return row.element;
+  const FACETS = ["mesh", "method", "asked", "status"];
+  const count = bulk.rows;
+  // A column is one value for each row, or distinct values and the index of each row's.
+  const columnOf = (path) => {
+    const column = bulk.columns[path];
+    if (!column) return () => null;
+    return Array.isArray(column) ? (row) => column[row] : (row) => column.values[column.of[row]];
   };
-  const output = form.querySelector("output");
-  const boxes = [...form.querySelectorAll("input[name=column]")];
-  const make = (tag, className, text) => {
-    const element = document.createElement(tag);
-    if (className) element.className = className;
-    if (text !== undefined) element.textContent = text;
-    return element;
-  };
+  const table = { mesh: columnOf("table/mesh"), series: columnOf("table/series"), best: columnOf("table/best") };
+  const texts = {};
+  for (const key of ["asked", "status", "remark", "link", "topology", "repeat", "warnings"]) texts[key] = columnOf(`table/${key}`);
+  texts.mesh = (row) => report.meshes[table.mesh(row)].name;
+  texts.method = (row) => report.series[table.series(row)].name;
+  const numbers = { asked: columnOf("table/count"), spheres: columnOf("table/spheres"), edges: columnOf("simplify/edges"),
+    faces: columnOf("simplify/faces"), memory: columnOf("simplify/peak_bytes") };
+  const text = (key, title, shown = true) => ({ key, title, shown, text: texts[key] });
+  const number = (key, title, shown, digits, scale = 1) => ({ key, title, shown, number: numbers[key],
+    text: (row) => written(numbers[key](row) === null ? null : numbers[key](row) * scale, digits) });
+  const columns = [
+    { ...text("mesh", "mesh"), always: true },
+    { ...text("asked", "requested"), number: numbers.asked, always: true },
+    { ...text("method", "method"), always: true },
+    text("status", "status"),
+    number("spheres", "spheres", true, "count"),
+    number("edges", "edges", false, "count"),
+    number("faces", "faces", false, "count"),
+    ...report.metrics.map(({ key, title, digits, shown }, k) => {
+      numbers[key] = columnOf(`table/${key}`);
+      return { ...number(key, title, shown, digits), bit: 1 << k };
+    }),
+    number("memory", "memory (MB) ↓", true, "count", 1e-6),
+    text("betti", "Betti"),
+    text("topology", "as solid"),
+    text("remark", "remark"),
+  ];
+  const betti = columnOf("evaluate/betti");
+  columns.find(({ key }) => key === "betti").text = (row) => betti(row)?.join(", ") ?? "–";
 
-  // What is asked of the rows, once for each column.
+  const collator = new Intl.Collator("en", { numeric: true });
   const cached = (compute) => {
     const known = new Map();
     return (key) => {
@@ -44,31 +48,53 @@
       return known.get(key);
     };
   };
-  const facet = cached((name) => {
-    const place = FACETS.indexOf(name);
-    return rows.map((row) => (row.facets ? row.facets[place] : row.element.dataset[name]));
-  });
-  const textOf = (row) => (row.html ? row.html.replace(/<[^>]*>/g, "") : row.element.textContent);
-  const texts = cached(() => rows.map((row) => textOf(row).toLowerCase()));
-  const collator = new Intl.Collator("en", { numeric: true });
-  // Numbers to sort by; NaN where there is none. Texts count by their rank.
+  const all = [...Array(count).keys()];
+  const searched = cached(() => all.map((row) => columns.map((column) => column.text(row)).join(" ").toLowerCase()));
+  // Numbers to sort by, NaN where there is none. Texts count by their rank.
   const keys = cached((column) => {
-    const cell = (row) => row.element.children[column];
-    if (heads[column].classList.contains("num")) {
-      return rows.map((row) => (row.values ? (row.values[column] ?? NaN) : parseFloat(cell(row).dataset.v)));
-    }
-    const words = rows.map((row) => (row.values ? row.values[column] : cell(row).textContent));
-    const ranks = new Map();
-    for (const word of [...new Set(words)].sort(collator.compare)) ranks.set(word, ranks.size);
-    return words.map((word) => ranks.get(word));
+    const { number: value, text: word } = columns[column];
+    if (value) return all.map((row) => value(row) ?? NaN);
+    const words = all.map(word);
+    const ranks = new Map([...new Set(words)].sort(collator.compare).map((each, rank) => [each, rank]));
+    return words.map((each) => ranks.get(each));
   });
 
+  const choices = (name) => {
+    const values = name === "mesh" ? report.meshes.map((mesh) => mesh.name)
+      : name === "method" ? report.series.map((series) => series.name)
+      : name === "asked" ? report.levels : [...new Set(all.map(texts.status))].sort();
+    const options = values.map((value) => new Option(value, value));
+    return make("label", {}, columns.find(({ key }) => key === name).title, " ",
+      make("select", { name }, new Option("all", ""), ...options));
+  };
+  const boxes = columns.filter((column) => !column.always).map(({ key, shown }) =>
+    make("input", { type: "checkbox", name: "column", value: key, checked: shown }));
+  const titleOf = (key) => columns.find((column) => column.key === key).title;
+  const chooser = make("details", { class: "columns" }, make("summary", {}, "columns"),
+    make("div", {}, ...boxes.map((input) => make("label", {}, input, ` ${titleOf(input.value)}`))));
+  const output = make("output");
+  const form = make("form", { class: "filters" }, ...FACETS.map(choices),
+    make("label", {}, "text ", make("input", { type: "search", name: "text" })), chooser,
+    make("button", { type: "reset" }, "reset"), " ", output);
+
+  const heads = columns.map(({ key, title, number: isNumber }, column) => {
+    const button = make("button", { type: "button", class: "sort" }, title);
+    button.addEventListener("click", () => {
+      const again = sorted?.column === column;
+      sort(again && sorted.down ? -1 : column, again);
+      changed();
+    });
+    return make("th", { scope: "col", "data-key": key, class: isNumber ? "num" : null }, button);
+  });
+  const body = make("tbody");
+  const grid = make("table", { class: "sortable" }, make("thead", {}, make("tr", {}, ...heads)), body);
+  const box = make("div", { class: "scroll tall", tabindex: 0 }, grid);
+
   // Equal rows keep their order; rows without a value come last in both directions.
-  let sorted = null;
-  let order = rows.map((_, index) => index);
+  let [sorted, order] = [null, all];
   const sort = (column, down) => {
     sorted = column < 0 ? null : { column, down };
-    order = rows.map((_, index) => index);
+    order = [...all];
     if (sorted) {
       const key = keys(column);
       const sign = down ? -1 : 1;
@@ -79,84 +105,109 @@
       });
     }
     heads.forEach((head, index) => {
-      if (index === column) head.setAttribute("aria-sort", down ? "descending" : "ascending");
-      else head.removeAttribute("aria-sort");
+      head.ariaSort = index !== column ? null : down ? "descending" : "ascending";
     });
   };
-
   const chosen = () => {
-    const wanted = FACETS.map((name) => [facet(name), form.elements[name].value]);
-    const asked = wanted.filter(([, value]) => value !== "");
+    const asked = FACETS.map((name) => [texts[name], form.elements[name].value]).filter(([, value]) => value !== "");
     const words = form.elements.text.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const text = words.length ? texts() : null;
-    return order.filter(
-      (index) =>
-        asked.every(([values, value]) => values[index] === value) &&
-        words.every((word) => text[index].includes(word)),
-    );
+    const searching = words.length ? searched() : null;
+    return order.filter((row) => asked.every(([value, wanted]) => value(row) === wanted) &&
+      words.every((word) => searching[row].includes(word)));
   };
 
-  const opened = new Map();
-  const rest = make("tr", "rest");
-  const restCell = rest.appendChild(make("td"));
-  const restButton = restCell.appendChild(make("button"));
-  restCell.colSpan = heads.length;
-  restButton.type = "button";
-  let matched = [];
-  let attached = 0;
-  const attach = (count) => {
-    const fragment = document.createDocumentFragment();
-    const end = Math.min(matched.length, attached + count);
-    for (; attached < end; attached += 1) {
-      const index = matched[attached];
-      const row = elementOf(index);
-      const head = row.firstElementChild;
-      if (head.firstElementChild.localName !== "button") {
-        const button = make("button", "more");
-        const { mesh, method, asked } = row.dataset;
-        button.type = "button";
-        button.setAttribute("aria-label", `details of ${mesh}, ${method}, ${asked}`);
-        button.setAttribute("aria-expanded", "false");
-        head.prepend(button);
-      }
-      fragment.append(row);
-      if (opened.has(index)) fragment.append(opened.get(index));
+  const cellOf = (row, { key, text: words, number: value, bit }) => {
+    const shown = words(row) ?? "";
+    if (key === "method") return make("td", {}, dot(table.series(row)), shown);
+    if (key === "status") return make("td", {}, make("span", { class: `status ${shown.replaceAll(" ", "_")}` }, shown));
+    if (key === "remark") {
+      const [link, warnings] = [texts.link(row), texts.warnings(row)];
+      return make("td", { class: "wrap" },
+        link && make("a", { href: link }, ".ma"),
+        warnings && make("span", { title: warnings.join("\n") }, `${link ? ", " : ""}${counted(warnings.length, "warning", "warnings")}`),
+        shown && make("div", { class: "brief", title: shown }, shown));
     }
-    if (attached < matched.length) {
-      restButton.textContent = `${matched.length - attached} more rows`;
-      fragment.append(rest);
-    }
-    return fragment;
+    if (!value) return make("td", {}, shown);
+    const best = bit && table.best(row) & bit;
+    return make("td", { class: "num", "data-v": value(row) }, best ? make("strong", {}, shown) : shown);
   };
-  const more = (count) => {
+  const opened = new Map();
+  const rowOf = (row) => {
+    const [mesh, method, asked] = ["mesh", "method", "asked"].map((key) => texts[key](row));
+    const more = make("button", { type: "button", class: "more", "aria-expanded": String(opened.has(row)),
+      "aria-label": `details of ${mesh}, ${method}, ${asked}` });
+    const element = make("tr", { "data-mesh": mesh, "data-method": method },
+      make("th", { scope: "row" }, more, make("a", { href: `#mesh-${report.meshes[table.mesh(row)].stem}` }, mesh)),
+      ...columns.slice(1).map((column) => cellOf(row, column)));
+    more.addEventListener("click", () => {
+      const detail = opened.get(row);
+      if (detail) {
+        detail.remove();
+        opened.delete(row);
+      } else {
+        opened.set(row, detailOf(row));
+        element.after(opened.get(row));
+      }
+      more.setAttribute("aria-expanded", String(!detail));
+    });
+    return [element, opened.get(row)];
+  };
+
+  const restButton = make("button", { type: "button" });
+  const rest = make("tr", { class: "rest" }, make("td", { colspan: columns.length }, restButton));
+  let [matched, attached] = [[], 0];
+  const more = (number) => {
+    const end = Math.min(matched.length, attached + number);
+    const rows = matched.slice(attached, end).flatMap(rowOf).filter(Boolean);
+    attached = end;
     rest.remove();
-    body.append(attach(count));
+    body.append(...rows);
+    restButton.textContent = `${matched.length - attached} more rows`;
+    if (attached < matched.length) body.append(rest);
   };
   const show = () => {
     matched = chosen();
     attached = 0;
-    body.replaceChildren(attach(CHUNK));
+    body.replaceChildren();
+    more(CHUNK);
     box.scrollTop = 0;
-    output.textContent = `${matched.length} of ${rows.length} rows`;
+    output.textContent = `${matched.length} of ${count} rows`;
   };
   restButton.addEventListener("click", () => more(CHUNK));
-  new IntersectionObserver(
-    (entries) => {
-      if (entries.some((entry) => entry.isIntersecting)) more(CHUNK);
-    },
-    { root: box, rootMargin: "800px" },
-  ).observe(rest);
+  new IntersectionObserver((entries) => entries.some((entry) => entry.isIntersecting) && more(CHUNK),
+    { root: box, rootMargin: "800px" }).observe(rest);
   window.addEventListener("beforeprint", () => more(Infinity));
+
+  // Everything that was recorded of a row, by the parts of the record.
+  const detailOf = (row) => {
+    const groups = new Map();
+    for (const path of Object.keys(bulk.columns)) {
+      const value = columnOf(path)(row);
+      const [title, ...names] = path.split("/");
+      if (title === "table" || value === null) continue;
+      if (!groups.has(title)) groups.set(title, []);
+      groups.get(title).push([names.join(": ").replaceAll("_", " "), valueOf(value)]);
+    }
+    const repeat = code(texts.repeat(row));
+    repeat.tabIndex = 0;
+    const sections = [...groups].map(([title, pairs]) => make("section", {}, make("h4", {}, title.replaceAll("_", " ")), listOf(pairs)));
+    const known = make("div", { class: "known" }, make("h4", {}, "Repeat this run"), repeat, make("div", { class: "groups" }, ...sections),
+      note("As recorded: lengths as fractions of the diagonal, seconds, bytes."));
+    return make("tr", { class: "detail" }, make("td", { colspan: columns.length }, known));
+  };
+  const valueOf = (value) => {
+    if (typeof value === "number") return String(Number.isInteger(value) ? value : Number(value.toPrecision(6)));
+    if (!Array.isArray(value)) return typeof value === "object" ? JSON.stringify(value) : String(value);
+    if (typeof value[0] !== "object") return value.join(typeof value[0] === "string" ? "\n" : ", ");
+    const names = Object.keys(value[0]).map((name) => ({ title: name.replaceAll("_", " "), number: true }));
+    return tableOf({ columns: names, rows: value.map((item) => ({ cells: Object.values(item).map(valueOf) })) });
+  };
 
   // Columns are left out by one rule, not cell by cell.
   const rules = document.head.appendChild(make("style"));
   const chooseColumns = () => {
-    const left = boxes.filter((input) => !input.checked).map((input) => {
-      const place = 1 + heads.findIndex((head) => head.dataset.key === input.value);
-      return `.sortable > * > tr:not(.detail, .rest) > :nth-child(${place})`;
-    });
-    const rule = left.length ? `${left.join(",\n")} { display: none; }` : "";
-    if (rules.textContent !== rule) rules.textContent = rule;
+    const left = boxes.filter((input) => !input.checked).map((input) => 1 + columns.findIndex(({ key }) => key === input.value));
+    rules.textContent = left.map((place) => `.sortable > * > tr:not(.detail, .rest) > :nth-child(${place}) { display: none; }`).join("\n");
   };
 
   // The state stands in the address: #results?method=qmat&asked=100&sort=-hausdorff.
@@ -166,20 +217,17 @@
     for (const name of [...FACETS, "text"]) {
       if (form.elements[name].value) state.set(name, form.elements[name].value);
     }
-    if (sorted) state.set("sort", (sorted.down ? "-" : "") + heads[sorted.column].dataset.key);
+    if (sorted) state.set("sort", (sorted.down ? "-" : "") + columns[sorted.column].key);
     if (boxes.some((input) => input.checked !== input.defaultChecked)) {
-      state.set("columns", boxes.filter((input) => input.checked).map((i) => i.value).join(" "));
+      state.set("columns", boxes.filter((input) => input.checked).map((input) => input.value).join(" "));
     }
-    const text = state.toString();
-    if (!text && !location.hash.startsWith(PREFIX)) return;
-    try {
-      history.replaceState(null, "", text ? PREFIX + text : "#results");
-    } catch {
-      // Where the page may not change its address, the state is not kept.
-    }
+    const words = state.toString();
+    if (!words && !location.hash.startsWith(PREFIX)) return;
+    // A page from some places may not change its address: the state is then not kept.
+    try { history.replaceState(null, "", words ? PREFIX + words : "#results"); } catch { }
   };
   const read = () => {
-    if (!location.hash.startsWith(PREFIX)) return false;
+    if (!location.hash.startsWith(PREFIX)) return;
     const state = new URLSearchParams(location.hash.slice(PREFIX.length));
     for (const name of [...FACETS, "text"]) {
       const field = form.elements[name];
@@ -187,14 +235,13 @@
       // A value that no row has.
       if (field.selectedIndex === -1) field.selectedIndex = 0;
     }
-    const columns = state.get("columns")?.split(" ");
-    for (const input of boxes) {
-      input.checked = columns ? columns.includes(input.value) : input.defaultChecked;
-    }
+    const wanted = state.get("columns")?.split(" ");
+    for (const input of boxes) input.checked = wanted ? wanted.includes(input.value) : input.defaultChecked;
     const by = state.get("sort") ?? "";
-    const key = by.replace(/^-/, "");
-    sort(heads.findIndex((head) => key && head.dataset.key === key), by.startsWith("-"));
-    return true;
+    sort(columns.findIndex(({ key }) => by && key === by.replace(/^-/, "")), by.startsWith("-"));
+    chooseColumns();
+    show();
+    document.getElementById("results")?.scrollIntoView();
   };
   let writing;
   const changed = () => {
@@ -205,139 +252,32 @@
   };
   form.addEventListener("input", changed);
   form.addEventListener("submit", (event) => event.preventDefault());
-  form.addEventListener("reset", () =>
-    setTimeout(() => {
-      sort(-1, false);
-      changed();
-    }),
-  );
-
-  for (const [column, head] of heads.entries()) {
-    const button = make("button", "sort", head.textContent);
-    button.type = "button";
-    head.replaceChildren(button);
-    button.addEventListener("click", () => {
-      const again = sorted?.column === column;
-      sort(again && sorted.down ? -1 : column, again);
-      changed();
-    });
-  }
-
-  // Details. Line 0 of the records holds what they share, the others one record each.
-  const lines = cached(async () => (await page.unpack(document.getElementById("records"))).split("\n"));
-  const recordOf = async (index) => {
-    const all = await lines();
-    const { keys, values } = JSON.parse(all[0]);
-    const record = JSON.parse(all[index + 1]);
-    for (const key of keys) if (key in record) record[key] = values[record[key]];
-    return record;
-  };
-  const isObject = (value) => typeof value === "object" && value !== null;
-  const words = (key) => key.replaceAll("_", " ");
-  const written = (value) => {
-    if (Array.isArray(value)) {
-      return value.map(written).join(value.some((item) => typeof item === "string") ? "\n" : ", ");
-    }
-    if (isObject(value)) return JSON.stringify(value);
-    return typeof value === "number" && !Number.isInteger(value)
-      ? String(Number(value.toPrecision(6)))
-      : String(value);
-  };
-  const tableOf = (list) => {
-    const small = make("table");
-    const columns = Object.keys(list[0]);
-    const head = small.createTHead().insertRow();
-    for (const column of columns) head.append(make("th", "num", words(column)));
-    const cells = small.createTBody();
-    for (const item of list) {
-      const row = cells.insertRow();
-      for (const column of columns) row.append(make("td", "num", written(item[column] ?? "")));
-    }
-    return small;
-  };
-  const group = (title, object, into) => {
-    const section = make("section");
-    const list = make("dl");
-    section.append(make("h4", "", title), list);
-    into.append(section);
-    for (const [key, value] of Object.entries(object)) {
-      const flat = isObject(value) && Object.values(value).every((inner) => !isObject(inner));
-      if (Array.isArray(value) && isObject(value[0]) && Object.values(value[0]).every((v) => !isObject(v))) {
-        section.append(make("h5", "", words(key)), tableOf(value));
-      } else if (isObject(value) && !Array.isArray(value)) {
-        group(flat || title === "item" ? `${title}: ${words(key)}` : words(key), value, into);
-      } else {
-        list.append(make("dt", "", words(key)), make("dd", "", written(value)));
-      }
-    }
-    if (!list.childElementCount) list.remove();
-    if (section.childElementCount === 1) section.remove();
-  };
-  const detailOf = async (index) => {
-    const { repeat, simplify, evaluate, initial, ...item } = await recordOf(index);
-    const row = make("tr", "detail");
-    const cell = row.appendChild(make("td"));
-    cell.colSpan = heads.length;
-    const all = cell.appendChild(make("div", "known"));
-    all.append(make("h4", "", "the same again"));
-    const command = all.appendChild(make("pre", "command")).appendChild(make("code", "", repeat));
-    command.parentElement.tabIndex = 0;
-    const groups = all.appendChild(make("div", "groups"));
-    group("item", item, groups);
-    if (simplify) group("simplify", simplify, groups);
-    if (evaluate) group("evaluate", evaluate, groups);
-    if (initial) group("initial medial mesh", initial, groups);
-    all.append(make("p", "note", "As recorded: lengths as fractions of the diagonal; seconds; bytes."));
-    return row;
-  };
-  body.addEventListener("click", async (event) => {
-    const button = event.target.closest("button.more");
-    if (!button) return;
-    const row = button.closest("tr");
-    const index = numbers.get(row);
-    if (opened.has(index)) {
-      opened.get(index).remove();
-      opened.delete(index);
-    } else {
-      const detail = await detailOf(index);
-      // Pressed twice meanwhile.
-      if (opened.has(index)) return;
-      opened.set(index, detail);
-      if (row.isConnected) row.after(detail);
-    }
-    button.setAttribute("aria-expanded", String(opened.has(index)));
+  form.addEventListener("reset", () => setTimeout(() => {
+    sort(-1, false);
+    changed();
+  }));
+  document.addEventListener("click", (event) => {
+    if (!chooser.contains(event.target)) chooser.open = false;
+  });
+  chooser.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape") return;
+    chooser.open = false;
+    chooser.firstElementChild.focus();
   });
 
   // The columns that stay in sight lie side by side, however wide their texts make them.
   const measure = () => {
     const [first, second] = heads.map((head) => head.getBoundingClientRect().width);
-    table.style.setProperty("--left-1", `${first}px`);
-    table.style.setProperty("--left-2", `${first + second}px`);
-    table.style.setProperty("--box", `${box.clientWidth}px`);
+    grid.style.setProperty("--left-1", `${first}px`);
+    grid.style.setProperty("--left-2", `${first + second}px`);
+    grid.style.setProperty("--box", `${box.clientWidth}px`);
   };
   const observer = new ResizeObserver(measure);
   for (const element of [box, heads[0], heads[1]]) observer.observe(element);
-
-  const chooser = form.querySelector("details.columns");
-  document.addEventListener("click", (event) => {
-    if (!chooser.contains(event.target)) chooser.open = false;
-  });
-  chooser.addEventListener("keydown", (event) => {
-    if (event.key === "Escape") {
-      chooser.open = false;
-      chooser.firstElementChild.focus();
-    }
-  });
-
-  form.hidden = false;
-  const fromAddress = read();
+  window.addEventListener("hashchange", read);
   chooseColumns();
   show();
-  if (fromAddress) document.getElementById("results").scrollIntoView();
-  window.addEventListener("hashchange", () => {
-    if (!read()) return;
-    chooseColumns();
-    show();
-    document.getElementById("results").scrollIntoView();
-  });
-})();
+  // The address may name rows: read once the section stands in the document.
+  queueMicrotask(read);
+  return section("results", "Results", form, box, note(report.units));
+};

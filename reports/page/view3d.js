@@ -1,47 +1,38 @@
-// 3D views: a surface and the medial meshes of its results, two beside each other with one camera.
+// 3D views: a surface and the medial meshes of its results, two next to each other with one camera.
 //
 // A view is made when it is opened and disposed of when it is closed or another one is opened: browsers keep few
-// contexts. Its numbers stand in the page, or in a script file beside it, which also a page from a disk may load.
-(() => {
-  // Sides of a tube, and how finely spheres are cut: of so many that a page can hold them.
+// contexts. Its numbers are part of the page, or a script file next to it, which also a page from a disk may load.
+const viewOf = (() => {
+  // Sides of a tube, and how finely spheres are cut, such that a page can hold all of them.
   const SIDES = [3, 24];
   const ALL_SIDES = 150000;
   const MANY_BALLS = 1000;
-  const make = (tag, className, text) => {
-    const element = document.createElement(tag);
-    if (className) element.className = className;
-    if (text !== undefined) element.textContent = text;
-    return element;
-  };
 
   // The text of a view, from the page or from its file.
   const arriving = new Map();
   window.medialView = (name, text) => arriving.get(name)?.(text);
-  const textOf = (name, source) => {
+  const textOf = ({ name, file }) => {
     const inside = document.getElementById(`view-${name}`);
     if (inside) return Promise.resolve(inside.textContent);
     return new Promise((resolve, reject) => {
-      const script = make("script");
+      const script = make("script", { src: file });
       arriving.set(name, resolve);
-      script.addEventListener("error", () => reject(new Error(`${source} is not there`)));
+      script.addEventListener("error", () => reject(new Error(`${file} is missing`)));
       script.addEventListener("load", () => script.remove());
-      script.src = source;
       document.head.append(script);
     });
   };
 
   let library;
   const loadLibrary = async () => {
-    const code = await page.unpack(document.getElementById("three"));
-    const address = URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
-    try {
-      return await import(address);
-    } finally {
-      URL.revokeObjectURL(address);
-    }
+    const address = (code) => URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
+    const three = address(await unpackedText("three"));
+    // The module names three.js by a bare word, which only an import map could resolve.
+    const controls = (await unpackedText("controls")).replace("'three'", `'${three}'`);
+    return { ...(await import(three)), ...(await import(address(controls))) };
   };
 
-  // The arrays of a view, in the order that reports/view3d.rs tells.
+  // The arrays of a view, in the order of reports/view3d.rs.
   const read = (buffer) => {
     const length = new DataView(buffer).getUint32(0, true);
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
@@ -241,88 +232,49 @@
   ];
   const percent = (value) => `${Number(value.toPrecision(2))} %`;
 
-  // One camera for both sides: angles around the upward direction, a zoom, and what it looks at.
+  // One camera for both sides. What the picture must hold in the first view decides its width.
   const cameraOf = (T, view) => {
-    const up = new T.Vector3(...view.up).normalize();
+    const camera = new T.OrthographicCamera();
     const direction = new T.Vector3(...view.direction).normalize();
-    const front = direction.clone().addScaledVector(up, -direction.dot(up)).normalize();
-    const right = up.clone().cross(front);
     const box = new T.Box3().setFromArray(view.positions);
-    const middle = box.getCenter(new T.Vector3());
-    // What the picture must hold in the first view, to the sides and upwards.
-    const seen = [new T.Vector3().crossVectors(up, direction).normalize()];
-    seen.push(new T.Vector3().crossVectors(direction, seen[0]));
-    const point = new T.Vector3();
-    const half = seen.map((axis) => {
+    const target = box.getCenter(new T.Vector3());
+    camera.up.set(...view.up).normalize();
+    camera.position.copy(target).addScaledVector(direction, 3 * view.diagonal);
+    [camera.near, camera.far] = [0.01 * view.diagonal, 6 * view.diagonal];
+    const across = new T.Vector3().crossVectors(camera.up, direction).normalize();
+    const half = [across, new T.Vector3().crossVectors(direction, across)].map((axis) => {
       let most = 0;
+      const point = new T.Vector3();
       for (let k = 0; k < view.positions.length; k += 3) {
-        most = Math.max(most, Math.abs(point.fromArray(view.positions, k).sub(middle).dot(axis)));
+        most = Math.max(most, Math.abs(point.fromArray(view.positions, k).sub(target).dot(axis)));
       }
       return 1.08 * most;
     });
-    const first = { turn: 0, lift: Math.asin(direction.dot(up)), zoom: 1, target: middle.clone() };
-    const state = { ...first, target: middle.clone() };
-    const back = () =>
-      front.clone().multiplyScalar(Math.cos(state.turn)).addScaledVector(right, Math.sin(state.turn))
-        .multiplyScalar(Math.cos(state.lift)).addScaledVector(up, Math.sin(state.lift));
-    return {
-      state,
-      turn(x, y) {
-        state.turn -= x;
-        state.lift = Math.min(1.55, Math.max(-1.55, state.lift + y));
-      },
-      pan(x, y) {
-        const across = up.clone().cross(back()).normalize();
-        const upward = back().cross(across);
-        const units = state.unitsPerPixel;
-        state.target.addScaledVector(across, -x * units).addScaledVector(upward, y * units);
-      },
-      zoom(factor) {
-        state.zoom = Math.min(40, Math.max(0.3, state.zoom * factor));
-      },
-      reset() {
-        Object.assign(state, first, { target: middle.clone() });
-      },
-      place(camera, light, width, height) {
-        const unitsPerPixel = Math.max((2 * half[0]) / width, (2 * half[1]) / height) / state.zoom;
-        const [x, y] = [0.5 * unitsPerPixel * width, 0.5 * unitsPerPixel * height];
-        state.unitsPerPixel = unitsPerPixel;
-        [camera.left, camera.right, camera.top, camera.bottom] = [-x, x, y, -y];
-        [camera.near, camera.far] = [0.01 * view.diagonal, 6 * view.diagonal];
-        camera.up.copy(up);
-        camera.position.copy(state.target).addScaledVector(back(), 3 * view.diagonal);
-        camera.lookAt(state.target);
-        camera.updateProjectionMatrix();
-        const across = up.clone().cross(back()).normalize();
-        light.position.copy(back()).addScaledVector(across, -0.45).addScaledVector(up, 0.6);
-      },
-    };
+    return { camera, target, half };
   };
 
   class Side {
-    constructor(T, view, camera, chosen, changed) {
-      this.figure = make("figure", "side");
-      const bar = this.figure.appendChild(make("div", "bar"));
+    constructor(T, view, eye, chosen, changed) {
       const select = (label, options, value) => {
-        const box = bar.appendChild(make("select"));
-        box.setAttribute("aria-label", label);
-        options.forEach(([key, text]) => box.add(new Option(text, key)));
-        box.value = value;
-        box.addEventListener("change", () => this.choose());
-        return box;
+        const list = make("select", { "aria-label": label }, ...options.map(([key, text]) => new Option(text, key)));
+        list.value = value;
+        list.addEventListener("change", () => this.choose());
+        return list;
       };
       this.of = select("result", view.results.map((result, k) => [k, result.label]), chosen[0]);
-      this.kind = select("what is shown", KINDS, chosen[1]);
-      this.canvas = this.figure.appendChild(make("canvas"));
-      this.canvas.tabIndex = 0;
-      this.caption = this.figure.appendChild(make("figcaption"));
+      this.kind = select("quantity", KINDS, chosen[1]);
+      this.canvas = make("canvas", { tabindex: 0 });
+      this.caption = make("figcaption");
+      this.figure = make("figure", { class: "side" }, make("div", { class: "bar" }, this.of, this.kind), this.canvas, this.caption);
       // Kept, so that the picture can be copied out of the page.
       this.renderer = new T.WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
       this.scene = new T.Scene();
-      this.eye = new T.OrthographicCamera();
       this.light = new T.DirectionalLight(0xffffff, 2.1);
       this.scene.add(this.light, new T.HemisphereLight(0xffffff, 0xb8bcc4, 1.5));
-      Object.assign(this, { view, camera, changed, build: scenes(T, view), shown: [] });
+      this.controls = new T.OrbitControls(eye.camera, this.canvas);
+      Object.assign(this.controls, { target: eye.target, enableZoom: false, minZoom: 0.3, maxZoom: 40 });
+      this.controls.saveState();
+      Object.assign(this, { T, view, eye, changed, build: scenes(T, view), shown: [] });
       this.listen();
       this.choose();
     }
@@ -333,16 +285,14 @@
       const result = this.view.results[this.of.value];
       this.shown = this.build[kind](result);
       this.scene.add(...this.shown);
-      const name = KINDS.find(([key]) => key === kind)[1];
       const { largest_error: end, radii, diagonal } = this.view;
-      const scale = {
-        axis: `colour: radius, ${percent((100 * radii[0]) / diagonal)} to ${percent((100 * radii[1]) / diagonal)} of the diagonal`,
-        union: `colour: radius, ${percent((100 * radii[0]) / diagonal)} to ${percent((100 * radii[1]) / diagonal)} of the diagonal`,
+      const [least, most] = radii.map((radius) => percent((100 * radius) / diagonal));
+      this.caption.textContent = {
         errors: `red: the reconstruction reaches beyond, blue: it falls short; full colour from ${percent(end)} of the diagonal`,
         surface: "the input",
-      }[kind];
-      this.caption.textContent = scale;
+      }[kind] ?? `colour: radius, ${least} to ${most} of the diagonal`;
       this.of.disabled = kind === "surface";
+      const name = KINDS.find(([key]) => key === kind)[1];
       this.canvas.setAttribute("aria-label", `${result.label}, ${name}: arrow keys turn, plus and minus zoom, 0 resets`);
       this.changed();
     }
@@ -350,65 +300,44 @@
     draw() {
       const { clientWidth: width, clientHeight: height } = this.canvas;
       if (!width || !height) return;
+      const { T, eye: { camera, target, half } } = this;
+      const size = Math.max(half[0] / width, half[1] / height);
+      [camera.left, camera.right, camera.top, camera.bottom] = [-width * size, width * size, height * size, -height * size];
+      camera.lookAt(target);
+      camera.updateProjectionMatrix();
+      const back = new T.Vector3().subVectors(camera.position, target).normalize();
+      const across = new T.Vector3().crossVectors(camera.up, back).normalize();
+      this.light.position.copy(back).addScaledVector(across, -0.45).addScaledVector(camera.up, 0.6);
       this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
       this.renderer.setSize(width, height, false);
-      this.camera.place(this.eye, this.light, width, height);
-      this.renderer.render(this.scene, this.eye);
+      this.renderer.render(this.scene, camera);
     }
 
     listen() {
-      const { canvas, camera } = this;
-      const held = new Map();
-      canvas.addEventListener("pointerdown", (event) => {
-        held.set(event.pointerId, [event.clientX, event.clientY]);
-        canvas.setPointerCapture(event.pointerId);
-        canvas.focus({ preventScroll: true });
-        event.preventDefault();
-      });
-      canvas.addEventListener("pointermove", (event) => {
-        const from = held.get(event.pointerId);
-        if (!from) return;
-        const to = [event.clientX, event.clientY];
-        const [x, y] = subtract(to, from);
-        const other = [...held].find(([id]) => id !== event.pointerId)?.[1];
-        if (other) {
-          const apart = (at) => Math.hypot(...subtract(at, other)) || 1;
-          camera.zoom(apart(to) / apart(from));
-        } else if (event.shiftKey || event.buttons === 2) {
-          camera.pan(x, y);
-        } else {
-          camera.turn(x * 0.008, y * 0.008);
-        }
-        held.set(event.pointerId, to);
-        this.changed();
-      });
-      for (const type of ["pointerup", "pointercancel"]) {
-        canvas.addEventListener(type, (event) => held.delete(event.pointerId));
-      }
-      canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-      // The wheel scrolls the page until the view was touched.
-      canvas.addEventListener(
-        "wheel",
-        (event) => {
-          if (document.activeElement !== canvas) return;
-          event.preventDefault();
-          camera.zoom(Math.exp(-0.0015 * event.deltaY));
-          this.changed();
-        },
-        { passive: false },
-      );
-      canvas.addEventListener("dblclick", () => {
-        camera.reset();
-        this.changed();
-      });
+      const { T, canvas, controls, eye: { camera, target } } = this;
+      controls.addEventListener("change", this.changed);
+      canvas.addEventListener("pointerdown", () => canvas.focus({ preventScroll: true }));
+      // The wheel scrolls the page until the view has the focus.
+      canvas.addEventListener("focus", () => (controls.enableZoom = true));
+      canvas.addEventListener("blur", () => (controls.enableZoom = false));
+      canvas.addEventListener("dblclick", () => controls.reset());
       canvas.addEventListener("keydown", (event) => {
-        const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
-        if (step && event.shiftKey) camera.pan(...step.map((x) => 20 * x));
-        else if (step) camera.turn(...step.map((x) => 0.1 * x));
-        else if (event.key === "+" || event.key === "=") camera.zoom(1.15);
-        else if (event.key === "-") camera.zoom(1 / 1.15);
-        else if (event.key === "0") camera.reset();
-        else return;
+        const turn = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
+        const zoom = { "+": 1.15, "=": 1.15, "-": 1 / 1.15 }[event.key];
+        if (turn) {
+          const back = camera.position.clone().sub(target);
+          const across = new T.Vector3().crossVectors(camera.up, back).normalize();
+          // Never over the pole, where up and the line of sight are one.
+          const lift = Math.min(back.angleTo(camera.up) - 0.02, Math.max(back.angleTo(camera.up) - 3.12, turn[1]));
+          back.applyAxisAngle(across, -lift).applyAxisAngle(camera.up, -turn[0]);
+          camera.position.copy(target).add(back);
+        } else if (zoom) {
+          camera.zoom = Math.min(40, Math.max(0.3, camera.zoom * zoom));
+        } else if (event.key === "0") {
+          controls.reset();
+        } else {
+          return;
+        }
         event.preventDefault();
         this.changed();
       });
@@ -425,24 +354,24 @@
 
     dispose() {
       this.clear();
+      this.controls.dispose();
       this.renderer.dispose();
       this.renderer.forceContextLoss();
     }
   }
 
   let close = () => {};
-  const open = async (place, button) => {
+  const open = async (place, button, source) => {
     close();
-    const say = place.appendChild(make("p", "note", "loading …"));
-    say.setAttribute("role", "status");
+    const say = place.appendChild(make("p", { class: "note", role: "status" }, "loading …"));
     button.disabled = true;
     let sides = [];
     try {
-      const text = await textOf(place.dataset.view, place.dataset.src);
+      const text = await textOf(source);
       library ??= loadLibrary();
       const T = await library;
-      const view = read(await page.unpackBytes(text));
-      const camera = cameraOf(T, view);
+      const view = read(await unpacked(text).arrayBuffer());
+      const eye = cameraOf(T, view);
       let waiting = false;
       const changed = () => {
         if (waiting) return;
@@ -454,9 +383,8 @@
       };
       const last = String(view.results.length - 1);
       const firsts = view.results.length > 1 ? [["0", "axis"], [last, "axis"]] : [["0", "axis"], ["0", "errors"]];
-      for (const chosen of firsts) sides.push(new Side(T, view, camera, chosen, changed));
-      const panel = make("div", "sides");
-      panel.append(...sides.map((side) => side.figure));
+      for (const chosen of firsts) sides.push(new Side(T, view, eye, chosen, changed));
+      const panel = make("div", { class: "sides" }, ...sides.map((side) => side.figure));
       place.append(panel);
       const observer = new ResizeObserver(changed);
       sides.forEach((side) => observer.observe(side.canvas));
@@ -478,21 +406,17 @@
     button.disabled = false;
   };
 
-  page.enlivenViews = (root) => {
-    for (const place of root.querySelectorAll("div.view3d")) {
-      const button = make("button", "", "show in 3D");
-      button.type = "button";
-      button.setAttribute("aria-expanded", "false");
-      button.addEventListener("click", () => {
-        if (button.getAttribute("aria-expanded") === "true") {
-          close();
-          return;
-        }
-        for (const note of place.querySelectorAll(".note")) note.remove();
-        open(place, button);
-      });
-      place.append(button);
-    }
+  return (source) => {
+    const button = make("button", { type: "button", "aria-expanded": "false" }, "show in 3D");
+    const place = make("div", { class: "view3d" }, button);
+    button.addEventListener("click", () => {
+      if (button.getAttribute("aria-expanded") === "true") {
+        close();
+        return;
+      }
+      for (const old of place.querySelectorAll(".note")) old.remove();
+      open(place, button, source);
+    });
+    return place;
   };
-  page.enlivenViews(document);
 })();

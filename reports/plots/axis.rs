@@ -14,16 +14,23 @@ const WIDTH_OF_LETTER: f64 = 0.018;
 pub(crate) enum Scale {
     /// From zero.
     Linear,
-    /// Logarithmic; what is not positive is drawn on the lower border.
+    /// Logarithmic; values that are not positive are drawn on the lower border.
     Log,
-    /// Logarithm of one more than the value: for counts that span decades and may be zero.
-    LogOfOneMore,
+}
+
+impl Scale {
+    /// The name of the scale in the page's plots.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Log => "log",
+        }
+    }
 }
 
 /// An axis fitted to its data.
 #[derive(Clone)]
 pub(crate) struct Axis {
-    pub(crate) title: String,
     scale: Scale,
     /// Both ends, as laid out.
     ends: (f64, f64),
@@ -33,11 +40,7 @@ pub(crate) struct Axis {
 
 impl Axis {
     /// An axis that holds all values with a margin; `None` where there is no finite value.
-    pub(crate) fn fit(
-        title: impl Into<String>,
-        scale: Scale,
-        values: impl IntoIterator<Item = f64>,
-    ) -> Option<Self> {
+    pub(crate) fn fit(scale: Scale, values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let usable = |value: &f64| value.is_finite() && (scale != Scale::Log || *value > 0.0);
         let (mut low, mut high) = values
             .into_iter()
@@ -51,12 +54,9 @@ impl Axis {
                 (low, high) = (low / widen / 1.12, high * widen * 1.12);
             }
             Scale::Linear => (low, high) = (low.min(0.0), (high * 1.05).max(1e-12)),
-            Scale::LogOfOneMore => (low, high) = (0.0, (1.15 * high).max(3.0)),
         }
-        let lay = |value| lay_out(scale, value);
-        let ticks = round_numbers(scale, low, high);
-        let margin = if scale == Scale::LogOfOneMore { -0.03 } else { 0.0 };
-        Some(Self { title: title.into(), scale, ends: (lay(low) + margin, lay(high)), ticks })
+        let ends = (lay_out(scale, low), lay_out(scale, high));
+        Some(Self { scale, ends, ticks: round_numbers(scale, low, high) })
     }
 
     /// Where a value lies between the ends of the axis, from 0 to 1.
@@ -65,16 +65,6 @@ impl Axis {
         let placed = (lay_out(self.scale, value) - low) / (high - low);
         // What has no logarithm goes to the lower end.
         if placed.is_finite() { placed.clamp(0.0, 1.0) } else { 0.0 }
-    }
-
-    /// Title, scale and ends as laid out, for the script of the page.
-    pub(crate) fn describe(&self) -> serde_json::Value {
-        let scale = match self.scale {
-            Scale::Linear => "linear",
-            Scale::Log => "log",
-            Scale::LogOfOneMore => "log1",
-        };
-        serde_json::json!({"title": self.title, "scale": scale, "ends": [self.ends.0, self.ends.1]})
     }
 
     /// The text at a tick.
@@ -103,12 +93,10 @@ impl Ranged for Axis {
     }
 
     fn range(&self) -> Range<f64> {
-        let back = |end: f64| match self.scale {
-            Scale::Linear => end,
-            Scale::Log => 10f64.powf(end),
-            Scale::LogOfOneMore => 10f64.powf(end) - 1.0,
-        };
-        back(self.ends.0)..back(self.ends.1)
+        match self.scale {
+            Scale::Linear => self.ends.0..self.ends.1,
+            Scale::Log => 10f64.powf(self.ends.0)..10f64.powf(self.ends.1),
+        }
     }
 }
 
@@ -122,7 +110,6 @@ fn lay_out(scale: Scale, value: f64) -> f64 {
     match scale {
         Scale::Linear => value,
         Scale::Log => value.log10(),
-        Scale::LogOfOneMore => (1.0 + value.max(0.0)).log10(),
     }
 }
 
@@ -136,30 +123,17 @@ fn round_numbers(scale: Scale, low: f64, high: f64) -> Vec<f64> {
     }
     let patterns: [&[f64]; 4] =
         [&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
-    let decades = match scale {
-        Scale::LogOfOneMore => 0..=high.log10().ceil() as i32,
-        _ => low.log10().floor() as i32..=high.log10().ceil() as i32,
-    };
-    let within = |pattern: &[f64]| -> Vec<f64> {
-        let mut values: Vec<f64> = decades
-            .clone()
+    let mut sparsest: Vec<f64> = Vec::new();
+    for pattern in patterns {
+        sparsest = (low.log10().floor() as i32..=high.log10().ceil() as i32)
             .flat_map(|decade| pattern.iter().map(move |digit| digit * 10f64.powi(decade)))
             .filter(|&value| value >= low && value <= high)
             .collect();
-        if scale == Scale::LogOfOneMore {
-            values.insert(0, 0.0);
-        }
-        values
-    };
-    let lay = |value| lay_out(scale, value);
-    let collide = |pair: &[f64]| {
-        let gap = (lay(pair[1]) - lay(pair[0])) / (lay(high) - lay(low));
-        gap < WIDTH_OF_LETTER * Axis::label(pair[1]).len() as f64
-    };
-    let mut sparsest = Vec::new();
-    for pattern in patterns {
-        sparsest = within(pattern);
-        if sparsest.len() <= 8 && !sparsest.windows(2).any(collide) {
+        let collide = sparsest.windows(2).any(|pair| {
+            let gap = (pair[1] / pair[0]).log10() / (high / low).log10();
+            gap < WIDTH_OF_LETTER * Axis::label(pair[1]).len() as f64
+        });
+        if sparsest.len() <= 8 && !collide {
             return sparsest;
         }
     }
@@ -183,7 +157,7 @@ mod tests {
     use super::*;
 
     fn labels(scale: Scale, values: &[f64]) -> Vec<String> {
-        let axis = Axis::fit("", scale, values.iter().copied()).unwrap();
+        let axis = Axis::fit(scale, values.iter().copied()).unwrap();
         axis.ticks.iter().map(|&tick| Axis::label(tick)).collect()
     }
 
@@ -197,7 +171,6 @@ mod tests {
         // 50,000 and 60,000 would touch.
         assert_eq!(labels(Scale::Log, &[9000.0, 60000.0]), ["10,000", "20,000", "50,000"]);
         assert_eq!(labels(Scale::Linear, &[3.0, 48.0]), ["0", "20", "40"]);
-        assert_eq!(labels(Scale::LogOfOneMore, &[0.0]), ["0", "1", "2", "3"]);
     }
 
     #[test]
@@ -205,12 +178,12 @@ mod tests {
         for exponent in -12..12 {
             for spread in [1.0, 1.001, 3.0, 1e4, 1e9, 1e15] {
                 let low = 1.7 * 10f64.powi(exponent);
-                let axis = Axis::fit("", Scale::Log, [low, low * spread]).unwrap();
+                let axis = Axis::fit(Scale::Log, [low, low * spread]).unwrap();
                 assert!((1..=12).contains(&axis.ticks.len()), "{low} {spread}: {:?}", axis.ticks);
                 let (first, last) = (axis.place(low), axis.place(low * spread));
                 assert!(0.0 < first && last < 1.0 && first <= last, "{first} {last}");
             }
         }
-        assert!(Axis::fit("", Scale::Log, [0.0, f64::NAN]).is_none());
+        assert!(Axis::fit(Scale::Log, [0.0, f64::NAN]).is_none());
     }
 }

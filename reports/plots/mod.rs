@@ -1,429 +1,296 @@
-//! Plots: which figures there are and what stands in them.
+//! Plots: what stands in them. The page draws a [`Figure`] from its JSON, `svg` draws it for papers.
+//!
+//! Every number of a figure is computed here, so both drawings show the same points, the same
+//! front and the same labels.
 
 mod axis;
-mod bars;
-mod figure;
-mod palette;
-mod points;
-mod scaling;
+mod svg;
 
-use std::fmt::Display;
+use serde_json::{Value, json};
 
-use crate::Target;
+use crate::comparison::{Comparison, Entry, reached};
+use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
+use crate::record::Target;
+use crate::summary::{CountSummary, NativeCurve};
+use crate::text::{grouped, significant};
 
-use crate::comparison::{Comparison, Entry, level_label, reached};
-use crate::equal_error::BoundSummary;
-use crate::metric::{BELOW_30, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
-use crate::native::{NativeCurve, NativePoint};
-use crate::purpose::Profile;
-use crate::summary::{CountSummary, SeriesSummary};
+pub(crate) use self::axis::Scale;
+pub(crate) use self::svg::{FONTS, PlotError, symbol};
 
-use self::axis::Scale;
-use self::bars::Bars;
-use self::figure::{Curve, Figure};
-use self::points::{Drawing, Origin};
-
-pub(crate) use self::palette::style;
-pub(crate) use self::scaling::scaling_plots;
-
-/// Why a plot could not be drawn.
-#[derive(Debug, thiserror::Error)]
-#[error("plot: {0}")]
-pub(crate) struct PlotError(String);
-
-impl PlotError {
-    fn new(error: impl Display) -> Self {
-        Self(error.to_string())
-    }
-}
-
-/// A drawn plot.
-pub(crate) struct Plot {
+/// A figure before it is drawn.
+pub(crate) struct Figure {
     /// File name without folder and extension.
     pub(crate) stem: String,
-    /// What it shows, for those who cannot see it.
     pub(crate) title: String,
-    pub(crate) svg: String,
-    /// Its points for the script of the page; null where it has none.
-    pub(crate) points: serde_json::Value,
+    pub(crate) x: (String, Scale),
+    pub(crate) y: (String, Scale),
+    pub(crate) curves: Vec<Curve>,
+    /// Whether less is better on both axes, so that some points dominate others.
+    pub(crate) front: bool,
+    /// Whether the page shows it unfolded.
+    pub(crate) leading: bool,
 }
 
-impl Plot {
-    fn new(stem: String, title: String, drawing: Drawing) -> Self {
-        Self { stem, title, svg: drawing.svg, points: drawing.points }
+/// The points of one series.
+#[derive(Clone, Default)]
+pub(crate) struct Curve {
+    pub(crate) series: usize,
+    /// Text of its row in the legend; none where it is empty.
+    pub(crate) label: String,
+    /// Name of the method, and the kind of its points: a mesh, a mean, a median.
+    pub(crate) name: String,
+    pub(crate) of: String,
+    /// In the order in which they are joined.
+    pub(crate) points: Vec<Point>,
+    /// Drawn instead of a line through the points, such as a fit.
+    pub(crate) line: Option<Vec<(f64, f64)>>,
+    pub(crate) dashed: bool,
+}
+
+/// One point of a curve.
+#[derive(Clone, Default)]
+pub(crate) struct Point {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    /// Number of meshes behind it, where known.
+    pub(crate) n: Option<usize>,
+    /// Spheres of the result, or their mean, where no axis shows them.
+    pub(crate) spheres: Option<f64>,
+    /// Whether it is over the same meshes as the others, and so may dominate them.
+    pub(crate) compared: bool,
+    /// Text next to the point.
+    pub(crate) tag: Option<String>,
+}
+
+impl Point {
+    pub(crate) fn at(x: f64, y: f64) -> Self {
+        Self { x, y, ..Self::default() }
     }
 }
 
-/// What stands on the axes of a family of figures.
+impl Figure {
+    /// The figure without its empty curves; `None` where no curve is left.
+    pub(crate) fn with_points(mut self) -> Option<Self> {
+        self.curves.retain(|curve| !curve.points.is_empty());
+        (!self.curves.is_empty()).then_some(self)
+    }
+
+    /// The figure for the script of the page: numbers with five digits.
+    pub(crate) fn to_json(&self) -> Value {
+        let rounded = |value: f64| -> f64 { significant(value, 5).parse().unwrap_or(value) };
+        let front = self.front();
+        let curves = self.curves.iter().enumerate().map(|(index, curve)| {
+            let points = curve.points.iter().enumerate().map(|(k, point)| {
+                let is_front = u8::from(front.contains(&(index, k)));
+                let spheres = point.spheres.map(rounded);
+                json!([rounded(point.x), rounded(point.y), point.n, spheres, is_front])
+            });
+            let tags = curve.points.iter().enumerate();
+            let tags = tags.filter_map(|(k, point)| Some(json!([k, point.tag.as_ref()?])));
+            let line = curve.line.as_ref().map(|line| {
+                line.iter().map(|&(x, y)| [rounded(x), rounded(y)]).collect::<Vec<_>>()
+            });
+            json!({
+                "series": curve.series, "label": curve.label, "name": curve.name, "of": curve.of,
+                "dashed": curve.dashed, "line": line,
+                "points": points.collect::<Vec<_>>(), "tags": tags.collect::<Vec<_>>(),
+            })
+        });
+        let axis = |(title, scale): &(String, Scale)| json!({"title": title, "scale": scale.key()});
+        json!({
+            "title": self.title, "leading": self.leading, "x": axis(&self.x), "y": axis(&self.y),
+            "curves": curves.collect::<Vec<_>>(),
+        })
+    }
+
+    /// The non-dominated points, by curve and index, from left to right: no other point is at most
+    /// as large in both coordinates. Empty where fewer than two series compare.
+    fn front(&self) -> Vec<(usize, usize)> {
+        let candidates = self.curves.iter().enumerate().flat_map(|(index, curve)| {
+            let points = curve.points.iter().enumerate();
+            let compared = points.filter(|(_, p)| p.compared && p.x > 0.0 && p.y.is_finite());
+            compared.map(move |(k, point)| (point.x, point.y, index, k))
+        });
+        let mut all: Vec<(f64, f64, usize, usize)> = candidates.filter(|_| self.front).collect();
+        let first = all.first().map(|point| self.curves[point.2].series);
+        if all.iter().all(|point| Some(self.curves[point.2].series) == first) {
+            return Vec::new();
+        }
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut lowest = f64::INFINITY;
+        all.retain(|&(_, y, _, _)| {
+            let is_lower = y < lowest;
+            lowest = lowest.min(y);
+            is_lower
+        });
+        all.into_iter().map(|(_, _, curve, point)| (curve, point)).collect()
+    }
+}
+
+/// A family of figures: one for each mesh, and one of the means over all.
 struct Kind {
     name: &'static str,
     title: &'static str,
+    axis: &'static str,
     y: &'static Metric,
     scale: Scale,
     /// Seconds rather than spheres along the bottom.
     against_time: bool,
+    /// Whether less is better on both axes.
+    front: bool,
 }
 
-static KINDS: [Kind; 6] = [
+impl Kind {
+    const fn of(name: &'static str, axis: &'static str, y: &'static Metric) -> Self {
+        Self { name, title: name, axis, y, scale: Scale::Log, against_time: false, front: true }
+    }
+}
+
+static KINDS: [Kind; 5] = [
     Kind {
-        name: "hausdorff",
         title: "Hausdorff error against spheres",
-        y: &HAUSDORFF,
-        scale: Scale::Log,
-        against_time: false,
+        ..Kind::of("hausdorff", "Hausdorff error (% of diagonal)", &HAUSDORFF)
     },
     Kind {
-        name: "mean",
-        title: "Mean error against spheres",
-        y: &MEAN_ERROR,
-        scale: Scale::Log,
-        against_time: false,
-    },
-    Kind {
-        name: "time",
         title: "Hausdorff error against time",
-        y: &HAUSDORFF,
-        scale: Scale::Log,
         against_time: true,
+        ..Kind::of("time", "Hausdorff error (% of diagonal)", &HAUSDORFF)
     },
     Kind {
-        name: "angles",
+        title: "Mean error against spheres",
+        ..Kind::of("mean", "mean error (% of diagonal)", &MEAN_ERROR)
+    },
+    Kind {
         title: "Triangle quality: mean smallest angle",
-        y: &MIN_ANGLE,
         scale: Scale::Linear,
-        against_time: false,
+        front: false,
+        ..Kind::of("angles", "mean smallest angle (degrees)", &MIN_ANGLE)
     },
     Kind {
-        name: "below-30",
-        title: "Triangle quality: smallest angle below 30°",
-        y: &BELOW_30,
-        scale: Scale::Linear,
-        against_time: false,
-    },
-    Kind {
-        name: "spikes",
         title: "Spikes left",
-        y: &SPIKES,
-        scale: Scale::LogOfOneMore,
-        against_time: false,
+        scale: Scale::Linear,
+        front: false,
+        ..Kind::of("spikes", "spikes", &SPIKES)
     },
 ];
 
 impl Kind {
-    fn figure(&self, title: String, curves: Vec<Curve>) -> Figure {
-        let spheres = || ("spheres".to_owned(), Scale::Log);
-        let x =
-            if self.against_time { (TOTAL_SECONDS.axis_title(), Scale::Log) } else { spheres() };
-        // Fewer spheres, less time, a smaller error: all of them are better where they are less.
-        let front = matches!(self.name, "hausdorff" | "mean" | "time");
-        Figure { title, x, y: (self.axis_title(), self.scale), curves, front }
+    fn figure(&self, stem: &str, of: &str, curves: Vec<Curve>) -> Option<Figure> {
+        let x = if self.against_time { TOTAL_SECONDS.axis_title() } else { "spheres".to_owned() };
+        let figure = Figure {
+            stem: format!("{stem}-{}", self.name),
+            title: format!("{of}: {}", self.title),
+            x: (x, Scale::Log),
+            y: (self.axis.to_owned(), self.scale),
+            curves,
+            front: self.front,
+            leading: matches!(self.name, "hausdorff" | "time"),
+        };
+        figure.with_points()
     }
 
-    fn axis_title(&self) -> String {
-        match self.name {
-            "hausdorff" | "time" => "Hausdorff error (% of diagonal)".to_owned(),
-            "mean" => "mean error (% of diagonal)".to_owned(),
-            "angles" => "mean smallest angle (degrees)".to_owned(),
-            "below-30" => "triangles below 30° (%)".to_owned(),
-            _ => self.y.axis_title(),
+    /// The point of a result or mean with so many spheres; the count is a tag where no axis has it.
+    fn point(&self, spheres: f64, seconds: Option<f64>, y: Option<f64>) -> Option<Point> {
+        let x = if self.against_time { seconds? } else { spheres };
+        Some(Point {
+            spheres: self.against_time.then_some(spheres),
+            compared: true,
+            ..Point::at(x, y?)
+        })
+    }
+
+    /// Tags both ends of a curve over time with their counts.
+    fn tag_ends(&self, points: &mut [Point]) {
+        let last = points.len().saturating_sub(1);
+        for (k, point) in points.iter_mut().enumerate() {
+            let spheres = point.spheres.filter(|_| k == 0 || k == last);
+            point.tag = spheres.map(|spheres| grouped(spheres as u64));
         }
-    }
-
-    fn draw(
-        &self,
-        stem: String,
-        title: String,
-        curves: Vec<Curve>,
-    ) -> Result<Option<Plot>, PlotError> {
-        let svg = self.figure(title.clone(), curves).to_svg()?;
-        Ok(svg.map(|drawing| Plot::new(stem, title, drawing)))
     }
 }
 
-/// The figures of one mesh; those without a point are left out.
-pub(crate) fn mesh_plots(
-    comparison: &Comparison<'_>,
-    mesh: usize,
-    stem: &str,
-) -> Result<Vec<Plot>, PlotError> {
-    let mut plots = Vec::new();
-    for kind in &KINDS {
+/// The figures of one mesh.
+pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str) -> Vec<Figure> {
+    let figure = |kind: &Kind| {
         let series = 0..comparison.series.len();
         let curves = series.flat_map(|series| mesh_curves(comparison, mesh, series, kind));
-        let title = format!("{}: {}", comparison.meshes[mesh], kind.title);
-        plots.extend(kind.draw(format!("mesh-{stem}-{}", kind.name), title, curves.collect())?);
-    }
-    Ok(plots)
+        kind.figure(&format!("mesh-{stem}"), &comparison.meshes[mesh], curves.collect())
+    };
+    KINDS.iter().filter_map(figure).collect()
 }
 
 /// Every measured result of one method on one mesh, from many spheres to few: those at counts and
-/// error bounds as a line, those at levels of its own as dashes.
+/// error bounds as a line, those at native levels as dashes.
 fn mesh_curves(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &Kind) -> Vec<Curve> {
-    let is_own = |entry: &Entry<'_>| {
-        matches!(entry.record.simplify.level, Target::Native(_) | Target::Published)
+    let of_level = |dashed: bool| {
+        let mut entries: Vec<&Entry<'_>> = comparison
+            .of_mesh(mesh)
+            .filter(|entry| entry.series == series && entry.measured())
+            .filter(|entry| {
+                matches!(entry.record.simplify.level, Target::Native(_) | Target::Published)
+                    == dashed
+            })
+            .collect();
+        entries.sort_by_key(|entry| std::cmp::Reverse(reached(entry.record)));
+        let point = |entry: &&Entry<'_>| {
+            let spheres = reached(entry.record)? as f64;
+            kind.point(spheres, TOTAL_SECONDS.of(entry.record), kind.y.of(entry.record))
+        };
+        let mut points: Vec<Point> = entries.iter().filter_map(point).collect();
+        points.iter_mut().for_each(|point| point.n = Some(1));
+        kind.tag_ends(&mut points);
+        Curve {
+            series,
+            label: comparison.series[series].clone(),
+            name: comparison.series[series].clone(),
+            of: comparison.meshes[mesh].clone(),
+            points,
+            line: None,
+            dashed,
+        }
     };
-    let mut curves: Vec<Curve> = [false, true]
-        .into_iter()
-        .map(|own| {
-            let entries = comparison.of_mesh(mesh).filter(|entry| entry.series == series);
-            let entries = entries.filter(|entry| entry.measured() && is_own(entry) == own);
-            Curve { dashed: own, ..mesh_curve(comparison, series, entries, kind) }
-        })
-        .filter(|curve| !curve.points.is_empty())
-        .collect();
+    let mut curves = [false, true].map(of_level).to_vec();
     // One row in the legend for both.
-    curves.iter_mut().skip(1).for_each(|curve| curve.label.clear());
+    if !curves[0].points.is_empty() {
+        curves[1].label.clear();
+    }
     curves
 }
 
-fn mesh_curve<'e>(
-    comparison: &Comparison<'_>,
-    series: usize,
-    entries: impl Iterator<Item = &'e Entry<'e>>,
-    kind: &Kind,
-) -> Curve {
-    let mut entries = entries.peekable();
-    let mesh = entries.peek().map(|entry| comparison.meshes[entry.mesh].clone());
-    let mesh = mesh.unwrap_or_default();
-    let point = |entry: &Entry<'_>| {
-        let spheres = reached(entry.record)?;
-        let x = if kind.against_time { TOTAL_SECONDS.of(entry.record)? } else { spheres as f64 };
-        Some((spheres, (x, kind.y.of(entry.record)?)))
-    };
-    let mut points: Vec<(usize, (f64, f64))> = entries.filter_map(point).collect();
-    points.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.0.total_cmp(&b.1.0)));
-    let tags =
-        if kind.against_time { ends(points.iter().map(|point| point.0)) } else { Vec::new() };
-    Curve {
-        series,
-        label: comparison.series[series].clone(),
-        name: comparison.series[series].clone(),
-        of: mesh,
-        origins: points.iter().map(|point| Origin::of_result(point.0)).collect(),
-        points: points.into_iter().map(|point| point.1).collect(),
-        line: None,
-        tags,
-        dashed: false,
-    }
-}
-
-/// The numbers of spheres at both ends of a curve.
-fn ends(counts: impl ExactSizeIterator<Item = usize>) -> Vec<(usize, String)> {
-    let last = counts.len().saturating_sub(1);
-    counts
-        .enumerate()
-        .filter(|(index, _)| *index == 0 || *index == last)
-        .map(|(index, count)| (index, crate::text::grouped(count as u64)))
-        .collect()
-}
-
-/// Figures of the means over all meshes, and the bars of the stages.
-pub(crate) fn mean_plots(
+/// Figures of the means over all meshes; with dashes the means at native levels.
+pub(crate) fn mean_figures(
     comparison: &Comparison<'_>,
     summaries: &[CountSummary],
     natives: &[NativeCurve],
-) -> Result<Vec<Plot>, PlotError> {
-    let mut plots = Vec::new();
-    for kind in &KINDS {
+) -> Vec<Figure> {
+    let figure = |kind: &Kind| {
         let mut curves: Vec<Curve> = (0..comparison.series.len())
             .map(|series| mean_curve(comparison, summaries, series, kind))
-            .filter(|curve| !curve.points.is_empty())
             .collect();
-        curves.extend(own_levels(comparison, natives, kind, &curves));
-        let title = format!("All meshes, {} means: {}", kind.y.mean.word(), kind.title);
-        plots.extend(kind.draw(format!("overview-{}", kind.name), title, curves)?);
-    }
-    // The fewest spheres take the most work.
-    if let Some(summary) =
-        summaries.iter().rev().find(|summary| summary.rows.iter().any(|row| row.over > 0))
-    {
-        plots.extend(stage_bars(comparison, summary)?);
-    }
-    Ok(plots)
-}
-
-/// The means at levels of their own as dashes, for the figures of errors against spheres.
-fn own_levels(
-    comparison: &Comparison<'_>,
-    natives: &[NativeCurve],
-    kind: &Kind,
-    named: &[Curve],
-) -> Vec<Curve> {
-    let error: fn(&NativePoint) -> f64 = match kind.name {
-        "hausdorff" => |point| point.hausdorff,
-        "mean" => |point| point.mean,
-        _ => return Vec::new(),
-    };
-    let curve = |native: &NativeCurve| {
-        let is_named = named.iter().any(|curve| curve.series == native.series);
-        let label = &comparison.series[native.series];
-        Curve {
-            series: native.series,
-            label: if is_named { String::new() } else { format!("{label} (own levels)") },
-            name: format!("{label} (own levels)"),
-            of: "mean".to_owned(),
-            points: native.points.iter().map(|point| (point.spheres, error(point))).collect(),
-            origins: own_origins(comparison, native, native.points.iter()),
-            line: None,
-            tags: vec![],
-            dashed: true,
+        for native in natives {
+            let mut points = native_points(comparison, native, |point| match kind.name {
+                "hausdorff" => Some((point.spheres, point.hausdorff)),
+                "mean" => Some((point.spheres, point.mean)),
+                _ => None,
+            });
+            points.iter_mut().for_each(|point| point.spheres = None);
+            let series = native.series;
+            let is_named = !curves[series].points.is_empty();
+            let name = format!("{} (native levels)", comparison.series[series]);
+            curves.push(Curve {
+                series,
+                label: if is_named { String::new() } else { name.clone() },
+                name,
+                of: "mean".to_owned(),
+                points,
+                line: None,
+                dashed: true,
+            });
         }
+        let of = format!("All meshes, {} means", kind.y.mean.word());
+        kind.figure("overview", &of, curves)
     };
-    natives.iter().map(curve).collect()
-}
-
-/// Where means at levels of their own come from.
-fn own_origins<'p>(
-    comparison: &Comparison<'_>,
-    native: &NativeCurve,
-    points: impl Iterator<Item = &'p NativePoint>,
-) -> Vec<Origin> {
-    let whole = native.over == comparison.meshes.len();
-    points.map(|point| Origin::of_mean(native.over, point.spheres, whole)).collect()
-}
-
-/// One figure for each method with a scalar of its own: what it does to the error, on its own axis.
-pub(crate) fn native_plots(
-    comparison: &Comparison<'_>,
-    natives: &[NativeCurve],
-    axis: &dyn Fn(&str) -> Option<String>,
-) -> Result<Vec<Plot>, PlotError> {
-    let mut plots = Vec::new();
-    let stems = crate::text::file_stems(comparison.series.iter().map(String::as_str));
-    for native in natives {
-        let at = |point: &NativePoint| match point.level {
-            Target::Native(value) => Some((value, point.hausdorff)),
-            _ => None,
-        };
-        let points: Vec<(f64, f64)> = native.points.iter().filter_map(at).collect();
-        if points.len() < 2 {
-            continue;
-        }
-        let (least, most) = (points.iter().map(|p| p.0), points.iter().map(|p| p.0));
-        let (least, most) = (least.fold(f64::INFINITY, f64::min), most.fold(0.0, f64::max));
-        let scale = if least > 0.0 && most > 20.0 * least { Scale::Log } else { Scale::Linear };
-        let label = &comparison.series[native.series];
-        let axis = axis(comparison.methods[native.series]);
-        let title = format!("{label}: Hausdorff error against its own level");
-        let spheres = native.points.iter().filter(|point| at(point).is_some());
-        let origins = own_origins(comparison, native, spheres.clone());
-        let spheres: Vec<f64> = spheres.map(|point| point.spheres).collect();
-        let tags = apart(&points, scale).into_iter();
-        let tags = tags.map(|k| (k, crate::text::grouped(spheres[k].round() as u64)));
-        let curve = Curve {
-            series: native.series,
-            label: format!("spheres, over {}", crate::text::counted(native.over, "mesh", "meshes")),
-            name: label.clone(),
-            of: "mean".to_owned(),
-            points,
-            origins,
-            line: None,
-            tags: tags.collect(),
-            dashed: true,
-        };
-        let figure = Figure {
-            title: title.clone(),
-            x: (axis.unwrap_or_else(|| "own level".to_owned()), scale),
-            y: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),
-            curves: vec![curve],
-            front: false,
-        };
-        let stem = format!("overview-level-{}", stems[native.series]);
-        plots.extend(figure.to_svg()?.map(|drawing| Plot::new(stem, title, drawing)));
-    }
-    Ok(plots)
-}
-
-/// The points whose tags would not cover each other: from the first on, each an eighth of the axis
-/// away from the one before.
-fn apart(points: &[(f64, f64)], scale: Scale) -> Vec<usize> {
-    let place = |k: usize| if matches!(scale, Scale::Log) { points[k].0.ln() } else { points[k].0 };
-    let places = || (0..points.len()).map(place);
-    let range = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
-    let mut kept: Vec<usize> = Vec::new();
-    for k in 0..points.len() {
-        if kept.last().is_none_or(|&last| (place(k) - place(last)).abs() >= range / 8.0) {
-            kept.push(k);
-        }
-    }
-    kept
-}
-
-/// Fewest spheres against the error that they keep, from a search.
-pub(crate) fn equal_error_plot(
-    comparison: &Comparison<'_>,
-    bounds: &[BoundSummary],
-) -> Result<Option<Plot>, PlotError> {
-    let curve = |series: usize| {
-        let point = |bound: &BoundSummary| {
-            let row = bound.rows.iter().find(|row| row.series == series)?;
-            Some((bound.percent, row.spheres?))
-        };
-        let points = bounds.iter().filter_map(point).collect();
-        let known = |bound: &BoundSummary| {
-            let row =
-                bound.rows.iter().find(|row| row.series == series && row.spheres.is_some())?;
-            Some(Origin { n: Some(row.asked), ..Origin::default() })
-        };
-        let origins = bounds.iter().filter_map(known).collect();
-        let (label, of) = (comparison.series[series].clone(), "median".to_owned());
-        Curve {
-            series,
-            name: label.clone(),
-            label,
-            of,
-            points,
-            origins,
-            line: None,
-            tags: vec![],
-            dashed: false,
-        }
-    };
-    let title = "Equal error: median of the fewest spheres, searched for".to_owned();
-    let figure = Figure {
-        title: title.clone(),
-        x: ("Hausdorff error kept (% of diagonal)".to_owned(), Scale::Log),
-        y: ("spheres".to_owned(), Scale::Log),
-        curves: (0..comparison.series.len())
-            .map(curve)
-            .filter(|curve| !curve.points.is_empty())
-            .collect(),
-        front: false,
-    };
-    let stem = "overview-equal-error".to_owned();
-    Ok(figure.to_svg()?.map(|drawing| Plot::new(stem, title, drawing)))
-}
-
-/// The share of the meshes on which each series is within an error at one number of spheres, of the
-/// meshes that it was asked for.
-pub(crate) fn profile_plot(
-    comparison: &Comparison<'_>,
-    spheres: usize,
-    profiles: &[Profile],
-) -> Result<Option<Plot>, PlotError> {
-    let share = |number: usize, asked: usize| 100.0 * number as f64 / asked as f64;
-    let curve = |(series, Profile { errors, asked }): (usize, &Profile)| {
-        // Up at each error.
-        let step =
-            |(k, &error): (usize, &f64)| [(error, share(k, *asked)), (error, share(k + 1, *asked))];
-        let points: Vec<(f64, f64)> = errors.iter().enumerate().flat_map(step).collect();
-        let origins = vec![Origin { n: Some(*asked), ..Origin::default() }; points.len()];
-        let label = comparison.series[series].clone();
-        let (name, of) = (label.clone(), "share".to_owned());
-        Curve { series, label, name, of, points, origins, line: None, tags: vec![], dashed: false }
-    };
-    let level = crate::text::counted(spheres, "sphere", "spheres");
-    let title = format!("Meshes within an error at {level}");
-    let curves = profiles.iter().enumerate().map(curve).filter(|curve| !curve.points.is_empty());
-    let figure = Figure {
-        title: title.clone(),
-        x: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),
-        y: ("meshes (%)".to_owned(), Scale::Linear),
-        curves: curves.collect(),
-        front: false,
-    };
-    let stem = "overview-profile".to_owned();
-    Ok(figure.to_svg()?.map(|drawing| Plot::new(stem, title, drawing)))
+    KINDS.iter().filter_map(figure).collect()
 }
 
 fn mean_curve(
@@ -432,55 +299,70 @@ fn mean_curve(
     series: usize,
     kind: &Kind,
 ) -> Curve {
-    let means: Vec<(usize, (f64, f64), Origin)> = summaries
-        .iter()
-        .filter_map(|summary| {
-            let row = summary.rows.iter().find(|row| row.series == series)?;
-            let x =
-                if kind.against_time { row.mean(&TOTAL_SECONDS)? } else { summary.count as f64 };
-            let whole = summary.is_whole_of(row, kind.y);
-            let origin = Origin::of_mean(row.over(kind.y), summary.count as f64, whole);
-            Some((summary.count, (x, row.mean(kind.y)?), origin))
-        })
-        .collect();
-    let tags = if kind.against_time { ends(means.iter().map(|mean| mean.0)) } else { Vec::new() };
-    // The set is the same at each count that has a mean.
-    let row_of = |summary: &'_ CountSummary| {
-        let row = summary.rows.iter().find(|row| row.series == series && row.over(kind.y) > 0)?;
-        Some(label_over(&comparison.series[series], summary, row.over(kind.y)))
-    };
-    let label = summaries.iter().find_map(row_of);
-    Curve {
-        series,
-        label: label.unwrap_or_else(|| comparison.series[series].clone()),
-        name: comparison.series[series].clone(),
-        of: "mean".to_owned(),
-        points: means.iter().map(|mean| mean.1).collect(),
-        origins: means.iter().map(|mean| mean.2).collect(),
-        line: None,
-        tags,
-        dashed: false,
+    let name = comparison.series[series].clone();
+    let mut label = name.clone();
+    let mut points = Vec::new();
+    for summary in summaries {
+        let Some(row) = summary.rows.iter().find(|row| row.series == series) else { continue };
+        let (seconds, y) = (row.mean(&TOTAL_SECONDS), row.mean(kind.y));
+        let Some(point) = kind.point(summary.count as f64, seconds, y) else { continue };
+        let over = row.over(kind.y);
+        let compared = summary.is_whole_of(row, kind.y);
+        points.push(Point { n: Some(over), compared, ..point });
+        // The set of meshes is the same at each count that has a mean.
+        if over != summary.meshes {
+            label = format!("{name} ({over} of {})", summary.meshes);
+        }
     }
+    kind.tag_ends(&mut points);
+    Curve { series, label, name, of: "mean".to_owned(), points, line: None, dashed: false }
 }
 
-/// The label of a curve of means, with the number of meshes where these are not all.
-fn label_over(label: &str, summary: &CountSummary, over: usize) -> String {
-    match over == summary.meshes {
-        true => label.to_owned(),
-        false => format!("{label} ({over} of {})", summary.meshes),
-    }
-}
-
-fn stage_bars(
+/// The means of a method at its native levels as points.
+pub(crate) fn native_points(
     comparison: &Comparison<'_>,
-    summary: &CountSummary,
-) -> Result<Option<Plot>, PlotError> {
-    let label = |row: &SeriesSummary| label_over(&comparison.series[row.series], summary, row.over);
-    let rows = summary.rows.iter().filter(|row| row.over > 0);
-    let rows: Vec<_> = rows.filter_map(|row| Some((label(row), row.stages?))).collect();
-    let level = level_label(Target::Spheres(summary.count));
-    let title = format!("Seconds by stage, to {level} spheres");
-    let svg = Bars { title: title.clone(), rows }.to_svg()?;
-    let points = serde_json::Value::Null;
-    Ok(svg.map(|svg| Plot { stem: "overview-stages".to_owned(), title, svg, points }))
+    native: &NativeCurve,
+    place: impl Fn(&crate::summary::NativePoint) -> Option<(f64, f64)>,
+) -> Vec<Point> {
+    let point = |point| {
+        let (x, y) = place(point)?;
+        Some(Point {
+            n: Some(native.over),
+            spheres: Some(point.spheres),
+            compared: native.over == comparison.meshes.len(),
+            ..Point::at(x, y)
+        })
+    };
+    native.points.iter().filter_map(point).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(series: usize, points: &[(f64, f64)], compared: bool) -> Curve {
+        let point = |&(x, y): &(f64, f64)| Point { compared, ..Point::at(x, y) };
+        Curve { series, points: points.iter().map(point).collect(), ..Curve::default() }
+    }
+
+    #[test]
+    fn the_front_holds_the_points_that_nothing_dominates() {
+        let axis = || (String::new(), Scale::Log);
+        let mut figure = Figure {
+            stem: String::new(),
+            title: String::new(),
+            x: axis(),
+            y: axis(),
+            curves: vec![
+                curve(0, &[(1.0, 5.0), (2.0, 3.0), (4.0, 3.0)], true),
+                curve(1, &[(1.5, 6.0), (3.0, 1.0), (3.0, 0.5)], true),
+                curve(2, &[(0.5, 0.1)], false),
+            ],
+            front: true,
+            leading: false,
+        };
+        assert_eq!(figure.front(), [(0, 0), (0, 1), (1, 2)]);
+        figure.curves.truncate(1);
+        assert!(figure.front().is_empty(), "one series has nothing to dominate");
+    }
 }

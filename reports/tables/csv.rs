@@ -1,26 +1,178 @@
-//! Every column of every record as CSV: raw values in the units of the JSON, one row per item.
+//! Every number of every record, flattened: the columns of `results.csv` and of the page.
 //!
-//! Column names are the JSON keys, joined by `_` where an object lies inside another. Lengths are
-//! fractions of the bounding-box diagonal. An empty field stands for what was not measured.
+//! Column names are the JSON keys, joined by `_` where an object lies inside another; the names of
+//! the parts that every record has are left out. Lengths are fractions of the bounding-box diagonal.
+//! An empty field stands for a number that was not measured.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use crate::Target;
+use serde_json::Value;
 
 use crate::comparison::{Comparison, Entry};
-use crate::metric::{METRICS, Metric, Value};
-use crate::record::{Record, Stages};
+use crate::metric::{METRICS, Value as Place};
+use crate::record::{Record, Target};
 use crate::text::printable;
+
+/// Columns that every table has, before those of [`METRICS`] and after them. Further ones follow by
+/// name.
+const FIRST: &str = "mesh dataset mesh_hash method params seed level asked status reason comparable \
+    reached native_level spheres edges faces peak_bytes threads seconds_substrate seconds_prepare \
+    seconds_simplify seconds_total cpu_seconds_substrate cpu_seconds_prepare cpu_seconds_simplify \
+    cpu_seconds_total";
+const LAST: &str = "diagonal evaluation_seed evaluate_seconds betti_0 betti_1 betti_2 euler \
+    expected_betti_0 expected_betti_1 expected_betti_2 initial_spheres initial_edges initial_faces \
+    initial_betti_0 initial_betti_1 initial_betti_2 diagnostics warnings repetitions seeds artifact \
+    cpu cores os memory version binary_hash command";
+
+/// Beginnings of paths that are no part of a column's name, and their replacement. The first one
+/// that fits counts.
+const NAMES: [(&str, &str); 10] = [
+    ("evaluate/seed", "evaluation_seed"),
+    ("evaluate/quality/", ""),
+    ("evaluate/counts/", ""),
+    ("evaluate/spikes/", ""),
+    ("evaluate/axis/in_space/", "axis_"),
+    ("evaluate/", ""),
+    ("simplify/substrates/", "substrate_"),
+    ("simplify/", ""),
+    ("item/machine/", ""),
+    ("item/", ""),
+];
+
+/// Parts that other columns hold, or one column as JSON because their keys are names.
+const SKIPPED: [&str; 11] = [
+    "simplify/status",
+    "simplify/version",
+    "simplify/level",
+    "simplify/warnings",
+    "simplify/params",
+    "simplify/diagnostics",
+    "evaluate/warnings",
+    "evaluate/counts/spheres",
+    "evaluate/counts/edges",
+    "evaluate/counts/faces",
+    "item/seeds",
+];
+
+/// The values of a record by path, such as `evaluate/quality/below_30`. Nulls, empty texts, lists and
+/// objects are left out. The fields of the record itself are below `item`.
+pub(crate) fn flatten(record: &Record) -> Vec<(String, Value)> {
+    let mut values = Vec::new();
+    if let Ok(Value::Object(all)) = serde_json::to_value(record) {
+        for (key, value) in all {
+            let is_part = matches!(key.as_str(), "simplify" | "evaluate" | "initial");
+            descend(if is_part { key } else { format!("item/{key}") }, value, &mut values);
+        }
+    }
+    values
+}
+
+fn descend(path: String, value: Value, values: &mut Vec<(String, Value)>) {
+    match value {
+        Value::Null => {}
+        Value::String(text) if text.is_empty() => {}
+        Value::Array(list) if list.is_empty() => {}
+        Value::Object(map) => {
+            for (key, value) in map {
+                descend(format!("{path}/{key}"), value, values);
+            }
+        }
+        value => values.push((path, value)),
+    }
+}
 
 /// A CSV with a header line. The command that made each row stands in the row.
 pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error> {
-    let columns = columns(comparison);
+    let rows: Vec<BTreeMap<String, String>> = comparison.entries.iter().map(row).collect();
+    let evaluated = METRICS.iter().filter(|metric| matches!(metric.value, Place::Evaluation(_)));
+    let mut columns: Vec<&str> = FIRST
+        .split_whitespace()
+        .chain(evaluated.map(|metric| metric.key))
+        .chain(LAST.split_whitespace())
+        .collect();
+    let found: BTreeSet<&str> = rows.iter().flatten().map(|(name, _)| name.as_str()).collect();
+    let further: Vec<&str> = found.into_iter().filter(|name| !columns.contains(name)).collect();
+    columns.extend(further);
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns.iter().map(|column| column.name.as_str()))?;
-    for entry in &comparison.entries {
-        writer.write_record(columns.iter().map(|column| inert((column.value)(entry))))?;
+    writer.write_record(&columns)?;
+    for row in &rows {
+        writer
+            .write_record(columns.iter().map(|&name| row.get(name).map_or("", String::as_str)))?;
     }
     writer.into_inner().map_err(|error| error.into_error().into())
+}
+
+/// The cells of a row by the names of their columns.
+fn row(entry: &Entry<'_>) -> BTreeMap<String, String> {
+    let record = entry.record;
+    let simplify = &record.simplify;
+    let json = |value: Result<String, serde_json::Error>| value.unwrap_or_default();
+    let (level, asked) = match simplify.level {
+        Target::Published => ("published", String::new()),
+        Target::Spheres(count) => ("spheres", count.to_string()),
+        Target::Native(value) => ("native", value.to_string()),
+        Target::MaxError(value) => ("max_error", value.to_string()),
+    };
+    let mut row: BTreeMap<String, String> = [
+        ("level", level.to_owned()),
+        ("asked", asked),
+        ("comparable", entry.comparable().to_string()),
+        ("params", json(serde_json::to_string(&simplify.params))),
+        ("diagnostics", json(serde_json::to_string(&simplify.diagnostics))),
+        ("seeds", json(serde_json::to_string(&record.seeds))),
+        ("warnings", warnings(record).join("; ")),
+    ]
+    .map(|(name, text)| (name.to_owned(), inert(text)))
+    .into();
+    for (path, value) in flatten(record) {
+        let is_skipped = SKIPPED.iter().any(|skipped| {
+            path.strip_prefix(skipped).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+        });
+        if is_skipped {
+            continue;
+        }
+        let renamed =
+            NAMES.iter().find_map(|(start, name)| Some((name, path.strip_prefix(start)?)));
+        let (start, rest) = renamed.unwrap_or((&"", &path));
+        add(format!("{start}{}", rest.replace('/', "_")), &value, &mut row);
+    }
+    // Some are computed from others.
+    for metric in METRICS {
+        if let (Place::Evaluation(value), Some(evaluation)) = (metric.value, &record.evaluate)
+            && let Some(value) = value(evaluation)
+        {
+            row.insert(metric.key.to_owned(), value.to_string());
+        }
+    }
+    row
+}
+
+/// Adds the cell of a value, or the cells of a list: of Betti numbers by index, of spikes by
+/// threshold.
+fn add(name: String, value: &Value, row: &mut BTreeMap<String, String>) {
+    let text = match value {
+        Value::String(text) => text.clone(),
+        // Shortest text that reads back as the same number, without an exponent.
+        Value::Number(number) if number.is_f64() => number.as_f64().unwrap_or(f64::NAN).to_string(),
+        Value::Array(list) if name.ends_with("betti") => {
+            for (index, number) in list.iter().enumerate() {
+                row.insert(format!("{name}_{index}"), number.to_string());
+            }
+            return;
+        }
+        Value::Array(list) if name == "by_ratio" => {
+            for (key, value) in list.iter().filter_map(Value::as_object).flat_map(|ratio| {
+                let threshold = ratio.get("threshold").cloned().unwrap_or_default();
+                let values = ratio.iter().filter(|(key, _)| *key != "threshold");
+                values.map(move |(key, value)| (format!("{key}_{threshold}"), value))
+            }) {
+                add(key, value, row);
+            }
+            return;
+        }
+        value => value.to_string(),
+    };
+    row.insert(name, inert(text));
 }
 
 /// Text that a spreadsheet shows and does not run: a quote goes before what would begin a formula.
@@ -29,181 +181,6 @@ fn inert(cell: String) -> String {
     let formula = cell.starts_with(['=', '+', '-', '@', '\t', '\r']);
     let cell = printable(&cell);
     if formula && cell.parse::<f64>().is_err() { format!("'{cell}") } else { cell }
-}
-
-/// A column: its name and how to fill it.
-struct Column {
-    name: String,
-    value: Box<dyn Fn(&Entry<'_>) -> String>,
-}
-
-fn column(name: impl Into<String>, value: impl Fn(&Record) -> Option<String> + 'static) -> Column {
-    Column {
-        name: name.into(),
-        value: Box::new(move |entry| value(entry.record).unwrap_or_default()),
-    }
-}
-
-/// Shortest text that reads back as the same number.
-fn number(value: f64) -> String {
-    value.to_string()
-}
-
-fn columns(comparison: &Comparison<'_>) -> Vec<Column> {
-    let mut columns = identity();
-    columns.extend(sizes());
-    columns.extend(stages("seconds", |record| record.simplify.seconds));
-    columns.extend(stages("cpu_seconds", |record| record.simplify.cpu_seconds));
-    columns.extend(substrates(comparison));
-    columns.extend(METRICS.iter().filter_map(measured));
-    columns.extend(spikes(comparison));
-    columns.extend(topology());
-    columns.extend(provenance());
-    columns
-}
-
-fn identity() -> Vec<Column> {
-    vec![
-        column("mesh", |r| Some(r.mesh.clone())),
-        column("dataset", |r| r.dataset.clone()),
-        column("mesh_hash", |r| r.mesh_hash.clone()),
-        column("method", |r| Some(r.simplify.method.clone())),
-        column("params", |r| serde_json::to_string(&r.simplify.params).ok()),
-        column("seed", |r| Some(r.simplify.seed.to_string())),
-        column("level", |r| {
-            Some(
-                match r.simplify.level {
-                    Target::Published => "published",
-                    Target::Spheres(_) => "spheres",
-                    Target::Native(_) => "native",
-                    Target::MaxError(_) => "max_error",
-                }
-                .to_owned(),
-            )
-        }),
-        column("asked", |r| match r.simplify.level {
-            Target::Published => None,
-            Target::Spheres(count) => Some(count.to_string()),
-            Target::Native(value) | Target::MaxError(value) => Some(number(value)),
-        }),
-        column("status", |r| Some(r.status.key().to_owned())),
-        column("reason", |r| r.reason.clone()),
-        Column {
-            name: "comparable".to_owned(),
-            value: Box::new(|entry| entry.comparable().to_string()),
-        },
-    ]
-}
-
-fn sizes() -> Vec<Column> {
-    let count = |value: Option<usize>| value.map(|value| value.to_string());
-    vec![
-        column("reached", move |r| count(r.simplify.reached)),
-        column("native_level", |r| r.simplify.native_level.map(number)),
-        column("spheres", move |r| count(r.simplify.spheres)),
-        column("edges", move |r| count(r.simplify.edges)),
-        column("faces", move |r| count(r.simplify.faces)),
-        column("peak_bytes", |r| r.simplify.peak_bytes.map(|bytes| bytes.to_string())),
-        column("threads", move |r| count(r.simplify.threads)),
-    ]
-}
-
-fn stages(prefix: &str, of: fn(&Record) -> Option<Stages>) -> Vec<Column> {
-    let stage = |name: &str, value: fn(&Stages) -> f64| {
-        column(format!("{prefix}_{name}"), move |r| of(r).as_ref().map(value).map(number))
-    };
-    vec![
-        stage("substrate", |s| s.substrate),
-        stage("prepare", |s| s.prepare),
-        stage("simplify", |s| s.simplify),
-        stage("total", |s| s.total),
-    ]
-}
-
-fn substrates(comparison: &Comparison<'_>) -> Vec<Column> {
-    let names: BTreeSet<&String> = comparison
-        .entries
-        .iter()
-        .flat_map(|entry| entry.record.simplify.substrates.keys())
-        .collect();
-    let substrate = |name: &String| {
-        let key = name.clone();
-        column(format!("substrate_{name}"), move |r| {
-            r.simplify.substrates.get(&key).copied().map(number)
-        })
-    };
-    names.into_iter().map(substrate).collect()
-}
-
-/// The column of a metric of the evaluation; those of the record itself have columns above.
-fn measured(metric: &'static Metric) -> Option<Column> {
-    let Value::Evaluation(value) = metric.value else { return None };
-    Some(column(metric.key, move |r| value(r.evaluate.as_ref()?).map(number)))
-}
-
-/// The spike measures at every threshold on the stability ratio.
-fn spikes(comparison: &Comparison<'_>) -> Vec<Column> {
-    let mut thresholds: Vec<f64> = comparison
-        .entries
-        .iter()
-        .filter_map(|entry| entry.record.evaluate.as_ref())
-        .flat_map(|evaluation| evaluation.spikes.by_ratio.iter().map(|ratio| ratio.threshold))
-        .collect();
-    thresholds.sort_by(f64::total_cmp);
-    thresholds.dedup();
-    thresholds.into_iter().flat_map(spikes_at).collect()
-}
-
-/// The measures for one threshold on the stability ratio.
-fn spikes_at(threshold: f64) -> Vec<Column> {
-    macro_rules! ratio {
-        ($($key:ident),*) => {
-            vec![$(column(format!("{}_{threshold}", stringify!($key)), move |r| {
-                let by_ratio = &r.evaluate.as_ref()?.spikes.by_ratio;
-                let ratio = by_ratio.iter().find(|ratio| ratio.threshold == threshold)?;
-                Some(ratio.$key.to_string())
-            })),*]
-        };
-    }
-    ratio!(edge_share, length_share, spikes, dangling_edges)
-}
-
-fn topology() -> Vec<Column> {
-    let betti = |name: &str, of: fn(&Record) -> Option<[u64; 3]>| -> Vec<Column> {
-        (0..3)
-            .map(|index| {
-                column(format!("{name}_{index}"), move |r| Some(of(r)?[index].to_string()))
-            })
-            .collect()
-    };
-    let mut columns = betti("betti", |r| Some(r.evaluate.as_ref()?.betti));
-    columns.push(column("euler", |r| Some(r.evaluate.as_ref()?.euler.to_string())));
-    columns.extend(betti("expected_betti", |r| r.evaluate.as_ref()?.expected_betti));
-    columns.push(column("initial_spheres", |r| Some(r.initial?.spheres.to_string())));
-    columns.push(column("initial_edges", |r| Some(r.initial?.edges.to_string())));
-    columns.push(column("initial_faces", |r| Some(r.initial?.faces.to_string())));
-    columns.extend(betti("initial_betti", |r| r.initial?.betti));
-    columns
-}
-
-fn provenance() -> Vec<Column> {
-    vec![
-        column("diagonal", |r| Some(number(r.evaluate.as_ref()?.diagonal))),
-        column("evaluation_seed", |r| Some(r.evaluate.as_ref()?.seed.to_string())),
-        column("evaluate_seconds", |r| r.evaluate_seconds.map(number)),
-        column("diagnostics", |r| serde_json::to_string(&r.simplify.diagnostics).ok()),
-        column("warnings", |r| Some(warnings(r).join("; "))),
-        column("repetitions", |r| serde_json::to_string(&r.repetitions).ok()),
-        column("seeds", |r| serde_json::to_string(&r.seeds).ok()),
-        column("artifact", |r| r.artifact.clone()),
-        column("cpu", |r| Some(r.machine.cpu.clone())),
-        column("cores", |r| Some(r.machine.cores.to_string())),
-        column("os", |r| Some(r.machine.os.clone())),
-        column("memory", |r| Some(r.machine.memory.to_string())),
-        column("version", |r| Some(r.version.clone())),
-        column("binary_hash", |r| Some(r.binary_hash.clone())),
-        column("command", |r| Some(r.command.clone())),
-    ]
 }
 
 /// Warnings of the method and of the evaluation, in that order.

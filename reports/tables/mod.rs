@@ -1,28 +1,45 @@
-//! Tables: what stands in them, apart from the format they are written in.
+//! Tables: one description, written as Markdown, as LaTeX, and as JSON for the page. `csv` writes
+//! every number of every record.
 
 mod csv;
-mod latex;
-mod markdown;
-mod per_mesh;
-mod summary;
+mod mesh;
 
-pub(crate) use self::csv::{to_csv, warnings};
-pub(crate) use self::latex::to_latex;
-pub(crate) use self::markdown::{escape as escape_markdown, to_markdown};
-pub(crate) use self::per_mesh::{Best, mesh_table, remark, topology_verdict};
-pub(crate) use self::summary::summary_tables;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
+
+use crate::text::{escape_html, printable};
+
+pub(crate) use self::csv::{flatten, to_csv, warnings};
+pub(crate) use self::mesh::{Best, mesh_table, remark, topology_verdict};
 
 /// A table before it takes a format.
+#[derive(Clone, Serialize)]
 pub(crate) struct Table {
     /// One sentence above the table.
     pub(crate) caption: String,
-    /// How it was made, units, and what bold means.
+    /// Units, definitions, and the meaning of bold. The first one is the command that made it.
     pub(crate) notes: Vec<String>,
     pub(crate) columns: Vec<Column>,
     pub(crate) rows: Vec<Row>,
 }
 
+impl Table {
+    /// The table without some columns, by their titles.
+    pub(crate) fn without(mut self, titles: &[&str]) -> Self {
+        let keep: Vec<bool> =
+            self.columns.iter().map(|column| !titles.contains(&column.title.as_str())).collect();
+        let mut kept = keep.iter();
+        self.columns.retain(|_| *kept.next().unwrap_or(&true));
+        for row in &mut self.rows {
+            let mut kept = keep.iter();
+            row.cells.retain(|_| *kept.next().unwrap_or(&true));
+        }
+        self
+    }
+}
+
 /// The head of a column.
+#[derive(Clone, Serialize)]
 pub(crate) struct Column {
     pub(crate) title: String,
     /// Numbers are set flush right.
@@ -39,7 +56,8 @@ impl Column {
     }
 }
 
-/// A row; `starts_group` asks for a rule above it.
+/// A row; `starts_group` draws a rule above it.
+#[derive(Clone, Serialize)]
 pub(crate) struct Row {
     pub(crate) cells: Vec<Cell>,
     pub(crate) starts_group: bool,
@@ -61,5 +79,209 @@ impl Cell {
     /// A dash where there is nothing.
     pub(crate) fn optional(text: Option<String>) -> Self {
         Self::new(text.unwrap_or_else(|| "–".to_owned()))
+    }
+}
+
+impl Serialize for Cell {
+    /// Most cells are plain: a text alone keeps the page small.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let text = printable(&self.text);
+        if !self.best {
+            return serializer.serialize_str(&text);
+        }
+        let mut cell = serializer.serialize_struct("Cell", 1)?;
+        cell.serialize_field("best", &text)?;
+        cell.end()
+    }
+}
+
+/// A heading, the notes, and a pipe table.
+pub(crate) fn to_markdown(table: &Table) -> String {
+    let mut text = format!("## {}\n\n", escape(&table.caption));
+    for note in &table.notes {
+        text.push_str(&format!("{}\n\n", escape(note)));
+    }
+    let titles = table.columns.iter().map(|column| escape(&column.title));
+    text.push_str(&markdown_line(titles));
+    let rules = table.columns.iter().map(|column| if column.number { "---:" } else { "---" });
+    text.push_str(&markdown_line(rules.map(str::to_owned)));
+    for row in &table.rows {
+        text.push_str(&markdown_line(row.cells.iter().map(|cell| {
+            let text = escape(&cell.text);
+            if cell.best { format!("**{text}**") } else { text }
+        })));
+    }
+    text
+}
+
+/// The table as HTML, in a box that scrolls sideways where the page is narrow.
+pub(crate) fn to_html(table: &Table) -> String {
+    let class = |column: &Column| if column.number { " class=\"num\"" } else { "" };
+    let mut html = String::from("<div class=\"scroll\"><table>\n<thead><tr>");
+    for column in &table.columns {
+        html.push_str(&format!("<th{}>{}</th>", class(column), escape_html(&column.title)));
+    }
+    html.push_str("</tr></thead>\n<tbody>\n");
+    for row in &table.rows {
+        html.push_str("<tr>");
+        for (cell, column) in row.cells.iter().zip(&table.columns) {
+            let text = escape_html(&cell.text);
+            let text = if cell.best { format!("<strong>{text}</strong>") } else { text };
+            html.push_str(&format!("<td{}>{text}</td>", class(column)));
+        }
+        html.push_str("</tr>\n");
+    }
+    html + "</tbody>\n</table></div>\n"
+}
+
+fn markdown_line(cells: impl Iterator<Item = String>) -> String {
+    format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
+}
+
+/// Escapes what Markdown or the HTML inside it would take for markup.
+pub(crate) fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in printable(text).chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '|' | '\\' | '`' | '*' | '_' | '[' | ']' | '#' | '~' | '$' => {
+                escaped.push('\\');
+                escaped.push(c);
+            }
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+/// Rules in the manner of booktabs for documents that do not load it.
+const RULES: &str = "\\providecommand{\\toprule}{\\hline}\n\
+                     \\providecommand{\\midrule}{\\hline}\n\
+                     \\providecommand{\\bottomrule}{\\hline}\n";
+
+/// The table in box 0, no wider than the text where graphicx can shrink it.
+const FITTED: &str = "\\ifdim\\wd0>\\linewidth\n\
+                      \\ifdefined\\resizebox\\resizebox{\\linewidth}{!}{\\usebox0}\\else\\usebox0\\fi\n\
+                      \\else\\usebox0\\fi\n";
+
+/// A `table` environment for `\input`: it needs no package, and looks better with booktabs and
+/// graphicx.
+pub(crate) fn to_latex(table: &Table, label: &str) -> String {
+    let mut text = String::new();
+    for note in &table.notes {
+        text.push_str(&format!("% {}\n", printable(note)));
+    }
+    text.push_str(RULES);
+    text.push_str("\\begin{table}\n\\centering\n\\scriptsize\n\\setlength{\\tabcolsep}{3pt}\n");
+    let caption = escape_latex(&table.caption);
+    text.push_str(&format!("\\caption{{{caption}}}\n\\label{{tab:{label}}}\n\\sbox0{{%\n"));
+    let alignment: String = (0..table.columns.len()).map(|column| align(table, column)).collect();
+    text.push_str(&format!("\\begin{{tabular}}{{{alignment}}}\n\\toprule\n"));
+    let titles: Vec<String> = table.columns.iter().map(|c| escape_latex(&c.title)).collect();
+    text.push_str(&format!("{} \\\\\n", titles.join(" & ")));
+    for (index, row) in table.rows.iter().enumerate() {
+        if index == 0 || row.starts_group {
+            text.push_str("\\midrule\n");
+        }
+        let cells = row.cells.iter().map(|cell| {
+            let text = escape_latex(&cell.text);
+            if cell.best { format!("\\textbf{{{text}}}") } else { text }
+        });
+        text.push_str(&format!("{} \\\\\n", cells.collect::<Vec<_>>().join(" & ")));
+    }
+    text.push_str("\\bottomrule\n\\end{tabular}}%\n");
+    text.push_str(FITTED);
+    for note in &table.notes {
+        let note = escape_latex(note);
+        text.push_str(&format!("\\par\\smallskip\\parbox{{\\linewidth}}{{{note}}}\n"));
+    }
+    text.push_str("\\end{table}\n");
+    text
+}
+
+/// The alignment of a column: a text that would be wider than a third of a line wraps.
+fn align(table: &Table, column: usize) -> &'static str {
+    const LONG: usize = 40;
+    let mut texts = table.rows.iter().filter_map(|row| row.cells.get(column));
+    match table.columns[column].number {
+        true => "r",
+        false if texts.any(|cell| cell.text.chars().count() > LONG) => "p{0.3\\linewidth}",
+        false => "l",
+    }
+}
+
+/// Characters that LaTeX spells.
+const SPELLED: [(char, &str); 27] = [
+    ('\\', "\\textbackslash{}"),
+    ('~', "\\textasciitilde{}"),
+    ('^', "\\textasciicircum{}"),
+    ('<', "\\textless{}"),
+    ('>', "\\textgreater{}"),
+    ('|', "\\textbar{}"),
+    ('"', "{\\ttfamily\\char34}"),
+    ('[', "{[}"),
+    (']', "{]}"),
+    ('↓', "$\\downarrow$"),
+    ('↑', "$\\uparrow$"),
+    ('ε', "$\\varepsilon$"),
+    ('°', "$^\\circ$"),
+    ('–', "--"),
+    ('…', "\\ldots{}"),
+    ('÷', "$\\div$"),
+    ('×', "$\\times$"),
+    ('±', "$\\pm$"),
+    ('·', "$\\cdot$"),
+    ('≤', "$\\le$"),
+    ('≥', "$\\ge$"),
+    ('λ', "$\\lambda$"),
+    ('θ', "$\\theta$"),
+    ('α', "$\\alpha$"),
+    ('\u{2019}', "'"),
+    ('\u{201c}', "``"),
+    ('\u{201d}', "''"),
+];
+
+/// Escapes LaTeX's own characters. European letters are passed on, which every LaTeX since 2018 reads
+/// as UTF-8. A character at which pdfLaTeX would stop is spelled by its number, such as `U+65E5`.
+pub(crate) fn escape_latex(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in printable(text).chars() {
+        match SPELLED.iter().find(|(spelled, _)| *spelled == c) {
+            Some((_, spelling)) => escaped.push_str(spelling),
+            None if "&%$#_{}".contains(c) => escaped.extend(['\\', c]),
+            None if c.is_ascii() || ('\u{c0}'..='\u{17e}').contains(&c) => escaped.push(c),
+            None => escaped.push_str(&format!("U+{:04X}", u32::from(c))),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn latex_spells_characters_that_pdflatex_cannot_set() {
+        assert_eq!(escape_latex("÷ ≤ λ é"), "$\\div$ $\\le$ $\\lambda$ é");
+        assert_eq!(escape_latex("日_%"), "U+65E5\\_\\%");
+    }
+
+    #[test]
+    fn long_texts_wrap_and_wide_tables_are_shrunk() {
+        let cells = vec![Cell::new("x".repeat(60)), Cell::new("short"), Cell::new("1")];
+        let table = Table {
+            caption: "A caption".to_owned(),
+            notes: vec![],
+            columns: vec![Column::text("a"), Column::text("b"), Column::number("c")],
+            rows: vec![Row { cells, starts_group: false }],
+        };
+        let latex = to_latex(&table, "label");
+        assert!(latex.contains("\\begin{tabular}{p{0.3\\linewidth}lr}"), "{latex}");
+        assert!(latex.contains("\\ifdefined\\resizebox"), "{latex}");
+        let count = |c: char| latex.chars().filter(|&other| other == c).count();
+        assert_eq!(count('{'), count('}'), "{latex}");
+        assert_eq!(table.without(&["b", "z"]).rows[0].cells.len(), 2);
     }
 }

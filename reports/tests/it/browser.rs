@@ -136,7 +136,7 @@ impl Browser {
 
     fn open(&mut self, url: &str) {
         self.call("Page.navigate", json!({"url": url}));
-        self.until("document.readyState === 'complete' && location.protocol === 'file:'");
+        self.until("location.protocol === 'file:' && 'ready' in document.documentElement.dataset");
         // What moves on its own moves from under the mouse.
         self.value("document.documentElement.style.scrollBehavior = 'auto'");
     }
@@ -245,13 +245,15 @@ fn check_address(browser: &mut Browser) {
     browser.value("document.getElementById('mesh-ant').open = false");
 }
 
-/// A mesh beyond the first ones is unpacked when it is opened, with plots that answer.
-fn check_packed(browser: &mut Browser) {
+/// The section of a mesh is made when it is opened, with plots that answer.
+fn check_meshes(browser: &mut Browser) {
     let last = format!("document.querySelectorAll('details.mesh')[{}]", SHAPES.len() - 1);
-    assert_eq!(browser.value(&format!("{last}.querySelector('table') === null")), true);
+    assert_eq!(browser.value(&format!("{last}.querySelector('figure') === null")), true);
     browser.value(&format!("{last}.open = true"));
-    browser.until(&format!("{last}.querySelector('svg.plot[tabindex]') !== null"));
-    assert_eq!(browser.value(&format!("{last}.querySelectorAll('table').length")), 1);
+    browser.until(&format!("{last}.querySelector('svg.chart[tabindex]') !== null"));
+    assert_eq!(browser.value(&format!("{last}.querySelectorAll('figure.plot').length > 1")), true);
+    let link = browser.text(&format!("{last}.querySelector('a').getAttribute('href')"));
+    assert_eq!(link, "#results?mesh=box");
     browser.value(&format!("{last}.open = false"));
 }
 
@@ -293,51 +295,68 @@ fn check_sticky(browser: &mut Browser) {
     browser.value("document.querySelector('.filters').reset()");
 }
 
+/// The chart is drawn anew for each view: always the one that is in the document now.
+const CHART: &str = "document.querySelector('figure.plot svg.chart')";
+const SPOKEN: &str = "document.querySelector('figure.plot output').textContent";
+const WHOLE: &str = "document.querySelector('figure.plot .whole').hidden";
+const LEGEND: &str = "document.querySelector('figure.plot .legend button')";
+
 fn check_plots(browser: &mut Browser) {
-    browser.value("window.plot = document.querySelector('svg.plot')");
-    assert_eq!(browser.value("document.querySelector('.tip').hidden"), true);
-    let mark = browser.centre("plot.querySelector('g.mark')");
+    let tips = format!(
+        "[...{CHART}.querySelectorAll('g[aria-label=tip]')].map(g => g.textContent).join('')"
+    );
+    assert_eq!(browser.text(&tips), "");
+    let mark = browser.centre(&format!("{CHART}.querySelector('g[aria-label=dot] > *')"));
     // The first movement brings the mouse into the plot.
     browser.mouse("mouseMoved", [mark[0] + 40.0, mark[1] + 40.0]);
     browser.mouse("mouseMoved", mark);
-    browser.until("!document.querySelector('.tip').hidden");
-    let tip = browser.text("document.querySelector('.tip').textContent");
-    assert!(tip.contains("qmat") && tip.contains("n = 13 meshes"), "{tip}");
+    browser.until(&format!("{tips}.includes('qmat') && {tips}.includes('n = 13 meshes')"));
 
-    browser.value("plot.focus()");
+    browser.value(&format!("{CHART}.focus()"));
     browser.key("ArrowDown", 40);
-    let next = browser.text("document.querySelector('.tip').textContent");
-    assert!(!next.is_empty() && next != tip, "{next}");
+    let first = browser.text(SPOKEN);
+    browser.key("ArrowDown", 40);
+    let next = browser.text(SPOKEN);
+    assert!(first.contains("qmat") && !next.is_empty() && next != first, "{first} {next}");
+    browser.key("ArrowRight", 39);
+    assert_ne!(browser.text(SPOKEN), next);
+    browser.key("Escape", 27);
+    assert_eq!(browser.text(SPOKEN), "");
 
-    browser.value("plot.querySelector('g.legend').focus()");
+    browser.value(&format!("{LEGEND}.focus()"));
     browser.key("Enter", 13);
-    let state = "plot.querySelector('g.legend').getAttribute('aria-pressed')";
-    let drawn = "getComputedStyle(plot.querySelector('g.line')).display";
-    assert_eq!((browser.text(state), browser.text(drawn)), ("false".into(), "none".into()));
-    let at = browser.centre("plot.querySelector('g.legend')");
+    let state = format!("{LEGEND}.getAttribute('aria-pressed')");
+    let drawn = format!(
+        "(() => {{ const colour = {LEGEND}.querySelector('path').getAttribute('stroke'); \
+         return [...{CHART}.querySelectorAll('g[aria-label=line] path')]\
+         .filter(path => path.getAttribute('stroke') === colour).length; }})()"
+    );
+    assert_eq!((browser.text(&state), browser.value(&drawn)), ("false".into(), json!(0)));
+    let at = browser.centre(LEGEND);
     browser.mouse("mousePressed", at);
     browser.mouse("mouseReleased", at);
-    assert_eq!((browser.text(state), browser.text(drawn)), ("true".into(), "inline".into()));
+    assert_eq!((browser.text(&state), browser.value(&drawn)), ("true".into(), json!(1)));
 
-    let from = browser.centre("plot.querySelectorAll('g.mark')[1]");
+    let marks = format!("{CHART}.querySelectorAll('g[aria-label=dot] > *')");
+    let all = browser.value(&format!("{marks}.length"));
+    let from = browser.centre(&format!("{marks}[1]"));
     browser.drag(from, [from[0] + 60.0, from[1] + 60.0]);
-    let is_whole = "plot.closest('figure').querySelector('.whole').hidden";
-    assert_eq!(browser.value(is_whole), false);
-    assert_eq!(browser.text(drawn), "none");
+    assert_eq!(browser.value(WHOLE), false);
+    assert_ne!(browser.value(&format!("{marks}.length")), all);
     browser.key("Escape", 27);
-    assert_eq!(browser.value(is_whole), true);
+    assert_eq!(browser.value(WHOLE), true);
 
-    browser.value("plot.focus()");
+    browser.value(&format!("{CHART}.focus()"));
     browser.key("+", 187);
-    assert_eq!(browser.value(is_whole), false);
+    assert_eq!(browser.value(WHOLE), false);
     browser.key("-", 189);
-    assert_eq!(browser.value(is_whole), true);
-    let larger = browser.centre("plot.closest('figure').querySelector('[aria-label=enlarge]')");
+    assert_eq!(browser.value(WHOLE), true);
+    let larger = browser.centre("document.querySelector('figure.plot [aria-label=enlarge]')");
     browser.mouse("mousePressed", larger);
     browser.mouse("mouseReleased", larger);
-    assert_eq!(browser.value(is_whole), false);
-    browser.value("plot.closest('figure').querySelector('.whole').click()");
-    assert_eq!(browser.value(is_whole), true);
+    assert_eq!(browser.value(WHOLE), false);
+    browser.value("document.querySelector('figure.plot .whole').click()");
+    assert_eq!(browser.value(WHOLE), true);
 }
 
 /// A cube, and the medial mesh of a smaller one in it.
@@ -375,7 +394,7 @@ fn check_views(browser: &mut Browser) {
     let canvases = "[...document.querySelectorAll('.side canvas')]";
     let all_drawn =
         format!("{canvases}.length === 2 && {canvases}.every(c => drawn(c).count > 5000)");
-    browser.value("document.querySelectorAll('.view3d > button')[0].click()");
+    browser.value("document.querySelector('.view3d > button').click()");
     browser.until(&all_drawn);
     for kind in ["union", "errors", "surface", "axis"] {
         browser.value(&format!(
@@ -396,14 +415,37 @@ fn check_views(browser: &mut Browser) {
 
     // Another one, from its file, takes the place of the first.
     browser.value("document.querySelectorAll('script.view')[1].remove()");
-    browser.value("document.querySelectorAll('details.mesh')[1].open = true");
-    browser.value("document.querySelectorAll('.view3d > button')[1].click()");
-    let second = "document.querySelectorAll('.view3d')[1].querySelectorAll('canvas').length === 2";
-    browser.until(second);
+    browser.value("location.hash = '#mesh-dolphin'");
+    let second = "document.querySelector('#mesh-dolphin .view3d')";
+    browser.until(&format!("{second} !== null"));
+    browser.value(&format!("{second}.querySelector('button').click()"));
+    browser.until(&format!("{second}.querySelectorAll('canvas').length === 2"));
     browser.until(&all_drawn);
-    browser.value("document.querySelectorAll('.view3d > button')[1].click()");
+    browser.value(&format!("{second}.querySelector('button').click()"));
     assert_eq!(browser.value(&format!("{canvases}.length")), 0);
-    browser.value("document.querySelectorAll('details.mesh')[1].open = false");
+}
+
+/// A button copies its text, or selects it where the browser lets no page copy.
+fn check_papers(browser: &mut Browser) {
+    browser.value("location.hash = '#papers'");
+    browser.until("document.getElementById('papers').open");
+    browser.value("window.paste = [...document.querySelectorAll('.paste')].pop()");
+    let at = browser.centre("paste.querySelector('button')");
+    browser.mouse("mousePressed", at);
+    browser.mouse("mouseReleased", at);
+    browser.until("paste.querySelector('output').textContent !== ''");
+    if browser.text("paste.querySelector('output').textContent").starts_with("Selected") {
+        let selected = browser.text("getSelection().toString()");
+        assert!(selected.starts_with("@article{qmat,") && selected.contains("@misc{medial,"));
+    }
+    // And where there is nothing to copy with.
+    browser.value(
+        "{ Object.defineProperty(navigator, 'clipboard', {value: undefined}); \
+         paste.querySelector('button').click(); }",
+    );
+    browser.until("paste.querySelector('output').textContent.startsWith('Selected')");
+    let selected = browser.text("getSelection().toString()");
+    assert!(selected.starts_with("@article{qmat,") && selected.contains("@misc{medial,"));
 }
 
 #[test]
@@ -417,11 +459,12 @@ fn the_page_answers_from_disk() {
     browser.open(&format!("file://{}/index.html", folder.path().display()));
     check_filters(&mut browser);
     check_address(&mut browser);
-    check_packed(&mut browser);
+    check_meshes(&mut browser);
     check_details(&mut browser);
     check_sticky(&mut browser);
     check_plots(&mut browser);
     check_views(&mut browser);
+    check_papers(&mut browser);
 
     let mut requests = 0;
     for event in &browser.events {

@@ -3,11 +3,26 @@
 
 use std::collections::BTreeMap;
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use flate2::read::GzDecoder;
 use medial::metrics::{Counts, Distances, Evaluation, RatioSpikes, Spikes, TriangleQuality};
 use medial_reports::Target;
 use medial_reports::{
     Header, Initial, Machine, MethodNote, Record, Repetition, RunNote, Simplify, Stages, Status,
 };
+use serde_json::Value;
+
+/// The two documents of a page: the plain one, and the packed one with the records.
+pub fn documents(page: &str) -> [Value; 2] {
+    let element = |id: &str| {
+        let (_, rest) = page.split_once(&format!("id=\"{id}\">")).unwrap();
+        rest.split_once("</script>").unwrap().0
+    };
+    let packed = BASE64_STANDARD.decode(element("bulk")).unwrap();
+    let bulk = serde_json::from_reader(GzDecoder::new(packed.as_slice())).unwrap();
+    [serde_json::from_str(element("report")).unwrap(), bulk]
+}
 
 /// Names of made-up shapes, as many as the published comparison has.
 pub const SHAPES: [&str; 13] = [
@@ -199,7 +214,7 @@ pub fn header(methods: &[&str]) -> Header {
         id: (*id).to_owned(),
         title: format!("Method {id}"),
         citation: "A. Author, 2015, Title, Journal, doi:10.1145/0000000".to_owned(),
-        bibtex: String::new(),
+        bibtex: format!("@article{{{id},\n  title = {{Method {id}}}\n}}"),
         summary: "Collapses edges by a quadric error.".to_owned(),
         home: format!("Few spheres; {id} is made up."),
         published: "a count of 1,000 spheres".to_owned(),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use super::common::{SHAPES, comparison, failed, header, ok};
+use super::common::{SHAPES, comparison, documents, failed, header, ok};
 use medial_reports::{Record, Status, read_header, summary_text, write_report};
 
 const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
@@ -220,7 +220,8 @@ fn bounds_and_own_levels_have_tables_of_their_own() {
     for plot in ["plots/overview-equal-error.svg", "plots/overview-level-angle.svg"] {
         assert!(files.contains_key(plot), "{plot}");
     }
-    assert!(text(&files, "index.html").contains("the lowest is 1.2 %"));
+    let [_, bulk] = documents(text(&files, "index.html"));
+    assert!(bulk["columns"]["item/reason"].to_string().contains("the lowest is 1.2 %"));
 }
 
 #[test]
@@ -230,6 +231,8 @@ fn names_from_files_stay_text() {
     record.simplify.warnings.push("</script><img src=x onerror=alert(2)>".to_owned());
     let files = report_of(&[record, failed(hostile, "angle", 100, Status::Failed, "<b>no</b>")]);
     let page = text(&files, "index.html");
+    let [report, _] = documents(page);
+    assert_eq!(report["meshes"][0]["name"], hostile);
     for forbidden in ["<script>alert", "<img src=x", "<b>no</b>"] {
         assert!(!page.contains(forbidden), "{forbidden}");
     }
@@ -281,10 +284,14 @@ fn numbers_of_an_earlier_report_do_not_stay() {
 #[test]
 fn nothing_measured_is_said() {
     let records = [failed("bear", "qmat", 100, Status::TimedOut, "no result within 300 s")];
+    let alert = |records: &[Record]| {
+        let [report, _] = documents(text(&report_of(records), "index.html"));
+        report["alert"].as_str().map(str::to_owned)
+    };
     for records in [&records[..], &[]] {
-        let files = report_of(records);
-        assert!(text(&files, "index.html").to_lowercase().contains("nothing was measured"));
+        assert!(alert(records).unwrap().starts_with("Nothing was measured"));
     }
+    assert_eq!(alert(&[ok("bear", "qmat", 100, 0, 0)]), None);
     assert_eq!(summary_text(&[]), "");
     assert!(summary_text(&records).contains("0/1"), "{}", summary_text(&records));
 }
@@ -327,4 +334,26 @@ fn the_answers_name_the_lead_and_a_weak_method_changes_none_of_them() {
     for line in rows(&before, "tables/summary.md") {
         assert!(rows(&after, "tables/summary.md").contains(&line), "{line}");
     }
+}
+
+#[test]
+fn the_bibliography_has_each_method_that_ran_once() {
+    let mut records = comparison(&SHAPES[..2], &["qmat", "angle"], &[100]);
+    // A row of its own with the entry of another.
+    let mut variant = ok("bear", "qmat", 100, 0, 0);
+    variant.simplify.params.set("k", "0");
+    records.push(variant);
+    let files = report_of(&records);
+    let bibliography = text(&files, "tables/methods.bib");
+    let keys: Vec<&str> = bibliography.lines().filter(|line| line.starts_with('@')).collect();
+    assert_eq!(keys, ["@article{qmat,", "@article{angle,", "@misc{medial,"]);
+    assert!(bibliography.contains("note = {Version 0.1.0}"), "{bibliography}");
+    let [page, _] = documents(text(&files, "index.html"));
+    assert_eq!(page["papers"]["texts"][0][2], bibliography);
+    let titles = page["methods"].as_array().unwrap().iter().map(|method| &method["home"]);
+    assert_eq!(
+        titles.collect::<Vec<_>>(),
+        ["Few spheres; qmat is made up.", "Few spheres; angle is made up."]
+    );
+    assert!(!report_of(&[]).contains_key("tables/methods.bib"));
 }

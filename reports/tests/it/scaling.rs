@@ -48,7 +48,7 @@ fn costs_grow_by_each_methods_own_records() {
     let page = text(&report, "index.html");
     for plot in ["overview-scaling", "overview-scaling-memory"] {
         let svg = text(&report, &format!("plots/{plot}.svg"));
-        assert!(svg.contains("qmat x^1.") && svg.contains("class=\"mark\""), "{plot}");
+        assert!(svg.contains("qmat x^1.") && svg.contains("<circle"), "{plot}");
         assert!(svg.contains("font-family=\"Helvetica, Arial, sans-serif\""), "{plot}");
     }
     assert!(

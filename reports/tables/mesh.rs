@@ -71,7 +71,7 @@ pub(crate) fn remark(entry: &Entry<'_>) -> String {
 pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) -> Table {
     let best = Best::of_mesh(comparison, mesh);
     let mut columns =
-        vec![Column::number("asked"), Column::text("method"), Column::number("spheres")];
+        vec![Column::number("requested"), Column::text("method"), Column::number("spheres")];
     columns.extend(COMPARED.iter().map(|metric| Column::number(metric.heading())));
     columns.extend([Column::text("Betti"), Column::text("as solid"), Column::text("remark")]);
     let mut level = None;

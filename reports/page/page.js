@@ -1,0 +1,212 @@
+// The page: its sections are made from the report's JSON. Text reaches the document as text alone,
+// so no name from a file can become markup.
+const make = (tag, attributes = {}, ...children) => {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === true) element.setAttribute(name, "");
+    else if (value !== false && value !== null && value !== undefined) element.setAttribute(name, value);
+  }
+  element.append(...children.filter((child) => child !== null && child !== undefined));
+  return element;
+};
+const code = (text) => make("pre", { class: "command" }, make("code", {}, text));
+const fold = (id, title, ...children) =>
+  make("details", { id, class: "fold" }, make("summary", {}, title), ...children);
+const section = (id, title, ...children) => make("section", { id }, make("h2", {}, title), ...children);
+const note = (text) => make("p", { class: "note" }, text);
+const counted = (count, one, many) => `${count.toLocaleString("en")} ${count === 1 ? one : many}`;
+
+// Gzip in Base64: as bytes or as text.
+const unpacked = (text) => {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
+};
+const unpackedText = (id) => unpacked(document.getElementById(id).textContent).text();
+
+// The script of a library that the page holds packed.
+const evaluated = async (id) => {
+  const script = make("script");
+  script.textContent = await unpackedText(id);
+  document.head.append(script);
+};
+
+const report = JSON.parse(document.getElementById("report").textContent);
+
+// Numbers with three significant digits, one decimal, or none, as the metric says.
+const written = (value, digits) => {
+  if (value === null || value === undefined) return "–";
+  if (digits === "tenths") return value.toFixed(1);
+  if (digits === "count") return Math.round(value).toLocaleString("en");
+  if (value === 0) return "0";
+  const rounded = Number(value.toPrecision(3));
+  const exponent = Math.floor(Math.log10(Math.abs(rounded)));
+  return exponent < -5 || exponent > 8 ? value.toExponential(2) : rounded.toFixed(Math.max(0, 2 - exponent));
+};
+
+const dot = (series) => make("span", { class: "dot", style: `background:${report.series[series].colour}` });
+
+// A table as Rust describes it: a cell is a text, or an object where it is the best of its group.
+const tableOf = ({ columns, rows }) => {
+  const kind = (k) => (columns[k].number ? "num" : null);
+  const head = make("tr", {}, ...columns.map(({ title }, k) => make("th", { scope: "col", class: kind(k) }, title)));
+  const body = rows.map(({ cells, starts_group: group }) =>
+    make("tr", { class: group ? "group" : null }, ...cells.map((cell, k) => {
+      const inner = cell.best === undefined ? cell : make("strong", {}, cell.best);
+      const long = !columns[k].number && (cell.best ?? cell).length > 60;
+      return make("td", { class: long ? "wrap" : kind(k) }, inner);
+    })));
+  const table = make("table", {}, make("thead", {}, head), make("tbody", {}, ...body));
+  return make("div", { class: "scroll" }, table);
+};
+const captioned = (table) => [make("h3", {}, table.caption), tableOf(table), ...table.notes.map(note)];
+
+const listOf = (pairs) =>
+  make("dl", {}, ...pairs.flatMap(([term, ...texts]) => [make("dt", {}, term), make("dd", {}, ...texts)]));
+
+const strip = (mesh, link) => {
+  if (!mesh.picture) return null;
+  const image = make("img", { src: mesh.picture, alt: mesh.words });
+  return make("figure", { class: "strip" }, link ? make("a", { href: link }, image) : image,
+    make("figcaption", {}, mesh.words));
+};
+
+// Picture, 3D view, initial medial mesh and curves of one mesh.
+const meshParts = (index, withPicture, plots) => {
+  const mesh = report.meshes[index];
+  const facts = mesh.initial.map(([term, text, bad]) =>
+    make("div", {}, make("dt", {}, term), make("dd", {}, bad ? make("strong", {}, text) : text)));
+  return [
+    withPicture ? strip(mesh) : null,
+    mesh.view ? viewOf(mesh.view) : null,
+    facts.length ? make("dl", { class: "initial" }, ...facts) : null,
+    mesh.measured ? null : make("p", { class: "notice bad" }, "Nothing was measured on this mesh."),
+    plots.length ? plotsOf(plots) : null,
+  ];
+};
+
+// A text with a button that copies it.
+const paste = (title, file, text) => {
+  const said = make("output");
+  const pre = make("pre", { tabindex: 0 }, text);
+  const button = make("button", { type: "button" }, "Copy");
+  button.addEventListener("click", async () => {
+    try {
+      // Pages from disk may lack a clipboard, and a browser may refuse it.
+      await navigator.clipboard.writeText(text);
+      said.textContent = "Copied.";
+    } catch {
+      getSelection().selectAllChildren(pre);
+      pre.focus();
+      said.textContent = "Selected: copy it by the keyboard.";
+    }
+  });
+  const link = make("a", { href: file }, file.replace("./", ""));
+  return make("div", { class: "paste" }, make("h3", {}, title), make("p", {}, button, " ", link, " ", said), pre);
+};
+
+const methodsOf = () => make("dl", {}, ...report.methods.flatMap(({ id, title, summary, home, published, citation }) => [
+  make("dt", {}, `${id}: ${title}`),
+  make("dd", {}, [summary, home && `Best suited for: ${home}`, published && `Published level: ${published}.`]
+    .filter(Boolean).join(" "), make("cite", {}, citation)),
+]));
+
+// A fold whose content is made when it is first opened, or printed.
+const late = (details, build) => {
+  details.fill = () => {
+    delete details.fill;
+    details.append(...build());
+  };
+  details.addEventListener("toggle", () => details.open && details.fill?.());
+  return details;
+};
+
+const meshFolds = (bulk) => report.meshes.map((mesh, index) => late(
+  make("details", { class: "mesh", id: `mesh-${mesh.stem}` }, make("summary", {}, `${mesh.name} `, make("small", {}, mesh.brief))),
+  () => [...meshParts(index, true, bulk.figures[index] ?? []).filter(Boolean),
+    make("p", {}, make("a", { href: `#results?mesh=${encodeURIComponent(mesh.name)}` }, "Results of this mesh"), " as ",
+      make("a", { href: `./tables/mesh-${mesh.stem}.md` }, "Markdown"), ", ",
+      make("a", { href: `./tables/mesh-${mesh.stem}.tex` }, "LaTeX"))]));
+
+// Opens what the address names, with the folds around it.
+const openTarget = () => {
+  let id = location.hash.slice(1);
+  try {
+    id = decodeURIComponent(id);
+  } catch {
+    // Not encoded: taken as it is.
+  }
+  const target = document.getElementById(id);
+  for (let around = target; around; around = around.parentElement) {
+    if (around.localName === "details") around.open = true;
+  }
+  target?.scrollIntoView();
+};
+
+const start = async () => {
+  const bulk = await unpackedText("bulk").then(JSON.parse);
+  await evaluated("d3");
+  await evaluated("plot");
+  const main = document.querySelector("main");
+  document.getElementById("facts").append(...report.facts.map((fact) => make("li", {}, fact)));
+  document.getElementById("how").append(...[
+    report.command && code(report.command),
+    report.earlier.length && fold(null, `${counted(report.earlier.length, "earlier run", "earlier runs")} that added records`,
+      make("ul", {}, ...report.earlier.map((line) => make("li", {}, make("code", {}, line))))),
+    report.study && fold(null, "Study file of the last run", code(report.study)),
+  ].filter(Boolean));
+
+  const isOne = report.meshes.length === 1;
+  const [first] = report.meshes;
+  const shown = report.meshes.findIndex((mesh) => mesh.picture);
+  const overview = isOne ? bulk.figures[0] ?? [] : report.figures;
+  const curves = overview.filter((figure) => figure.leading);
+  const others = overview.filter((figure) => !figure.leading);
+  const parts = [];
+  if (report.alert) {
+    parts.push(make("p", { class: "notice bad", role: "alert" }, report.alert));
+  }
+  if (report.notices.length) {
+    parts.push(make("ul", { class: "notice" }, ...report.notices.map((text) => make("li", {}, text))));
+  }
+  if (report.answers) {
+    parts.push(section("answers", "Which method?", tableOf(report.answers), ...report.answers.notes.map(note)));
+  }
+  if (isOne) {
+    const inner = meshParts(0, true, []).filter(Boolean);
+    if (inner.length) parts.push(make("section", { id: `mesh-${first.stem}` }, make("h2", {}, "Pictures"), ...inner));
+  } else if (shown >= 0) {
+    const way = make("a", { href: "#meshes" }, "Pictures, 3D views and curves of each mesh");
+    const mesh = report.meshes[shown];
+    parts.push(section("pictures", "Pictures", strip(mesh, `#mesh-${mesh.stem}`), mesh.view && viewOf(mesh.view), make("p", {}, way)));
+  }
+  if (curves.length) parts.push(section("curves", "Error against spheres and time", plotsOf(curves)));
+  if (bulk.rows) parts.push(resultsOf(bulk));
+  else if (report.too_many) parts.push(section("results", "Results", make("p", {}, report.too_many)));
+  const folds = report.sections.map(({ id, title, tables }) => fold(id, title, ...tables.flatMap(captioned)));
+  if (!isOne && report.meshes.length) folds.push(fold("meshes", "Each mesh: pictures, 3D, curves", ...meshFolds(bulk)));
+  if (others.length) folds.push(late(fold("plots", "More plots"), () => [plotsOf(others)]));
+  if (report.warnings.length) folds.push(fold("warnings", "Warnings", listOf(report.warnings)));
+  if (report.methods.length) folds.push(fold("methods", "Methods", methodsOf()));
+  folds.push(fold("definitions", "Definitions", listOf(report.definitions)));
+  if (report.papers) {
+    const { about, texts } = report.papers;
+    folds.push(fold("papers", "For papers", make("p", {}, about), ...texts.map((text) => paste(...text))));
+  }
+  folds.push(fold("files", "Files", make("ul", {}, ...report.files.map(([path, text]) =>
+    make("li", {}, make("a", { href: `./${path}` }, path), `: ${text}`)))));
+  main.append(...parts, make("section", { id: "more" }, ...folds));
+  const named = [...main.querySelectorAll(":scope > section > h2, :scope > section > details.fold > summary")];
+  document.querySelector("nav").append(...named.map((head) =>
+    make("a", { href: `#${head.parentElement.id}` }, head.textContent)));
+  openTarget();
+  document.documentElement.dataset.ready = "";
+};
+window.addEventListener("hashchange", openTarget);
+window.addEventListener("beforeprint", () => {
+  for (const details of document.querySelectorAll("details")) {
+    details.open = true;
+    details.fill?.();
+  }
+  for (const image of document.images) image.loading = "eager";
+});
+

@@ -1,0 +1,241 @@
+//! All records for the page: one column for each number, so that equal values are stored once and
+//! the browser parses one short document.
+
+use std::collections::{BTreeMap, HashMap};
+
+use serde_json::{Map, Value, json};
+
+use crate::comparison::{Comparison, Entry, level_label, reached};
+use crate::metric::COMPARED;
+use crate::record::{Record, Target};
+use crate::tables::{Best, flatten, remark, topology_verdict, warnings};
+use crate::text::significant;
+
+/// A table of more results takes a browser's memory and minutes.
+pub(super) const MOST: usize = 20_000;
+
+/// The columns of all entries by path. Below `table` are those of the table of results, below the
+/// names of a record's parts its values as recorded.
+pub(super) fn all_columns(comparison: &Comparison<'_>) -> Map<String, Value> {
+    let mut best: Option<(usize, Best)> = None;
+    let mut rows = Vec::with_capacity(comparison.entries.len());
+    for entry in &comparison.entries {
+        // Entries are sorted by mesh.
+        let best = match &mut best {
+            Some((mesh, best)) if *mesh == entry.mesh => best,
+            slot => &mut slot.insert((entry.mesh, Best::of_mesh(comparison, entry.mesh))).1,
+        };
+        rows.push(row(entry, best));
+    }
+    columns(rows)
+}
+
+fn row(entry: &Entry<'_>, best: &Best) -> Vec<(String, Value)> {
+    let record = entry.record;
+    let mut row = flatten(record);
+    // The seconds of a single repetition are those of the record.
+    if record.repetitions.len() < 2 {
+        row.retain(|(path, _)| path != "item/repetitions");
+    }
+    let count = match record.simplify.level {
+        Target::Spheres(count) => Some(count),
+        _ => None,
+    };
+    let mut bits = 0_u32;
+    for (bit, metric) in COMPARED.iter().enumerate() {
+        let Some(value) = metric.of(record) else { continue };
+        let rounded: f64 = significant(value, 5).parse().unwrap_or(value);
+        row.push((format!("table/{}", metric.key), json!(rounded)));
+        bits |= u32::from(best.is_best(entry, metric, value)) << bit;
+    }
+    let warnings = warnings(record);
+    let cells = [
+        ("mesh", json!(entry.mesh)),
+        ("series", json!(entry.series)),
+        ("best", json!(bits)),
+        ("asked", json!(level_label(record.simplify.level))),
+        ("count", json!(count)),
+        ("status", json!(record.status.to_string())),
+        ("spheres", json!(reached(record))),
+        ("topology", json!(topology_verdict(entry))),
+        ("remark", json!(remark(entry))),
+        ("link", json!(record.artifact.as_deref().and_then(local_link))),
+        ("warnings", if warnings.is_empty() { Value::Null } else { json!(warnings) }),
+        ("repeat", json!(repeat_command(record))),
+    ];
+    row.extend(cells.map(|(name, value)| (format!("table/{name}"), value)));
+    row
+}
+
+/// Columns from rows: the values in order, or distinct values with the index of each row's where at
+/// most half of them are distinct.
+fn columns(rows: Vec<Vec<(String, Value)>>) -> Map<String, Value> {
+    let count = rows.len();
+    let mut columns: BTreeMap<String, Vec<Value>> = BTreeMap::new();
+    for (index, row) in rows.into_iter().enumerate() {
+        for (path, value) in row {
+            columns.entry(path).or_insert_with(|| vec![Value::Null; count])[index] = value;
+        }
+    }
+    let encoded = columns.into_iter().map(|(path, column)| {
+        let mut distinct: HashMap<String, usize> = HashMap::new();
+        let mut values = Vec::new();
+        let mut of = Vec::with_capacity(count);
+        for value in &column {
+            let next = values.len();
+            let index = *distinct.entry(value.to_string()).or_insert(next);
+            if index == next {
+                values.push(value);
+            }
+            of.push(index);
+        }
+        let is_short = 2 * values.len() <= count;
+        (path, if is_short { json!({"values": values, "of": of}) } else { Value::Array(column) })
+    });
+    encoded.collect()
+}
+
+/// A link to a file in the folder of the page, percent-encoded. `None` for a path that leaves that
+/// folder, such as `../`, or is none, such as `javascript:`.
+pub(super) fn local_link(path: &str) -> Option<String> {
+    let inside = !path.is_empty()
+        && !path.starts_with('/')
+        && !path.contains('\\')
+        && path.split('/').all(|part| !part.is_empty() && part != ".." && part != ".");
+    if !inside {
+        return None;
+    }
+    let mut link = String::from("./");
+    for byte in path.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-_./~".contains(&byte) {
+            link.push(char::from(byte));
+        } else {
+            link.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    Some(link)
+}
+
+/// The command that repeats the run of a record.
+fn repeat_command(record: &Record) -> String {
+    let simplify = &record.simplify;
+    let mut words: Vec<String> = ["medial", "simplify"].map(str::to_owned).into();
+    words.push(mesh_argument(record));
+    words.extend(["-m".to_owned(), simplify.method.clone()]);
+    for (key, value) in &simplify.params.0 {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        words.extend(["--set".to_owned(), format!("{key}={value}")]);
+    }
+    match simplify.level {
+        Target::Published => {}
+        Target::Spheres(count) => words.extend(["--spheres".to_owned(), count.to_string()]),
+        Target::Native(value) => words.extend(["--level".to_owned(), value.to_string()]),
+        Target::MaxError(value) => words.extend(["--max-error".to_owned(), value.to_string()]),
+    }
+    if let Some(conditions) = &record.conditions {
+        let defaults =
+            [("--sampling", &conditions.sampling, "vertices"), ("--dual", &conditions.dual, "fan")];
+        for (option, value, default) in defaults {
+            if !value.is_empty() && value != default {
+                words.extend([option.to_owned(), value.clone()]);
+            }
+        }
+    }
+    if simplify.seed != 0 {
+        words.extend(["--seed".to_owned(), simplify.seed.to_string()]);
+    }
+    words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+}
+
+/// The sets whose meshes `dataset:NAME` names.
+const LIBRARY: [&str; 5] = ["public", "defective", "small", "papers", "added"];
+
+/// The mesh as the command line of the run names it, or else its name.
+fn mesh_argument(record: &Record) -> String {
+    let is_named = |word: &str| {
+        let name = match (word.strip_prefix("builtin:"), word.strip_prefix("dataset:")) {
+            (Some(spec), _) => spec.replacen(':', "-", 1),
+            (None, Some(name)) => name.to_owned(),
+            (None, None) => {
+                let file = word.rsplit('/').next().unwrap_or(word);
+                // A bare word may be a method's name: files have an extension.
+                match file.rsplit_once('.') {
+                    Some((stem, _)) if !stem.is_empty() => stem.to_owned(),
+                    _ => return false,
+                }
+            }
+        };
+        name == record.mesh
+    };
+    let word = record.command.split_whitespace().find(|word| is_named(word));
+    match word {
+        Some(word) => word.to_owned(),
+        None => match record.dataset.as_deref() {
+            Some("builtin") => format!("builtin:{}", record.mesh),
+            Some(set) if LIBRARY.contains(&set) => format!("dataset:{}", record.mesh),
+            // A foreign set: its meshes have no name here.
+            _ => record.mesh.clone(),
+        },
+    }
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Simplify, Status};
+
+    fn record(level: Target) -> Record {
+        let simplify = serde_json::to_value(Simplify::asked("qmat", level, Status::Ok)).unwrap();
+        let json = serde_json::json!({"mesh": "bear", "status": "ok", "simplify": simplify});
+        serde_json::from_value(json).unwrap()
+    }
+
+    #[test]
+    fn the_command_repeats_the_item() {
+        let mut of = record(Target::Spheres(100));
+        assert_eq!(repeat_command(&of), "medial simplify bear -m qmat --spheres 100");
+        of.command = "medial compare in/bear.off --methods qmat".to_owned();
+        of.simplify.params.set("k", "0.5");
+        of.simplify.params.set("mode", "a b");
+        of.simplify.seed = 7;
+        assert_eq!(
+            repeat_command(&of),
+            "medial simplify in/bear.off -m qmat --set k=0.5 --set 'mode=a b' --spheres 100 --seed 7"
+        );
+        of = record(Target::Native(0.25));
+        of.dataset = Some("builtin".to_owned());
+        assert_eq!(repeat_command(&of), "medial simplify builtin:bear -m qmat --level 0.25");
+        of.dataset = Some("public".to_owned());
+        assert_eq!(repeat_command(&of), "medial simplify dataset:bear -m qmat --level 0.25");
+        of.dataset = Some("of-others".to_owned());
+        assert_eq!(repeat_command(&of), "medial simplify bear -m qmat --level 0.25");
+    }
+
+    #[test]
+    fn columns_keep_every_value_of_every_row() {
+        let rows = [json!({"a": 1, "b": "x"}), json!({"a": 2, "b": "x"}), json!({"b": "x"})];
+        let rows = rows.map(|row| row.as_object().unwrap().clone().into_iter().collect());
+        let columns = columns(rows.into_iter().collect());
+        assert_eq!(columns["a"], json!([1, 2, null]));
+        assert_eq!(columns["b"], json!({"values": ["x"], "of": [0, 0, 0]}));
+    }
+
+    #[test]
+    fn links_stay_inside() {
+        assert_eq!(local_link("meshes/a b#1.ma").unwrap(), "./meshes/a%20b%231.ma");
+        assert_eq!(local_link("javascript:alert(1)").unwrap(), "./javascript%3Aalert%281%29");
+        for outside in ["", "/etc/passwd", "../x", "a/../../x", "a//b", "..\\x"] {
+            assert_eq!(local_link(outside), None, "{outside}");
+        }
+    }
+}

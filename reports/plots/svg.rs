@@ -1,0 +1,299 @@
+//! Figures as SVG for papers, by plotters: one line and one marker for each method, the legend at
+//! the right of the data.
+//!
+//! The first colours are those of Okabe and Ito (2008, "Color universal design") without black and
+//! yellow, which vanish on a dark or a light page, and with three of Paul Tol's muted scheme. A
+//! method keeps its colour and its marker in every figure of a report.
+
+use std::fmt::Display;
+
+use plotters::chart::ChartContext;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::axis::Axis;
+use super::{Curve, Figure};
+use crate::text::{printable, shortened};
+
+/// The backend draws at whole pixels: a large drawing keeps circles and slopes smooth at any size.
+const WIDTH: i32 = 1280;
+const HEIGHT: i32 = 800;
+const LEGEND_ROW: i32 = 42;
+
+const INK: RGBColor = RGBColor(0x20, 0x21, 0x24);
+const GRID: RGBColor = RGBColor(0xE3, 0xE5, 0xE8);
+
+const COLOURS: [RGBColor; 12] = [
+    RGBColor(0x00, 0x72, 0xB2),
+    RGBColor(0xD5, 0x5E, 0x00),
+    RGBColor(0x00, 0x9E, 0x73),
+    RGBColor(0xCC, 0x79, 0xA7),
+    RGBColor(0xE6, 0x9F, 0x00),
+    RGBColor(0x56, 0xB4, 0xE9),
+    RGBColor(0x88, 0x22, 0x55),
+    RGBColor(0x99, 0x99, 0x33),
+    RGBColor(0x77, 0x77, 0x77),
+    RGBColor(0x6A, 0x51, 0xA3),
+    RGBColor(0x44, 0xAA, 0x99),
+    RGBColor(0xA6, 0x56, 0x28),
+];
+
+/// Markers: name of the page's symbol, whether it is hollow, and its outline in pixels.
+/// A disc has no outline, a cross has two strokes of two points.
+const MARKERS: [(&str, bool, &[(i32, i32)]); 11] = [
+    ("circle", false, &[]),
+    ("square", false, &[(-7, -7), (7, -7), (7, 7), (-7, 7), (-7, -7)]),
+    ("triangle", false, &[(0, -10), (9, 7), (-9, 7), (0, -10)]),
+    ("diamond", false, &[(0, -11), (9, 0), (0, 11), (-9, 0), (0, -11)]),
+    (
+        "star",
+        false,
+        &[
+            (0, -11),
+            (3, -4),
+            (10, -3),
+            (5, 2),
+            (6, 10),
+            (0, 6),
+            (-6, 10),
+            (-5, 2),
+            (-10, -3),
+            (-3, -4),
+            (0, -11),
+        ],
+    ),
+    ("times", true, &[(-8, -8), (8, 8), (-8, 8), (8, -8)]),
+    ("circle", true, &[]),
+    ("square", true, &[(-7, -7), (7, -7), (7, 7), (-7, 7), (-7, -7)]),
+    ("plus", true, &[(-10, 0), (10, 0), (0, -10), (0, 10)]),
+    ("triangle", true, &[(0, -10), (9, 7), (-9, 7), (0, -10)]),
+    ("diamond", true, &[(0, -11), (9, 0), (0, 11), (-9, 0), (0, -11)]),
+];
+
+/// Colour, symbol, and whether it is hollow. Twelve colours and eleven markers repeat together only
+/// after 132 series.
+pub(crate) fn symbol(series: usize) -> (String, &'static str, bool) {
+    let RGBColor(r, g, b) = COLOURS[series % COLOURS.len()];
+    let (name, hollow, _) = MARKERS[series % MARKERS.len()];
+    (format!("#{r:02x}{g:02x}{b:02x}"), name, hollow)
+}
+
+/// The fonts that the texts of all figures name, the first one that is there.
+pub(crate) const FONTS: &str = "Helvetica, Arial, sans-serif";
+
+const FRONT: &str = "not dominated";
+
+/// Why a plot could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("plot: {0}")]
+pub(crate) struct PlotError(String);
+
+impl PlotError {
+    fn new(error: impl Display) -> Self {
+        Self(error.to_string())
+    }
+}
+
+fn font(size: i32, at: HPos) -> TextStyle<'static> {
+    // The backend divides sizes by 1.24.
+    let text = (FONTS, f64::from(size) * 1.24).into_font().color(&INK);
+    text.pos(Pos::new(at, VPos::Center))
+}
+
+type Chart<'a, 'b, B> = ChartContext<'a, B, Cartesian2d<Axis, Axis>>;
+
+impl Figure {
+    /// The figure as SVG; `None` where there is no point to draw.
+    pub(crate) fn to_svg(&self) -> Result<Option<String>, PlotError> {
+        let points = || self.curves.iter().flat_map(|curve| &curve.points);
+        let x = Axis::fit(self.x.1, points().map(|point| point.x));
+        let y = Axis::fit(self.y.1, points().map(|point| point.y));
+        let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
+        let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 1;
+        let size = (WIDTH as u32, HEIGHT.max(rows as i32 * LEGEND_ROW + 120) as u32);
+        let mut svg = String::new();
+        self.draw(x, y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())?;
+        Ok(Some(svg))
+    }
+
+    fn draw<B: DrawingBackend>(
+        &self,
+        x: Axis,
+        y: Axis,
+        area: &DrawingArea<B, Shift>,
+    ) -> Result<(), PlotError> {
+        area.fill(&WHITE).map_err(PlotError::new)?;
+        let title = printable(&shortened(&self.title, 76));
+        area.draw(&Text::new(title, (28, 40), font(30, HPos::Left))).map_err(PlotError::new)?;
+        let (_, below) = area.split_vertically(68);
+        let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
+        let legend_width = (88 + 14 * longest.unwrap_or(0).max(FRONT.len()) as i32).min(460);
+        let (plot, legend) = below.split_horizontally(WIDTH - legend_width);
+        let (x_ticks, y_ticks) = (x.ticks.len(), y.ticks.len());
+        let mut chart = ChartBuilder::on(&plot)
+            .margin_top(12)
+            .margin_left(16)
+            .margin_right(28)
+            .margin_bottom(12)
+            .x_label_area_size(88)
+            .y_label_area_size(116)
+            .build_cartesian_2d(x, y)
+            .map_err(PlotError::new)?;
+        chart
+            .configure_mesh()
+            .bold_line_style(GRID.stroke_width(2))
+            .light_line_style(TRANSPARENT)
+            .axis_style(INK.stroke_width(2))
+            .set_all_tick_mark_size(8)
+            .x_labels(x_ticks)
+            .y_labels(y_ticks)
+            .label_style((FONTS, 24.0 * 1.24).into_font().color(&INK))
+            .axis_desc_style((FONTS, 26.0 * 1.24).into_font().color(&INK))
+            .x_desc(&self.x.0)
+            .y_desc(&self.y.0)
+            .draw()
+            .map_err(PlotError::new)?;
+        let mut taken = Vec::new();
+        for curve in &self.curves {
+            draw_curve(&mut chart, curve, &mut taken)?;
+        }
+        let front = self.front().into_iter().map(|(curve, point)| {
+            let point = &self.curves[curve].points[point];
+            (point.x, point.y)
+        });
+        let front: Vec<(f64, f64)> = front.collect();
+        let has_front = front.len() > 1;
+        if has_front {
+            let line = LineSeries::new(front, INK.stroke_width(2));
+            chart.draw_series(line).map_err(PlotError::new)?;
+        }
+        self.draw_legend(&legend, has_front)?;
+        area.present().map_err(PlotError::new)
+    }
+
+    fn draw_legend<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+        has_front: bool,
+    ) -> Result<(), PlotError> {
+        let mut y = 36;
+        for curve in self.curves.iter().filter(|curve| !curve.label.is_empty()) {
+            let stroke = COLOURS[curve.series % COLOURS.len()].stroke_width(4);
+            let dashes: &[(i32, i32)] =
+                if curve.dashed { &[(0, 10), (38, 48)] } else { &[(0, 48)] };
+            for &(from, to) in dashes {
+                area.draw(&PathElement::new(vec![(from, y), (to, y)], stroke))
+                    .map_err(PlotError::new)?;
+            }
+            for shape in marker::<B>(curve.series, (24, y)) {
+                area.draw(&shape).map_err(PlotError::new)?;
+            }
+            area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))
+                .map_err(PlotError::new)?;
+            y += LEGEND_ROW;
+        }
+        if has_front {
+            area.draw(&PathElement::new(vec![(0, y), (48, y)], INK.stroke_width(2)))
+                .map_err(PlotError::new)?;
+            area.draw(&Text::new(FRONT, (62, y), font(24, HPos::Left))).map_err(PlotError::new)?;
+        }
+        Ok(())
+    }
+}
+
+fn legend_text(curve: &Curve) -> String {
+    printable(&shortened(&curve.label, 26))
+}
+
+fn draw_curve<B: DrawingBackend>(
+    chart: &mut Chart<'_, '_, B>,
+    curve: &Curve,
+    taken: &mut Vec<[i32; 4]>,
+) -> Result<(), PlotError> {
+    let stroke = COLOURS[curve.series % COLOURS.len()].stroke_width(4);
+    let through = || curve.points.iter().map(|point| (point.x, point.y)).collect();
+    let line: Vec<(f64, f64)> = curve.line.clone().unwrap_or_else(through);
+    if curve.dashed {
+        let dashes = DashedLineSeries::new(line, 14, 10, stroke);
+        chart.draw_series(dashes).map_err(PlotError::new)?;
+    } else {
+        chart.draw_series(LineSeries::new(line, stroke)).map_err(PlotError::new)?;
+    }
+    let area = chart.plotting_area().strip_coord_spec();
+    let origin = area.get_base_pixel();
+    for point in &curve.points {
+        let (x, y) = chart.backend_coord(&(point.x, point.y));
+        let at = (x - origin.0, y - origin.1);
+        for shape in marker::<B>(curve.series, at) {
+            area.draw(&shape).map_err(PlotError::new)?;
+        }
+        let Some(tag) = &point.tag else { continue };
+        let Some(at) = free_place(at, tag, taken) else { continue };
+        area.draw(&Text::new(tag.clone(), at, font(20, HPos::Left))).map_err(PlotError::new)?;
+    }
+    Ok(())
+}
+
+/// A place for a tag next to a pixel that no other tag covers: at the right above or below, or at
+/// the left. `None` where all are taken.
+fn free_place((x, y): (i32, i32), tag: &str, taken: &mut Vec<[i32; 4]>) -> Option<(i32, i32)> {
+    let (width, height) = (12 * tag.chars().count() as i32, 24);
+    let aside = [x + 14, x - 14 - width];
+    let places = aside.map(|left| [(left, y - 20), (left, y + 20)]);
+    places.into_iter().flatten().find(|&(left, middle)| {
+        let own = [left, middle - height / 2, left + width, middle + height / 2];
+        let is_free = taken.iter().all(|other| {
+            own[2] <= other[0] || other[2] <= own[0] || own[3] <= other[1] || other[3] <= own[1]
+        });
+        if is_free {
+            taken.push(own);
+        }
+        is_free
+    })
+}
+
+/// The marker of a series around a pixel. Hollow ones hide the line beneath, so that they differ
+/// from filled ones.
+fn marker<B: DrawingBackend>(
+    series: usize,
+    (x, y): (i32, i32),
+) -> Vec<DynElement<'static, B, (i32, i32)>> {
+    let colour = COLOURS[series % COLOURS.len()];
+    let (name, hollow, outline) = MARKERS[series % MARKERS.len()];
+    let stroke = colour.stroke_width(4);
+    let path: Vec<(i32, i32)> = outline.iter().map(|&(a, b)| (x + a, y + b)).collect();
+    let fill = if hollow { WHITE } else { colour };
+    match name {
+        "times" | "plus" => {
+            path.chunks(2).map(|ends| PathElement::new(ends.to_vec(), stroke).into_dyn()).collect()
+        }
+        "circle" => vec![
+            Circle::new((x, y), 8, fill.filled()).into_dyn(),
+            Circle::new((x, y), 8, stroke).into_dyn(),
+        ],
+        _ => vec![
+            Polygon::new(path.clone(), fill.filled()).into_dyn(),
+            PathElement::new(path, stroke).into_dyn(),
+        ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn styles_differ() {
+        let styles: std::collections::BTreeSet<_> = (0..132).map(symbol).collect();
+        assert_eq!(styles.len(), 132);
+    }
+
+    #[test]
+    fn tags_never_cover_each_other() {
+        let mut taken = vec![];
+        let places: Vec<_> = (0..5).map(|_| free_place((100, 100), "1,000", &mut taken)).collect();
+        assert_eq!(places.iter().flatten().count(), 4, "{places:?}");
+        assert_eq!(places[4], None);
+    }
+}
