@@ -157,7 +157,7 @@ const start = async () => {
 
   const isOne = report.meshes.length === 1;
   const [first] = report.meshes;
-  const shown = report.meshes.findIndex((mesh) => mesh.picture);
+  const shown = report.meshes.findIndex((mesh) => mesh.picture || mesh.view);
   const overview = isOne ? bulk.figures[0] ?? [] : report.figures;
   const curves = overview.filter((figure) => figure.leading);
   const others = overview.filter((figure) => !figure.leading);

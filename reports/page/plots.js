@@ -144,13 +144,14 @@ const plotOf = (figure) => {
     [from, area] = [null, null];
   };
   const stage = make("div", { class: "stage" });
+  // Captured: a press on a point pins its tip, and stops there.
   stage.addEventListener("pointerdown", (event) => {
     if (event.pointerType !== "mouse" || event.button !== 0) return;
     event.preventDefault();
     chart.focus({ preventScroll: true });
     from = local(event);
     area = d3.select(chart).append("rect").attr("class", "area").node();
-  });
+  }, { capture: true });
   stage.addEventListener("pointermove", (event) => {
     if (!from) return;
     const to = local(event);

@@ -136,7 +136,9 @@ impl Browser {
 
     fn open(&mut self, url: &str) {
         self.call("Page.navigate", json!({"url": url}));
-        self.until("location.protocol === 'file:' && 'ready' in document.documentElement.dataset");
+        self.until(
+            "location.protocol === 'file:' && 'ready' in (document.documentElement?.dataset ?? {})",
+        );
         // What moves on its own moves from under the mouse.
         self.value("document.documentElement.style.scrollBehavior = 'auto'");
     }
@@ -429,21 +431,21 @@ fn check_views(browser: &mut Browser) {
 fn check_papers(browser: &mut Browser) {
     browser.value("location.hash = '#papers'");
     browser.until("document.getElementById('papers').open");
-    browser.value("window.paste = [...document.querySelectorAll('.paste')].pop()");
-    let at = browser.centre("paste.querySelector('button')");
+    browser.value("window.copied = [...document.querySelectorAll('.paste')].pop()");
+    let at = browser.centre("copied.querySelector('button')");
     browser.mouse("mousePressed", at);
     browser.mouse("mouseReleased", at);
-    browser.until("paste.querySelector('output').textContent !== ''");
-    if browser.text("paste.querySelector('output').textContent").starts_with("Selected") {
+    browser.until("copied.querySelector('output').textContent !== ''");
+    if browser.text("copied.querySelector('output').textContent").starts_with("Selected") {
         let selected = browser.text("getSelection().toString()");
         assert!(selected.starts_with("@article{qmat,") && selected.contains("@misc{medial,"));
     }
     // And where there is nothing to copy with.
     browser.value(
         "{ Object.defineProperty(navigator, 'clipboard', {value: undefined}); \
-         paste.querySelector('button').click(); }",
+         copied.querySelector('button').click(); }",
     );
-    browser.until("paste.querySelector('output').textContent.startsWith('Selected')");
+    browser.until("copied.querySelector('output').textContent.startsWith('Selected')");
     let selected = browser.text("getSelection().toString()");
     assert!(selected.starts_with("@article{qmat,") && selected.contains("@misc{medial,"));
 }
