@@ -86,7 +86,7 @@
 //! # Published claims
 //!
 //! Q-MAT's paper finds the error of HEM below Q-MAT's at many spheres and above it at 100 and 50, with
-//! the code of the authors. `docs/published.md` has both here, by the paper's one-sided error. The
+//! the code of the authors. `docs/measured/papers.md` has both here, by the paper's one-sided error. The
 //! first half of the claim holds on all three models, the second on none: HEM stays below Q-MAT at
 //! 100 and at 50 spheres.
 //!
