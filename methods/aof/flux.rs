@@ -1,5 +1,7 @@
-//! The average outward flux through one sphere, without two-sided fans.
+//! The average outward flux through one sphere, without two-sided fans, and the move of a voxel's
+//! centre onto the axis.
 //!
+//! # Flux
 //! With `g` the gradient of the distance at a sample and `a = g . N`:
 //!
 //! - Closest point on a face, a flat or a convex edge: the sample adds `a`.
@@ -12,16 +14,74 @@
 //!
 //!   A two-sided sample adds nothing; a one-sided one adds `a`.
 //!
-//! The sum is divided by the number of all samples. Where the surface that is near is one plane,
-//! the gradient is the same everywhere, and need not be sampled.
+//! The sum is divided by the number of all samples. They lie along a spiral: E. B. Saff, A. B. J.
+//! Kuijlaars, *Distributing many points on a sphere*, The Mathematical Intelligencer 19(1), 1997,
+//! doi:10.1007/BF03024331 (the paper prints 1991).
+//!
+//! # Onto the axis
+//! S. Stolpner, S. Whitesides, K. Siddiqi, *Sampled medial loci for 3D shape representation*,
+//! Computer Vision and Image Understanding 115(5), 2011, doi:10.1016/j.cviu.2010.10.014: a point
+//! between a sample and its opposite whose closest points differ is localised by bisection.
+//!
+//! 1. A sample `p` with `a < 0` and closest point `B` looks into the sphere along the ray from `B`
+//!    through `p`. Up to the axis, `B` stays the closest point of the points of the ray.
+//! 2. If `B` is no longer the closest point of the opposite `p'` of `p`, the axis lies between. The
+//!    last point `x` with `D(x) = |x - B|` is found by cutting an interval: if a point of the ray is
+//!    nearer to some `B'`, so is the whole ray beyond the bisector plane of `B` and `B'`, and the
+//!    interval ends there. It is halved only when that is slow.
+//! 3. The ball of radius `D(x)` around `x` is inside the solid. It touches the surface at `B` and,
+//!    within the tolerance, at a second point `B'`. Of the samples whose rays pass closest to the
+//!    centre, the one whose `B`, `B'` subtend the largest angle is taken.
 
-use super::nearby::{NearBatch, NearSet, NearbyTriangles};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use medial::Vec3;
+use medial::complex::Sphere as Ball;
+use medial::geometry::planar_frame::PlanarFrame;
+use medial::shape::Shape;
+use medial::simplifier::{RunContext, SimplifyError};
+use medial::surface::{Closest, Feature, InsideTest, TriMesh, TriangleBvh};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-use super::spiral::Spiral;
+/// How samples lie on a sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Spiral {
+    /// Heights `-1 + (2k - 1) / N`, in the middle of zones of equal area.
+    EqualArea,
+    /// Heights `-1 + 2 (k - 1) / (N - 1)`, from pole to pole, as published.
+    Classic,
+}
 
-/// The surface has another closest point only if it is nearer by this fraction of the distance.
-const SAME: f64 = 1e-10;
+impl Spiral {
+    /// `count` unit vectors from the south pole up: each longitude is the one before plus
+    /// `3.6 / sqrt(N (1 - h^2))`, and 0 at a pole.
+    pub fn directions(self, count: usize) -> Vec<Vec3> {
+        let n = count as f64;
+        let mut longitude = 0.0_f64;
+        (0..count)
+            .map(|k| {
+                let k = k as f64;
+                let height = match self {
+                    Self::EqualArea => -1.0 + (2.0 * k + 1.0) / n,
+                    Self::Classic if count == 1 => -1.0,
+                    Self::Classic => -1.0 + 2.0 * k / (n - 1.0),
+                };
+                let across = (1.0 - height * height).max(0.0).sqrt();
+                let at_pole = across < 1e-9;
+                longitude = if k == 0.0 || at_pole {
+                    0.0
+                } else {
+                    (longitude + 3.6 / (n.sqrt() * across)) % TAU
+                };
+                Vec3::new(across * longitude.cos(), across * longitude.sin(), height)
+            })
+            .collect()
+    }
+}
 
 /// The samples of one level.
 #[derive(Clone, Debug)]
@@ -30,75 +90,334 @@ pub struct Sphere {
     pub directions: Vec<Vec3>,
     /// `sigma`.
     pub radius: f64,
-    /// Mean of the unit vectors: its product with a constant field is that field's flux.
-    pub mean: Vec3,
-    /// Length of the mean: the largest flux of a constant unit field, which should be 0.
+    /// Length of the mean direction: the largest flux of a constant unit field, which should be 0.
     pub bias: f64,
-}
-
-/// Buffers for the flux, reused from voxel to voxel.
-#[derive(Clone, Debug)]
-pub struct Probe<'a> {
-    sphere: &'a Sphere,
-    samples: NearBatch,
-    opposite: NearBatch,
-    /// For each opposite its `a`.
-    inward: Vec<f64>,
 }
 
 impl Sphere {
     /// `count` samples on a sphere of radius `sigma`.
     pub fn new(spiral: Spiral, count: usize, radius: f64) -> Self {
         let directions = spiral.directions(count);
-        let mean = directions.iter().sum::<Vec3>() / count as f64;
-        Self { directions, radius, mean, bias: mean.length() }
+        let bias = (directions.iter().sum::<Vec3>() / count as f64).length();
+        Self { directions, radius, bias }
     }
 }
 
-impl<'a> Probe<'a> {
-    /// Buffers for spheres of one radius.
-    pub fn new(sphere: &'a Sphere) -> Self {
-        let mut samples = NearBatch::default();
-        for &direction in &sphere.directions {
-            samples.push(direction * sphere.radius, f64::INFINITY);
-        }
-        Self { sphere, samples, opposite: NearBatch::default(), inward: Vec::new() }
+/// Sine of the dihedral deviation below which two faces are coplanar.
+const COPLANAR: f64 = 1e-7;
+/// A sample of the flux is one-sided only if the surface is nearer to its opposite by this fraction.
+const SAME: f64 = 1e-10;
+
+/// A closed, outward-oriented surface, seen from inside.
+///
+/// Features differ in their effect on the distance there. A *fan* feature is a concave edge or a vertex
+/// of one: it is the closest point of a whole wedge of space. Edges between coplanar faces, convex
+/// edges, and vertices without a concave edge are the closest point of points straight above them only,
+/// as any other point of their faces.
+pub struct Surface {
+    tree: Arc<TriangleBvh>,
+    pub(super) inside: Arc<InsideTest>,
+    /// For each face: bit `k` if side `k` is concave, bit `3 + k` if corner `k` ends a concave side.
+    fans: Vec<u8>,
+}
+
+impl Surface {
+    /// That of a shape.
+    ///
+    /// # Errors
+    /// When it has no face.
+    pub fn of(shape: &Shape) -> Result<Self, SimplifyError> {
+        let (tree, inside) = (shape.surface_tree()?, shape.inside_test());
+        Ok(Self { tree, inside, fans: fans(shape.mesh()) })
     }
 
-    /// `AOF'` through the sphere around the centre of a set, whose reach is at least the radius.
-    pub fn flux(&mut self, triangles: &NearbyTriangles, set: &NearSet) -> f64 {
-        if let Some(gradient) = triangles.constant_gradient(set) {
-            return gradient.dot(self.sphere.mean);
+    /// The closest point. The search is faster with a face near to the point as `start`.
+    pub fn closest(&self, p: Vec3, start: Option<u32>) -> Closest {
+        self.tree.closest_from(p, start)
+    }
+
+    fn is_fan(&self, closest: &Closest) -> bool {
+        let fans = self.fans[closest.face as usize];
+        match closest.feature {
+            Feature::Face => false,
+            Feature::Edge(k) => fans >> k & 1 == 1,
+            Feature::Vertex(k) => fans >> (3 + k) & 1 == 1,
         }
-        self.samples.reset();
-        self.opposite.clear();
-        self.inward.clear();
-        triangles.closest(set, &mut self.samples);
-        let Self { sphere, samples, opposite, inward } = self;
-        let mut beside_faces = 0.0;
-        let inside_faces = triangles.sum_along(set, samples, |k, near| {
-            let normal = sphere.directions[k];
-            let along = near.gradient.dot(normal);
-            if !near.on_fan {
-                beside_faces += along;
-            // For `along >= 0` the fan is two-sided and adds nothing, see the head.
-            } else if along < 0.0 {
+    }
+
+    /// `AOF'` through a sphere around a centre, whose closest face is `start`.
+    pub fn flux(&self, sphere: &Sphere, centre: Vec3, start: u32) -> f64 {
+        let mut sum = 0.0;
+        // Samples that follow each other are neighbours, mostly with the same closest face.
+        let mut face = start;
+        for &normal in &sphere.directions {
+            let p = centre + normal * sphere.radius;
+            let closest = self.closest(p, Some(face));
+            face = closest.face;
+            let gradient = gradient(p, &closest);
+            let along = gradient.dot(normal);
+            let adds = !self.is_fan(&closest) || {
                 let step = -2.0 * sphere.radius * along;
-                let point = normal * sphere.radius + near.gradient * step;
-                opposite.push(point, (near.distance + step) * (1.0 - SAME));
-                inward.push(along);
-            }
-        });
-        // Queries were `radius` times the unit directions.
-        let mut sum = inside_faces / sphere.radius + beside_faces;
-        if !self.opposite.is_empty() {
-            triangles.closest(set, &mut self.opposite);
-            for (k, along) in self.inward.iter().enumerate() {
-                if self.opposite.is_nearer(k) {
-                    sum += along;
-                }
+                let bound = (closest.distance + step) * (1.0 - SAME);
+                along < 0.0 && self.tree.any_within(p + gradient * step, bound)
+            };
+            if adds {
+                sum += along;
             }
         }
-        sum / self.sphere.directions.len() as f64
+        sum / sphere.directions.len() as f64
+    }
+}
+
+/// Gradient of the distance: the unit vector from the closest point; zero on the surface.
+fn gradient(p: Vec3, closest: &Closest) -> Vec3 {
+    (p - closest.point).try_normalize().unwrap_or(Vec3::ZERO)
+}
+
+/// See [`Surface::fans`].
+fn fans(mesh: &TriMesh) -> Vec<u8> {
+    let mut sides: Vec<([u32; 2], u32, usize)> = Vec::with_capacity(3 * mesh.faces.len());
+    for (face, corners) in (0..).zip(&mesh.faces) {
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            sides.push(([a.min(b), a.max(b)], face, k));
+        }
+    }
+    sides.sort_unstable();
+    let normal = |face: u32| PlanarFrame::new(mesh.triangle(face as usize)).0.normal;
+    let mut fans = vec![0_u8; mesh.faces.len()];
+    let mut ends_concave = vec![false; mesh.vertices.len()];
+    for edge in sides.chunk_by(|a, b| a.0 == b.0) {
+        let is_concave = match *edge {
+            [(_, f, k), (_, g, _)] => {
+                let corners = mesh.faces[f as usize];
+                let [a, b] = [k, (k + 1) % 3].map(|k| mesh.vertices[corners[k] as usize]);
+                let (n, m) = (normal(f), normal(g));
+                let sine = n.cross(m).dot((b - a).normalize_or_zero());
+                sine < -COPLANAR || (sine <= COPLANAR && n.dot(m) < 0.0)
+            }
+            _ => true,
+        };
+        if is_concave {
+            edge.iter().for_each(|&(_, face, k)| fans[face as usize] |= 1 << k);
+            edge[0].0.iter().for_each(|&vertex| ends_concave[vertex as usize] = true);
+        }
+    }
+    for (fans, corners) in fans.iter_mut().zip(&mesh.faces) {
+        for (k, &vertex) in corners.iter().enumerate() {
+            *fans |= u8::from(ends_concave[vertex as usize]) << (3 + k);
+        }
+    }
+    fans
+}
+
+/// Samples that are followed onto the axis.
+const FOLLOWED_SAMPLES: usize = 4;
+/// Width of the last interval, in radii of the voxel's sphere.
+const TOLERANCE: f64 = 1e-9;
+/// A point of a ray has another closest point only if that is nearer by this fraction.
+const SAME_ON_RAY: f64 = 1e-12;
+/// Every fourth cut halves the interval.
+const HALVING: u32 = 4;
+/// Voxels between two reports of progress.
+const TASK: usize = 256;
+
+/// A ball on the axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refined {
+    /// The ball: its radius is the distance of its centre to the surface.
+    pub ball: Ball,
+    /// Two closest points, the second within the tolerance; the same point twice if the centre was
+    /// not moved.
+    pub contacts: [Vec3; 2],
+}
+
+impl Surface {
+    /// The balls on the axis near `centres`; around the centre itself if no sample and its opposite
+    /// have different closest points.
+    ///
+    /// # Errors
+    /// When the run was cancelled.
+    pub fn refine(
+        &self,
+        sphere: &Sphere,
+        centres: &[Vec3],
+        run: &RunContext,
+    ) -> Result<Vec<Refined>, SimplifyError> {
+        let done = AtomicUsize::new(0);
+        let parts: Result<Vec<Vec<Refined>>, SimplifyError> = centres
+            .par_chunks(TASK)
+            .map(|centres_of_task| {
+                let refined = centres_of_task.iter().map(|&c| self.refined(sphere, c)).collect();
+                let before = done.fetch_add(centres_of_task.len(), Ordering::Relaxed);
+                run.step(before + centres_of_task.len(), centres.len())?;
+                Ok(refined)
+            })
+            .collect();
+        Ok(parts?.concat())
+    }
+
+    fn refined(&self, sphere: &Sphere, centre: Vec3) -> Refined {
+        let own = self.closest(centre, None);
+        let mut face = own.face;
+        let mut rays = Vec::with_capacity(sphere.directions.len());
+        for &normal in &sphere.directions {
+            let start = centre + normal * sphere.radius;
+            let closest = self.closest(start, Some(face));
+            face = closest.face;
+            let gradient = gradient(start, &closest);
+            let along = gradient.dot(normal);
+            if along < 0.0 {
+                rays.push((along, Ray { surface: self, start, gradient, closest }));
+            }
+        }
+        // Most inward first: these rays pass closest to the centre. Stable, so ties are by sample.
+        rays.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let found = rays
+            .iter()
+            .filter_map(|(along, ray)| {
+                let length = -2.0 * sphere.radius * along;
+                let (centre, contacts) = ray.localise(length, TOLERANCE * sphere.radius)?;
+                let distance = self.closest(centre, Some(ray.closest.face)).distance;
+                Some(Refined { ball: Ball::new(centre, distance), contacts })
+            })
+            .take(FOLLOWED_SAMPLES);
+        let subtended = |r: &Refined| r.contacts[0].distance(r.contacts[1]) / r.ball.radius;
+        let better = |best, next| if subtended(&next) > subtended(&best) { next } else { best };
+        found.reduce(better).unwrap_or_else(|| Refined {
+            ball: Ball::new(centre, own.distance),
+            contacts: [own.point; 2],
+        })
+    }
+}
+
+/// The ray from a closest point through its sample.
+struct Ray<'a> {
+    surface: &'a Surface,
+    start: Vec3,
+    gradient: Vec3,
+    /// The closest point of the start.
+    closest: Closest,
+}
+
+impl Ray<'_> {
+    /// The closest point of the surface to the point of the ray `t` behind the sample, if it is
+    /// nearer than the foot.
+    fn other(&self, t: f64) -> Option<Vec3> {
+        let bound = (self.closest.distance + t) * (1.0 - SAME_ON_RAY);
+        let q = self.start + self.gradient * t;
+        self.surface.tree.closest_within(q, bound).map(|other| other.point)
+    }
+
+    /// The parameter at which the ray is equally far from the foot and from another point.
+    fn even(&self, other: Vec3) -> f64 {
+        let apart = other - self.closest.point;
+        0.5 * apart.length_squared() / self.gradient.dot(apart) - self.closest.distance
+    }
+
+    /// Step 2: the point and its two closest points.
+    fn localise(&self, length: f64, tolerance: f64) -> Option<(Vec3, [Vec3; 2])> {
+        let mut second = self.other(length)?;
+        let (mut low, mut high) = (0.0, length);
+        for cut in 1_u32.. {
+            high = self.even(second).clamp(low, high);
+            if high - low <= tolerance {
+                break;
+            }
+            // Just below the cut succeeds at once if no third point interferes.
+            let in_the_middle = cut.is_multiple_of(HALVING);
+            let at = if in_the_middle { low.midpoint(high) } else { high - tolerance };
+            if !(low < at && at < high) {
+                break;
+            }
+            match self.other(at) {
+                Some(point) => (high, second) = (at, point),
+                None => low = at,
+            }
+        }
+        Some((self.start + self.gradient * low, [self.closest.point, second]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two boxes joined to an L, with one reflex edge in four pieces and flat edges between.
+    fn bracket() -> TriMesh {
+        // Profile in (x, z), counter-clockwise seen from -y.
+        let profile = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]];
+        let (n, steps) = (profile.len() as u32, 4_u32);
+        let vertices = (0..=steps)
+            .flat_map(|j| profile.map(|[x, z]| Vec3::new(x, f64::from(j) * 0.5, z)))
+            .collect();
+        let mut faces = Vec::new();
+        for j in 0..steps {
+            for i in 0..n {
+                let [a, b] = [j * n + i, j * n + (i + 1) % n];
+                faces.extend([[a, b + n, b], [a, a + n, b + n]]);
+            }
+        }
+        for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]] {
+            faces.push([a, b, c]);
+            let top = steps * n;
+            faces.push([top + a, top + c, top + b]);
+        }
+        TriMesh { vertices, faces }
+    }
+
+    #[test]
+    fn only_the_reflex_edge_and_its_vertices_are_fans() {
+        let mesh = bracket();
+        let tree = TriangleBvh::new(&mesh).expect("faces");
+        let fans = fans(&mesh);
+        let is_fan = |p| {
+            let Closest { face, feature, .. } = tree.closest(p);
+            match feature {
+                Feature::Face => false,
+                Feature::Edge(k) => fans[face as usize] >> k & 1 == 1,
+                Feature::Vertex(k) => fans[face as usize] >> (3 + k) & 1 == 1,
+            }
+        };
+        // Over the reflex edge at (1, 1), between its vertices and at one of them.
+        assert!(is_fan(Vec3::new(0.9, 1.1, 0.9)) && is_fan(Vec3::new(0.9, 1.0, 0.9)));
+        // Under the top of the wall; next to the inner wall, over a flat edge too.
+        for p in [[0.5, 1.0, 2.9], [0.9, 0.9, 2.0], [0.9, 1.0, 2.0]] {
+            assert!(!is_fan(Vec3::from(p)), "{p:?}");
+        }
+    }
+
+    /// Largest deviation of the flux through a sphere whose centre is on a sheet, over many
+    /// orientations of the sheet.
+    fn error_on_planes(spiral: Spiral, count: usize) -> f64 {
+        let points = spiral.directions(count);
+        let normals = Spiral::EqualArea.directions(4001);
+        let flux = |n: &Vec3| -points.iter().map(|p| p.dot(*n).abs()).sum::<f64>() / count as f64;
+        normals.iter().map(|n| (flux(n) + 0.5).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn quadrature_errors_on_planes_are_those_of_the_literature() {
+        for (count, classic, equal) in [(50, 0.018, 0.011), (60, 0.013, 0.008), (70, 0.011, 0.007)]
+        {
+            let [c, e] = [Spiral::Classic, Spiral::EqualArea].map(|s| error_on_planes(s, count));
+            // The published maxima are over random planes, to three digits after the point.
+            assert!((c - classic).abs() < 1.5e-3, "classic {count}: {c}");
+            assert!((e - equal).abs() < 1.5e-3, "equal area {count}: {e}");
+        }
+        assert!(error_on_planes(Spiral::EqualArea, 500) < 0.002);
+    }
+
+    #[test]
+    fn points_are_on_the_sphere_and_the_classic_ones_reach_the_poles() {
+        for spiral in [Spiral::Classic, Spiral::EqualArea] {
+            for count in [1, 2, 3, 50, 1000] {
+                let points = spiral.directions(count);
+                assert_eq!(points.len(), count);
+                assert!(points.iter().all(|p| (p.length() - 1.0).abs() < 1e-12));
+            }
+        }
+        let classic = Spiral::Classic.directions(60);
+        assert_eq!([classic[0].z, classic[59].z], [-1.0, 1.0]);
     }
 }

@@ -1,7 +1,70 @@
-//! The voxels of a result as data for others.
+//! The cubic lattice, its voxels in sparse bricks of 8 x 8 x 8, and the descent that finds them.
+//!
+//! Only bricks with voxels are allocated: 4.2 KB for each of them, and four bytes for each brick of the
+//! bounding box.
+//!
+//! COARSETOFINE (Algorithm 1): voxels are dismissed where no sheet crosses their sphere, and split
+//! elsewhere.
+//!
+//! 1. The bounding box is halved down to blocks of coarse voxels; blocks outside are left out.
+//! 2. Each voxel gets its distance `D` to the surface. It has the side of its parent, without a test,
+//!    if the parent's distance exceeds that of its farthest descendant.
+//! 3. Above the finest level: where the sphere of radius `sigma` lies inside (`D >= sigma`), `AOF'`
+//!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, by default up
+//!    to the flux of the samples themselves in a constant field.
+//! 4. At the finest level: `AOF'` of every voxel whose sphere lies inside. The final threshold is
+//!    applied later, as it depends on the level that is asked.
+//!
+//! Blocks are independent; they run in parallel and are collected in order.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use medial::Vec3;
 use medial::complex::cubical_betti;
+use medial::simplifier::{RunContext, SimplifyError};
+use medial::surface::{Closest, Side, TriMesh};
+use rayon::prelude::*;
+
+use super::flux::{Sphere, Surface};
+use super::{AofParams, Dismiss, Start};
+
+/// A lattice whose voxels have `resolution` along the longest side of the bounding box; its lower
+/// corner is that of the box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Lower corner.
+    pub origin: Vec3,
+    /// `sigma` at the finest level.
+    pub side: f64,
+    /// Voxels along each axis at the finest level, a multiple of `split`.
+    pub size: [u32; 3],
+    /// Voxels of the finest level along a side of the coarsest.
+    pub split: u32,
+}
+
+impl Grid {
+    /// The lattice over a mesh.
+    ///
+    /// # Panics
+    /// If the mesh has no vertices.
+    pub fn new(mesh: &TriMesh, resolution: u32, split: u32) -> Self {
+        let (lo, hi) = mesh.bounding_box().expect("a shape has vertices");
+        let extent = hi - lo;
+        let side = extent.max_element() / f64::from(resolution);
+        // Rounding must not add a voxel to a side that is a whole number of voxels.
+        let size = extent.to_array().map(|length| {
+            let voxels = (length / side * (1.0 - 1e-9)).ceil().max(1.0) as u32;
+            voxels.next_multiple_of(split)
+        });
+        Self { origin: lo, side, size, split }
+    }
+
+    /// Centre of a voxel of the finest level.
+    pub fn centre(&self, place: Place) -> Vec3 {
+        let [x, y, z] = place.map(|i| f64::from(i) + 0.5);
+        self.origin + Vec3::new(x, y, z) * self.side
+    }
+}
 
 /// The voxels of a cubic lattice that the spheres of a result stand for, one for each sphere in the
 /// same order.
@@ -37,5 +100,550 @@ impl LatticeVoxels {
     /// Betti numbers of the union of the closed voxels.
     pub fn betti(&self) -> [u64; 3] {
         cubical_betti(&self.voxels.iter().map(|voxel| voxel.place).collect::<Vec<_>>())
+    }
+}
+
+/// Voxels along a side of a brick.
+const SIDE: u32 = 8;
+const ABSENT: u32 = u32::MAX;
+
+/// Indices of a voxel along the three axes, from the lower corner of the bounding box.
+pub type Place = [u16; 3];
+
+/// A voxel and its values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Voxel {
+    /// Where it is.
+    pub place: Place,
+    /// Distance of its centre to the surface, a fraction of the diagonal.
+    pub distance: f32,
+    /// `AOF'`; 0 if the voxel was dismissed at a coarser level.
+    pub flux: f32,
+}
+
+/// A set of voxels with values.
+#[derive(Clone, Debug)]
+pub struct Bricks {
+    there: Bits,
+    values: Vec<Box<Values>>,
+    len: usize,
+}
+
+/// Distance and flux of each voxel of a brick.
+type Values = [[f32; 2]; (SIDE * SIDE * SIDE) as usize];
+
+impl Bricks {
+    /// An empty set of voxels of a grid with these numbers along the axes.
+    pub fn new(grid: [u32; 3]) -> Self {
+        Self { there: Bits::new(grid), values: Vec::new(), len: 0 }
+    }
+
+    /// Whether there is no voxel.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of voxels.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Puts in a voxel that is not there yet.
+    pub fn insert(&mut self, voxel: Voxel) {
+        let brick = self.there.brick_or_new(voxel.place);
+        if brick == self.values.len() {
+            self.values.push(Box::new([[0.0; 2]; (SIDE * SIDE * SIDE) as usize]));
+        }
+        let (layer, bit) = inside(voxel.place);
+        let word = &mut self.there.words[brick][layer];
+        debug_assert!(*word >> bit & 1 == 0, "inserted twice");
+        *word |= 1 << bit;
+        self.values[brick][64 * layer + bit] = [voxel.distance, voxel.flux];
+        self.len += 1;
+    }
+
+    /// Takes out a voxel that is there.
+    pub fn remove(&mut self, place: Place) {
+        *self.there.word(place) &= !(1 << inside(place).1);
+        self.len -= 1;
+    }
+
+    /// The voxel at a place, if there is one.
+    pub fn get(&self, place: Place) -> Option<Voxel> {
+        let brick = self.there.brick(place)?;
+        let (layer, bit) = inside(place);
+        let [distance, flux] = self.values[brick][64 * layer + bit];
+        let is_there = self.there.words[brick][layer] >> bit & 1 == 1;
+        is_there.then_some(Voxel { place, distance, flux })
+    }
+
+    /// The existing voxels among the 27 around and at a place, as bits
+    /// `dx + 1 + 3 (dy + 1) + 9 (dz + 1)`.
+    #[inline]
+    pub fn neighbourhood(&self, place: Place) -> u32 {
+        self.there.neighbourhood(place)
+    }
+
+    /// All voxels, brick by brick.
+    pub fn iter(&self) -> impl Iterator<Item = Voxel> + '_ {
+        (0..self.values.len()).flat_map(move |brick| {
+            (0..8).flat_map(move |layer| {
+                let mut bits = self.there.words[brick][layer];
+                std::iter::from_fn(move || {
+                    let bit = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
+                    bits &= bits - 1;
+                    let at = [bit as u16 % 8, bit as u16 / 8, layer as u16];
+                    let place = [0, 1, 2].map(|k| self.there.at[brick][k] * SIDE as u16 + at[k]);
+                    let [distance, flux] = self.values[brick][64 * layer + bit];
+                    Some(Voxel { place, distance, flux })
+                })
+            })
+        })
+    }
+
+    /// Approximate number of bytes in memory.
+    pub fn bytes(&self) -> usize {
+        self.there.bytes() + (size_of::<Values>() + size_of::<usize>()) * self.values.len()
+    }
+}
+
+/// A mark for each place of a set of bricks.
+pub struct Marks(Bits);
+
+impl Marks {
+    /// No mark on any place of these bricks.
+    pub fn of(bricks: &Bricks) -> Self {
+        let mut marks = bricks.there.clone();
+        marks.words.fill([0; 8]);
+        Self(marks)
+    }
+
+    /// Marks a place; whether it had no mark.
+    pub fn set(&mut self, place: Place) -> bool {
+        let bit = 1 << inside(place).1;
+        let word = self.0.word(place);
+        let new = *word & bit == 0;
+        *word |= bit;
+        new
+    }
+
+    /// Takes the mark from a place.
+    pub fn clear(&mut self, place: Place) {
+        *self.0.word(place) &= !(1 << inside(place).1);
+    }
+
+    /// The marked places among the 27 around and at a place, as bits as in [`Bricks::neighbourhood`].
+    #[inline]
+    pub fn neighbourhood(&self, place: Place) -> u32 {
+        self.0.neighbourhood(place)
+    }
+}
+
+/// A bit for each place; only bricks with a bit are allocated.
+#[derive(Clone, Debug)]
+struct Bits {
+    /// Bricks along each axis.
+    size: [u32; 3],
+    table: Vec<u32>,
+    /// For each brick its place among the bricks.
+    at: Vec<Place>,
+    /// For each brick a byte for each row along x, a word for each layer.
+    words: Vec<[u64; 8]>,
+}
+
+impl Bits {
+    fn new(grid: [u32; 3]) -> Self {
+        let size = grid.map(|n| n.div_ceil(SIDE));
+        let table = vec![ABSENT; size.iter().map(|&n| n as usize).product()];
+        Self { size, table, at: Vec::new(), words: Vec::new() }
+    }
+
+    fn bytes(&self) -> usize {
+        4 * self.table.len() + (size_of::<Place>() + 64) * self.words.len()
+    }
+
+    #[inline]
+    fn slot(&self, [x, y, z]: Place) -> usize {
+        let [width, depth, _] = self.size.map(|n| n as usize);
+        usize::from(x / 8) + width * (usize::from(y / 8) + depth * usize::from(z / 8))
+    }
+
+    #[inline]
+    fn brick(&self, place: Place) -> Option<usize> {
+        let brick = self.table[self.slot(place)];
+        (brick != ABSENT).then_some(brick as usize)
+    }
+
+    fn brick_or_new(&mut self, place: Place) -> usize {
+        let slot = self.slot(place);
+        if self.table[slot] == ABSENT {
+            self.table[slot] = self.words.len() as u32;
+            self.words.push([0; 8]);
+            self.at.push(place.map(|x| x / 8));
+        }
+        self.table[slot] as usize
+    }
+
+    /// The word of a place in a brick that is there.
+    #[inline]
+    fn word(&mut self, place: Place) -> &mut u64 {
+        let brick = self.table[self.slot(place)] as usize;
+        &mut self.words[brick][inside(place).0]
+    }
+
+    #[inline]
+    fn neighbourhood(&self, place: Place) -> u32 {
+        // All neighbours in one brick: three words instead of nine rows. Most voxels are inside.
+        let within = |v: u16| (1..7).contains(&(v % 8));
+        if place.into_iter().all(within) {
+            let Some(brick) = self.brick(place) else {
+                return 0;
+            };
+            let (layer, bit) = inside(place);
+            return (0..3).fold(0, |bits, k| {
+                let rows = self.words[brick][layer + k - 1] >> (bit - 9);
+                let nine = (rows & 7) | (rows >> 8 & 7) << 3 | (rows >> 16 & 7) << 6;
+                bits | (nine as u32) << (9 * k)
+            });
+        }
+        self.across_bricks(place.map(i32::from))
+    }
+
+    fn across_bricks(&self, [x, y, z]: [i32; 3]) -> u32 {
+        (0..9).fold(0, |bits, k| {
+            let (y, z) = (y + k % 3 - 1, z + k / 3 - 1);
+            let row = |x: i32| u32::from(self.row([x, y, z]));
+            // The row with one bit of room on either side, for neighbours in the bricks beside.
+            let mut ten = row(x) << 1;
+            match x % 8 {
+                0 => ten |= row(x - 1) >> 7,
+                7 => ten |= (row(x + 1) & 1) << 9,
+                _ => {}
+            }
+            bits | (ten >> (x % 8) & 7) << (3 * k)
+        })
+    }
+
+    /// The row of a brick that holds a place; empty outside.
+    #[inline]
+    fn row(&self, place: [i32; 3]) -> u8 {
+        if (0..3).any(|axis| place[axis] < 0 || place[axis] >= (self.size[axis] * SIDE) as i32) {
+            return 0;
+        }
+        let place = place.map(|x| x as u16);
+        let brick = self.brick(place);
+        brick.map_or(0, |brick| (self.words[brick][inside(place).0] >> (8 * (place[1] % 8))) as u8)
+    }
+}
+
+/// Layer of a place in its brick, and bit in the layer.
+#[inline]
+fn inside([x, y, z]: Place) -> (usize, usize) {
+    (usize::from(z % 8), usize::from(x % 8 + 8 * (y % 8)))
+}
+
+/// Coarse voxels along a side of a block, at most.
+const BLOCK: u32 = 4;
+/// Blocks along the longest side of a small lattice, so that there is work for several threads.
+const BLOCKS: u32 = 4;
+/// Half the diagonal of a unit cube.
+const HALF_DIAGONAL: f64 = 0.866_025_403_784_438_6;
+
+/// The values of the voxels that are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// Places alone.
+    Places,
+    /// Values of all voxels that are not dismissed.
+    Kept,
+    /// Values of all voxels to begin with: distances of dismissed ones too.
+    All,
+}
+
+/// Numbers of voxels, in voxels of the finest level.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Voxels to begin with.
+    pub start: u64,
+    /// Dismissed at each level above the finest.
+    pub dismissed: Vec<u64>,
+    /// Spheres evaluated at each level.
+    pub evaluated: Vec<u64>,
+    /// Largest distance of a finest voxel's centre that was met inside; 0 for none.
+    pub deepest: f64,
+}
+
+/// The outcome of a descent.
+pub struct Descent {
+    /// The voxels.
+    pub voxels: Bricks,
+    /// Counts of what happened to them.
+    pub tally: Tally,
+}
+
+/// Runs the algorithm.
+///
+/// # Errors
+/// When the run was cancelled.
+pub fn coarse_to_fine(
+    surface: &Surface,
+    grid: &Grid,
+    params: &AofParams,
+    wanted: Wanted,
+    run: &RunContext,
+) -> Result<Descent, SimplifyError> {
+    let levels = Levels::new(grid, params)?;
+    let blocks = blocks(surface, grid);
+    let done = AtomicUsize::new(0);
+    let parts: Result<Vec<_>, SimplifyError> = blocks
+        .par_iter()
+        .map(|block| {
+            run.step(done.fetch_add(1, Ordering::Relaxed), blocks.len())?;
+            let (voxels, tally) = (Vec::new(), levels.tally());
+            let mut walk = Walk { surface, grid, levels: &levels, wanted, voxels, tally };
+            walk.block(block);
+            Ok((walk.voxels, walk.tally))
+        })
+        .collect();
+    run.step(blocks.len(), blocks.len())?;
+    let mut descent = Descent { voxels: Bricks::new(grid.size), tally: levels.tally() };
+    // In the order of the blocks: brick numbers, and with them every later order, are deterministic.
+    for (voxels, tally) in parts? {
+        voxels.into_iter().for_each(|voxel| descent.voxels.insert(voxel));
+        descent.tally.add(&tally);
+    }
+    Ok(descent)
+}
+
+/// Sizes that depend on the level alone, from coarse to fine.
+struct Levels {
+    spheres: Vec<Sphere>,
+    /// Finest voxels along a side.
+    sizes: Vec<u32>,
+    /// Flux from which on a voxel of the level is dismissed.
+    dismissed_from: Vec<f64>,
+    d: u32,
+    start: Start,
+}
+
+impl Levels {
+    fn new(grid: &Grid, params: &AofParams) -> Result<Self, SimplifyError> {
+        let counts = params.sample_counts()?;
+        let sizes: Vec<u32> =
+            (0..params.levels).map(|level| params.d.pow(params.levels - 1 - level)).collect();
+        let spheres = sizes.iter().zip(counts);
+        let spheres: Vec<Sphere> = spheres
+            .map(|(&size, n)| Sphere::new(params.spiral, n, grid.side * f64::from(size)))
+            .collect();
+        let from = |sphere: &Sphere| match params.dismiss {
+            Dismiss::Zero => 0.0,
+            Dismiss::Bias => -sphere.bias,
+        };
+        let dismissed_from = spheres.iter().map(from).collect();
+        Ok(Self { spheres, sizes, dismissed_from, d: params.d, start: params.start })
+    }
+
+    fn tally(&self) -> Tally {
+        let levels = self.sizes.len();
+        Tally { dismissed: vec![0; levels - 1], evaluated: vec![0; levels], ..Tally::default() }
+    }
+}
+
+impl Tally {
+    fn add(&mut self, other: &Self) {
+        self.start += other.start;
+        self.deepest = self.deepest.max(other.deepest);
+        let pairs =
+            [(&mut self.dismissed, &other.dismissed), (&mut self.evaluated, &other.evaluated)];
+        for (mine, theirs) in pairs {
+            mine.iter_mut().zip(theirs).for_each(|(a, b)| *a += b);
+        }
+    }
+}
+
+/// A box of coarse voxels, and a face near it.
+struct Block {
+    lo: [u32; 3],
+    hi: [u32; 3],
+    face: u32,
+}
+
+/// Step 1.
+fn blocks(surface: &Surface, grid: &Grid) -> Vec<Block> {
+    let whole = Block { lo: [0; 3], hi: grid.size.map(|n| n / grid.split), face: 0 };
+    let longest = whole.hi.into_iter().max().unwrap_or(0);
+    let most = (longest / BLOCKS).clamp(1, BLOCK);
+    let corner = |c: [u32; 3]| {
+        grid.origin + Vec3::from(c.map(f64::from)) * f64::from(grid.split) * grid.side
+    };
+    let (mut open, mut done) = (vec![whole], Vec::new());
+    while let Some(block) = open.pop() {
+        let extent = [0, 1, 2].map(|axis| block.hi[axis] - block.lo[axis]);
+        let longest = (0..3).max_by_key(|&axis| (extent[axis], 2 - axis)).unwrap_or(0);
+        if extent[longest] <= most {
+            done.push(block);
+            continue;
+        }
+        let middle = block.lo[longest] + extent[longest] / 2;
+        let (mut low, mut high) = (block.hi, block.lo);
+        low[longest] = middle;
+        high[longest] = middle;
+        for (lo, hi) in [(block.lo, low), (high, block.hi)] {
+            let centre = (corner(lo) + corner(hi)) * 0.5;
+            let half = (corner(hi) - corner(lo)).length() * 0.5;
+            let Closest { distance, face, .. } = surface.closest(centre, Some(block.face));
+            // A block farther from the surface than its own corners is on one side as a whole.
+            if distance <= half || surface.inside.side(centre) == Side::Inside {
+                open.push(Block { lo, hi, face });
+            }
+        }
+    }
+    done.sort_by_key(|block| [block.lo[2], block.lo[1], block.lo[0]]);
+    done
+}
+
+/// The walk through one block.
+struct Walk<'a> {
+    surface: &'a Surface,
+    grid: &'a Grid,
+    levels: &'a Levels,
+    wanted: Wanted,
+    voxels: Vec<Voxel>,
+    tally: Tally,
+}
+
+/// The facts about a voxel that follow from its ancestors.
+#[derive(Clone, Copy)]
+struct Known {
+    /// Whether it and its descendants are inside, if that is the same for all.
+    inside: Option<bool>,
+    dismissed: bool,
+    /// The closest face of the parent.
+    face: u32,
+}
+
+impl Walk<'_> {
+    fn block(&mut self, block: &Block) {
+        for z in block.lo[2]..block.hi[2] {
+            for y in block.lo[1]..block.hi[1] {
+                for x in block.lo[0]..block.hi[0] {
+                    let base = [x, y, z].map(|i| i * self.grid.split);
+                    self.visit(0, base, Known { inside: None, dismissed: false, face: block.face });
+                }
+            }
+        }
+    }
+
+    /// Steps 2 to 4 for the voxel of a level whose lowest finest voxel is at `base`.
+    fn visit(&mut self, level: usize, base: [u32; 3], mut known: Known) {
+        let size = self.levels.sizes[level];
+        let sigma = self.levels.spheres[level].radius;
+        let middle = Vec3::from(base.map(|i| f64::from(i) + f64::from(size) * 0.5));
+        let centre = self.grid.origin + middle * self.grid.side;
+        let Closest { distance, face, .. } = self.surface.closest(centre, Some(known.face));
+        known.face = face;
+        // Farthest centre of a descendant.
+        let spread = HALF_DIAGONAL * (sigma - self.grid.side);
+        let finest = level + 1 == self.levels.sizes.len();
+        // The sphere does not fit. Only the depth of the solid, for messages, may need the side.
+        if finest && distance < sigma {
+            if distance > self.tally.deepest && self.is_inside(known, centre) {
+                self.tally.deepest = distance;
+            }
+            return;
+        }
+        // Farther from the surface than any descendant's centre is away: all have this side.
+        if distance > spread {
+            if !self.is_inside(known, centre) {
+                return;
+            }
+            known.inside = Some(true);
+        }
+        if level == 0 && self.levels.start == Start::Coarse && distance < sigma {
+            self.tally.deepest = self.tally.deepest.max(distance);
+            return;
+        }
+        let evaluate = !known.dismissed && self.wanted != Wanted::Places && distance >= sigma;
+        let flux = if evaluate {
+            self.tally.evaluated[level] += 1;
+            self.surface.flux(&self.levels.spheres[level], centre, face)
+        } else {
+            0.0
+        };
+        if finest {
+            self.emit(base, distance, flux);
+            return;
+        }
+        if evaluate && flux >= self.levels.dismissed_from[level] {
+            self.tally.dismissed[level] += u64::from(size).pow(3);
+            known.dismissed = true;
+            if self.wanted == Wanted::Kept {
+                self.tally.start += u64::from(size).pow(3);
+                return;
+            }
+        }
+        // The spheres of all descendants fit, and no values are needed: skip the recursion.
+        if self.wanted == Wanted::Places && distance >= spread + self.grid.side {
+            for k in 0..size.pow(3) {
+                let at = [k % size, k / size % size, k / size / size];
+                self.emit([0, 1, 2].map(|axis| base[axis] + at[axis]), distance, 0.0);
+            }
+            return;
+        }
+        let (step, d) = (self.levels.sizes[level + 1], self.levels.d);
+        for k in 0..d.pow(3) {
+            let at = [k % d, k / d % d, k / d / d];
+            let child = [0, 1, 2].map(|axis| base[axis] + at[axis] * step);
+            self.visit(level + 1, child, known);
+        }
+    }
+
+    fn is_inside(&self, known: Known, centre: Vec3) -> bool {
+        known.inside.unwrap_or_else(|| self.surface.inside.side(centre) == Side::Inside)
+    }
+
+    fn emit(&mut self, place: [u32; 3], distance: f64, flux: f64) {
+        self.tally.start += 1;
+        self.tally.deepest = self.tally.deepest.max(distance);
+        let place = place.map(|i| i as u16);
+        self.voxels.push(Voxel { place, distance: distance as f32, flux: flux as f32 });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn voxels_come_back_and_neighbourhoods_cross_bricks() {
+        let mut bricks = Bricks::new([20, 17, 30]);
+        let mut state = 5_u64;
+        let mut kept = Vec::new();
+        for k in 0..20 * 17 * 30_u64 {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let place = [k % 20, k / 20 % 17, k / 340].map(|x| x as u16);
+            if state >> 62 == 0 {
+                let voxel = Voxel { place, distance: k as f32, flux: -(k as f32) };
+                bricks.insert(voxel);
+                kept.push(voxel);
+            }
+        }
+        assert_eq!(bricks.len(), kept.len());
+        assert_eq!(bricks.iter().count(), kept.len());
+        for voxel in &kept {
+            assert_eq!(bricks.get(voxel.place), Some(*voxel));
+            let around = bricks.neighbourhood(voxel.place);
+            for k in 0..27 {
+                let [dx, dy, dz] = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
+                let at = [dx, dy, dz];
+                let at = [0, 1, 2].map(|i| i32::from(voxel.place[i]) + at[i]);
+                let there = kept.iter().any(|v| v.place.map(i32::from) == at);
+                assert_eq!(around >> k & 1 == 1, there);
+            }
+        }
+        let gone = kept[kept.len() / 2];
+        bricks.remove(gone.place);
+        assert_eq!((bricks.get(gone.place), bricks.len()), (None, kept.len() - 1));
+        assert_eq!(bricks.neighbourhood(gone.place) >> 13 & 1, 0);
     }
 }

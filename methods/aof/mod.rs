@@ -47,11 +47,11 @@
 //!   the built-in box 31 % with zero and 64 % with bias.
 //! - If the start set on a lattice has other Betti numbers than the solid, or leaves part of the
 //!   surface far from every voxel, the lattice is refined up to three times, and the best one is used
-//!   (file `base.rs`). Warnings name what is still lost (file `losses.rs`).
+//!   (`solid.rs`). Warnings name what is still lost.
 //! - Line 3 of Algorithm 1, read literally, begins with the smallest spheres. The intended meaning is
 //!   `sigma` at the coarsest level and `sigma / d^j` after `j` divisions.
 //! - The equal-area spiral is the default: its largest error on a plane through the centre is about
-//!   0.6 of that of the classic one (held by a test in `spiral.rs`). `spiral=classic` is the paper's.
+//!   0.6 of that of the classic one (held by a test in `flux.rs`). `spiral=classic` is the paper's.
 //! - A coarse voxel whose sphere does not fit inside is split instead of dropped, so that the start
 //!   set is that of the finest level (`start=fine`). The paper's rule (`start=coarse`) loses every part
 //!   thinner than twice the coarsest voxel.
@@ -61,55 +61,24 @@
 //! - [`Level::Spheres`] is not in the paper. Ranking the voxels of a fine lattice by `AOF'` leaves
 //!   scattered pieces of the flattest sheet. Instead the lattice is made as coarse or as fine as the
 //!   count requires, while its start set keeps the topology. Then simple voxels are deleted from its
-//!   thinned axis, largest `AOF'` first, down to the count (file `count.rs`).
+//!   thinned axis, largest `AOF'` first, down to the count (`solid.rs`).
 
-mod advice;
-mod base;
-mod bricks;
-mod coarse_to_fine;
-mod count;
 mod flux;
-mod grid;
 mod lattice;
-mod losses;
-mod nearby;
 mod output;
-mod output_size;
-mod params;
-mod published;
-mod queue;
-mod refine;
-mod settings;
-mod simple;
 mod solid;
-mod spiral;
 mod thinning;
-mod voids;
-
-use std::sync::Arc;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Capability, Extras, Level, Method, MethodInfo, NativeLevel, RunContext, Simplification,
-    Simplified, SimplifyError,
+    Capability, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
+    Simplification, Simplified, SimplifyError,
 };
-use medial::surface::TriangleBvh;
+use serde::{Deserialize, Serialize};
 
-pub use base::Base;
-pub use bricks::{Bricks, Place, Voxel};
-pub use coarse_to_fine::{Descent, Surface, Tally, Wanted, coarse_to_fine};
-pub use flux::{Probe, Sphere};
-pub use grid::Grid;
-pub use lattice::{LatticeVoxel, LatticeVoxels};
-pub use losses::Loss;
-pub use nearby::{NearBatch, NearPoint, NearSet, NearbyTriangles};
-pub use params::{AofParams, Dismiss, Start, Variant};
-pub use refine::{Refined, refine};
-pub use settings::{AofSettings, Auto};
-pub use simple::{SimpleTable, is_simple};
-pub use solid::{Axis, Solid};
-pub use spiral::Spiral;
-pub use thinning::{Order, is_end_point, thin};
+pub use flux::{Refined, Sphere, Spiral, Surface};
+pub use lattice::{Bricks, Descent, Grid, LatticeVoxel, LatticeVoxels, Place, Voxel, Wanted};
+pub use solid::{Axis, Base, Loss, Solid};
 
 /// Name of the extra that holds the [`LatticeVoxels`].
 pub const VOXELS: &str = "voxels";
@@ -144,7 +113,7 @@ pub fn method() -> Method<AofSettings> {
              side, or as many as fit into memory; the paper chooses a flux for each model, -0.15 to \
              -0.25",
         )
-        .params(settings::describe())
+        .params(AofSettings::describe())
         .extra(Capability::new(VOXELS, "the voxels that the spheres stand for, with their flux"));
     Method::new(info, prepare)
 }
@@ -156,69 +125,338 @@ fn prepare<'s>(
 ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
     settings.at(Level::Published).validate()?;
     let params = settings.at(Level::Spheres(1)).validate()?;
-    let tree = shape.surface_tree()?;
-    let solid = Solid::new(shape, Surface::of(shape), params, run.clone());
+    let solid = Solid::new(shape, params, run.clone())?;
     let base = solid.base()?;
-    let usual = Stage { solid, base };
-    Ok(Box::new(Prepared { shape, settings, run: run.clone(), tree, usual }))
-}
-
-/// One shape at the resolution of the parameters.
-struct Prepared<'s> {
-    shape: &'s Shape,
-    settings: AofSettings,
-    run: RunContext,
-    tree: Arc<TriangleBvh>,
-    usual: Stage<'s>,
-}
-
-/// One shape with one set of parameters.
-struct Stage<'s> {
-    solid: Solid<'s>,
-    base: Base,
-}
-
-impl Simplification for Prepared<'_> {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
-        let is_other = self.settings.at(level) != *self.usual.solid.params();
-        if level == Level::Published && is_other {
-            let stage = published::stage(self.shape, &self.settings, &self.run)?;
-            return stage.at(level, &self.tree);
+    let run = run.clone();
+    Ok(Box::new(move |level: Level| {
+        // The published level has a lattice of its own, unless all parameters are set.
+        if level == Level::Published && settings.at(level) != *solid.params() {
+            let (solid, base) = solid::published(shape, &settings, &run)?;
+            return at(&solid, &base, level);
         }
-        self.usual.at(level, &self.tree)
+        at(&solid, &base, level)
+    }))
+}
+
+fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified, SimplifyError> {
+    let mut diagnostics = base.diagnostics.clone();
+    let angle = match level {
+        Level::Native(angle) => angle,
+        Level::Spheres(_) | Level::Published => solid.params().angle,
+    };
+    let axis = match level {
+        Level::Spheres(0) => {
+            return Err(SimplifyError::Level("ask for at least one sphere".into()));
+        }
+        Level::Spheres(count) => solid.with_count(base, count, &mut diagnostics)?,
+        Level::Native(_) | Level::Published => {
+            check_angle(angle).map_err(SimplifyError::Level)?;
+            solid.say_what_is_lost(base, base.resolution, &mut diagnostics)?;
+            solid.axis(base.resolution, &base.descent, angle)?
+        }
+    };
+    solid.check_output(base, &axis)?;
+    let mesh = solid.medial_mesh(&axis)?;
+    mesh.check()?;
+    axis.diagnose(angle, &mut diagnostics);
+    let native_level = (!matches!(level, Level::Spheres(_))).then_some(angle);
+    let extras = Extras::with(axis.lattice_voxels());
+    Ok(Simplified { native_level, diagnostics, extras, ..Simplified::new(mesh, level) })
+}
+
+/// Most voxels along a side of the bounding box: places have 16 bits.
+pub(super) const MAX_RESOLUTION: u32 = 60_000;
+/// Most voxels along the longest side of a coarse voxel.
+const MAX_SPLIT: u32 = 1024;
+
+/// Samples of the three default levels.
+const SAMPLES: &str = "70/60/50";
+/// Voxels along the longest side in the paper's figures of the torus and the cow.
+const PUBLISHED_RESOLUTION: u32 = 369;
+/// Flux at or below which the paper's figures of Venus and the cow keep a voxel.
+const PUBLISHED_FLUX: f64 = 0.2;
+/// `mu` on a sheet.
+const ON_SHEET: f64 = 0.5;
+
+/// A value, or that of the level.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected `auto`, a number or a word of the list")]
+pub enum Auto<T> {
+    /// The value.
+    Value(T),
+    /// That of the level.
+    Word(AutoWord),
+}
+
+/// The word `auto`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AutoWord {
+    /// `auto`.
+    Auto,
+}
+
+impl<T: Copy> Auto<T> {
+    fn or(self, value: T) -> T {
+        match self {
+            Self::Value(value) => value,
+            Self::Word(AutoWord::Auto) => value,
+        }
+    }
+
+    fn is_auto(&self) -> bool {
+        matches!(self, Self::Word(_))
     }
 }
 
-impl Stage<'_> {
-    fn at(&self, level: Level, tree: &TriangleBvh) -> Result<Simplified, SimplifyError> {
-        let Self { solid, base } = self;
-        let mut diagnostics = base.diagnostics.clone();
-        let angle = match level {
-            Level::Native(angle) => angle,
-            Level::Spheres(_) | Level::Published => solid.params().angle,
-        };
-        let axis = match level {
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
-            Level::Spheres(count) => solid.with_count(base, count, &mut diagnostics)?,
-            Level::Native(_) | Level::Published => {
-                params::check_angle(angle).map_err(SimplifyError::Level)?;
-                solid.say_what_is_lost(base, base.resolution, &mut diagnostics)?;
-                solid.axis(base.resolution, &base.descent, angle)?
-            }
-        };
-        solid.check_output(base, &axis)?;
-        let mesh = solid.medial_mesh(&axis, tree)?;
-        mesh.check()?;
-        axis.diagnose(angle, &mut diagnostics);
-        let native = (!matches!(level, Level::Spheres(_))).then_some(angle);
-        Ok(Simplified {
-            mesh,
-            asked: level,
-            native_level: native,
-            diagnostics,
-            extras: Extras::with(axis.lattice_voxels()),
-        })
+/// Most defaults are the paper's at the published level and our own at all others: `auto`.
+const fn auto<T>() -> Auto<T> {
+    Auto::Word(AutoWord::Auto)
+}
+
+medial::parameters! {
+    /// Parameters as the user sets them; [`AofSettings::at`] has their values at a level.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct AofSettings {
+        /// Voxels along the longest side of the bounding box, at the finest level; auto is 54, and
+        /// 369 at the published level, or as many as fit into memory.
+        resolution: Auto<u32> = auto(), "voxels, or auto";
+        /// `d`: each voxel is split into d x d x d.
+        d: u32 = 3, "number";
+        /// Levels of resolution, from coarse to fine.
+        levels: u32 = 3, "number";
+        /// `N`: samples on each sphere, from the coarsest level to the finest, or one number for all.
+        #[serde(deserialize_with = "number_or_text")]
+        samples: String = SAMPLES.to_owned(), "numbers, separated by /";
+        /// `alpha`: object angle of the thinnest sheets that are kept, when no level names one; auto
+        /// is 30, and 23.6 at the published level, where sheets have a flux of -0.2.
+        angle: Auto<f64> = auto(), "degrees, or auto";
+        /// Factor of the threshold -mu sin(angle); auto is 0.125 for plain and homotopy, where a sheet
+        /// anywhere in a voxel keeps it, 0.375 for the end points of thinning, and 0.5 at the
+        /// published level.
+        mu: Auto<f64> = auto(), "pure number, or auto";
+        /// Keep by threshold; delete simple voxels alone, outermost first; or thin by flux; auto is
+        /// thinning, and plain at the published level.
+        variant: Auto<Variant> = auto(), "plain, homotopy, thinning or auto";
+        /// How samples lie on the sphere; auto is equal-area, and classic at the published level.
+        spiral: Auto<Spiral> = auto(), "equal-area, classic or auto";
+        /// Begin with the voxels whose spheres fit inside at the finest level, or at the coarsest as
+        /// in the paper; auto is fine, and coarse at the published level where that has a voxel.
+        start: Auto<Start> = auto(), "fine, coarse or auto";
+        /// Dismiss coarse voxels from a flux of 0 on, as in the paper, or of minus that of the samples
+        /// in a constant field; auto is bias, and zero at the published level.
+        dismiss: Auto<Dismiss> = auto(), "zero, bias or auto";
+        /// Move centres onto the axis, between opposite closest points; auto is true, and false at the
+        /// published level.
+        refine: Auto<bool> = auto(), "true, false or auto";
+        /// Limit of the memory for voxels and the medial mesh.
+        max_memory: f64 = 2000.0, "megabytes";
     }
+}
+
+impl AofSettings {
+    /// The parameters at a level.
+    pub fn at(&self, level: Level) -> AofParams {
+        let auto = match level {
+            Level::Published => AofParams {
+                resolution: PUBLISHED_RESOLUTION,
+                angle: (PUBLISHED_FLUX / ON_SHEET).asin().to_degrees(),
+                mu: ON_SHEET,
+                variant: Variant::Plain,
+                spiral: Spiral::Classic,
+                start: Start::Coarse,
+                dismiss: Dismiss::Zero,
+                refine: false,
+                ..AofParams::default()
+            },
+            _ => AofParams::default(),
+        };
+        AofParams {
+            resolution: self.resolution.or(auto.resolution),
+            d: self.d,
+            levels: self.levels,
+            samples: self.samples.clone(),
+            angle: self.angle.or(auto.angle),
+            mu: self.mu.or(auto.mu),
+            variant: self.variant.or(auto.variant),
+            spiral: self.spiral.or(auto.spiral),
+            start: self.start.or(auto.start),
+            dismiss: self.dismiss.or(auto.dismiss),
+            refine: self.refine.or(auto.refine),
+            max_memory: self.max_memory,
+        }
+    }
+}
+
+/// Parameters at one level; [`AofSettings`] has their meaning. The default is that of every level but
+/// the published one.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "documented by the fields of the settings")]
+pub struct AofParams {
+    pub resolution: u32,
+    pub d: u32,
+    pub levels: u32,
+    pub samples: String,
+    pub angle: f64,
+    /// 0 for 1/8 where voxels are kept by the threshold, and 3/8 where only end points are.
+    pub mu: f64,
+    pub variant: Variant,
+    pub spiral: Spiral,
+    pub start: Start,
+    pub dismiss: Dismiss,
+    pub refine: bool,
+    pub max_memory: f64,
+}
+
+impl Default for AofParams {
+    fn default() -> Self {
+        Self {
+            resolution: 54,
+            d: 3,
+            levels: 3,
+            samples: SAMPLES.to_owned(),
+            angle: 30.0,
+            mu: 0.0,
+            variant: Variant::Thinning,
+            spiral: Spiral::EqualArea,
+            start: Start::Fine,
+            dismiss: Dismiss::Bias,
+            refine: true,
+            max_memory: 2000.0,
+        }
+    }
+}
+
+/// The use of the flux.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Variant {
+    /// All voxels with a flux at or below the threshold.
+    Plain,
+    /// Voxels above the threshold are deleted where they are simple, outermost first.
+    Homotopy,
+    /// Simple voxels are deleted by flux, the least medial first, except for end points below the
+    /// threshold (Siddiqi, Bouix, Tannenbaum, Zucker 2002).
+    Thinning,
+}
+
+/// The start set of voxels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Start {
+    /// Voxels of the finest level whose spheres lie inside. Coarser ones that do not are split.
+    Fine,
+    /// Voxels of the coarsest level whose spheres lie inside, as in the paper.
+    Coarse,
+}
+
+/// From which flux on a coarse voxel is dismissed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Dismiss {
+    /// `AOF' >= 0`, as in the paper.
+    Zero,
+    /// Where `AOF'` is not below minus the flux that the samples have in a constant field.
+    Bias,
+}
+
+impl AofParams {
+    /// The parameters if they are in their ranges.
+    fn validate(self) -> Result<Self, SimplifyError> {
+        let refuse = |message: String| Err(SimplifyError::Parameter(message));
+        if !(1..=MAX_RESOLUTION).contains(&self.resolution) {
+            return refuse(format!(
+                "resolution = {}: give 1 to {MAX_RESOLUTION} voxels along the longest side",
+                self.resolution
+            ));
+        }
+        if self.levels == 0 || (self.levels > 1 && self.d < 2) {
+            return refuse(format!(
+                "levels = {}, d = {}: give at least one level, and 2 or more for d",
+                self.levels, self.d
+            ));
+        }
+        let split = self.d.checked_pow(self.levels - 1).filter(|&split| split <= MAX_SPLIT);
+        if split.is_none() {
+            return refuse(format!(
+                "levels = {}, d = {}: d^(levels - 1) is above {MAX_SPLIT}; give fewer levels",
+                self.levels, self.d
+            ));
+        }
+        check_angle(self.angle).map_err(SimplifyError::Parameter)?;
+        if !(self.mu >= 0.0 && self.mu <= 0.75) {
+            return refuse(format!(
+                "mu = {:?}: give a number in [0, 0.75], such as 0.125",
+                self.mu
+            ));
+        }
+        if !(self.max_memory > 0.0 && self.max_memory.is_finite()) {
+            return refuse(format!("max_memory = {:?}: give megabytes, above 0", self.max_memory));
+        }
+        self.sample_counts()?;
+        Ok(self)
+    }
+
+    /// Samples of each level, from coarse to fine.
+    pub(super) fn sample_counts(&self) -> Result<Vec<usize>, SimplifyError> {
+        let refuse = || {
+            SimplifyError::Parameter(format!(
+                "samples = {}: give 8 to 10000 for each level, such as 70/60/50",
+                self.samples
+            ))
+        };
+        let counts: Option<Vec<usize>> =
+            self.samples.split('/').map(|word| word.trim().parse().ok()).collect();
+        let mut counts = counts.ok_or_else(refuse)?;
+        let levels = self.levels as usize;
+        // The default is made for its own number of levels; of fewer, the coarse ones are left out.
+        if self.samples == SAMPLES {
+            counts.drain(..counts.len().saturating_sub(levels));
+        } else if counts.len() != 1 && counts.len() != levels {
+            return Err(SimplifyError::Parameter(format!(
+                "samples = {}: {} numbers for {levels} levels; give one for each, from coarse to \
+                 fine, or one for all",
+                self.samples,
+                counts.len()
+            )));
+        }
+        let last = *counts.last().ok_or_else(refuse)?;
+        counts.resize(levels, last);
+        if counts.iter().any(|count| !(8..=10_000).contains(count)) {
+            return Err(refuse());
+        }
+        Ok(counts)
+    }
+
+    /// Flux at or below which a voxel is kept for an object angle in degrees.
+    pub(super) fn threshold(&self, angle: f64) -> f32 {
+        let mu = match self.variant {
+            _ if self.mu > 0.0 => self.mu,
+            Variant::Plain | Variant::Homotopy => 0.125,
+            Variant::Thinning => 0.375,
+        };
+        (-mu * angle.to_radians().sin()) as f32
+    }
+}
+
+/// One number of samples for all levels may be given as a number.
+fn number_or_text<'de, D: serde::Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "expected 8 to 10000 for each level, such as 70/60/50")]
+    enum Given {
+        Number(u64),
+        Text(String),
+    }
+    Ok(match Given::deserialize(from)? {
+        Given::Number(number) => number.to_string(),
+        Given::Text(text) => text,
+    })
+}
+
+/// An object angle is above 0 and at most a right angle.
+fn check_angle(angle: f64) -> Result<(), String> {
+    if angle > 0.0 && angle <= 90.0 {
+        return Ok(());
+    }
+    Err(format!("angle = {angle:?}: an object angle is above 0 and at most 90 degrees"))
 }

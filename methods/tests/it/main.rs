@@ -1,9 +1,6 @@
 //! The tests of the methods against real shapes, definitions and published figures.
 
 mod aof;
-mod aof_losses;
-mod aof_refusals;
-mod aof_solids;
 mod box_axis;
 mod chain;
 mod common;
