@@ -7,27 +7,20 @@ use medial::simplifier::{Level, MedialSimplifier, Registered};
 
 pub mod angle;
 pub mod aof;
-mod by_knob;
 pub mod coverage_axis;
 pub mod dey_zhao;
 pub mod hem;
 pub mod initial;
 pub mod lambda;
-mod perturb;
+mod levels;
 pub mod pmat;
 pub mod qmat;
 mod ranked;
-mod ranked_facets;
 pub mod sat;
 pub mod sat_pairwise;
-mod scale;
-mod sheets;
-mod size_search;
 pub mod tam_heidrich;
-mod ties;
 pub mod tight;
 pub mod vmas;
-mod within;
 
 /// All methods, in the order of the tables. Those that take long are marked to run only when named.
 pub fn registry() -> Vec<Registered> {

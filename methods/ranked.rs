@@ -1,13 +1,15 @@
 //! The common part of the per-sphere filters: rank the spheres once, then keep those above a threshold
 //! or a number of the best, and return the induced subcomplex.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use medial::complex::MedialMesh;
+use medial::Vec3;
+use medial::complex::{DualTriangulation, MedialMesh, Sphere, VoronoiFacets};
+use medial::geometry::trees::spread_order;
+use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError};
-
-use crate::scale::{Scale, Wanted};
-use crate::ties::{break_ties, tie};
+use rayon::prelude::*;
 
 /// An initial medial mesh with a value for each sphere; larger values are kept longer.
 pub(crate) struct Ranked {
@@ -87,5 +89,522 @@ impl Simplification for Ranked {
             diagnostics,
             extras: Extras::default(),
         })
+    }
+}
+
+// How the filters compare a value with a level, and the requests that they answer.
+
+/// How the values are compared with a native level.
+pub(crate) struct Scale {
+    /// Name of the level for messages.
+    pub name: &'static str,
+    /// Range of meaningful levels, in native units.
+    pub range: RangeInclusive<f64>,
+    /// `true` keeps values at the level (`>=`), `false` only those above it (`>`).
+    pub inclusive: bool,
+    /// The meaning of [`Level::Published`].
+    pub published: Published,
+}
+
+/// The meaning of [`Level::Published`].
+pub(crate) enum Published {
+    /// The paper's own level.
+    Native(f64),
+    /// A documented level where no paper has a single one, and whose it is, as a warning says.
+    Documented(f64, &'static str),
+    /// There is none, and why.
+    None(&'static str),
+}
+
+/// A valid request to a filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Wanted {
+    /// At least one sphere.
+    Spheres(usize),
+    /// A level in range.
+    Native(f64),
+}
+
+impl Scale {
+    /// The request of a level; a documented level is announced in `diagnostics`.
+    pub(crate) fn wanted(
+        &self,
+        level: Level,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<Wanted, SimplifyError> {
+        match level {
+            Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
+            Level::Spheres(count) => Ok(Wanted::Spheres(count)),
+            Level::Native(level) => self.check(level).map(|()| Wanted::Native(level)),
+            Level::Published => match self.published {
+                Published::Native(level) => Ok(Wanted::Native(level)),
+                Published::Documented(level, whose) => {
+                    let name = self.name;
+                    diagnostics.warn(format!(
+                        "no single level is published; this is {name} = {level}, {whose}"
+                    ));
+                    Ok(Wanted::Native(level))
+                }
+                Published::None(why) => Err(SimplifyError::unsupported(why)),
+            },
+        }
+    }
+
+    /// Refuses a level that means nothing.
+    fn check(&self, level: f64) -> Result<(), SimplifyError> {
+        let Self { name, range, .. } = self;
+        if range.contains(&level) {
+            return Ok(());
+        }
+        let (least, most) = (range.start(), range.end());
+        let message = match *most {
+            f64::MAX => format!("{name} = {level:?} is below {least}, or no number"),
+            _ => format!("{name} = {level:?} is outside {least} to {most}"),
+        };
+        Err(SimplifyError::Level(message))
+    }
+}
+
+// The order of items of equal value.
+//
+// Many values are equal: sheets through the middle of their two samples all have 180 degrees, facets of
+// a plate all have half its thickness. Ordered by index, the first of them would form one lump at one
+// end of the shape, because indices follow a curve. Ordered by rounding errors, which grow with the
+// coordinates, they would, too. So values that agree up to rounding count as equal ([`tie`]).
+//
+// Larger items are kept first. Items of about the same size are ordered such that every prefix is
+// spread over all of them ([`spread_order`]). Sizes are compared by half octaves: compared exactly, the
+// first items would gather where the shape is thickest, and rounding would decide on a plate.
+
+/// Size classes in a doubling of the radius.
+const CLASSES: f64 = 2.0;
+
+/// Bound on the relative rounding error of equal values.
+const ROUNDING: f64 = 1e-12;
+
+/// Whether two values are equal up to rounding.
+pub(crate) fn tie(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}
+
+/// Puts every run of values that tie in order. `items` are by descending value; `sphere` says where an
+/// item is and how large. `O(n)` where nothing ties.
+pub(crate) fn break_ties<T: Copy>(
+    items: &mut [T],
+    value: impl Fn(T) -> f64,
+    sphere: impl Fn(T) -> Sphere,
+) {
+    for run in items.chunk_by_mut(|&a, &b| tie(value(a), value(b))) {
+        if run.len() > 1 {
+            order_of_equals(run, &sphere);
+        }
+    }
+}
+
+fn order_of_equals<T: Copy>(run: &mut [T], sphere: &impl Fn(T) -> Sphere) {
+    let class = |&item: &T| (sphere(item).radius.log2() * CLASSES).floor();
+    let mut keyed: Vec<(f64, T)> = run.iter().map(|item| (class(item), *item)).collect();
+    keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut rest = run.iter_mut();
+    for equals in keyed.chunk_by(|a, b| a.0 == b.0) {
+        let centres: Vec<Vec3> = equals.iter().map(|&(_, item)| sphere(item).centre).collect();
+        let spread = spread_order(&centres);
+        for (place, next) in spread.into_iter().zip(rest.by_ref()) {
+            *next = equals[place as usize].1;
+        }
+    }
+}
+
+/// The mean centre and radius of some spheres, at least one.
+pub(crate) fn mean(spheres: impl ExactSizeIterator<Item = Sphere>) -> Sphere {
+    let share = 1.0 / spheres.len() as f64;
+    let sum = spheres.fold((Vec3::ZERO, 0.0), |sum, s| (sum.0 + s.centre, sum.1 + s.radius));
+    Sphere::new(sum.0 * share, sum.1 * share)
+}
+
+// # Facets
+//
+// The common part of the per-facet filters: rank the Voronoi facets once, then keep those above a
+// threshold, or as many of the best as a number of spheres allows, with their edges and vertices.
+
+/// The Voronoi facets of a shape and the medial mesh that their vertices belong to.
+pub(crate) struct FacetSet {
+    pub mesh: Arc<MedialMesh>,
+    pub facets: Arc<VoronoiFacets>,
+    pub dual: DualTriangulation,
+}
+
+impl FacetSet {
+    /// The facets of a shape's own Voronoi diagram.
+    ///
+    /// # Errors
+    /// As [`Shape::voronoi`]; when a medial mesh was given, which has no Voronoi facets.
+    pub(crate) fn of(shape: &Shape) -> Result<Self, SimplifyError> {
+        Self::refuse_given(shape)?;
+        let (facets, mesh) = (shape.facets()?, shape.voronoi()?);
+        Ok(Self { mesh, facets, dual: shape.options().dual })
+    }
+
+    /// Refuses a shape with a given medial mesh.
+    pub(crate) fn refuse_given(shape: &Shape) -> Result<(), SimplifyError> {
+        if shape.has_given_initial() {
+            let why = "it selects facets of the Voronoi diagram of the samples, and a given medial \
+                       mesh has none: leave out --initial";
+            return Err(SimplifyError::unsupported(why));
+        }
+        Ok(())
+    }
+
+    /// The mean centre and radius of the vertices of a facet.
+    pub(crate) fn middle(&self, facet: u32) -> Sphere {
+        let vertices = self.facets.polygon(facet as usize).iter();
+        mean(vertices.map(|&v| self.mesh.spheres[v as usize]))
+    }
+}
+
+/// The value by which facets are ranked.
+pub(crate) trait FacetValue: Send + Sync {
+    /// The value of a facet, in native units; larger values are kept longer.
+    fn value(&self, facet: usize) -> f64;
+
+    /// Whether the value of a facet is above a level. To be overridden where that is known sooner
+    /// than the value.
+    fn is_above(&self, level: f64) -> Box<dyn Fn(usize) -> bool + Sync + '_> {
+        Box::new(move |facet| self.value(facet) > level)
+    }
+}
+
+impl FacetValue for Vec<f64> {
+    fn value(&self, facet: usize) -> f64 {
+        self[facet]
+    }
+}
+
+/// Facets with a value for each.
+pub(crate) struct RankedFacets<'s> {
+    set: FacetSet,
+    value: Box<dyn FacetValue + 's>,
+    scale: Scale,
+    /// Counts and warnings of the preparation, repeated with every level.
+    prepared: Diagnostics,
+}
+
+impl<'s> RankedFacets<'s> {
+    /// Ranks facets by `value`.
+    pub(crate) fn new(
+        set: FacetSet,
+        value: impl FacetValue + 's,
+        scale: Scale,
+        prepared: Diagnostics,
+    ) -> Self {
+        Self { set, value: Box::new(value), scale, prepared }
+    }
+
+    /// Values and facets by descending value. Only numbers of spheres need it, and each pays for it,
+    /// because native levels are often decided without the values.
+    fn order(&self) -> Vec<(f64, u32)> {
+        let facets = (0..self.set.facets.len()).into_par_iter().with_min_len(256);
+        let mut ranked: Vec<(f64, u32)> =
+            facets.map(|facet| (self.value.value(facet), facet as u32)).collect();
+        ranked.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        break_ties(&mut ranked, |(value, _)| value, |(_, facet)| self.set.middle(facet));
+        ranked
+    }
+
+    /// The number of first facets of an order that together have at most `spheres` vertices; at least
+    /// one.
+    fn facets_for(&self, order: &[(f64, u32)], spheres: usize) -> usize {
+        let mut seen = vec![false; self.set.mesh.spheres.len()];
+        let mut count = 0;
+        for (rank, &(_, facet)) in order.iter().enumerate() {
+            for &sphere in self.set.facets.polygon(facet as usize) {
+                count += usize::from(!std::mem::replace(&mut seen[sphere as usize], true));
+            }
+            if count > spheres {
+                return rank.max(1);
+            }
+        }
+        self.set.facets.len()
+    }
+
+    /// The facets that a native level keeps, ascending.
+    fn by_level(&self, level: f64) -> Vec<u32> {
+        let (value, inclusive) = (&self.value, self.scale.inclusive);
+        let is_above = value.is_above(level);
+        let kept = |&facet: &u32| {
+            let facet = facet as usize;
+            is_above(facet) || (inclusive && value.value(facet) == level)
+        };
+        let facets = (0..self.set.facets.len() as u32).into_par_iter().with_min_len(256);
+        facets.filter(kept).collect()
+    }
+
+    /// The facets that a number of spheres allows, ascending, and the value of the best of the
+    /// others.
+    fn by_count(&self, spheres: usize) -> (Vec<u32>, f64) {
+        let order = self.order();
+        let count = self.facets_for(&order, spheres);
+        let dropped = order.get(count).map(|&(value, _)| value);
+        let mut kept: Vec<u32> = order[..count].iter().map(|&(_, facet)| facet).collect();
+        kept.sort_unstable();
+        (kept, dropped.unwrap_or(*self.scale.range.start()))
+    }
+}
+
+impl Simplification for RankedFacets<'_> {
+    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        if self.set.facets.is_empty() {
+            // A tetrahedron has a Voronoi vertex inside, but no facet around it.
+            let why = "no Voronoi facet lies inside the surface as a whole, so that none can be \
+                       selected: sample more densely, for example --sampling blue:20000";
+            return Err(SimplifyError::unsupported(why));
+        }
+        let mut diagnostics = self.prepared.clone();
+        let (kept, native) = match self.scale.wanted(level, &mut diagnostics)? {
+            Wanted::Spheres(spheres) => self.by_count(spheres),
+            Wanted::Native(level) => (self.by_level(level), level),
+        };
+        let FacetSet { mesh, facets, dual } = &self.set;
+        let mesh = facets.subcomplex(mesh, *dual, &kept, &[], &[]);
+        let reached = mesh.spheres.len();
+        match level {
+            Level::Spheres(asked) if reached != asked => diagnostics.warn(format!(
+                "{reached} spheres instead of {asked}: whole facets are kept, {} in all",
+                if kept.len() == self.set.facets.len() { "and these are" } else { "the best" }
+            )),
+            _ if reached == 0 => diagnostics.warn(format!(
+                "no facet passes {} = {native}: the largest is {}",
+                self.scale.name,
+                self.order().first().map_or(0.0, |&(value, _)| value.max(0.0))
+            )),
+            _ => {}
+        }
+        Ok(Simplified {
+            mesh,
+            asked: level,
+            native_level: Some(native),
+            diagnostics,
+            extras: Extras::default(),
+        })
+    }
+}
+
+// The complex of the Voronoi facets inside a surface, and its subcomplexes without some of them.
+//
+// A facet consists of the points whose closest samples are a given pair: it is a sheet of the medial
+// axis, governed by two sites of the boundary.
+
+/// The facets inside a surface as sheets, with the edges and spheres that have no facet.
+pub(crate) struct Sheets {
+    /// The edges and the vertices of each sheet, ascending; each once.
+    edges: Vec<Vec<u32>>,
+    vertices: Vec<Vec<u32>>,
+    /// For each edge and each sphere the sheets that it belongs to, ascending.
+    sheets_at_edge: Vec<Vec<u32>>,
+    sheets_at_sphere: Vec<Vec<u32>>,
+    /// Whether a sphere has an edge without a facet.
+    has_bare_edge: Vec<bool>,
+    bare_edges: Vec<[u32; 2]>,
+    bare_spheres: Vec<u32>,
+}
+
+impl Sheets {
+    /// The facets of a Voronoi medial mesh. `O(n log n)`.
+    ///
+    /// # Panics
+    /// If a side of a facet is no edge of the mesh.
+    pub(crate) fn of(mesh: &MedialMesh, facets: &VoronoiFacets) -> Self {
+        let edge_id = |a: u32, b: u32| {
+            let found = mesh.edges.binary_search(&[a.min(b), a.max(b)]);
+            found.expect("a side of a facet is an edge") as u32
+        };
+        let sorted = |ids: &mut dyn Iterator<Item = u32>| {
+            let mut ids: Vec<u32> = ids.collect();
+            ids.sort_unstable();
+            ids
+        };
+        let (mut edges, mut vertices) = (Vec::new(), Vec::new());
+        for facet in 0..facets.len() {
+            let v = facets.polygon(facet);
+            let mut sides = (0..v.len()).map(|k| edge_id(v[k], v[(k + 1) % v.len()]));
+            edges.push(sorted(&mut sides));
+            vertices.push(sorted(&mut v.iter().copied()));
+        }
+        let count = edges.len();
+        let mut sheets_at_edge = vec![Vec::new(); mesh.edges.len()];
+        let mut sheets_at_sphere = vec![Vec::new(); mesh.spheres.len()];
+        for sheet in 0..count {
+            edges[sheet].iter().for_each(|&e| sheets_at_edge[e as usize].push(sheet as u32));
+            vertices[sheet].iter().for_each(|&v| sheets_at_sphere[v as usize].push(sheet as u32));
+        }
+        // Diagonals that cut a facet into triangles lie in a facet though they are no side of one.
+        let mut in_face = vec![false; mesh.edges.len()];
+        for &[a, b, c] in &mesh.faces {
+            for [u, v] in [[a, b], [a, c], [b, c]] {
+                in_face[edge_id(u, v) as usize] = true;
+            }
+        }
+        let bare = mesh.edges.iter().zip(&in_face).filter(|&(_, &in_face)| !in_face);
+        let bare_edges: Vec<[u32; 2]> = bare.map(|(&edge, _)| edge).collect();
+        let mut has_bare_edge = vec![false; mesh.spheres.len()];
+        for &end in bare_edges.as_flattened() {
+            has_bare_edge[end as usize] = true;
+        }
+        let bare_spheres = (0..mesh.spheres.len() as u32)
+            .filter(|&v| sheets_at_sphere[v as usize].is_empty() && !has_bare_edge[v as usize])
+            .collect();
+        Self {
+            edges,
+            vertices,
+            sheets_at_edge,
+            sheets_at_sphere,
+            has_bare_edge,
+            bare_edges,
+            bare_spheres,
+        }
+    }
+
+    /// Number of sheets.
+    pub(crate) fn len(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// Edges that lie in no facet: parts that are like curves.
+    pub(crate) fn bare_edges(&self) -> &[[u32; 2]] {
+        &self.bare_edges
+    }
+
+    /// Spheres without an edge or facet.
+    pub(crate) fn bare_spheres(&self) -> &[u32] {
+        &self.bare_spheres
+    }
+}
+
+/// A complex while sheets are removed.
+pub(crate) struct Without<'a> {
+    sheets: &'a Sheets,
+    gone: Vec<bool>,
+    /// Sheets left at each edge; at each sphere, with one more for edges that lie in no facet.
+    at_edge: Vec<u32>,
+    at_sphere: Vec<u32>,
+    /// Spheres left.
+    spheres: usize,
+}
+
+impl<'a> Without<'a> {
+    /// All sheets are there.
+    pub(crate) fn none(sheets: &'a Sheets) -> Self {
+        let number = |lists: &[Vec<u32>]| -> Vec<u32> {
+            lists.iter().map(|list| list.len() as u32).collect()
+        };
+        let mut at_sphere = number(&sheets.sheets_at_sphere);
+        for (count, &bare) in at_sphere.iter_mut().zip(&sheets.has_bare_edge) {
+            *count += u32::from(bare);
+        }
+        Self {
+            gone: vec![false; sheets.len()],
+            at_edge: number(&sheets.sheets_at_edge),
+            spheres: at_sphere.len(),
+            at_sphere,
+            sheets,
+        }
+    }
+
+    /// Whether a sheet has been removed.
+    pub(crate) fn is_gone(&self, sheet: usize) -> bool {
+        self.gone[sheet]
+    }
+
+    /// Number of spheres left.
+    pub(crate) fn spheres(&self) -> usize {
+        self.spheres
+    }
+
+    /// Whether removing a sheet leaves the Betti numbers as they are: a part of its border is free, and
+    /// its seam, what it shares with others, has its own Euler characteristic, 1.
+    pub(crate) fn may_go(&self, sheet: usize) -> bool {
+        if self.gone[sheet] {
+            return false;
+        }
+        let Sheets { edges, vertices, .. } = self.sheets;
+        let shared_edges = edges[sheet].iter().filter(|&&e| self.at_edge[e as usize] > 1).count();
+        let shared_vertices =
+            vertices[sheet].iter().filter(|&&v| self.at_sphere[v as usize] > 1).count();
+        shared_edges < edges[sheet].len() && shared_vertices == shared_edges + 1
+    }
+
+    /// Removes a sheet without its seam; the sheets at its seam that are left, ascending.
+    pub(crate) fn remove(&mut self, sheet: usize) -> Vec<usize> {
+        let Sheets { edges, vertices, sheets_at_sphere, .. } = self.sheets;
+        self.gone[sheet] = true;
+        for &edge in &edges[sheet] {
+            self.at_edge[edge as usize] -= 1;
+        }
+        let mut neighbours = Vec::new();
+        for &v in &vertices[sheet] {
+            let left = &mut self.at_sphere[v as usize];
+            *left -= 1;
+            self.spheres -= usize::from(*left == 0);
+            let others = sheets_at_sphere[v as usize].iter().map(|&other| other as usize);
+            neighbours.extend(others.filter(|&other| !self.gone[other]));
+        }
+        neighbours.sort_unstable();
+        neighbours.dedup();
+        neighbours
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Balls along a line, in order, so that the first ones are one end.
+    fn line(radius: impl Fn(u32) -> f64) -> Vec<Sphere> {
+        (0..1000).map(|k| Sphere::new(Vec3::new(f64::from(k), 0.0, 0.0), radius(k))).collect()
+    }
+
+    fn ordered(balls: &[Sphere], value: impl Fn(u32) -> f64) -> Vec<u32> {
+        let mut items: Vec<u32> = (0..balls.len() as u32).collect();
+        items.sort_by(|&a, &b| value(b).total_cmp(&value(a)));
+        break_ties(&mut items, value, |item| balls[item as usize]);
+        items
+    }
+
+    #[test]
+    fn every_beginning_of_the_tied_is_spread() {
+        // Radii that differ by rounding alone.
+        let balls = line(|k| 1.1 + 1e-16 * f64::from(k % 7));
+        // Values that grow along the line by rounding alone.
+        let order = ordered(&balls, |k| 180.0 * (1.0 + 1e-15 * f64::from(k / 100)));
+        for kept in [5, 30, 200] {
+            let mut first = order[..kept].to_vec();
+            first.sort_unstable();
+            let ends = [first[0], 999 - first[kept - 1]];
+            let gaps = first.windows(2).map(|pair| pair[1] - pair[0]);
+            let widest = gaps.chain(ends).max().expect("gaps");
+            assert!(widest as usize <= 3 * 1000 / kept, "{kept}: {widest}");
+        }
+    }
+
+    #[test]
+    fn values_come_before_sizes_and_sizes_before_places() {
+        let balls = line(|k| if k % 10 == 0 { 4.0 } else { 1.0 });
+        let order = ordered(&balls, |k| f64::from(u32::from(k >= 500)));
+        let large = |items: &[u32]| items.iter().filter(|&&k| k % 10 == 0).count();
+        assert!(order[..500].iter().all(|&k| k >= 500));
+        assert_eq!((large(&order[..50]), large(&order[50..500])), (50, 0));
+        assert_eq!((large(&order[500..550]), large(&order[550..])), (50, 0));
+    }
+
+    #[test]
+    fn the_numbering_does_not_matter() {
+        let balls = line(|k| 1.0 + f64::from(k % 3));
+        let mut reversed = balls.clone();
+        reversed.reverse();
+        let one: Vec<Vec3> =
+            ordered(&balls, |_| 0.0).iter().map(|&k| balls[k as usize].centre).collect();
+        let other: Vec<Vec3> =
+            ordered(&reversed, |_| 0.0).iter().map(|&k| reversed[k as usize].centre).collect();
+        assert_eq!(one, other);
     }
 }

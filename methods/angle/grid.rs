@@ -7,7 +7,7 @@
 //! 4. The faces, as squares of two triangles on the corners of the voxels. The radius at a corner is
 //!    its distance from the surface.
 //!
-//! A number of spheres is met by the resolution (file `resolution.rs`) or, with `size=ranking`, by the
+//! A number of spheres is met by the resolution (below) or, with `size=ranking`, by the
 //! faces of largest angle that together have at most this many corners.
 //!
 //! # Deviations from the paper
@@ -23,13 +23,12 @@ use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Extras, Level, RunContext, Simplification, Simplified, SimplifyError,
 };
-use medial::surface::TriangleBvh;
-use medial::surface::{InsideTest, Side};
+use medial::surface::{InsideTest, Side, TriangleBvh};
 use rayon::prelude::*;
 
-use super::AngleParams;
-use crate::scale::{Scale, Wanted};
-use crate::ties::{break_ties, mean};
+use super::{AngleParams, grid};
+use crate::levels::{ByKnob, Knob};
+use crate::ranked::{Scale, Wanted, break_ties, mean};
 
 /// Largest number of voxels along the longest side: a cube of this size takes about a gigabyte.
 pub(super) const MAX_RESOLUTION: f64 = 320.0;
@@ -302,4 +301,41 @@ impl Simplification for Faces {
             extras: Extras::default(),
         })
     }
+}
+
+// Angle filter on a grid, where the resolution decides the number of spheres.
+//
+// Foskey, Lin and Manocha control the size of the result by the grid: `theta` says which sheets there
+// are, the resolution how finely they are cut. A number of spheres is met by a search over the
+// resolution (`methods/levels.rs`) at the `theta` of the parameters. It can have a fraction,
+// reported in thousandths: then the last voxels stick out of the bounding box.
+
+/// Finest lattice of a search: eight million voxels for a cube.
+const FINEST: f64 = 200.0;
+
+/// The shape on lattices of any resolution. Builds what all of them share, the tree and the inside
+/// test of the surface.
+pub(super) fn prepare_by_resolution<'s>(
+    shape: &'s Shape,
+    params: AngleParams,
+    run: &RunContext,
+) -> Result<ByKnob<'s>, SimplifyError> {
+    shape.surface_tree()?;
+    shape.inside_test();
+    // A sheet of area A has A R^2 faces, and about as many corners.
+    let knob = Knob {
+        count: "resolution_in_thousandths",
+        unit: "voxels along the longest side",
+        range: MIN_RESOLUTION..=FINEST,
+        steps: 1e3,
+        rate: 0.4,
+        exponent: 2.0,
+    };
+    let run_again = run.clone();
+    let at = move |value: Option<f64>| -> Result<Box<dyn Simplification>, SimplifyError> {
+        let resolution = value.unwrap_or(params.resolution);
+        let lattice = AngleParams { resolution, ..params };
+        Ok(Box::new(prepare(shape, &lattice, &run_again)?))
+    };
+    Ok(ByKnob::new(knob, params.theta, run, at))
 }

@@ -22,14 +22,14 @@
 //! # The level
 //! The paper has none: the density of the samples decides the size of the result. So a requested
 //! number of spheres is met by a search over the number of samples, at the paper's constants
-//! (`size=density`; `methods/size_search.rs`). The sampling is of the same kind as the shape's, with
+//! (`size=density`; `methods/levels.rs`). The sampling is of the same kind as the shape's, with
 //! blue noise in place of vertices. All other levels use the shape's own samples.
 //!
 //! For comparison there is the *strength* `t`, which multiplies both thresholds, `[t theta]` and
 //! `[t rho]`; the paper has `t = 1`. The value of a facet is the largest `t` at which it is kept. With
 //! `size=ranking` a number of spheres is met by the facets of largest value. From `t = 4` on no angle
 //! suffices, and only ratios count. Facets of equal value are kept in the order of the size of their
-//! balls, then spread over the shape (`methods/ties.rs`).
+//! balls, then spread over the shape (`methods/ranked.rs`).
 //!
 //! # Deviations from the paper
 //! - The paper restricts the result to the inside of a watertight surface that it reconstructs;
@@ -64,9 +64,9 @@ use medial::surface::Side;
 use serde::{Deserialize, Serialize};
 use umbrella::{Place, Umbrellas};
 
-use crate::by_knob::ByKnob;
-use crate::ranked_facets::{FacetSet, FacetValue, RankedFacets};
-use crate::scale::{Published, Scale};
+use crate::levels::ByKnob;
+use crate::ranked::{FacetSet, FacetValue, RankedFacets};
+use crate::ranked::{Published, Scale};
 
 medial::parameters! {
     /// Parameters of the Voronoi subcomplex; the default is the paper's.

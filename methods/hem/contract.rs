@@ -1,15 +1,17 @@
 //! The contraction: collapses the edge of smallest Hausdorff error; the survivor does not move.
 
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
 use medial::complex::MedialMesh;
 use medial::complex::collapse::{Candidate, Collapse, CollapseComplex, CollapseQueue};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 use rayon::prelude::*;
 
+use super::SampleLists;
+use super::edge::Star;
 use super::edge::{Edge, Ground, NONE};
-use super::edges::{Edges, ascending};
-use super::params::{Blocking, HemParams, Inside};
-use super::samples::SampleLists;
-use super::star::Star;
+use super::{Blocking, HemParams, Inside};
 
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 256;
@@ -363,5 +365,41 @@ fn enqueue(queue: &mut CollapseQueue, complex: &CollapseComplex, ends: [u32; 2],
     if !edge.is_barred() && cost < edge.queued {
         edge.queued = cost;
         queue.push(candidate(complex, ends, cost));
+    }
+}
+
+// The table of the edges, by their ends.
+
+/// Edges by their ends, ascending. Never iterated.
+pub(super) type Edges = HashMap<[u32; 2], Edge, BuildHasherDefault<EndsHasher>>;
+
+/// Two ends in order.
+pub(super) fn ascending(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// Hash of two ids: multiply and mix.
+#[derive(Default)]
+pub(super) struct EndsHasher(u64);
+
+impl Hasher for EndsHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.write_u32(u32::from(byte));
+        }
+    }
+
+    #[inline]
+    fn write_u32(&mut self, id: u32) {
+        let mixed = (self.0 ^ u64::from(id)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.0 = mixed ^ (mixed >> 29);
+    }
+
+    fn write_usize(&mut self, _length: usize) {
+        // The length of the array, which is always two.
     }
 }

@@ -99,33 +99,25 @@
 //!
 //! [`CollapseComplex::keeps_homotopy`]: medial::complex::collapse::CollapseComplex::keeps_homotopy
 
-mod bound;
 mod contract;
 mod edge;
-mod edges;
-#[cfg(test)]
-mod model;
-mod params;
-mod samples;
-mod star;
 #[cfg(test)]
 mod tests;
 
 use std::sync::Arc;
 
-use medial::complex::MedialMesh;
+use contract::{Contraction, Stop};
+use medial::Vec3;
 use medial::complex::collapse::replay;
-use medial::shape::{Shape, ShapeError};
+use medial::complex::{MedialMesh, MedialUnion, UnionError};
+use medial::metrics::{EnvelopeOptions, MetricError, sample_envelope};
+use medial::shape::{ContactSets, Shape, ShapeError};
 use medial::simplifier::{
     Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
     Simplified, SimplifyError,
 };
-
-pub use params::{Blocking, HemParams, Inside, Sides};
-
-use bound::{Found, Ruler, last_within};
-use contract::{Contraction, Stop};
-use samples::SampleLists;
+use medial::surface::TriangleBvh;
+use serde::{Deserialize, Serialize};
 
 /// Cost at which [`Level::Published`] stops: the default of the authors' code.
 const PUBLISHED: f64 = 1e-4;
@@ -337,4 +329,270 @@ fn answer(
 ) -> Result<Simplified, SimplifyError> {
     mesh.check()?;
     Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
+}
+
+// The parameters of HEM.
+
+medial::parameters! {
+    /// Parameters of HEM.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct HemParams {
+        /// Error of a sample inside the union: its depth in the deepest primitive, or its distance to
+        /// the nearest surface of a primitive, buried ones included.
+        inside: Inside = Inside::Depth, "depth or surface";
+        /// The error that a bound covers: that at the samples, or also the distance from the boundary
+        /// of the union to the surface.
+        sides: Sides = Sides::One, "one or both";
+        /// Blocked collapses: those that change the homotopy type, or as in the authors' code those of
+        /// edges whose ends have a common neighbour without a face.
+        blocking: Blocking = Blocking::Homotopy, "homotopy or neighbours";
+    }
+}
+
+/// The error of a sample inside the union. Outside, it is always the distance to the nearest
+/// primitive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Inside {
+    /// Its depth in the primitive that holds it deepest: `|sigma|`.
+    Depth,
+    /// Its distance to the nearest surface of a primitive, buried ones included: `mu`.
+    Surface,
+}
+
+/// The directions in which the error of a whole mesh is measured. The order of the collapses always
+/// uses one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sides {
+    /// From the samples to the union, as published.
+    One,
+    /// Also from the boundary of the union to the surface.
+    Both,
+}
+
+/// The collapses that are blocked to protect the topology.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Blocking {
+    /// Those that change the homotopy type.
+    Homotopy,
+    /// Those of edges whose ends have a common neighbour that forms no face with them, as in the
+    /// authors' code.
+    Neighbours,
+}
+
+// The error of a medial mesh, and the search for the last collapse within a bound.
+
+/// Approximate number of samples on the boundary of the union.
+const ENVELOPE_SAMPLES: usize = 20_000;
+/// A point deeper than this in some primitive, in diagonals, is not on the boundary of the union.
+const MAX_BURIAL: f64 = 1e-7;
+/// Number of evenly spread states that are measured before a bound is refused.
+const SPREAD_STATES: usize = 16;
+
+/// Measures medial meshes. Lengths are fractions of the diagonal.
+pub(super) struct Ruler {
+    /// The samples that some sphere is responsible for.
+    pub samples: Vec<Vec3>,
+    /// The error of a sample inside the union.
+    pub inside: Inside,
+    /// The surface, if the other direction counts too.
+    pub surface: Option<Arc<TriangleBvh>>,
+}
+
+impl Ruler {
+    /// The largest error of a sample against the whole union; with two sides also that of a point on
+    /// the union's boundary against the surface.
+    ///
+    /// # Errors
+    /// When the mesh has no union.
+    pub(super) fn error(&self, mesh: &MedialMesh) -> Result<f64, SimplifyError> {
+        let union = MedialUnion::new(mesh).map_err(no_union)?;
+        let at_samples = sample_error(mesh, &union, &self.samples, self.inside)?;
+        let Some(surface) = &self.surface else {
+            return Ok(at_samples);
+        };
+        let options = EnvelopeOptions { samples: ENVELOPE_SAMPLES, burial: MAX_BURIAL, seed: 0 };
+        let boundary = sample_envelope(mesh, &union, &options).map_err(no_boundary)?;
+        let nearest = surface.closest_batch(&boundary);
+        Ok(nearest.iter().map(|n| n.distance).fold(at_samples, f64::max))
+    }
+}
+
+fn no_union(error: UnionError) -> SimplifyError {
+    SimplifyError::Unsupported { why: error.to_string() }
+}
+
+fn no_boundary(error: MetricError) -> SimplifyError {
+    SimplifyError::Unsupported { why: error.to_string() }
+}
+
+/// Largest error of a sample against the whole union, in one of the two readings.
+fn sample_error(
+    mesh: &MedialMesh,
+    union: &MedialUnion,
+    samples: &[Vec3],
+    inside: Inside,
+) -> Result<f64, SimplifyError> {
+    let largest = |distances: Vec<f64>| distances.into_iter().fold(0.0, |m, d| d.abs().max(m));
+    if inside == Inside::Depth {
+        return Ok(largest(union.signed_batch(samples)));
+    }
+    // The union leaves out spheres inside cones, but their surfaces count in this reading.
+    let spheres = MedialUnion::of_spheres(&mesh.spheres).map_err(no_union)?;
+    let mut distances = union.unsigned_nearest_batch(samples);
+    for (distance, sphere) in distances.iter_mut().zip(spheres.unsigned_nearest_batch(samples)) {
+        *distance = distance.min(sphere);
+    }
+    Ok(largest(distances))
+}
+
+/// The result of a search for a bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Found {
+    /// After this many collapses the mesh is within the bound; one more exceeds it or does not exist.
+    Within(usize),
+    /// No measured state is within the bound.
+    None {
+        /// Collapses of the state of least error.
+        best: usize,
+        /// That error.
+        error: f64,
+        /// Number of states that were measured.
+        measured: usize,
+    },
+}
+
+/// A large number of collapses, up to `all`, after which the mesh is within a bound, such that one
+/// more exceeds it.
+///
+/// The error is not monotone, and the initial mesh need not have the least one. So states are
+/// measured backwards from the last in growing steps. If even the initial mesh exceeds the bound,
+/// states spread over all collapses are measured. From the first state within the bound, bisection
+/// finds one whose next collapse exceeds it.
+///
+/// # Errors
+/// Those of the measurement.
+pub(super) fn last_within(
+    all: usize,
+    bound: f64,
+    mut error_at: impl FnMut(usize) -> Result<f64, SimplifyError>,
+) -> Result<Found, SimplifyError> {
+    let (mut best, mut measured) = ((f64::INFINITY, 0), 0);
+    // Remembers the best state, for the message of a refusal.
+    let mut is_within = |collapses: usize| {
+        let error = error_at(collapses)?;
+        measured += 1;
+        if error < best.0 {
+            best = (error, collapses);
+        }
+        Ok::<bool, SimplifyError>(error <= bound)
+    };
+    let (mut within, mut beyond, mut step) = (all, all + 1, 1);
+    let mut is_found = is_within(within)?;
+    while !is_found && within > 0 {
+        beyond = within;
+        within = within.saturating_sub(step);
+        step *= 2;
+        is_found = is_within(within)?;
+    }
+    // From coarse to fine, so that the first state within is the coarsest of them.
+    for k in (1..SPREAD_STATES).rev() {
+        if is_found {
+            break;
+        }
+        (within, beyond) = (all * k / SPREAD_STATES, all * (k + 1) / SPREAD_STATES);
+        is_found = within < beyond && is_within(within)?;
+    }
+    // Invariant: `within` was measured and holds the bound; `beyond` exceeds it or is `all + 1`.
+    while is_found && beyond - within > 1 {
+        let middle = within + (beyond - within) / 2;
+        if is_within(middle)? {
+            within = middle;
+        } else {
+            beyond = middle;
+        }
+    }
+    let none = Found::None { best: best.1, error: best.0, measured };
+    Ok(if is_found { Found::Within(within) } else { none })
+}
+
+// The boundary samples that each sphere is responsible for.
+
+/// The boundary samples and for each sphere the ids of its own, each once, ascending.
+///
+/// A sample that several spheres touch is in several lists. The list of a sphere never loses a sample
+/// while the sphere exists, and the total length never grows.
+#[derive(Clone, Debug)]
+pub(super) struct SampleLists {
+    points: Arc<[Vec3]>,
+    of_sphere: Vec<Vec<u32>>,
+}
+
+impl SampleLists {
+    /// The samples that each sphere touches.
+    pub(super) fn of_contacts(contacts: &ContactSets) -> Self {
+        let lists = (0..contacts.spheres()).map(|v| contacts.ids(v).to_vec()).collect();
+        Self::new(Arc::clone(contacts.samples()), lists)
+    }
+
+    /// Lists in any order, with repetitions.
+    pub(super) fn new(points: Arc<[Vec3]>, mut of_sphere: Vec<Vec<u32>>) -> Self {
+        for list in &mut of_sphere {
+            list.sort_unstable();
+            list.dedup();
+        }
+        Self { points, of_sphere }
+    }
+
+    /// Number of spheres at the beginning.
+    pub(super) fn spheres(&self) -> usize {
+        self.of_sphere.len()
+    }
+
+    /// The samples of a sphere, ascending.
+    pub(super) fn of(&self, v: u32) -> &[u32] {
+        &self.of_sphere[v as usize]
+    }
+
+    /// The position of a sample.
+    #[inline]
+    pub(super) fn point(&self, id: u32) -> Vec3 {
+        self.points[id as usize]
+    }
+
+    /// Assigns the samples of a removed sphere to the survivor.
+    pub(super) fn assign(&mut self, removed: u32, kept: u32) {
+        let gone = std::mem::take(&mut self.of_sphere[removed as usize]);
+        self.of_sphere[kept as usize] = merged(&self.of_sphere[kept as usize], &gone);
+    }
+
+    /// Length of all lists together.
+    pub(super) fn assigned(&self) -> usize {
+        self.of_sphere.iter().map(Vec::len).sum()
+    }
+
+    /// The samples that are in some list, in the order of their ids.
+    pub(super) fn touched(&self) -> Vec<Vec3> {
+        let mut ids = self.of_sphere.concat();
+        ids.sort_unstable();
+        ids.dedup();
+        ids.into_iter().map(|id| self.point(id)).collect()
+    }
+}
+
+/// The union of two ascending lists.
+fn merged(a: &[u32], b: &[u32]) -> Vec<u32> {
+    let mut union = Vec::with_capacity(a.len() + b.len());
+    let (mut a, mut b) = (a, b);
+    while let ([x, ..], [y, ..]) = (a, b) {
+        union.push(*x.min(y));
+        // Branch-free; a common element advances both lists, so it is kept once.
+        let (skip_a, skip_b) = (usize::from(x <= y), usize::from(y <= x));
+        (a, b) = (&a[skip_a..], &b[skip_b..]);
+    }
+    union.extend_from_slice(a);
+    union.extend_from_slice(b);
+    union
 }

@@ -7,11 +7,11 @@
 //!
 //! 1. The shape as a union of balls: the inner polar balls of its samples.
 //! 2. Radii times 1.002, centres moved by up to `1e-4 r`, the *jitter*, so that balls that touch in a
-//!    sample overlap in general position (the authors' tool; `methods/perturb.rs`).
+//!    sample overlap in general position (the authors' tool; `methods/levels.rs`).
 //! 3. Every radius is multiplied by the scale `s`.
 //! 4. The medial axis of the union of the grown balls, exact ([`UnionAxis`]). A ball that the union of
 //!    others covers contributes nothing.
-//! 5. Optional: sheets of small object angle are removed from the outside in (file `sheets.rs`).
+//! 5. Optional: sheets of small object angle are removed from the outside in (`sheets.rs`).
 //! 6. Radii are divided by `s`.
 //!
 //! Where grown parts touch, a tunnel closes or a loop appears. This is part of the transform: the result
@@ -30,17 +30,13 @@
 //!   we know the authors' tool does not undo it either. Without step 2 (`radius_factor=1`, `jitter=0`)
 //!   rounding decides which polar balls meet at scale 1, and the result is torn; a warning says so.
 //! - The authors choose the density of the samples, `delta`, beside `s`; with `size=density` a number of
-//!   spheres is met by the number of samples at `s` = 1.1 (`methods/size_search.rs`). Each count then
+//!   spheres is met by the number of samples at `s` = 1.1 (`methods/levels.rs`). Each count then
 //!   has balls of its own.
 //! - By default a number of spheres is met by a search on `s`. Not every count occurs: the result is the
 //!   largest count met that does not exceed the request; a count within 1 % ends the search. The seconds
 //!   of a request are those of all scales that it tried.
 
-mod params;
-mod search;
 mod sheets;
-#[cfg(test)]
-mod tests;
 
 use std::sync::Arc;
 
@@ -50,11 +46,10 @@ use medial::simplifier::{
     Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
     Simplification, Simplified, SimplifyError,
 };
+use serde::{Deserialize, Serialize};
 
-use crate::by_knob::ByKnob;
-use crate::perturb::perturbed;
-
-pub use params::{SatParams, Size};
+use super::{Prepared, Scaled};
+use crate::levels::{ByKnob, perturbed, within};
 
 /// Scale of [`Level::Published`]: the default of the authors' tool.
 const PUBLISHED: f64 = 1.1;
@@ -213,7 +208,7 @@ impl Simplification for Prepared {
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
             }
-            Level::Spheres(count) => search::to_count(self, count, &mut diagnostics)?,
+            Level::Spheres(count) => to_count(self, count, &mut diagnostics)?,
         };
         scaled.diagnose(self.spheres.len(), &mut diagnostics);
         Ok(Simplified {
@@ -223,5 +218,206 @@ impl Simplification for Prepared {
             diagnostics,
             extras: Extras::default(),
         })
+    }
+}
+
+// The parameters of the scale axis transform.
+
+medial::parameters! {
+    /// Parameters of the scale axis transform; the default is that of the authors' tool, without its
+    /// angle filter.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SatParams {
+        /// Factor of all radii before the scale, so that balls that touch in a sample overlap.
+        radius_factor: f64 = 1.002, "pure number";
+        /// Largest seeded displacement of a centre along each axis.
+        jitter: f64 = 1e-4, "fraction of the radius";
+        /// Facets below it are removed from the outside in; the authors' tool has 30.
+        sat_angle: f64 = 0.0, "degrees of object angle, 0 for no filter";
+        /// Meet a number of spheres by the scale, or by the number of samples at scale 1.1.
+        size: Size = Size::Scale, "scale or density";
+    }
+}
+
+/// How a number of spheres is met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Size {
+    /// The scale, the samples as they are.
+    Scale,
+    /// The number of samples, at the published scale.
+    Density,
+}
+
+impl SatParams {
+    fn validate(self) -> Result<Self, SimplifyError> {
+        let ranges = [
+            ("radius_factor", self.radius_factor, 0.5..=2.0),
+            ("jitter", self.jitter, 0.0..=0.1),
+            ("sat_angle", self.sat_angle, 0.0..=90.0),
+        ];
+        for (name, value, range) in ranges {
+            within(name, value, range)?;
+        }
+        Ok(self)
+    }
+}
+
+// A scale for a number of spheres.
+//
+// 1. From scale 1 up, in steps that double, until the count is at most the requested one. The count can
+//    rise, because facets with more corners have more vertices. The ladder of scales ends when the
+//    count has stalled.
+// 2. Between the last two scales the Illinois variant of regula falsi, on logarithms of scale and
+//    count.
+//
+// No scale is tried twice.
+
+/// The first step above scale 1; each further one is twice as long.
+const FIRST_STEP: f64 = 0.1;
+
+/// Steps until the search gives up: scale 3,277.
+const MAX_STEPS: usize = 16;
+
+/// Steps before the test for a stall, up to scale 7.4: there the count can rise for long and fall later.
+const STEPS_BEFORE_STALL: usize = 7;
+
+/// The count has stalled if as many steps brought it down by less than this fraction.
+const STALL: (usize, f64) = (3, 0.03);
+
+/// Scales that are tried between two of these steps.
+const MAX_TRIES: usize = 8;
+
+/// A count within this fraction below the one asked ends the search.
+const TOLERANCE: f64 = 0.01;
+
+/// The scale axis with the largest count that the search meets of those not above `count`; with a
+/// larger one, the smallest met, where there is none.
+fn to_count(
+    sat: &Prepared,
+    count: usize,
+    diagnostics: &mut Diagnostics,
+) -> Result<Arc<Scaled>, SimplifyError> {
+    let mut tried = 0;
+    let mut at = |scale: f64| {
+        sat.run.step(tried, MAX_TRIES + 3)?;
+        tried += 1;
+        sat.at_scale(scale)
+    };
+    let (found, stalled) = match ladder(count, &mut at)? {
+        Ladder::Passed { fine, coarse } => (between(&fine, coarse, count, &mut at)?, false),
+        Ladder::First(only) => (only, false),
+        Ladder::Above { smallest, stalled } => (smallest, stalled),
+    };
+    diagnostics.count("scales_tried", tried);
+    if found.size() != count {
+        let (reached, scale) = (found.size(), found.scale);
+        let why = match reached > count {
+            true if stalled => "at larger scales the count does not fall any more",
+            true => "no scale tried has so few",
+            false if scale == 1.0 => "the medial axis of the union of balls has no more",
+            false => "the nearest count from below that the search on s met",
+        };
+        diagnostics.warn(format!("{reached} spheres instead of {count}, at s = {scale}: {why}"));
+    }
+    Ok(found)
+}
+
+/// Where the ladder of scales ended.
+enum Ladder {
+    /// Scale 1 has no more spheres than asked.
+    First(Arc<Scaled>),
+    /// Between two scales.
+    Passed { fine: Arc<Scaled>, coarse: Arc<Scaled> },
+    /// Nowhere: the scale with the fewest spheres, the first of several.
+    Above { smallest: Arc<Scaled>, stalled: bool },
+}
+
+/// Step 1.
+fn ladder(
+    count: usize,
+    at: &mut impl FnMut(f64) -> Result<Arc<Scaled>, SimplifyError>,
+) -> Result<Ladder, SimplifyError> {
+    let mut fine = at(1.0)?;
+    if fine.size() <= count {
+        return Ok(Ladder::First(fine));
+    }
+    let mut smallest = Arc::clone(&fine);
+    let mut least = vec![fine.size()];
+    for step in 0..MAX_STEPS {
+        let scaled = at(1.0 + FIRST_STEP * f64::powi(2.0, step as i32))?;
+        if scaled.size() <= count {
+            return Ok(Ladder::Passed { fine, coarse: scaled });
+        }
+        if scaled.size() < smallest.size() {
+            smallest = Arc::clone(&scaled);
+        }
+        least.push(smallest.size());
+        fine = scaled;
+        if has_stalled(&least) {
+            return Ok(Ladder::Above { smallest, stalled: true });
+        }
+    }
+    Ok(Ladder::Above { smallest, stalled: false })
+}
+
+/// Whether the ladder goes nowhere, from the least counts up to each of its scales.
+fn has_stalled(least: &[usize]) -> bool {
+    let (steps, fall) = STALL;
+    let last = least.len() - 1;
+    last >= STEPS_BEFORE_STALL && least[last] as f64 > (1.0 - fall) * least[last - steps] as f64
+}
+
+/// Step 2. Aims a little below the count, since a count above is of no use.
+fn between(
+    fine: &Scaled,
+    mut coarse: Arc<Scaled>,
+    count: usize,
+    at: &mut impl FnMut(f64) -> Result<Arc<Scaled>, SimplifyError>,
+) -> Result<Arc<Scaled>, SimplifyError> {
+    let target = ((1.0 - TOLERANCE / 2.0) * count as f64).ln();
+    let point = |s: &Scaled| (s.scale.ln(), (s.size() as f64).max(0.5).ln() - target);
+    let (mut low, mut high) = (point(fine), point(&coarse));
+    let mut last_was_above = None;
+    for _ in 0..MAX_TRIES {
+        if coarse.size() as f64 >= (1.0 - TOLERANCE) * count as f64 {
+            break;
+        }
+        let share = (low.1 / (low.1 - high.1)).clamp(0.05, 0.95);
+        let logarithm = low.0 + share * (high.0 - low.0);
+        if logarithm <= low.0 || logarithm >= high.0 {
+            break;
+        }
+        let scaled = at(logarithm.exp())?;
+        let is_above = scaled.size() > count;
+        // Illinois: an end that stays twice counts half.
+        let again = last_was_above == Some(is_above);
+        if is_above {
+            low = point(&scaled);
+            high.1 *= if again { 0.5 } else { 1.0 };
+        } else {
+            high = point(&scaled);
+            low.1 *= if again { 0.5 } else { 1.0 };
+            if scaled.size() >= coarse.size() {
+                coarse = scaled;
+            }
+        }
+        last_was_above = Some(is_above);
+    }
+    Ok(coarse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ladder_stalls_only_late_and_when_flat() {
+        // A plate: rises and stays above.
+        let plate = [3205; 8];
+        assert!(!has_stalled(&plate[..7]) && has_stalled(&plate));
+        // Falls by a third of a tenth each step.
+        let slow: Vec<usize> = (0..12).map(|k| (5000.0 * 0.97_f64.powi(k)) as usize).collect();
+        assert!((7..12).all(|k| !has_stalled(&slow[..=k])));
     }
 }

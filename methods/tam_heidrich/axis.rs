@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::parts::without_fins;
 use super::{AxisChoice, TamHeidrichParams};
-use crate::perturb::perturbed;
+use crate::levels::perturbed;
 
 /// A medial mesh with everything that pruning needs.
 pub(super) struct Axis {

@@ -59,7 +59,7 @@
 //!   stays, also in the rounds without a test.
 //! - Inner poles that are equally far from their sample, up to rounding, are all taken. On a grid which of
 //!   them is farthest is decided by rounding, and sheets would end in other places at each corner of a box.
-//! - Radii times 1.002 and centres moved by up to `1e-7 r` before the axis is made (`methods/perturb.rs`),
+//! - Radii times 1.002 and centres moved by up to `1e-7 r` before the axis is made (`methods/levels.rs`),
 //!   because rounding tears the axis of polar balls as they are, see [`medial::complex::union_axis`].
 //!   The results are 0.2 % larger. The paper merges equal corners before it makes the Voronoi diagram of
 //!   them; here those that stem from one sample are a little apart, and what the merging would not have
@@ -99,7 +99,7 @@ use parts::{Parts, Remaining};
 use schedule::Pruning;
 use serde::{Deserialize, Serialize};
 
-use crate::within::within;
+use crate::levels::within;
 
 /// Name of the extra that holds the poles that are left, [`RemainingPoles`].
 pub const POLES: &str = "poles";

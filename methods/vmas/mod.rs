@@ -91,7 +91,7 @@ use rayon::prelude::*;
 use sampling::{Ended, NONE, Solid, Tally, VariationalSampling};
 use serde::{Deserialize, Serialize};
 
-use crate::within::within;
+use crate::levels::within;
 
 /// Spheres of [`Level::Published`]: CGAL's default.
 const PUBLISHED: usize = 100;

@@ -12,11 +12,17 @@
 //! values, or when no value is left to try. The answer is the largest count met that does not exceed the
 //! request. No value is tried twice.
 
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 
-use medial::complex::MedialMesh;
+use medial::Vec3;
+use medial::complex::{MedialMesh, Sphere};
 use medial::shape::{Shape, ShapeError};
-use medial::simplifier::{Diagnostics, Level, RunContext, Simplified, SimplifyError};
+use medial::simplifier::{
+    Diagnostics, Level, RunContext, Simplification, Simplified, SimplifyError,
+};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 /// A count within this fraction below the requested one ends the search; comparisons at equal counts
 /// accept such a count.
@@ -273,6 +279,117 @@ fn or_empty(result: Result<Probe, SimplifyError>) -> Result<Probe, SimplifyError
         ) => Ok(Probe { mesh: MedialMesh::default(), diagnostics: Diagnostics::default() }),
         result => result,
     }
+}
+
+// Methods that meet a number of spheres by a knob other than their level: the density of the samples,
+// or the resolution of a lattice (below).
+
+/// A method on one shape, as it is prepared.
+type Prepared<'s> = Box<dyn Simplification + 's>;
+
+/// Prepares a method at a value of the knob; without one, as the shape and the parameters have it.
+type Prepare<'s> = Box<dyn Fn(Option<f64>) -> Result<Prepared<'s>, SimplifyError> + Send + 's>;
+
+/// A shape whose numbers of spheres are met by a knob. All other levels are those of the value that the
+/// shape and the parameters have. Nothing is kept between levels, so that each costs what it would
+/// cost alone.
+pub(crate) struct ByKnob<'s> {
+    prepare: Prepare<'s>,
+    search: SizeSearch,
+    /// The native level of every number of spheres.
+    native: f64,
+}
+
+impl<'s> ByKnob<'s> {
+    /// By any knob.
+    pub(crate) fn new(
+        knob: Knob,
+        native: f64,
+        run: &RunContext,
+        prepare: impl Fn(Option<f64>) -> Result<Prepared<'s>, SimplifyError> + Send + 's,
+    ) -> Self {
+        let search = SizeSearch::new(knob, run);
+        Self { prepare: Box::new(prepare), search, native }
+    }
+
+    /// By the number of samples of a shape. Builds what all samplings share, the tree and the inside
+    /// test of the surface, so that they count as substrates.
+    ///
+    /// # Errors
+    /// When the surface has no face.
+    pub(crate) fn of_samples(
+        shape: &'s Shape,
+        native: f64,
+        run: &RunContext,
+        prepare: impl Fn(&Shape) -> Result<Prepared<'static>, SimplifyError> + Send + 's,
+    ) -> Result<Self, SimplifyError> {
+        shape.surface_tree()?;
+        shape.inside_test();
+        let at = move |samples: Option<f64>| -> Result<Prepared<'s>, SimplifyError> {
+            match samples {
+                None => Ok(prepare(shape)?),
+                Some(samples) => Ok(prepare(&resampled(shape, samples))?),
+            }
+        };
+        Ok(Self::new(Knob::samples(), native, run, at))
+    }
+}
+
+impl Simplification for ByKnob<'_> {
+    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+        let Level::Spheres(count @ 1..) = level else {
+            return (self.prepare)(None)?.at(level);
+        };
+        let Self { prepare, search, native, .. } = self;
+        search.at(
+            count,
+            |_| *native,
+            |value| {
+                let Simplified { mesh, diagnostics, .. } =
+                    prepare(Some(value))?.at(Level::Native(*native))?;
+                Ok(Probe { mesh, diagnostics })
+            },
+        )
+    }
+}
+
+// Parameters that have a range.
+
+/// Refuses a parameter outside its range; a NaN is outside every one.
+pub(crate) fn within<T: PartialOrd + Display>(
+    name: &str,
+    value: T,
+    range: RangeInclusive<T>,
+) -> Result<(), SimplifyError> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    let (least, most) = (range.start(), range.end());
+    Err(SimplifyError::Parameter(format!("{name} = {value} is outside {least} to {most}")))
+}
+
+// Balls in general position, for methods on unions of polar balls.
+//
+// Polar balls meet in samples by construction, but only up to rounding, which decides at random which
+// of them overlap there. With slightly larger radii and slightly moved centres, as in the authors' tool
+// of the scale axis transform, they all overlap.
+
+/// The balls with radii times `radius_factor` and centres moved by at most `jitter` radii along each
+/// axis, each by its own random numbers in order.
+pub(crate) fn perturbed(
+    balls: &[Sphere],
+    radius_factor: f64,
+    jitter: f64,
+    seed: u64,
+) -> Vec<Sphere> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut offset = || rng.random_range(-1.0..=1.0);
+    let moved = |ball: &Sphere| {
+        let offset = Vec3::new(offset(), offset(), offset());
+        let centre = ball.centre + jitter * ball.radius * offset;
+        Sphere::new(centre, ball.radius * radius_factor)
+    };
+    balls.iter().map(moved).collect()
 }
 
 #[cfg(test)]
