@@ -139,7 +139,6 @@ mod tests {
     use rand_pcg::Pcg64;
 
     use super::critical_scales;
-    use super::*;
 
     #[test]
     fn critical_scales_are_those_of_all_pairs() {

@@ -26,7 +26,7 @@ use medial::simplifier::{
 use medial::surface::{InsideTest, Side, TriangleBvh};
 use rayon::prelude::*;
 
-use super::{AngleParams, grid};
+use super::AngleParams;
 use crate::levels::{ByKnob, Knob};
 use crate::ranked::{Scale, Wanted, break_ties, mean};
 

@@ -44,7 +44,6 @@ use medial::simplifier::{
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::FacetAngle;
 use crate::levels::ByKnob;
 use crate::ranked::{
     FacetSet, Published, Ranked, RankedFacets, Scale, Sheets, Wanted, Without, break_ties,
@@ -334,7 +333,7 @@ fn peel_by_samples<'s>(
     FacetSet::refuse_given(shape)?;
     let run_again = run.clone();
     let at = move |shape: &Shape| -> Result<Box<dyn Simplification>, SimplifyError> {
-        Ok(Box::new(peel(shape, super::scale(theta), &run_again)?))
+        Ok(Box::new(peel(shape, scale(theta), &run_again)?))
     };
     ByKnob::of_samples(shape, theta, run, at)
 }

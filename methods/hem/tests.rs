@@ -279,7 +279,7 @@ fn readings_differ_inside() {
     assert!(error(&surface) < 1e-15, "on the sphere");
     let all = |model: &Model| {
         let (samples, inside) = (model.points.clone(), model.inside);
-        bound::Ruler { samples, inside, surface: None }.error(&model.mesh()).unwrap()
+        Ruler { samples, inside, surface: None }.error(&model.mesh()).unwrap()
     };
     assert!((all(&depth) - 1.0).abs() < 1e-15 && all(&surface) < 1e-15);
 }

@@ -48,7 +48,6 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::{Prepared, Scaled};
 use crate::levels::{ByKnob, perturbed, within};
 
 /// Scale of [`Level::Published`]: the default of the authors' tool.
