@@ -64,8 +64,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use crate::levels::{Knob, Probe, SizeSearch};
 use crate::levels::within;
+use crate::levels::{Knob, Probe, SizeSearch};
 
 /// Spheres that the authors' scripts choose at most.
 const PUBLISHED_PICKS: usize = 100;
