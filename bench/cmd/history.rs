@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use medial_reports::history::{Findings, HistoryError, Run, read_runs};
+use medial_reports::history::{Findings, Run, read_runs};
 use medial_reports::read_records;
 use serde_json::{json, to_value};
 
@@ -81,10 +81,8 @@ fn add(arguments: &Arguments) -> Result<(Option<PathBuf>, Vec<String>), Failure>
     let path = store.join(RESULTS);
     let journaled = read_records(&path).map_err(Failure::input)?;
     let warnings = journaled.bad_lines.iter().map(|line| format!("{}: {line}", path.display()));
-    let run = Run::of_records(&journaled.records, commit, date).map_err(|error| match error {
-        HistoryError::Commit(_) | HistoryError::Date(_) => Failure::usage(error),
-        error => Failure::input(format!("{}: {error}", store.display())),
-    })?;
+    let run = Run::of_records(&journaled.records, commit, date)
+        .map_err(|error| Failure::input(format!("{}: {error}", store.display())))?;
     let (file, is_new) = run.add_to(folder).map_err(Failure::input)?;
     Ok((is_new.then_some(file), warnings.collect()))
 }

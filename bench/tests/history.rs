@@ -23,7 +23,7 @@ fn a_run_is_added_once_and_a_regression_ends_in_code_4() {
     assert_eq!((code, &object["regressions"]), (0, &0.into()));
     assert!(json(&with(COMMIT)).1["added"].is_null(), "a run is added once");
     let (code, _, stderr) = run(&with("HEAD"));
-    assert!(code == 2 && stderr.contains("--commit HEAD"), "{stderr}");
+    assert!(code == 1 && stderr.contains("--commit HEAD"), "{stderr}");
     assert_eq!(run(&["history", &history, "--add", &store]).0, 2, "a run needs its commit");
 
     let (code, stdout, stderr) = run(&["history", &history, "-o", &page]);

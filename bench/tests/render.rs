@@ -22,12 +22,14 @@ fn every_kind_of_picture_is_written() {
         assert_eq!(run(&["simplify", mesh, "-m", "qmat", "--spheres", spheres, "-o", path]).0, 0);
     }
     let out = at("x.png");
-    let cases: [(&[&str], [u32; 2]); 8] = [
+    let cases: [(&[&str], [u32; 2]); 7] = [
         (&[], [160, 120]),
-        (&["--camera", "top", "--up", "z", "--perspective", "--zoom", "1.5"], [160, 120]),
+        (&["--camera", "top", "--up", "z", "--zoom", "1.5"], [160, 120]),
         (&[&coarse], [160, 120]),
-        (&[&coarse, "--color", "stability", "--camera", "-1,0,0.5"], [160, 120]),
-        (&[&coarse, "--color", "plain", "--background", "transparent"], [160, 120]),
+        (
+            &[&coarse, "--color", "plain", "--camera", "-1,0,0.5", "--background", "transparent"],
+            [160, 120],
+        ),
         (&[&coarse, "--show", "reconstruction", "--tolerance", "0.03"], [160, 120]),
         (&[&coarse, "--show", "error", "--tolerance", "0.03", "--max-error", "0.02"], [160, 120]),
         (&[&coarse, &fine, "--show", "error", "--tolerance", "0.03"], [412, 280]),
@@ -40,12 +42,6 @@ fn every_kind_of_picture_is_written() {
         assert_eq!((&object["width"], &object["height"]), (&size[0].into(), &size[1].into()));
         fs::remove_file(&out).expect("the picture");
     }
-    let (code, _, stderr) =
-        run(&["render", mesh, &coarse, "-o", &out, "--size", "64x64", "--turntable", "3"]);
-    assert_eq!(code, 0, "{stderr}");
-    let turned: Vec<_> = (0..3).map(|k| fs::read(at(&format!("x-00{k}.png")))).collect();
-    assert!(turned.iter().all(Result::is_ok) && !Path::new(&out).exists());
-    assert_eq!(size_of(&at("x-002.png")), [64, 64]);
 }
 
 #[test]
@@ -72,7 +68,7 @@ fn wrong_words_are_named_and_nothing_is_written() {
     let (out, axis, points) = (at("x.png"), at("ball.ma"), at("points.ma"));
     fs::write(&axis, "1 0 0\nv 0 0 0 0.9\n").expect("written");
     fs::write(&points, "2 1 0\nv 0 0 0 0\nv 0.5 0 0 0\ne 0 1\n").expect("written");
-    let cases: [(&[&str], i32, &str); 20] = [
+    let cases: [(&[&str], i32, &str); 18] = [
         (&["--size", "800"], 2, "--size 800"),
         (&["--size", "8x8"], 2, "--size: a picture of 8 by 8"),
         (&["--size", "90000x10"], 2, "--size: a picture of 90000 by 10"),
@@ -84,12 +80,10 @@ fn wrong_words_are_named_and_nothing_is_written() {
         (&["--zoom", "0"], 2, "--zoom: a zoom of 0"),
         (&["--zoom", "nan"], 2, "--zoom: a zoom of NaN"),
         (&["--background", "mauve"], 2, "--background mauve"),
-        (&["--turntable", "0"], 2, "--turntable 0"),
         (&["--max-error", "0"], 2, "--max-error 0"),
         (&["--tolerance", "2"], 2, "--tolerance 2"),
         (&["--show", "error"], 2, "--show error: name a medial mesh"),
         (&[&axis, &axis, "--show", "reconstruction"], 2, "--show reconstruction"),
-        (&[&axis, &axis, "--turntable", "4"], 2, "--turntable 4"),
         (&[&axis, "--show", "error", "--tolerance", "1e-7"], 2, "is feasible"),
         (&["no-such.ma"], 1, "no-such.ma"),
         (&[&points, "--show", "error"], 1, "points.ma: all spheres have radius zero"),

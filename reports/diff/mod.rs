@@ -1,14 +1,14 @@
 //! Two sets of records of one study, an older and a newer one: what became worse, better, or merely different.
 //!
-//! 1. **Pairs** (`pairs`): records of one mesh, row, level and seed, measured under the same settings. What has no
+//! 1. **Pairs** (`results`): records of one mesh, row, level and seed, measured under the same settings. What has no
 //!    partner, or one that cannot be compared, is named with the reason.
-//! 2. **What is deterministic** (`exact`): results, errors, counts, topology. Compared exactly; every change is listed,
+//! 2. **What is deterministic** (`results`): results, errors, counts, topology. Compared exactly; every change is listed,
 //!    and called a regression where it is for the worse by more than its threshold.
-//! 3. **Seconds** (`timing`): the same work takes other seconds each time. A slowdown is called a regression only if
-//!    it is larger than a threshold, its bootstrap interval excludes none at all, and the repetitions agree.
+//! 3. **Seconds** (`timing`): the same work takes other seconds each time. A slowdown in CPU seconds is called a
+//!    regression only if it is larger than a threshold, its bootstrap interval excludes none at all, and the repetitions
+//!    agree. Wall-clock seconds are shown and are no gate.
 
-mod exact;
-mod pairs;
+mod results;
 mod text;
 mod timing;
 
@@ -19,7 +19,7 @@ use serde_json::Value;
 
 use crate::record::Record;
 
-use pairs::Pairs;
+use results::Pairs;
 
 pub use timing::Timing;
 
@@ -30,8 +30,7 @@ pub struct DiffOptions {
     pub error: f64,
     /// Peak of memory.
     pub memory: f64,
-    /// CPU seconds of a method over all meshes; twice as much on a single mesh, and twice by the clock on the wall,
-    /// which other programs disturb.
+    /// CPU seconds of a method over all meshes; twice as much on a single mesh.
     pub seconds: f64,
     /// Whether repetition `k` of both sides ran right after each other, so that they are compared in pairs.
     pub alternating: bool,
@@ -138,7 +137,7 @@ impl Diff {
     pub fn new(names: [String; 2], old: &[Record], new: &[Record], options: DiffOptions) -> Self {
         let Pairs { both, missing, added, unlike } = Pairs::new(old, new);
         let mut changes: Vec<Change> =
-            both.iter().flat_map(|pair| exact::changes(pair, &options)).collect();
+            both.iter().flat_map(|pair| results::changes(pair, &options)).collect();
         // Stable: within one meaning the order of the pairs remains.
         changes.sort_by_key(|change| change.meaning);
         let (timings, untimed) = timing::timings(&both, &options);

@@ -143,9 +143,9 @@ fn timing_table(diff: &Diff) -> Table {
         }
     };
     let note = format!(
-        "The methods' own seconds, without shared substrates. Slower or faster: by more than {:.0} % ({:.0} % on a single \
-         mesh, twice by the wall clock), in the mean and by the fastest repetitions, with an interval that excludes 1, and nine of ten repetitions on that \
-         side. {together}",
+        "The methods' own seconds, without shared substrates. Slower or faster: by more than {:.0} % of CPU seconds \
+         ({:.0} % on a single mesh), in the mean and by the fastest repetitions, with an interval that excludes 1, and \
+         nine of ten repetitions on that side. {together}",
         100.0 * options.seconds,
         200.0 * options.seconds
     );

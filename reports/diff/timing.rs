@@ -1,6 +1,6 @@
 //! Whether a method became slower, from repeated timings of both builds.
 //!
-//! One number for each repetition: the mean, over the results of a method, of the logarithm of new over old seconds.
+//! One number for each repetition: the mean, over the results of a method, of the logarithm of new over old CPU seconds.
 //! Over the repetitions of these numbers, a slowdown is a regression only if
 //!
 //! 1. its mean is beyond the threshold,
@@ -14,14 +14,15 @@
 //! slowed the machine in that moment slowed both. Otherwise both sides are resampled by themselves, and a machine that
 //! was busier on one of the two days cannot be told from a slower program.
 //!
-//! The method's own time is what counts; substrates, which methods share, have a row of their own.
+//! The method's own time counts. Substrates, which methods share, have their own row. Wall-clock seconds are shown and
+//! have no meaning here.
 
 use std::collections::BTreeMap;
 
 use medial::geometry::hash::splitmix;
 use serde::Serialize;
 
-use super::pairs::Pair;
+use super::results::Pair;
 use super::{DiffOptions, Meaning};
 use crate::record::{Record, Repetition, Stages};
 
@@ -66,9 +67,10 @@ pub struct Timing {
     pub meaning: Option<Meaning>,
 }
 
-/// The clocks, and the factor on the threshold.
-const CLOCKS: [(&str, Clock, f64); 2] =
-    [("cpu", |r| r.cpu_seconds, 1.0), ("wall", |r| r.seconds, 2.0)];
+/// The clocks, and whether a change by them means anything: other programs disturb the clock on the wall, so it is shown
+/// and never a gate.
+const CLOCKS: [(&str, Clock, bool); 2] =
+    [("cpu", |r| r.cpu_seconds, true), ("wall", |r| r.seconds, false)];
 
 /// Stages of a repetition by a clock.
 type Clock = fn(&Repetition) -> Stages;
@@ -183,7 +185,7 @@ impl<'a> Group<'_, 'a> {
     /// The row by one clock; `None` where all times are too short.
     fn timing(
         &self,
-        &(name, clock, factor): &(&'static str, Clock, f64),
+        &(name, clock, is_gate): &(&'static str, Clock, bool),
         options: &DiffOptions,
     ) -> Option<Timing> {
         let pairs = self.long(clock);
@@ -195,12 +197,12 @@ impl<'a> Group<'_, 'a> {
         });
         let Shift { mean, interval, agreement } = Shift::new(&old, &new, options.alternating);
         let alone = if self.mesh.is_some() { 2.0 } else { 1.0 };
-        let threshold = (alone * factor * options.seconds).ln_1p();
+        let threshold = (alone * options.seconds).ln_1p();
         let fastest = self.fastest_shift(&pairs, clock);
         // The smaller of the two shifts, where they have one sign.
         let least = if mean * fastest > 0.0 { mean.abs().min(fastest.abs()) } else { 0.0 };
         let is_certain = agreement >= AGREEMENT && interval[0] * interval[1] > 0.0;
-        let meaning = (least > threshold && is_certain).then_some(match mean > 0.0 {
+        let meaning = (is_gate && least > threshold && is_certain).then_some(match mean > 0.0 {
             true => Meaning::Regression,
             false => Meaning::Improvement,
         });

@@ -115,7 +115,7 @@ impl<'a> Findings<'a> {
             for point in &run.series {
                 let setting = [run.machine.as_str(), run.conditions.as_str()];
                 let series = (&point.mesh, &point.method, &point.level);
-                let track = tracks.entry((series, setting, run.meshes.get(&point.mesh)));
+                let track = tracks.entry((series, setting, &point.mesh_hash));
                 let track = track.or_insert_with(|| Track { setting, points: vec![] });
                 track.points.push((index, point));
             }

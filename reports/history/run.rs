@@ -17,42 +17,23 @@ use crate::text::printable;
 /// Why a run cannot be stored, or a history cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum HistoryError {
-    /// The file system refused.
-    #[error("{}: {source}", path.display())]
-    Io {
+    /// A file or folder cannot be read or written, or is not as it was written.
+    #[error("{}: {message}", path.display())]
+    File {
         /// The file or folder.
         path: PathBuf,
-        /// The reason.
-        source: io::Error,
-    },
-    /// The file of a run is not as it was written.
-    #[error("{}: {message}; restore the file, or remove it", path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong in it.
+        /// What is wrong.
         message: String,
     },
-    /// The run is there already, with other results.
-    #[error("{}: the history has this run with other content; remove the file to replace it", .0.display())]
-    Taken(PathBuf),
-    /// The commit is no hash.
-    #[error("--commit {0}: expected 8 to 64 hexadecimal digits, as printed by git rev-parse HEAD")]
-    Commit(String),
-    /// The date is none.
-    #[error("--date {0}: expected YYYY-MM-DD or YYYY-MM-DDTHH:MM:SS with any time zone")]
-    Date(String),
-    /// The records are of more than one machine or study.
-    #[error("{item}: {what} differs from the other records; a run is one study on one machine")]
-    Mixed {
-        /// Mesh and method of the record.
-        item: String,
-        /// What differs.
-        what: &'static str,
-    },
-    /// There is nothing to store.
-    #[error("no record: a run needs the results of `medial compare`")]
-    Empty,
+    /// Records, commit and date do not make a run.
+    #[error("{0}")]
+    NoRun(String),
+}
+
+impl HistoryError {
+    fn file(path: &Path, message: impl ToString) -> Self {
+        Self::File { path: path.to_owned(), message: message.to_string() }
+    }
 }
 
 /// What one build measured in one study.
@@ -68,8 +49,6 @@ pub struct Run {
     pub machine: String,
     /// What results depend on beside mesh, method and level: sampling, samples, seeds, threads.
     pub conditions: String,
-    /// First digits of the hash of each mesh.
-    pub meshes: BTreeMap<String, String>,
     /// The measured items, sorted by mesh, method and level.
     pub series: Vec<Point>,
 }
@@ -79,6 +58,9 @@ pub struct Run {
 pub struct Point {
     /// Name of the mesh.
     pub mesh: String,
+    /// First digits of the hash of its content; empty for a run that ended before it was read.
+    #[serde(default)]
+    pub mesh_hash: String,
     /// The method with its parameters, or the name that it was given.
     pub method: String,
     /// The requested level.
@@ -109,48 +91,47 @@ impl Run {
     /// # Errors
     /// When there is no record, the records are of several machines or studies, or commit or date are malformed.
     pub fn of_records(records: &[Record], commit: &str, date: &str) -> Result<Self, HistoryError> {
+        let invalid = |message: String| Err(HistoryError::NoRun(message));
         if !(8..=64).contains(&commit.len()) || !commit.bytes().all(|b| b.is_ascii_hexdigit()) {
-            return Err(HistoryError::Commit(commit.to_owned()));
+            return invalid(format!("--commit {commit}: expected 8 to 64 hexadecimal digits"));
         }
         // The date is sorted as text and is part of a file name.
         let is_day = |day: &str| {
-            day.bytes().enumerate().all(|(k, byte)| match k {
-                4 | 7 => byte == b'-',
-                _ => byte.is_ascii_digit(),
-            })
+            let mut bytes = day.bytes().enumerate();
+            bytes.all(|(k, b)| if k == 4 || k == 7 { b == b'-' } else { b.is_ascii_digit() })
         };
         let is_plain = date.bytes().all(|b| b.is_ascii_alphanumeric() || b"-+:.".contains(&b));
         if !date.get(..10).is_some_and(is_day) || !is_plain {
-            return Err(HistoryError::Date(date.to_owned()));
+            return invalid(format!("--date {date}: expected YYYY-MM-DD or YYYY-MM-DDTHH:MM:SSZ"));
         }
-        let last = records.last().ok_or(HistoryError::Empty)?;
+        let Some(last) = records.last() else { return invalid("no record".to_owned()) };
         let mut run = Self {
             date: date.to_owned(),
             commit: commit.to_ascii_lowercase(),
             version: printable(&last.version),
             machine: machine(&last.machine),
             conditions: conditions(last),
-            meshes: BTreeMap::new(),
             series: vec![],
         };
+        let mut hashes = BTreeMap::new();
         let mut series = BTreeMap::new();
         for record in records.iter().filter(|record| record.binary_hash == last.binary_hash) {
             let point = Point::of(record);
-            // A run that ended before its input was read has no hash.
-            let hash = record.mesh_hash.as_deref().map(first_digits);
-            let known =
-                hash.clone().map(|hash| run.meshes.entry(point.mesh.clone()).or_insert(hash));
-            let differs = [
-                ("the machine", machine(&record.machine) != run.machine),
-                ("sampling, dual, samples, seeds or threads", conditions(record) != run.conditions),
-                ("the content of the mesh", known.map(|known| known.clone()) != hash),
-            ];
-            if let Some((what, _)) = differs.into_iter().find(|(_, differs)| *differs) {
+            if machine(&record.machine) != run.machine || conditions(record) != run.conditions {
                 let item = format!("{}, {}", point.mesh, point.method);
-                return Err(HistoryError::Mixed { item, what });
+                return invalid(format!(
+                    "{item}: not the machine, samples, seeds or threads of the rest"
+                ));
+            }
+            if !point.mesh_hash.is_empty() {
+                hashes.insert(point.mesh.clone(), point.mesh_hash.clone());
             }
             let key = (point.mesh.clone(), point.method.clone(), point.level.clone());
             series.insert(key, point);
+        }
+        for point in series.values_mut().filter(|point| point.mesh_hash.is_empty()) {
+            // Otherwise a first time-out would begin another history.
+            point.mesh_hash = hashes.get(&point.mesh).cloned().unwrap_or_default();
         }
         run.series = series.into_values().collect();
         Ok(run)
@@ -167,29 +148,33 @@ impl Run {
     /// When the folder cannot be written, or has another run of this date and commit.
     pub fn add_to(&self, folder: &Path) -> Result<(PathBuf, bool), HistoryError> {
         let path = folder.join(self.file_name());
-        let failed = |source| HistoryError::Io { path: path.clone(), source };
+        let failed = |error: io::Error| HistoryError::file(&path, error);
+        let text = serde_json::to_string(self).map_err(|error| failed(error.into()))? + "\n";
         fs::create_dir_all(folder).map_err(failed)?;
-        let text = serde_json::to_string(self).map_err(|e| failed(e.into()))? + "\n";
         match fs::read_to_string(&path) {
-            Ok(old) if old == text => return Ok((path, false)),
-            Ok(_) => return Err(HistoryError::Taken(path)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-            Err(error) => return Err(failed(error)),
+            Ok(old) if old == text => Ok((path, false)),
+            Ok(_) => {
+                let message =
+                    "this run is stored with other content; remove the file to replace it";
+                Err(HistoryError::file(&path, message))
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                let written = medial::write_atomically(&path, |out| out.write_all(text.as_bytes()));
+                written.map_err(failed).map(|()| (path, true))
+            }
+            Err(error) => Err(failed(error)),
         }
-        medial::write_atomically(&path, |out| out.write_all(text.as_bytes())).map_err(failed)?;
-        Ok((path, true))
     }
 
     fn read(path: &Path) -> Result<Self, HistoryError> {
-        let failed = |source| HistoryError::Io { path: path.to_owned(), source };
-        let damaged = |message| HistoryError::Damaged { path: path.to_owned(), message };
-        let text = fs::read_to_string(path).map_err(failed)?;
-        let run: Self = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
-        let is_named = run.date.len() >= 10 && run.commit.len() >= 8;
-        if !is_named || path.file_name().is_none_or(|name| *name != *run.file_name()) {
-            return Err(damaged("date and commit are not those of its name".to_owned()));
+        let text = fs::read_to_string(path).map_err(|error| HistoryError::file(path, error))?;
+        let run = serde_json::from_str(&text).map_err(|error| HistoryError::file(path, error))?;
+        let Self { date, commit, .. } = &run;
+        let is_named = date.len() >= 10 && commit.len() >= 8;
+        match is_named && path.file_name().is_some_and(|name| *name == *run.file_name()) {
+            true => Ok(run),
+            false => Err(HistoryError::file(path, "date and commit are not those of its name")),
         }
-        Ok(run)
     }
 }
 
@@ -198,9 +183,9 @@ impl Run {
 /// # Errors
 /// When the folder cannot be listed.
 pub fn read_runs(folder: &Path) -> Result<(Vec<Run>, Vec<HistoryError>), HistoryError> {
-    let failed = |source| HistoryError::Io { path: folder.to_owned(), source };
-    let entries = fs::read_dir(folder).map_err(failed)?.collect::<Result<Vec<_>, _>>();
-    let mut paths: Vec<PathBuf> = entries.map_err(failed)?.iter().map(fs::DirEntry::path).collect();
+    let entries = fs::read_dir(folder).and_then(|entries| entries.collect::<io::Result<Vec<_>>>());
+    let entries = entries.map_err(|error| HistoryError::file(folder, error))?;
+    let mut paths: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
     paths.sort();
     let (mut runs, mut damaged) = (vec![], vec![]);
@@ -226,6 +211,7 @@ impl Point {
         let seconds = median(&repetitions).or(record.simplify.cpu_seconds.as_ref().map(own));
         Self {
             mesh: printable(&record.mesh),
+            mesh_hash: record.mesh_hash.as_deref().map(first_digits).unwrap_or_default(),
             method: printable(&row_name(record)),
             level: record.simplify.level.to_string(),
             status: record.status,

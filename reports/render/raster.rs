@@ -1,20 +1,75 @@
 //! Rasterisation: which facet is in front at each sample, and how much light comes from each pixel.
 //!
-//! 1. Corners are projected and snapped to 1/256 of a sample, so that the signs of edge functions are exact:
-//!    two facets at a side never share a sample and never leave one out (file `placed.rs`).
-//! 2. The picture is cut into bands of rows, each facet listed in those that it reaches; bands run in
-//!    parallel. Every sample sees the facets in the same order, so the picture is the same with any number of
-//!    threads.
-//! 3. In a band: the nearest facet of each sample (z-buffer), then glass, then the light of each pixel as
-//!    the mean over its samples ([`PixelLight`]).
+//! 1. Corners are projected and snapped to 1/256 of a sample, so that edge functions are integers and their signs exact:
+//!    two facets at a side never share a sample and never leave one out.
+//! 2. The picture is cut into bands of rows, each facet listed in those that it reaches. Bands run in parallel. Every
+//!    sample sees the facets in the same order, so the picture is the same with any number of threads.
+//! 3. In a band: the nearest facet of each sample (z-buffer), then glass, then the light of each pixel as the mean over
+//!    its samples ([`PixelLight`]).
 
+use std::ops::Range;
+
+use medial::Vec3;
 use rayon::prelude::*;
 
 use super::camera::Frame;
-use super::colour::{Light, mix};
-use super::facets::{Batch, Kind};
-use super::placed::{Placed, SIDE, Within, middle};
-use super::shade::{LINE, Lamp, glass_opacity};
+use super::light::{LINE, Lamp, Light, Paint, glass_opacity, mix};
+
+/// A triangle with the values that vary along it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet {
+    pub(super) corners: [Vec3; 3],
+    /// Unit normals at the corners.
+    pub(super) normals: [Vec3; 3],
+    /// Places in the colour map, 0 to 1; of glass, how much a corner faces the eye.
+    pub(super) places: [f32; 3],
+    /// Width of the line along the sides, side `k` from corner `k` to `k + 1`, in line widths.
+    pub(super) lines: [u8; 3],
+}
+
+/// Facets that look alike.
+#[derive(Clone, Debug)]
+pub(super) struct Batch {
+    pub(super) facets: Vec<Facet>,
+    pub(super) look: Look,
+}
+
+/// The look of a batch.
+#[derive(Clone, Debug)]
+pub(super) struct Look {
+    pub(super) paint: Paint,
+    pub(super) lines: Option<Lines>,
+    pub(super) kind: Kind,
+}
+
+/// Lines along the sides of facets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lines {
+    /// Half the width of a line of width 1, in pixels; the facets on both sides draw a half each.
+    pub(super) half_width: f32,
+    /// Share of ink, 0 to 1.
+    pub(super) opacity: f32,
+}
+
+/// How a batch hides what is behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Wholly.
+    Solid,
+    /// Hardly.
+    Glass,
+    /// As glass, and seen only where nothing solid is, before or behind.
+    Ghost,
+}
+
+/// Samples along a side of a pixel.
+const SIDE: usize = 3;
+
+/// Steps of a coordinate from one sample to the next.
+const STEPS: i64 = 256;
+
+/// Facets that reach farther from the picture than this, in steps, are left out: edge functions must not overflow.
+const FARTHEST: f64 = (1 << 29) as f64;
 
 /// Rows of pixels in a band: enough bands for all threads, few enough that most facets lie in one.
 const BAND: usize = 16;
@@ -22,87 +77,93 @@ const BAND: usize = 16;
 /// No facet.
 const NONE: u32 = u32::MAX;
 
-/// What a pixel shows, as sums over its samples of light and of shares.
+/// What a pixel shows, as means over its samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PixelLight {
-    /// Light of what is not glass, after the glass in front of it.
+    /// Light of the solid facets, after the glass in front of them.
     pub(super) solid: Light,
     /// Share of the pixel that this light comes from.
     pub(super) solid_share: f32,
     /// Share of the pixel that is glass.
     pub(super) glass_share: f32,
-    /// Share that is covered by what is not glass.
+    /// Share that is covered by solid facets.
     pub(super) covered: f32,
-    /// Depth of what is not glass, in pixels; without meaning where nothing is covered.
+    /// Depth of the solid facets, in pixels; without meaning where nothing is covered.
     pub(super) depth: f32,
-    /// Depth of the farthest of it.
+    /// Depth of the farthest of them.
     pub(super) farthest: f32,
 }
 
 /// Draws batches on a picture of this size: the light of every pixel, row by row.
-pub(super) fn rasterise(batches: &[Batch], frame: &Frame, size: [usize; 2]) -> Vec<PixelLight> {
-    let placed = place(batches, frame, size);
-    let bands = size[1].div_ceil(BAND);
-    let lists = list_by_band(&placed, bands, size[1]);
-    let rows: Vec<Vec<PixelLight>> = (0..bands)
-        .into_par_iter()
-        .map(|band| {
-            let top = band * BAND;
-            let bottom = (top + BAND).min(size[1]);
-            let list = &lists.facets[lists.start[band]..lists.start[band + 1]];
-            let samples = Band::new(top, bottom, size[0]);
-            samples.draw(batches, &placed, list, frame, frame.scale(size[0], size[1]))
+pub(super) fn rasterise(batches: Vec<Batch>, frame: &Frame, size: [usize; 2]) -> Vec<PixelLight> {
+    let project = frame.projection(size);
+    let mut facets: Vec<PlacedFacet> = Vec::new();
+    let mut looks = Vec::new();
+    for (id, Batch { facets: some, look }) in batches.into_iter().enumerate() {
+        let place = |facet| PlacedFacet::new(&project, id as u32, facet);
+        facets.par_extend(some.into_par_iter().filter_map(place));
+        looks.push(look);
+    }
+    let picture = FacetPicture { facets: &facets, looks: &looks, lamp: Lamp::new(frame) };
+    let rows: Vec<Vec<PixelLight>> = (by_band(&facets, size[1]).into_par_iter().enumerate())
+        .map(|(band, list)| {
+            let rows = band * BAND..((band + 1) * BAND).min(size[1]);
+            Band::new(rows, size[0]).draw(&picture, &list)
         })
         .collect();
     rows.concat()
 }
 
-fn place(batches: &[Batch], frame: &Frame, size: [usize; 2]) -> Vec<Placed> {
-    let mut all = Vec::new();
-    let lens = frame.lens(size);
-    for (id, batch) in batches.iter().enumerate() {
-        let facets = batch.facets.par_iter().enumerate();
-        all.par_extend(
-            facets
-                .filter_map(|(facet, shown)| Placed::new(&lens, [id as u32, facet as u32], shown)),
-        );
-    }
-    all
-}
-
-/// For each band the facets that reach it, ascending.
-struct Lists {
-    start: Vec<usize>,
-    facets: Vec<u32>,
-}
-
-fn list_by_band(placed: &[Placed], bands: usize, height: usize) -> Lists {
-    let reach = |placed: &Placed| {
-        let rows = placed.samples(1, 0, height * SIDE);
-        let of = |row: usize| row / (BAND * SIDE);
-        if rows.is_empty() { 0..0 } else { of(rows.start)..of(rows.end - 1) + 1 }
-    };
-    let mut start = vec![0; bands + 1];
-    for band in placed.iter().flat_map(reach) {
-        start[band + 1] += 1;
-    }
-    for band in 0..bands {
-        start[band + 1] += start[band];
-    }
-    let mut next = start.clone();
-    let mut facets = vec![0; start[bands]];
-    for (id, facet) in placed.iter().enumerate() {
-        for band in reach(facet) {
-            facets[next[band]] = id as u32;
-            next[band] += 1;
+/// For each band of a height the facets that reach it, ascending.
+fn by_band(facets: &[PlacedFacet], height: usize) -> Vec<Vec<u32>> {
+    let mut lists = vec![vec![]; height.div_ceil(BAND)];
+    for (id, facet) in facets.iter().enumerate() {
+        let rows = facet.samples(1, 0..height * SIDE);
+        if !rows.is_empty() {
+            let bands = rows.start / (BAND * SIDE)..=(rows.end - 1) / (BAND * SIDE);
+            lists[bands].iter_mut().for_each(|list| list.push(id as u32));
         }
     }
-    Lists { start, facets }
+    lists
+}
+
+/// What the bands have in common.
+struct FacetPicture<'a> {
+    facets: &'a [PlacedFacet],
+    looks: &'a [Look],
+    lamp: Lamp,
+}
+
+impl FacetPicture<'_> {
+    fn look(&self, facet: &PlacedFacet) -> &Look {
+        &self.looks[facet.batch as usize]
+    }
+
+    /// The light of a facet on some samples of a pixel, whose first sample is at this column and row. It is lit once,
+    /// in their middle: only its outline and its lines need every sample.
+    fn light(&self, share: &FacetShare, corner: [usize; 2]) -> Light {
+        let facet = &self.facets[share.id as usize];
+        let (look, sides) = (self.look(facet), Sides::new(facet));
+        let samples = || share.samples(corner);
+        let sum = samples().fold([0; 2], |sum, at| [sum[0] + at[0], sum[1] + at[1]]);
+        let count = i64::from(share.mask.count_ones());
+        let w = sides.weights(sum.map(|sum| sum / count));
+        let normal = w[0] * facet.normals[0] + w[1] * facet.normals[1] + w[2] * facet.normals[2];
+        let light = self.lamp.shade(normal, look.paint.at(weighted(&w, facet.places)));
+        let Some(lines) = look.lines.filter(|_| facet.lines != [0; 3]) else { return light };
+        let ends = sides.line_ends(facet, lines);
+        let on_line = samples().filter(|at| sides.is_on_line(&ends, *at)).count();
+        mix(light, LINE, lines.opacity * on_line as f32 / count as f32)
+    }
+}
+
+fn weighted(weights: &[f64; 3], values: [f32; 3]) -> f32 {
+    weights.iter().zip(values).map(|(w, value)| *w as f32 * value).sum()
 }
 
 /// The samples of a band of rows.
 struct Band {
-    rows: std::ops::Range<usize>,
+    rows: Range<usize>,
     columns: usize,
     nearness: Vec<f64>,
     /// Which facet is in front.
@@ -112,8 +173,8 @@ struct Band {
 }
 
 impl Band {
-    fn new(top: usize, bottom: usize, width: usize) -> Self {
-        let (rows, columns) = (top * SIDE..bottom * SIDE, width * SIDE);
+    fn new(rows: Range<usize>, width: usize) -> Self {
+        let (rows, columns) = (rows.start * SIDE..rows.end * SIDE, width * SIDE);
         let count = rows.len() * columns;
         Self {
             rows,
@@ -124,33 +185,24 @@ impl Band {
         }
     }
 
-    fn draw(
-        mut self,
-        batches: &[Batch],
-        placed: &[Placed],
-        list: &[u32],
-        frame: &Frame,
-        scale: f64,
-    ) -> Vec<PixelLight> {
-        let is_glass = |id: u32| batches[placed[id as usize].batch as usize].kind != Kind::Solid;
-        for &id in list.iter().filter(|&&id| !is_glass(id)) {
-            self.bring_forward(&placed[id as usize], id);
+    fn draw(mut self, picture: &FacetPicture<'_>, list: &[u32]) -> Vec<PixelLight> {
+        let facet = |id: u32| &picture.facets[id as usize];
+        let is_solid = |&&id: &&u32| picture.look(facet(id)).kind == Kind::Solid;
+        for &id in list.iter().filter(is_solid) {
+            self.bring_forward(facet(id), id);
         }
-        // After all else is in place: glass behind it does not show.
-        for &id in list.iter().filter(|&&id| is_glass(id)) {
-            let facet = &placed[id as usize];
-            self.lay_over(facet, batches);
+        // Glass comes last: behind solid facets it does not show.
+        for &id in list.iter().filter(|id| !is_solid(id)) {
+            self.lay_over(facet(id), picture.look(facet(id)));
         }
-        let lit = Lit { batches, placed, frame, scale, lamp: Lamp::new(frame) };
-        let pixels = self.columns / SIDE;
-        let of_rows = (0..self.rows.len() / SIDE)
-            .flat_map(|row| (0..pixels).map(move |column| (row, column)));
-        of_rows.map(|(row, column)| self.pixel(row, column, &lit)).collect()
+        let (rows, columns) = (self.rows.len() / SIDE, self.columns / SIDE);
+        let pixels = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        pixels.map(|(row, column)| self.pixel(row, column, picture)).collect()
     }
 
-    fn bring_forward(&mut self, facet: &Placed, id: u32) {
+    fn bring_forward(&mut self, facet: &PlacedFacet, id: u32) {
         let (top, columns) = (self.rows.start, self.columns);
-        facet.scan(self.rows.clone(), columns, |row, column, nearness| {
+        facet.scan(&Sides::new(facet), self.rows.clone(), columns, |row, column, nearness| {
             let sample = (row - top) * columns + column;
             if nearness > self.nearness[sample] {
                 self.nearness[sample] = nearness;
@@ -159,139 +211,242 @@ impl Band {
         });
     }
 
-    fn lay_over(&mut self, placed: &Placed, batches: &[Batch]) {
+    fn lay_over(&mut self, facet: &PlacedFacet, look: &Look) {
         let (top, columns) = (self.rows.start, self.columns);
-        let within = Within::new(placed, batches);
-        let batch = &batches[placed.batch as usize];
-        let only_alone = batch.kind == Kind::Ghost;
-        let lines = batch.lines.filter(|_| within.facet.lines != [0; 3]);
-        let lines = lines.map(|lines| (lines.opacity, within.line_ends(lines)));
-        placed.scan(self.rows.clone(), columns, |row, column, nearness| {
+        let sides = Sides::new(facet);
+        let lines = look.lines.filter(|_| facet.lines != [0; 3]);
+        let lines = lines.map(|lines| (lines.opacity, sides.line_ends(facet, lines)));
+        facet.scan(&sides, self.rows.clone(), columns, |row, column, nearness| {
             let sample = (row - top) * columns + column;
-            let is_seen = match only_alone {
-                true => self.front[sample] == NONE,
-                false => nearness > self.nearness[sample],
+            let is_seen = match look.kind {
+                Kind::Ghost => self.front[sample] == NONE,
+                _ => nearness > self.nearness[sample],
             };
             if is_seen {
                 let at = middle(row, column);
-                let facing = weighted(&within.weights(at), within.facet.places);
                 let line = match &lines {
-                    Some((opacity, ends)) if within.is_on_line(ends, at) => *opacity,
+                    Some((opacity, ends)) if sides.is_on_line(ends, at) => *opacity,
                     _ => 0.0,
                 };
+                let facing = weighted(&sides.weights(at), facet.places);
                 self.through[sample] *= 1.0 - glass_opacity(facing).max(line);
             }
         });
     }
 
     /// The light of a pixel, by its row and column in the band.
-    fn pixel(&self, row: usize, column: usize, lit: &Lit<'_>) -> PixelLight {
+    fn pixel(&self, row: usize, column: usize, picture: &FacetPicture<'_>) -> PixelLight {
         let mut sum = PixelLight { farthest: f32::NEG_INFINITY, ..PixelLight::default() };
-        let mut parts = [Part::NONE; SIDE * SIDE];
+        let mut shares = [FacetShare { id: NONE, through: 0.0, mask: 0 }; SIDE * SIDE];
         for k in 0..SIDE * SIDE {
-            let (y, x) = (row * SIDE + k / SIDE, column * SIDE + k % SIDE);
-            let sample = y * self.columns + x;
+            let sample = (row * SIDE + k / SIDE) * self.columns + column * SIDE + k % SIDE;
             let (id, through) = (self.front[sample], self.through[sample]);
             sum.glass_share += 1.0 - through;
             if id == NONE {
                 continue;
             }
-            if let Some(part) = parts.iter_mut().find(|part| part.id == id || part.id == NONE) {
-                part.add(id, through, k);
+            if let Some(share) = shares.iter_mut().find(|share| share.id == id || share.id == NONE)
+            {
+                *share =
+                    FacetShare { id, through: share.through + through, mask: share.mask | 1 << k };
             }
-            let depth = (lit.scale * lit.frame.depth(self.nearness[sample])) as f32;
+            let depth = -self.nearness[sample] as f32;
             sum.covered += 1.0;
             sum.depth += depth;
             sum.farthest = sum.farthest.max(depth);
         }
         let corner = [column * SIDE, self.rows.start + row * SIDE];
-        for part in parts.iter().take_while(|part| part.id != NONE) {
-            let light = lit.light(part, corner);
-            sum.solid = std::array::from_fn(|c| sum.solid[c] + part.through * light[c]);
-            sum.solid_share += part.through;
+        for share in shares.iter().take_while(|share| share.id != NONE) {
+            let light = picture.light(share, corner);
+            sum.solid = std::array::from_fn(|c| sum.solid[c] + share.through * light[c]);
+            sum.solid_share += share.through;
         }
-        sum.mean()
+        let count = (SIDE * SIDE) as f32;
+        PixelLight {
+            solid: sum.solid.map(|light| light / count),
+            solid_share: sum.solid_share / count,
+            glass_share: sum.glass_share / count,
+            covered: sum.covered / count,
+            depth: sum.depth / sum.covered.max(1.0),
+            farthest: sum.farthest,
+        }
     }
 }
 
-/// A facet's samples in a pixel. It is lit once, in their middle: only its outline and its lines need every sample.
+/// The samples of a pixel that show one facet.
 #[derive(Clone, Copy)]
-struct Part {
+struct FacetShare {
     id: u32,
     /// Light that glass lets through, as a sum.
     through: f32,
     /// Which samples, a bit for each.
-    samples: u32,
+    mask: u32,
 }
 
-impl Part {
-    const NONE: Self = Self { id: NONE, through: 0.0, samples: 0 };
-
-    fn add(&mut self, id: u32, through: f32, sample: usize) {
-        self.id = id;
-        self.through += through;
-        self.samples |= 1 << sample;
-    }
-
-    fn count(&self) -> u32 {
-        self.samples.count_ones()
-    }
-
+impl FacetShare {
     /// The middles of the samples, in steps, from the column and row of the pixel's first one.
-    fn places(&self, [column, row]: [usize; 2]) -> impl Iterator<Item = [i64; 2]> {
-        let samples = self.samples;
-        let taken = (0..SIDE * SIDE).filter(move |sample| samples >> sample & 1 == 1);
+    fn samples(&self, [column, row]: [usize; 2]) -> impl Iterator<Item = [i64; 2]> {
+        let mask = self.mask;
+        let taken = (0..SIDE * SIDE).filter(move |sample| mask >> sample & 1 == 1);
         taken.map(move |sample| middle(row + sample / SIDE, column + sample % SIDE))
     }
-
-    /// Inside the facet, which is convex.
-    fn middle(&self, corner: [usize; 2]) -> [i64; 2] {
-        let sum = self.places(corner).fold([0; 2], |sum, at| [sum[0] + at[0], sum[1] + at[1]]);
-        sum.map(|sum| sum / i64::from(self.count()))
-    }
 }
 
-impl PixelLight {
-    /// The mean from the sum over the samples of a pixel.
-    fn mean(self) -> Self {
-        let count = (SIDE * SIDE) as f32;
-        Self {
-            solid: self.solid.map(|light| light / count),
-            solid_share: self.solid_share / count,
-            glass_share: self.glass_share / count,
-            covered: self.covered / count,
-            depth: if self.covered > 0.0 { self.depth / self.covered } else { 0.0 },
-            farthest: self.farthest,
+/// The middle of a sample, in steps.
+fn middle(row: usize, column: usize) -> [i64; 2] {
+    [column, row].map(|k| STEPS * k as i64 + STEPS / 2)
+}
+
+/// A facet on the picture, its corners in clockwise order as seen there.
+struct PlacedFacet {
+    batch: u32,
+    at: [[i64; 2]; 3],
+    nearness: [f64; 3],
+    normals: [Vec3; 3],
+    places: [f32; 3],
+    lines: [u8; 3],
+}
+
+impl PlacedFacet {
+    /// `None` for facets that are seen from their side, and for those far off the picture.
+    fn new(project: &impl Fn(Vec3) -> [f64; 3], batch: u32, facet: Facet) -> Option<Self> {
+        let projected = facet.corners.map(project);
+        let mut at = [[0; 2]; 3];
+        for k in 0..3 {
+            for axis in 0..2 {
+                let steps = projected[k][axis] * (SIDE as i64 * STEPS) as f64;
+                if steps.is_nan() || steps.abs() >= FARTHEST {
+                    return None;
+                }
+                // Rounded without a call: the number whose fraction is cut off is positive.
+                at[k][axis] = (steps + FARTHEST + 0.5) as i64 - FARTHEST as i64;
+            }
+        }
+        let Facet { normals, places, lines, .. } = facet;
+        let nearness = projected.map(|p| p[2]);
+        let mut placed = Self { batch, at, nearness, normals, places, lines };
+        let area = placed.area();
+        if area < 0 {
+            placed.at.swap(1, 2);
+            placed.nearness.swap(1, 2);
+            placed.normals.swap(1, 2);
+            placed.places.swap(1, 2);
+            // Side k lies between corners k and k + 1: the middle one stays.
+            placed.lines.swap(0, 2);
+        }
+        (area != 0).then_some(placed)
+    }
+
+    /// Twice the area, in square steps.
+    fn area(&self) -> i64 {
+        let [a, b, c] = self.at;
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    }
+
+    /// The sample rows or columns whose middles the corners may enclose, cut to a range.
+    fn samples(&self, axis: usize, range: Range<usize>) -> Range<usize> {
+        let [a, b, c] = self.at.map(|at| at[axis]);
+        let cut = |x: i64| x.clamp(range.start as i64, range.end as i64) as usize;
+        let least = (a.min(b).min(c) - STEPS / 2).div_euclid(STEPS);
+        let most = (a.max(b).max(c) + STEPS / 2).div_euclid(STEPS);
+        cut(least)..cut(most + 1)
+    }
+
+    /// Calls `hit` for each sample in a range of rows that is inside, with its column and nearness.
+    fn scan(
+        &self,
+        sides: &Sides,
+        rows: Range<usize>,
+        columns: usize,
+        mut hit: impl FnMut(usize, usize, f64),
+    ) {
+        // Nearness is a plane over the picture: at corner 0, and its change for a step along x and y.
+        let [a, b, c] = self.at;
+        let [u, v] = [b, c].map(|p| [(p[0] - a[0]) as f64, (p[1] - a[1]) as f64]);
+        let [du, dv] = [1, 2].map(|k| self.nearness[k] - self.nearness[0]);
+        let area = self.area() as f64;
+        let zx = (du * v[1] - dv * u[1]) / area;
+        let zy = (dv * u[0] - du * v[0]) / area;
+        let columns = self.samples(0, 0..columns);
+        for row in self.samples(1, rows) {
+            let [first, y] = middle(row, columns.start);
+            let mut w = sides.inclusive(first, y);
+            let z_row = self.nearness[0] + zy * (y - a[1]) as f64;
+            let mut entered = false;
+            for column in columns.clone() {
+                // The sign bit of a disjunction is set if any of the three is negative.
+                if (w[0] | w[1] | w[2]) >= 0 {
+                    entered = true;
+                    let [x, _] = middle(0, column);
+                    hit(row, column, z_row + zx * (x - a[0]) as f64);
+                } else if entered {
+                    break;
+                }
+                for k in 0..3 {
+                    w[k] += STEPS * sides.along_x[k];
+                }
+            }
         }
     }
 }
 
-/// What the light of a sample follows from.
-struct Lit<'a> {
-    batches: &'a [Batch],
-    placed: &'a [Placed],
-    frame: &'a Frame,
-    /// Pixels for a unit.
-    scale: f64,
-    lamp: Lamp,
+/// Edge functions: positive on the inner side of a side, twice the area of it and the point.
+struct Sides {
+    along_x: [i64; 3],
+    along_y: [i64; 3],
+    at_origin: [i64; 3],
+    /// 1 for sides whose own points belong to the facet beyond.
+    excluded: [i64; 3],
 }
 
-impl Lit<'_> {
-    /// The light of a part of a pixel, which has its first sample at this column and row.
-    fn light(&self, part: &Part, corner: [usize; 2]) -> Light {
-        let placed = &self.placed[part.id as usize];
-        let within = Within::new(placed, self.batches);
-        let (batch, facet) = (&self.batches[placed.batch as usize], within.facet);
-        let w = within.weights(part.middle(corner));
-        let normal = w[0] * facet.normals[0] + w[1] * facet.normals[1] + w[2] * facet.normals[2];
-        let light = self.lamp.shade(normal, batch.paint.at(weighted(&w, facet.places)));
-        let Some(lines) = batch.lines.filter(|_| facet.lines != [0; 3]) else { return light };
-        let ends = within.line_ends(lines);
-        let on_line = part.places(corner).filter(|at| within.is_on_line(&ends, *at)).count();
-        mix(light, LINE, lines.opacity * on_line as f32 / part.count() as f32)
+impl Sides {
+    fn new(facet: &PlacedFacet) -> Self {
+        let zero = [0; 3];
+        let mut sides = Self { along_x: zero, along_y: zero, at_origin: zero, excluded: zero };
+        for k in 0..3 {
+            let (a, b) = (facet.at[k], facet.at[(k + 1) % 3]);
+            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            sides.along_x[k] = -dy;
+            sides.along_y[k] = dx;
+            sides.at_origin[k] = dy * a[0] - dx * a[1];
+            // Exactly one of a side and its reverse is included.
+            sides.excluded[k] = i64::from(!(dy > 0 || (dy == 0 && dx > 0)));
+        }
+        sides
     }
-}
 
-fn weighted(weights: &[f64; 3], values: [f32; 3]) -> f32 {
-    weights.iter().zip(values).map(|(w, value)| *w as f32 * value).sum()
+    fn at(&self, x: i64, y: i64) -> [i64; 3] {
+        std::array::from_fn(|k| self.at_origin[k] + self.along_x[k] * x + self.along_y[k] * y)
+    }
+
+    /// Not negative where the point belongs to the facet.
+    fn inclusive(&self, x: i64, y: i64) -> [i64; 3] {
+        let w = self.at(x, y);
+        std::array::from_fn(|k| w[k] - self.excluded[k])
+    }
+
+    /// Weights of the corners at a point; their sum is 1.
+    fn weights(&self, [x, y]: [i64; 2]) -> [f64; 3] {
+        let w = self.at(x, y).map(|w| w as f64);
+        let sum = w[0] + w[1] + w[2];
+        // Corner k lies across side k + 1.
+        [w[1] / sum, w[2] / sum, w[0] / sum]
+    }
+
+    /// How large the edge functions are where lines end; negative without a line.
+    fn line_ends(&self, facet: &PlacedFacet, lines: Lines) -> [f64; 3] {
+        let half = f64::from(lines.half_width) * (STEPS * SIDE as i64) as f64;
+        std::array::from_fn(|k| {
+            let (dx, dy) = (self.along_y[k] as f64, self.along_x[k] as f64);
+            match facet.lines[k] {
+                0 => -1.0,
+                width => half * f64::from(width) * (dx * dx + dy * dy).sqrt(),
+            }
+        })
+    }
+
+    fn is_on_line(&self, ends: &[f64; 3], [x, y]: [i64; 2]) -> bool {
+        let w = self.at(x, y);
+        (0..3).any(|k| (w[k] as f64) < ends[k])
+    }
 }

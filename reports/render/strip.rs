@@ -3,13 +3,10 @@
 use medial::complex::MedialMesh;
 use medial::surface::TriMesh;
 
-use super::bar::{Bar, LINE, letter_size, round_up};
 use super::camera::{Camera, Frame};
-use super::error::RenderError;
-use super::layers::{AxisColour, Layer, Scale};
-use super::lettering::{Align, Lettering, fitted};
-use super::picture::{Background, Picture};
-use super::{Scene, check_size};
+use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, round_up, text_width};
+use super::scene::{AxisColour, Layer, Scale, Scene};
+use super::{RenderError, check_size};
 
 /// What medial meshes are coloured by, before the scale is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,8 +14,6 @@ pub enum ColourBy {
     /// The radii of the spheres.
     #[default]
     Radius,
-    /// The stability ratio of edges and faces.
-    Stability,
     /// One colour for sheets, one for curves.
     Plain,
 }
@@ -26,23 +21,13 @@ pub enum ColourBy {
 impl ColourBy {
     /// The colours for some medial meshes of a shape with this bounding-box diagonal, and the bar that explains them.
     pub fn of(self, meshes: &[&MedialMesh], diagonal: f64) -> (AxisColour, Option<Bar>) {
-        let bar = |scale, times, title: &[&str]| Bar {
-            scale,
-            times,
-            title: title.iter().map(|line| (*line).to_owned()).collect(),
-            note: vec![],
-        };
         match self {
             Self::Plain => (AxisColour::Plain, None),
             Self::Radius => {
                 let scale = Scale::radii(meshes.iter().copied());
-                let bar = bar(scale, 100.0 / diagonal, &["radius", "% of diagonal"]);
+                let title = vec!["radius".into(), "% of diagonal".into()];
+                let bar = Bar { scale, times: 100.0 / diagonal, title, note: vec![] };
                 (AxisColour::Radius(scale), Some(bar))
-            }
-            Self::Stability => {
-                let scale = Scale { lo: 0.0, hi: 1.0, ..Scale::radii([]) };
-                let bar = bar(scale, 1.0, &["stability", "ratio"]);
-                (AxisColour::Stability(1.0 / diagonal), Some(bar))
             }
         }
     }
@@ -131,16 +116,16 @@ pub struct Strip<'a> {
     pub max_error: Option<f64>,
 }
 
-/// More pixels than this in one picture are taken for a slip.
+/// More pixels than this in one picture are rejected as implausible.
 const MOST_PIXELS_OF_ALL: usize = 1 << 27;
 
-/// Medial meshes beside each other: one panel each, its caption below, and in a second row their
-/// reconstructions coloured by error, with what they lack as glass, if any panel has one. Colours are on one scale along a row, which a bar at its
-/// end shows.
+/// Medial meshes next to each other: one panel each, its caption below. If any panel has errors, a second row shows the
+/// reconstructions coloured by error, with what they lack as glass. Colours are on one scale along a row, which a bar at
+/// its end shows.
 ///
 /// # Errors
 /// When there is no panel, the camera cannot be set up, or the picture is too large.
-pub fn strip(panels: &[Panel<'_>], strip: &Strip<'_>) -> Result<Picture, RenderError> {
+pub fn strip<'a>(panels: &'a [Panel<'a>], strip: &'a Strip<'a>) -> Result<Picture, RenderError> {
     if panels.is_empty() {
         return Err(RenderError::Empty);
     }
@@ -148,69 +133,65 @@ pub fn strip(panels: &[Panel<'_>], strip: &Strip<'_>) -> Result<Picture, RenderE
     let frame = Frame::fit(&strip.camera, &strip.surface.vertices)?;
     let meshes: Vec<&MedialMesh> = panels.iter().map(|panel| panel.axis).collect();
     let (colour, bar) = strip.colour.of(&meshes, strip.diagonal);
-    let axes = panels.iter().map(|panel| {
-        let axis = Layer::Axis { mesh: panel.axis, colour };
-        Some((vec![axis, Layer::Glass(strip.surface)], panel.caption.as_str()))
-    });
-    let mut axes = axes.peekable();
+    let across = strip.across.max(1);
     let mut rows = vec![];
-    while axes.peek().is_some() {
-        let cells = axes.by_ref().take(strip.across.max(1)).collect();
+    for (line, some) in panels.chunks(across).enumerate() {
+        let cell = |panel: &'a Panel<'a>| {
+            let axis = Layer::Axis { mesh: panel.axis, colour };
+            Some((vec![axis, Layer::Glass(strip.surface)], panel.caption.clone()))
+        };
         // One bar explains all lines.
-        let bar = bar.clone().filter(|_| rows.is_empty());
-        rows.push(Row { cells, bar });
+        let bar = bar.clone().filter(|_| line == 0);
+        rows.push(PanelRow { cells: some.iter().map(cell).collect(), bar });
     }
     let errors: Vec<&Errors<'_>> = panels.iter().filter_map(|p| p.errors.as_ref()).collect();
     if !errors.is_empty() {
-        let end = strip.max_error;
-        let end = end.unwrap_or_else(|| Errors::common_scale(&errors, strip.diagonal));
-        let scale = Scale::errors(end);
-        let mut cells = panels.iter().map(|panel| {
-            let errors = panel.errors.as_ref()?;
-            let layer = Layer::Values { mesh: errors.mesh, values: errors.values, scale };
-            Some((vec![layer, Layer::Ghost(strip.surface)], errors.caption.as_str()))
-        });
-        let mut bar = Some(Errors::bar(&errors, end, strip.diagonal));
-        while cells.len() > 0 {
-            let line = cells.by_ref().take(strip.across.max(1)).collect();
-            rows.push(Row { cells: line, bar: bar.take() });
+        let chosen = || Errors::common_scale(&errors, strip.diagonal);
+        let end = strip.max_error.unwrap_or_else(chosen);
+        for (line, some) in panels.chunks(across).enumerate() {
+            let cell = |panel: &'a Panel<'a>| {
+                let Errors { mesh, values, caption } = panel.errors.clone()?;
+                let layer = Layer::Values { mesh, values, scale: Scale::errors(end) };
+                Some((vec![layer, Layer::Ghost(strip.surface)], caption))
+            };
+            let bar = (line == 0).then(|| Errors::bar(&errors, end, strip.diagonal));
+            rows.push(PanelRow { cells: some.iter().map(cell).collect(), bar });
         }
     }
-    draw(&rows, strip, &frame)
+    draw(rows, strip, &frame)
 }
 
-/// A row of panels: what is drawn in each and stands below it, and the bar at the end.
-struct Row<'a> {
-    cells: Vec<Option<(Vec<Layer<'a>>, &'a str)>>,
+/// A row of panels: the layers and the caption of each, and the bar at the end.
+struct PanelRow<'a> {
+    cells: Vec<Option<(Vec<Layer<'a>>, String)>>,
     bar: Option<Bar>,
 }
 
-fn draw(rows: &[Row<'_>], strip: &Strip<'_>, frame: &Frame) -> Result<Picture, RenderError> {
-    let [width, height] = strip.size;
-    let letter = letter_size(strip.size);
+fn draw(rows: Vec<PanelRow<'_>>, strip: &Strip<'_>, frame: &Frame) -> Result<Picture, RenderError> {
+    let &Strip { size, background, .. } = strip;
+    let ([width, height], ink) = (size, background.ink());
+    let letter = letter_size(size);
     let caption = (LINE * letter * 1.3).ceil() as usize;
-    let column = if rows.iter().any(|row| row.bar.is_some()) { Bar::column(strip.size) } else { 0 };
+    let column = if rows.iter().any(|row| row.bar.is_some()) { Bar::column(size) } else { 0 };
     let columns = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
     let whole = [columns * width + column, rows.len() * (height + caption)];
     if whole[0] * whole[1] > MOST_PIXELS_OF_ALL {
-        let [width, height] = whole;
-        return Err(RenderError::Size { width, height, most: super::MOST_PIXELS });
+        return Err(RenderError::Size { width: whole[0], height: whole[1] });
     }
-    let mut picture = Picture::blank(whole[0], whole[1], strip.background);
-    let letters = Lettering { size: letter, ink: strip.background.ink(), align: Align::Middle };
-    for (index, row) in rows.iter().enumerate() {
+    let mut picture = Picture::blank(whole, background);
+    for (index, row) in rows.into_iter().enumerate() {
         let top = index * (height + caption);
-        for (k, cell) in row.cells.iter().enumerate() {
+        for (k, cell) in row.cells.into_iter().enumerate() {
             let Some((layers, words)) = cell else { continue };
-            let scene =
-                Scene { layers: layers.clone(), size: strip.size, background: strip.background };
-            picture.paste(&scene.picture(frame)?, k * width, top);
-            let words = fitted(words, letter, width as f64 - letter);
-            let at = [(k as f64 + 0.5) * width as f64, (top + height) as f64 + 1.3 * letter];
-            letters.write(&mut picture, at, &words);
+            let scene = Scene { layers, size, background };
+            picture.paste(&scene.picture(frame)?, [k * width, top]);
+            let words = fitted(&words, letter, width as f64 - letter);
+            let middle = (k as f64 + 0.5) * width as f64;
+            let left = middle - 0.5 * text_width(&words, letter);
+            picture.write([left, (top + height) as f64 + 1.3 * letter], &words, letter, ink);
         }
         if let Some(bar) = &row.bar {
-            bar.draw(&mut picture, [columns * width, top], height, letter, strip.background);
+            bar.draw(&mut picture, [columns * width, top], height, letter, ink);
         }
     }
     Ok(picture)

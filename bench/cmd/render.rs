@@ -1,0 +1,461 @@
+//! `medial render MESH [AXIS.ma ...] -o x.png`: pictures of a surface and of its medial meshes.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use medial::complex::{ContourError, MedialMesh, union_surface};
+use medial::shape::{Cost, Shape, ShapeOptions};
+use medial::surface::{SignedDistance, TriMesh};
+use medial::{Vec3, write_atomically};
+use medial_reports::render::{
+    Background, Bar, Camera, ColourBy, Errors, Frame, Layer, Panel, Picture, RenderError, Scale,
+    Scene, Strip, strip,
+};
+use serde_json::json;
+
+use crate::args::{AxisArguments, Global, MeshArgument};
+use crate::exit::{Exit, Failure};
+use crate::files::{check_extension, check_folder, medial_mesh_for};
+use crate::output::{counted, print_json, print_line};
+use crate::run::{Input, Source, StageLine, percent};
+
+/// Arguments of `render`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
+    mesh: MeshArgument,
+    /// Medial meshes of it (.ma or .ply with radii). Several give a strip: a panel for each, from the same camera.
+    axes: Vec<PathBuf>,
+    /// The picture (.png).
+    #[arg(short, long)]
+    output: PathBuf,
+    /// What is drawn [default: `axis`, `surface` without a medial mesh]. `error` with several medial meshes: both the
+    /// medial meshes and, below, their reconstructions.
+    #[arg(long, value_enum)]
+    show: Option<Show>,
+    /// What a medial mesh is coloured by.
+    #[arg(long, alias = "colour", value_enum, default_value_t = Colour::Radius)]
+    color: Colour,
+    /// `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`, AZIMUTH,ELEVATION in degrees, or X,Y,Z from the shape to
+    /// the eye [default: the direction that shows most of the shape].
+    #[arg(long, value_name = "VIEW", allow_hyphen_values = true)]
+    camera: Option<String>,
+    /// Upward direction: `x`, `y`, `z`, `-x`, `-y`, `-z` or X,Y,Z [default: `y`, `z` for shapes that are flat along `y`].
+    #[arg(long, value_name = "DIRECTION", allow_hyphen_values = true)]
+    up: Option<String>,
+    /// 1: the shape fills the picture; 2: twice as large.
+    #[arg(long, default_value_t = 1.0)]
+    zoom: f64,
+    /// Pixels of the picture, of a strip's panel.
+    #[arg(long, value_name = "WxH", default_value = "800x600")]
+    size: String,
+    /// `white`, `black`, `transparent` or `#rrggbb`.
+    #[arg(long, value_name = "COLOUR", default_value = "white")]
+    background: String,
+    /// The end of the scale of errors, as a fraction of the diagonal [default: 99 % of the errors are within it].
+    #[arg(long, value_name = "FRACTION")]
+    max_error: Option<f64>,
+    /// Largest distance of a reconstruction from the boundary of the union, as a fraction of the diagonal.
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.01)]
+    tolerance: f64,
+    #[command(flatten)]
+    fitting: AxisArguments,
+}
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Show {
+    /// The surface.
+    Surface,
+    /// The medial mesh, with the surface as glass around it.
+    Axis,
+    /// The boundary of the union of the spheres, cones and slabs.
+    Reconstruction,
+    /// The same, coloured by its distance to the surface: red outside, blue inside. Missing parts of the surface are
+    /// glass.
+    Error,
+}
+
+/// What a medial mesh is coloured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Colour {
+    /// The radii of the spheres.
+    Radius,
+    /// One colour for sheets, one for curves.
+    Plain,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When an input is rejected, an option is not understood, or the picture cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    // All options are checked before anything is read.
+    let wanted = Wanted::new(arguments)?;
+    let line = StageLine::new(global.stages());
+    line.at("reading");
+    let read = Read::new(arguments)?;
+    let camera = camera(arguments, read.shape.mesh())?;
+    line.at("making the reconstructions");
+    let deviations = match wanted.show {
+        Show::Error | Show::Reconstruction => arguments
+            .axes
+            .iter()
+            .zip(&read.axes)
+            .map(|(path, axis)| Deviation::new(&read.shape, path, axis, arguments.tolerance))
+            .collect::<Result<Vec<_>, _>>()?,
+        Show::Surface | Show::Axis => vec![],
+    };
+    line.at("drawing");
+    let (picture, drawing) = Cost::of(|| match read.axes.len() {
+        0 | 1 => single(arguments, &wanted, &read, camera, deviations.first()),
+        _ => side_by_side(arguments, &wanted, &read, camera, &deviations),
+    });
+    let picture = picture.map_err(usage)?;
+    let bytes = picture.to_png().map_err(Failure::input)?;
+    let output = &arguments.output;
+    write_atomically(output, |out| out.write_all(&bytes))
+        .map_err(|error| Failure::input(format!("{}: {error}", output.display())))?;
+    drop(line);
+    let (width, height) = (picture.width(), picture.height());
+    if global.json {
+        let errors = deviations.iter().map(|d| json!({ "max": d.max(), "mean": d.mean() }));
+        let object = json!({
+            "output": output, "width": width, "height": height,
+            "direction": camera.direction.to_array(), "up": camera.up.to_array(),
+            "errors": errors.collect::<Vec<_>>(), "seconds": drawing.seconds,
+        });
+        print_json(&object, &read.warnings);
+        return Ok(Exit::Done);
+    }
+    print_line(&format!("{}: {width} x {height} pixels", output.display()));
+    read.warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
+    Ok(Exit::Done)
+}
+
+/// The options after parsing.
+struct Wanted {
+    show: Show,
+    colour: ColourBy,
+    size: [usize; 2],
+    background: Background,
+}
+
+impl Wanted {
+    fn new(arguments: &Arguments) -> Result<Self, Failure> {
+        check_extension(&arguments.output, &["png"])?;
+        check_folder(&arguments.output)?;
+        let shares = [("max-error", arguments.max_error), ("tolerance", Some(arguments.tolerance))];
+        for (option, value) in shares {
+            if let Some(value) = value.filter(|value| !(*value > 0.0 && *value <= 1.0)) {
+                let message = format!("--{option} {value}: expected more than 0 and at most 1");
+                return Err(Failure::usage(message));
+            }
+        }
+        let colour = match arguments.color {
+            Colour::Radius => ColourBy::Radius,
+            Colour::Plain => ColourBy::Plain,
+        };
+        let (size, background) = (size(&arguments.size)?, background(&arguments.background)?);
+        Ok(Self { show: show(arguments)?, colour, size, background })
+    }
+}
+
+/// What is drawn, as far as there are medial meshes for it.
+fn show(arguments: &Arguments) -> Result<Show, Failure> {
+    let rejected = |show: Show, problem: &str| {
+        let word = show.to_possible_value().map_or_else(String::new, |v| v.get_name().into());
+        Err(Failure::usage(format!("--show {word}{problem}")))
+    };
+    match (arguments.show, arguments.axes.len()) {
+        (None, 0) => Ok(Show::Surface),
+        (None, _) => Ok(Show::Axis),
+        (Some(show), 0) if show != Show::Surface => {
+            rejected(show, ": name a medial mesh after the surface")
+        }
+        (Some(show @ (Show::Surface | Show::Reconstruction)), 2..) => {
+            rejected(show, " with several medial meshes: expected axis or error")
+        }
+        (Some(show), _) => Ok(show),
+    }
+}
+
+/// The inputs, in diagonals of the surface.
+struct Read {
+    shape: Shape,
+    axes: Vec<MedialMesh>,
+    warnings: Vec<String>,
+}
+
+impl Read {
+    fn new(arguments: &Arguments) -> Result<Self, Failure> {
+        let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
+        let input = Input::load(&source)?;
+        let mut warnings = input.report.warnings.clone();
+        let shape =
+            input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
+        let to_normal = *shape.normalisation();
+        let mut axes = Vec::new();
+        for path in &arguments.axes {
+            let (mesh, notes) = medial_mesh_for(path, &shape, &arguments.fitting)?.0.with_remarks();
+            warnings.extend(notes);
+            axes.push(mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)));
+        }
+        Ok(Self { shape, axes, warnings })
+    }
+}
+
+/// A strip of several medial meshes.
+fn side_by_side(
+    arguments: &Arguments,
+    wanted: &Wanted,
+    read: &Read,
+    camera: Camera,
+    deviations: &[Deviation],
+) -> Result<Picture, RenderError> {
+    let panel = |(k, axis): (usize, &'_ MedialMesh)| {
+        let name = arguments.axes[k].file_stem().unwrap_or_default().to_string_lossy();
+        let caption = format!("{name}, {}", counted(axis.spheres.len() as u64, "sphere"));
+        (caption, deviations.get(k).map(Deviation::errors))
+    };
+    let described: Vec<_> = read.axes.iter().enumerate().map(panel).collect();
+    let panels: Vec<Panel<'_>> = (described.into_iter().zip(&read.axes))
+        .map(|((caption, errors), axis)| Panel { axis, caption, errors })
+        .collect();
+    let common = Strip {
+        surface: read.shape.mesh(),
+        diagonal: 1.0,
+        camera,
+        size: wanted.size,
+        across: usize::MAX,
+        background: wanted.background,
+        colour: wanted.colour,
+        max_error: arguments.max_error,
+    };
+    strip(&panels, &common)
+}
+
+/// A picture of at most one medial mesh, with a bar where colours mean numbers.
+fn single(
+    arguments: &Arguments,
+    wanted: &Wanted,
+    read: &Read,
+    camera: Camera,
+    made: Option<&Deviation>,
+) -> Result<Picture, RenderError> {
+    let surface = read.shape.mesh();
+    let (layers, bar) = match (wanted.show, read.axes.first(), made) {
+        (Show::Axis, Some(mesh), _) => {
+            let (colour, bar) = wanted.colour.of(&[mesh], 1.0);
+            (vec![Layer::Axis { mesh, colour }, Layer::Glass(surface)], bar)
+        }
+        (Show::Reconstruction, _, Some(made)) => (vec![Layer::Surface(&made.mesh)], None),
+        (Show::Error, _, Some(made)) => {
+            let errors = made.errors();
+            let chosen = || Errors::common_scale(&[&errors], 1.0);
+            let end = arguments.max_error.unwrap_or_else(chosen);
+            let scale = Scale::errors(end);
+            let layer = Layer::Values { mesh: &made.mesh, values: &made.values, scale };
+            (vec![layer, Layer::Ghost(surface)], Some(Errors::bar(&[&errors], end, 1.0)))
+        }
+        _ => (vec![Layer::Surface(surface)], None),
+    };
+    let [width, height] = wanted.size;
+    // On a picture as small as an icon nothing would be left beside it.
+    let bar = bar.filter(|_| 2 * Bar::column(wanted.size) <= width);
+    let column = if bar.is_some() { Bar::column(wanted.size) } else { 0 };
+    let (size, background) = ([width - column, height], wanted.background);
+    let frame = Frame::fit(&camera, &surface.vertices)?;
+    let picture = Scene { layers, size, background }.picture(&frame)?;
+    Ok(match bar {
+        Some(bar) => bar.beside(&picture, wanted.size, background),
+        None => picture,
+    })
+}
+
+fn usage(error: RenderError) -> Failure {
+    let option = match error {
+        RenderError::Size { .. } => "--size: ",
+        RenderError::Direction(_) => "--camera: ",
+        RenderError::Up(_) => "--up: ",
+        RenderError::Zoom(_) => "--zoom: ",
+        RenderError::Empty | RenderError::Values { .. } | RenderError::Png(_) => "",
+    };
+    Failure::usage(format!("{option}{error}"))
+}
+
+/// The boundary of a union, and the signed distances of its vertices from the surface, in its diagonals.
+struct Deviation {
+    mesh: TriMesh,
+    /// Positive outside.
+    values: Vec<f64>,
+}
+
+impl Deviation {
+    /// Makes the reconstruction of a medial mesh in diagonals of the surface, and measures it.
+    fn new(shape: &Shape, path: &Path, axis: &MedialMesh, tolerance: f64) -> Result<Self, Failure> {
+        let path = path.display();
+        let mesh = union_surface(axis, tolerance).map_err(|error| match error {
+            ContourError::TooFine { tolerance, feasible, .. } => Failure::usage(format!(
+                "--tolerance {tolerance} is too fine for {path}; {feasible:.1e} is feasible"
+            )),
+            ContourError::TooThin { feasible, .. } => Failure::usage(format!(
+                "--tolerance {tolerance}: no sphere of {path} is thick enough to show; {feasible:.1e} would show \
+                 the largest"
+            )),
+            other => Failure::input(format!("{path}: {other}")),
+        })?;
+        let mesh = mesh.mesh;
+        let tree = shape.surface_tree().map_err(Failure::input)?;
+        let inside = shape.inside_test();
+        let values = SignedDistance::closed(&tree, &inside).batch(&mesh.vertices);
+        Ok(Self { mesh, values })
+    }
+
+    fn max(&self) -> f64 {
+        self.values.iter().copied().map(f64::abs).fold(0.0, f64::max)
+    }
+
+    fn mean(&self) -> f64 {
+        self.values.iter().copied().map(f64::abs).sum::<f64>() / self.values.len().max(1) as f64
+    }
+
+    fn errors(&self) -> Errors<'_> {
+        let caption = format!("error up to {}, mean {}", percent(self.max()), percent(self.mean()));
+        Errors { mesh: &self.mesh, values: &self.values, caption }
+    }
+}
+
+/// Named views: azimuth and elevation in degrees. The top and the bottom are a little off, since the upward direction
+/// must not lie along the line of sight.
+const VIEWS: [(&str, f64, f64); 7] = [
+    ("front", 0.0, 0.0),
+    ("right", 90.0, 0.0),
+    ("back", 180.0, 0.0),
+    ("left", -90.0, 0.0),
+    ("top", 0.0, 89.5),
+    ("bottom", 0.0, -89.5),
+    ("iso", 45.0, 35.264),
+];
+
+/// The camera of the options, or the one that shows most of the surface.
+fn camera(arguments: &Arguments, surface: &TriMesh) -> Result<Camera, Failure> {
+    let up = arguments.up.as_deref().map(upwards).transpose()?;
+    let camera = match (arguments.camera.as_deref().map(str::trim), up) {
+        (None | Some("auto"), None) => Camera::fitting(surface),
+        (None | Some("auto"), Some(up)) => Camera::around(up, 28.0, 20.0),
+        (Some(text), up) => from_words(text, up.unwrap_or_else(|| Camera::fitting_up(surface)))?,
+    };
+    Ok(Camera { zoom: arguments.zoom, ..camera })
+}
+
+fn from_words(text: &str, up: Vec3) -> Result<Camera, Failure> {
+    let lower = text.to_ascii_lowercase();
+    if let Some(&(_, azimuth, elevation)) = VIEWS.iter().find(|view| view.0 == lower) {
+        return Ok(Camera::around(up, azimuth, elevation));
+    }
+    match numbers(text).as_deref() {
+        Some(&[azimuth, elevation]) if elevation.abs() < 90.0 => {
+            Ok(Camera::around(up, azimuth, elevation))
+        }
+        Some(&[x, y, z]) => Ok(Camera::new(Vec3::new(x, y, z), up)),
+        _ => {
+            let names: Vec<_> = VIEWS.iter().map(|view| view.0).collect();
+            Err(Failure::usage(format!(
+                "--camera {text}: write one of {}, or AZIMUTH,ELEVATION in degrees with an elevation between -90 and 90, \
+                 or a direction X,Y,Z from the shape to the eye",
+                names.join(", ")
+            )))
+        }
+    }
+}
+
+/// Numbers between commas, if all are finite.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    let number = |word: &str| word.trim().parse().ok().filter(|x: &f64| x.is_finite());
+    text.split(',').map(number).collect()
+}
+
+fn upwards(text: &str) -> Result<Vec3, Failure> {
+    let (sign, axis) = match text.strip_prefix('-') {
+        Some(rest) => (-1.0, rest),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let axis = match axis {
+        "x" | "X" => Some(sign * Vec3::X),
+        "y" | "Y" => Some(sign * Vec3::Y),
+        "z" | "Z" => Some(sign * Vec3::Z),
+        _ => match numbers(text).as_deref() {
+            Some(&[x, y, z]) => Vec3::new(x, y, z).try_normalize(),
+            _ => None,
+        },
+    };
+    axis.ok_or_else(|| {
+        Failure::usage(format!("--up {text}: write x, y, z, -x, -y, -z or a direction X,Y,Z"))
+    })
+}
+
+/// Width and height from `WxH`.
+fn size(text: &str) -> Result<[usize; 2], Failure> {
+    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| {
+        Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
+    });
+    sides.ok_or_else(|| {
+        Failure::usage(format!("--size {text}: write WIDTHxHEIGHT in pixels, such as 800x600"))
+    })
+}
+
+/// The background by name or code.
+fn background(text: &str) -> Result<Background, Failure> {
+    let code = |hex: &str, k: usize| u8::from_str_radix(hex.get(2 * k..2 * k + 2)?, 16).ok();
+    let colour = |hex: &str| {
+        // A sign would be taken for a digit's.
+        let is_hex = hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit());
+        is_hex.then(|| Some([code(hex, 0)?, code(hex, 1)?, code(hex, 2)?])).flatten()
+    };
+    let found = match text {
+        "white" => Some(Background::WHITE),
+        "black" => Some(Background::Colour([0; 3])),
+        "transparent" => Some(Background::Transparent),
+        _ => text.strip_prefix('#').and_then(colour).map(Background::Colour),
+    };
+    found.ok_or_else(|| {
+        Failure::usage(format!("--background {text}: write white, black, transparent or #rrggbb"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_parsed() {
+        assert_eq!(size("800x600").ok(), Some([800, 600]));
+        assert_eq!(background("#0a0B0c").ok(), Some(Background::Colour([10, 11, 12])));
+        assert_eq!(upwards("-z").ok(), Some(-Vec3::Z));
+        assert_eq!(upwards("0,3,0").ok(), Some(Vec3::Y));
+        let around = |text| from_words(text, Vec3::Y).ok().map(|camera| camera.direction);
+        assert!(around("right").is_some_and(|d| d.distance(Vec3::X) < 1e-12));
+        assert!(around("-90,0").is_some_and(|d| d.distance(-Vec3::X) < 1e-12));
+        assert_eq!(around("1,2,3"), Some(Vec3::new(1.0, 2.0, 3.0)));
+    }
+
+    #[test]
+    fn malformed_options_are_named() {
+        let said = |failure: Option<Failure>, word: &str| {
+            assert!(failure.is_some_and(|failure| failure.message.contains(word)), "{word}");
+        };
+        for text in ["800", "800x", "x600", "-1x5", "800x600x2"] {
+            said(size(text).err(), text);
+        }
+        for text in ["red", "#12345", "#1234567", "#+1+1+1", "#äöü"] {
+            said(background(text).err(), text);
+        }
+        for text in ["w", "0,0,0", "1,2", "nan,0,1"] {
+            said(upwards(text).err(), text);
+        }
+        for text in ["somewhere", "1", "0,90", "1,2,3,4", "inf,0"] {
+            said(from_words(text, Vec3::Y).err(), text);
+        }
+    }
+}
