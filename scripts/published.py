@@ -20,7 +20,7 @@ from pathlib import Path
 
 def seconds(*names):
     """The sum of timing columns of a row."""
-    return lambda row: sum(float(row[name] or 0) for name in names)
+    return lambda row: sum(float(row.get(name) or 0) for name in names)
 
 
 def column(name, scale=1):
@@ -158,7 +158,7 @@ def measured(folder, method, value):
             rows = [row for row in csv.DictReader(file)
                     if row["method"] == method and row["status"] in ("ok", "other_count")]
         return value(rows[0])
-    except (OSError, IndexError, ValueError):
+    except (OSError, IndexError, KeyError, ValueError):
         return None
 
 
