@@ -147,11 +147,13 @@ impl Refinement<'_> {
                 best = Some(found);
                 stalled = 0;
             }
+            // Rounds since the best one, itself included: the counter is never 0 here.
             stalled += 1;
             let full = samples.len() >= most;
             if is_right || full || round == ROUNDS {
                 break;
             }
+            // Samples go where defects are; only where that no longer helps, everywhere.
             let mut added = self.spread(places, &samples);
             if added.is_empty() || stalled % STALLED == 0 {
                 added.extend(self.halved(&samples));
@@ -167,9 +169,8 @@ impl Refinement<'_> {
 
     /// Right before wrong, right topology before wrong topology, small errors before large ones.
     fn is_better(&self, new: &Refined, old: &Refined) -> bool {
-        let rank = |r: &Refined| (self.wrong(r.betti), r.error);
-        let ((wrong, error), (old_wrong, old_error)) = (rank(new), rank(old));
-        wrong < old_wrong || (wrong == old_wrong && error < old_error)
+        let (wrong, old_wrong) = (self.wrong(new.betti), self.wrong(old.betti));
+        wrong < old_wrong || (wrong == old_wrong && new.error < old.error)
     }
 
     /// How far Betti numbers are from the solid's.
@@ -182,6 +183,8 @@ impl Refinement<'_> {
     fn judge(&self, diagram: &Diagram, tested: &[Vec3], rounds: usize) -> (Refined, Vec<Place>) {
         let betti = betti(&diagram.medial);
         let wrong = self.wrong(betti) > 0;
+        // Step 3 runs only while the topology is wrong; after some rounds a third of the share
+        // counts as a defect.
         let pierced = wrong.then_some(if rounds < PATIENCE { PIERCED } else { PIERCED / 3.0 });
         let (mut places, reach) = self.outgrown(&diagram.medial, pierced);
         let (uncovered, gap) = self.uncovered(&diagram.medial, tested);
@@ -245,11 +248,13 @@ impl Refinement<'_> {
             .zip(diagram.cells.circumspheres())
             .filter_map(|(cell, sphere)| Some((cell, (*sphere)?)))
             .collect();
-        let middle = |cell| {
-            let corners = triangulation.vertices(cell).map(|v| diagram.delaunay.point(v));
-            corners.into_iter().sum::<Vec3>() / 4.0
-        };
-        let middles: Vec<Vec3> = cells.iter().map(|&(cell, _)| middle(cell)).collect();
+        let middles: Vec<Vec3> = cells
+            .iter()
+            .map(|&(cell, _)| {
+                let corners = triangulation.vertices(cell).map(|v| diagram.delaunay.point(v));
+                corners.into_iter().sum::<Vec3>() / 4.0
+            })
+            .collect();
         let sides = self.inside.sides(&middles);
         let odd: Vec<_> = cells
             .into_iter()
@@ -274,11 +279,13 @@ impl Refinement<'_> {
         let old = PointTree::new(samples);
         let distance = |p: Vec3| old.nearest(p).map_or(f64::INFINITY, |(_, d)| d.sqrt());
         let mut new = Growing::default();
+        // The worst first: a new sample makes lesser places near it superfluous.
         for Place { mut point, clear } in places {
             if new.distance(point) < 0.5 * clear {
                 continue;
             }
             if distance(point) < CLEAR * clear {
+                // Occupied: of the points around, the one farthest from all samples.
                 let around = directions().map(|d| self.tree.closest(point + clear * d).point);
                 point = around
                     .max_by(|a: &Vec3, b: &Vec3| distance(*a).total_cmp(&distance(*b)))
@@ -354,24 +361,26 @@ impl Diagram {
 
 /// The balls of a medial mesh, and the interpolated ones in the middle of its edges and triangles.
 fn barycentres(medial: &MedialMesh) -> Vec<(Vec3, f64)> {
-    let ball = |v: u32| medial.spheres[v as usize];
-    let mean = |corners: &[u32]| {
-        let share = 1.0 / corners.len() as f64;
-        let sum = corners.iter().map(|&v| (ball(v).centre, ball(v).radius));
-        let (centre, radius) = sum.fold((Vec3::ZERO, 0.0), |(c, r), (d, s)| (c + d, r + s));
-        (centre * share, radius * share)
-    };
     let spheres = medial.spheres.iter().map(|s| (s.centre, s.radius));
-    let edges = medial.edges.iter().map(|e| mean(e));
-    spheres.chain(edges).chain(medial.faces.iter().map(|f| mean(f))).collect()
+    let edges = medial.edges.iter().map(|e| mean_ball(medial, e));
+    spheres.chain(edges).chain(medial.faces.iter().map(|f| mean_ball(medial, f))).collect()
+}
+
+fn mean_ball(medial: &MedialMesh, corners: &[u32]) -> (Vec3, f64) {
+    let share = 1.0 / corners.len() as f64;
+    let (centre, radius) = corners.iter().fold((Vec3::ZERO, 0.0), |(centre, radius), &v| {
+        let ball = medial.spheres[v as usize];
+        (centre + ball.centre, radius + ball.radius)
+    });
+    (centre * share, radius * share)
 }
 
 /// Twelve directions, those of the corners of an icosahedron.
 fn directions() -> impl Iterator<Item = Vec3> {
     const GOLDEN: f64 = 1.618_033_988_749_895;
     (0..12).map(|k| {
-        let sign = |bit: usize| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
-        let (short, long) = (sign(0), sign(1) * GOLDEN);
+        let short = if k & 1 == 0 { 1.0 } else { -1.0 };
+        let long = if k & 2 == 0 { GOLDEN } else { -GOLDEN };
         let corner = match k / 4 {
             0 => Vec3::new(0.0, short, long),
             1 => Vec3::new(short, long, 0.0),

@@ -152,24 +152,28 @@ impl Shape {
     pub fn fit(&self, mesh: &MedialMesh) -> Result<Fit, ShapeError> {
         let surface = Surface::of(self)?;
         let spheres = surface.spheres(mesh);
-        let misfit = |s: &Similarity| median(&surface.residuals(&spheres, s)).unwrap_or(0.0);
-        let quality = |s: &Similarity| surface.mean(&spheres, s);
-        let known = surface.conventions();
         let boxes = (FitSource::Fitted, surface.by_boxes(&spheres));
-        let candidates =
-            known.into_iter().chain([boxes]).map(|(source, s)| (quality(&s), source, s));
-        let mut candidates: Vec<(f64, FitSource, Similarity)> = candidates.collect();
+        let mut candidates: Vec<(f64, FitSource, Similarity)> = surface
+            .conventions()
+            .into_iter()
+            .chain([boxes])
+            .map(|(source, s)| (surface.mean(&spheres, &s), source, s))
+            .collect();
         let start = candidates.iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("the first one").2;
         let optimum = surface.optimised(&spheres, start);
+        // The last candidate, that of the boxes, is only a start for the optimum.
         candidates.pop();
-        let least = quality(&optimum);
+        let least = surface.mean(&spheres, &optimum);
+        // A convention is exact, the optimum follows the errors of the mesh: one that is nearly as
+        // good is preferred.
         let enough = f64::max(PREFERENCE * least, CLOSE / optimum.scale);
         let (_, source, normal) = candidates
             .into_iter()
             .filter(|(of_known, ..)| *of_known <= enough)
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or((least, FitSource::Fitted, optimum));
-        let (before, misfit) = (misfit(&Similarity::IDENTITY), misfit(&normal));
+        let [before, misfit] = [&Similarity::IDENTITY, &normal]
+            .map(|s| median(&surface.residuals(&spheres, s)).unwrap_or(0.0));
         let similarity = surface.in_input_units(&normal);
         Ok(Fit { similarity, source, misfit_before: Some(before), misfit: Some(misfit) })
     }
@@ -180,11 +184,11 @@ impl Shape {
     /// # Errors
     /// When the surface has no face.
     pub fn fit_if_needed(&self, mesh: &MedialMesh) -> Result<Option<Fit>, ShapeError> {
-        let fits = |misfit: Option<f64>| misfit.is_some_and(|misfit| misfit <= DOUBTFUL);
-        if fits(self.misfit(mesh)?) {
+        if self.misfit(mesh)?.is_some_and(|misfit| misfit <= DOUBTFUL) {
             return Ok(None);
         }
-        Ok(Some(self.fit(mesh)?).filter(|fit| fits(fit.misfit)))
+        let fit = self.fit(mesh)?;
+        Ok(fit.misfit.is_some_and(|misfit| misfit <= DOUBTFUL).then_some(fit))
     }
 
     /// The similarity for points without radii: that convention of a tool which brings nearly all of them into the solid, the
@@ -195,13 +199,12 @@ impl Shape {
     pub fn fit_of_points(&self, mesh: &MedialMesh) -> Result<Option<Fit>, ShapeError> {
         let surface = Surface::of(self)?;
         let points = surface.spheres(mesh);
-        let inside = |s: &Similarity| {
+        let fitting = surface.conventions().into_iter().filter(|(_, s)| {
             let centres: Vec<Vec3> = points.iter().map(|p| s.point(p.centre)).collect();
             let sides = surface.inside.sides(&centres);
             let count = sides.iter().filter(|side| **side != Side::Outside).count();
             count as f64 >= INSIDE * points.len() as f64
-        };
-        let fitting = surface.conventions().into_iter().filter(|(_, s)| inside(s));
+        });
         // The first of equals: the units of the surface, if they will do.
         let best =
             fitting.reduce(|best, other| if other.1.scale > best.1.scale { other } else { best });
