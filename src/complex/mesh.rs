@@ -1,13 +1,13 @@
 //! The medial mesh as plain arrays: the type that methods take and return, files store, and metrics
 //! read.
 
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::closure::{ascending_edge, ascending_face, closure};
 use crate::Vec3;
-use crate::geometry::Sphere;
+use crate::geometry::{Sphere, TriangleTree, triangles_meet};
 
 /// The boundary samples that each sphere touches, from the triangulation that it was made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -296,5 +296,294 @@ fn check_order<T: Ord>(what: &'static str, simplices: &[T]) -> Result<(), Comple
     match simplices.windows(2).position(|pair| pair[0] >= pair[1]) {
         Some(index) => Err(ComplexError::Order { what, index: index + 1 }),
         None => Ok(()),
+    }
+}
+
+// Incidence of edges and faces: the combinatorics of a medial mesh, without coordinates.
+
+/// The edges of every face and the number of faces at every edge.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Incidence {
+    face_edges: Vec<[u32; 3]>,
+    faces_at: Vec<u32>,
+}
+
+impl Incidence {
+    /// The incidences of a mesh in canonical form. Cost `O(V + E + F log d)`, `d` the largest
+    /// number of edges at a sphere.
+    ///
+    /// # Panics
+    /// If a side of a face is not listed as an edge; see [`MedialMesh::check`].
+    pub fn of(mesh: &MedialMesh) -> Self {
+        let first = first_edges(mesh);
+        let edge_id = |a: u32, b: u32| {
+            let (from, to) = (first[a as usize], first[a as usize + 1]);
+            let found = mesh.edges[from..to].binary_search_by_key(&b, |edge| edge[1]);
+            let place = found.expect("every side of a face is an edge in canonical form");
+            (from + place) as u32
+        };
+        let face_edges: Vec<[u32; 3]> = mesh
+            .faces
+            .iter()
+            .map(|&[a, b, c]| [edge_id(a, b), edge_id(a, c), edge_id(b, c)])
+            .collect();
+        let mut faces_at = vec![0; mesh.edges.len()];
+        for &edge in face_edges.iter().flatten() {
+            faces_at[edge as usize] += 1;
+        }
+        Self { face_edges, faces_at }
+    }
+
+    /// For each face `[a, b, c]` the ids of its edges `ab`, `ac`, `bc`.
+    pub fn face_edges(&self) -> &[[u32; 3]] {
+        &self.face_edges
+    }
+
+    /// For each edge the number of its faces.
+    pub fn faces_at(&self) -> &[u32] {
+        &self.faces_at
+    }
+}
+
+/// For each sphere the position of the first edge that starts at it or later: the edges are
+/// sorted, so those that start at sphere `a` are `first[a]..first[a + 1]`.
+fn first_edges(mesh: &MedialMesh) -> Vec<usize> {
+    let mut first = vec![0; mesh.spheres.len() + 1];
+    for &[a, _] in &mesh.edges {
+        first[a as usize + 1] += 1;
+    }
+    for sphere in 0..mesh.spheres.len() {
+        first[sphere + 1] += first[sphere];
+    }
+    first
+}
+
+// The canonical lists of a complex from simplices in any order.
+//
+// 1. Simplices are counted into runs by their smallest sphere.
+// 2. The run of a sphere is sorted, and repetitions are dropped: these are its faces.
+// 3. Its edges are those to the other spheres of its faces, those to the largest sphere of faces in
+//    which it is the middle one, and those that were given; again sorted, each once.
+//
+// Linear where few simplices begin at the same sphere.
+
+/// Spheres whose runs are sorted by one task.
+const CHUNK: usize = 2048;
+
+/// The faces, and the edges with the sides of all faces: indices ascend, the lists are sorted
+/// lexicographically, nothing is repeated. Given are simplices whose indices ascend, in any order.
+/// Parallel; the same for any number of threads.
+///
+/// # Panics
+/// If an index is not below `spheres`.
+pub(super) fn closure(
+    edges: &[[u32; 2]],
+    faces: &[[u32; 3]],
+    spheres: usize,
+) -> (Vec<[u32; 2]>, Vec<[u32; 3]>) {
+    let by_first = Runs::of(faces.iter().map(|&[a, b, c]| (a, Pair::of(b, c))), spheres);
+    let by_middle = faces.iter().map(|&[_, b, c]| (b, c));
+    let others = Runs::of(by_middle.chain(edges.iter().map(|&[a, b]| (a, b))), spheres);
+    let parts: Vec<_> = (0..spheres)
+        .into_par_iter()
+        .step_by(CHUNK)
+        .map(|first| {
+            let part = first..spheres.min(first + CHUNK);
+            let mut faces = Vec::with_capacity(by_first.len(&part));
+            let mut edges = Vec::with_capacity(faces.capacity() + others.len(&part));
+            let (mut pairs, mut ends) = (Vec::new(), Vec::new());
+            for sphere in part {
+                pairs.clear();
+                pairs.extend_from_slice(by_first.run(sphere));
+                sort_once(&mut pairs);
+                ends.clear();
+                ends.extend_from_slice(others.run(sphere));
+                ends.extend(pairs.iter().flat_map(|pair| pair.spheres()));
+                sort_once(&mut ends);
+                let sphere = sphere as u32;
+                faces.extend(pairs.iter().map(|pair| pair.spheres()).map(|[b, c]| [sphere, b, c]));
+                edges.extend(ends.iter().map(|&end| [sphere, end]));
+            }
+            (edges, faces)
+        })
+        .collect();
+    let (edges, faces): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+    (edges.concat(), faces.concat())
+}
+
+/// The indices of a simplex, ascending. Without a branch: which is smaller cannot be foreseen.
+#[inline]
+pub(super) fn ascending_face([a, b, c]: [u32; 3]) -> [u32; 3] {
+    let ([low, high], last) = (ascending_edge([a, b]), c);
+    let [middle, high] = ascending_edge([high, last]);
+    let [low, middle] = ascending_edge([low, middle]);
+    [low, middle, high]
+}
+
+/// See [`ascending_face`].
+#[inline]
+pub(super) fn ascending_edge([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+fn sort_once<T: Ord>(items: &mut Vec<T>) {
+    items.sort_unstable();
+    items.dedup();
+}
+
+/// Two spheres in one word that is ordered as they are.
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Pair(u64);
+
+impl Pair {
+    fn of(b: u32, c: u32) -> Self {
+        Self(u64::from(b) << 32 | u64::from(c))
+    }
+
+    fn spheres(self) -> [u32; 2] {
+        [(self.0 >> 32) as u32, self.0 as u32]
+    }
+}
+
+/// Items by sphere, in the order in which they came.
+struct Runs<T> {
+    /// `items[start[s]..start[s + 1]]` are those of sphere `s`.
+    start: Vec<u32>,
+    items: Vec<T>,
+}
+
+impl<T: Copy + Default> Runs<T> {
+    fn of(items: impl Iterator<Item = (u32, T)> + Clone, spheres: usize) -> Self {
+        // Shifted by one while the runs are filled, so that in the end each start is where it
+        // belongs.
+        let mut start = vec![0_u32; spheres + 2];
+        for (sphere, _) in items.clone() {
+            start[sphere as usize + 2] += 1;
+        }
+        for sphere in 2..start.len() {
+            start[sphere] += start[sphere - 1];
+        }
+        let mut placed = vec![T::default(); start[spheres + 1] as usize];
+        for (sphere, item) in items {
+            let next = &mut start[sphere as usize + 1];
+            placed[*next as usize] = item;
+            *next += 1;
+        }
+        start.pop();
+        Self { start, items: placed }
+    }
+
+    /// The number of items of some spheres.
+    fn len(&self, spheres: &Range<usize>) -> usize {
+        (self.start[spheres.end] - self.start[spheres.start]) as usize
+    }
+
+    fn run(&self, sphere: usize) -> &[T] {
+        &self.items[self.start[sphere] as usize..self.start[sphere + 1] as usize]
+    }
+}
+
+// Faces of a medial mesh that cross: pairs that meet outside of the vertices and edges they share.
+//
+// The medial axis of a solid has none; that of samples has a few where sheets are thinner than the samples
+// are apart; collapses and moves of spheres make more. Exact, and of the centres alone: radii play no part.
+
+/// The pairs of faces that cross, ascending. Faces without area are not looked at.
+///
+/// Cost `O(F log F)` and the pairs whose boxes overlap.
+///
+/// # Panics
+/// If a face is out of range; see [`MedialMesh::check`].
+pub fn crossing_faces(mesh: &MedialMesh) -> Vec<[u32; 2]> {
+    let corners = |face: u32| mesh.faces[face as usize].map(|v| mesh.spheres[v as usize].centre);
+    Crossings::new(mesh.faces.clone(), corners).pairs()
+}
+
+/// Faces in a tree, for the pairs that cross.
+#[derive(Clone, Debug)]
+pub struct Crossings {
+    faces: Vec<[u32; 3]>,
+    tree: TriangleTree,
+}
+
+impl Crossings {
+    /// The faces of these vertices, with the corners `corners(face)`.
+    pub fn new(faces: Vec<[u32; 3]>, corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
+        let tree = TriangleTree::new(0..faces.len() as u32, corners);
+        Self { faces, tree }
+    }
+
+    /// The faces that cross one with these vertices and corners, ascending. It need not be one of them.
+    pub fn of(&self, face: [u32; 3], corners: [Vec3; 3]) -> Vec<u32> {
+        self.among(face, corners, |_| true)
+    }
+
+    /// All pairs that cross, ascending.
+    pub fn pairs(&self) -> Vec<[u32; 2]> {
+        self.pairs_with(|_| true)
+    }
+
+    /// The pairs that cross and have a face for which `is_asked`, ascending.
+    pub fn pairs_with(&self, is_asked: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
+        let of = |place: usize| {
+            let (face, corners) = self.tree.at(place);
+            let others = if is_asked(face) {
+                // Each pair once, and no face with itself.
+                let is_later = |other: u32| other > face || (other < face && !is_asked(other));
+                self.among(self.faces[face as usize], corners, is_later)
+            } else {
+                vec![]
+            };
+            others.into_iter().map(move |other| [face.min(other), face.max(other)])
+        };
+        let mut pairs: Vec<[u32; 2]> =
+            (0..self.tree.len()).into_par_iter().flat_map_iter(of).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    fn among(
+        &self,
+        face: [u32; 3],
+        corners: [Vec3; 3],
+        is_asked: impl Fn(u32) -> bool,
+    ) -> Vec<u32> {
+        let mut found = vec![];
+        self.tree.overlapping(corners, |other, place| {
+            if is_asked(other) && triangles_meet(face, corners, self.faces[other as usize], place) {
+                found.push(other);
+            }
+            ControlFlow::Continue(())
+        });
+        found.sort_unstable();
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::complex::Sphere;
+
+    #[test]
+    fn a_face_through_another_crosses_it_and_neighbours_do_not() {
+        let at = |x: f64, y: f64, z: f64| Sphere::new(Vec3::new(x, y, z), 0.1);
+        let spheres = vec![
+            at(0.0, 0.0, 0.0),
+            at(1.0, 0.0, 0.0),
+            at(0.0, 1.0, 0.0),
+            at(1.0, 1.0, 0.0),
+            at(0.2, 0.2, -1.0),
+            at(0.3, 0.2, 1.0),
+            at(0.2, 0.3, 1.0),
+        ];
+        let faces = vec![[0, 1, 2], [1, 2, 3], [4, 5, 6], [0, 5, 6]];
+        let mesh = MedialMesh::from_simplices(spheres, vec![], faces).unwrap();
+        let pair = |f: [u32; 3], g: [u32; 3]| {
+            let place = |f| mesh.faces.iter().position(|&x| x == f).unwrap() as u32;
+            let [a, b] = [place(f), place(g)];
+            [a.min(b), a.max(b)]
+        };
+        assert_eq!(crossing_faces(&mesh), vec![pair([0, 1, 2], [4, 5, 6])]);
     }
 }

@@ -1,38 +1,31 @@
 //! The medial mesh: a simplicial complex of dimension at most two on medial spheres.
 
-mod closure;
 pub mod collapse;
 mod contour;
-mod crossing;
-mod cubical;
 mod formats;
-mod incidence;
 mod mesh;
-mod reduction;
-mod stability;
 mod topology;
 mod union;
 pub mod union_axis;
 mod voronoi;
-mod voronoi_facets;
 
 pub use contour::{
     ContourError, UnionSurface, union_surface, union_surface_while, union_surface_within,
 };
-pub use crossing::{Crossings, crossing_faces};
-pub use cubical::cubical_betti;
 pub use formats::{
     LoadedMa, Look, MaError, MaErrorKind, Radii, ReadOptions, SphereValues, parse_ma,
     parse_ma_with, parse_obj, parse_ply, parse_ply_with, read, read_with, single_precision_loss,
     write, write_with,
 };
-pub use incidence::Incidence;
+pub use mesh::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};
-pub use stability::{ZERO_LENGTH, stability_ratio};
+pub use mesh::{Crossings, crossing_faces};
+pub use topology::cubical_betti;
 pub use topology::{betti, euler};
 pub use union::{MedialUnion, NearestPrimitive, Primitive, Readings, UnionError};
 pub use union_axis::{AxisFacet, AxisTally, UnionAxis};
+pub use voronoi::VoronoiFacets;
 pub use voronoi::{CellSpheres, DualTriangulation, voronoi_medial_mesh};
-pub use voronoi_facets::VoronoiFacets;
+pub use voronoi::{ZERO_LENGTH, stability_ratio};
 
 pub use crate::geometry::Sphere;

@@ -20,10 +20,13 @@
 
 use rayon::prelude::*;
 
-use super::pose::Pose;
+use super::envelope::{EnvelopeOptions, sample_envelope_along};
+use super::hausdorff::{BURIAL, EXPOSED};
+use super::samples::{Pose, SurfaceSamples};
+use super::{DistanceOptions, MetricError};
 use crate::Vec3;
-use crate::complex::MedialUnion;
-use crate::surface::TriangleBvh;
+use crate::complex::{MedialMesh, MedialUnion};
+use crate::surface::{TriMesh, TriangleBvh};
 
 /// Seeds that are followed to the last step.
 const LAST_SEEDS: usize = 6;
@@ -42,7 +45,7 @@ const GAIN: f64 = 1e-10;
 
 /// A point of a surface, with its distance from the other one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Peak {
+pub(super) struct Summit {
     pub point: Vec3,
     pub value: f64,
 }
@@ -57,7 +60,7 @@ pub(super) struct Near {
 /// A surface, and a distance at each of its points.
 pub(super) trait Hill: Sync {
     /// A point of the surface near to `p` with its distance, where one is found.
-    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak>;
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Summit>;
 }
 
 /// The points of a triangle mesh.
@@ -68,10 +71,10 @@ pub(super) struct OnMesh<'a, F> {
 }
 
 impl<F: Fn(Vec3, &mut usize) -> f64 + Sync> Hill for OnMesh<'_, F> {
-    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak> {
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Summit> {
         let closest = self.mesh.closest_from(p, near.face);
         near.face = Some(closest.face);
-        Some(Peak { point: closest.point, value: (self.value)(closest.point, &mut near.place) })
+        Some(Summit { point: closest.point, value: (self.value)(closest.point, &mut near.place) })
     }
 }
 
@@ -84,11 +87,11 @@ pub(super) struct OnUnion<'a> {
 }
 
 impl Hill for OnUnion<'_> {
-    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak> {
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Summit> {
         let point = self.union.boundary_near(p, self.burial, &mut near.place)?;
         let closest = self.surface.closest_from(point, near.face);
         near.face = Some(closest.face);
-        Some(Peak { point, value: closest.distance })
+        Some(Summit { point, value: closest.distance })
     }
 }
 
@@ -106,8 +109,8 @@ pub(super) struct Start<'a> {
 }
 
 /// The points that the ascent reaches from the largest of some samples, one for each seed.
-pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Peak> {
-    let mut climbers: Vec<(Peak, Near)> =
+pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Summit> {
+    let mut climbers: Vec<(Summit, Near)> =
         start.pick().into_iter().map(|seed| (seed, Near::default())).collect();
     let gain = GAIN * start.pose.diameter();
     let mut given_up = Vec::new();
@@ -130,7 +133,7 @@ pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Peak> {
 }
 
 /// Moves a climber to the best of the points around it, if that is better.
-fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Peak, Near)) {
+fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Summit, Near)) {
     let here = peak.point;
     for &arm in arms {
         if let Some(found) = hill.near(here + arm, near)
@@ -144,14 +147,14 @@ fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Peak, N
 impl Start<'_> {
     /// The largest samples that are at least a step apart. Samples equal up to rounding are taken in
     /// the order of the pose's curve, which depends neither on numbering nor on orientation.
-    fn pick(&self) -> Vec<Peak> {
+    fn pick(&self) -> Vec<Summit> {
         let grain = GAIN * self.pose.diameter();
         let rank =
             |k: usize| ((-self.values[k] / grain).round(), self.pose.place_of(self.points[k]));
         let mut ranked: Vec<_> =
             self.largest().into_iter().map(|k| (rank(k), self.peak(k))).collect();
         ranked.sort_by(|((a, at), _), ((b, other), _)| a.total_cmp(b).then_with(|| at.cmp(other)));
-        let mut seeds: Vec<Peak> = Vec::with_capacity(self.seeds);
+        let mut seeds: Vec<Summit> = Vec::with_capacity(self.seeds);
         for (_, peak) in ranked {
             let apart = self.spacing * self.spacing;
             if seeds.iter().all(|seed| seed.point.distance_squared(peak.point) >= apart) {
@@ -178,8 +181,8 @@ impl Start<'_> {
         order
     }
 
-    fn peak(&self, k: usize) -> Peak {
-        Peak { point: self.points[k], value: self.values[k] }
+    fn peak(&self, k: usize) -> Summit {
+        Summit { point: self.points[k], value: self.values[k] }
     }
 }
 
@@ -203,10 +206,106 @@ fn directions(pose: &Pose, round: usize) -> [Vec3; 12] {
     })
 }
 
+// Where a union is farthest from a surface, both ways: for methods that mend their worst places.
+
+/// A place and its distance from the other surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// A point of the surface, or of the union's boundary.
+    pub point: Vec3,
+    /// How far it is from the other one: `|sigma|` of a point of the surface, the distance from the
+    /// surface of a point of the union's boundary.
+    pub distance: f64,
+}
+
+/// The worst places of a medial mesh, the largest distance first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Peaks {
+    /// On the surface.
+    pub forward: Vec<Peak>,
+    /// On the boundary of the union.
+    pub reverse: Vec<Peak>,
+}
+
+impl Peaks {
+    /// The largest distance of both directions: a lower bound of the Hausdorff distance.
+    pub fn hausdorff(&self) -> f64 {
+        let first = |peaks: &[Peak]| peaks.first().map_or(0.0, |peak| peak.distance);
+        first(&self.forward).max(first(&self.reverse))
+    }
+}
+
+/// A surface whose samples are laid out once, to be searched with many medial meshes.
+pub struct PeakSearch<'a> {
+    tree: &'a TriangleBvh,
+    samples: SurfaceSamples,
+    options: DistanceOptions,
+}
+
+impl<'a> PeakSearch<'a> {
+    /// A search over `surface`, whose faces are in `tree`.
+    ///
+    /// # Errors
+    /// When the surface has no area, or no samples are asked.
+    pub fn new(
+        surface: &TriMesh,
+        tree: &'a TriangleBvh,
+        options: DistanceOptions,
+    ) -> Result<Self, MetricError> {
+        let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
+        Ok(Self { tree, samples, options })
+    }
+
+    /// The samples with the largest distances, and the points that local ascent reaches from them.
+    ///
+    /// The distances are those of [`crate::metrics::distances`], whose maximum also counts an ascent of `mu` and
+    /// can be a little larger.
+    ///
+    /// # Errors
+    /// When the medial mesh is empty or not valid, or no samples are asked.
+    pub fn of(&self, mesh: &MedialMesh) -> Result<Peaks, MetricError> {
+        let Self { tree, samples, options } = self;
+        let (mesh, union) = samples.ordered(mesh)?;
+        let pose = &samples.pose;
+        let mut sigma = union.signed_batch(&samples.points);
+        sigma.iter_mut().for_each(|value| *value = value.abs());
+        let value = |p, near: &mut usize| union.signed_from(p, near).abs();
+        let forward = ascend(&OnMesh { mesh: tree, value }, &samples.start(&sigma));
+        let envelope = EnvelopeOptions {
+            samples: options.envelope_samples,
+            burial: BURIAL * pose.diameter(),
+            seed: options.seed,
+        };
+        let points = sample_envelope_along(pose.axes(), &mesh, &union, &envelope)?;
+        let values = tree.distance_batch(&points);
+        let hill = OnUnion { union: &union, surface: tree, burial: EXPOSED * pose.diameter() };
+        let start = samples.start(&sigma);
+        let reverse = ascend(&hill, &Start { points: &points, values: &values, ..start });
+        Ok(Peaks {
+            forward: sorted(forward, &samples.points, &sigma),
+            reverse: sorted(reverse, &points, &values),
+        })
+    }
+}
+
+/// Peaks and samples above half the largest, the largest first.
+fn sorted(peaks: Vec<Summit>, points: &[Vec3], values: &[f64]) -> Vec<Peak> {
+    let peaks = peaks.into_iter().map(|peak| Peak { point: peak.point, distance: peak.value });
+    let samples = points.iter().zip(values);
+    let samples = samples.map(|(&point, &distance)| Peak { point, distance });
+    let mut all: Vec<Peak> = peaks.chain(samples).collect();
+    let largest = all.iter().map(|peak| peak.distance).fold(0.0, f64::max);
+    all.retain(|peak| peak.distance >= 0.5 * largest);
+    // Stable: peaks come before samples of the same distance.
+    all.sort_by(|a, b| b.distance.total_cmp(&a.distance));
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::complex::Sphere;
+    use crate::metrics::distances;
     use crate::surface::TriMesh;
 
     fn square() -> TriMesh {
@@ -216,7 +315,7 @@ mod tests {
     }
 
     /// A start from points that all miss the maximum.
-    fn best(hill: &impl Hill, surface: &TriMesh, points: &[Vec3], spacing: f64) -> Peak {
+    fn best(hill: &impl Hill, surface: &TriMesh, points: &[Vec3], spacing: f64) -> Summit {
         let pose = Pose::new(surface);
         let mut near = Near::default();
         let values: Vec<f64> =
@@ -269,5 +368,39 @@ mod tests {
         let start = Start { pose: &pose, points: &points, values: &values, spacing: 0.1, seeds: 3 };
         let seeds = start.pick();
         assert_eq!((seeds.len(), seeds[0].point), (1, Vec3::X));
+    }
+
+    #[test]
+    fn the_largest_peak_is_the_hausdorff_distance_and_lies_where_it_says() {
+        let corners =
+            [0.0, 1.0].map(|x| [0.0, 1.0].map(|y| [0.0, 1.0].map(|z| Vec3::new(x, y, z))));
+        let vertices: Vec<Vec3> = corners.as_flattened().as_flattened().to_vec();
+        let square = |a, b, c, d| [[a, b, c], [a, c, d]];
+        let sides = [
+            square(0, 1, 3, 2),
+            square(4, 6, 7, 5),
+            square(0, 4, 5, 1),
+            square(2, 3, 7, 6),
+            square(0, 2, 6, 4),
+            square(1, 5, 7, 3),
+        ];
+        let surface = TriMesh { vertices, faces: sides.as_flattened().to_vec() };
+        let tree = TriangleBvh::new(&surface).unwrap();
+        let ball = Sphere::new(Vec3::new(0.5, 0.5, 0.4), 0.5);
+        let mesh = MedialMesh::from_simplices(vec![ball], vec![], vec![]).unwrap();
+        let options = DistanceOptions { surface_samples: 500, envelope_samples: 500, seed: 3 };
+        let peaks = PeakSearch::new(&surface, &tree, options).unwrap().of(&mesh).unwrap();
+        // The corners above are farthest, and the ball protrudes by a tenth below.
+        let corner = Vec3::new(0.5, 0.5, 0.6).length() - 0.5;
+        assert!((peaks.forward[0].distance - corner).abs() < 1e-12, "{:?}", peaks.forward[0]);
+        assert_eq!(peaks.forward[0].point.z, 1.0);
+        let measured = distances(&surface, &tree, &mesh, &options).unwrap();
+        assert!((peaks.hausdorff() - measured.hausdorff).abs() < 1e-9);
+        assert_eq!(peaks.reverse[0].distance, measured.reverse);
+        let descends = |peaks: &[Peak]| peaks.is_sorted_by(|a, b| a.distance >= b.distance);
+        assert!(descends(&peaks.forward) && descends(&peaks.reverse));
+        for peak in &peaks.reverse {
+            assert!(ball.signed_distance(peak.point).abs() < 1e-9);
+        }
     }
 }

@@ -14,7 +14,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::MetricError;
-use super::pose::Pose;
+use super::samples::Pose;
 use crate::Vec3;
 use crate::complex::MedialUnion;
 use crate::geometry::Sphere;

@@ -27,30 +27,22 @@
 //! Every vertex has a stamp, which grows with each collapse at the vertex itself. A queued candidate
 //! remembers the stamps of its edge; if they differ when it is popped, it is out of date and dropped.
 
-mod check;
-mod contract;
-mod heap;
-mod hierarchy;
-mod inversion;
-mod link;
-mod pool;
-mod queue;
-mod record;
-#[cfg(test)]
-mod tests;
-
-pub use check::CollapseError;
-pub use heap::{LazyHeap, Prioritised};
 pub use hierarchy::{
     Change, Hierarchy, HierarchyError, HierarchyFileError, HierarchyFileErrorKind, Stage, Step,
 };
-pub use inversion::folds_over;
-pub use queue::{Candidate, CollapseQueue};
-pub use record::{Collapse, replay};
+pub use link::CollapseError;
+pub use queue::{Candidate, CollapseQueue, LazyHeap, Prioritised};
+use queue::{List, Pool};
 
-use pool::{List, Pool};
+use super::{MedialMesh, ZERO_LENGTH};
+use crate::Vec3;
+use crate::geometry::Sphere;
 
-use super::{MedialMesh, Sphere};
+mod hierarchy;
+mod link;
+mod queue;
+#[cfg(test)]
+mod tests;
 
 /// A complex under edge collapse.
 ///
@@ -268,4 +260,260 @@ impl Marks {
     fn contains(&self, v: u32) -> bool {
         self.of_vertex[v as usize] == self.current
     }
+}
+
+// The collapse of an edge, with set semantics for the simplices that become equal.
+
+impl CollapseComplex {
+    /// Collapses the edge `{kept, removed}`: one vertex with the id `kept` and the given sphere
+    /// takes the place of both.
+    ///
+    /// Edges and faces that become equal are merged. Faces with both ends vanish; an edge that
+    /// loses its last face stays as a lone edge unless it is merged. Nothing is tested here:
+    /// [`CollapseComplex::link_condition`] and [`CollapseComplex::folded_face`] are the caller's.
+    /// Cheapest when `removed` has the smaller star. Cost: the stars of both ends and the lists of
+    /// the neighbours of `removed`.
+    ///
+    /// # Panics
+    /// If the two are not the ends of an edge.
+    pub fn collapse(&mut self, kept: u32, removed: u32, sphere: Sphere) {
+        let is_edge = self.is_alive(removed) && self.neighbours(removed).contains(&kept);
+        assert!(is_edge, "{kept} and {removed} are not the ends of an edge");
+        // The marks and shared sides describe both links before either changes.
+        self.find_shared(kept, removed);
+        self.rename_in_neighbours(kept, removed);
+        self.absorb_neighbours(kept, removed);
+        self.absorb_sides(kept, removed);
+        self.sphere_count -= 1;
+        self.alive[removed as usize] = false;
+        self.spheres[kept as usize] = sphere;
+        self.touch(kept);
+        if let Some(record) = &mut self.record {
+            record.push(Collapse { kept, removed, sphere });
+        }
+    }
+
+    /// Marks the neighbours of `a` and finds the sides `{c, d}` for which both `{a, c, d}` and
+    /// `{b, c, d}` are faces.
+    fn find_shared(&mut self, a: u32, b: u32) {
+        self.marks.clear();
+        for &c in self.neighbour_pool.get(self.neighbours[a as usize]) {
+            self.marks.insert(c);
+        }
+        let mut shared = std::mem::take(&mut self.shared);
+        shared.clear();
+        for &[c, d] in self.opposite_sides(b) {
+            // Marks first: they rule out almost every side without a search through links.
+            if self.marks.contains(c) && self.marks.contains(d) && self.has_face(a, c, d) {
+                shared.push([c, d]);
+            }
+        }
+        // Sorted for the binary searches of the collapse.
+        shared.sort_unstable();
+        self.shared = shared;
+    }
+
+    fn rename_in_neighbours(&mut self, kept: u32, removed: u32) {
+        // By index: the lists of other vertices change in the same pool meanwhile.
+        let around = self.neighbours[removed as usize];
+        for index in 0..around.len() {
+            let v = self.neighbour_pool.at(around, index);
+            if v != kept {
+                self.rename_neighbour_of(v, kept, removed);
+                self.rename_sides_of(v, kept, removed);
+            }
+        }
+    }
+
+    fn rename_neighbour_of(&mut self, v: u32, kept: u32, removed: u32) {
+        let list = &mut self.neighbours[v as usize];
+        let position = self.neighbour_pool.get(*list).iter().position(|&w| w == removed);
+        let position = position.expect("neighbours name each other");
+        // A common neighbour names `kept` already: its two edges merge.
+        if self.marks.contains(v) {
+            self.neighbour_pool.swap_remove(list, position);
+            self.edge_count -= 1;
+        } else {
+            self.neighbour_pool.get_mut(*list)[position] = kept;
+        }
+    }
+
+    fn rename_sides_of(&mut self, v: u32, kept: u32, removed: u32) {
+        let list = &mut self.sides[v as usize];
+        let mut index = 0;
+        while index < list.len() {
+            let [p, q] = self.side_pool.at(*list, index);
+            let other = match (p == removed, q == removed) {
+                (true, _) => q,
+                (_, true) => p,
+                _ => {
+                    index += 1;
+                    continue;
+                }
+            };
+            let merges = !self.shared.is_empty()
+                && self.shared.binary_search(&[v.min(other), v.max(other)]).is_ok();
+            // A face with both ends vanishes; of two that merge, the one of `kept` stays.
+            if other == kept || merges {
+                // `index` stays, since the last side has moved here.
+                self.side_pool.swap_remove(list, index);
+            } else {
+                self.side_pool.get_mut(*list)[index] = [kept.min(other), kept.max(other)];
+                index += 1;
+            }
+        }
+    }
+
+    fn absorb_neighbours(&mut self, kept: u32, removed: u32) {
+        let [a, b] = [kept as usize, removed as usize];
+        let position = self.neighbours(kept).iter().position(|&w| w == removed);
+        let position = position.expect("neighbours name each other");
+        self.neighbour_pool.swap_remove(&mut self.neighbours[a], position);
+        self.edge_count -= 1;
+        for index in 0..self.neighbours[b].len() {
+            let v = self.neighbour_pool.at(self.neighbours[b], index);
+            // Marked vertices are neighbours of `kept` already.
+            if v != kept && !self.marks.contains(v) {
+                self.neighbour_pool.push(&mut self.neighbours[a], v);
+            }
+        }
+        self.neighbour_pool.release(&mut self.neighbours[b]);
+    }
+
+    fn absorb_sides(&mut self, kept: u32, removed: u32) {
+        let [a, b] = [kept as usize, removed as usize];
+        let mut index = 0;
+        // Faces with both ends are counted here, faces that merge in the next loop.
+        while index < self.sides[a].len() {
+            if self.side_pool.at(self.sides[a], index).contains(&removed) {
+                self.side_pool.swap_remove(&mut self.sides[a], index);
+                self.face_count -= 1;
+            } else {
+                index += 1;
+            }
+        }
+        for index in 0..self.sides[b].len() {
+            let side = self.side_pool.at(self.sides[b], index);
+            // A face with both ends: it was removed and counted above.
+            if side.contains(&kept) {
+                continue;
+            }
+            if !self.shared.is_empty() && self.shared.binary_search(&side).is_ok() {
+                self.face_count -= 1;
+            } else {
+                self.side_pool.push(&mut self.sides[a], side);
+            }
+        }
+        self.side_pool.release(&mut self.sides[b]);
+    }
+}
+
+// The record of collapses, and the mesh after any number of them.
+
+/// One collapse, in the ids of the initial mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Collapse {
+    /// The end whose id the merged vertex keeps.
+    pub kept: u32,
+    /// The end whose id is retired.
+    pub removed: u32,
+    /// The merged sphere.
+    pub sphere: Sphere,
+}
+
+/// The mesh after the first collapses of a record, without doing them one by one: the image of the
+/// initial mesh under the composition of their simplicial maps.
+///
+/// `replay(initial, &record[..t])` is, bit for bit, the mesh that the engine had after `t`
+/// collapses, for every `t` and in any order of asking. Cost `O(n log n)`.
+///
+/// # Panics
+/// If the collapses name spheres that `initial` does not have.
+pub fn replay(initial: &MedialMesh, collapses: &[Collapse]) -> MedialMesh {
+    let mut image: Vec<u32> = (0..initial.spheres.len() as u32).collect();
+    let mut spheres = initial.spheres.clone();
+    for collapse in collapses {
+        spheres[collapse.kept as usize] = collapse.sphere;
+        image[collapse.removed as usize] = collapse.kept;
+    }
+    // Later collapses decide where a kept vertex ends up: resolve from the last to the first.
+    for collapse in collapses.iter().rev() {
+        image[collapse.removed as usize] = image[collapse.kept as usize];
+    }
+    let left: Vec<bool> = image.iter().enumerate().map(|(v, &to)| v == to as usize).collect();
+    let mut renumbered = vec![u32::MAX; left.len()];
+    for (new, old) in (0..left.len()).filter(|&v| left[v]).enumerate() {
+        renumbered[old] = new as u32;
+    }
+    let map = |v: u32| renumbered[image[v as usize] as usize];
+    let mut edges: Vec<[u32; 2]> = initial.edges.iter().map(|e| e.map(map)).collect();
+    let mut faces: Vec<[u32; 3]> = initial.faces.iter().map(|f| f.map(map)).collect();
+    for edge in &mut edges {
+        edge.sort_unstable();
+    }
+    for face in &mut faces {
+        face.sort_unstable();
+    }
+    // Simplices whose vertices merged are degenerate; their lower-dimensional images are listed
+    // anyway.
+    edges.retain(|e| e[0] < e[1]);
+    faces.retain(|f| f[0] < f[1] && f[1] < f[2]);
+    edges.sort_unstable();
+    edges.dedup();
+    faces.sort_unstable();
+    faces.dedup();
+    let spheres = spheres.iter().zip(&left).filter(|&(_, &l)| l).map(|(&s, _)| s).collect();
+    MedialMesh { spheres, edges, faces, contacts: None }
+}
+
+// The inversion test: whether a collapse folds a face over.
+
+impl CollapseComplex {
+    /// A face `[v, p, q]` that folds over when both ends of the edge `{a, b}` move to `centre`; `v`
+    /// is the one end that belongs to the face. See [`CollapseComplex::folds`].
+    ///
+    /// The answer stays valid until one of `a`, `b`, `p`, `q` is part of a collapse.
+    /// Cost: the faces of both ends.
+    pub fn folded_face(&self, a: u32, b: u32, centre: Vec3) -> Option<[u32; 3]> {
+        let folded_at = |moved: u32, other: u32| {
+            let sides = self.opposite_sides(moved).iter();
+            // Faces with both ends vanish, so they cannot fold.
+            let mut faces = sides.filter(|&&[p, q]| p != other && q != other);
+            let folded = faces.find(|&&[p, q]| self.folds([moved, p, q], centre));
+            folded.map(|&[p, q]| [moved, p, q])
+        };
+        folded_at(a, b).or_else(|| folded_at(b, a))
+    }
+
+    /// Whether a face `[v, p, q]` folds over when `v` moves to `centre`: the dot product of its
+    /// normals before and after is negative.
+    ///
+    /// A face thinner than [`ZERO_LENGTH`] before the move never counts as folded: its normal is
+    /// rounding noise, which must not hold a collapse back. Lengths in units of the diagonal.
+    ///
+    /// Source: Garland, Heckbert 1997, *Surface simplification using quadric error metrics*,
+    /// <https://doi.org/10.1145/258734.258849>, section 3.7.
+    #[inline]
+    pub fn folds(&self, face: [u32; 3], centre: Vec3) -> bool {
+        let [from, p, q] = face.map(|v| self.sphere(v).centre);
+        folds_over([from, p, q], [centre, p, q])
+    }
+}
+
+/// Whether a triangle folds over when its corners move, as [`CollapseComplex::folds`] has it for one of
+/// them.
+#[inline]
+pub fn folds_over(before: [Vec3; 3], after: [Vec3; 3]) -> bool {
+    let [u, v] = [before[1] - before[0], before[2] - before[0]];
+    let normal = u.cross(v);
+    let moved = (after[1] - after[0]).cross(after[2] - after[0]);
+    // Sign first: it is cheap, and few faces get past it.
+    normal.dot(moved) < 0.0 && !is_thin(normal, u, v)
+}
+
+/// Whether the smallest height of the triangle with sides `u`, `v` and `u × v = normal` is noise.
+fn is_thin(normal: Vec3, u: Vec3, v: Vec3) -> bool {
+    let longest = u.length_squared().max(v.length_squared()).max((u - v).length_squared());
+    // The smallest height is the doubled area over the longest side; squared, without division.
+    normal.length_squared() <= ZERO_LENGTH * ZERO_LENGTH * longest
 }

@@ -4,7 +4,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::parts::Shape;
+use super::search::Shape;
 use super::*;
 
 fn vector(rng: &mut Pcg64) -> Vec3 {
@@ -157,7 +157,7 @@ fn no_primitive_is_nearer_than_its_part() {
                 let p = vector(&mut rng) * 10.0_f64.powi(rng.random_range(-2..2));
                 let least = all(&mesh, p).iter().map(|part| part.0).fold(f64::INFINITY, f64::min);
                 let told = union.signed(p);
-                let off = 6.0 * coincident::EQUAL + 1e-15 * (1.0 + p.length());
+                let off = 6.0 * EQUAL + 1e-15 * (1.0 + p.length());
                 assert!((told - least).abs() <= off, "{kind}, {count}, {p}: {told} {least}");
             }
         }

@@ -34,10 +34,7 @@
 //! Rounding: all of this is double precision, whose errors, at coordinates of the order of the
 //! surface's diagonal, are below [`ROUNDING`] diagonals. The interval is wider by that on both sides.
 
-mod surface_side;
-#[cfg(test)]
-mod tests;
-mod union_side;
+use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -45,12 +42,12 @@ use serde::{Deserialize, Serialize};
 use super::MetricError;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, Primitive};
-use crate::geometry::{Cone, Slab, Sphere};
-use crate::surface::TriMesh;
-use crate::surface::TriangleBvh;
+use crate::geometry::planar_frame::PlanarFrame;
+use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
+use crate::surface::{TriMesh, TriangleBvh};
 
-use surface_side::SurfaceSide;
-use union_side::UnionSide;
+#[cfg(test)]
+mod tests;
 
 /// Bound on the rounding error of a distance, in units of the surface's diagonal.
 pub const ROUNDING: f64 = 1e-9;
@@ -246,4 +243,297 @@ fn farthest(from: Vec3, points: &[Vec3]) -> f64 {
 fn quartered([a, b, c]: [Vec3; 3], middle: impl Fn(Vec3, Vec3) -> Vec3) -> [[Vec3; 3]; 4] {
     let [d, e, f] = [middle(b, c), middle(c, a), middle(a, b)];
     [[a, f, e], [f, b, d], [e, d, c], [d, e, f]]
+}
+
+// The first side: `|sigma|` over the triangles of the surface.
+
+/// Closer than this to the centre that attains a distance, the direction of its gradient is mostly
+/// rounding.
+const MIN_ARM: f64 = 1e-9;
+
+/// The triangles of a surface against a union.
+struct SurfaceSide<'a> {
+    pub union: &'a MedialUnion,
+    pub hulls: &'a Hulls,
+}
+
+impl SurfaceSide<'_> {
+    pub fn pieces(&self, surface: &TriMesh) -> Vec<[Vec3; 3]> {
+        (0..surface.faces.len()).map(|face| surface.triangle(face)).collect()
+    }
+
+    /// The farthest of some points of the surface, the first of equally far ones, and its distance.
+    pub fn farthest_of(&self, points: &[Vec3]) -> (f64, Vec3) {
+        let mut farthest = (0.0, points[0]);
+        for (signed, &point) in self.union.signed_batch(points).into_iter().zip(points) {
+            if signed.abs() > farthest.0 {
+                farthest = (signed.abs(), point);
+            }
+        }
+        farthest
+    }
+
+    /// An upper bound of `sigma` over a triangle: the best one from the primitives that are deepest at
+    /// the centre or at a corner.
+    fn above(&self, triangle: &[Vec3; 3], enough: f64, first: f64) -> f64 {
+        let mut least = first;
+        for &corner in triangle {
+            if least <= enough {
+                break;
+            }
+            let deepest = self.union.deepest(corner).primitive;
+            least = least.min(self.hulls.largest_over(deepest, triangle));
+        }
+        least
+    }
+
+    /// An upper bound of `-sigma` over a triangle, from the primitives with which it can exceed
+    /// `enough`.
+    fn below(&self, triangle: &[Vec3; 3], centre: Vec3, reach: f64, enough: f64) -> f64 {
+        let mut depth = 0.0_f64;
+        self.union.each_nearer(centre, reach - enough, |signed, attained_at| {
+            let arm = centre - attained_at;
+            let length = arm.length();
+            let mut lowest = signed - reach;
+            if length > MIN_ARM {
+                // The tangent plane of a convex function lies below it.
+                let rise = |&corner: &Vec3| signed + arm.dot(corner - centre) / length;
+                lowest = triangle.iter().map(rise).fold(f64::INFINITY, f64::min).max(lowest);
+            }
+            depth = depth.max(-lowest);
+        });
+        depth
+    }
+}
+
+impl Side for SurfaceSide<'_> {
+    type Piece = [Vec3; 3];
+
+    const SIDE: WitnessSide = WitnessSide::Surface;
+
+    fn bound(&self, triangle: &[Vec3; 3], _: f64, enough: f64) -> Bound {
+        let centre = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
+        let reach = farthest(centre, triangle);
+        let deepest = self.union.deepest(centre);
+        let reached = deepest.signed.abs();
+        let lipschitz = reached + reach;
+        if lipschitz <= enough {
+            return Bound { reached, centre, upper: lipschitz };
+        }
+        let first = self.hulls.largest_over(deepest.primitive, triangle);
+        let above = self.above(triangle, enough, first.min(deepest.signed + reach));
+        if above > enough {
+            return Bound { reached, centre, upper: above };
+        }
+        // Primitives that `below` skips are no deeper than `enough`.
+        let unseen = enough.min(reach - deepest.signed);
+        let below = self.below(triangle, centre, reach, enough).max(unseen);
+        Bound { reached, centre, upper: above.max(below) }
+    }
+
+    fn divide(&self, triangle: &[Vec3; 3], parts: &mut Vec<[Vec3; 3]>) {
+        parts.extend(quartered(*triangle, Vec3::midpoint));
+    }
+}
+
+// The second side: distances to the surface over the boundary of the union.
+
+/// A point of a primitive's surface is on the boundary of the union, up to rounding, if it is no
+/// deeper than this in any primitive.
+const EXPOSED: f64 = 1e-12;
+
+/// Initial parts of a cone's lateral around its axis.
+const SECTORS: u32 = 6;
+
+/// The surfaces of all primitives against a surface.
+struct UnionSide<'a> {
+    bvh: &'a TriangleBvh,
+    triangles: Vec<PlanarFrame>,
+    mesh: &'a MedialMesh,
+    frames: Vec<Option<ConeFrame>>,
+    union: &'a MedialUnion,
+    hulls: &'a Hulls,
+}
+
+/// A part of the surface of one primitive.
+#[derive(Clone, Copy, Debug)]
+enum Piece {
+    /// A part of a tangent triangle of a slab.
+    Flat([Vec3; 3]),
+    /// A spherical triangle: a sphere, and unit vectors towards its corners.
+    Round(u32, [Vec3; 3]),
+    /// A part of a cone's lateral: an edge, ranges of the share along the axis and of the angle
+    /// around it.
+    Lateral(u32, [f64; 2], [f64; 2]),
+}
+
+/// A point of a piece, and the corners of a convex polytope around the piece.
+struct Enclosure {
+    centre: Vec3,
+    corners: [Vec3; 6],
+    count: usize,
+}
+
+impl<'a> UnionSide<'a> {
+    pub fn new(
+        surface: &TriMesh,
+        bvh: &'a TriangleBvh,
+        mesh: &'a MedialMesh,
+        union: &'a MedialUnion,
+        hulls: &'a Hulls,
+    ) -> Self {
+        let faces = 0..surface.faces.len();
+        Self {
+            bvh,
+            triangles: faces.map(|f| PlanarFrame::new(surface.triangle(f)).0).collect(),
+            mesh,
+            frames: hulls.cones.iter().map(Cone::frame).collect(),
+            union,
+            hulls,
+        }
+    }
+
+    pub fn pieces(&self) -> Vec<Piece> {
+        let mut pieces = Vec::new();
+        for v in 0..self.mesh.spheres.len() as u32 {
+            for signs in 0..8 {
+                let sign = |k: u32| if signs >> k & 1 == 0 { 1.0 } else { -1.0 };
+                let corners = [sign(0) * Vec3::X, sign(1) * Vec3::Y, sign(2) * Vec3::Z];
+                pieces.push(Piece::Round(v, corners));
+            }
+        }
+        for (edge, frame) in (0..).zip(&self.frames) {
+            if frame.is_some() {
+                let angle = |k: u32| TAU * f64::from(k) / f64::from(SECTORS);
+                let sectors = (0..SECTORS).map(|k| [angle(k), angle(k + 1)]);
+                pieces.extend(sectors.map(|sector| Piece::Lateral(edge, [0.0, 1.0], sector)));
+            }
+        }
+        for corners in &self.mesh.faces {
+            let corners = corners.map(|v| self.mesh.spheres[v as usize]);
+            if let Some(planes) = Slab::new(corners).planes() {
+                let touched = |n: Vec3| corners.map(|m| m.centre + m.radius * n);
+                pieces.extend(planes.normals().map(|n| Piece::Flat(touched(n))));
+            }
+        }
+        pieces
+    }
+
+    fn sphere(&self, v: u32) -> Sphere {
+        self.mesh.spheres[v as usize]
+    }
+
+    /// The interpolated sphere of a cone at a share of its axis, and the cone's frame.
+    fn interpolated(&self, edge: u32, share: f64) -> (Sphere, ConeFrame) {
+        let [a, b] = self.mesh.edges[edge as usize].map(|v| self.sphere(v));
+        (a.lerp(b, share), self.frames[edge as usize].expect("laterals have a frame"))
+    }
+
+    fn enclose(&self, piece: &Piece) -> Enclosure {
+        match *piece {
+            Piece::Flat([a, b, c]) => Enclosure::new((a + b + c) / 3.0, &[a, b, c]),
+            Piece::Round(v, [a, b, c]) => {
+                // Between the plane of its corners and the parallel tangent plane the piece is
+                // within the cone over its corners.
+                let Sphere { centre, radius } = self.sphere(v);
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                let height = normal.dot(a).abs();
+                let at = |direction: Vec3| centre + radius * direction;
+                let beyond = [a, b, c].map(|corner| at(corner / height));
+                let middle = at((a + b + c).normalize());
+                Enclosure::new(middle, &[at(a), at(b), at(c), beyond[0], beyond[1], beyond[2]])
+            }
+            Piece::Lateral(edge, shares, [from, to]) => {
+                // Around the axis, between the chord and the tangents at its ends.
+                let bulge = 1.0 / (0.5 * (to - from)).cos();
+                let middle = 0.5 * (from + to);
+                let mut corners = [Vec3::ZERO; 6];
+                for (k, share) in shares.into_iter().enumerate() {
+                    let (sphere, frame) = self.interpolated(edge, share);
+                    let rings = [(from, 1.0), (middle, bulge), (to, 1.0)];
+                    for (corner, (angle, lift)) in corners[3 * k..].iter_mut().zip(rings) {
+                        *corner = lateral_point(sphere, &frame, angle, lift);
+                    }
+                }
+                let (sphere, frame) = self.interpolated(edge, 0.5 * (shares[0] + shares[1]));
+                Enclosure::new(lateral_point(sphere, &frame, middle, 1.0), &corners)
+            }
+        }
+    }
+}
+
+/// The point of a cone's sphere in the direction of the lateral's normal, with the component of the
+/// normal across the axis multiplied by `lift`.
+fn lateral_point(sphere: Sphere, frame: &ConeFrame, angle: f64, lift: f64) -> Vec3 {
+    let (sin, cos) = angle.sin_cos();
+    sphere.centre + sphere.radius * frame.normal(lift * (cos * frame.v + sin * frame.w))
+}
+
+impl Enclosure {
+    fn new(centre: Vec3, points: &[Vec3]) -> Self {
+        let mut corners = [Vec3::ZERO; 6];
+        corners[..points.len()].copy_from_slice(points);
+        Self { centre, corners, count: points.len() }
+    }
+
+    fn corners(&self) -> &[Vec3] {
+        &self.corners[..self.count]
+    }
+}
+
+impl Side for UnionSide<'_> {
+    type Piece = Piece;
+
+    const SIDE: WitnessSide = WitnessSide::Union;
+
+    fn bound(&self, piece: &Piece, known: f64, enough: f64) -> Bound {
+        let enclosure = self.enclose(piece);
+        let (centre, corners) = (enclosure.centre, enclosure.corners());
+        let reach = farthest(centre, corners);
+        let closest = self.bvh.closest(centre);
+        let lipschitz = closest.distance + reach;
+        // Cheapest exit first; it needs no look at the union, since the piece cannot raise `lower`.
+        if lipschitz <= enough && closest.distance <= known {
+            return Bound { reached: 0.0, centre, upper: lipschitz };
+        }
+        let deepest = self.union.deepest(centre);
+        let held = || self.hulls.largest_over(deepest.primitive, corners) < -EXPOSED;
+        if deepest.signed < -EXPOSED && (deepest.signed + reach < -EXPOSED || held()) {
+            return Bound { reached: 0.0, centre, upper: 0.0 };
+        }
+        let reached = if deepest.signed >= -EXPOSED { closest.distance } else { 0.0 };
+        if lipschitz <= enough {
+            return Bound { reached, centre, upper: lipschitz };
+        }
+        let triangle = &self.triangles[closest.face as usize];
+        let squared = |&corner: &Vec3| triangle.distance_squared(corner);
+        let convex = corners.iter().map(squared).fold(0.0, f64::max).sqrt();
+        Bound { reached, centre, upper: lipschitz.min(convex) }
+    }
+
+    fn divide(&self, piece: &Piece, parts: &mut Vec<Piece>) {
+        match *piece {
+            Piece::Flat(triangle) => {
+                parts.extend(quartered(triangle, Vec3::midpoint).map(Piece::Flat));
+            }
+            Piece::Round(v, corners) => {
+                let middle = |a: Vec3, b: Vec3| (a + b).normalize();
+                parts.extend(quartered(corners, middle).map(|c| Piece::Round(v, c)));
+            }
+            Piece::Lateral(edge, [t0, t1], [from, to]) => {
+                let [(first, _), (second, _)] = [t0, t1].map(|t| self.interpolated(edge, t));
+                let around = (to - from) * first.radius.max(second.radius);
+                // The longer direction, so that pieces stay compact and the bounds sharp.
+                if around > first.centre.distance(second.centre) {
+                    let middle = 0.5 * (from + to);
+                    let halves = [[from, middle], [middle, to]];
+                    parts.extend(halves.map(|sector| Piece::Lateral(edge, [t0, t1], sector)));
+                } else {
+                    let middle = 0.5 * (t0 + t1);
+                    let halves = [[t0, middle], [middle, t1]];
+                    parts.extend(halves.map(|shares| Piece::Lateral(edge, shares, [from, to])));
+                }
+            }
+        }
+    }
 }

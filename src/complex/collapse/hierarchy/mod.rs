@@ -20,19 +20,16 @@
 //! A [`Stage`] is a view and costs nothing. Nothing is replayed to reach it and there is no current
 //! stage, so a stage is the same, bit for bit, whatever was asked for before.
 
-mod file;
-mod layer;
+use std::ops::Range;
+use std::sync::Arc;
+
+pub use stage::{Change, HierarchyFileError, HierarchyFileErrorKind, Stage};
+
+use crate::complex::MedialMesh;
+
 mod stage;
 #[cfg(test)]
 mod tests;
-
-use std::sync::Arc;
-
-pub use file::{HierarchyFileError, HierarchyFileErrorKind};
-pub use stage::{Change, Stage};
-
-use crate::complex::MedialMesh;
-use layer::Layer;
 
 /// One collapse of an edge into one of its ends, in the ids of the initial mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -217,4 +214,270 @@ fn rank_by_removal(
         }
     }
     Ok((ranks, by_rank))
+}
+
+// The simplices of one dimension, of all stages.
+
+/// The most simplices of one dimension. Ids have 32 bits; the bound is lower because each simplex
+/// takes some 20 bytes.
+const MAX_SIMPLICES: usize = 1 << 30;
+
+/// Absent id.
+const NONE: u32 = u32::MAX;
+
+/// The placeholder of a simplex that never lives. No stage selects it: stage 0 takes initial
+/// simplices only, the others only ranks from 1 on.
+fn nothing<const K: usize>() -> [u32; K] {
+    [0; K]
+}
+
+/// All simplices with `K` vertices that exist at some stage.
+///
+/// A vertex is named by its *rank*, the number of vertices that are removed before it. So a simplex
+/// with ascending ranks begins with the vertex that is removed first, and lives up to the stage of
+/// that number. Then its image replaces it: a simplex that exists already, a new one, or, if the
+/// kept vertex belongs to it, one of lower dimension. A vertex never comes back, so each simplex
+/// lives through one interval of stages.
+#[derive(Clone, Debug, PartialEq)]
+struct Layer<const K: usize> {
+    /// The initial simplices in the order of their deaths, then all others in the order of their
+    /// births. A copy that arises while the same simplex lives is replaced by [`nothing`].
+    simplices: Vec<[u32; K]>,
+    /// The first `born[t]` of `simplices` were born up to stage `t`.
+    born: Vec<u32>,
+    /// The ids of those that ever live, in the order of their deaths, the survivors last.
+    by_death: Vec<u32>,
+    /// The first `died[t]` of `by_death` are gone at stage `t`.
+    died: Vec<u32>,
+    /// Number of simplices at each stage.
+    count: Vec<u32>,
+}
+
+/// Counts of the simplices that a step removed without a new one in their place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Moved {
+    /// Those that became equal to another simplex.
+    merged: u32,
+    /// Those with both ends of the collapsed edge.
+    vanished: u32,
+}
+
+impl<const K: usize> Layer<K> {
+    /// The layer of a complex whose vertices of ranks 0, 1, ... are collapsed into the vertices of
+    /// ranks `kept`, and the counts of each step. `ranks` holds the ranks of all vertices.
+    /// Cost: the simplices at the removed vertices when they are removed, sorted at each.
+    fn new(
+        initial: &[[u32; K]],
+        ranks: &[u32],
+        kept: &[u32],
+    ) -> Result<(Self, Vec<Moved>), HierarchyError> {
+        let mut builder = Builder::new(initial, ranks, kept.len())?;
+        for (removed, &kept) in (0..).zip(kept) {
+            builder.take(removed, kept)?;
+        }
+        Ok(builder.finish())
+    }
+
+    /// Number of simplices at a stage.
+    fn count(&self, stage: usize) -> usize {
+        self.count[stage] as usize
+    }
+
+    /// The simplices of a stage. Cost: those, and the births up to the stage or the deaths after
+    /// it, whichever are fewer.
+    fn at(&self, stage: usize) -> impl Iterator<Item = [u32; K]> + '_ {
+        let deaths = self.died[stage] as usize..self.by_death.len();
+        self.select(0..self.born[stage] as usize, deaths, stage..usize::MAX)
+    }
+
+    /// The simplices of stage `fine` that are not of the later stage `coarse`. Cost: those, and
+    /// the deaths between them or the births up to `fine`, whichever are fewer.
+    fn dying(&self, fine: usize, coarse: usize) -> impl Iterator<Item = [u32; K]> + '_ {
+        let deaths = self.died[fine] as usize..self.died[coarse] as usize;
+        self.select(0..self.born[fine] as usize, deaths, fine..coarse)
+    }
+
+    /// The simplices of stage `coarse` that are not of the earlier stage `fine`. Cost: those, and
+    /// the births between them or the deaths after `coarse`, whichever are fewer.
+    fn arising(&self, fine: usize, coarse: usize) -> impl Iterator<Item = [u32; K]> + '_ {
+        let births = self.born[fine] as usize..self.born[coarse] as usize;
+        let deaths = self.died[coarse] as usize..self.by_death.len();
+        self.select(births, deaths, coarse..usize::MAX)
+    }
+
+    /// The simplices with ids in `births` whose first vertices have ranks in `firsts`: initial
+    /// ones, then others. Requires that the range `deaths` of `by_death` holds the ids of all of
+    /// them, and no other id of `births`.
+    fn select(
+        &self,
+        births: Range<usize>,
+        deaths: Range<usize>,
+        firsts: Range<usize>,
+    ) -> impl Iterator<Item = [u32; K]> + '_ {
+        // Initial simplices lie in the order of their deaths: they are a slice.
+        let initial = self.born[0] as usize;
+        let among = &self.simplices[births.start.min(initial)..births.end.min(initial)];
+        let before = |rank: usize| among.partition_point(|s| (s[0] as usize) < rank);
+        let slice = &among[before(firsts.start)..before(firsts.end)];
+        let births = births.start.max(initial)..births.end.max(initial);
+        // Either range holds them all; scan the shorter one.
+        let by_birth = births.len() <= deaths.len();
+        let later = if by_birth { &self.simplices[births.clone()] } else { &[] };
+        let ids = if by_birth { &[] } else { &self.by_death[deaths] };
+        let later = later.iter().filter(move |s| firsts.contains(&(s[0] as usize)));
+        let ids = ids.iter().map(|&id| id as usize).filter(move |id| births.contains(id));
+        slice.iter().chain(later).chain(ids.map(|id| &self.simplices[id])).copied()
+    }
+}
+
+/// A layer under construction: each simplex waits at its first vertex, the next of its vertices to
+/// be removed.
+struct Builder<const K: usize> {
+    layer: Layer<K>,
+    /// Initial simplices `start[r]..start[r + 1]` wait at rank `r`.
+    start: Vec<u32>,
+    /// For each rank the simplex born last of those that wait there: the head of a linked list.
+    last: Vec<u32>,
+    /// For each simplex made by a step: the one before it in its list, and the step.
+    previous: Vec<(u32, u32)>,
+    moved: Vec<Moved>,
+    /// The simplices that wait at the vertex being removed: their other vertices, then their id. A
+    /// field to save allocations.
+    here: Vec<[u32; K]>,
+}
+
+impl<const K: usize> Builder<K> {
+    fn new(initial: &[[u32; K]], ranks: &[u32], steps: usize) -> Result<Self, HierarchyError> {
+        if initial.len() > MAX_SIMPLICES {
+            return Err(HierarchyError::TooManySimplices);
+        }
+        let ranked = |simplex: &[u32; K]| {
+            let mut simplex = simplex.map(|v| ranks[v as usize]);
+            simplex.sort_unstable();
+            simplex
+        };
+        let mut start = vec![0_u32; ranks.len() + 1];
+        for simplex in initial {
+            start[ranked(simplex)[0] as usize + 1] += 1;
+        }
+        for rank in 0..ranks.len() {
+            start[rank + 1] += start[rank];
+        }
+        // In a sheet each collapse moves about half a star, so this many are born in all.
+        let mut simplices = Vec::with_capacity(initial.len() * 5 / 2);
+        simplices.resize(initial.len(), nothing());
+        let mut place = start.clone();
+        // Counting sort by the first rank, which is the order of the deaths.
+        for simplex in initial {
+            let simplex = ranked(simplex);
+            let place = &mut place[simplex[0] as usize];
+            simplices[*place as usize] = simplex;
+            *place += 1;
+        }
+        let mut layer = Layer {
+            by_death: Vec::with_capacity(simplices.capacity()),
+            simplices,
+            born: Vec::with_capacity(steps + 1),
+            died: Vec::with_capacity(steps + 1),
+            count: Vec::with_capacity(steps + 1),
+        };
+        layer.end_stage();
+        let (last, moved) = (vec![NONE; ranks.len()], vec![Moved::default(); steps]);
+        Ok(Self { layer, start, last, previous: Vec::new(), moved, here: Vec::new() })
+    }
+
+    /// One step: the simplices at the removed vertex die, their images are born.
+    fn take(&mut self, removed: u32, kept: u32) -> Result<(), HierarchyError> {
+        self.open(removed);
+        for index in 0..self.here.len() {
+            if self.is_repeated(index) {
+                continue;
+            }
+            let mut image = self.here[index];
+            self.layer.by_death.push(image[K - 1]);
+            // With both ends: it shrinks to a simplex of the layer below, which has its own record.
+            if image[..K - 1].contains(&kept) {
+                self.moved[removed as usize].vanished += 1;
+                continue;
+            }
+            image[K - 1] = kept;
+            image.sort_unstable();
+            self.add(image, removed)?;
+        }
+        self.layer.end_stage();
+        Ok(())
+    }
+
+    fn add(&mut self, simplex: [u32; K], step: u32) -> Result<(), HierarchyError> {
+        let id = self.layer.simplices.len();
+        if id >= MAX_SIMPLICES {
+            return Err(HierarchyError::TooManySimplices);
+        }
+        self.layer.simplices.push(simplex);
+        let last = &mut self.last[simplex[0] as usize];
+        self.previous.push((*last, step));
+        *last = id as u32;
+        Ok(())
+    }
+
+    /// Lists the simplices that wait at a rank, equal ones side by side, the earliest born first.
+    fn open(&mut self, rank: u32) {
+        let Self { layer, start, last, previous, here, .. } = self;
+        let simplices = &layer.simplices;
+        let entry = |id: u32| {
+            let mut entry = simplices[id as usize];
+            entry.copy_within(1.., 0);
+            entry[K - 1] = id;
+            entry
+        };
+        here.clear();
+        here.extend((start[rank as usize]..start[rank as usize + 1]).map(entry));
+        let mut id = last[rank as usize];
+        while id != NONE {
+            here.push(entry(id));
+            id = previous[id as usize - layer.born[0] as usize].0;
+        }
+        here.sort_unstable();
+    }
+
+    /// Whether an opened simplex equals the one before it. Then it merged when it was born, which is
+    /// noticed only now: a search at birth would cost more.
+    fn is_repeated(&mut self, index: usize) -> bool {
+        let here = &self.here;
+        if index == 0 || here[index - 1][..K - 1] != here[index][..K - 1] {
+            return false;
+        }
+        // Initial simplices are distinct, so this one was made by a step.
+        let id = here[index][K - 1] as usize;
+        let (_, step) = self.previous[id - self.layer.born[0] as usize];
+        self.moved[step as usize].merged += 1;
+        self.layer.simplices[id] = nothing();
+        true
+    }
+
+    fn finish(mut self) -> (Layer<K>, Vec<Moved>) {
+        // The survivors, which no step opens: their copies are still to be found.
+        for rank in self.moved.len()..self.last.len() {
+            self.open(rank as u32);
+            for index in 0..self.here.len() {
+                if !self.is_repeated(index) {
+                    self.layer.by_death.push(self.here[index][K - 1]);
+                }
+            }
+        }
+        let mut count = self.layer.born[0];
+        self.layer.count.push(count);
+        for moved in &self.moved {
+            count -= moved.merged + moved.vanished;
+            self.layer.count.push(count);
+        }
+        (self.layer, self.moved)
+    }
+}
+
+impl<const K: usize> Layer<K> {
+    fn end_stage(&mut self) {
+        self.born.push(self.simplices.len() as u32);
+        self.died.push(self.by_death.len() as u32);
+    }
 }

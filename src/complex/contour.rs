@@ -1,0 +1,650 @@
+//! The boundary surface of the union of spheres, cones and slabs of a medial mesh.
+//!
+//! With `sigma` the least signed distance to a primitive, negative inside and 1-Lipschitz
+//! ([`MedialUnion`]):
+//!
+//! 1. A cube around the union is filled with tetrahedra. Those that may meet the boundary, judged by
+//!    `sigma` at their vertices, are bisected until no edge is longer than 4/5 of the tolerance, or
+//!    than the radius of the union's balls there if that is less (file `bisection.rs`).
+//! 2. Marching tetrahedra: a closed manifold with its vertices on the boundary (file `march.rs`).
+//! 3. Edges shorter than a quarter of the tetrahedron's edge are contracted: a closed manifold stays one,
+//!    and vertices stay on the boundary ([`contract_short_edges_while`]).
+//!
+//! # What the tolerance means
+//!
+//! Every point with `sigma > tolerance` is outside the surface, and every point with
+//! `sigma < -tolerance` is inside. Proof: let `d` be the longest edge of the tetrahedron that holds the
+//! point. If `|sigma| > d` at the point, all four vertices are on its side, so the surface does not
+//! enter the tetrahedron. If `d` is larger than 4/5 of the tolerance, the tetrahedron was not refined
+//! because `|sigma| > d` at a vertex; then it is on one side as a whole. Contraction moves the surface
+//! by at most `d / 4`.
+//!
+//! So no point of the surface is farther than the tolerance from the union, or deeper in it. On smooth
+//! parts the distance is much less, about `d^2 / 8 r` for curvature radius `r`. Features thinner than a
+//! tetrahedron can be missed: parts of the union with a radius below 1/20 of the tolerance
+//! ([`UnionSurface::lost`]), and crevices and holes narrower than the tolerance. A crevice that is
+//! missed only in some places is bridged there, so the surface has loops that the union does not have;
+//! [`union_betti`](crate::metrics::union_betti) detects this.
+
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+use rayon::prelude::*;
+
+use super::{MedialMesh, MedialUnion, UnionError};
+use crate::Vec3;
+use crate::geometry::hash::splitmix;
+use crate::surface::{Folds, TriMesh, contract_short_edges_while};
+
+/// The boundary surface of a union, see [`union_surface`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnionSurface {
+    /// Closed and manifold, counter-clockwise as seen from outside.
+    pub mesh: TriMesh,
+    /// Tetrahedra that were needed.
+    pub tetrahedra: usize,
+    /// Spheres with a radius below the smallest tetrahedron: these, and what tapers to them, may be
+    /// missing.
+    pub lost: usize,
+    /// Radius below which a sphere counts as lost, in the unit of the mesh.
+    pub smallest: f64,
+}
+
+/// Why there is no surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ContourError {
+    /// The medial mesh has no union.
+    #[error(transparent)]
+    Union(#[from] UnionError),
+    /// The tolerance is not a positive number.
+    #[error("a tolerance of {0} is not positive")]
+    Tolerance(f64),
+    /// The tolerance is too fine for the memory that this may take.
+    #[error(
+        "a tolerance of {tolerance:e} needs more than {most} tetrahedra, or finer ones than there are; \
+         {feasible:e} is feasible"
+    )]
+    TooFine {
+        /// The requested tolerance, in the unit of the mesh.
+        tolerance: f64,
+        /// The most tetrahedra that are taken.
+        most: usize,
+        /// A tolerance that is feasible, in the unit of the mesh.
+        feasible: f64,
+    },
+    /// No part of the union is thick enough.
+    #[error(
+        "no part of the union is as thick as {smallest:e}: a tolerance below {feasible:e} shows some"
+    )]
+    TooThin {
+        /// The smallest tetrahedron.
+        smallest: f64,
+        /// A tolerance that would show the largest sphere.
+        feasible: f64,
+    },
+    /// All radii are zero.
+    #[error("all spheres have radius zero: their union has no inside")]
+    NoInside,
+    /// It was stopped.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// Tetrahedra's edges as a share of the tolerance; contraction takes the rest.
+const EDGE_SHARE: f64 = 0.8;
+
+/// Edges shorter than this share of the tetrahedron's edge that the vertex is on are contracted.
+const CONTRACTED: f64 = 0.25;
+
+/// Tetrahedra are refined to the radius of the union's balls, but no further than to this share of the
+/// edge that the tolerance requires.
+const MIN_SHARE_OF_CELL: f64 = 1.0 / 16.0;
+
+/// Bound on the number of tetrahedra: about 4 GB.
+const MAX_TETRAHEDRA: usize = 50_000_000;
+
+/// The boundary of the union of all primitives of a medial mesh as triangles. `tolerance` is in the unit of
+/// the mesh; the head of this file says what it means.
+///
+/// The time and memory grow with the area of the boundary over the square of the tolerance. Parallel;
+/// the same surface for any number of threads.
+///
+/// ```
+/// use medial::{Vec3, surface};
+/// use medial::complex::{MedialMesh, Sphere, union_surface};
+///
+/// let spheres = vec![Sphere::new(Vec3::ZERO, 1.0), Sphere::new(4.0 * Vec3::X, 1.0)];
+/// let capsule = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![])?;
+/// let boundary = union_surface(&capsule, 0.2)?;
+/// let report = surface::validate(&boundary.mesh)?;
+/// let exact = std::f64::consts::PI * (4.0 / 3.0 + 4.0);
+/// assert!((report.volume.unwrap() / exact - 1.0).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the mesh has no union, the tolerance is not positive, or so fine that more than 50 million
+/// tetrahedra would be needed, and when nothing is thick enough to show.
+pub fn union_surface(mesh: &MedialMesh, tolerance: f64) -> Result<UnionSurface, ContourError> {
+    union_surface_within(mesh, tolerance, MAX_TETRAHEDRA)
+}
+
+/// [`union_surface`] with at most `most` tetrahedra, of some 80 bytes each.
+///
+/// # Errors
+/// As [`union_surface`].
+pub fn union_surface_within(
+    mesh: &MedialMesh,
+    tolerance: f64,
+    most: usize,
+) -> Result<UnionSurface, ContourError> {
+    union_surface_while(mesh, tolerance, most, || true)
+}
+
+/// [`union_surface_within`] for as long as `go_on` says so, which is asked every few ten thousand
+/// vertices: of a [`RunContext`](crate::simplifier::RunContext), `|| run.step(0, 1).is_ok()`.
+///
+/// # Errors
+/// As [`union_surface`], and [`ContourError::Cancelled`] if it was stopped.
+pub fn union_surface_while(
+    mesh: &MedialMesh,
+    tolerance: f64,
+    most: usize,
+    mut go_on: impl FnMut() -> bool,
+) -> Result<UnionSurface, ContourError> {
+    let union = MedialUnion::new(mesh)?;
+    if !(tolerance > 0.0 && tolerance.is_finite()) {
+        return Err(ContourError::Tolerance(tolerance));
+    }
+    let largest = mesh.spheres.iter().map(|m| m.radius).fold(0.0, f64::max);
+    if largest == 0.0 {
+        return Err(ContourError::NoInside);
+    }
+    let longest = EDGE_SHARE * tolerance;
+    let smallest = MIN_SHARE_OF_CELL * longest;
+    let mut grid = cube_around(&union, longest);
+    let sizes: Vec<f64> = (0..=MAX_BISECTIONS).map(|g| grid.longest_edge(g)).collect();
+    let goal = sizes.iter().position(|&s| s <= longest).unwrap_or(sizes.len() - 1) as u8;
+    let wanted = |leaf: &Leaf, values: [Value; 4]| {
+        let size = sizes[usize::from(leaf.generation)];
+        let radius = values.iter().map(|v| v.radius).fold(f64::INFINITY, f64::min);
+        size > longest.min(radius.max(smallest)) && values.iter().all(|v| v.signed.abs() <= size)
+    };
+    let values = |points: &[Vec3]| {
+        let found = union.deepest_ball_batch(points).into_iter();
+        found.map(|(signed, radius)| Value { signed, radius }).collect()
+    };
+    grid.refine(goal, most, values, wanted, &mut go_on).map_err(|unfinished| match unfinished {
+        Unfinished::TooMany { generation, leaves } => {
+            // Feasible even if everything is thin and refined as far as possible.
+            let size = sizes[usize::from(generation)] / MIN_SHARE_OF_CELL;
+            let feasible = size / EDGE_SHARE * f64::max(1.0, (leaves as f64 / most as f64).sqrt());
+            ContourError::TooFine { tolerance, most, feasible }
+        }
+        Unfinished::Stopped => ContourError::Cancelled,
+    })?;
+    if sizes[usize::from(goal)] > longest {
+        let feasible = sizes[usize::from(goal)] / EDGE_SHARE;
+        return Err(ContourError::TooFine { tolerance, most, feasible });
+    }
+    let (raw, edges) = march(&grid, &union);
+    if raw.faces.is_empty() {
+        // With edges of half its radius, a ball certainly contains a vertex.
+        let feasible = 0.5 * largest / EDGE_SHARE;
+        return Err(ContourError::TooThin { smallest, feasible });
+    }
+    let limits: Vec<f64> = edges.iter().map(|length| CONTRACTED * length).collect();
+    let contracted = contract_short_edges_while(&raw, &limits, Folds::Refused, go_on);
+    let mesh_of = contracted.ok_or(ContourError::Cancelled)?.mesh;
+    let lost = mesh.spheres.iter().filter(|m| m.radius < smallest).count();
+    Ok(UnionSurface { mesh: mesh_of, tetrahedra: grid.leaves.len(), lost, smallest })
+}
+
+/// A cube with the union in its inside. It is off centre by odd fractions, so that symmetric unions do not
+/// have their boundary run through vertices.
+fn cube_around(union: &MedialUnion, longest: f64) -> Bisection {
+    let (lo, hi) = union.bounding_box();
+    let extent = (hi - lo).max_element().max(longest);
+    let margin = 0.1 * extent * Vec3::new(0.731, 0.617, 0.849);
+    Bisection::of_cube(lo - margin, 1.2 * extent)
+}
+
+// The surface between tetrahedra's vertices inside and outside: marching tetrahedra.
+//
+// A. Doi, A. Koide: *An efficient method of triangulating equi-valued surfaces by using tetrahedral
+// cells*, IEICE Transactions E74 (1991).
+//
+// 1. Each edge of the tetrahedra with ends on different sides has one vertex of the surface, where
+//    the signed distance is zero, found by the Illinois variant of regula falsi.
+// 2. In a tetrahedron with one or three vertices inside, the three vertices on its edges are a
+//    triangle; with two inside, the four are cut into two triangles along the shorter diagonal.
+//
+// Tetrahedra are conforming, so that every edge of the result is in the common face of two of them and
+// has two triangles, and the triangles around a vertex go once around its edge: the result is a closed
+// manifold, always.
+
+/// For each vertex of a tetrahedron the other three, so that the four are an even permutation.
+const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// The even permutations that begin with an ascending pair.
+const PAIRS: [[usize; 4]; 6] =
+    [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]];
+
+/// Largest distance of a vertex from the boundary, in lengths of its edge.
+const VERTEX_TOLERANCE: f64 = 1e-9;
+
+/// Evaluations on one edge: halving alone would reach the resolution of doubles.
+const MAX_STEPS: usize = 60;
+
+/// The surface, and for each of its vertices the length of the edge that it is on.
+fn march(grid: &Bisection, union: &MedialUnion) -> (TriMesh, Vec<f64>) {
+    let inside = |v: u32| grid.values[v as usize].signed < 0.0;
+    let is_mixed = |leaf: &&Leaf| {
+        let count = leaf.vertices.iter().filter(|&&v| inside(v)).count();
+        count != 0 && count != 4
+    };
+    let mixed: Vec<&Leaf> = grid.leaves.iter().filter(is_mixed).collect();
+    let crossings = |leaf: &&Leaf| {
+        let v = leaf.vertices;
+        let pairs = PAIRS.map(|[i, j, ..]| (v[i], v[j]));
+        pairs.into_iter().filter(|&(a, b)| inside(a) != inside(b)).map(|(a, b)| edge_key(a, b))
+    };
+    let mut edges: Vec<u64> = mixed.par_iter().flat_map_iter(crossings).collect();
+    edges.par_sort_unstable();
+    edges.dedup();
+    let meet = |near: &mut usize, &key: &u64| {
+        let ends = [(key >> 32) as u32, key as u32];
+        let [a, b] = ends.map(|v| grid.position(v));
+        let values = ends.map(|v| grid.values[v as usize].signed);
+        (crossing(union, near, [a, b], values), a.distance(b))
+    };
+    let chunks = edges.par_iter().with_min_len(1 << 8);
+    let found: Vec<(Vec3, f64)> = chunks.map_init(|| 0, meet).collect();
+    let vertices: Vec<Vec3> = found.iter().map(|f| f.0).collect();
+    let vertex = |a: u32, b: u32| {
+        edges.binary_search(&edge_key(a, b)).expect("listed, its ends are on different sides")
+            as u32
+    };
+    let triangles = |leaf: &&Leaf| {
+        let x = leaf.vertices;
+        let (polygon, corners) = polygon(x.map(inside));
+        let mut ring =
+            polygon.map(|(i, j)| if corners == 3 && i == j { 0 } else { vertex(x[i], x[j]) });
+        let ring = &mut ring[..corners];
+        let [a, b, c, d] = x.map(|v| grid.position(v));
+        if (b - a).cross(c - a).dot(d - a) < 0.0 {
+            ring.reverse();
+        }
+        cut(ring, &vertices)
+    };
+    let faces = mixed.par_iter().with_min_len(1 << 10).flat_map_iter(triangles).collect();
+    (TriMesh { vertices, faces }, found.iter().map(|f| f.1).collect())
+}
+
+fn edge_key(a: u32, b: u32) -> u64 {
+    u64::from(a.min(b)) << 32 | u64::from(a.max(b))
+}
+
+/// Step 2: the edges that the surface crosses in a positive tetrahedron, counter-clockwise as seen from
+/// outside, and their number.
+fn polygon(inside: [bool; 4]) -> ([(usize, usize); 4], usize) {
+    let count = inside.iter().filter(|&&i| i).count();
+    if count == 2 {
+        let both = PAIRS.iter().find(|[i, j, ..]| inside[*i] && inside[*j]);
+        let &[i, j, k, l] = both.expect("two are inside");
+        return ([(i, k), (i, l), (j, l), (j, k)], 4);
+    }
+    // The one that is alone on its side.
+    let i = (0..4).find(|&i| inside[i] == (count == 1)).expect("the sides are mixed");
+    let [j, k, l] = OTHERS[i];
+    let ring = if count == 1 { [(i, j), (i, k), (i, l)] } else { [(i, l), (i, k), (i, j)] };
+    ([ring[0], ring[1], ring[2], (i, i)], 3)
+}
+
+/// A triangle, or a quadrilateral cut along its shorter diagonal.
+fn cut(ring: &[u32], vertices: &[Vec3]) -> Vec<[u32; 3]> {
+    if let &[a, b, c] = ring {
+        return vec![[a, b, c]];
+    }
+    let [a, b, c, d] = [ring[0], ring[1], ring[2], ring[3]];
+    let length = |a: u32, b: u32| vertices[a as usize].distance_squared(vertices[b as usize]);
+    if length(a, c) <= length(b, d) {
+        vec![[a, b, c], [a, c, d]]
+    } else {
+        vec![[a, b, d], [b, c, d]]
+    }
+}
+
+/// Step 1: a point of the edge from `a` to `b` at which the signed distance is zero, up to rounding,
+/// for values of different sides at its ends.
+fn crossing(
+    union: &MedialUnion,
+    near: &mut usize,
+    [a, b]: [Vec3; 2],
+    [at_a, at_b]: [f64; 2],
+) -> Vec3 {
+    let (mut s, mut t) = (0.0, 1.0);
+    let (mut low, mut high) = (at_a, at_b);
+    let enough = VERTEX_TOLERANCE * a.distance(b);
+    let mut best = if at_a.abs() < at_b.abs() { (at_a.abs(), 0.0) } else { (at_b.abs(), 1.0) };
+    for _ in 0..MAX_STEPS {
+        if best.0 <= enough || t - s <= f64::EPSILON {
+            break;
+        }
+        // Illinois: the value of the end that stays is halved, so that both ends converge.
+        let u = (s + (t - s) * (low / (low - high))).clamp(s, t);
+        let value = union.signed_from(a.lerp(b, u), near);
+        if value.abs() < best.0 {
+            best = (value.abs(), u);
+        }
+        if (value < 0.0) == (at_a < 0.0) {
+            (s, low, high) = (u, value, 0.5 * high);
+        } else {
+            (t, high, low) = (u, value, 0.5 * low);
+        }
+    }
+    a.lerp(b, best.1)
+}
+
+// Tetrahedra that fill a cube and are refined by bisection, conforming, with a value at each vertex.
+//
+// J. M. Maubach: *Local bisection refinement for n-simplicial grids generated by reflection*, SIAM
+// Journal on Scientific Computing 16 (1995), <https://doi.org/10.1137/0916014>.
+//
+// 1. The cube is cut into Kuhn's six tetrahedra `(x0, x1, x2, x3)` around its diagonal `x0 x3`, of tag 3.
+// 2. A tetrahedron of tag `k` is bisected at the middle `z` of `x0 xk` into `(x0 .. x(k-1), z, x(k+1) ..)`
+//    and `(x1 .. xk, z, x(k+1) ..)`, both of tag `k - 1`, or 3 after 1. Three bisections halve all
+//    lengths; there are three shapes of tetrahedra, however often they are bisected.
+// 3. A tetrahedron is bisected if it is too coarse, or if the middle of one of its edges is a vertex.
+//    When no tetrahedron is left to bisect, they are conforming: any two share a face, an edge, a
+//    vertex or nothing.
+
+/// Steps of the integer grid of the vertices along a side of the cube.
+const STEPS: u32 = 1 << 20;
+
+/// The most bisections of one tetrahedron: after three for each bit of the steps, sides are one step.
+const MAX_BISECTIONS: u8 = 60;
+
+/// The values at a vertex.
+#[derive(Clone, Copy, Debug)]
+struct Value {
+    /// Signed distance to the union.
+    pub signed: f64,
+    /// Radius of the ball of the union that attains it.
+    pub radius: f64,
+}
+
+/// A tetrahedron of the current subdivision.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    pub vertices: [u32; 4],
+    tag: u8,
+    /// How often its ancestors were bisected.
+    pub generation: u8,
+    /// Whether it was found not to be wanted.
+    settled: bool,
+    /// Whether it is of the last round, and was not yet tested for vertices on its edges.
+    fresh: bool,
+}
+
+/// A cube in tetrahedra.
+struct Bisection {
+    corner: Vec3,
+    step: f64,
+    pub leaves: Vec<Leaf>,
+    /// Grid coordinates, 21 bits each, of every vertex.
+    keys: Vec<u64>,
+    pub values: Vec<Value>,
+    /// The last round in which an edge at each vertex was bisected.
+    bisected_in: Vec<u32>,
+    round: u32,
+    /// Looked up only, never iterated.
+    vertex_at: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
+}
+
+/// Why the subdivision is not finished.
+enum Unfinished {
+    /// It has more tetrahedra than are allowed, or would have many times as many.
+    TooMany {
+        /// Bisections of the finest one when that was found.
+        generation: u8,
+        /// Tetrahedra then.
+        leaves: usize,
+    },
+    /// It was stopped.
+    Stopped,
+}
+
+/// Vertices that are evaluated between two calls of `go_on`.
+const CHUNK: usize = 1 << 16;
+
+/// Refinement gives up early if the predicted number of tetrahedra exceeds the limit by this factor.
+const HOPELESS: f64 = 8.0;
+
+/// Predictions start at this generation: earlier, the tetrahedra near the boundary are too coarse.
+const FORESIGHT: u8 = 15;
+
+impl Bisection {
+    /// Kuhn's six tetrahedra of the cube with this lowest corner and side; no values yet.
+    fn of_cube(corner: Vec3, side: f64) -> Self {
+        let mut all = Self {
+            corner,
+            step: side / f64::from(STEPS),
+            leaves: Vec::new(),
+            keys: Vec::new(),
+            values: Vec::new(),
+            bisected_in: Vec::new(),
+            round: 1,
+            vertex_at: HashMap::default(),
+        };
+        let far = u64::from(STEPS);
+        let axis = [far, far << 21, far << 42];
+        for [i, j, k] in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let path = [0, axis[i], axis[i] + axis[j], axis[i] + axis[j] + axis[k]];
+            let vertices = path.map(|key| all.vertex(key));
+            all.leaves.push(Leaf { vertices, tag: 3, generation: 0, settled: false, fresh: true });
+        }
+        all
+    }
+
+    /// The position of a vertex.
+    fn position(&self, vertex: u32) -> Vec3 {
+        let key = self.keys[vertex as usize];
+        let mask = (1 << 21) - 1;
+        let at = [key & mask, key >> 21 & mask, key >> 42].map(|c| c as f64);
+        self.corner + self.step * Vec3::from_array(at)
+    }
+
+    /// The longest edge of tetrahedra after `generation` bisections: a space diagonal, a diagonal of a
+    /// face, or a side.
+    fn longest_edge(&self, generation: u8) -> f64 {
+        let side = self.step * f64::from(STEPS) * f64::powi(0.5, i32::from(generation / 3));
+        side * [3f64.sqrt(), 2f64.sqrt(), 1.0][usize::from(generation % 3)]
+    }
+
+    /// Bisects until no tetrahedron is wanted and all are conforming. `values` gives the values at
+    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary. `go_on` is asked
+    /// in every round, and every so many vertices.
+    ///
+    /// # Errors
+    /// When there are more than `most` tetrahedra, or will be by far: near a surface, three bisections
+    /// make four of one. When `go_on` stops it.
+    fn refine(
+        &mut self,
+        goal: u8,
+        most: usize,
+        values: impl Fn(&[Vec3]) -> Vec<Value>,
+        wanted: impl Fn(&Leaf, [Value; 4]) -> bool + Sync,
+        mut go_on: impl FnMut() -> bool,
+    ) -> Result<(), Unfinished> {
+        let mut finest = 0;
+        loop {
+            let new: Vec<Vec3> =
+                (self.values.len()..self.keys.len()).map(|v| self.position(v as u32)).collect();
+            for chunk in new.chunks(CHUNK) {
+                if !go_on() {
+                    return Err(Unfinished::Stopped);
+                }
+                self.values.extend(values(chunk));
+            }
+            let is_split = |leaf: &Leaf| {
+                let may = leaf.generation < MAX_BISECTIONS;
+                let wanted = !leaf.settled && may && wanted(leaf, self.values_of(leaf));
+                (wanted || self.has_hanging_vertex(leaf), wanted)
+            };
+            let chunks = self.leaves.par_iter().with_min_len(1 << 12);
+            let split: Vec<(bool, bool)> = chunks.map(is_split).collect();
+            let more = split.iter().filter(|s| s.0).count();
+            if more == 0 {
+                return Ok(());
+            }
+            let to_come = f64::from(goal.saturating_sub(finest)) * 2.0 / 3.0;
+            let foreseen = if finest < FORESIGHT { 0.0 } else { more as f64 * to_come.exp2() };
+            let leaves = self.leaves.len() + more;
+            if leaves > most || foreseen > HOPELESS * most as f64 {
+                return Err(Unfinished::TooMany { generation: finest, leaves });
+            }
+            self.round += 1;
+            let old = std::mem::take(&mut self.leaves);
+            self.leaves.reserve(old.len() + more);
+            for (mut leaf, (is_split, wanted)) in old.into_iter().zip(split) {
+                leaf.settled |= !wanted;
+                leaf.fresh = false;
+                if is_split {
+                    self.bisect(leaf);
+                    finest = finest.max(leaf.generation + 1);
+                } else {
+                    self.leaves.push(leaf);
+                }
+            }
+        }
+    }
+
+    /// Step 2.
+    fn bisect(&mut self, leaf: Leaf) {
+        let k = usize::from(leaf.tag);
+        let x = leaf.vertices;
+        let middle = self.vertex(self.middle(x[0], x[k]));
+        for end in [x[0], x[k]] {
+            self.bisected_in[end as usize] = self.round;
+        }
+        let (mut low, mut high) = (x, x);
+        low[k] = middle;
+        high.copy_within(1..=k, 0);
+        high[k] = middle;
+        let tag = if k > 1 { leaf.tag - 1 } else { 3 };
+        // If a tetrahedron needs no refinement, neither do its parts.
+        let settled = leaf.settled;
+        for vertices in [low, high] {
+            let generation = leaf.generation + 1;
+            self.leaves.push(Leaf { vertices, tag, generation, settled, fresh: true });
+        }
+    }
+
+    fn has_hanging_vertex(&self, leaf: &Leaf) -> bool {
+        let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+        pairs.iter().any(|&(i, j)| {
+            let (a, b) = (leaf.vertices[i], leaf.vertices[j]);
+            // An edge tested before can have got a middle vertex only in the last round.
+            let is_new = |v: u32| self.bisected_in[v as usize] == self.round;
+            if !(leaf.fresh || is_new(a) && is_new(b)) {
+                return false;
+            }
+            // Ends one step apart have no grid point between them.
+            let odd = (self.keys[a as usize] ^ self.keys[b as usize]) & ODD;
+            odd == 0 && self.vertex_at.contains_key(&self.middle(a, b))
+        })
+    }
+
+    /// The key of the middle of an edge whose ends differ by even steps.
+    fn middle(&self, a: u32, b: u32) -> u64 {
+        // Fields cannot overflow: the sum of two of at most 2^20 has 21 bits, and is even.
+        (self.keys[a as usize] + self.keys[b as usize]) >> 1
+    }
+
+    fn vertex(&mut self, key: u64) -> u32 {
+        let next = self.keys.len() as u32;
+        let vertex = *self.vertex_at.entry(key).or_insert(next);
+        if vertex == next {
+            self.keys.push(key);
+            self.bisected_in.push(0);
+        }
+        vertex
+    }
+
+    /// The values at the vertices of a tetrahedron.
+    fn values_of(&self, leaf: &Leaf) -> [Value; 4] {
+        leaf.vertices.map(|v| self.values[v as usize])
+    }
+}
+
+/// The lowest bit of each coordinate of a key.
+const ODD: u64 = 1 | 1 << 21 | 1 << 42;
+
+/// Spreads keys over the table; there is no adversary.
+#[derive(Default)]
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&b| self.write_u64(self.0 ^ u64::from(b)));
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        self.0 = splitmix(key);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Refined around a point of the unit cube.
+    fn refined(target: Vec3, smallest: f64) -> Bisection {
+        let mut all = Bisection::of_cube(Vec3::ZERO, 1.0);
+        let values = |points: &[Vec3]| {
+            points.iter().map(|p| Value { signed: p.distance(target), radius: 1.0 }).collect()
+        };
+        let sizes: Vec<f64> = (0..=MAX_BISECTIONS).map(|g| all.longest_edge(g)).collect();
+        let wanted = |leaf: &Leaf, values: [Value; 4]| {
+            let size = sizes[usize::from(leaf.generation)];
+            size > smallest && values.iter().all(|v| v.signed <= size)
+        };
+        assert!(all.refine(0, 1 << 20, values, wanted, || true).is_ok());
+        all
+    }
+
+    #[test]
+    fn the_tetrahedra_are_conforming_and_fill_the_cube() {
+        let all = refined(Vec3::new(0.3, 0.2, 0.9), 0.01);
+        let mut volume = 0.0;
+        let mut sides: Vec<([u32; 3], Vec3)> = Vec::new();
+        for leaf in &all.leaves {
+            let [a, b, c, d] = leaf.vertices.map(|v| all.position(v));
+            volume += (b - a).cross(c - a).dot(d - a).abs() / 6.0;
+            let longest = [a.distance(b), a.distance(c), a.distance(d), b.distance(c)];
+            let longest = longest.into_iter().fold(b.distance(d).max(c.distance(d)), f64::max);
+            let expected = all.longest_edge(leaf.generation);
+            assert!((longest - expected).abs() < 1e-12 * expected, "{longest} {expected}");
+            for i in 0..4 {
+                let mut side: Vec<u32> = leaf.vertices.to_vec();
+                side.remove(i);
+                side.sort_unstable();
+                let middle = side.iter().map(|&v| all.position(v)).sum::<Vec3>() / 3.0;
+                sides.push((side.try_into().unwrap(), middle));
+            }
+        }
+        assert!((volume - 1.0).abs() < 1e-12, "{volume}");
+        sides.sort_by_key(|s| s.0);
+        for group in sides.chunk_by(|s, t| s.0 == t.0) {
+            // Within the cube every triangle has two tetrahedra, on its boundary one.
+            let on_boundary = group[0].1.to_array().iter().any(|x| x.min(1.0 - x).abs() < 1e-12);
+            assert_eq!(group.len(), if on_boundary { 1 } else { 2 });
+        }
+        assert!(all.leaves.len() > 1000);
+    }
+}
