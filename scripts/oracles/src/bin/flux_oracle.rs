@@ -21,9 +21,8 @@ use std::time::Instant;
 use medial::Vec3;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::RunContext;
-use medial::surface::{self, TriMesh};
-use medial_methods::aof::{AofParams, Probe, Solid, Sphere, Spiral, Surface, Variant, Wanted};
-use medial_methods::aof::{NearBatch, NearSet, NearbyTriangles};
+use medial::surface::{self, TriMesh, TriangleBvh};
+use medial_methods::aof::{AofParams, Solid, Sphere, Spiral, Surface, Variant, Wanted};
 
 /// Samples of the finest level.
 const SAMPLES: usize = 50;
@@ -55,27 +54,24 @@ fn mesh(name: &str) -> Result<TriMesh, Box<dyn Error>> {
     })
 }
 
-fn shape(name: &str) -> Result<Shape, Box<dyn Error>> {
-    let mesh = mesh(name)?;
-    let report = surface::validate(&mesh)?;
-    Ok(Shape::new(name, &mesh, report, ShapeOptions::default())?)
+fn shape(mesh: &TriMesh) -> Result<Shape, Box<dyn Error>> {
+    let report = surface::validate(mesh)?;
+    Ok(Shape::new("oracle", mesh, report, ShapeOptions::default())?)
 }
 
-fn solid(shape: &Shape) -> Solid<'_> {
-    let surface =
-        Surface { triangles: NearbyTriangles::new(shape.mesh()), inside: shape.inside_test() };
+fn solid(shape: &Shape) -> Result<Solid<'_>, Box<dyn Error>> {
     let params = AofParams {
         levels: 1,
         samples: SAMPLES.to_string(),
         variant: Variant::Plain,
         ..AofParams::default()
     };
-    Solid::new(shape, surface, params, RunContext::default())
+    Ok(Solid::new(shape, params, RunContext::default())?)
 }
 
 fn make(name: &str, resolution: u32, count: usize, file: &str) -> Outcome {
-    let shape = shape(name)?;
-    let solid = solid(&shape);
+    let shape = shape(&mesh(name)?)?;
+    let solid = solid(&shape)?;
     let grid = solid.grid(resolution);
     let start = solid.descend(resolution, Wanted::Places)?.voxels;
     let step = (start.len() / count).max(1);
@@ -107,8 +103,7 @@ fn bytes(numbers: impl Iterator<Item = f64>) -> Vec<u8> {
 }
 
 fn numbers(bytes: &[u8]) -> Vec<f64> {
-    let number = |c: &[u8]| f64::from_le_bytes(c.try_into().unwrap_or_default());
-    bytes.chunks_exact(8).map(number).collect()
+    bytes.chunks_exact(8).map(|c| f64::from_le_bytes(c.try_into().unwrap_or_default())).collect()
 }
 
 fn run(file: &str, answers: &str) -> Outcome {
@@ -127,24 +122,16 @@ fn run(file: &str, answers: &str) -> Outcome {
     };
     let voxels = numbers(&std::fs::read(format!("{file}.voxels"))?);
     let sphere = Sphere::new(Spiral::EqualArea, voxels[1] as usize, voxels[2]);
-    let triangles = NearbyTriangles::new(&mesh);
-    let mut probe = Probe::new(&sphere);
-    let (mut set, mut batch) = (NearSet::default(), NearBatch::default());
+    // The mesh has a diagonal of 1 already. The shape rounds it once more, which the compared points must not have.
+    let shape = shape(&mesh)?;
+    let (tree, surface) = (TriangleBvh::new(&mesh)?, Surface::of(&shape)?);
     let (mut closest, mut fluxes) = (Vec::new(), Vec::new());
-    let whole = triangles.all(Vec3::ZERO);
     for centre in voxels[3..].chunks_exact(3).map(vector) {
-        triangles.narrow(&whole, centre, sphere.radius, &mut set);
-        fluxes.push(probe.flux(&triangles, &set));
-        batch.clear();
+        let start = tree.closest_from(centre, None).face;
+        fluxes.push(surface.flux(&sphere, shape.normalisation().forward(centre), start));
         for &n in &sphere.directions {
-            // Rounded as the written samples were, so that both sides query the same points.
-            batch.push((centre + n * sphere.radius) - centre, f64::INFINITY);
-        }
-        triangles.closest(&set, &mut batch);
-        for k in 0..batch.len() {
-            let point = triangles.closest_point(&set, &batch, k).ok_or("no triangle")?;
-            let near = triangles.answer(&set, &batch, k).ok_or("no triangle")?;
-            closest.extend([point.x, point.y, point.z, near.distance]);
+            let near = tree.closest_from(centre + n * sphere.radius, Some(start));
+            closest.extend([near.point.x, near.point.y, near.point.z, near.distance]);
         }
     }
     std::fs::write(answers, bytes(closest.into_iter()))?;
@@ -153,8 +140,8 @@ fn run(file: &str, answers: &str) -> Outcome {
 }
 
 fn time(name: &str, resolution: u32) -> Outcome {
-    let shape = shape(name)?;
-    let solid = solid(&shape);
+    let shape = shape(&mesh(name)?)?;
+    let solid = solid(&shape)?;
     let (clock, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
     let tally = solid.descend(resolution, Wanted::Kept)?.tally;
     let (wall, cpu) = (clock.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
@@ -163,18 +150,14 @@ fn time(name: &str, resolution: u32) -> Outcome {
 }
 
 fn points(name: &str, sigma: f64, numbers: &[f64]) -> Outcome {
-    let triangles = NearbyTriangles::new(&mesh(name)?);
-    let sphere = Sphere::new(Spiral::EqualArea, SAMPLES, sigma);
-    let mut probe = Probe::new(&sphere);
-    let mut set = NearSet::default();
+    let shape = shape(&mesh(name)?)?;
+    let (surface, units) = (Surface::of(&shape)?, shape.normalisation());
+    let sphere = Sphere::new(Spiral::EqualArea, SAMPLES, sigma / units.diagonal);
     for c in numbers.chunks_exact(3) {
-        let centre = Vec3::new(c[0], c[1], c[2]);
-        triangles.narrow(&triangles.all(centre), centre, sigma, &mut set);
-        let mut own = NearBatch::default();
-        own.push(Vec3::ZERO, f64::INFINITY);
-        triangles.closest(&set, &mut own);
-        let point = triangles.closest_point(&set, &own, 0).ok_or("no triangle")?;
-        println!("{} {point} {}", set.distance(), probe.flux(&triangles, &set));
+        let centre = units.forward(Vec3::new(c[0], c[1], c[2]));
+        let near = surface.closest(centre, None);
+        let flux = surface.flux(&sphere, centre, near.face);
+        println!("{} {} {flux}", near.distance * units.diagonal, units.backward(near.point));
     }
     Ok(())
 }
