@@ -403,21 +403,18 @@ mod tests {
     /// Whether two convex planar polygons are disjoint: the separating axis theorem with exact
     /// integers, over all normals, pairs of edges, and edges within each plane.
     fn disjoint(s: &[Point], t: &[Point]) -> bool {
-        let edges = |p: &[Point]| -> Vec<Point> {
+        let [es, et] = [s, t].map(|p| -> Vec<Point> {
             (0..p.len()).map(|i| sub(p[(i + 1) % p.len()], p[i])).collect()
-        };
-        let normal = |p: &[Point]| cross(sub(p[1], p[0]), sub(p[2], p[0]));
-        let (es, et, normals) = (edges(s), edges(t), [normal(s), normal(t)]);
+        });
+        let normals = [s, t].map(|p| cross(sub(p[1], p[0]), sub(p[2], p[0])));
         let mut axes = normals.to_vec();
         axes.extend(es.iter().flat_map(|&e| et.iter().map(move |&f| cross(e, f))));
         axes.extend(es.iter().chain(&et).flat_map(|&e| normals.map(|n| cross(n, e))));
         axes.into_iter().any(|axis| {
-            let along = |p: &Point| (0..3).map(|k| axis[k] * p[k]).sum::<i128>();
-            let range = |p: &[Point]| {
-                let values = p.iter().map(along);
+            let [(l, h), (m, i)] = [s, t].map(|polygon| {
+                let values = polygon.iter().map(|p| (0..3).map(|k| axis[k] * p[k]).sum::<i128>());
                 (values.clone().min().unwrap(), values.max().unwrap())
-            };
-            let ((l, h), (m, i)) = (range(s), range(t));
+            });
             h < m || i < l
         })
     }

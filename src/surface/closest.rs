@@ -256,7 +256,7 @@ impl TriangleBvh {
         let frame = &self.frames[place];
         let corners = &self.corners[place];
         let first = usize::from(self.firsts[place]);
-        let corner = |k: usize| (first + k) % 3;
+        let order = [first, (first + 1) % 3, (first + 2) % 3];
         let (part, t) = frame.nearest_part(p);
         let (feature, point) = match part {
             Part::Face => {
@@ -264,10 +264,10 @@ impl TriangleBvh {
                 (Feature::Face, frame.point(x, y))
             }
             Part::Side(k) => {
-                let (a, b) = (corners[corner(k)], corners[corner(k + 1)]);
-                (Feature::Edge(corner(k) as u8), a.lerp(b, t))
+                let (a, b) = (corners[order[k]], corners[order[(k + 1) % 3]]);
+                (Feature::Edge(order[k] as u8), a.lerp(b, t))
             }
-            Part::Corner(k) => (Feature::Vertex(corner(k) as u8), corners[corner(k)]),
+            Part::Corner(k) => (Feature::Vertex(order[k] as u8), corners[order[k]]),
         };
         Closest { point, distance: squared.sqrt(), face: self.tree.order()[place], feature }
     }
@@ -359,8 +359,7 @@ const NEGLIGIBLE: f64 = 1e-30;
 impl Block {
     pub fn new(frames: &[PlanarFrame], frame: &Frame) -> Self {
         let lanes = |value: &dyn Fn(&PlanarFrame) -> f64| {
-            let of = |k: usize| value(frames.get(k).unwrap_or(&frames[0])) as f32;
-            Lanes::from([of(0), of(1), of(2), of(3)])
+            Lanes::from([0, 1, 2, 3].map(|k| value(frames.get(k).unwrap_or(&frames[0])) as f32))
         };
         let s = frame.scale;
         let reciprocal = |run: &dyn Fn(&PlanarFrame) -> f64| {

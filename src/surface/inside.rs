@@ -83,11 +83,11 @@ impl InsideTest {
 
     /// The same for points that are scaled already.
     pub(super) fn of_scaled(unit: Unit, points: &[Vec3], faces: &[[u32; 3]]) -> Self {
-        let corners = |face: &[u32; 3]| face.map(|v| points[v as usize]);
-        let boxes: Vec<_> = faces.iter().map(|f| (Bounds::of_points(corners(f)), 0.0)).collect();
+        let corners: Vec<_> = faces.iter().map(|face| face.map(|v| points[v as usize])).collect();
+        let boxes: Vec<_> = corners.iter().map(|&t| (Bounds::of_points(t), 0.0)).collect();
         let tree = Tree::build(&boxes, Plan { max_leaf: LEAF, group: LEAF, padding: 0.0 });
         let ids = tree.order().to_vec();
-        let triangles = ids.iter().map(|&face| corners(&faces[face as usize])).collect();
+        let triangles = ids.iter().map(|&face| corners[face as usize]).collect();
         Self { unit, tree: WideTree::new(&tree), triangles, ids, bounds: tree.bounds() }
     }
 

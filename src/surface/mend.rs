@@ -431,10 +431,10 @@ fn fans(vertices: usize, faces: &[[u32; 3]]) -> Vec<BTreeMap<u32, Fan>> {
 fn rim_mean(vertices: &[Vec3], faces: &[[u32; 3]], fan: &Fan) -> Vec3 {
     // Each is divided first: the sum of coordinates near the end of the range would overflow.
     let share = 0.5 / fan.len() as f64;
-    let others = |&corner: &usize| {
-        let [first, face] = [corner % 3, corner / 3];
-        let at = |k: usize| vertices[faces[face][(first + k) % 3] as usize] * share;
-        at(1) + at(2)
-    };
-    fan.iter().map(others).sum()
+    let others = fan.iter().map(|&corner| {
+        let face = faces[corner / 3];
+        let [after, before] = [corner + 1, corner + 2].map(|k| vertices[face[k % 3] as usize]);
+        after * share + before * share
+    });
+    others.sum()
 }

@@ -812,23 +812,18 @@ fn keyword(cursor: &mut Cursor<'_>, word: &str) -> Result<(), Fault> {
 fn parse_ply(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
     let file = ply::header(bytes)?;
     let vertices = file.count("vertex");
-    let unexpected = |expected: &str| Fault::Syntax {
-        at: Place::Line(file.line - 1),
-        expected: expected.to_owned(),
-        found: quote(b"end_header"),
-    };
     if file.elements.iter().any(|element| element.name == "tristrips") {
         let what = "PLY triangle strips are not read; export the surface as faces";
         return Err(Fault::Unsupported(what.into()));
     }
     if ["x", "y", "z"].iter().any(|axis| !file.has("vertex", &[axis])) {
-        return Err(unexpected("element vertex with x, y and z before it"));
+        return Err(missing_in(&file, "element vertex with x, y and z before it"));
     }
     if !file.elements.iter().any(|element| element.name == "face") {
         return Err(Fault::NoFaces { vertices });
     }
     if !file.has("face", &["vertex_indices", "vertex_index"]) {
-        return Err(unexpected("a list vertex_indices in element face before it"));
+        return Err(missing_in(&file, "a list vertex_indices in element face before it"));
     }
     let mut soup = PolygonSoup::default();
     file.rows(|element, row, at, values| match element {
@@ -844,6 +839,11 @@ fn parse_ply(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
         _ => Ok(()),
     })?;
     Ok(soup)
+}
+
+fn missing_in(file: &ply::Ply<'_>, expected: &str) -> Fault {
+    let (at, found) = (Place::Line(file.line - 1), quote(b"end_header"));
+    Fault::Syntax { at, expected: expected.to_owned(), found }
 }
 
 #[cfg(test)]

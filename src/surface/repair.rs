@@ -165,15 +165,16 @@ fn duplicates(polygons: &PolygonSoup) -> Vec<bool> {
         sorted[start..end as usize].sort_unstable();
         start = end as usize;
     }
-    let key = |&i: &u32| {
-        let start = if i == 0 { 0 } else { polygons.ends[i as usize - 1] };
-        &sorted[start as usize..polygons.ends[i as usize] as usize]
-    };
+    let sorted =
+        PolygonSoup { corners: sorted, ends: polygons.ends.clone(), ..PolygonSoup::default() };
     let mut order: Vec<u32> = (0..polygons.len() as u32).collect();
-    order.sort_unstable_by(|i, j| key(i).cmp(key(j)).then(i.cmp(j)));
+    order.sort_unstable_by(|&i, &j| {
+        sorted.polygon(i as usize).cmp(sorted.polygon(j as usize)).then(i.cmp(&j))
+    });
     let mut duplicate = vec![false; polygons.len()];
     let mut pairs = Vec::new();
-    for group in order.chunk_by(|i, j| key(i) == key(j)).filter(|group| group.len() > 1) {
+    let same = |&i: &u32, &j: &u32| sorted.polygon(i as usize) == sorted.polygon(j as usize);
+    for group in order.chunk_by(same).filter(|group| group.len() > 1) {
         group[1..].iter().for_each(|&i| duplicate[i as usize] = true);
         if let &[first, second] = group {
             pairs.push([first, second]);
@@ -344,8 +345,9 @@ fn push(triangles: &mut Vec<[u32; 3]>, [a, b, c]: [u32; 3]) {
 /// The polygon in the plane, counter-clockwise.
 fn flatten(polygon: &[u32], points: &[Vec3]) -> Vec<Point2> {
     let origin = points[polygon[0] as usize];
-    let at = |i: usize| points[polygon[i % polygon.len()] as usize] - origin;
-    let normal = (0..polygon.len()).fold(Vec3::ZERO, |sum, i| sum + at(i).cross(at(i + 1)));
+    let corners: Vec<Vec3> = polygon.iter().map(|&i| points[i as usize] - origin).collect();
+    let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+    let normal = sides.fold(Vec3::ZERO, |sum, (&a, &b)| sum + a.cross(b));
     let axis = normal.abs().max_position();
     let is_clockwise = normal[axis] < 0.0;
     let flat = polygon.iter().map(|&i| project(points[i as usize], axis));

@@ -222,16 +222,18 @@ impl<'a> Areas<'a> {
         }
         let mut random = Pcg64::seed_from_u64(seed);
         // 53 random bits, spelled out so that the points do not depend on a crate's version.
-        let mut unit = move || (random.next_u64() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64);
-        let point = |_| {
-            let share = unit() * total;
+        let units = std::iter::repeat_with(move || {
+            [(); 3].map(|()| (random.next_u64() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64))
+        });
+        let points = units.take(count).map(|[share, u, v]| {
             let last = self.up_to.len() - 1;
-            let face = self.up_to.partition_point(|&sum| sum <= share).min(last);
-            let (root, v) = (unit().sqrt(), unit());
+            let face = self.up_to.partition_point(|&sum| sum <= share * total).min(last);
+            // The root makes the points uniform by area.
+            let root = u.sqrt();
             let [a, b, c] = self.mesh.triangle(face);
             (a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v), face as u32)
-        };
-        (0..count).map(point).collect()
+        });
+        points.collect()
     }
 }
 

@@ -267,17 +267,16 @@ fn ball() -> (Vec<Vec3>, Vec<[u32; 3]>) {
         vertices.extend([[0.0, x, y], [x, y, 0.0], [y, 0.0, x]].map(Vec3::from));
     }
     let corners: Vec<Vec3> = vertices.clone();
-    // Neighbours are two units apart, others more than three.
-    let near = |a: u32, b: u32| corners[a as usize].distance_squared(corners[b as usize]) < 5.0;
     let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
     let mut quarters = Vec::with_capacity(BALL[1]);
     for [a, b, c] in
         (0..12).flat_map(|a| (a + 1..12).flat_map(move |b| (b + 1..12).map(move |c| [a, b, c])))
     {
-        if !(near(a, b) && near(b, c) && near(a, c)) {
+        let [p, q, r] = [a, b, c].map(|v| corners[v as usize]);
+        // Neighbours are two units apart, others more than three.
+        if [(p, q), (q, r), (p, r)].iter().any(|&(p, q)| p.distance(q) > 2.5) {
             continue;
         }
-        let [p, q, r] = [a, b, c].map(|v| corners[v as usize]);
         let [b, c] = if (q - p).cross(r - p).dot(p) > 0.0 { [b, c] } else { [c, b] };
         let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[p, q]| {
             *middles.entry([p.min(q), p.max(q)]).or_insert_with(|| {
@@ -368,8 +367,8 @@ mod tests {
             .sum();
         // Of an icosphere of 80 triangles, against 4.18879 of the ball.
         assert!((sixfold / 6.0 - 3.6587).abs() < 1e-3, "{sixfold}");
-        let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
-        let mut sides: Vec<_> = triangles.iter().flat_map(sides).collect();
+        let sides = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let mut sides: Vec<_> = sides.collect();
         sides.sort_unstable();
         assert!(sides.windows(2).all(|pair| pair[0] != pair[1]), "every side once in a direction");
         assert!(sides.iter().all(|&[a, b]| sides.binary_search(&[b, a]).is_ok()), "closed");

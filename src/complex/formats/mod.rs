@@ -288,18 +288,19 @@ fn write_as(
     mesh: &MedialMesh,
     look: &Look,
 ) -> Result<(), MaErrorKind> {
-    let lacks = |what: &str, known: &str| {
-        Err(MaErrorKind::Unwritable(format!("{extension:?} files hold no {what}; write {known}")))
-    };
-    match extension {
-        "ma" | "ply" | "obj" | "vtp" if look.balls => return lacks("spheres as bodies", ".glb"),
-        "ma" | "ply" | "obj" if look.values.is_some() => return lacks("values", ".vtp or .glb"),
-        "ma" | "ply" | "obj" | "vtp" | "glb" => mesh.check()?,
+    let lacks = match extension {
+        "ma" | "ply" | "obj" | "vtp" if look.balls => Some("spheres as bodies; write .glb"),
+        "ma" | "ply" | "obj" if look.values.is_some() => Some("values; write .vtp or .glb"),
+        "ma" | "ply" | "obj" | "vtp" | "glb" => None,
         _ => {
             let known = ".ma, .ply, .obj, .vtp, .glb";
             return Err(MaErrorKind::Extension { extension: extension.to_owned(), known });
         }
+    };
+    if let Some(lacks) = lacks {
+        return Err(MaErrorKind::Unwritable(format!("{extension:?} files hold no {lacks}")));
     }
+    mesh.check()?;
     match extension {
         "ma" => write_atomically(path, |out| ma::write_ma(out, mesh))?,
         "ply" => write_atomically(path, |out| viewers::write_ply(out, mesh))?,

@@ -372,8 +372,8 @@ fn awkward_mesh() -> MedialMesh {
     let numbers = [0.1, -1.0 / 3.0, 1e-300, 6.02e23, f64::MIN_POSITIVE, 0.0, 1e200, 2.5];
     let spheres = (0..6)
         .map(|i| {
-            let at = |k: usize| numbers[(i + k) % numbers.len()];
-            Sphere::new(Vec3::new(at(0), at(1), at(2)), at(3).abs())
+            let [x, y, z, radius] = [0, 1, 2, 3].map(|k| numbers[(i + k) % numbers.len()]);
+            Sphere::new(Vec3::new(x, y, z), radius.abs())
         })
         .collect();
     MedialMesh::from_simplices(spheres, vec![[0, 5], [3, 4]], vec![[0, 1, 2], [1, 2, 3]]).unwrap()

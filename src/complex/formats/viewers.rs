@@ -52,14 +52,12 @@ impl SphereValues {
     /// If the mesh is not in canonical form; see [`MedialMesh::check`].
     pub fn stability(mesh: &MedialMesh, diagonal: f64) -> Self {
         let mut values = vec![1.0_f64; mesh.spheres.len()];
-        let scaled = |v: u32| {
-            let mut sphere = mesh.spheres[v as usize];
-            sphere.centre /= diagonal;
-            sphere.radius /= diagonal;
-            sphere
-        };
         for &[a, b] in &mesh.edges {
-            let ratio = stability_ratio(scaled(a), scaled(b));
+            let [p, q] = [a, b].map(|v| {
+                let Sphere { centre, radius } = mesh.spheres[v as usize];
+                Sphere::new(centre / diagonal, radius / diagonal)
+            });
+            let ratio = stability_ratio(p, q);
             for v in [a, b] {
                 values[v as usize] = values[v as usize].min(ratio);
             }
