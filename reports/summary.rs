@@ -451,6 +451,9 @@ pub(crate) fn native_figures(
     natives.iter().filter_map(figure).collect()
 }
 
+/// Caption of the table of means.
+pub(crate) const MEANS: &str = "Means over meshes at equal numbers of spheres";
+
 /// The means of all methods at each number of spheres.
 pub(crate) fn means_table(
     comparison: &Comparison<'_>,
@@ -474,7 +477,7 @@ pub(crate) fn means_table(
         }
     }
     Table {
-        caption: "Means over meshes at equal numbers of spheres".to_owned(),
+        caption: MEANS.to_owned(),
         notes: vec![
             how.to_owned(),
             "Geometric means of errors and total time, arithmetic means of angles, shares, spikes \

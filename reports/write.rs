@@ -17,7 +17,7 @@ use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
 use crate::plots::{Figure, mean_figures, mesh_figures};
 use crate::record::Record;
 use crate::scaling::{scaling, scaling_figures, scaling_table};
-use crate::summary::{by_count, means_table, native_curves, native_figures, native_table};
+use crate::summary::{MEANS, by_count, means_table, native_curves, native_figures, native_table};
 use crate::tables::{Table, mesh_table, to_csv, to_latex, to_markdown};
 use crate::text::file_stems;
 use crate::view3d::text_of;
@@ -106,9 +106,18 @@ pub fn write_report(
     let shown = pictures.values().flat_map(|strip| [strip.file.clone(), strip.view_file()]);
     let shown = shown.map(|file| dir.join(file)).collect();
     files.remove_stale(shown)?;
+    let mut equal_error: Vec<Table> = equal_error.into_iter().collect();
+    if is_one {
+        // Means over one mesh are its results, and counts of meshes are ones.
+        means.retain(|table| table.caption != MEANS);
+        for table in means.iter_mut().chain(&mut equal_error) {
+            *table =
+                table.clone().without(&["means over", "kept on", "on", "topology right", "failed"]);
+        }
+    }
     let sections = [
-        ("equal-error", "Equal error", equal_error.into_iter().collect()),
-        ("means", if is_one { "All methods" } else { "Means over meshes" }, means),
+        ("equal-error", "Equal error", equal_error),
+        ("means", if is_one { "Native levels" } else { "Means over meshes" }, means),
         ("wins", "Method against method", wins.into_iter().collect()),
         ("scaling", "Time and memory against input size", growths),
     ];

@@ -174,11 +174,15 @@ impl Page<'_> {
             });
         let runs = &header.runs;
         let command = runs.last().map(|run| &run.command).filter(|command| !command.is_empty());
-        let answers = self.answers.as_ref().map(|table| match is_one {
-            // Shares and counts of meshes say nothing about one mesh.
-            true => Table { notes: vec![], ..table.clone() }
-                .without(&["meshes", "better, equal, worse"]),
-            false => without_command(table),
+        let answers = self.answers.as_ref().map(|table| {
+            if !is_one {
+                return without_command(table);
+            }
+            // Medians, shares and counts of meshes say nothing about one mesh.
+            let mut table = table.clone().without(&["meshes", "better, equal, worse"]);
+            table.notes.clear();
+            table.columns[2].title = "result".to_owned();
+            table
         });
         json!({
             "facts": self.facts(),

@@ -357,3 +357,23 @@ fn the_bibliography_has_each_method_that_ran_once() {
     );
     assert!(!report_of(&[]).contains_key("tables/methods.bib"));
 }
+
+#[test]
+fn a_page_of_one_mesh_counts_no_meshes() {
+    let report = |shapes: &[&str]| {
+        let files = report_of(&comparison(shapes, &METHODS, &COUNTS));
+        let [report, bulk] = documents(text(&files, "index.html"));
+        assert_eq!(bulk["figures"].as_array().unwrap().len(), shapes.len());
+        report
+    };
+    let [one, two] = [&SHAPES[..1], &SHAPES[..2]].map(report);
+    for (page, columns) in [(&one, 5), (&two, 7)] {
+        assert_eq!(page["answers"]["columns"].as_array().unwrap().len(), columns);
+    }
+    let sections = |page: &serde_json::Value| page["sections"].to_string();
+    for counted in ["1 of 1", "1 mesh", "Means over meshes", "Method against method"] {
+        assert!(!sections(&one).contains(counted), "{counted}: {}", sections(&one));
+    }
+    assert!(sections(&two).contains("Means over meshes") && sections(&two).contains("2 of 2"));
+    assert_eq!(one["figures"].as_array().unwrap().len(), 0, "its own curves are those of all");
+}
