@@ -106,8 +106,7 @@ fn substrates(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// What a hierarchy is asked for: the way between two stages, simplex by simplex, one stage as a
-/// view and as a mesh of its own, and its file.
+/// Queries of a hierarchy: the way between two stages, simplex by simplex, and one stage as a mesh.
 fn hierarchy(criterion: &mut Criterion) {
     let source = Source::BuiltIn { id: "blob".into(), resolution: None };
     let input = Input::load(&source).expect("a built-in shape");
@@ -145,9 +144,6 @@ fn hierarchy(criterion: &mut Criterion) {
     }
     let half = hierarchy.stage(last / 2);
     group.bench_function("half as a mesh", |b| b.iter_with_large_drop(|| half.to_mesh()));
-    let mut bytes = Vec::new();
-    hierarchy.write_to(&mut bytes, "").expect("into memory");
-    group.bench_function("parse", |b| b.iter_with_large_drop(|| Hierarchy::parse(&bytes, "")));
     group.finish();
 }
 

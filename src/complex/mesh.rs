@@ -119,6 +119,12 @@ impl MedialMesh {
         Ok(Self { spheres, edges, faces, contacts: None })
     }
 
+    /// The spheres of an edge or a face.
+    #[inline]
+    pub fn spheres_of<const N: usize>(&self, simplex: [u32; N]) -> [Sphere; N] {
+        simplex.map(|v| self.spheres[v as usize])
+    }
+
     /// Verifies the canonical form and the validity of every sphere.
     ///
     /// # Errors
@@ -189,28 +195,21 @@ impl MedialMesh {
         for (new, old) in (0..keep.len()).filter(|&sphere| keep[sphere]).enumerate() {
             renumbered[old] = new as u32;
         }
-        let kept = |sphere: u32| keep[sphere as usize];
-        let new = |sphere: u32| renumbered[sphere as usize];
-        let select = |indices: &[[u32; 4]]| {
-            indices.iter().zip(keep).filter(|&(_, &k)| k).map(|(&ids, _)| ids).collect()
-        };
+        // Renumbering keeps the order, so the result is in canonical form without sorting.
+        fn select<T: Copy>(list: &[T], keep: &[bool]) -> Vec<T> {
+            list.iter().zip(keep).filter(|&(_, &k)| k).map(|(&item, _)| item).collect()
+        }
+        fn induced<const N: usize>(simplices: &[[u32; N]], renumbered: &[u32]) -> Vec<[u32; N]> {
+            let all = simplices.iter().map(|s| s.map(|v| renumbered[v as usize]));
+            all.filter(|s| !s.contains(&u32::MAX)).collect()
+        }
         Self {
-            spheres: self.spheres.iter().zip(keep).filter(|&(_, &k)| k).map(|(&s, _)| s).collect(),
-            edges: self
-                .edges
-                .iter()
-                .filter(|e| e.iter().all(|&v| kept(v)))
-                .map(|e| e.map(new))
-                .collect(),
-            faces: self
-                .faces
-                .iter()
-                .filter(|f| f.iter().all(|&v| kept(v)))
-                .map(|f| f.map(new))
-                .collect(),
+            spheres: select(&self.spheres, keep),
+            edges: induced(&self.edges, &renumbered),
+            faces: induced(&self.faces, &renumbered),
             contacts: self.contacts.as_ref().map(|c| Contacts {
                 samples: Arc::clone(&c.samples),
-                of_sphere: select(&c.of_sphere),
+                of_sphere: select(&c.of_sphere, keep),
             }),
         }
     }
@@ -225,18 +224,18 @@ impl MedialMesh {
         for (to, &from) in (0..).zip(order) {
             new[from as usize] = to;
         }
-        let mut edges: Vec<[u32; 2]> =
-            self.edges.iter().map(|e| e.map(|v| new[v as usize])).collect();
-        edges.iter_mut().for_each(|e| e.sort_unstable());
-        edges.sort_unstable();
-        let mut faces: Vec<[u32; 3]> =
-            self.faces.iter().map(|f| f.map(|v| new[v as usize])).collect();
-        faces.iter_mut().for_each(|f| f.sort_unstable());
-        faces.sort_unstable();
+        fn carried<const N: usize>(simplices: &[[u32; N]], new: &[u32]) -> Vec<[u32; N]> {
+            let mut carried: Vec<_> =
+                simplices.iter().map(|s| s.map(|v| new[v as usize])).collect();
+            // The new numbers need not ascend, but the canonical form does.
+            carried.iter_mut().for_each(|s| s.sort_unstable());
+            carried.sort_unstable();
+            carried
+        }
         Self {
             spheres: order.iter().map(|&v| self.spheres[v as usize]).collect(),
-            edges,
-            faces,
+            edges: carried(&self.edges, &new),
+            faces: carried(&self.faces, &new),
             contacts: self.contacts.as_ref().map(|c| Contacts {
                 samples: Arc::clone(&c.samples),
                 of_sphere: order.iter().map(|&v| c.of_sphere[v as usize]).collect(),

@@ -119,19 +119,18 @@ enum Patch {
 }
 
 fn patches(mesh: &MedialMesh) -> Vec<Patch> {
-    let sphere = |v: u32| mesh.spheres[v as usize];
     let mut patches: Vec<Patch> = mesh.spheres.iter().map(|&m| Patch::Sphere(m)).collect();
     for ends in &mesh.edges {
-        let [a, b] = ends.map(sphere);
+        let [a, b] = mesh.spheres_of(*ends);
         if let Some(frame) = Cone::new(a, b).frame() {
             patches.push(Patch::Lateral(a, b, frame));
         }
     }
     for corners in &mesh.faces {
-        let corners = corners.map(sphere);
+        let corners = mesh.spheres_of(*corners);
         if let Some(planes) = Slab::new(corners).planes() {
-            let touched = |n: Vec3| corners.map(|m| m.centre + m.radius * n);
-            patches.extend(planes.normals().map(|n| Patch::Triangle(touched(n))));
+            let touching = planes.normals().map(|n| corners.map(|m| m.centre + m.radius * n));
+            patches.extend(touching.map(Patch::Triangle));
         }
     }
     patches

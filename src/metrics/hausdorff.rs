@@ -144,16 +144,14 @@ pub(super) fn distances_with_envelope(
     let balls = MedialUnion::of_spheres(&mesh.spheres)?;
     let spheres = absolute(balls.signed_batch(&samples.points));
     let start = samples.start(&sigma);
-    let signed = |p, near: &mut usize| union.signed_from(p, near).abs();
-    let epsilon_union = highest(bvh, &start, signed);
-    let unsigned = |p, near: &mut usize| union.unsigned_from(p, near);
-    let epsilon = highest(bvh, &Start { values: &mu, ..start }, unsigned);
+    let epsilon_union = highest(bvh, &start, |p, near| union.signed_from(p, near).abs());
+    let by_mu = Start { values: &mu, ..start };
+    let epsilon = highest(bvh, &by_mu, |p, near| union.unsigned_from(p, near));
     // |sigma| >= mu at every point, so the maximum found for mu bounds it, too.
     let epsilon_union = epsilon_union.max(epsilon);
-    let of_balls = |p, near: &mut usize| balls.signed_from(p, near).abs();
     // Fewer seeds: this is a figure beside the others, not one that results are compared by.
     let aside = Start { values: &spheres, seeds: SEEDS / 3, ..start };
-    let spheres_only = highest(bvh, &aside, of_balls);
+    let spheres_only = highest(bvh, &aside, |p, near| balls.signed_from(p, near).abs());
     let envelope = EnvelopeOptions {
         samples: options.envelope_samples,
         burial: BURIAL * pose.diameter(),
@@ -223,8 +221,8 @@ fn absolute(mut values: Vec<f64>) -> Vec<f64> {
 
 /// Largest of some distances; not a number if one is not, which must not pass for a small error.
 fn largest(values: &[f64]) -> f64 {
-    let larger = |a: f64, b: f64| if a.is_nan() || b <= a { a } else { b };
-    values.iter().copied().fold(0.0, larger)
+    // `f64::max` would drop a NaN.
+    values.iter().fold(0.0, |a, &b| if a.is_nan() || b <= a { a } else { b })
 }
 
 /// Mean, root mean square and percentiles of some values.

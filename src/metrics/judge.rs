@@ -543,11 +543,8 @@ pub(super) fn extreme_angles([a, b, c]: [Vec3; 3]) -> Option<[f64; 2]> {
         return None;
     }
     // The arc tangent is exact to rounding for needles and caps, where the arc cosine is not.
-    let angle = |p: Vec3, q: Vec3, r: Vec3| {
-        let (u, v) = (q - p, r - p);
-        u.cross(v).length().atan2(u.dot(v)).to_degrees()
-    };
-    let angles = [angle(a, b, c), angle(b, c, a), angle(c, a, b)];
+    let angles = [(b - a, c - a), (c - b, a - b), (a - c, b - c)]
+        .map(|(u, v)| u.cross(v).length().atan2(u.dot(v)).to_degrees());
     let smallest = angles.into_iter().fold(f64::INFINITY, f64::min);
     let largest = angles.into_iter().fold(0.0, f64::max);
     Some([smallest, largest])

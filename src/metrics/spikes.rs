@@ -71,7 +71,7 @@ struct EdgeFacts {
 
 impl EdgeFacts {
     fn of(mesh: &MedialMesh, incidence: &Incidence) -> Self {
-        let ends = || mesh.edges.iter().map(|e| e.map(|sphere| mesh.spheres[sphere as usize]));
+        let ends = || mesh.edges.iter().map(|&edge| mesh.spheres_of(edge));
         let degrees = degrees(mesh);
         let faces_at = incidence.faces_at();
         let mut boundary_spheres = vec![false; mesh.spheres.len()];

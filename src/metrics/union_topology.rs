@@ -62,13 +62,12 @@ fn checked_balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricE
 
 /// The spheres, then those between the ends of each edge, then those within each face.
 fn balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
-    let sphere = |v: u32| mesh.spheres[v as usize];
     let parts = |[a, b]: [Sphere; 2]| (a.centre.distance(b.centre) / spacing).ceil().max(1.0);
-    let sides = |f: &[u32; 3]| {
-        let [a, b, c] = f.map(sphere);
+    let sides = |&f: &[u32; 3]| {
+        let [a, b, c] = mesh.spheres_of(f);
         parts([a, b]).max(parts([b, c])).max(parts([c, a]))
     };
-    let on_edges: f64 = mesh.edges.iter().map(|e| parts(e.map(sphere))).sum();
+    let on_edges: f64 = mesh.edges.iter().map(|e| parts(mesh.spheres_of(*e))).sum();
     let in_faces: f64 = mesh.faces.iter().map(|f| sides(f) * sides(f) / 2.0).sum();
     let count = mesh.spheres.len() as f64 + on_edges + in_faces;
     if count > MAX_BALLS as f64 {
@@ -76,12 +75,12 @@ fn balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
     }
     let mut balls = mesh.spheres.clone();
     for edge in &mesh.edges {
-        let [a, b] = edge.map(sphere);
+        let [a, b] = mesh.spheres_of(*edge);
         let n = parts([a, b]);
         balls.extend((1..n as u32).map(|k| a.lerp(b, f64::from(k) / n)));
     }
     for face in &mesh.faces {
-        let [a, b, c] = face.map(sphere);
+        let [a, b, c] = mesh.spheres_of(*face);
         let n = sides(face);
         for i in 1..n as u32 {
             // A row from side ab to side ac, parallel to bc, without its ends.

@@ -115,7 +115,6 @@ impl MedialUnion {
         if let Some(sphere) = mesh.spheres.iter().position(too_large) {
             return Err(UnionError::TooLarge { sphere });
         }
-        let sphere = |v: u32| mesh.spheres[v as usize];
         let mut distinct = Distinct::new(mesh);
         // Spheres that need no part of their own: ends of proper cones, and spheres inside a neighbour,
         // which is nearer everywhere.
@@ -125,7 +124,7 @@ impl MedialUnion {
             if !distinct.is_proper(ends) {
                 continue;
             }
-            let balls = ends.map(sphere);
+            let balls = mesh.spheres_of(ends);
             let [a, b] = balls;
             let cone = Cone::new(a, b);
             if let Some(larger) = cone.larger() {
@@ -141,7 +140,7 @@ impl MedialUnion {
         }
         for (f, &corners) in (0..).zip(&mesh.faces) {
             let is_proper = distinct.is_proper(corners);
-            let balls = corners.map(sphere);
+            let balls = mesh.spheres_of(corners);
             // Without tangent planes the slab is the union of its cones.
             if is_proper
                 && let Some(face) = SlabFace::new(balls)
@@ -150,10 +149,11 @@ impl MedialUnion {
                 parts.push(Part::new(Primitive::Face(f), Shape::Slab(face), &balls));
             }
         }
-        let is_alone = |v: u32| distinct.sphere(v) == v && !covered[v as usize];
-        let alone = (0..).zip(&mesh.spheres).filter(|&(v, _)| is_alone(v));
-        let part = |(v, &m)| Part::new(Primitive::Sphere(v), Shape::Sphere(m), &[m]);
-        parts.extend(alone.map(part));
+        for (v, &m) in (0..).zip(&mesh.spheres) {
+            if distinct.sphere(v) == v && !covered[v as usize] {
+                parts.push(Part::new(Primitive::Sphere(v), Shape::Sphere(m), &[m]));
+            }
+        }
         if parts.is_empty() {
             return Err(UnionError::Empty);
         }

@@ -215,11 +215,17 @@ struct Hulls {
 
 impl Hulls {
     fn new(mesh: &MedialMesh) -> Self {
-        let sphere = |v: u32| mesh.spheres[v as usize];
         Self {
             spheres: mesh.spheres.clone(),
-            cones: mesh.edges.iter().map(|e| Cone::new(sphere(e[0]), sphere(e[1]))).collect(),
-            slabs: mesh.faces.iter().map(|f| Slab::new(f.map(sphere))).collect(),
+            cones: mesh
+                .edges
+                .iter()
+                .map(|&edge| {
+                    let [a, b] = mesh.spheres_of(edge);
+                    Cone::new(a, b)
+                })
+                .collect(),
+            slabs: mesh.faces.iter().map(|&f| Slab::new(mesh.spheres_of(f))).collect(),
         }
     }
 

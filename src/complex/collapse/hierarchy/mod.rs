@@ -23,7 +23,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-pub use stage::{Change, HierarchyFileError, HierarchyFileErrorKind, Stage};
+pub use stage::{Change, Stage};
 
 use crate::complex::MedialMesh;
 

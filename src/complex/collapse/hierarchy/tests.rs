@@ -1,4 +1,4 @@
-//! Every stage against [`replay`] and the engine; files against what can happen to them.
+//! Every stage against [`replay`] and the engine.
 
 use std::collections::BTreeSet;
 
@@ -146,65 +146,4 @@ proptest! {
             }
         }
     }
-
-    #[test]
-    fn files_hold_all_of_it(seed in any::<u64>(), label in ".{0,20}") {
-        let (initial, steps, ..) = random_steps(seed);
-        let hierarchy = Hierarchy::new(initial, steps).unwrap();
-        let mut bytes = Vec::new();
-        hierarchy.write_to(&mut bytes, &label).unwrap();
-        prop_assert_eq!(Hierarchy::parse(&bytes, "x").unwrap(), (hierarchy, label));
-    }
-
-    /// Noise is refused, and so is a file with noise behind a valid beginning.
-    #[test]
-    fn noise_is_refused(noise in prop::collection::vec(any::<u8>(), 0..400), keep in 0..60_usize) {
-        let mut bytes = bytes_of(&path());
-        bytes.truncate(keep);
-        bytes.extend(noise);
-        prop_assert!(Hierarchy::parse(&bytes, "x").is_err());
-    }
-}
-
-fn bytes_of(hierarchy: &Hierarchy) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    hierarchy.write_to(&mut bytes, "a label").unwrap();
-    bytes
-}
-
-#[test]
-fn cut_and_forged_files_are_refused_with_the_reason() {
-    let text = String::from_utf8(bytes_of(&path())).unwrap();
-    for end in 0..text.len() {
-        assert!(Hierarchy::parse(&text.as_bytes()[..end], "x").is_err(), "cut to {end} bytes");
-    }
-    for (from, to, why) in [
-        ("hierarchy 1", "hierarchy 2", "unknown variant"),
-        ("{\"format\":\"medial hierarchy 1\",", "{", "missing field `format`"),
-        ("\"steps\"", "\"more\":1,\"steps\"", "unknown field `more`"),
-        ("[1.0,0.0,0.0,0.25]", "[1.0,0.0,0.0,-0.25]", "sphere 1 is not valid"),
-        ("[1.0,0.0,0.0,0.25]", "[1.0,0.0,1e999,0.25]", "out of range at line 1"),
-        ("[0,1],", "", "not valid"),
-        ("[4,3,null]", "[4,2,null]", "step 1: there is no edge between the spheres 4 and 2"),
-        ("[4,3,null]", "[1,3,null]", "step 1: sphere 1 does not exist"),
-    ] {
-        assert!(text.contains(from), "{from} in {text}");
-        let error = Hierarchy::parse(text.replacen(from, to, 1).as_bytes(), "x").unwrap_err();
-        let error = error.to_string();
-        assert!(error.starts_with("x: ") && error.contains(why), "{from} by {to}: {error}");
-    }
-}
-
-#[test]
-fn files_are_written_and_read() {
-    let folder = std::env::temp_dir().join(format!("medial-hierarchy-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    let file = folder.join("path.hierarchy");
-    path().write(&file, "label").unwrap();
-    assert_eq!(Hierarchy::read(&file).unwrap(), (path(), "label".to_owned()));
-    let missing = Hierarchy::read(folder.join("missing")).unwrap_err();
-    assert!(missing.to_string().contains("missing: "), "{missing}");
-    let no_file = Hierarchy::read(&folder).unwrap_err().to_string();
-    assert!(no_file.ends_with("not a regular file"), "{no_file}");
-    std::fs::remove_dir_all(folder).unwrap();
 }
