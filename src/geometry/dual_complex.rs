@@ -282,13 +282,9 @@ fn tetrahedra(regular: &Regular) -> Vec<bool> {
         .collect()
 }
 
-/// Whether a cell is in the complex; no infinite cell is.
-fn is_in(cells: &[bool], cell: CellId) -> bool {
-    cells.get(cell.index()).is_some_and(|&is_in| is_in)
-}
-
 /// Step 2: two bits for each facet of each cell, the same from both sides.
 fn triangles(regular: &Regular, cells: &[bool]) -> Vec<u8> {
+    let is_in = |c: CellId| cells.get(c.index()).is_some_and(|&c| c);
     // Computed once, at the cell with the smaller id, then copied to the other.
     let ids = || (0..regular.cell_count() as u32).into_par_iter().with_min_len(GRAIN);
     let first = |c| {
@@ -299,7 +295,7 @@ fn triangles(regular: &Regular, cells: &[bool]) -> Vec<u8> {
             if mirror.cell < cell || regular.is_infinite(cell) {
                 return bits;
             }
-            let class = match (is_in(cells, cell), is_in(cells, mirror.cell)) {
+            let class = match (is_in(cell), is_in(mirror.cell)) {
                 (true, true) => Class::Interior as u8,
                 (false, false) => u8::from(is_singular_triangle(regular, facet, mirror)),
                 _ => Class::Regular as u8,
@@ -324,12 +320,11 @@ fn triangles(regular: &Regular, cells: &[bool]) -> Vec<u8> {
 /// Whether a triangle without cofaces in the complex is in it.
 fn is_singular_triangle(regular: &Regular, facet: Facet, mirror: Facet) -> bool {
     let triangle = sites(regular, regular.facet_vertices(facet));
-    triangle_size(triangle) != Sign::Positive
-        && [facet, mirror].into_iter().all(|f| {
-            let v = regular.vertices(f.cell)[f.opposite];
-            v == VertexId::INFINITE
-                || triangle_clearance(triangle, regular.site(v)) != Sign::Negative
-        })
+    let is_clear = |f: Facet| {
+        let v = regular.vertices(f.cell)[f.opposite];
+        v == VertexId::INFINITE || triangle_clearance(triangle, regular.site(v)) != Sign::Negative
+    };
+    triangle_size(triangle) != Sign::Positive && is_clear(facet) && is_clear(mirror)
 }
 
 /// Indexed by the set of vertices across whose opposite facets lie later cells: the pairs, as bits,
@@ -390,7 +385,7 @@ fn edge_class(
     ends: [VertexId; 2],
     ring: &[CellId],
 ) -> u8 {
-    let members = ring.iter().filter(|&&c| is_in(cells, c)).count();
+    let members = ring.iter().filter(|c| cells.get(c.index()).is_some_and(|&c| c)).count();
     if members == ring.len() {
         return Class::Interior as u8;
     }
@@ -408,11 +403,12 @@ fn edge_class(
         return Class::Regular as u8;
     }
     let edge = sites(regular, ends);
-    let is_singular = edge_size(edge) != Sign::Positive
-        && ring.iter().flat_map(|&c| others(c)).all(|(_, v)| {
-            v == VertexId::INFINITE || edge_clearance(edge, regular.site(v)) != Sign::Negative
-        });
-    if is_singular { Class::Singular as u8 } else { 0 }
+    let is_clear = |v: VertexId| {
+        v == VertexId::INFINITE || edge_clearance(edge, regular.site(v)) != Sign::Negative
+    };
+    let is_in = edge_size(edge) != Sign::Positive
+        && ring.iter().all(|&c| others(c).all(|(_, v)| is_clear(v)));
+    if is_in { Class::Singular as u8 } else { 0 }
 }
 
 /// Step 3 for vertices: the class of each point, zero if it is not in the complex.
@@ -427,7 +423,7 @@ fn vertices(regular: &Regular, cells: &[bool], edges: &[u16]) -> Vec<u8> {
             }
         }
     }
-    for cell in regular.cells().filter(|&c| !is_in(cells, c)) {
+    for cell in regular.cells().filter(|c| !cells.get(c.index()).is_some_and(|&c| c)) {
         for v in regular.vertices(cell).into_iter().filter(|&v| v != VertexId::INFINITE) {
             let class = &mut class[v.index()];
             *class = (*class).min(Class::Regular as u8);
@@ -505,12 +501,12 @@ fn anchors(centres: &[Vec3]) -> ([Vec3; 4], f64) {
     let least = (origin.abs().max_element() * 1e-13).max(1e-30);
     let length = (extent / 2.0).clamp(least, MAX_COORDINATE);
     let step = f64::powi(2.0, length.log2().floor() as i32);
-    let [x, y, z] = [0, 1, 2].map(|k| {
+    let along = |k: usize| {
         let mut anchor = origin.to_array();
         anchor[k] -= if anchor[k] < 0.0 { -step } else { step };
         Vec3::from_array(anchor)
-    });
-    ([origin, x, y, z], -step * step)
+    };
+    ([origin, along(0), along(1), along(2)], -step * step)
 }
 
 // The topology of the dual complex: simplices, Euler number, Betti numbers.

@@ -273,14 +273,14 @@ impl PowerCrust {
     /// # Errors
     /// A centre or radius that is not finite, a radius that is negative, as in [`Regular::new`].
     pub fn new(inner: &[Sphere], outer: &[Sphere]) -> Result<Self, TriangulationError> {
-        let balls = inner.iter().chain(outer);
-        for (index, ball) in balls.clone().enumerate() {
+        let balls = || inner.iter().chain(outer);
+        for (index, ball) in balls().enumerate() {
             if ball.radius < 0.0 || !ball.radius.is_finite() {
                 return Err(TriangulationError::Radius { index, radius: ball.radius });
             }
         }
-        let mut points: Vec<Vec3> = balls.clone().map(|b| b.centre).collect();
-        let mut weights: Vec<f64> = balls.map(|b| b.radius * b.radius).collect();
+        let mut points: Vec<Vec3> = balls().map(|b| b.centre).collect();
+        let mut weights: Vec<f64> = balls().map(|b| b.radius * b.radius).collect();
         points.extend(box_around(&points));
         weights.resize(points.len(), 0.0);
         let regular = Regular::new(&points, &weights)?;
@@ -289,11 +289,11 @@ impl PowerCrust {
 
     /// Step 2: the facets between balls below the index `first_outer` and the others.
     fn between(regular: &Regular, first_outer: u32) -> Self {
+        let is_inner = |v: VertexId| v.0 < first_outer;
         let facets_of = |cell: CellId| {
             let v = regular.vertices(cell);
             let pairs = (0..4).flat_map(move |i| (0..4).map(move |j| (i, j)));
-            let separating =
-                pairs.filter(move |&(i, j)| v[i].0 < first_outer && v[j].0 >= first_outer);
+            let separating = pairs.filter(move |&(i, j)| is_inner(v[i]) && !is_inner(v[j]));
             separating.filter_map(move |(i, j)| {
                 let ring: Vec<CellId> = regular.edge_ring(cell, i, j).collect();
                 // Each facet once, from the first of its cells.
@@ -371,6 +371,8 @@ fn box_around(points: &[Vec3]) -> [Vec3; 8] {
     let extent = (hi - lo).length();
     let margin = Vec3::splat(if extent > 0.0 { MARGIN * extent } else { 1.0 });
     let (lo, hi) = (lo - margin, hi + margin);
-    [0, 1, 2, 3, 4, 5, 6, 7]
-        .map(|k: u32| Vec3::select(glam::BVec3::new(k & 1 == 0, k & 2 == 0, k & 4 == 0), lo, hi))
+    [0, 1, 2, 3, 4, 5, 6, 7].map(|k: u32| {
+        let pick = |bit: u32, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
+        Vec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z))
+    })
 }

@@ -317,13 +317,11 @@ impl Slab {
         if let Some((sphere, weights)) = self.face.as_ref().and_then(|face| face.best_sphere(p)) {
             return HullFoot::towards(sphere, weights, p, || self.free_direction(sphere));
         }
-        let (mut side, mut foot) = (0, self.cones[0].foot(p));
-        for k in 1..3 {
-            let other = self.cones[k].foot(p);
-            if other.signed_distance < foot.signed_distance {
-                (side, foot) = (k, other);
-            }
-        }
+        let feet = [0, 1, 2].map(|k| (k, self.cones[k].foot(p)));
+        let nearer = |a: (usize, HullFoot<2>), b: (usize, HullFoot<2>)| {
+            if b.1.signed_distance < a.1.signed_distance { b } else { a }
+        };
+        let (side, foot) = nearer(nearer(feet[0], feet[1]), feet[2]);
         let mut weights = [0.0; 3];
         weights[side] = foot.weights[0];
         weights[(side + 1) % 3] = foot.weights[1];

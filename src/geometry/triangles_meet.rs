@@ -84,7 +84,8 @@ impl TriangleTree {
 /// Whether two triangles of positive area share more than corners and edges: `f` and `g` are the indices of
 /// their corners, `s` and `t` the places.
 pub fn triangles_meet(f: [u32; 3], s: [Vec3; 3], g: [u32; 3], t: [Vec3; 3]) -> bool {
-    let mut common = (0..3).filter_map(|i| Some((i, g.iter().position(|&v| v == f[i])?)));
+    let shared = |i: usize| g.iter().position(|&v| v == f[i]);
+    let mut common = (0..3).filter_map(|i| shared(i).map(|j| (i, j)));
     match (common.next(), common.next(), common.next()) {
         (None, ..) => apart_triangles_meet(s, t),
         (Some((i, j)), None, _) => {
@@ -110,17 +111,14 @@ fn folded(a: Vec3, b: Vec3, p: Vec3, q: Vec3) -> bool {
 }
 
 fn apart_triangles_meet(s: [Vec3; 3], t: [Vec3; 3]) -> bool {
-    // One of the two planes often settles it without testing segments.
-    if plane_separates(t, s) || plane_separates(s, t) {
+    let apart = |plane: [Vec3; 3], other: [Vec3; 3]| {
+        let [x, y, z] = other.map(|p| orient3d(plane[0], plane[1], plane[2], p));
+        !x.is_zero() && x == y && y == z
+    };
+    if apart(t, s) || apart(s, t) {
         return false;
     }
     (0..3).any(|i| segment_meets(opposite(s, i), t) || segment_meets(opposite(t, i), s))
-}
-
-/// Whether a triangle is strictly on one side of the plane of another.
-fn plane_separates([a, b, c]: [Vec3; 3], other: [Vec3; 3]) -> bool {
-    let [x, y, z] = other.map(|p| orient3d(a, b, c, p));
-    !x.is_zero() && x == y && y == z
 }
 
 /// Whether a segment and a triangle of positive area meet, both with their ends.

@@ -315,26 +315,23 @@ impl Node {
 
 /// Up to four descendants of an inner node, from left to right.
 fn descendants(tree: &Tree, index: usize) -> Vec<usize> {
-    let mut children = pair_below(tree, index).to_vec();
+    let pair = |index: usize| {
+        let first = tree.nodes[index].first as usize;
+        [first, first + 1]
+    };
+    let mut children = pair(index).to_vec();
     while children.len() < 4 {
-        // By the surface-area heuristic the largest box is the likeliest to be entered.
-        let largest =
-            (0..children.len()).filter(|&k| tree.nodes[children[k]].count == 0).max_by(|&a, &b| {
-                let [a, b] = [a, b].map(|k| tree.nodes[children[k]].bounds.half_area(0.0));
-                a.total_cmp(&b)
-            });
+        let area = |&child: &usize| tree.nodes[child].bounds.half_area(0.0);
+        let inner = |child: &usize| tree.nodes[*child].count == 0;
+        let largest = (0..children.len())
+            .filter(|&k| inner(&children[k]))
+            .max_by(|&a, &b| area(&children[a]).total_cmp(&area(&children[b])));
         let Some(largest) = largest else {
             break;
         };
-        children.splice(largest..=largest, pair_below(tree, children[largest]));
+        children.splice(largest..=largest, pair(children[largest]));
     }
     children
-}
-
-/// The children of an inner node of the binary tree.
-fn pair_below(tree: &Tree, index: usize) -> [usize; 2] {
-    let first = tree.nodes[index].first as usize;
-    [first, first + 1]
 }
 
 // A wide tree over balls: each node has a box of centres, and the largest and the smallest radius
@@ -387,11 +384,8 @@ impl ReachTree {
         };
         let wide = WideTree::within(tree, frame, CLUSTER, &mut each);
         let scale = wide.frame().scale;
-        let radii = radii
-            .into_iter()
-            .map(|pair| pair.map(|of| Lanes::from(of.map(|radius| (radius * scale) as f32))))
-            .collect();
-        Self { wide, radii }
+        let scaled = |of: [f64; 4]| Lanes::from(of.map(|radius| (radius * scale) as f32));
+        Self { wide, radii: radii.into_iter().map(|pair| pair.map(scaled)).collect() }
     }
 
     /// The tree over the boxes alone.
@@ -452,7 +446,8 @@ pub struct ConeBlock {
 
 /// The values of up to four items in single precision, and `absent` for the others.
 fn lanes<T>(items: &[T], absent: f32, value: impl Fn(&T) -> f64) -> Lanes {
-    Lanes::from([0, 1, 2, 3].map(|k| items.get(k).map_or(absent, |item| value(item) as f32)))
+    let of = |k: usize| items.get(k).map_or(absent, |item| value(item) as f32);
+    Lanes::from([of(0), of(1), of(2), of(3)])
 }
 
 #[inline]

@@ -204,13 +204,9 @@ impl<'s, M: Metric> Builder<'s, M> {
     fn divide(&mut self, cut: Cut, range: &Range<u32>) -> ([Part<'s, M>; 2], Vec<Place>) {
         let (places, counts) = self.places(cut);
         let parts = [0, 1].map(|part| {
-            let sites: Vec<u32> = range
-                .clone()
-                .filter(|&v| {
-                    let position = Vec3::from_array(self.sites[v as usize].p);
-                    cut.is_below(position) == (part == 0)
-                })
-                .collect();
+            let position = |v: u32| Vec3::from_array(self.sites[v as usize].p);
+            let sites: Vec<u32> =
+                range.clone().filter(|v: &u32| cut.is_below(position(*v)) == (part == 0)).collect();
             let mut builder = Self::new(self.sites, self.filter, 0);
             let hints = self.hints(part, &sites, &places);
             builder.last = counts[part].min(1);

@@ -198,12 +198,6 @@ fn remove_repeated(sites: &[Site], sorted: &mut Vec<u32>) -> Vec<(u32, u32)> {
     repeated
 }
 
-/// The round of a site, the last by default: it descends one round for every three zero bits of its
-/// hash, that is with probability 1/8.
-fn round_of(site: u32, rounds: u32) -> usize {
-    (rounds - 1 - (splitmix(u64::from(site)).trailing_zeros() / 3).min(rounds - 1)) as usize
-}
-
 /// Splits a sequence into rounds of growing size, each in the order of the sequence; returns also
 /// where each round ends, counted from one.
 fn into_rounds(sorted: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
@@ -215,9 +209,11 @@ fn into_rounds(sorted: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
         let end = sorted.len() as u32 + 1;
         return (sorted, vec![end]);
     }
+    // Round 0 is the last: a site descends one round for every three zero bits of its hash.
+    let round = |i: u32| (splitmix(u64::from(i)).trailing_zeros() / 3).min(rounds - 1);
     let mut starts = vec![0usize; rounds as usize + 1];
     for &i in &sorted {
-        starts[round_of(i, rounds) + 1] += 1;
+        starts[(rounds - 1 - round(i)) as usize + 1] += 1;
     }
     for r in 0..rounds as usize {
         starts[r + 1] += starts[r];
@@ -225,7 +221,7 @@ fn into_rounds(sorted: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
     // A stable counting sort by round: within a round the curve's order stays.
     let mut ordered = vec![0; sorted.len()];
     for &i in &sorted {
-        let slot = &mut starts[round_of(i, rounds)];
+        let slot = &mut starts[(rounds - 1 - round(i)) as usize];
         ordered[*slot] = i;
         *slot += 1;
     }
@@ -339,7 +335,7 @@ fn permute(cells: &mut [Cell], mut places: Vec<u32>) {
 
 /// Exchanges cells until each is in its segment. A segment has `size` places, a power of two.
 fn exchange(cells: &mut [Cell], places: &mut [u32], size: usize) {
-    let shift = size.trailing_zeros();
+    let segment = |place: u32| place as usize >> size.trailing_zeros();
     // Invariant: every cell of a segment before its head belongs there.
     let mut heads: Vec<usize> = (0..cells.len()).step_by(size).collect();
     for s in 0..heads.len() {
@@ -347,8 +343,8 @@ fn exchange(cells: &mut [Cell], places: &mut [u32], size: usize) {
         while heads[s] < end {
             let (mut cell, mut place) = (cells[heads[s]], places[heads[s]]);
             // Follow the cycle: each swap settles one cell, so all swaps together are linear.
-            while place as usize >> shift != s {
-                let head = &mut heads[place as usize >> shift];
+            while segment(place) != s {
+                let head = &mut heads[segment(place)];
                 std::mem::swap(&mut cell, &mut cells[*head]);
                 std::mem::swap(&mut place, &mut places[*head]);
                 *head += 1;
