@@ -169,7 +169,7 @@ pub fn power_test(
 /// Computed in double precision relative to `p[0]`. If the distances to the four points then differ
 /// from the radius by more than `1e-6` of it, or the cell is nearly flat, it is computed again with
 /// exact numerators and denominator. The unit is that of the points, whose coordinates must be
-/// finite and at most [`MAX_COORDINATE`](MAX_COORDINATE): with others the call may panic.
+/// finite and at most [`MAX_COORDINATE`]: with others the call may panic.
 pub fn circumsphere(p: [Vec3; 4]) -> Option<(Vec3, f64)> {
     let (offset, _) = relative_orthocentre(p, [0.0; 4])?;
     Some((p[0] + offset, norm(offset)))
