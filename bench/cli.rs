@@ -56,7 +56,7 @@ pub enum Verb {
     Datasets(cmd::datasets::Arguments),
     /// Find regressions between two stores of results, or two builds that run in turn.
     Diff(cmd::diff::Arguments),
-    /// Rebuild the report of a store of results.
+    /// Rebuild the report of a store of results, or merge several stores.
     Report(cmd::report::Arguments),
     /// Find change points over many runs.
     History(cmd::history::Arguments),

@@ -1,32 +1,45 @@
 //! The processes that a process has started, and those that these have started.
 //!
-//! Neither a process group nor the parents alone hold a tree together: a program can leave its group
-//! (`setsid`), and a process whose parent ends gets another one. So on Linux
+//! A worker leads a session of its own and adopts the orphans among its descendants (subreaper). So
+//! everything that a method starts is a descendant of the worker while the worker lives, and all but
+//! what called `setsid` itself has the worker's session afterwards. A [`Tree`] knows its members by
+//! descent, by session, by process group, and by having been seen: exactly these are ended, and never
+//! another child of the process that watches them.
 //!
-//! - a worker adopts strays ([`adopt_strays`]): what loses its parent becomes its child, and
-//!   [`end_descendants`] finds it;
-//! - a [`Family`], which shares its process with others, knows its members by any of four signs:
-//!   descent, process group, a mark in the environment, and having been seen before.
-//!
-//! Where there is no `/proc`, the process group is all there is.
+//! Without `/proc`, the process group is all that is known.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::process::{Child, Command, ExitStatus};
+use std::process::{Child, ExitStatus};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
+
+#[cfg(unix)]
+use rustix::process::Signal;
+
+#[cfg(not(unix))]
+#[derive(Clone, Copy)]
+enum Signal {
+    KILL,
+    STOP,
+}
 
 /// How long processes that were killed may take to vanish: one that waits for a disk ends later.
 const LONGEST_END: Duration = Duration::from_secs(5);
 
-/// Variable of the environment that marks a [`Family`].
-const MARK: &str = "MEDIAL_FAMILY";
+/// Whether this process adopts the orphans among its descendants: then every child is its own.
+static ADOPTS: AtomicBool = AtomicBool::new(false);
 
-/// From now on processes whose parent ends become children of this one, where the system can do so.
-pub fn adopt_strays() {
+/// Makes this process, a worker, the leader of a session that adopts orphans, where the system can.
+pub fn become_worker() {
+    #[cfg(unix)]
+    // An interrupt from the keyboard goes to the supervisor alone.
+    let _ = rustix::process::setsid();
     #[cfg(target_os = "linux")]
-    // An old kernel has no such thing: strays go to the system then.
-    let _ = rustix::process::set_child_subreaper(Some(rustix::process::getpid()));
+    if rustix::process::set_child_subreaper(Some(rustix::process::getpid())).is_ok() {
+        ADOPTS.store(true, Ordering::Relaxed);
+    }
 }
 
 /// All descendants of a process, parents before children; none where the system does not tell.
@@ -54,55 +67,24 @@ pub fn resident_bytes(pid: u32) -> u64 {
     tree.filter_map(Stat::of).map(|stat| stat.resident_bytes).sum()
 }
 
-/// Ends all descendants of this process by force, and says how many still ran.
+/// Ends all descendants of this process, a worker, by force. Returns the number that still ran.
 ///
-/// Only to be called when no child is awaited by anybody else: their remains are removed too.
+/// Only for a process all of whose children are its own, because it reaps them too.
 pub fn end_descendants() -> usize {
     end_all(|| descendants(std::process::id()).into_iter().filter_map(Stat::of).collect())
 }
 
-/// Ends a child with its process group and all its descendants by force, and gives its status.
-///
-/// Only to be called when no other child is awaited by anybody else, as [`end_descendants`].
-pub fn end_tree(child: &mut Child) -> Option<ExitStatus> {
-    // While the child lives, its descendants can be told from those of others.
-    let below = descendants(child.id());
-    kill_group(child.id());
-    let _ = child.kill();
-    below.into_iter().for_each(kill);
-    let status = child.wait().ok();
-    end_descendants();
-    status
-}
-
 /// A child of this process and all that it starts, told from everything else that runs here.
-pub struct Family {
+pub struct Tree {
     root: u32,
-    /// As it stands in the environment of the members.
-    mark: Vec<u8>,
     /// Members met so far below the root, with their times of birth, since numbers are used again.
     seen: BTreeMap<u32, u64>,
 }
 
-impl Family {
-    /// Prepares a command to be the root of a family: it gets a process group of its own, and a mark
-    /// that is unlike any other.
-    pub fn mark(command: &mut Command) -> String {
-        use std::sync::atomic::{AtomicU64, Ordering};
-        static FAMILIES: AtomicU64 = AtomicU64::new(0);
-        let number = FAMILIES.fetch_add(1, Ordering::Relaxed);
-        let born = Stat::of(std::process::id()).map_or(0, |stat| stat.born);
-        let mark = format!("{}-{born}-{number}", std::process::id());
-        command.env(MARK, &mark);
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(command, 0);
-        mark
-    }
-
-    /// The family of a child that was started from a command with this mark.
-    pub fn of(child: &Child, mark: &str) -> Self {
-        let mark = format!("{MARK}={mark}").into_bytes();
-        Self { root: child.id(), mark, seen: BTreeMap::new() }
+impl Tree {
+    /// The tree of a child.
+    pub fn of(child: &Child) -> Self {
+        Self { root: child.id(), seen: BTreeMap::new() }
     }
 
     /// Resident bytes of all members that are below the root now or were once.
@@ -116,39 +98,35 @@ impl Family {
         seen.sum::<u64>() + Stat::of(self.root).map_or(0, |stat| stat.resident_bytes)
     }
 
-    /// Ends the root and all members by force.
-    pub fn end(&mut self, root: &mut Child) {
-        // Noted while the root lives: later their descent cannot be told.
+    /// Ends the root and all members by force, and returns the root's status.
+    pub fn end(&mut self, root: &mut Child) -> Option<ExitStatus> {
+        // Noted while the root lives: later their descent is lost. A stopped root starts no other.
+        signal(self.root, Signal::STOP);
         self.resident_bytes();
-        kill_group(self.root);
         let _ = root.kill();
-        let _ = root.wait();
-        self.end_strays();
+        let status = root.wait().ok();
+        self.end_orphans();
+        status
     }
 
-    /// Ends by force what is left after the root has ended and was waited for, and says how many
-    /// members still ran.
-    pub fn end_strays(&mut self) -> usize {
+    /// Ends by force the members that are left after the root has ended and was waited for. Returns
+    /// the number that still ran.
+    pub fn end_orphans(&mut self) -> usize {
         if Stat::of(std::process::id()).is_none() {
-            // The system does not tell who is left.
             kill_group(self.root);
         }
-        end_all(|| self.members())
+        if ADOPTS.load(Ordering::Relaxed) { end_descendants() } else { end_all(|| self.members()) }
     }
 
-    /// All members but the root, by any sign.
+    /// All members but the root.
     fn members(&self) -> Vec<Stat> {
         let all = processes();
-        let is_marked = |stat: &Stat| {
-            let environment = fs::read(format!("/proc/{}/environ", stat.pid)).unwrap_or_default();
-            environment.split(|&byte| byte == 0).any(|variable| variable == self.mark)
-        };
-        let is_member = |stat: &Stat| {
+        let is_member = |stat: &&Stat| {
             stat.group == self.root
+                || stat.session == self.root
                 || self.seen.get(&stat.pid) == Some(&stat.born)
-                || is_marked(stat)
         };
-        let ids: BTreeSet<u32> = all.iter().filter(|stat| is_member(stat)).map(|s| s.pid).collect();
+        let ids: BTreeSet<u32> = all.iter().filter(is_member).map(|stat| stat.pid).collect();
         let below: BTreeSet<u32> = ids.iter().flat_map(|&pid| descendants(pid)).collect();
         let mut members = all;
         members.retain(|s| s.pid != self.root && (ids.contains(&s.pid) || below.contains(&s.pid)));
@@ -165,10 +143,10 @@ fn end_all(list: impl Fn() -> Vec<Stat>) -> usize {
     loop {
         let (over, running): (Vec<Stat>, Vec<Stat>) = list().into_iter().partition(|s| s.is_zombie);
         for stat in &running {
-            kill(stat.pid);
+            signal(stat.pid, Signal::KILL);
             ended.insert((stat.pid, stat.born));
         }
-        // Somebody else's remains are not ours to collect, and need not be waited for.
+        // Reap only our own zombies.
         over.iter().filter(|stat| stat.parent == std::process::id()).for_each(|s| collect(s.pid));
         // A process that ended while the listing was made has handed its children to another parent,
         // perhaps to one whose children were already listed: its remains ask for one more look.
@@ -182,18 +160,18 @@ fn end_all(list: impl Fn() -> Vec<Stat>) -> usize {
     }
 }
 
-fn kill(pid: u32) {
+fn signal(pid: u32, signal: Signal) {
     #[cfg(unix)]
     if let Some(pid) = pid_of(pid) {
-        let _ = rustix::process::kill_process(pid, rustix::process::Signal::KILL);
+        let _ = rustix::process::kill_process(pid, signal);
     }
-    let _ = pid;
+    let _ = (pid, signal);
 }
 
 fn kill_group(leader: u32) {
     #[cfg(unix)]
     if let Some(leader) = pid_of(leader) {
-        let _ = rustix::process::kill_process_group(leader, rustix::process::Signal::KILL);
+        let _ = rustix::process::kill_process_group(leader, Signal::KILL);
     }
     let _ = leader;
 }
@@ -236,6 +214,7 @@ struct Stat {
     pid: u32,
     parent: u32,
     group: u32,
+    session: u32,
     /// In ticks since the system started.
     born: u64,
     resident_bytes: u64,
@@ -254,6 +233,7 @@ impl Stat {
             pid,
             parent: number(1)? as u32,
             group: number(2)? as u32,
+            session: number(3)? as u32,
             born: number(19)?,
             resident_bytes: number(21)? * page_bytes(),
             is_zombie: matches!(fields.first(), Some(&("Z" | "X"))),

@@ -87,9 +87,9 @@ pub(crate) fn study(bytes: &[u8]) {
         return;
     }
     // Numbers that TOML has no form for are told; all else comes back.
-    if let Ok(written) = study.to_text(None) {
+    if let Ok(written) = study.to_text() {
         let again: Study = toml::from_str(&written).expect("what was written can be read");
-        assert_eq!(again.to_text(None).ok(), Some(written));
+        assert_eq!(again.to_text().ok(), Some(written));
     }
 }
 

@@ -24,7 +24,7 @@ pub mod vmas;
 
 /// All methods, in the order of the tables. Those that take long are marked to run only when named.
 pub fn registry() -> Vec<Registered> {
-    vec![
+    let methods = vec![
         Registered::from(angle::method())
             .best_for(
                 "Dense samples, when the axis is to stay where it is and only its spikes go, \
@@ -112,7 +112,31 @@ pub fn registry() -> Vec<Registered> {
                  where seconds to a minute for each number of spheres do not matter.",
             )
             .on_request(),
-    ]
+    ];
+    let versioned = |registered: Registered| {
+        let version = version(&registered.method.info().id);
+        Registered { version: version.map(Into::into), ..registered }
+    };
+    methods.into_iter().map(versioned).collect()
+}
+
+/// A text that changes whenever the sources that decide the results of a method do: its module, the
+/// modules of the methods that [`registry`] builds it from, the shared modules, the library and the
+/// kernel, the dependencies, the compiler. `None` for an id without a module.
+pub fn version(id: &str) -> Option<String> {
+    let module = id.replace('-', "_");
+    let hash_of = |module: &str| {
+        let mut hashes = env!("SOURCE_HASHES").split(';');
+        hashes.find_map(|pair| pair.strip_prefix(module)?.strip_prefix('='))
+    };
+    let mut parts = vec![hash_of(&module)?];
+    // These two hand their result to Q-MAT.
+    if module == "coverage_axis" || module == "tight" {
+        parts.push(hash_of("qmat").unwrap_or_default());
+    }
+    parts.push(hash_of("shared").unwrap_or_default());
+    parts.extend([medial::SOURCE_HASH, medial::geometry::SOURCE_HASH, env!("BUILD")]);
+    Some(parts.join(" "))
 }
 
 /// The method with an id, or `None`. [`initial`] simplifies nothing and is not among them.
@@ -122,11 +146,68 @@ pub fn find(id: &str) -> Option<Box<dyn MedialSimplifier>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Registered, registry};
+    use std::fs;
+    use std::path::Path;
+
+    use super::{Registered, registry, version};
+
+    #[path = "../build.rs"]
+    mod build;
+
+    #[test]
+    fn an_edit_of_one_method_changes_the_version_of_that_method_alone() {
+        fn copy(from: &Path, to: &Path) {
+            fs::create_dir_all(to).expect("a folder");
+            for entry in fs::read_dir(from).expect("a folder") {
+                let (path, to) =
+                    entry.map(|e| (e.path(), to.join(e.file_name()))).expect("an entry");
+                if path.is_dir() {
+                    copy(&path, &to);
+                } else {
+                    fs::copy(&path, &to).expect("copied");
+                }
+            }
+        }
+        let root = tempfile::tempdir().expect("a folder");
+        copy(Path::new(env!("CARGO_MANIFEST_DIR")), root.path());
+        let before = build::hashes(root.path());
+        let exported: Vec<String> =
+            before.iter().map(|(module, hash)| format!("{module}={hash}")).collect();
+        assert_eq!(exported.join(";"), env!("SOURCE_HASHES"));
+        let edit = |file: &str| {
+            let path = root.path().join(file);
+            let mut bytes = fs::read(&path).expect("a source");
+            bytes.push(b'\n');
+            fs::write(&path, bytes).expect("written");
+            build::hashes(root.path())
+        };
+        let qmat =
+            ["qmat.rs", "qmat/mod.rs"].into_iter().find(|file| root.path().join(file).exists());
+        let after = edit(qmat.expect("the module of Q-MAT"));
+        for (module, hash) in &after {
+            assert_eq!(before[module] != *hash, module == "qmat", "{module}");
+        }
+        assert_eq!(edit("lib.rs"), after, "how methods are presented changes no result");
+        assert_ne!(edit("ties.rs")["shared"], after["shared"]);
+    }
+
+    #[test]
+    fn every_method_has_a_version_of_its_own() {
+        let versions: Vec<_> =
+            registry().into_iter().map(|r| r.version.expect("a version")).collect();
+        for (k, version) in versions.iter().enumerate() {
+            assert!(!versions[..k].contains(version));
+        }
+        let part = |id: &str, k: usize| {
+            version(id).expect("a method").split(' ').nth(k).map(str::to_owned)
+        };
+        assert_eq!(part("tight", 1), part("qmat", 0), "the method that it starts from");
+        assert_eq!(version("nothing"), None);
+    }
 
     #[test]
     fn default_sweeps_go_from_fine_to_coarse_wherever_there_is_a_native_level() {
-        for Registered { method, presentation } in registry() {
+        for Registered { method, presentation, .. } in registry() {
             let (info, sweep) = (method.info(), presentation.sweep);
             let native = match &info.native {
                 Some(native) if !presentation.on_request => native,

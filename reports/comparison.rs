@@ -289,13 +289,19 @@ impl<'a> SeriesKey<'a> {
             .map(|(key, value)| format!("{key}={}", value.trim_matches('"')))
             .collect();
         let conditions = record.conditions.as_ref();
+        // The files of one external method are one row, whatever their paths and hashes.
+        let is_external = record.status == Status::External;
         Self {
             method: &simplify.method,
             variant: simplify.variant.as_deref(),
-            params: params.join(" "),
+            params: if is_external { String::new() } else { params.join(" ") },
             seed: simplify.seed,
-            build: &record.binary_hash,
-            plugin: conditions.and_then(|c| c.fingerprint.as_deref()),
+            // A rebuild that changed no method gives the same rows.
+            build: match record.method_version.as_str() {
+                "" => &record.binary_hash,
+                version => version,
+            },
+            plugin: conditions.filter(|_| !is_external).and_then(|c| c.fingerprint.as_deref()),
             sampling: conditions.map_or("", |c| &c.sampling),
             dual: conditions.map_or("", |c| &c.dual),
             samples: conditions.map_or(0, |c| c.samples),

@@ -64,7 +64,7 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
     for entry in &comparison.entries {
         let record = entry.record;
         // A file of another program has one number of spheres, whatever that is.
-        let at_level = entry.level == level || record.status == Status::AsGiven;
+        let at_level = entry.level == level || record.status == Status::External;
         let shown = at_level && entry.measured();
         let Some(artifact) = record.artifact.clone().filter(|_| shown) else { continue };
         let mut caption = comparison.series[entry.series].clone();

@@ -23,7 +23,8 @@ pub enum Status {
     /// A valid medial mesh came out.
     Ok,
     /// A valid medial mesh, from a file of another program.
-    AsGiven,
+    #[serde(alias = "as_given")]
+    External,
     /// A valid medial mesh came out, with a number of spheres more than 2 % off the one asked.
     OtherCount,
     /// No level that was tried keeps the error bound: an answer, not a failure.
@@ -48,7 +49,7 @@ impl Status {
     /// Every status, in the order of the enumeration.
     pub const ALL: [Self; 11] = [
         Self::Ok,
-        Self::AsGiven,
+        Self::External,
         Self::OtherCount,
         Self::BoundMissed,
         Self::Unsupported,
@@ -62,12 +63,12 @@ impl Status {
 
     /// Whether the result is as it was asked, or as it was given.
     pub fn is_ok(self) -> bool {
-        matches!(self, Self::Ok | Self::AsGiven)
+        matches!(self, Self::Ok | Self::External)
     }
 
     /// Whether there is a result to measure, at the count that was asked or another.
     pub fn has_result(self) -> bool {
-        matches!(self, Self::Ok | Self::AsGiven | Self::OtherCount)
+        matches!(self, Self::Ok | Self::External | Self::OtherCount)
     }
 
     /// Whether something went wrong: neither a result nor a plain answer that there is none.
@@ -79,7 +80,7 @@ impl Status {
     pub fn key(self) -> &'static str {
         match self {
             Self::Ok => "ok",
-            Self::AsGiven => "as_given",
+            Self::External => "external",
             Self::OtherCount => "other_count",
             Self::BoundMissed => "bound_missed",
             Self::Unsupported => "unsupported",
@@ -148,7 +149,10 @@ pub struct Record {
     /// Where it ran.
     #[serde(default)]
     pub machine: Machine,
-    /// Hash of the program that ran the method: a stale build must not lend its numbers.
+    /// Version of the method, a hash of its sources; empty in records of older builds.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub method_version: String,
+    /// Hash of the program that ran the method.
     #[serde(default)]
     pub binary_hash: String,
     /// The command line, as the user typed it.

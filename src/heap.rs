@@ -17,6 +17,7 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI64, Ordering};
 
 use serde::{Deserialize, Serialize};
@@ -40,6 +41,21 @@ static SURROUNDING: AtomicI64 = AtomicI64::new(0);
 
 thread_local! {
     static PENDING: Cell<i64> = const { Cell::new(0) };
+}
+
+/// Runs when an allocation is refused.
+static ON_REFUSAL: OnceLock<fn()> = OnceLock::new();
+
+/// Sets what runs whenever the system refuses an allocation, before the program aborts or copes.
+/// The first call counts. `hook` must not allocate.
+pub fn on_refusal(hook: fn()) {
+    let _ = ON_REFUSAL.set(hook);
+}
+
+fn refused() {
+    if let Some(hook) = ON_REFUSAL.get() {
+        hook();
+    }
 }
 
 fn count(bytes: i64) {
@@ -71,7 +87,9 @@ unsafe impl GlobalAlloc for Heap {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller's promise is passed on.
         let pointer = unsafe { System.alloc(layout) };
-        if !pointer.is_null() {
+        if pointer.is_null() {
+            refused();
+        } else {
             count(layout.size() as i64);
         }
         pointer
@@ -80,7 +98,9 @@ unsafe impl GlobalAlloc for Heap {
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as above.
         let pointer = unsafe { System.alloc_zeroed(layout) };
-        if !pointer.is_null() {
+        if pointer.is_null() {
+            refused();
+        } else {
             count(layout.size() as i64);
         }
         pointer
@@ -95,7 +115,9 @@ unsafe impl GlobalAlloc for Heap {
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         // SAFETY: as above.
         let moved = unsafe { System.realloc(pointer, layout, size) };
-        if !moved.is_null() {
+        if moved.is_null() {
+            refused();
+        } else {
             count(size as i64 - layout.size() as i64);
         }
         moved

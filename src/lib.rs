@@ -34,6 +34,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+/// A hash of the sources of this crate; that of the kernel is its own.
+pub const SOURCE_HASH: &str = env!("SOURCE_HASH");
+
 mod atomic;
 mod colour;
 pub mod complex;

@@ -13,8 +13,9 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::run::{
-    AXES, Given, Here, Item, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Source,
-    Store, Study, StudyMethod, Supervisor, Tally, count, missing, refused_params, run_items,
+    AXES, Given, Here, Item, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Shard,
+    Source, Store, Study, StudyMethod, Supervisor, Tally, count, missing, refused_params,
+    run_items,
 };
 
 /// Arguments of `compare`.
@@ -57,15 +58,18 @@ pub struct Arguments {
     /// Set a parameter of one method; can be given several times.
     #[arg(long = "set", value_name = "METHOD.KEY=VALUE")]
     set: Vec<String>,
-    /// A medial mesh of another program as the result of a named method, judged like the rest; its number of spheres is
-    /// asked of the methods too, unless `--spheres` says others; `NAME@MESH=FILE.ma` with several meshes; can be given
-    /// several times.
-    #[arg(long, value_name = "NAME=FILE.ma")]
+    /// Add medial meshes computed elsewhere as results of method NAME: a file, `NAME@MESH=FILE` with several
+    /// meshes, or a folder of MESH.ma or MESH-COUNT.ma; repeatable. Their counts are the default of
+    /// `--spheres`.
+    #[arg(long, value_name = "NAME=PATH")]
     given: Vec<String>,
     /// Time each item so many times, the methods in turn; the median is reported, all are kept
     /// [default: 1].
     #[arg(long, value_name = "N")]
     repeat: Option<usize>,
+    /// Run share I of N of the items, into a folder of its own; `medial report` merges the folders.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<String>,
     /// Folder of the results. What is there already is not run again.
     #[arg(long, value_name = "DIR", default_value = "medial-report")]
     out: PathBuf,
@@ -109,6 +113,11 @@ pub fn run(
     let provenance = Provenance::here();
     let here = Here::of(&provenance);
     let items = study.items(registry, &here)?;
+    let shard = arguments.shard.as_deref().map(Shard::parse).transpose()?;
+    let items = match shard {
+        Some(shard) => shard.share(items),
+        None => items,
+    };
     let interrupted = interrupt::listen();
     let axes = Some(arguments.out.join(AXES));
     let mut supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);
@@ -126,7 +135,7 @@ pub fn run(
         store.clear(RESULTS)?;
     }
     if !left.is_empty() {
-        report::write_study(&arguments.out, &study, arguments.study.as_deref())?;
+        report::write_study(&arguments.out, &study)?;
     }
     let mut progress = Progress::new(global.progress(), left.len());
     let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Record]| {
@@ -281,7 +290,7 @@ fn finish(
         if ok > 0 {
             print_line(&medial_reports::summary_text(records));
         }
-        let given = match count(records, Status::AsGiven) {
+        let given = match count(records, Status::External) {
             0 => String::new(),
             files => format!(" ({files} as given)"),
         };
@@ -297,7 +306,7 @@ fn finish(
     let measured = records.iter().filter(|record| record.status.has_result()).count();
     Ok(match measured {
         0 => Exit::NothingMeasured,
-        _ if ok < records.len() => Exit::SomeFailed,
+        _ if records.iter().any(|record| record.status.is_failure()) => Exit::SomeFailed,
         _ => Exit::Done,
     })
 }

@@ -1,27 +1,36 @@
-//! `medial report DIR`: rebuilds tables, plots and page from the records of a folder.
+//! `medial report DIR [DIR ...] [--out DIR]`: rebuilds tables, plots and page from the records of a store, or of
+//! several stores that it merges.
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeSet, HashMap};
+use std::fs;
+use std::io;
+use std::path::{Component, Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
-use medial_reports::{Header, Record, RunNote, read_header, read_records, write_report};
+use medial_reports::{
+    Header, Record, RunNote, read_header, read_records, write_records, write_report,
+};
 use serde_json::json;
 
 use super::pictures;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
-use crate::run::{Provenance, RESULTS, Registry, Source, Store, Study};
+use crate::run::{Here, Provenance, RESULTS, Registry, Source, Store, Study};
 
-/// Name of the file with the study that was asked last.
+/// Name of the file with the last requested study.
 pub const STUDY: &str = "study.toml";
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Folder with `results.jsonl`.
-    dir: PathBuf,
+    /// Stores: folders with `results.jsonl`.
+    #[arg(required = true, value_name = "DIR")]
+    dirs: Vec<PathBuf>,
+    /// Store that the others are merged into; needed for several.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 }
 
 /// Runs the verb.
@@ -30,13 +39,18 @@ pub struct Arguments {
 /// When the folder has no readable records, another process adds to it, or the report cannot be
 /// written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
-    // A page of records that are just being added to would be of no moment in particular.
-    let held = match arguments.dir.is_dir() {
-        true => Some(Store::open(&arguments.dir, RESULTS, "medial report")?),
-        false => None,
+    let (dir, notes) = match (&arguments.dirs[..], &arguments.out) {
+        ([dir], None) => (dir, Vec::new()),
+        (_, None) => {
+            return Err(Failure::usage("several stores: name the merged one by --out DIR"));
+        }
+        (dirs, Some(out)) => (out, merge(dirs, out, registry)?),
     };
-    let Rebuilt { records, files, mut warnings, undrawn } = rebuild(&arguments.dir, registry)?;
+    // While records are being added, no page would match them.
+    let held = dir.is_dir().then(|| Store::open(dir, RESULTS, "medial report")).transpose()?;
+    let Rebuilt { records, files, mut warnings, undrawn } = rebuild(dir, registry)?;
     warnings.extend(undrawn);
+    warnings.extend(notes);
     drop(held);
     if global.json {
         print_json(&json!({ "records": records.len(), "files": files }), &warnings);
@@ -44,10 +58,139 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         for warning in &warnings {
             print_line(&format!("warning: {warning}"));
         }
-        let page = arguments.dir.join("index.html");
+        let page = dir.join("index.html");
         print_line(&format!("{} records; page: {}", records.len(), page.display()));
     }
     Ok(Exit::Done)
+}
+
+/// Merges stores into `out`: records with their medial meshes, the study, the notes of the runs. Of
+/// records of the same key the first counts if they are equal but for seconds, else the one of the
+/// store that was written last. Returns a remark for each such difference.
+fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String>, Failure> {
+    let failed =
+        |path: &Path, error: io::Error| Failure::input(format!("{}: {error}", path.display()));
+    let mut stores = Vec::new();
+    // What stands in `out` already takes part like another store.
+    let earlier = out.join(RESULTS).exists().then(|| out.to_owned());
+    for dir in earlier.iter().chain(dirs) {
+        let (records, mut bad) = records(dir)?;
+        let written = fs::metadata(dir.join(RESULTS)).and_then(|file| file.modified());
+        let written = written.map_err(|error| failed(dir, error))?;
+        bad.iter_mut().for_each(|line| *line = format!("{}: {line}", dir.display()));
+        stores.push((dir, written, records, bad));
+    }
+    let mut notes = Vec::new();
+    let mut merged: Vec<(Record, &PathBuf, SystemTime)> = Vec::new();
+    let mut places: HashMap<String, usize> = HashMap::new();
+    for (dir, written, records, bad) in stores {
+        notes.extend(bad);
+        for record in records {
+            // Records of older builds have no key and cannot be told apart.
+            let known = places.get(&record.key).copied().filter(|_| !record.key.is_empty());
+            let Some(place) = known else {
+                places.insert(record.key.clone(), merged.len());
+                merged.push((record, dir, written));
+                continue;
+            };
+            let (other, other_dir, other_written) = &merged[place];
+            // Within one store the last record of a key counts.
+            let replaces = match dir == *other_dir {
+                true => true,
+                false if is_same(other, &record) => false,
+                false => {
+                    let newer = written > *other_written;
+                    let taken = if newer { dir } else { *other_dir };
+                    notes.push(format!(
+                        "{}, {}, {}: {} and {} differ; the newer one, of {}, is taken",
+                        record.mesh,
+                        record.simplify.variant.as_ref().unwrap_or(&record.simplify.method),
+                        record.simplify.level,
+                        other_dir.display(),
+                        dir.display(),
+                        taken.display()
+                    ));
+                    newer
+                }
+            };
+            if replaces {
+                merged[place] = (record, dir, written);
+            }
+        }
+    }
+    let store = Store::open(out, RESULTS, "medial report")?;
+    for (record, dir, _) in merged.iter().filter(|(_, dir, _)| dir.as_path() != out) {
+        let Some(artifact) = record.artifact.as_deref().filter(|path| is_inside(path)) else {
+            continue;
+        };
+        let (from, to) = (dir.join(artifact), out.join(artifact));
+        let bytes = fs::read(&from).map_err(|error| failed(&from, error))?;
+        fs::create_dir_all(to.parent().unwrap_or(out)).map_err(|error| failed(&to, error))?;
+        medial::write_atomically(&to, |file| file.write_all(&bytes))
+            .map_err(|error| failed(&to, error))?;
+    }
+    // The first store's study stands for all; relative paths in it start at the folder it names.
+    let studies: Vec<(&PathBuf, Study)> = (earlier.iter().chain(dirs))
+        .filter_map(|dir| Some((dir, Study::read(&dir.join(STUDY)).ok()?)))
+        .collect();
+    if let Some((first, study)) = studies.first() {
+        for (dir, _) in studies.iter().filter(|(_, other)| other != study) {
+            let (dir, first) = (dir.display(), first.display());
+            notes.push(format!("{dir}: its study differs; that of {first} is kept"));
+        }
+        write_study(out, study)?;
+    }
+    let order = studies.first().and_then(|(_, study)| order_of(study, registry));
+    let order = order.unwrap_or_default();
+    let mut records: Vec<Record> = merged.into_iter().map(|(record, ..)| record).collect();
+    // Tables follow the order of the records: that of the study, as if one process had run it all.
+    records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
+    write_records(&out.join(RESULTS), &records).map_err(Failure::input)?;
+    let mut header = Header::default();
+    for dir in earlier.iter().chain(dirs) {
+        let Ok(Header { runs, methods, .. }) = read_header(dir) else { continue };
+        header.runs.extend(runs);
+        for note in methods {
+            if !header.methods.iter().any(|known| known.id == note.id) {
+                header.methods.push(note);
+            }
+        }
+    }
+    let path = out.join("header.json");
+    let text = serde_json::to_vec(&header).map_err(Failure::input)?;
+    medial::write_atomically(&path, |file| file.write_all(&text))
+        .map_err(|error| failed(&path, error))?;
+    drop(store);
+    Ok(notes)
+}
+
+/// Whether two records of one key hold the same result and the same measures.
+fn is_same(a: &Record, b: &Record) -> bool {
+    (a.status, &a.result_hash, &a.evaluate, &a.mesh_hash)
+        == (b.status, &b.result_hash, &b.evaluate, &b.mesh_hash)
+}
+
+/// Whether a path of a record stays in its store.
+fn is_inside(path: &str) -> bool {
+    Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
+}
+
+/// What tells the place of a record in its study: mesh, method with parameters, level.
+fn row_of(record: &Record) -> String {
+    let Record { mesh, simplify, .. } = record;
+    json!([mesh, simplify.method, simplify.variant, simplify.params, simplify.level]).to_string()
+}
+
+/// The place of each row of a study; `None` where its meshes or plug-ins are not at hand.
+fn order_of(study: &Study, registry: &Registry) -> Option<HashMap<String, usize>> {
+    let items = study.items(registry, &Here::of(&Provenance::here())).ok()?;
+    let rows = items.iter().flat_map(|item| {
+        let method = &item.method;
+        item.levels.iter().map(move |level| {
+            json!([item.scene.mesh, method.id, method.name, method.params, level]).to_string()
+        })
+    });
+    Some(rows.enumerate().map(|(place, row)| (row, place)).collect())
 }
 
 /// A report that was rebuilt, or found as it should be.
@@ -114,13 +257,13 @@ fn sources(dir: &Path) -> Vec<Source> {
     study.and_then(|study| study.sources().ok()).unwrap_or_default()
 }
 
-/// Writes the study that is asked, and may be that of a file, beside the results.
+/// Writes the requested study next to its results.
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn write_study(dir: &Path, study: &Study, source: Option<&Path>) -> Result<(), Failure> {
+pub fn write_study(dir: &Path, study: &Study) -> Result<(), Failure> {
     let path = dir.join(STUDY);
-    let text = study.to_text(source)?;
+    let text = study.to_text()?;
     medial::write_atomically(&path, |out| out.write_all(text.as_bytes()))
         .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
 }

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use medial::simplifier::RunContext;
 
-use crate::process_tree::Family;
+use crate::process_tree::Tree;
 
 /// How much of the end of each output is kept.
 const KEPT: usize = 64 * 1024;
@@ -54,22 +54,38 @@ impl From<io::Error> for NoEnd {
     }
 }
 
+/// Lifts the limit of memory that a program inherits from its worker. The supervisor limits both
+/// together by their resident bytes: what a program prints when an allocation fails decides nothing.
+fn lift_limit(child: &Child) {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::process::{Pid, Resource, Rlimit, getrlimit, prlimit};
+        let Rlimit { maximum, .. } = getrlimit(Resource::Data);
+        let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+        // A program that has ended already needs no more memory.
+        let _ = prlimit(pid, Resource::Data, Rlimit { current: maximum, maximum });
+    }
+    let _ = child;
+}
+
 /// Runs a program to its end.
 pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, NoEnd> {
-    let mark = Family::mark(&mut command);
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn()?;
-    let mut family = Family::of(&child, &mark);
+    let mut tree = Tree::of(&child);
+    lift_limit(&child);
     let stdout = child.stdout.take().map(Drain::start);
     let stderr = child.stderr.take().map(Drain::start);
-    let (status, peak) = match watch(&mut child, &mut family, context) {
+    let (status, peak) = match watch(&mut child, &mut tree, context) {
         Ok(watched) => watched,
         Err(none) => {
-            family.end(&mut child);
+            tree.end(&mut child);
             return Err(none);
         }
     };
-    let strays = family.end_strays();
+    let strays = tree.end_orphans();
     let deadline = Instant::now() + LONGEST_DRAIN;
     let text = |drain: Option<Drain>| drain.map_or_else(String::new, |d| d.finish(deadline));
     Ok(Ended { status, stdout: text(stdout), stderr: text(stderr), peak, strays })
@@ -77,12 +93,12 @@ pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, N
 
 fn watch(
     child: &mut Child,
-    family: &mut Family,
+    tree: &mut Tree,
     context: &RunContext,
 ) -> Result<(ExitStatus, u64), NoEnd> {
     let (mut peak, mut pause) = (0, FIRST_LOOK);
     loop {
-        peak = peak.max(family.resident_bytes());
+        peak = peak.max(tree.resident_bytes());
         if let Some(status) = child.try_wait()? {
             return Ok((status, peak));
         }

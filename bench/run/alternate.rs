@@ -72,7 +72,9 @@ impl Build {
 
     /// An item as this build has to run it.
     pub fn own(&self, item: &Item) -> Item {
-        Item { binary: self.provenance.binary_hash.clone(), ..item.clone() }
+        // Two builds are compared as such: the version of a method is not known of another program.
+        let binary = self.provenance.binary_hash.clone();
+        Item { version: binary.clone(), binary, ..item.clone() }
     }
 }
 

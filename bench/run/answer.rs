@@ -70,7 +70,6 @@ impl From<SimplifyError> for Fault {
             SimplifyError::Parameter(_) | SimplifyError::Level(_) => Status::Refused,
             SimplifyError::InvalidOutput(_) => Status::InvalidOutput,
             SimplifyError::Crashed(_) => Status::Panicked,
-            SimplifyError::Failed(why) if speaks_of_memory(why) => Status::OutOfMemory,
             SimplifyError::Shape(_)
             | SimplifyError::Hierarchy(_)
             | SimplifyError::Failed(_)
@@ -78,16 +77,6 @@ impl From<SimplifyError> for Fault {
         };
         Self { status, reason: error.to_string() }
     }
-}
-
-/// Whether the message of a failed program says that it ran out of memory. Programs inherit the
-/// worker's limit, and most end with such a message when they reach it.
-fn speaks_of_memory(why: &str) -> bool {
-    let why = why.to_lowercase();
-    let words =
-        ["memoryerror", "bad_alloc", "out of memory", "cannot allocate", "unable to allocate"];
-    let more = ["memory exhausted", "memory allocation of", "outofmemory"];
-    words.iter().chain(&more).any(|word| why.contains(word))
 }
 
 /// Starts a simplification on a view of a shape and computes every level, given from fine to coarse

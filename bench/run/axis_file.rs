@@ -4,9 +4,9 @@ use std::fmt::Display;
 use std::path::Path;
 
 use clap::ValueEnum;
-use medial::complex::{self, LoadedMa, MedialMesh, Radii, ReadOptions};
+use medial::complex::{self, LoadedMa, MedialMesh, Radii, ReadOptions, Sphere};
 use medial::shape::{Fit, Shape, ShapeError};
-use medial::surface::Side;
+use medial::surface::{self, Side};
 use serde::{Deserialize, Serialize};
 
 use super::reach;
@@ -80,8 +80,7 @@ pub fn read_axis(
     let from_surface = options.radii == RadiiFrom::Surface;
     let radii = if from_surface { Radii::NotNeeded } else { Radii::Needed };
     let read = ReadOptions { lenient: options.lenient, block: options.block, radii };
-    let mut loaded =
-        complex::read_with(path, read).map_err(|error| AxisError(error.to_string()))?;
+    let mut loaded = read_external(path, read).map_err(AxisError)?;
     if loaded.mesh.spheres.is_empty() {
         return Err(named(&"no sphere"));
     }
@@ -111,6 +110,30 @@ pub fn read_axis(
         loaded.warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", path.display())));
     }
     Ok((loaded, fit))
+}
+
+/// Reads a medial mesh, or a surface as one of spheres without extent: the union of its slabs is the
+/// surface itself.
+///
+/// # Errors
+/// In words that name the file.
+pub(super) fn read_external(path: &Path, options: ReadOptions) -> Result<LoadedMa, String> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let read = || complex::read_with(path, options).map_err(|error| error.to_string());
+    let surface = || -> Result<LoadedMa, String> {
+        let surface = surface::read_any(path).map_err(|error| error.to_string())?.mesh;
+        let spheres = surface.vertices.iter().map(|&v| Sphere::new(v, 0.0)).collect();
+        let mesh = MedialMesh::from_simplices(spheres, vec![], surface.faces);
+        let mesh = mesh.map_err(|error| format!("{}: {error}", path.display()))?;
+        let notes = vec!["a surface: measured as spheres of radius 0".to_owned()];
+        Ok(LoadedMa { mesh, notes, warnings: Vec::new() })
+    };
+    match extension.as_str() {
+        "off" | "stl" => surface(),
+        // Without radii it is a surface, and its first error is the more telling one if it is neither.
+        "ply" | "obj" => read().or_else(|why| surface().map_err(|_| why)),
+        _ => read(),
+    }
 }
 
 /// Gives every sphere the distance of its centre to the surface as its radius.

@@ -1,11 +1,13 @@
 //! Error bounds as levels: a search, then a timed run of the level that it found.
 
+use std::io;
+
 use medial::shape::Shape;
 use medial::simplifier::{Level, MethodInfo, Simplification, SimplifyError};
 use medial_reports::{Status, Target};
 
 use super::answer::guarded;
-use super::search::{Measure, Search};
+use super::search::{Found, Measure, Search};
 use super::{Fault, LevelRun, Times, answer};
 
 /// Begins a simplification on a view.
@@ -29,50 +31,59 @@ pub struct Bounds<'a> {
 }
 
 impl Bounds<'_> {
-    /// A run for each bound, given from small to large. The seconds are those of the level found,
-    /// without the search.
-    pub fn answer(&self, bounds: &[f64]) -> Vec<LevelRun> {
-        if bounds.is_empty() {
-            return Vec::new();
-        }
-        let found =
-            guarded(|| self.search(bounds)).unwrap_or_else(|fault| vec![Err(fault); bounds.len()]);
-        let levels: Vec<Level> =
-            found.iter().filter_map(|level| level.as_ref().ok()).copied().collect();
-        let view = self.shape.view();
-        let mut runs = match levels.is_empty() {
-            true => Vec::new(),
-            false => answer(&view, self.info, || (self.prepare)(&view), &levels, |_| {}),
-        }
-        .into_iter();
-        let run = |(&bound, found): (&f64, Result<Level, Fault>)| {
-            let level = Target::MaxError(bound);
-            match found {
-                Ok(_) => LevelRun { level, ..runs.next().expect("one for each level") },
-                Err(fault) => LevelRun { level, outcome: Err(fault), times: Times::default() },
-            }
+    /// A run for each bound, given from large to small: `each` gets it before the next search begins.
+    /// The seconds are those of the level found, without the search.
+    ///
+    /// # Errors
+    /// When `each` fails.
+    pub fn answer(
+        &self,
+        bounds: &[f64],
+        each: &mut dyn FnMut(LevelRun) -> io::Result<()>,
+    ) -> io::Result<()> {
+        let failed = |&bound: &f64, fault: &Fault| LevelRun {
+            level: Target::MaxError(bound),
+            outcome: Err(fault.clone()),
+            times: Times::default(),
         };
-        bounds.iter().zip(found).map(run).collect()
-    }
-
-    /// The level for each bound.
-    fn search(&self, bounds: &[f64]) -> Result<Vec<Result<Level, Fault>>, SimplifyError> {
         let view = self.shape.view();
-        let most = view.initial()?.spheres.len();
-        let mut simplification = (self.prepare)(&view)?;
+        let begun = guarded(|| Ok((view.initial()?.spheres.len(), (self.prepare)(&view)?)));
+        let (most, mut simplification) = match begun {
+            Ok(begun) => begun,
+            Err(fault) => return bounds.iter().try_for_each(|bound| each(failed(bound, &fault))),
+        };
         let mut search =
             Search::new(simplification.as_mut(), self.sweep, most, self.measure, &|_| {});
-        let mut found = Vec::new();
+        let mut broken: Option<Fault> = None;
         // The loosest bound first: the levels tried for it help the others.
-        for &bound in bounds.iter().rev() {
-            (self.searching)(Target::MaxError(bound));
-            let result = search.within(bound)?;
-            found.push(result.within.map(|probe| probe.level).ok_or_else(|| Fault {
-                status: Status::BoundMissed,
-                reason: result.refusal(bound),
-            }));
+        for bound in bounds {
+            (self.searching)(Target::MaxError(*bound));
+            let found = match &broken {
+                Some(fault) => Err(fault.clone()),
+                None => guarded(|| search.within(*bound)),
+            };
+            let run = match found {
+                Ok(Found { within: Some(probe), .. }) => self.timed(probe.level, *bound),
+                Ok(found) => {
+                    let reason = found.refusal(*bound);
+                    failed(bound, &Fault { status: Status::BoundMissed, reason })
+                }
+                Err(fault) => {
+                    // A method that panicked is in no state to be asked again.
+                    broken = (fault.status == Status::Panicked).then(|| fault.clone());
+                    failed(bound, &fault)
+                }
+            };
+            each(run)?;
         }
-        found.reverse();
-        Ok(found)
+        Ok(())
+    }
+
+    /// The timed run of the level that a search found.
+    fn timed(&self, level: Level, bound: f64) -> LevelRun {
+        let view = self.shape.view();
+        let runs = answer(&view, self.info, || (self.prepare)(&view), &[level], |_| {});
+        let run = runs.into_iter().next().expect("one level, one run");
+        LevelRun { level: Target::MaxError(bound), ..run }
     }
 }

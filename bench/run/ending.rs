@@ -55,14 +55,17 @@ pub fn out_of_memory(stage: Stage, limits: &Limits) -> Fault {
     Fault { status: Status::OutOfMemory, reason }
 }
 
-/// The worker ended by itself: the fault by its exit status and its last words.
-pub fn ended(stage: Stage, status: Option<ExitStatus>, last_words: &str, limits: &Limits) -> Fault {
-    // The standard library prints this line before it aborts.
-    let allocation =
-        last_words.lines().rev().find(|line| line.starts_with("memory allocation of "));
-    if let Some(line) = allocation {
-        let fault = out_of_memory(stage, limits);
-        return Fault { reason: format!("{} ({line})", fault.reason), ..fault };
+/// The worker ended by itself: the fault by its exit status and its last words, or by its own signal
+/// that memory was refused.
+pub fn ended(
+    stage: Stage,
+    status: Option<ExitStatus>,
+    last_words: &str,
+    memory_refused: bool,
+    limits: &Limits,
+) -> Fault {
+    if memory_refused {
+        return out_of_memory(stage, limits);
     }
     if last_words.contains("has overflowed its stack") {
         let reason =

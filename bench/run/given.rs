@@ -1,9 +1,14 @@
 //! Files of other programs as results of a named method.
 //!
+//! A folder holds `MESH.ma` or `MESH-COUNT.ma` for the meshes of the study, and may hold `method.toml` with
+//! the claims of its authors. A surface in place of a medial mesh is the decimation baseline.
 //! A file is a pseudo-method: on its mesh it answers one number of spheres, that which the file has, and is judged
 //! like the rest. Nothing is known of the time that it took, so its record has none.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use medial::shape::Shape;
 use medial::simplifier::{
@@ -11,6 +16,8 @@ use medial::simplifier::{
     SimplifyError,
 };
 use serde::{Deserialize, Serialize};
+
+use crate::plugin::OwnSeconds;
 
 use super::{AxisOptions, FitBy, RadiiFrom, hex_digest, read_axis};
 
@@ -70,12 +77,93 @@ impl Given {
     }
 }
 
+/// The claims in a folder's `method.toml`. Nothing else about its results is taken from it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Claims {
+    /// Full name of the method.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub title: String,
+    /// Its source.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub citation: String,
+    /// Claimed seconds by the name of the file without its extension.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub seconds: BTreeMap<String, f64>,
+}
+
+/// Name of the file with [`Claims`].
+const CLAIMS: &str = "method.toml";
+/// Extensions of external results.
+const EXTENSIONS: [&str; 5] = ["ma", "ply", "off", "obj", "stl"];
+
+impl Given {
+    /// The files of a folder with the meshes that they belong to, by name, and the claims; files of no
+    /// mesh of the study are passed over.
+    ///
+    /// # Errors
+    /// In words, when the folder or its claims cannot be read, or no file belongs to a mesh.
+    pub fn in_folder(
+        &self,
+        folder: &Path,
+        meshes: &[String],
+    ) -> Result<(Vec<Self>, Claims), String> {
+        let failed = |error: io::Error| format!("{}: {error}", folder.display());
+        let path = folder.join(CLAIMS);
+        let claims = match fs::read_to_string(&path) {
+            Ok(text) => {
+                toml::from_str(&text).map_err(|why| format!("{}: {why}", path.display()))?
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Claims::default(),
+            Err(error) => return Err(failed(error)),
+        };
+        let mut files = Vec::new();
+        for entry in fs::read_dir(folder).map_err(failed)? {
+            let file = entry.map_err(failed)?.path();
+            let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let of = |mesh: &&String| {
+                stem.strip_prefix(mesh.as_str()).is_some_and(|rest| {
+                    rest.is_empty() || rest.strip_prefix('-').is_some_and(is_number)
+                })
+            };
+            // `box-8` is a mesh of its own where the study has one: the longest name wins.
+            let mesh = meshes.iter().filter(of).max_by_key(|mesh| mesh.len());
+            if let Some(mesh) = mesh.filter(|_| EXTENSIONS.contains(&extension.as_str())) {
+                files.push(Self { file, mesh: Some(mesh.clone()), ..self.clone() });
+            }
+        }
+        files.sort_by(|a, b| a.file.cmp(&b.file));
+        if files.is_empty() {
+            let known = meshes.join(", ");
+            return Err(format!(
+                "{}: no file MESH.ma or MESH-COUNT.ma for a mesh of the study ({known})",
+                folder.display()
+            ));
+        }
+        Ok((files, claims))
+    }
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
 /// Parameters of the pseudo-method.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GivenParams {
     /// The medial mesh.
     pub file: PathBuf,
+    /// See [`Claims::title`].
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub title: String,
+    /// See [`Claims::citation`].
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub citation: String,
+    /// See [`Claims::seconds`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub claimed_seconds: Option<f64>,
     /// Names under which the same bytes are given, too.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub same_as: String,
@@ -104,6 +192,9 @@ pub fn method() -> Method<GivenParams> {
         )
         .published("the file as it is")
         .param(ParamInfo::new("file", "", "path", "the medial mesh"))
+        .param(ParamInfo::new("title", "", "text", "full name of the method, as claimed"))
+        .param(ParamInfo::new("citation", "", "text", "source of the method, as claimed"))
+        .param(ParamInfo::new("claimed_seconds", "", "seconds", "seconds as claimed"))
         .param(ParamInfo::new("same_as", "", "names", "who gave the same bytes"))
         .param(ParamInfo::new("fit", "none", "none, similarity or auto", "how units are found"))
         .param(ParamInfo::new("radii", "file", "file or surface", "where radii come from"))
@@ -122,7 +213,7 @@ fn prepare<'s>(
     params: GivenParams,
     _run: &RunContext,
 ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-    let GivenParams { file, same_as, fit, radii, lenient, block } = params;
+    let GivenParams { file, same_as, fit, radii, lenient, block, claimed_seconds, .. } = params;
     let options = AxisOptions { lenient, block, radii, fit };
     let read = read_axis(&file, shape, &options);
     let (loaded, _) = read.map_err(|error| SimplifyError::Parameter(error.to_string()))?;
@@ -144,6 +235,10 @@ fn prepare<'s>(
         }
         let mut simplified = Simplified::new(mesh.clone(), level);
         remarks.iter().for_each(|remark| simplified.diagnostics.warn(remark.clone()));
+        if claimed_seconds.is_some() {
+            let claimed = OwnSeconds { prepare: None, simplify: claimed_seconds };
+            simplified.extras.insert(claimed);
+        }
         Ok(simplified)
     }))
 }

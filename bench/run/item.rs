@@ -35,7 +35,9 @@ pub struct Item {
     pub threads: usize,
     /// What ends the item by force.
     pub limits: Limits,
-    /// SHA-256 of the program that runs it: a stale build must not lend its numbers.
+    /// The version of the method: a stale one must not lend its numbers.
+    pub version: String,
+    /// SHA-256 of the program that runs it, recorded only.
     pub binary: String,
 }
 
@@ -47,7 +49,7 @@ pub struct SceneSpec {
     pub mesh: String,
     /// Where the input comes from.
     pub source: Source,
-    /// SHA-256 of the input's file; `None` for a built-in shape, which the program's hash decides.
+    /// SHA-256 of the input's file; of a built-in shape its surface and known axis.
     pub hash: Option<String>,
     /// Displacements of the vertices of which results are measured against the input without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -148,7 +150,7 @@ impl Item {
         let SceneSpec { mesh, hash, noise, sampling, dual, measure, .. } = &self.scene;
         let MethodSpec { id, name, fingerprint, .. } = &self.method;
         let scene = (mesh, source, hash, noise, sampling, dual, measure);
-        let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.binary);
+        let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.version);
         let common = serde_json::to_string(&rest).expect("plain data");
         let key = |level: &Target| {
             let level = serde_json::to_string(level).expect("plain data");
@@ -243,7 +245,8 @@ mod tests {
             repeat: 1,
             threads: 2,
             limits: Limits { seconds: 300.0, bytes: 1 << 30 },
-            binary: "34cd".into(),
+            version: "34cd".into(),
+            binary: "56ef".into(),
         }
     }
 
@@ -255,7 +258,9 @@ mod tests {
             changed.key(Target::Spheres(100))
         };
         let plain = key(|_| ());
-        let same: [fn(&mut Item); 4] = [
+        let same: [fn(&mut Item); 5] = [
+            // A rebuild that changed no method: the page, a verb.
+            |i| i.binary = "56f0".into(),
             |i| i.limits.seconds = 1.0,
             |i| i.repeat = 5,
             |i| i.levels.clear(),
@@ -274,7 +279,7 @@ mod tests {
             |i| i.method.params.set("k", "0"),
             |i| i.seed = 1,
             |i| i.threads = 1,
-            |i| i.binary = "34ce".into(),
+            |i| i.version = "34ce".into(),
         ];
         let mut keys: Vec<String> = other.into_iter().map(key).collect();
         keys.push(plain);

@@ -59,6 +59,8 @@ pub use similar::did_you_mean;
 pub use source::{Input, InputError, Source};
 pub use stage_line::StageLine;
 pub use store::{AXES, Failures, RESULTS, Store, StoreError};
-pub use study::{Here, MOST_REPEATS, Study, StudyError, StudyMethod, VOLUME_DEPTH, no_such_method};
+pub use study::{
+    Here, MOST_REPEATS, Shard, Study, StudyError, StudyMethod, VOLUME_DEPTH, no_such_method,
+};
 pub use supervise::{RunError, Supervisor};
 pub use verdict::{Verdict, judge, reach};

@@ -103,6 +103,8 @@ pub enum Event {
     Doing(String),
     /// How the case ended.
     Checked(Outcome),
+    /// The system has refused memory to the worker, which may end because of it.
+    OutOfMemory,
     /// The request is done.
     Finished,
 }
@@ -118,6 +120,12 @@ pub fn send(event: &Event) -> io::Result<()> {
     let mut out = io::stdout().lock();
     out.write_all(&line)?;
     out.flush()
+}
+
+/// Writes [`Event::OutOfMemory`] without an allocation and without a lock, from inside the allocator.
+pub fn send_out_of_memory() {
+    #[cfg(unix)]
+    let _ = rustix::io::write(rustix::stdio::stdout(), b"\n\x1e\"OutOfMemory\"\n");
 }
 
 /// Reads events until the stream ends. Other lines are ignored, however long.
@@ -162,6 +170,11 @@ fn parse(line: &[u8]) -> Option<Event> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_event_that_is_written_without_an_allocation_is_an_event() {
+        assert!(matches!(parse(b"\x1e\"OutOfMemory\""), Some(Event::OutOfMemory)));
+    }
 
     /// Gives a few bytes at a time.
     struct Drops<'a>(&'a [u8], usize);

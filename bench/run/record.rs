@@ -48,6 +48,7 @@ pub fn failure_record(
         seeds: seeds.map(|(purpose, seed)| (purpose.to_owned(), seed)).into(),
         repetitions: vec![],
         machine: provenance.machine.clone(),
+        method_version: item.version.clone(),
         binary_hash: item.binary.clone(),
         command: provenance.command.clone(),
         version: provenance.version.clone(),
@@ -79,7 +80,7 @@ pub fn record(
 ) -> Record {
     let is_given = item.method.id == GIVEN;
     let fault = match &run.outcome {
-        Ok(_) if is_given => Fault { status: Status::AsGiven, reason: String::new() },
+        Ok(_) if is_given => Fault { status: Status::External, reason: String::new() },
         Ok(result) => count_fault(run.level, result),
         Err(fault) => fault.clone(),
     };

@@ -8,11 +8,14 @@ use medial::simplifier::{Chain, Level, MedialSimplifier, MethodInfo, Presentatio
 use medial_methods::initial;
 use serde::{Serialize, Serializer};
 
-use super::given;
+use super::{given, hex_digest};
 use crate::plugin::{self, PluginError, ScriptLoader, ScriptMethod};
 
 /// Id of the pseudo-method that returns the initial medial mesh.
 pub const INITIAL: &str = "initial";
+
+/// Raised when the runner's own work changes what stands in records.
+const RUNNER: u32 = 1;
 
 /// Methods by id, in the order of the tables.
 pub struct Registry {
@@ -32,6 +35,8 @@ pub struct Entry {
     method: Arc<dyn MedialSimplifier>,
     presentation: Presentation,
     fingerprint: Option<String>,
+    /// See [`Registered::version`].
+    version: Option<String>,
 }
 
 /// The description and the presentation as one object.
@@ -61,8 +66,9 @@ impl Entry {
     }
 
     fn new(registered: Registered, fingerprint: Option<String>) -> Self {
-        let Registered { method, presentation } = registered;
-        Self { method: method.into(), presentation, fingerprint }
+        let Registered { method, presentation, version } = registered;
+        let version = version.map(|version| version.into_owned());
+        Self { method: method.into(), presentation, fingerprint, version }
     }
 
     fn chain(first: &Self, then: &Self) -> Self {
@@ -73,7 +79,25 @@ impl Entry {
             .iter()
             .any(|part| part.is_some())
             .then(|| parts.map(|part| part.as_deref().unwrap_or("built in")).join(" + "));
-        Self::new(Registered::from(chain).sweep(&then.presentation.sweep), fingerprint)
+        let registered = Registered::from(chain).sweep(&then.presentation.sweep);
+        let version = first.version.as_ref().zip(then.version.as_ref());
+        let version = version.map(|(first, then)| format!("{filter:?} {first} + {then}"));
+        Self { version, ..Self::new(registered, fingerprint) }
+    }
+
+    /// A hash that changes whenever the results of the method may. `binary` is the hash of the running
+    /// program, which stands for a method that came with it and has no version of its own.
+    pub fn version(&self, binary: &str) -> String {
+        let own = match (&self.version, &self.fingerprint) {
+            (Some(version), None) => version.clone(),
+            // The program gives a plug-in its input and measures its output.
+            (version, Some(fingerprint)) => {
+                let library = [medial::SOURCE_HASH, medial::geometry::SOURCE_HASH];
+                format!("{fingerprint} {} {}", library.join(" "), version.as_deref().unwrap_or(""))
+            }
+            (None, None) => binary.to_owned(),
+        };
+        hex_digest(format!("{RUNNER} {own}").as_bytes())
     }
 
     /// Its id.
@@ -105,7 +129,8 @@ impl Registry {
     /// # Errors
     /// [`RegistryError::Duplicate`] when two have one id.
     pub fn new(methods: Vec<Registered>) -> Result<Self, RegistryError> {
-        let initial = Entry::new(initial::method().into(), None);
+        let mut initial = Entry::new(initial::method().into(), None);
+        initial.version = medial_methods::version(INITIAL);
         let given = Entry::new(given::method().into(), None);
         let (entries, others) = (Vec::new(), vec![initial, given]);
         let mut registry = Self { entries, others, files: Vec::new(), loader: None };

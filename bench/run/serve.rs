@@ -24,7 +24,7 @@ use crate::process_tree;
 use super::answer::panic_message;
 use super::bounds::Bounds;
 use super::given;
-use super::protocol::{CheckItem, Event, Request, send};
+use super::protocol::{self, CheckItem, Event, Request, send};
 use super::record::{failure_record, record, repetition};
 use super::scene::Scene;
 use super::verdict::{judge, mesh_hash};
@@ -35,7 +35,8 @@ use super::{
 /// Serves requests until standard input ends. `bytes` is the memory limit of this process.
 pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
     limit(bytes);
-    process_tree::adopt_strays();
+    process_tree::become_worker();
+    medial::heap::on_refusal(protocol::send_out_of_memory);
     let mut scene = None;
     for request in requests() {
         let served = match request {
@@ -61,8 +62,10 @@ fn limit(bytes: u64) {
     {
         use rlimit::Resource;
         let _ = Resource::CORE.set(0, 0);
+        // The hard limit stays: programs that the worker starts are watched by the supervisor alone.
         #[cfg(target_os = "linux")]
-        let _ = Resource::DATA.set(bytes, bytes);
+        let _ =
+            Resource::DATA.get_hard().and_then(|hard| Resource::DATA.set(bytes.min(hard), hard));
     }
     let _ = bytes;
 }
@@ -117,16 +120,23 @@ fn run(
         Err(why) => return send(&Event::Refused(why)),
     };
     send(&Event::Preparing(scene.input.hash.clone()))?;
-    let runs = answer_item(registry, item, scene, scene.shape());
-    send(&Event::Measuring)?;
-    let verdicts = judge(scene, &runs);
-    for (run, verdict) in runs.iter().zip(verdicts) {
-        let record = record(item, scene, run, verdict, provenance, axes);
-        let record =
-            if survives_json(&record) { record } else { unreadable(item, run, provenance) };
-        send(&Event::Record(Box::new(record)))?;
+    let report = |runs: &[LevelRun]| -> io::Result<()> {
+        send(&Event::Measuring)?;
+        for (run, verdict) in runs.iter().zip(judge(scene, runs)) {
+            let record = record(item, scene, run, verdict, provenance, axes);
+            let record =
+                if survives_json(&record) { record } else { unreadable(item, run, provenance) };
+            send(&Event::Record(Box::new(record)))?;
+        }
+        Ok(())
+    };
+    let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
+    if !levels.is_empty() {
+        report(&answer_levels(registry, item, scene, &levels))?;
     }
-    Ok(())
+    // Each bound is recorded before the next, tighter one is searched: a method that ends its worker
+    // at a tight bound loses none of the looser ones.
+    answer_bounds(registry, item, scene, &mut |run| report(std::slice::from_ref(&run)))
 }
 
 /// Whether a record reads back as it is: JSON has no infinity and no NaN, and writes `null`.
@@ -149,11 +159,15 @@ fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Res
         Err(why) => return send(&Event::Refused(why)),
     };
     send(&Event::Preparing(scene.input.hash.clone()))?;
-    for LevelRun { level, outcome, times } in answer_item(registry, item, scene, scene.shape()) {
+    let report = |LevelRun { level, outcome, times }: LevelRun| {
         let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
-        send(&Event::Repeated(level, outcome))?;
+        send(&Event::Repeated(level, outcome))
+    };
+    let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
+    for run in answer_levels(registry, item, scene, &levels) {
+        report(run)?;
     }
-    Ok(())
+    answer_bounds(registry, item, scene, &mut |run| report(run))
 }
 
 /// Prepares the method of an item on a very small shape.
@@ -178,44 +192,60 @@ fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
     }
 }
 
-/// The answers of an item's method on a shape of its scene, in the order of its levels; error bounds
-/// come last.
-fn answer_item(registry: &Registry, item: &Item, scene: &Scene, shape: &Shape) -> Vec<LevelRun> {
+/// The results of an item's method at some of its levels.
+fn answer_levels(
+    registry: &Registry,
+    item: &Item,
+    scene: &Scene,
+    levels: &[Level],
+) -> Vec<LevelRun> {
+    let entry = find(registry, &item.method);
+    let context = RunContext::with_seed(item.seed);
+    let unknown = MethodInfo::default();
+    let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
+    let view = scene.shape().view();
+    let prepare = || match &entry {
+        Ok(entry) => entry.method().prepare(&view, &item.method.params, &context),
+        Err(why) => Err(SimplifyError::Failed(why.clone())),
+    };
+    // The supervisor notices by itself when the pipe is closed.
+    answer(&view, info, prepare, levels, |level| drop(send(&Event::Asked(level.into()))))
+}
+
+/// The results of an item's method for its error bounds, from the loosest to the tightest. Each goes
+/// to `each` before the next search begins.
+fn answer_bounds(
+    registry: &Registry,
+    item: &Item,
+    scene: &Scene,
+    each: &mut dyn FnMut(LevelRun) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut bounds: Vec<f64> =
+        item.levels.iter().filter_map(|target| target.level().err()).collect();
+    if bounds.is_empty() {
+        return Ok(());
+    }
+    bounds.sort_by(|a, b| b.total_cmp(a));
     let entry = find(registry, &item.method);
     let context = RunContext::with_seed(item.seed);
     let prepare = preparing(|view| match &entry {
         Ok(entry) => entry.method().prepare(view, &item.method.params, &context),
         Err(why) => Err(SimplifyError::Failed(why.clone())),
     });
-    let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
-    let bounds: Vec<f64> = item.levels.iter().filter_map(|target| target.level().err()).collect();
     let unknown = MethodInfo::default();
-    let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
-    // The supervisor notices by itself when the pipe is closed.
-    let view = shape.view();
-    let mut runs = answer(
-        &view,
-        info,
-        || prepare(&view),
-        &levels,
-        |level| {
-            let _ = send(&Event::Asked(level.into()));
-        },
-    );
     let measure = |mesh: &MedialMesh| {
         let distances = scene.judge.distances(&scene.carried(mesh));
         distances.map(|distances| distances.hausdorff).map_err(|error| error.to_string())
     };
     let search = Bounds {
-        shape,
-        info,
+        shape: scene.shape(),
+        info: entry.as_ref().map_or(&unknown, |entry| entry.method().info()),
         sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation().sweep),
         prepare: &prepare,
         measure: &measure,
         searching: &|bound| drop(send(&Event::Searching(bound))),
     };
-    runs.extend(search.answer(&bounds));
-    runs
+    search.answer(&bounds, each)
 }
 
 /// Returns its argument, a closure that starts a simplification on any view. Passing the closure

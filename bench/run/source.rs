@@ -193,15 +193,12 @@ impl Input {
     pub fn load(source: &Source) -> Result<Self, InputError> {
         match source {
             Source::File(path) | Source::Cached { path, .. } => {
-                // First, since it refuses what is no regular file and would never end.
-                let loaded = surface::read(path)?;
-                let bytes = fs::read(path)
-                    .map_err(|error| InputError::Read { path: path.clone(), error })?;
-                let hash = hex_digest(&bytes);
-                drop(bytes);
+                // One read: the hash is that of the bytes that were parsed.
+                let bytes = surface::content(path)?;
+                let loaded = surface::read_content(path, &bytes)?;
                 Ok(Self {
                     name: source.name(),
-                    hash,
+                    hash: hex_digest(&bytes),
                     mesh: loaded.mesh,
                     report: loaded.report,
                     axis: None,
@@ -215,14 +212,14 @@ impl Input {
         let (shape, resolution) = built_in(id, resolution)?;
         let mesh = shape.mesh(resolution);
         let report = surface::validate(&mesh)?;
-        Ok(Self {
-            name: source.name(),
-
-            hash: hex_digest(&surface_bytes(&mesh)),
-            mesh,
-            report,
-            axis: shape.axis().map(|axis| axis.mesh),
-        })
+        let axis = shape.axis().map(|axis| axis.mesh);
+        // Records hold distances to the known axis: a corrected axis is another input.
+        let mut bytes = surface_bytes(&mesh);
+        let spheres = axis.iter().flat_map(|axis| &axis.spheres);
+        for number in spheres.flat_map(|s| [s.centre.x, s.centre.y, s.centre.z, s.radius]) {
+            bytes.extend(number.to_le_bytes());
+        }
+        Ok(Self { name: source.name(), hash: hex_digest(&bytes), mesh, report, axis })
     }
 
     /// SHA-256 of the surface itself, whatever the format of its file.

@@ -77,6 +77,9 @@ pub enum StoreError {
     /// It is a file.
     #[error("{}: not a folder", .0.display())]
     NotAFolder(PathBuf),
+    /// It holds something else than results.
+    #[error("{}: neither empty nor a folder of results; take another with --out", .0.display())]
+    NotAStore(PathBuf),
     /// Another process adds to it.
     #[error(
         "{}: {holder} is adding results to this folder; wait for it, or take another with --out",
@@ -110,6 +113,10 @@ impl Store {
             move |source| StoreError::Io { path, source }
         };
         fs::create_dir_all(dir).map_err(failed(dir))?;
+        let is_store = [LOCK, journal, "study.toml"].iter().any(|name| dir.join(name).exists());
+        if !is_store && fs::read_dir(dir).map_err(failed(dir))?.next().is_some() {
+            return Err(StoreError::NotAStore(dir.to_owned()));
+        }
         let lock = lock(dir, command)?;
         let path = dir.join(journal);
         let mut remarks = Vec::new();
@@ -215,7 +222,7 @@ impl Known {
             Status::OutOfMemory if item.limits.bytes > self.bytes_limit => true,
             status if status.is_failure() => failures == Failures::Retried,
             // A file is not timed.
-            Status::AsGiven => false,
+            Status::External => false,
             status => status.has_result() && self.repetitions < item.repeat,
         }
     }

@@ -75,7 +75,6 @@ impl<'a> Supervisor<'a> {
         axes: Option<PathBuf>,
         interrupted: &'a AtomicBool,
     ) -> Self {
-        crate::process_tree::adopt_strays();
         Self {
             program: None,
             plugins: plugins.to_vec(),
@@ -100,9 +99,8 @@ impl<'a> Supervisor<'a> {
 
     /// Runs an item: a record for each level, in the order of the levels.
     ///
-    /// When a worker ends, the results that it had not reported are lost. The levels that it had
-    /// answered are run again, the level that ended it gets the reason, and the coarser ones are not
-    /// tried.
+    /// When a worker ends, its reported records are kept. Levels that it had finished but not reported
+    /// are run again, the level that ended it gets the reason, and the later ones are not tried.
     ///
     /// # Errors
     /// When the user interrupts, or no worker can be started.
@@ -128,11 +126,18 @@ impl<'a> Supervisor<'a> {
                 }
                 Attempt::Ended(Stage::Asked(answered), fault) => {
                     let at = part.levels[answered];
-                    fail(&[at], &fault);
                     let reason = format!("not run: the method ended its worker at {at}");
-                    fail(&part.levels[answered + 1..], &Fault { reason, ..fault });
-                    if answered > 0 {
-                        groups.push(part.levels[..answered].to_vec());
+                    let not_run = Fault { reason, ..fault.clone() };
+                    let mut before = Vec::new();
+                    for level in &missing {
+                        match part.levels.iter().position(|other| other == level) {
+                            Some(place) if place < answered => before.push(*level),
+                            Some(place) if place == answered => fail(&[*level], &fault),
+                            _ => fail(&[*level], &not_run),
+                        }
+                    }
+                    if !before.is_empty() {
+                        groups.push(before);
                     }
                 }
                 Attempt::Ended(Stage::Measuring, _) if missing.len() > 1 => {
@@ -249,7 +254,7 @@ impl<'a> Supervisor<'a> {
         let (item, (_, limits)) = (request.item(), request.terms());
         let mut worker = self.worker_for(request)?;
         let mut stage = Stage::Loading;
-        let mut refused = None;
+        let (mut refused, mut memory_refused) = (None, false);
         if worker.ask(request).is_err() {
             // Gone while it was idle: once more with a new one.
             drop(worker);
@@ -275,6 +280,7 @@ impl<'a> Supervisor<'a> {
                     }
                     Event::Refused(why) => refused = Some(why),
                     Event::Loading => {}
+                    Event::OutOfMemory => memory_refused = true,
                     Event::Preparing(hash) => {
                         self.input = item.map(|item| (item.scene.clone(), hash));
                         (stage, since) = (Stage::Preparing, Instant::now());
@@ -299,7 +305,9 @@ impl<'a> Supervisor<'a> {
                 },
                 Said::Gone => {
                     let (status, last_words) = worker.collect();
-                    let fault = ending::ended(stage, status, &last_words, &limits);
+                    // A refused allocation that the worker survived did not end it.
+                    let memory_refused = memory_refused && !status.is_some_and(|s| s.success());
+                    let fault = ending::ended(stage, status, &last_words, memory_refused, &limits);
                     return Ok(Attempt::Ended(stage, fault));
                 }
                 Said::Nothing if worker.resident_bytes() > limits.bytes => {

@@ -13,12 +13,14 @@ use tempfile::TempDir;
 
 use crate::host::{self, Host};
 use crate::plugin::SCRATCH;
-use crate::process_tree;
+use crate::process_tree::Tree;
 
 use super::protocol::{Event, Request, receive};
 
 /// Bytes kept of a worker's standard error: its last words.
 const LAST_WORDS: usize = 16 << 10;
+/// Longest wait for the end of standard error after the worker has ended.
+const LONGEST_DRAIN: Duration = Duration::from_secs(5);
 
 /// How a worker is started. Another item can use it only if its options are the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,9 +38,12 @@ pub struct WorkerOptions {
 /// A running worker.
 pub struct Worker {
     child: Child,
+    tree: Tree,
     requests: Option<ChildStdin>,
     events: Receiver<Event>,
     last_words: Arc<Mutex<VecDeque<u8>>>,
+    /// Disconnected once standard error has ended.
+    closed: Receiver<()>,
     /// Folder for the files of the programs that it starts; removed with the worker, however that
     /// ends.
     _scratch: TempDir,
@@ -74,10 +79,6 @@ impl Worker {
         let scratch = tempfile::Builder::new().prefix("medial-").tempdir()?;
         command.env(SCRATCH, scratch.path());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        // A group of its own: an interrupt from the keyboard goes to the supervisor alone, and one
-        // signal ends the worker with what it started.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn()?;
         let pipe = || io::Error::other("a pipe of the worker is missing");
         let requests = child.stdin.take().ok_or_else(pipe)?;
@@ -92,8 +93,14 @@ impl Worker {
         });
         let last_words = Arc::new(Mutex::new(VecDeque::new()));
         let kept = Arc::clone(&last_words);
-        thread::spawn(move || keep_last(errors, &kept));
-        Ok(Self { child, requests: Some(requests), events, last_words, _scratch: scratch, options })
+        let (closing, closed) = mpsc::channel();
+        thread::spawn(move || {
+            keep_last(errors, &kept);
+            drop(closing);
+        });
+        let tree = Tree::of(&child);
+        let requests = Some(requests);
+        Ok(Self { child, tree, requests, events, last_words, closed, _scratch: scratch, options })
     }
 
     /// Sends a request.
@@ -118,13 +125,13 @@ impl Worker {
     }
 
     /// Resident bytes of the worker and of all processes that it started.
-    pub fn resident_bytes(&self) -> u64 {
-        process_tree::resident_bytes(self.child.id())
+    pub fn resident_bytes(&mut self) -> u64 {
+        self.tree.resident_bytes()
     }
 
     /// Ends the worker and everything that it started, by force, and gives its exit status.
     pub fn end(mut self) -> Option<ExitStatus> {
-        process_tree::end_tree(&mut self.child)
+        self.tree.end(&mut self.child)
     }
 
     /// The exit status and the last words, once its output has ended. A process that only closed its
@@ -138,9 +145,10 @@ impl Worker {
                 thread::sleep(Duration::from_millis(2));
             }
         }
-        let killed = process_tree::end_tree(&mut self.child);
-        // The thread that reads the last words needs a moment for the rest of the pipe.
-        thread::sleep(Duration::from_millis(20));
+        let killed = self.tree.end(&mut self.child);
+        // Everything that could hold the pipe is dead, so its end comes at once; the bound is for a
+        // process that waits for a disk.
+        let _ = self.closed.recv_timeout(LONGEST_DRAIN);
         (status.or(killed), self.last_words())
     }
 
@@ -158,11 +166,12 @@ impl Drop for Worker {
         drop(self.requests.take());
         for _ in 0..100 {
             if matches!(self.child.try_wait(), Ok(Some(_))) {
+                self.tree.end_orphans();
                 return;
             }
             thread::sleep(Duration::from_millis(1));
         }
-        let _ = process_tree::end_tree(&mut self.child);
+        let _ = self.tree.end(&mut self.child);
     }
 }
 

@@ -249,7 +249,7 @@ impl ScriptLoader for Classes {
             let methods = classes.try_iter()?.map(|class| {
                 let method = ClassMethod::new(&class?)?;
                 let presentation = method.presentation.clone();
-                Ok(Registered { method: Box::new(method), presentation })
+                Ok(Registered { method: Box::new(method), presentation, version: None })
             });
             methods.collect::<PyResult<Vec<_>>>()
         })

@@ -38,6 +38,9 @@
 //! # Ok::<(), medial_geometry::TriangulationError>(())
 //! ```
 
+/// A hash of the sources of this crate.
+pub const SOURCE_HASH: &str = env!("SOURCE_HASH");
+
 pub mod delaunay;
 mod disjoint;
 pub mod dual_complex;

@@ -188,6 +188,9 @@ pub struct Registered {
     pub method: Box<dyn MedialSimplifier>,
     /// Its place in a comparison.
     pub presentation: Presentation,
+    /// A text that changes with the sources of the method; `None` where the program's file stands for
+    /// them.
+    pub version: Option<Text>,
 }
 
 /// How the harness presents a method. Nothing here changes a result.
@@ -207,7 +210,7 @@ pub struct Presentation {
 
 impl<M: MedialSimplifier + 'static> From<M> for Registered {
     fn from(method: M) -> Self {
-        Self { method: Box::new(method), presentation: Presentation::default() }
+        Self { method: Box::new(method), presentation: Presentation::default(), version: None }
     }
 }
 

@@ -101,6 +101,26 @@ pub fn read_any(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
     Ok(Loaded { mesh: examined.mesh, report: examined.report })
 }
 
+/// The bytes of a surface file, for [`read_content`].
+///
+/// # Errors
+/// When it cannot be read, or is no regular file.
+pub fn content(path: impl AsRef<Path>) -> Result<Vec<u8>, SurfaceError> {
+    let path = path.as_ref();
+    read::content(path).map_err(|fault| in_file(path, fault))
+}
+
+/// [`read`] for the bytes of the file `path`, which is not opened: hash and mesh of the same bytes
+/// cannot differ.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_content(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Loaded, SurfaceError> {
+    let path = path.as_ref();
+    let examined = Format::of(path).and_then(|format| examine(bytes, format));
+    examined.and_then(accept).map_err(|fault| in_file(path, fault))
+}
+
 /// [`read`] for the content of a file.
 ///
 /// # Errors

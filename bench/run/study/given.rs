@@ -2,19 +2,22 @@
 
 use std::path::PathBuf;
 
-use medial::complex::{self, Radii, ReadOptions};
+use medial::complex::{Radii, ReadOptions};
 use medial::simplifier::Params;
 use medial_reports::Target;
 
 use super::items::hash_of;
 use super::{Here, Study, StudyError};
-use crate::run::{GIVEN, Given, Item, MethodSpec, RadiiFrom, SceneSpec};
+use crate::run::axis_file::read_external;
+use crate::run::given::Claims;
+use crate::run::{GIVEN, Given, Item, MethodSpec, RadiiFrom, SceneSpec, hex_digest};
 
 /// A file that was looked at.
-pub(super) struct GivenFile<'a> {
+pub(super) struct GivenFile {
     /// Name of the mesh in tables.
     pub mesh: String,
-    given: &'a Given,
+    given: Given,
+    claims: Claims,
     path: PathBuf,
     /// SHA-256 of its bytes.
     hash: String,
@@ -29,17 +32,37 @@ impl Study {
     ///
     /// # Errors
     /// [`StudyError::Value`] for a file that cannot be read or belongs to no mesh, and for two of one name.
-    pub(super) fn given_files(&self, meshes: &[String]) -> Result<Vec<GivenFile<'_>>, StudyError> {
-        let mut files: Vec<GivenFile<'_>> = Vec::new();
+    pub(super) fn given_files(&self, meshes: &[String]) -> Result<Vec<GivenFile>, StudyError> {
+        let mut files: Vec<GivenFile> = Vec::new();
+        let mut all: Vec<(Given, Claims)> = Vec::new();
         for given in &self.given {
-            let mesh = mesh_of(given, meshes)?;
+            let folder = self.resolved(&given.file);
+            if folder.is_dir() {
+                let wrong = |why| StudyError::Value(format!("given `{}`: {why}", given.name));
+                let (found, claims) = given.in_folder(&folder, meshes).map_err(wrong)?;
+                all.extend(found.into_iter().map(|given| (given, claims.clone())));
+            } else {
+                all.push((given.clone(), Claims::default()));
+            }
+        }
+        for (given, claims) in all {
+            let mesh = mesh_of(&given, meshes)?;
             let named = self.methods.iter().filter_map(|method| method.name.as_ref());
-            let mut taken = files.iter().filter(|file| file.mesh == mesh).map(|f| &f.given.name);
-            if taken.any(|name| *name == given.name) || named.clone().any(|n| *n == given.name) {
-                let message = format!("two methods are named `{}` on {mesh}", given.name);
+            let taken = named.clone().any(|name| *name == given.name);
+            let file = self.look_at(given, claims, mesh)?;
+            let same_row = |other: &GivenFile| {
+                (&other.mesh, &other.given.name, other.spheres)
+                    == (&file.mesh, &file.given.name, file.spheres)
+            };
+            if taken || files.iter().any(same_row) {
+                let GivenFile { given, mesh, spheres, .. } = &file;
+                let message = format!(
+                    "two methods are named `{}` on {mesh} at {spheres} spheres",
+                    given.name
+                );
                 return Err(StudyError::Value(message));
             }
-            files.push(self.look_at(given, mesh)?);
+            files.push(file);
         }
         for file in 0..files.len() {
             let (mesh, hash) = (files[file].mesh.clone(), files[file].hash.clone());
@@ -50,7 +73,7 @@ impl Study {
         Ok(files)
     }
 
-    fn look_at<'a>(&'a self, given: &'a Given, mesh: String) -> Result<GivenFile<'a>, StudyError> {
+    fn look_at(&self, given: Given, claims: Claims, mesh: String) -> Result<GivenFile, StudyError> {
         let path = self.resolved(&given.file);
         let path = std::path::absolute(&path).unwrap_or(path);
         let radii = match given.radii {
@@ -59,13 +82,13 @@ impl Study {
         };
         let options = ReadOptions { lenient: given.lenient, block: given.block, radii };
         let wrong = |why: String| StudyError::Value(format!("given `{}`: {why}", given.name));
-        let loaded = complex::read_with(&path, options).map_err(|e| wrong(e.to_string()))?;
+        let loaded = read_external(&path, options).map_err(wrong)?;
         let spheres = loaded.mesh.spheres.len();
         if spheres == 0 {
             return Err(wrong(format!("{}: no sphere", path.display())));
         }
         let hash = hash_of(&path)?;
-        Ok(GivenFile { mesh, given, path, hash, spheres, same_as: vec![] })
+        Ok(GivenFile { mesh, given, claims, path, hash, spheres, same_as: vec![] })
     }
 
     /// The numbers of spheres of the given files, from many to few.
@@ -73,17 +96,17 @@ impl Study {
     /// # Errors
     /// For a file that cannot be read.
     pub fn given_counts(&self) -> Result<Vec<usize>, StudyError> {
-        let looked = self.given.iter().map(|given| self.look_at(given, String::new()));
-        let mut counts =
-            looked.map(|file| Ok(file?.spheres)).collect::<Result<Vec<_>, StudyError>>()?;
+        let sources = self.sources()?;
+        let files = self.given_files(&super::items::unique_names(&sources))?;
+        let mut counts: Vec<usize> = files.iter().map(|file| file.spheres).collect();
         counts.sort_unstable_by(|a, b| b.cmp(a));
         counts.dedup();
         Ok(counts)
     }
 
     /// The item that judges a given file.
-    pub(super) fn given_item(&self, scene: SceneSpec, file: &GivenFile<'_>, here: &Here) -> Item {
-        let Given { name, fit, radii, lenient, block, .. } = file.given;
+    pub(super) fn given_item(&self, scene: SceneSpec, file: &GivenFile, here: &Here) -> Item {
+        let Given { name, fit, radii, lenient, block, .. } = &file.given;
         let mut params = Params::none();
         let mut set = |key: &str, value: serde_json::Value| {
             params.0.insert(key.to_owned(), value);
@@ -96,6 +119,16 @@ impl Study {
         }
         if let Some(block) = block {
             set("block", (*block).into());
+        }
+        let Claims { title, citation, seconds } = &file.claims;
+        for (key, text) in [("title", title), ("citation", citation)] {
+            if !text.is_empty() {
+                set(key, text.as_str().into());
+            }
+        }
+        let stem = file.path.file_stem().unwrap_or_default().to_string_lossy();
+        if let Some(seconds) = seconds.get(stem.as_ref()) {
+            set("claimed_seconds", (*seconds).into());
         }
         if !file.same_as.is_empty() {
             set("same_as", file.same_as.join(", ").into());
@@ -113,6 +146,10 @@ impl Study {
             repeat: 1,
             threads: self.threads.unwrap_or(here.threads),
             limits: self.limits(here),
+            // The program that measures it; its own hash is the fingerprint.
+            version: hex_digest(
+                format!("{} {}", medial::SOURCE_HASH, medial::geometry::SOURCE_HASH).as_bytes(),
+            ),
             binary: here.binary.clone(),
         }
     }

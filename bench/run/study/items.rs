@@ -8,8 +8,8 @@ use medial_reports::Target;
 use super::{Study, StudyError, StudyMethod, VOLUME_DEPTH};
 use crate::run::public::Library;
 use crate::run::{
-    Entry, INITIAL, InputError, Item, Limits, Measure, MethodSpec, Provenance, Registry, SceneSpec,
-    Source, hex_digest,
+    Entry, INITIAL, Input, InputError, Item, Limits, Measure, MethodSpec, Noise, Provenance,
+    Registry, SceneSpec, Source, hex_digest,
 };
 
 /// What is the same for all items of this process.
@@ -114,11 +114,14 @@ impl Study {
         let files = self.given_files(&names)?;
         let mut items = Vec::new();
         for (source, mesh) in sources.iter().zip(names) {
-            let hash = source.path().map(hash_of).transpose()?;
+            let hash = match source.path() {
+                Some(path) => hash_of(path)?,
+                None => Input::load(source)?.hash,
+            };
             let scene = SceneSpec {
                 mesh,
                 source: source.clone(),
-                hash,
+                hash: Some(hash),
                 noise: None,
                 sampling: self.sampling,
                 dual: self.dual,
@@ -126,6 +129,14 @@ impl Study {
             };
             for (method, entry) in &methods {
                 items.push(self.item(scene.clone(), method, entry, here));
+            }
+            for &eta in &self.noise {
+                let mesh = format!("{} noise {eta}", scene.mesh);
+                let noise = Some(Noise { eta, seed: self.seed });
+                let noisy = SceneSpec { mesh, noise, ..scene.clone() };
+                for (method, entry) in &methods {
+                    items.push(self.item(noisy.clone(), method, entry, here));
+                }
             }
             let of_mesh = files.iter().filter(|file| file.mesh == scene.mesh);
             items.extend(of_mesh.map(|file| self.given_item(scene.clone(), file, here)));
@@ -156,6 +167,7 @@ impl Study {
             repeat: self.repeat,
             threads: self.threads.unwrap_or(here.threads),
             limits: self.limits(here),
+            version: entry.version(&here.binary),
             binary: here.binary.clone(),
         }
     }
@@ -192,12 +204,47 @@ impl Study {
             native.reverse();
         }
         levels.extend(native.into_iter().map(Target::Native));
-        // Last, since a search that does not end must cost nothing else.
+        // Last and from loose to tight, since a search that does not end must cost nothing else.
         let mut bounds = self.max_error.clone();
-        bounds.sort_by(f64::total_cmp);
+        bounds.sort_by(|a, b| b.total_cmp(a));
         bounds.dedup();
         levels.extend(bounds.into_iter().map(Target::MaxError));
         levels
+    }
+}
+
+/// One of N shares of a study's items.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1 to `of`.
+    pub number: usize,
+    /// Number of shares.
+    pub of: usize,
+}
+
+impl Shard {
+    /// Reads `I/N`.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`] where it is not two numbers, the first from 1 to the second.
+    pub fn parse(text: &str) -> Result<Self, StudyError> {
+        let wrong = || StudyError::Value(format!("--shard {text}: write I/N with I from 1 to N"));
+        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
+        let (number, of) = (number.parse().ok(), of.parse().ok());
+        let (number, of) = number.zip(of).ok_or_else(wrong)?;
+        if number == 0 || number > of { Err(wrong()) } else { Ok(Self { number, of }) }
+    }
+
+    /// Every Nth item. The place in the whole study decides, not what a store lacks: a shard that is
+    /// run again continues with its own items. The start moves from mesh to mesh, so that no shard
+    /// gets one method on all meshes.
+    pub fn share(self, items: Vec<Item>) -> Vec<Item> {
+        let mut shares = Vec::new();
+        for (mesh, of_mesh) in items.chunk_by(|a, b| a.scene == b.scene).enumerate() {
+            let own = |place: &usize| (place + mesh) % self.of == self.number - 1;
+            shares.extend((0..of_mesh.len()).filter(own).map(|place| of_mesh[place].clone()));
+        }
+        shares
     }
 }
 
@@ -209,7 +256,7 @@ pub(super) fn hash_of(path: &Path) -> Result<String, StudyError> {
 
 /// A name for each source, unlike every other even as the stem of a file: the file's stem, where
 /// that is not enough its name with the extension, then with its folder, then a number.
-fn unique_names(sources: &[Source]) -> Vec<String> {
+pub(super) fn unique_names(sources: &[Source]) -> Vec<String> {
     let key = |name: &str| medial_reports::file_stem(name).to_ascii_lowercase();
     let mut names: Vec<String> = sources.iter().map(Source::name).collect();
     for depth in 1..=2 {

@@ -37,7 +37,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::{Dual, Given, Source};
 
 pub use error::{StudyError, no_such_method};
-pub use items::Here;
+pub use items::{Here, Shard};
 
 /// Items are ended after so many seconds unless told otherwise.
 pub const TIMEOUT: f64 = 300.0;
@@ -67,6 +67,10 @@ pub struct Study {
     pub spheres: Vec<usize>,
     /// Error bounds, fractions of the diagonal, for each of which the fewest spheres are searched.
     pub max_error: Vec<f64>,
+    /// Noise on the surfaces: each magnitude, the largest displacement of a vertex as a fraction of the
+    /// diagonal, adds a row of meshes whose results are measured against the clean surface.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub noise: Vec<f64>,
     /// Counts alone: no levels of the methods' own but those given to them, and no row of the
     /// initial medial mesh.
     pub counts_only: bool,
@@ -151,6 +155,7 @@ impl Default for Study {
             dataset: vec![],
             spheres: vec![1000, 500, 200, 100],
             max_error: vec![],
+            noise: vec![],
             counts_only: false,
             published: false,
             seed: 0,
@@ -179,32 +184,18 @@ impl Study {
         let failed = |message: String| StudyError::File { path: path.to_owned(), message };
         let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
         let mut study: Self = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
-        let own = path.parent().map_or_else(PathBuf::new, Path::to_owned);
-        let folder = study.folder.map_or(own.clone(), |folder| own.join(folder));
+        let own = path.parent().filter(|own| !own.as_os_str().is_empty());
+        let own = own.unwrap_or(Path::new("."));
+        let folder = study.folder.map_or(own.to_owned(), |folder| own.join(folder));
         study.folder = Some(std::path::absolute(&folder).unwrap_or(folder));
         Ok(study)
     }
 
-    /// The study as a file. One that was read from `source` and is unchanged is that file, its
-    /// comments included, with a line that says where relative paths start.
+    /// The study as a file that [`Study::read`] reads.
     ///
     /// # Errors
-    /// [`StudyError::File`] when `source` cannot be read again; [`StudyError::Value`] for a number
-    /// that TOML cannot hold.
-    pub fn to_text(&self, source: Option<&Path>) -> Result<String, StudyError> {
-        if let Some(path) = source
-            && Self::read(path)? == *self
-        {
-            let failed = |error: std::io::Error| StudyError::File {
-                path: path.to_owned(),
-                message: error.to_string(),
-            };
-            let text = std::fs::read_to_string(path).map_err(failed)?;
-            let names_folder = text.lines().any(|line| line.trim_start().starts_with("folder"));
-            let folder = self.folder.as_ref().filter(|_| !names_folder);
-            let folder = folder.map(|f| format!("folder = {:?}\n", f.to_string_lossy()));
-            return Ok(folder.unwrap_or_default() + &text);
-        }
+    /// [`StudyError::Value`] for a number that TOML cannot hold, or a path that is not UTF-8.
+    pub fn to_text(&self) -> Result<String, StudyError> {
         toml::to_string(self).map_err(|error| StudyError::Value(format!("study: {error}")))
     }
 
@@ -237,6 +228,9 @@ impl Study {
         }
         if self.memory == Some(0) {
             return wrong("--memory 0: a positive number of megabytes".into());
+        }
+        if let Some(eta) = self.noise.iter().find(|&&eta| !(eta > 0.0 && eta <= 0.1)) {
+            return wrong(format!("noise {eta}: a fraction of the diagonal of at most 0.1"));
         }
         let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
         if counts.chain([&self.spheres]).any(|counts| counts.contains(&0)) {

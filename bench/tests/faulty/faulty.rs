@@ -39,12 +39,40 @@ fn panics<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
 fn loops<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
     Ok(Box::new(move |level| {
         if level == AT {
-            loop {
-                std::thread::sleep(Duration::from_millis(1));
-            }
+            wait_for_ever();
         }
         largest(shape, level)
     }))
+}
+
+/// Reads from a pipe that nobody writes to and nobody closes.
+fn wait_for_ever() {
+    let (mut reader, writer) = std::io::pipe().expect("a pipe");
+    let _ = std::io::Read::read(&mut reader, &mut [0]);
+    drop(writer);
+}
+
+/// Hangs at its published level, which a search for an error bound tries once no count is within it.
+fn hangs_late<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+    Ok(Box::new(move |level| {
+        if level == Level::Published {
+            wait_for_ever();
+        }
+        largest(shape, level)
+    }))
+}
+
+/// Waits until the pipe that `FAULTY_GATE` names is opened and closed by its writer.
+fn waits<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+    if let Some(gate) = std::env::var_os("FAULTY_GATE") {
+        std::fs::read(gate).map_err(|error| SimplifyError::Failed(error.to_string()))?;
+    }
+    Ok(Box::new(move |level| largest(shape, level)))
+}
+
+/// Fails with words that speak of memory, of which there is plenty.
+fn complains<'s>(_: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+    Err(SimplifyError::Failed("unable to allocate a licence: out of memory".into()))
 }
 
 fn allocates<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
@@ -138,14 +166,6 @@ fn warms_up<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
     }))
 }
 
-/// Works as it should, but takes its time.
-fn slow<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    Ok(Box::new(move |level| {
-        std::thread::sleep(Duration::from_millis(100));
-        largest(shape, level)
-    }))
-}
-
 fn main() -> ExitCode {
     let method = |id: &'static str, prepare| {
         Registered::from(Method::<NoParams>::new(MethodInfo::new(id, id), prepare))
@@ -165,7 +185,9 @@ fn main() -> ExitCode {
         method("strays", strays),
         method("random", random),
         method("warms-up", warms_up),
-        method("slow", slow),
+        method("waits", waits),
+        method("hangs-late", hangs_late),
+        method("complains", complains),
     ]);
     medial_bench::main_with(methods)
 }

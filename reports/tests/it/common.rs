@@ -186,6 +186,7 @@ pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
         seeds: BTreeMap::from([("evaluation".to_owned(), 7), ("method".to_owned(), 1)]),
         repetitions: Vec::new(),
         machine: machine(),
+        method_version: String::new(),
         binary_hash: "3f9c0d".to_owned(),
         command: "medial compare --spheres 1000,500,200,100".to_owned(),
         version: "0.1.0".to_owned(),

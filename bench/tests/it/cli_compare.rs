@@ -5,8 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-mod command;
-use command::{json, run, text_path};
+use crate::command::{json, run, text_path};
 
 #[test]
 fn compare_leaves_a_row_for_every_run() {
@@ -254,7 +253,7 @@ fn given_files_are_rows_without_times_beside_the_methods() {
         [&words[..], &["--given", &plus, "--samples", "500", "--out", text_path(&out)]].concat();
     let (code, object) = json(&words);
     assert_eq!(code, 0, "{object}");
-    assert_eq!((&object["status"]["ok"], &object["status"]["as_given"]), (&1.into(), &2.into()));
+    assert_eq!((&object["status"]["ok"], &object["status"]["external"]), (&1.into(), &2.into()));
     let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
     let records: Vec<Value> =
         lines.lines().map(|line| serde_json::from_str(line).expect("a record")).collect();
@@ -265,7 +264,7 @@ fn given_files_are_rows_without_times_beside_the_methods() {
     {
         assert_eq!(
             (&record["status"], &record["simplify"]["variant"]),
-            (&"as_given".into(), &name.into())
+            (&"external".into(), &name.into())
         );
         assert!(record["simplify"]["seconds"].is_null(), "{record}");
         let warnings = record["simplify"]["warnings"].as_array().expect("a list");

@@ -6,8 +6,7 @@ use std::path::Path;
 
 use medial_bench::plugin::{self, PluginFault};
 
-mod plugins;
-use plugins::{VALID, entry, written};
+use crate::plugins::{VALID, entry, written};
 
 #[test]
 fn a_changed_script_or_declaration_has_another_fingerprint() {

@@ -1,13 +1,11 @@
 //! Methods that go wrong in every way: each is classified with its reason, the rest completes, and
 //! nothing is left running.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use common::{code, example, processes_with, records, run, stderr};
+use crate::common::{code, example, processes_with, records, run, stderr};
 use serde_json::Value;
 
 /// Status and reason by method and number of spheres.
@@ -25,9 +23,10 @@ fn ends(out: &Path) -> BTreeMap<(String, u64), (String, String)> {
 fn faults_of_methods_are_contained_and_named() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
-    let methods = "panics,allocates,grows,overflows,aborts,exits,invalid,empty,talks,strays,qmat";
+    let methods =
+        "panics,allocates,grows,overflows,aborts,exits,invalid,empty,talks,strays,complains,qmat";
     // What ends by itself, or by its memory, may take its time on a busy machine.
-    for (methods, timeout) in [(methods, "60"), ("loops", "3")] {
+    for (methods, timeout) in [(methods, "60"), ("loops", "10")] {
         let arguments = [
             &["compare", "builtin:box:8", "--methods", methods, "--spheres", "30,20,10"][..],
             &["--samples", "100", "--counts-only", "--timeout", timeout, "--memory", "1500"],
@@ -58,6 +57,7 @@ fn faults_of_methods_are_contained_and_named() {
         ("exits", "panicked", "exit code 0"),
         ("invalid", "invalid_output", "radius NaN"),
         ("empty", "failed", "no sphere"),
+        ("complains", "failed", "unable to allocate"),
     ];
     for (method, status, part) in broken_at_once {
         let (found, reason) = end(method, 30);
@@ -66,7 +66,7 @@ fn faults_of_methods_are_contained_and_named() {
     for method in ["talks", "strays", "qmat"] {
         assert!([30, 20, 10].iter().all(|&count| end(method, count).0 == "ok"), "{method}");
     }
-    assert_eq!(ends.len(), 36);
+    assert_eq!(ends.len(), 39);
     assert!(processes_with("sleep 7654").is_empty(), "a stray is left");
 }
 
@@ -107,7 +107,7 @@ fn a_bound_that_the_level_found_misses_when_it_is_asked_alone_is_missed() {
         &["--out", out.to_str().expect("UTF-8")],
     ];
     let output = run(example("faulty"), &arguments.concat());
-    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
     let within = |method: &str| {
         let is_wanted = |record: &Value| {
             record["simplify"]["method"] == method
@@ -193,4 +193,49 @@ fn faults_of_programs_are_contained_and_named() {
     let stray = records(&out).into_iter().find(|r| r["simplify"]["method"] == "p-stray");
     let warnings = stray.expect("a record")["simplify"]["warnings"].to_string();
     assert!(warnings.contains("process"), "{warnings}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn only_the_tree_of_the_worker_ends_with_it() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (out, program) = (dir.path().join("out"), example("faulty"));
+    let pid = dir.path().join("pid");
+    // The shell's other child becomes a child of the command by `exec`.
+    let script = format!(
+        "sleep 7777 & echo $! > '{}'; exec '{}' compare builtin:box:8 --methods loops --spheres 20 \
+         --counts-only --samples 100 --timeout 2 --quiet --out '{}'",
+        pid.display(),
+        program.display(),
+        out.display()
+    );
+    let output = run("bash", &["-c", &script]);
+    assert_eq!(code(&output), 5, "{}", stderr(&output));
+    assert_eq!(records(&out)[0]["status"], "timed_out");
+    let pid = fs::read_to_string(&pid).expect("a number").trim().to_owned();
+    let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+    assert!(String::from_utf8_lossy(&line).contains("7777"), "the neighbour still runs");
+    assert!(std::process::Command::new("kill").arg(&pid).status().expect("kill runs").success());
+}
+
+#[test]
+fn bounds_that_were_found_survive_a_method_that_hangs_later() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let arguments = [
+        &["compare", "builtin:box:8", "--methods", "hangs-late", "--max-error", "0.3,0.0000001"][..],
+        &["--spheres", "30", "--samples", "500", "--counts-only", "--timeout", "10", "--quiet"],
+        &["--out", out.to_str().expect("UTF-8")],
+    ];
+    let output = run(example("faulty"), &arguments.concat());
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    let status = |bound: f64| {
+        let of = |r: &Value| r["simplify"]["level"]["max_error"] == bound;
+        let record = records(&out).into_iter().find(of).expect("a record");
+        (record["status"].clone(), record["reason"].clone())
+    };
+    assert_eq!(status(0.3).0, "ok", "{:?}", status(0.3));
+    assert_eq!(status(0.000_000_1).0, "timed_out", "{:?}", status(0.000_000_1));
+    let count = |r: &Value| r["simplify"]["level"]["spheres"] == 30 && r["status"] == "ok";
+    assert!(records(&out).iter().any(count));
 }

@@ -11,8 +11,7 @@ use std::time::{Duration, Instant};
 use medial::complex;
 use medial_test_support::skip;
 
-mod common;
-use common::records;
+use crate::common::records;
 
 const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
 const ADAPTERS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/adapters/adapters.toml");

@@ -1,11 +1,9 @@
 //! `medial diff`: exit codes, and two builds that take turns.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{code, run, stderr};
+use crate::common::{code, run, stderr};
 use serde_json::Value;
 
 const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");

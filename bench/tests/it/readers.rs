@@ -3,8 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-mod command;
-use command::{json, run, text_path};
+use crate::command::{json, run, text_path};
 
 /// The Python that `scripts/readers.sh` sets up, or that of `$READERS_PYTHON`.
 fn python() -> Option<String> {

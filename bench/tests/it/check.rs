@@ -1,10 +1,8 @@
 //! The conformance corpus: all methods of the project pass it, and methods that are broken do not.
 
-mod common;
-
 use std::path::Path;
 
-use common::{code, example, run, stderr};
+use crate::common::{code, example, run, stderr};
 use serde_json::Value;
 
 const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");

@@ -2,8 +2,7 @@
 
 use std::fs;
 
-mod command;
-use command::{json, run, text_path};
+use crate::command::{json, run, text_path};
 
 const COMMIT: &str = "0123456789abcdef0123456789abcdef01234567";
 

@@ -12,8 +12,7 @@ use medial_bench::run::hex_digest;
 use serde_json::Value;
 use tempfile::TempDir;
 
-mod command;
-use command::{medial, text_path};
+use crate::command::{medial, text_path};
 
 /// A user's machine: clients, a cache, a catalogue with two packages, and what the clients were asked.
 struct Machine {

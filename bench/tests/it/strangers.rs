@@ -1,12 +1,10 @@
 //! Methods from elsewhere: a program, a Python script. Each stands in tables, plots, page and `medial methods`
 //! beside the built-in ones. (The third way in, a crate of one's own, has its test in `examples/plugin-crate`.)
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{code, records, run, stderr};
+use crate::common::{code, records, run, stderr};
 
 const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
 

@@ -17,8 +17,7 @@ use medial_bench::plugin::{self, External, OwnSeconds, ProgramPeak, SCRATCH};
 use medial_test_support::skip;
 use tempfile::TempDir;
 
-mod plugins;
-use plugins::{VALID, entry, written};
+use crate::plugins::{VALID, entry, written};
 
 fn shape() -> Shape {
     let mesh = medial_datasets::find("capsule").expect("in the catalogue").mesh(12);

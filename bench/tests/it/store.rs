@@ -1,14 +1,12 @@
 //! Results accumulate: nothing is run twice, nothing is lost, whatever ends a run.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use common::{code, example, records, run, stderr, without_timings};
+use crate::common::{code, example, records, run, stderr, without_timings};
 use medial_bench::process_tree;
 use serde_json::Value;
 
@@ -79,44 +77,37 @@ fn failures_are_run_again_when_asked_or_when_a_limit_is_wider() {
         let output = run(example("faulty"), &arguments.concat());
         run_and_found(&serde_json::from_slice(&output.stdout).expect("JSON"))
     };
-    assert_eq!(faulty(&["--timeout", "0.5"]), (2, 0));
-    assert_eq!(faulty(&["--timeout", "0.5"]), (0, 2));
-    assert_eq!(faulty(&["--timeout", "1"]), (1, 1), "the one that had too little time");
-    assert_eq!(faulty(&["--timeout", "1", "--retry-failed"]), (2, 0));
+    // A method that reads from a pipe nobody writes to reaches any limit on any machine.
+    assert_eq!(faulty(&["--timeout", "10"]), (2, 0));
+    assert_eq!(faulty(&["--timeout", "10"]), (0, 2));
+    assert_eq!(faulty(&["--timeout", "11"]), (1, 1), "the one that had too little time");
+    assert_eq!(faulty(&["--timeout", "11", "--retry-failed"]), (2, 0));
 }
 
 #[test]
 fn two_runs_into_one_folder_lose_nothing() {
     let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("out");
+    let (out, gate) = (dir.path().join("out"), dir.path().join("gate"));
+    assert!(Command::new("mkfifo").arg(&gate).status().expect("mkfifo runs").success());
     let arguments = |method: &'static str| {
         let words = ["compare", "builtin:box:8", "--methods", method, "--spheres", "40,30,20"];
         let more = ["--samples", "100", "--counts-only", "--quiet", "--out"];
         words.into_iter().chain(more).map(str::to_owned).chain([text(&out).to_owned()])
     };
     let program = example("faulty");
-    let mut slow = Command::new(&program);
-    let mut slow =
-        slow.args(arguments("slow")).stdout(Stdio::null()).spawn().expect("the first run starts");
-    let deadline = Instant::now() + Duration::from_secs(20);
-    while !out.join(".lock").exists() && Instant::now() < deadline {
-        thread::sleep(Duration::from_millis(5));
-    }
-    // The lock is taken a moment after its file is made.
-    thread::sleep(Duration::from_millis(50));
+    let mut first = Command::new(&program);
+    first.args(arguments("waits")).env("FAULTY_GATE", &gate).stdout(Stdio::null());
+    let mut first = first.spawn().expect("the first run starts");
+    // Opening the pipe for writing blocks until the method of the first run reads from it: from then
+    // until the pipe is closed the first run holds the store.
+    let pipe = fs::OpenOptions::new().write(true).open(&gate).expect("the method waits");
     let second = Command::new(&program).args(arguments("qmat")).output().expect("it starts");
-    let first = slow.wait().expect("it ends").code();
-    assert_eq!(first, Some(0));
-    match second.status.code() {
-        // The first had ended already: both are complete.
-        Some(0) => assert_eq!(records(&out).len(), 6),
-        code => {
-            let message = stderr(&second);
-            assert!(code == Some(1) && message.contains("is adding results"), "{message}");
-            assert!(message.contains("slow"), "it names the other run: {message}");
-            assert_eq!(records(&out).len(), 3);
-        }
-    }
+    let message = stderr(&second);
+    assert!(code(&second) == 1 && message.contains("is adding results"), "{message}");
+    assert!(message.contains("waits"), "it names the other run: {message}");
+    drop(pipe);
+    assert_eq!(first.wait().expect("it ends").code(), Some(0));
+    assert_eq!(records(&out).len(), 3);
 }
 
 /// Starts a comparison, kills it after a while, and says whether it was still running. Its workers
@@ -234,7 +225,7 @@ fn a_small_item_after_a_large_one_shows_its_own_memory() {
 fn a_study_is_a_file_and_lies_beside_its_results() {
     let dir = tempfile::tempdir().expect("a folder");
     let (file, out) = (dir.path().join("study.toml"), dir.path().join("out"));
-    let study = "# Two rows of one method.\nmeshes = [\"builtin:box:8\"]\nspheres = [30]\nsamples = 200\ncounts_only = true\n\n\
+    let study = "meshes = [\"builtin:box:8\"]\nspheres = [30]\nsamples = 200\ncounts_only = true\n\n\
                  [[method]]\nid = \"qmat\"\n\n\
                  [[method]]\nid = \"qmat\"\nname = \"no scale\"\nparams = { k = 0 }\nspheres = [20, 10]\n\n\
                  [[method]]\nid = \"angle\"\nlevels = [30, 60]\n";
@@ -243,10 +234,8 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
     let words = study_of(&file);
     let (status, object) = compare(&words.each_ref().map(String::as_str), &out);
     assert_eq!((status, run_and_found(&object)), (0, (6, 0)), "{object}");
-    let copied = fs::read_to_string(out.join("study.toml")).expect("a copy");
-    assert!(copied.ends_with(study), "{copied}");
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
-    assert!(page.contains("no scale") && page.contains("Two rows of one method"));
+    assert!(page.contains("no scale") && page.contains("builtin:box:8"));
     let native = |r: &Value| r["simplify"]["level"]["native"].as_f64();
     assert_eq!(records(&out).iter().filter_map(native).collect::<Vec<_>>(), [30.0, 60.0]);
 
@@ -311,4 +300,124 @@ fn an_interrupted_run_says_how_to_go_on() {
     let alive =
         |pid: &u32| fs::read(format!("/proc/{pid}/cmdline")).is_ok_and(|line| !line.is_empty());
     assert!(!workers.iter().any(alive), "a worker is left");
+}
+
+#[test]
+fn a_study_in_a_folder_with_any_name_is_read_back() {
+    let dir = tempfile::tempdir().expect("a folder");
+    // A decomposed accent, a quotation mark and a backslash.
+    let folder = dir.path().join("me\u{301}di\"al\\x");
+    fs::create_dir(&folder).expect("made");
+    let made = run(
+        MEDIAL,
+        &["datasets", "make", "box", "--resolution", "8", "-o", text(&folder.join("b.off"))],
+    );
+    assert_eq!(code(&made), 0, "{}", stderr(&made));
+    let study = "meshes = [\"b.off\"]\nspheres = [10]\nsamples = 100\ncounts_only = true\n[[method]]\nid = \"qmat\"\n";
+    fs::write(folder.join("study.toml"), study).expect("written");
+    let compare = |study: &Path, folder: &Path| {
+        let mut command = Command::new(MEDIAL);
+        command.args(["compare", "--quiet", "--json", "--out", "out", "--study"]).arg(study);
+        let output = command.current_dir(folder).output().expect("it starts");
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        run_and_found(&serde_json::from_slice(&output.stdout).expect("JSON"))
+    };
+    // A name without a folder stands for the working folder.
+    assert_eq!(compare(Path::new("study.toml"), &folder), (1, 0));
+    let kept = folder.join("out/study.toml");
+    let named = fs::read_to_string(&kept).expect("a copy");
+    let named: toml::Table = named.parse().expect("TOML");
+    let absolute = fs::canonicalize(&folder).expect("a folder");
+    let given = Path::new(named["folder"].as_str().expect("a text"));
+    assert_eq!(fs::canonicalize(given).expect("a folder"), absolute);
+    assert_eq!(compare(&kept, &folder), (0, 1), "the copy requests the same");
+}
+
+#[test]
+fn a_folder_of_other_files_is_refused() {
+    let dir = tempfile::tempdir().expect("a folder");
+    fs::write(dir.path().join("thesis.tex"), "").expect("written");
+    let words = ["compare", "builtin:box:8", "--methods", "qmat", "--out", text(dir.path())];
+    let output = run(MEDIAL, &words);
+    assert_eq!(code(&output), 1);
+    assert!(
+        stderr(&output).contains("neither empty nor a folder of results"),
+        "{}",
+        stderr(&output)
+    );
+    assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 1, "nothing was written");
+}
+
+#[test]
+fn shards_merge_into_what_one_run_gives() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name);
+    let words =
+        ["builtin:box:8", "builtin:torus:16", "--methods", "qmat,pmat,angle", "--spheres", "30,20"];
+    let (_, whole) = compare(&words, &at("whole"));
+    let total = whole["run"].as_u64().expect("a count");
+    let mut made = 0;
+    for shard in ["1/3", "2/3", "3/3"] {
+        let out = at(&shard[..1]);
+        let (_, object) = compare(&[&words[..], &["--shard", shard]].concat(), &out);
+        let ran = object["run"].as_u64().expect("a count");
+        assert!(ran > 0 && ran < total, "{shard}: {ran} of {total}");
+        made += ran;
+        let (_, again) = compare(&[&words[..], &["--shard", shard]].concat(), &out);
+        assert_eq!(again["run"], 0, "a shard that is run again has its items");
+    }
+    assert_eq!(made, total, "every item is in one shard");
+    let merge = |out: &str| {
+        let stores = ["3", "1", "2"].map(|name| text(&at(name)).to_owned());
+        let mut words = vec!["report", "--json"];
+        words.extend(stores.iter().map(String::as_str));
+        let out = text(&at(out)).to_owned();
+        words.extend(["--out", &out]);
+        let output = run(MEDIAL, &words);
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        serde_json::from_slice::<Value>(&output.stdout).expect("JSON")
+    };
+    let object = merge("all");
+    assert_eq!((&object["records"], &object["warnings"]), (&total.into(), &Value::Array(vec![])));
+    assert_eq!(without_timings(records(&at("all"))), without_timings(records(&at("whole"))));
+    // The tables are the same but for seconds.
+    let table = |out: &str| -> Vec<Vec<String>> {
+        let mut rows = csv::Reader::from_path(at(out).join("results.csv")).expect("a table");
+        let heads = rows.headers().expect("a head").clone();
+        let kept: Vec<usize> = (0..heads.len())
+            .filter(|&k| {
+                let timed = ["seconds", "bytes", "command", "repetition"];
+                !timed.iter().any(|word| heads[k].contains(word))
+            })
+            .collect();
+        rows.records()
+            .map(|row| row.expect("a row"))
+            .map(|row| kept.iter().map(|&k| row[k].to_owned()).collect())
+            .collect()
+    };
+    assert_eq!(table("all"), table("whole"));
+    for record in records(&at("all")) {
+        let artifact = record["artifact"].as_str().expect("a medial mesh");
+        assert!(at("all").join(artifact).exists());
+    }
+    // The same again changes nothing: equal records are one.
+    assert_eq!(merge("all")["records"], total);
+
+    // One store has another result under a key: it is reported, and the newer store counts.
+    let path = at("2").join("results.jsonl");
+    let altered = fs::read_to_string(&path)
+        .expect("results")
+        .replace("\"result_hash\":\"", "\"result_hash\":\"0");
+    fs::create_dir(at("4")).expect("made");
+    fs::write(at("4/results.jsonl"), altered).expect("written");
+    let (two, four, out) =
+        (text(&at("2")).to_owned(), text(&at("4")).to_owned(), text(&at("both")).to_owned());
+    let words = ["report", "--json", &two, &four, "--out", &out];
+    let output = run(MEDIAL, &words);
+    let object: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let told = object["warnings"].to_string();
+    assert!(told.contains("differ; the newer one"), "{object}");
+
+    let wrong = run(MEDIAL, &["compare", "builtin:box:8", "--shard", "4/3", "--out", &out]);
+    assert_eq!(code(&wrong), 2, "{}", stderr(&wrong));
 }

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-mod command;
-use command::{json, run, text_path};
+use crate::command::{json, run, text_path};
 
 /// Checks what both methods promise, and that `medial info` agrees.
 fn check(object: &Value, output: &str, genus: u64) {

@@ -2,8 +2,7 @@
 
 use std::fs;
 
-mod command;
-use command::{json, run, text_path};
+use crate::command::{json, run, text_path};
 
 /// Seconds and sizes that differ from run to run become `#`.
 fn without_timings(text: &str) -> String {
@@ -37,7 +36,7 @@ fn methods_and_their_parameters() {
 fn datasets_are_listed() {
     // Whatever the user of this machine has fetched.
     let cache = tempfile::tempdir().expect("a folder");
-    let mut command = command::medial(&["datasets", "list"]);
+    let mut command = crate::command::medial(&["datasets", "list"]);
     let output = command.env("MEDIAL_CACHE", cache.path()).output().expect("the command starts");
     let text = String::from_utf8(output.stdout).expect("UTF-8");
     let (shapes, published) = text.split_once("\n\n").expect("two lists");

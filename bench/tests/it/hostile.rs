@@ -3,8 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-mod command;
-use command::{run, text_path};
+use crate::command::{run, text_path};
 
 #[test]
 fn deleted_elements_change_no_byte_of_an_evaluation() {

@@ -2,8 +2,7 @@
 
 use std::fs;
 
-mod command;
-use command::{json, run, text_path};
+use crate::command::{json, run, text_path};
 
 #[test]
 fn axis_simplify_evaluate_convert() {

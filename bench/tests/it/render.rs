@@ -3,8 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-mod command;
-use command::{json, run, text_path};
+use crate::command::{json, run, text_path};
 
 /// Width and height in the header of a PNG file.
 fn size_of(path: &str) -> [u32; 2] {

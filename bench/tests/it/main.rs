@@ -1,0 +1,25 @@
+//! Tests of the command and the runner as a whole.
+
+mod adapters;
+mod check;
+mod cli;
+mod cli_compare;
+mod cli_simplify;
+mod command;
+mod common;
+mod diff;
+mod faults;
+mod fuzz_inputs;
+mod history;
+mod hostile;
+mod layers;
+mod plugin;
+mod plugin_files;
+mod plugins;
+mod process_tree;
+mod public;
+mod readers;
+mod reconstruct;
+mod render;
+mod store;
+mod strangers;
