@@ -10,7 +10,10 @@ use medial::simplifier::Params;
 use medial::surface::Sampling;
 
 use crate::exit::Failure;
-use crate::run::{AxisOptions, Dual, FitBy, RadiiFrom, Study, Verbosity};
+use crate::progress::Verbosity;
+use crate::study::Study;
+use crate::study::external::{AxisOptions, FitBy, RadiiFrom};
+use crate::study::item::Dual;
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]

@@ -13,7 +13,7 @@ use crate::host::Host;
 use crate::interrupt;
 use crate::output::{exit_after_output, print_failure, print_raw};
 use crate::plugin::ScriptLoader;
-use crate::run::Registry;
+use crate::study::registry::Registry;
 
 /// Simplify the 3D medial axis transform, and compare the published methods that do.
 #[derive(Debug, Parser)]

@@ -2,8 +2,12 @@
 
 use std::process::ExitCode;
 
-use crate::run::public::PublicError;
-use crate::run::{InputError, PlanError, RunError, Source, StoreError, StudyError};
+use crate::exec::RunError;
+use crate::exec::queue::PlanError;
+use crate::store::StoreError;
+use crate::study::StudyError;
+use crate::study::library::PublicError;
+use crate::study::source::{InputError, Source};
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

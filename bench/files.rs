@@ -9,7 +9,7 @@ use medial::shape::{Fit, Shape};
 
 use crate::args::AxisArguments;
 use crate::exit::Failure;
-use crate::run::read_axis;
+use crate::study::external::read_axis;
 
 /// Reads a medial mesh that was made for a shape, in input units, and the change of units that brought it there, if one
 /// was asked for.

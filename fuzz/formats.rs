@@ -5,7 +5,7 @@ use std::path::Path;
 use medial::complex::{self, LoadedMa, Radii, ReadOptions};
 use medial::surface::{self, Format};
 use medial_bench::plugin;
-use medial_bench::run::Study;
+use medial_bench::study::Study;
 use medial_reports::parse_records;
 
 /// Larger meshes are not put to checks that take longer than reading.

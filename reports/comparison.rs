@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Target;
 
-use crate::record::Record;
+use crate::record::{Record, Status};
 use crate::text::{grouped, printable};
 
 /// Largest relative difference between the spheres reached and the spheres asked at which two

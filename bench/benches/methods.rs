@@ -12,7 +12,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, criterion_group
 use medial::complex::collapse::Hierarchy;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext};
-use medial_bench::run::{Input, Source};
+use medial_bench::study::source::{Input, Source};
 
 /// Spheres that each method is asked for.
 const SPHERES: usize = 100;

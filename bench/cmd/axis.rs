@@ -13,7 +13,9 @@ use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
 use crate::exit::{Exit, Failure};
 use crate::files::check_output;
 use crate::output::{counted, print_json, print_line};
-use crate::run::{Input, Source, StageLine, peak_bytes};
+use crate::progress::StageLine;
+use crate::provenance::peak_bytes;
+use crate::study::source::{Input, Source};
 
 /// Arguments of `axis`.
 #[derive(Debug, Args)]

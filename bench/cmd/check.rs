@@ -7,14 +7,16 @@ use serde_json::{Value, json};
 
 use crate::args::{self, Global};
 use crate::check::{Case, Outcome, cases, find};
+use crate::exec::protocol::CheckItem;
+use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::host::Host;
 use crate::interrupt;
 use crate::output::{counted, print_json, print_line};
-use crate::run::{
-    CheckItem, Entry, Here, MethodSpec, Provenance, Registry, RunError, Study, Supervisor,
-    no_such_method, shell_line,
-};
+use crate::provenance::{Provenance, shell_line};
+use crate::study::item::MethodSpec;
+use crate::study::registry::{Entry, Registry};
+use crate::study::{Here, Study, no_such_method};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]

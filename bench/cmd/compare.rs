@@ -9,14 +9,19 @@ use serde_json::json;
 
 use super::report::{self, Rebuilt};
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
+use crate::exec::queue::{PlanError, Tally, count, missing, refused_params, run_items};
+use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
-use crate::run::{
-    AXES, Given, Here, Item, PlanError, Progress, Provenance, RESULTS, Registry, RunError, Shard,
-    Source, Store, Study, StudyMethod, Supervisor, Tally, count, missing, refused_params,
-    run_items,
-};
+use crate::progress::Progress;
+use crate::provenance::Provenance;
+use crate::store::{AXES, RESULTS, Store};
+use crate::study::external::Given;
+use crate::study::item::Item;
+use crate::study::registry::Registry;
+use crate::study::source::Source;
+use crate::study::{Here, Shard, Study, StudyMethod};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]

@@ -11,13 +11,16 @@ use medial_reports::diff::{Diff, DiffOptions, Meaning};
 use medial_reports::{Record, read_records};
 
 use crate::args::Global;
+use crate::exec::queue::{Build, Contender, PlanError, missing_in_either, run_alternately};
+use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_raw};
-use crate::run::{
-    AXES, Build, Contender, Here, PlanError, Progress, Provenance, RESULTS, Registry, RunError,
-    Store, Study, Supervisor, missing_in_either, run_alternately,
-};
+use crate::progress::Progress;
+use crate::provenance::Provenance;
+use crate::store::{AXES, RESULTS, Store};
+use crate::study::registry::Registry;
+use crate::study::{Here, Study};
 
 /// The folders of the two sides of `--run`.
 const SIDES: [&str; 2] = ["old", "new"];

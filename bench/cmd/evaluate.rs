@@ -16,7 +16,8 @@ use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument, judge_o
 use crate::exit::{Exit, Failure};
 use crate::files::medial_mesh_for;
 use crate::output::{counted, note, print_error, print_json, print_line};
-use crate::run::{Input, Source, StageLine};
+use crate::progress::StageLine;
+use crate::study::source::{Input, Source};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]

@@ -11,7 +11,7 @@ use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::{note, print_json, print_line};
-use crate::run::RESULTS;
+use crate::store::RESULTS;
 
 /// Arguments of `history`.
 #[derive(Debug, Args)]

@@ -6,7 +6,7 @@ use medial::surface::{self, SurfaceReport};
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::output::{note, print_json, print_line};
-use crate::run::{Input, Source};
+use crate::study::source::{Input, Source};
 
 /// Arguments of `info`.
 #[derive(Debug, Args)]

@@ -6,7 +6,8 @@ use serde_json::json;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
-use crate::run::{Entry, Registry, no_such_method};
+use crate::study::no_such_method;
+use crate::study::registry::{Entry, Registry};
 
 /// Arguments of `methods`.
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ use medial::write_atomically;
 use medial_reports::render::{Background, Camera, ColourBy, Errors, Panel, Strip, strip};
 use medial_reports::{PictureStrip, Record, View3d, picture_strips};
 
-use crate::run::{Input, Source};
+use crate::study::source::{Input, Source};
 
 /// Pixels of a panel, and panels beside each other.
 const PANEL: [usize; 2] = [320, 260];

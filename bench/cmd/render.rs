@@ -17,7 +17,9 @@ use crate::args::{AxisArguments, Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_extension, check_folder, medial_mesh_for};
 use crate::output::{counted, print_json, print_line};
-use crate::run::{Input, Source, StageLine, percent};
+use crate::progress::StageLine;
+use crate::study::external::percent;
+use crate::study::source::{Input, Source};
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]

@@ -17,7 +17,11 @@ use super::pictures;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
-use crate::run::{Here, Provenance, RESULTS, Registry, Source, Store, Study};
+use crate::provenance::Provenance;
+use crate::store::{RESULTS, Store};
+use crate::study::registry::Registry;
+use crate::study::source::Source;
+use crate::study::{Here, Study};
 
 /// Name of the file with the last requested study.
 pub const STUDY: &str = "study.toml";

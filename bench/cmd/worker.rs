@@ -2,8 +2,9 @@
 
 use clap::Args;
 
+use crate::exec::serve::serve;
 use crate::exit::{Exit, Failure};
-use crate::run::{Registry, serve};
+use crate::study::registry::Registry;
 
 /// Arguments of `worker`.
 #[derive(Debug, Args)]

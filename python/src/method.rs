@@ -15,7 +15,8 @@ use medial::simplifier::{
 };
 use medial::surface::Side;
 use medial_bench::plugin::ScriptLoader;
-use medial_bench::run::{Entry, Registry, no_such_method};
+use medial_bench::study::no_such_method;
+use medial_bench::study::registry::{Entry, Registry};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde::Deserialize;

@@ -9,7 +9,9 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{
     self, InsideTest, Loaded, Sampling, SignedDistance, SurfaceReport, TriMesh, TriangleBvh,
 };
-use medial_bench::run::{AxisOptions, Dual, Input, Source, read_axis};
+use medial_bench::study::external::{AxisOptions, read_axis};
+use medial_bench::study::item::Dual;
+use medial_bench::study::source::{Input, Source};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

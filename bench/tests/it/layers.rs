@@ -108,7 +108,11 @@ const BENCH: Layers<'_> = &[
     &["host", "process_tree"],
     &["plugin"],
     &["check"],
-    &["run"],
+    &["progress", "provenance"],
+    &["study"],
+    &["measure"],
+    &["store"],
+    &["exec"],
     &["exit"],
     &["args", "interrupt"],
     &["output"],
@@ -188,4 +192,22 @@ fn used_modules(text: &str) -> Vec<String> {
         }
     }
     used
+}
+
+#[test]
+fn verbs_never_call_verbs() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("cmd");
+    let mut read = 0;
+    for (verb, path) in sources(&root) {
+        read += 1;
+        let text = std::fs::read_to_string(&path).expect("source text");
+        for used in text.split("crate::cmd::").skip(1) {
+            let used: String =
+                used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            // The report of a comparison is rebuilt by the same code as that of `report`.
+            let is_shared = ["report", "pictures", "methods", "reconstruct"].contains(&&*used);
+            assert!(used == verb || is_shared, "{} uses the verb {used}", path.display());
+        }
+    }
+    assert!(read > 10, "the sources were found");
 }

@@ -207,10 +207,10 @@ fn an_earlier_output_is_not_taken_for_the_next() {
 
 #[test]
 fn a_gigabyte_of_messages_is_no_problem() {
-    let before = medial_bench::run::peak_bytes().unwrap_or(0);
+    let before = medial_bench::provenance::peak_bytes().unwrap_or(0);
     let text = "head -c 1000000000 /dev/zero >&2; echo; echo '{\"native_level\": 1}'";
     assert_eq!(valid_and(text).expect("two spheres").native_level, Some(1.0));
-    let after = medial_bench::run::peak_bytes().unwrap_or(0);
+    let after = medial_bench::provenance::peak_bytes().unwrap_or(0);
     assert!(after < before + 300_000_000, "{before} {after}");
 }
 

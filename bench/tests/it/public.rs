@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use medial::surface;
-use medial_bench::run::hex_digest;
+use medial_bench::provenance::hex_digest;
 use serde_json::Value;
 use tempfile::TempDir;
 

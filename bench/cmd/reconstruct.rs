@@ -1,0 +1,498 @@
+//! `medial reconstruct X.ma -o x.ply`: a surface from a medial mesh.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use medial::complex::{
+    ContourError, LoadedMa, MedialMesh, MedialUnion, UnionSurface, union_surface,
+};
+use medial::geometry::PowerCrust;
+use medial::metrics::union_betti;
+use medial::shape::{Cost, Shape};
+use medial::surface::{Normalisation, SurfaceReport, TriMesh};
+use medial::{complex, surface};
+use serde_json::{Map, Value, json};
+
+use crate::args::{AxisArguments, Global, MeshArgument, SubstrateArguments, shape_options};
+use crate::exit::{Exit, Failure};
+use crate::files::{SURFACES, check_extension, check_folder, medial_mesh_for};
+use crate::output::{counted, print_json, print_line};
+use crate::progress::StageLine;
+use crate::provenance::peak_bytes;
+use crate::study::external::{FitBy, RadiiFrom, percent};
+use crate::study::source::{Input, Source};
+
+/// Arguments of `reconstruct`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Medial mesh (.ma, or .ply with radii). The power crust can do without one: it then takes all
+    /// inner poles of the mesh.
+    axis: Option<PathBuf>,
+    /// The surface (.ply, .off, .obj), in the units of the medial mesh.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// What is made of the spheres.
+    #[arg(long, value_enum, default_value_t = Method::Union)]
+    method: Method,
+    /// Surface that the medial mesh is of: a file, or `builtin:ID[:RESOLUTION]`. The power crust
+    /// takes its outer poles; either result is measured against it.
+    #[arg(long, value_name = "MESH")]
+    mesh: Option<MeshArgument>,
+    /// How far the surface may be from the boundary of the union, as a fraction of the diagonal of
+    /// the mesh, or of the box around the spheres without one [default: the coarsest of 0.04, 0.02 and
+    /// 0.01 that shows the union's topology, with all faces within 0.005].
+    #[arg(long, value_name = "FRACTION")]
+    tolerance: Option<f64>,
+    #[command(flatten)]
+    fitting: AxisArguments,
+    #[command(flatten)]
+    substrate: SubstrateArguments,
+}
+
+/// What is made of the spheres.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// The boundary of the union of spheres, cones and slabs.
+    Union,
+    /// The surface between the power cells of the spheres and of the outer poles of the mesh.
+    PowerCrust,
+}
+
+/// A result farther from the mesh than this, in its diagonals, is taken to be of another surface.
+const ASTRAY: f64 = 0.5;
+
+/// A surface that was made, in input units.
+struct Made {
+    mesh: TriMesh,
+    said: Said,
+    warnings: Vec<String>,
+}
+
+/// What is to be said of it.
+struct Said {
+    diagonal: f64,
+    /// As a fraction of the diagonal.
+    tolerance: f64,
+    /// Betti numbers of the union, where they are known.
+    union: Option<[u64; 3]>,
+    /// Keys of this method alone.
+    more: Map<String, Value>,
+}
+
+/// Seconds by stage.
+#[derive(Default)]
+struct Stages {
+    seconds: Map<String, Value>,
+    cpu_seconds: Map<String, Value>,
+    total: Cost,
+}
+
+impl Stages {
+    fn add(&mut self, stage: &str, lap: Cost) {
+        self.seconds.insert(stage.into(), lap.seconds.into());
+        self.cpu_seconds.insert(stage.into(), lap.cpu_seconds.into());
+        self.total += lap;
+    }
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When an input is refused, the power crust has no mesh, the tolerance is too fine, or the output
+/// cannot be written.
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    check_arguments(arguments)?;
+    let mut stages = Stages::default();
+    let line = StageLine::new(global.stages());
+    line.at("reading");
+    let (read, lap) = Cost::of(|| read(arguments));
+    let (shape, axis, mut warnings) = read?;
+    stages.add("read", lap);
+    line.at("making the surface");
+    let made = match arguments.method {
+        Method::Union => union_surface_of(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
+        Method::PowerCrust => power_crust_of(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
+    }?;
+    warnings.extend(made.warnings);
+    let (written, lap) = Cost::of(|| surface::write(&arguments.output, &made.mesh));
+    written.map_err(Failure::input)?;
+    stages.add("write", lap);
+    let peak = peak_bytes();
+
+    // Untimed: the verdict.
+    line.at("checking the surface");
+    let report = examine(arguments, &made.mesh, &mut warnings)?;
+    warnings.extend(made.said.union.and_then(|union| other_topology(union, &report)));
+    let deviation = shape.as_ref().map(|shape| deviation(shape, &made.mesh)).transpose()?;
+    if let (Some([max, _]), Some(axis)) = (deviation, &arguments.axis)
+        && max > ASTRAY
+    {
+        warnings.push(format!(
+            "the result is up to {max:.1} diagonals of the mesh away from it: is {} of this surface, and in \
+             its units?",
+            axis.display()
+        ));
+    }
+    drop(line);
+    stages.seconds.insert("total".into(), stages.total.seconds.into());
+    stages.cpu_seconds.insert("total".into(), stages.total.cpu_seconds.into());
+    let verdict = Verdict { report, deviation, stages, peak, made: made.said };
+    if global.json {
+        print_json(&verdict.object(arguments), &warnings);
+    } else {
+        verdict.print(arguments);
+        warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
+    }
+    Ok(Exit::Done)
+}
+
+/// What is told of a surface that was made.
+struct Verdict {
+    report: SurfaceReport,
+    deviation: Option<[f64; 2]>,
+    stages: Stages,
+    peak: Option<u64>,
+    made: Said,
+}
+
+impl Verdict {
+    fn object(self, arguments: &Arguments) -> Map<String, Value> {
+        let Self { report, deviation, stages, peak, made } = self;
+        let method = match arguments.method {
+            Method::Union => "union",
+            Method::PowerCrust => "power-crust",
+        };
+        let deviation = deviation.map(|[max, mean]| json!({ "max": max, "mean": mean }));
+        let known = [
+            ("method", json!(method)),
+            ("vertices", json!(report.vertices)),
+            ("faces", json!(report.faces)),
+            ("closed", json!(report.closed)),
+            ("manifold", json!(report.manifold)),
+            ("genus", json!(report.genus)),
+            ("components", json!(report.components)),
+            ("intersecting_pairs", json!(report.intersecting_pairs)),
+            ("tolerance", json!(made.tolerance)),
+            ("diagonal", json!(made.diagonal)),
+            ("betti", json!(report.expected_betti)),
+            ("union_betti", json!(made.union)),
+            ("deviation", json!(deviation)),
+            ("seconds", stages.seconds.into()),
+            ("cpu_seconds", stages.cpu_seconds.into()),
+            ("peak_bytes", json!(peak)),
+            ("output", json!(arguments.output)),
+        ];
+        known.into_iter().map(|(key, value)| (key.to_owned(), value)).chain(made.more).collect()
+    }
+
+    fn print(&self, arguments: &Arguments) {
+        let Self { report, deviation, stages, .. } = self;
+        let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
+        let yes = |flag: bool| if flag { "" } else { "not " };
+        print_line(&format!(
+            "{}: {}, {} in {:.2} s",
+            arguments.output.display(),
+            counted(report.vertices as u64, "vertex"),
+            counted(report.faces as u64, "face"),
+            stages.total.seconds
+        ));
+        print_line(&format!(
+            "  {}closed, {}manifold, {}, genus {genus}",
+            yes(report.closed),
+            yes(report.manifold),
+            counted(report.components as u64, "component")
+        ));
+        if let Some([max, mean]) = deviation {
+            let (max, mean) = (percent(*max), percent(*mean));
+            print_line(&format!("  from the mesh: at most {max}, mean {mean}"));
+        }
+    }
+}
+
+/// What can be refused before anything is read.
+fn check_arguments(arguments: &Arguments) -> Result<(), Failure> {
+    let output = &arguments.output;
+    check_extension(output, &SURFACES)?;
+    check_folder(output)?;
+    if let Some(tolerance) = arguments.tolerance
+        && !(tolerance > 0.0 && tolerance <= 1.0)
+    {
+        let message = format!("--tolerance {tolerance}: ask for more than 0 and at most 1");
+        return Err(Failure::usage(message));
+    }
+    match (arguments.method, &arguments.axis, &arguments.mesh) {
+        (Method::Union, None, _) => Err(no_axis()),
+        (Method::PowerCrust, _, None) => Err(no_mesh()),
+        _ => Ok(()),
+    }
+}
+
+fn no_axis() -> Failure {
+    Failure::usage("the union is that of a medial mesh: name one, or ask for --method power-crust")
+}
+
+fn no_mesh() -> Failure {
+    Failure::usage(
+        "the power crust takes its outer poles from a surface: name it by --mesh MESH, or ask \
+         for --method union",
+    )
+}
+
+/// The shape and the medial mesh, in its own units, where they are named, and what was repaired.
+type Read = (Option<Shape>, Option<MedialMesh>, Vec<String>);
+
+fn read(arguments: &Arguments) -> Result<Read, Failure> {
+    let options = shape_options(&arguments.substrate)?;
+    let mut warnings = Vec::new();
+    let shape = match &arguments.mesh {
+        None => None,
+        Some(mesh) => {
+            let source = Source::parse(mesh).map_err(Failure::usage)?;
+            let input = Input::load(&source)?;
+            warnings.extend(input.report.warnings.iter().cloned());
+            Some(input.shape(options).map_err(|error| Failure::of(&source, error))?)
+        }
+    };
+    let axis = match (&arguments.axis, &shape) {
+        (None, _) => None,
+        (Some(path), Some(shape)) => Some(medial_mesh_for(path, shape, &arguments.fitting)?.0),
+        (Some(path), None) => Some(without_surface(path, &arguments.fitting)?),
+    };
+    let axis = axis.map(|loaded| {
+        let (mesh, notes) = loaded.with_remarks();
+        warnings.extend(notes);
+        mesh
+    });
+    Ok((shape, axis, warnings))
+}
+
+/// A medial mesh, where there is no surface to take units and radii from.
+fn without_surface(path: &Path, fitting: &AxisArguments) -> Result<LoadedMa, Failure> {
+    for (is_asked, option) in
+        [(fitting.fit != FitBy::None, "--fit"), (fitting.radii != RadiiFrom::File, "--radii")]
+    {
+        if is_asked {
+            return Err(Failure::usage(format!("{option} needs the surface: name it with --mesh")));
+        }
+    }
+    complex::read_with(path, fitting.read.options()).map_err(Failure::input)
+}
+
+fn face_centres(mesh: &TriMesh) -> Vec<medial::Vec3> {
+    (0..mesh.faces.len())
+        .map(|f| mesh.triangle(f).into_iter().sum::<medial::Vec3>() / 3.0)
+        .collect()
+}
+
+/// What `medial info` says of the file that was written; of what is no file, the mesh itself.
+fn examine(
+    arguments: &Arguments,
+    mesh: &TriMesh,
+    warnings: &mut Vec<String>,
+) -> Result<SurfaceReport, Failure> {
+    let path: &Path = &arguments.output;
+    if !path.is_file() {
+        return surface::validate(mesh).map_err(Failure::input);
+    }
+    let inspection = surface::inspect(path).map_err(Failure::input)?;
+    warnings.extend(inspection.refused.map(|fault| fault.to_string()));
+    warnings.extend(inspection.report.repairs.iter().map(ToString::to_string));
+    warnings.extend(inspection.report.warnings.iter().cloned());
+    Ok(inspection.report)
+}
+
+/// The Betti numbers of the solid that a closed surface bounds.
+fn betti_of(report: &SurfaceReport) -> Option<[u64; 3]> {
+    Some(report.expected_betti?.map(|b| b as u64))
+}
+
+/// What is to be said where a surface has not the Betti numbers of the union.
+fn other_topology(union: [u64; 3], report: &SurfaceReport) -> Option<String> {
+    let found = betti_of(report)?;
+    (found != union).then(|| {
+        format!(
+            "the surface has Betti numbers {found:?}, the union of the primitives {union:?}: crevices, \
+             holes or necks are narrower than --tolerance shows; ask for a finer one"
+        )
+    })
+}
+
+/// The largest and the mean distance of a surface's vertices and face centres from the mesh of a
+/// shape, as fractions of its diagonal.
+fn deviation(shape: &Shape, mesh: &TriMesh) -> Result<[f64; 2], Failure> {
+    let to_normal = shape.normalisation();
+    let points = mesh.vertices.iter().copied().chain(face_centres(mesh));
+    let points: Vec<_> = points.map(|p| to_normal.forward(p)).collect();
+    let distances = shape.surface_tree().map_err(Failure::input)?.distance_batch(&points);
+    let max = distances.iter().copied().fold(0.0, f64::max);
+    Ok([max, distances.iter().sum::<f64>() / distances.len() as f64])
+}
+
+/// Corners of the power crust that are nearer than this along it are one, as a fraction of the
+/// diagonal.
+pub const COINCIDENT: f64 = 1e-6;
+
+/// The power crust of the spheres of the medial mesh, or of all inner poles, and of the outer poles.
+fn power_crust_of(
+    arguments: &Arguments,
+    shape: Option<&Shape>,
+    axis: Option<&MedialMesh>,
+    stages: &mut Stages,
+) -> Result<Made, Failure> {
+    let (Some(shape), Some(mesh)) = (shape, &arguments.mesh) else {
+        return Err(no_mesh());
+    };
+    let of_mesh = |message: String| Failure::input(format!("{}: {message}", mesh.display()));
+    let (balls, lap) = Cost::of(|| shape.polar_balls());
+    stages.add("poles", lap);
+    let balls = balls.map_err(|error| of_mesh(error.to_string()))?;
+    let to_normal = shape.normalisation();
+    let inner = match axis {
+        Some(axis) => axis.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)).spheres,
+        None => balls.inner,
+    };
+    let (counts, named) =
+        ([inner.len(), balls.outer.len()], arguments.axis.as_ref().unwrap_or(mesh));
+    let of_named = |message: String| Failure::input(format!("{}: {message}", named.display()));
+    let (crust, lap) = Cost::of(|| {
+        let crust = PowerCrust::new(&inner, &balls.outer)?;
+        Ok((crust.facet_count(), surface::crust_surface(&crust, COINCIDENT)))
+    });
+    stages.add("reconstruct", lap);
+    let (facets, mut crust) =
+        crust.map_err(|error: medial::geometry::TriangulationError| of_named(error.to_string()))?;
+    if crust.mesh.faces.is_empty() {
+        return Err(of_named(
+            "no inner ball has a power cell: is the medial mesh of this surface, and in its units?"
+                .into(),
+        ));
+    }
+    for vertex in &mut crust.mesh.vertices {
+        *vertex = to_normal.backward(*vertex);
+    }
+    let more = Map::from_iter([
+        ("inner".to_owned(), Value::from(counts[0])),
+        ("outer".to_owned(), Value::from(counts[1])),
+        ("rejected".to_owned(), Value::from(balls.rejected)),
+        ("facets".to_owned(), Value::from(facets)),
+        ("merged".to_owned(), Value::from(crust.contracted)),
+        ("samples".to_owned(), Value::from(shape.samples().len())),
+        ("sampling".to_owned(), Value::from(shape.options().sampling.to_string())),
+        ("seed".to_owned(), Value::from(arguments.substrate.seed)),
+    ]);
+    let said = Said { diagonal: to_normal.diagonal, tolerance: COINCIDENT, union: None, more };
+    Ok(Made { mesh: crust.mesh, said, warnings: vec![] })
+}
+
+/// Balls that stand for the union where its topology is asked are so far apart, in tolerances.
+const BALL_SPACING: f64 = 0.5;
+
+/// Tolerances that are tried first where none is asked for.
+const COARSE: [f64; 2] = [0.04, 0.02];
+
+/// The tolerance where these show too little.
+const FINE: f64 = 0.01;
+
+/// Faces of a surface that was made without asking for a tolerance are this near to the union.
+const FACES_WITHIN: f64 = 0.005;
+
+/// The boundary of the union of spheres, cones and slabs.
+fn union_surface_of(
+    arguments: &Arguments,
+    shape: Option<&Shape>,
+    axis: Option<&MedialMesh>,
+    stages: &mut Stages,
+) -> Result<Made, Failure> {
+    let (Some(axis), Some(path)) = (axis, &arguments.axis) else { return Err(no_axis()) };
+    let of_file = |message: String| Failure::input(format!("{}: {message}", path.display()));
+    let union = MedialUnion::new(axis).map_err(|error| of_file(error.to_string()))?;
+    let (lo, hi) = union.bounding_box();
+    let corners = TriMesh { vertices: vec![lo, hi], faces: vec![] };
+    let diagonal = shape.map(|s| s.normalisation().diagonal);
+    let of_balls = || Normalisation::of(&corners).map(|n| n.diagonal);
+    let diagonal = diagonal
+        .or_else(of_balls)
+        .ok_or_else(|| of_file("its spheres have no extent, or one that is not finite".into()))?;
+    let (made, lap) = Cost::of(|| fitting_surface(axis, &union, diagonal, arguments.tolerance));
+    stages.add("reconstruct", lap);
+    let Fitting { made, tolerance, off, betti } =
+        made.map_err(|error| of_file(contour_error(error, diagonal)))?;
+    let mut warnings = Vec::new();
+    if made.lost > 0 {
+        warnings.push(format!(
+            "{} with a radius below {:.1e} of the diagonal: where the union is as thin, parts of it may be \
+             missing; a finer --tolerance shows more",
+            counted(made.lost as u64, "sphere"),
+            made.smallest / diagonal
+        ));
+    }
+    let more = Map::from_iter([
+        ("tetrahedra".to_owned(), Value::from(made.tetrahedra)),
+        ("lost".to_owned(), Value::from(made.lost)),
+        ("faces_to_union".to_owned(), Value::from(off)),
+    ]);
+    let said = Said { diagonal, tolerance, union: betti, more };
+    Ok(Made { mesh: made.mesh, said, warnings })
+}
+
+/// A surface of a union at the tolerance that was taken.
+pub struct Fitting {
+    /// The surface.
+    pub made: UnionSurface,
+    /// The tolerance, in diagonals.
+    pub tolerance: f64,
+    /// Largest distance of a face's centre from the union, in diagonals.
+    pub off: f64,
+    /// Betti numbers of the union, where there are not too many balls to tell.
+    pub betti: Option<[u64; 3]>,
+}
+
+/// The surface of a union at a tolerance in diagonals, or at the coarsest that shows what there is.
+///
+/// # Errors
+/// When the tolerance is too fine or too coarse for this union: which one would do.
+pub fn fitting_surface(
+    axis: &MedialMesh,
+    union: &MedialUnion,
+    diagonal: f64,
+    asked: Option<f64>,
+) -> Result<Fitting, ContourError> {
+    let finest = asked.unwrap_or(FINE);
+    // There may be too many balls to tell.
+    let betti = union_betti(axis, BALL_SPACING * finest * diagonal).ok();
+    let at = |tolerance: f64| -> Result<Fitting, ContourError> {
+        let made = union_surface(axis, tolerance * diagonal)?;
+        let off = union.signed_batch(&face_centres(&made.mesh)).into_iter().map(f64::abs);
+        let off = off.fold(0.0, f64::max) / diagonal;
+        Ok(Fitting { made, tolerance, off, betti })
+    };
+    let shows_all = |fitting: &Fitting| {
+        let found = surface::validate(&fitting.made.mesh).ok().and_then(|report| betti_of(&report));
+        fitting.off <= FACES_WITHIN && found.is_some() && found == betti
+    };
+    let coarse = if asked.is_none() { &COARSE[..] } else { &[] };
+    for &tolerance in coarse {
+        match at(tolerance) {
+            Ok(fitting) if shows_all(&fitting) => return Ok(fitting),
+            Ok(_) | Err(ContourError::TooThin { .. }) => {}
+            Err(other) => return Err(other),
+        }
+    }
+    at(finest)
+}
+
+fn contour_error(error: ContourError, diagonal: f64) -> String {
+    match error {
+        ContourError::TooFine { tolerance, most, feasible } => format!(
+            "--tolerance {} needs more than {most} tetrahedra, or finer ones than there are; \
+             --tolerance {:.1e} is feasible",
+            tolerance / diagonal,
+            feasible / diagonal
+        ),
+        ContourError::TooThin { feasible, .. } => format!(
+            "no sphere is thick enough to show; --tolerance {:.1e} would show the largest",
+            feasible / diagonal
+        ),
+        other => other.to_string(),
+    }
+}

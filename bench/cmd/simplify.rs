@@ -1,0 +1,500 @@
+//! `medial simplify MESH --method ID -o x.ma`: one method, one mesh.
+
+use std::io;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use medial::complex::MedialMesh;
+use medial::metrics::{JudgeOptions, MetricError, topology_warning};
+use medial::shape::Shape;
+use medial::simplifier::{
+    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError,
+};
+use medial::surface::TriMesh;
+use medial::{complex, surface};
+use medial_methods::aof::LatticeVoxels;
+use medial_methods::tam_heidrich::{OuterPoles, PartInfo, RemainingPoles};
+use medial_methods::{aof, tam_heidrich};
+use medial_reports::{Simplify, Status};
+use serde::Serialize;
+use serde_json::json;
+
+use crate::args::{
+    AxisArguments, Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options,
+    params, shape_options,
+};
+use crate::cmd::methods::method;
+use crate::cmd::reconstruct::COINCIDENT;
+use crate::exit::{Exit, Failure};
+use crate::files::{SURFACES, check_extension, check_folder, check_output, medial_mesh_for};
+use crate::measure::answer::{Fault, LevelRun, answer};
+use crate::measure::fill_result;
+use crate::measure::search::{Probe, Search};
+use crate::output::{counted, note, print_json, print_line, version};
+use crate::progress::StageLine;
+use crate::study::external::percent;
+use crate::study::registry::{Entry, Registry};
+use crate::study::source::{Input, Source};
+
+/// Arguments of `simplify`.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
+    mesh: MeshArgument,
+    /// Id of the method; `medial methods` lists them.
+    #[arg(long, short, value_name = "ID")]
+    method: String,
+    /// Number of spheres.
+    #[arg(long, value_name = "N", conflicts_with_all = ["level", "max_error"])]
+    spheres: Option<usize>,
+    /// The method's own level, in its own unit.
+    #[arg(long, value_name = "X", conflicts_with = "max_error", allow_negative_numbers = true)]
+    level: Option<f64>,
+    /// As few spheres as keep the symmetric Hausdorff error within this fraction of the diagonal.
+    #[arg(long, value_name = "E")]
+    max_error: Option<f64>,
+    /// Hold that bound by a certificate, not by samples alone.
+    #[arg(long, requires = "max_error")]
+    certify: bool,
+    /// Set a parameter of the method; can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Start from this medial mesh instead of the Voronoi one.
+    #[arg(long, value_name = "Y.ma")]
+    initial: Option<PathBuf>,
+    #[command(flatten)]
+    fitting: AxisArguments,
+    #[command(flatten)]
+    outputs: Outputs,
+    #[command(flatten)]
+    substrate: SubstrateArguments,
+    #[command(flatten)]
+    measure: MeasureArguments,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the input is refused, the level is not met at all, or the output cannot be written.
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
+    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
+    let entry = method(registry, &arguments.method)?;
+    let method = entry.method();
+    let options = shape_options(&arguments.substrate)?;
+    check_bound(arguments)?;
+    arguments.outputs.check(method)?;
+    let line = StageLine::new(global.stages());
+    line.at("reading");
+    let input = Input::load(&source)?;
+    let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
+    let mut warnings = input.report.warnings.clone();
+    if let Some(path) = &arguments.initial {
+        let (initial, notes) = medial_mesh_for(path, &shape, &arguments.fitting)?.0.with_remarks();
+        warnings.extend(notes);
+        shape = shape.with_initial(&initial);
+    }
+    let params = params(&arguments.set)?;
+    let start = Start { entry, params, shape: &shape };
+    let (run, search) = simplify(arguments, &start, &input, &line)?;
+    let mut simplify = describe(arguments, &start, &run);
+    let simplified = run.outcome.map_err(|fault| failure(&source, fault))?;
+    line.at("checking the topology");
+    simplify.warnings.extend(shape.sampling_warning().map(str::to_owned));
+    simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
+    line.at("writing");
+    arguments.outputs.write(&simplified, &shape)?;
+    drop(line);
+    if global.json {
+        let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
+        let extras = &simplified.extras;
+        if let Some(search) = &search {
+            object["max_error"] = serde_json::to_value(search).map_err(Failure::input)?;
+        }
+        if let Some(parts) = extras.get::<Vec<PartInfo>>() {
+            object["parts"] = in_input_units(parts, &shape).map_err(Failure::input)?;
+        }
+        if let Some(voxels) = extras.get() {
+            object["voxels"] = describe_voxels(voxels, &shape);
+        }
+        print_json(&object, &warnings);
+    } else {
+        print_result(&simplify, search.as_ref(), arguments, global);
+        if let Some(parts) = simplified.extras.get::<Vec<PartInfo>>() {
+            print_line(&format!("  {}, listed by --json", counted(parts.len() as u64, "part")));
+        }
+        for warning in simplify.warnings.iter().chain(&warnings) {
+            print_line(&format!("  warning: {warning}"));
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// What is to be said where the result, or what it was made from, has not the solid's topology.
+fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
+    let expected = shape.expected_betti();
+    let Some(own) = topology_warning(complex::betti(result), expected) else { return Vec::new() };
+    let initial = shape.initial().ok();
+    let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
+    let start = start.map(|start| {
+        format!("the initial medial mesh is not right either ({start}); `--sampling auto` adds samples where it fails")
+    });
+    [Some(format!("the topology is not the solid's: {own}")), start].into_iter().flatten().collect()
+}
+
+/// The list of parts with their centres as in the input.
+fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde_json::Value> {
+    let back = shape.normalisation();
+    let carried = |part: &PartInfo| PartInfo {
+        centre: back.backward(part.centre.into()).to_array(),
+        ..part.clone()
+    };
+    serde_json::to_value(parts.iter().map(carried).collect::<Vec<_>>())
+}
+
+/// What a method starts from.
+struct Start<'a> {
+    entry: &'a Entry,
+    params: Params,
+    shape: &'a Shape,
+}
+
+impl<'a> Start<'a> {
+    /// Begins on a view of the shape.
+    fn begin<'v>(
+        &self,
+        view: &'v Shape,
+        run: &RunContext,
+    ) -> Result<Box<dyn Simplification + 'v>, SimplifyError> {
+        self.entry.method().prepare(view, &self.params, run)
+    }
+
+    /// Number of spheres that the method starts from.
+    fn spheres(&self) -> Result<usize, SimplifyError> {
+        Ok(self.shape.initial()?.spheres.len())
+    }
+}
+
+/// Runs the method at the level that is asked, or at the one that a search finds.
+fn simplify(
+    arguments: &Arguments,
+    start: &Start<'_>,
+    input: &Input,
+    line: &StageLine,
+) -> Result<(LevelRun, Option<Searched>), Failure> {
+    let seed = arguments.substrate.seed();
+    let run = RunContext::with_seed(seed).on_progress(line.steps());
+    let (level, search) = match (arguments.spheres, arguments.level, arguments.max_error) {
+        (Some(count), ..) => (Level::Spheres(count), None),
+        (_, Some(value), _) => (Level::Native(value), None),
+        (.., Some(bound)) => {
+            // The seconds are those of the level found, asked alone.
+            let (level, search) = search_bound(arguments, start, input, (bound, line))?;
+            (level, Some(search))
+        }
+        _ => (Level::Published, None),
+    };
+    line.at(format!("preparing {}", arguments.method));
+    let view = start.shape.view();
+    let mut runs = answer(
+        &view,
+        start.entry.method().info(),
+        || start.begin(&view, &run),
+        &[level],
+        |level| {
+            line.at(format!("simplifying to {level} by {}", arguments.method));
+        },
+    );
+    let run = runs.pop().ok_or_else(|| Failure::input("no level was run"))?;
+    Ok((run, search))
+}
+
+fn describe(arguments: &Arguments, start: &Start<'_>, run: &LevelRun) -> Simplify {
+    let times = &run.times;
+    let mut simplify = Simplify {
+        params: start.params.clone(),
+        seed: arguments.substrate.seed(),
+        substrates: times
+            .substrates
+            .iter()
+            .map(|(substrate, cost)| (substrate.name().to_owned(), cost.seconds))
+            .collect(),
+        seconds: Some(times.seconds()),
+        cpu_seconds: Some(times.cpu_seconds()),
+        peak_bytes: Some(times.peak_bytes),
+        threads: Some(rayon::current_num_threads()),
+        version: version().to_owned(),
+        ..Simplify::asked(&arguments.method, run.level, Status::Ok)
+    };
+    if let Ok(result) = &run.outcome {
+        fill_result(&mut simplify, result);
+    }
+    simplify
+}
+
+fn failure_of(input: &Input, fault: Fault) -> Failure {
+    failure_named(&input.name, fault)
+}
+
+fn failure(source: &Source, fault: Fault) -> Failure {
+    failure_named(&source.to_string(), fault)
+}
+
+fn failure_named(name: &str, Fault { status, reason }: Fault) -> Failure {
+    match status {
+        Status::Unsupported => Failure { code: Exit::SomeFailed, message: reason },
+        Status::Refused => Failure::usage(reason),
+        _ => Failure::input(format!("{name}: {reason}")),
+    }
+}
+
+fn print_result(
+    simplify: &Simplify,
+    search: Option<&Searched>,
+    arguments: &Arguments,
+    global: &Global,
+) {
+    let seconds = simplify.seconds.unwrap_or_default();
+    print_line(&format!(
+        "{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
+        simplify.method,
+        counted(simplify.spheres.unwrap_or(0) as u64, "sphere"),
+        counted(simplify.edges.unwrap_or(0) as u64, "edge"),
+        counted(simplify.faces.unwrap_or(0) as u64, "face"),
+        seconds.substrate,
+        seconds.prepare,
+        seconds.simplify
+    ));
+    if let Some(level) = simplify.native_level {
+        print_line(&format!("  native level {level}"));
+    }
+    if let Some(search) = search {
+        print_line(&format!(
+            "  Hausdorff error {}{}, the fewest spheres of {} tried",
+            if search.certified { "at most " } else { "" },
+            percent(search.hausdorff),
+            counted(search.tried as u64, "level")
+        ));
+    }
+    let written = arguments.outputs.written();
+    written.iter().for_each(|line| print_line(&format!("  {line}")));
+    if written.is_empty() {
+        note(global, "medial: the result was not written; -o FILE.ma keeps it");
+    }
+}
+
+/// What a search over sphere counts found, for the answer to `--max-error`.
+#[derive(Debug, Serialize)]
+struct Searched {
+    /// The bound, a fraction of the diagonal.
+    bound: f64,
+    /// The error of the result.
+    hausdorff: f64,
+    /// Number of levels that were tried.
+    tried: usize,
+    /// Spheres of the result.
+    spheres: usize,
+    /// Whether the error is the upper end of a certified interval, or else a maximum of samples.
+    certified: bool,
+}
+
+/// Width of the interval that certifies a bound, as a share of it.
+const CERTIFIED_SHARE: f64 = 0.05;
+
+/// Refuses a bound that is none, before anything is read.
+fn check_bound(arguments: &Arguments) -> Result<(), Failure> {
+    match arguments.max_error {
+        Some(bound) if !(bound.is_finite() && bound > 0.0) => {
+            let message = format!("--max-error {bound}: a positive fraction of the diagonal");
+            Err(Failure::usage(message))
+        }
+        // The whole solid is within one diagonal of anything inside it.
+        Some(bound) if bound >= 1.0 => Err(Failure::usage(format!(
+            "--max-error {bound}: a fraction of the diagonal is meant, and this is {} % of it; \
+             write {} for {bound} %",
+            100.0 * bound,
+            bound / 100.0
+        ))),
+        Some(_) => judge_options(&arguments.measure, JudgeOptions::default(), 0).map(|_| ()),
+        None => Ok(()),
+    }
+}
+
+/// Searches the fewest spheres within an error bound.
+fn search_bound(
+    arguments: &Arguments,
+    start: &Start<'_>,
+    input: &Input,
+    (bound, line): (f64, &StageLine),
+) -> Result<(Level, Searched), Failure> {
+    let seed = arguments.substrate.seed();
+    let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
+    let refused = |error: SimplifyError| failure_of(input, error.into());
+    let judge = start.shape.judge(input.axis.as_ref(), options);
+    let judge = judge.map_err(|error| refused(error.into()))?;
+    let view = start.shape.view();
+    line.at(format!("preparing {}", arguments.method));
+    let run = RunContext::with_seed(seed).on_progress(line.steps());
+    let mut simplification = start.begin(&view, &run).map_err(refused)?;
+    let initial = start.spheres().map_err(refused)?;
+    let measure = |mesh: &MedialMesh| -> Result<f64, String> {
+        let told = |error: MetricError| error.to_string();
+        let sampled = judge.distances(mesh).map_err(told)?.hausdorff;
+        match arguments.certify && sampled <= bound {
+            // An upper end within the bound needs an interval that is narrow beside it.
+            true => Ok(judge.certify(mesh, CERTIFIED_SHARE * bound).map_err(told)?.upper),
+            false => Ok(sampled),
+        }
+    };
+    let trying = |level: Level| line.at(format!("searching the bound: {level}"));
+    let sweep = &start.entry.presentation().sweep;
+    let mut search = Search::new(simplification.as_mut(), sweep, initial, &measure, &trying);
+    let found = search.within(bound).map_err(refused)?;
+    let Some(Probe { level, spheres, error }) = found.within else {
+        return Err(Failure::usage(found.refusal(bound)));
+    };
+    let (tried, certified) = (found.tried, arguments.certify);
+    Ok((level, Searched { bound, hausdorff: error, tried, spheres, certified }))
+}
+
+/// Files to write.
+#[derive(Debug, Args)]
+struct Outputs {
+    /// The result (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Write the voxels with their distance and flux (.csv), for methods on a lattice.
+    #[arg(long, value_name = "FILE")]
+    voxels: Option<PathBuf>,
+    /// Write the power crust of the poles that are left (.ply, .off, .obj), for methods that prune
+    /// by parts.
+    #[arg(long, value_name = "FILE")]
+    power_crust: Option<PathBuf>,
+    /// Outer poles that this power crust takes.
+    #[arg(long, value_enum, default_value_t = Outer::All, requires = "power_crust")]
+    outer_poles: Outer,
+}
+
+/// Outer poles of a power crust.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Outer {
+    /// Those of all samples.
+    All,
+    /// Not those of removed features: sharper where the shape has corners.
+    Remaining,
+}
+
+impl Outputs {
+    /// Refuses what the method has not or what could not be written, before anything is computed.
+    ///
+    /// # Errors
+    /// When an extension is unknown, a folder not there, or the method has no such thing.
+    fn check(&self, method: &dyn MedialSimplifier) -> Result<(), Failure> {
+        let info = method.info();
+        let needs = |option: &str, extra: &str, what: &str| match info.has_extra(extra) {
+            true => Ok(()),
+            false => Err(Failure::usage(format!("{option}: {} has no {what}", info.id))),
+        };
+        check_output(self.output.as_deref())?;
+        if let Some(path) = &self.voxels {
+            needs("--voxels", aof::VOXELS, "voxels")?;
+            check_extension(path, &["csv"])?;
+            check_folder(path)?;
+        }
+        if let Some(path) = &self.power_crust {
+            needs("--power-crust", tam_heidrich::POLES, "poles")?;
+            check_extension(path, &SURFACES)?;
+            check_folder(path)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the requested files.
+    ///
+    /// # Errors
+    /// When the poles have no power crust, and then nothing is written, or when a file cannot be
+    /// written.
+    fn write(&self, result: &Simplified, shape: &Shape) -> Result<(), Failure> {
+        // Before anything is written: whether there is a crust shows only when it is made.
+        let crust = match (&self.power_crust, result.extras.get()) {
+            (Some(path), Some(poles)) => Some((path, self.crust(path, poles, shape)?)),
+            _ => None,
+        };
+        if let Some(path) = &self.output {
+            let back = shape.normalisation();
+            let mesh = result.mesh.transformed(back.diagonal, |p| back.backward(p));
+            complex::write(path, &mesh).map_err(Failure::input)?;
+        }
+        if let (Some(path), Some(voxels)) = (&self.voxels, result.extras.get::<LatticeVoxels>()) {
+            write_voxels(path, voxels, shape)?;
+        }
+        if let Some((path, crust)) = crust {
+            surface::write(path, &crust).map_err(Failure::input)?;
+        }
+        Ok(())
+    }
+
+    /// The power crust for the file `path`, in the units of the surface.
+    fn crust(
+        &self,
+        path: &Path,
+        poles: &RemainingPoles,
+        shape: &Shape,
+    ) -> Result<TriMesh, Failure> {
+        let outer = match self.outer_poles {
+            Outer::All => OuterPoles::All,
+            Outer::Remaining => OuterPoles::OfRemaining,
+        };
+        let of_file = |why: String| Failure::input(format!("{}: {why}", path.display()));
+        let crust = poles.power_crust(shape, outer).map_err(|error| of_file(error.to_string()))?;
+        let mut crust = surface::crust_surface(&crust, COINCIDENT).mesh;
+        if crust.faces.is_empty() {
+            return Err(of_file("no pole is left: nothing to make a surface of".into()));
+        }
+        let back = shape.normalisation();
+        crust.vertices.iter_mut().for_each(|vertex| *vertex = back.backward(*vertex));
+        Ok(crust)
+    }
+
+    /// What was written, a line each.
+    fn written(&self) -> Vec<String> {
+        let files = [
+            (&self.output, ""),
+            (&self.voxels, ", a point for each voxel"),
+            (&self.power_crust, ", the power crust of the poles that are left"),
+        ];
+        let written = files.into_iter().filter_map(|(path, what)| {
+            path.as_ref().map(|path| format!("written: {}{what}", path.display()))
+        });
+        written.collect()
+    }
+}
+
+/// Writes a line for each voxel: its centre and distance in the units of the surface, its flux, and
+/// its indices in the lattice.
+fn write_voxels(path: &Path, voxels: &LatticeVoxels, shape: &Shape) -> Result<(), Failure> {
+    let back = shape.normalisation();
+    let write = |out: &mut dyn Write| -> io::Result<()> {
+        writeln!(out, "x,y,z,distance,flux,i,j,k")?;
+        for voxel in &voxels.voxels {
+            let [x, y, z] = back.backward(voxels.centre(voxel)).to_array();
+            let ([i, j, k], distance) = (voxel.place, voxel.distance * back.diagonal);
+            writeln!(out, "{x},{y},{z},{distance},{},{i},{j},{k}", voxel.flux)?;
+        }
+        Ok(())
+    };
+    medial::write_atomically(path, |out| write(out))
+        .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+}
+
+/// The lattice of the voxels, for the JSON of the result.
+fn describe_voxels(voxels: &LatticeVoxels, shape: &Shape) -> serde_json::Value {
+    let back = shape.normalisation();
+    json!({
+        "count": voxels.voxels.len(),
+        "origin": back.backward(voxels.origin).to_array(),
+        "side": voxels.side * back.diagonal,
+        "size": voxels.size,
+        "betti": voxels.betti(),
+    })
+}

@@ -1,0 +1,219 @@
+//! The messages between the supervisor and a worker: JSON, one message per line.
+//!
+//! Requests go to the worker's standard input. Events come from its standard output, each on a line
+//! that begins with [`MARK`]. Methods may print there, too: lines without the mark are ignored.
+
+use std::io;
+use std::io::{Read, Write};
+use std::path::PathBuf;
+
+use medial_reports::{Record, Repetition, Target};
+use serde::{Deserialize, Serialize};
+
+use crate::check::Outcome;
+use crate::measure::answer::Fault;
+use crate::provenance::Provenance;
+use crate::study::item::{Item, Limits, MethodSpec};
+
+/// The record separator of ASCII, with which no printed text begins.
+const MARK: u8 = 0x1e;
+
+/// A longer line is not a message.
+const MAX_LINE_BYTES: usize = 64 << 20;
+
+/// A request to a worker.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub enum Request {
+    /// Run all levels of an item, measure, and give records.
+    Run {
+        /// The item.
+        item: Item,
+        /// Folder for results as `.ma`.
+        axes: Option<PathBuf>,
+        /// The machine and the command, for the records.
+        provenance: Box<Provenance>,
+    },
+    /// Prepare the method of an item on a very small shape, to check its parameters.
+    Probe {
+        /// The item.
+        item: Item,
+    },
+    /// Time all levels of an item once more.
+    Again {
+        /// The item.
+        item: Item,
+    },
+    /// Run one case of the conformance corpus on a method.
+    Check(CheckItem),
+}
+
+impl Request {
+    /// The item of the request, if it has one.
+    pub fn item(&self) -> Option<&Item> {
+        match self {
+            Self::Run { item, .. } | Self::Probe { item } | Self::Again { item } => Some(item),
+            Self::Check(_) => None,
+        }
+    }
+
+    /// The threads of the worker that serves it, and its limits.
+    pub fn terms(&self) -> (usize, Limits) {
+        match self {
+            Self::Run { item, .. } | Self::Probe { item } | Self::Again { item } => {
+                (item.threads, item.limits)
+            }
+            Self::Check(item) => (item.threads, item.limits),
+        }
+    }
+}
+
+/// One case of the conformance corpus on one method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CheckItem {
+    /// The method.
+    pub method: MethodSpec,
+    /// Name of the case.
+    pub case: String,
+    /// Number of threads.
+    pub threads: usize,
+    /// The limits at which the case is killed.
+    pub limits: Limits,
+}
+
+/// A message from a worker.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub enum Event {
+    /// The input is being read and prepared.
+    Loading,
+    /// The input is ready, its SHA-256; the method prepares.
+    Preparing(String),
+    /// The method is asked for a level.
+    Asked(Target),
+    /// The search for the fewest spheres within a bound begins; it is not timed as the method's work.
+    Searching(Target),
+    /// The results are being measured.
+    Measuring,
+    /// The input is refused: why.
+    Refused(String),
+    /// The method does not take its parameters: why.
+    WrongParameter(String),
+    /// The record of a level.
+    Record(Box<Record>),
+    /// The times of a repetition of a level, and a hash of its result.
+    Repeated(Target, Result<(Repetition, String), Fault>),
+    /// A case of the conformance corpus has reached this step.
+    Doing(String),
+    /// How the case ended.
+    Checked(Outcome),
+    /// The system has refused memory to the worker, which may end because of it.
+    OutOfMemory,
+    /// The request is done.
+    Finished,
+}
+
+/// Writes an event to standard output, where the supervisor reads.
+///
+/// # Errors
+/// When nobody reads any more.
+pub fn send(event: &Event) -> io::Result<()> {
+    let text = serde_json::to_string(event)?;
+    // One write, and a line break first: a method may have printed an unfinished line.
+    let line = [b"\n", &[MARK][..], text.as_bytes(), b"\n"].concat();
+    let mut out = io::stdout().lock();
+    out.write_all(&line)?;
+    out.flush()
+}
+
+/// Writes [`Event::OutOfMemory`] without an allocation and without a lock, from inside the allocator.
+pub fn send_out_of_memory() {
+    #[cfg(unix)]
+    let _ = rustix::io::write(rustix::stdio::stdout(), b"\n\x1e\"OutOfMemory\"\n");
+}
+
+/// Reads events until the stream ends. Other lines are ignored, however long.
+pub fn receive(mut from: impl Read, mut each: impl FnMut(Event)) {
+    let mut line = Vec::new();
+    let mut block = vec![0; 1 << 16];
+    loop {
+        let read = match from.read(&mut block) {
+            Ok(0) => return,
+            Ok(read) => read,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(_) => return,
+        };
+        let mut rest = &block[..read];
+        while let Some(end) = rest.iter().position(|&byte| byte == b'\n') {
+            line.extend_from_slice(&rest[..end]);
+            rest = &rest[end + 1..];
+            if let Some(event) = parse(&line) {
+                each(event);
+            }
+            line.clear();
+        }
+        // Memory stays bounded: neither other lines nor overlong messages are collected.
+        if line.is_empty() && rest.first() != Some(&MARK) {
+            // One blank marks the line as no message until it ends.
+            line.extend(rest.first().map(|_| b' '));
+        } else if line.first() == Some(&MARK) || line.is_empty() {
+            line.extend_from_slice(rest);
+        }
+        if line.len() > MAX_LINE_BYTES {
+            line.truncate(1);
+            line[0] = b' ';
+        }
+    }
+}
+
+fn parse(line: &[u8]) -> Option<Event> {
+    let message = line.strip_prefix(&[MARK])?;
+    serde_json::from_slice(message).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_event_that_is_written_without_an_allocation_is_an_event() {
+        assert!(matches!(parse(b"\x1e\"OutOfMemory\""), Some(Event::OutOfMemory)));
+    }
+
+    /// Gives a few bytes at a time.
+    struct Drops<'a>(&'a [u8], usize);
+
+    impl Read for Drops<'_> {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            let length = self.1.min(self.0.len()).min(buffer.len());
+            buffer[..length].copy_from_slice(&self.0[..length]);
+            self.0 = &self.0[length..];
+            Ok(length)
+        }
+    }
+
+    #[test]
+    fn messages_are_found_among_talk() {
+        let message = |event: &Event| {
+            let text = serde_json::to_string(event).unwrap();
+            [b"\n", &[MARK][..], text.as_bytes(), b"\n"].concat()
+        };
+        let talk: &[u8] = b"hello\n\x00\xff{\"Finished\": 1}\nno end of line";
+        let broken: &[u8] = b"\n\x1e{\"Refused\":\n";
+        let stream = [
+            talk,
+            &message(&Event::Refused("no mesh".into())),
+            broken,
+            talk,
+            &message(&Event::Finished),
+            talk,
+        ]
+        .concat();
+        for size in [1, 2, 7, 1000] {
+            let mut events = Vec::new();
+            receive(Drops(&stream, size), |event| events.push(event));
+            let [Event::Refused(why), Event::Finished] = &events[..] else {
+                panic!("{events:?}");
+            };
+            assert_eq!(why, "no mesh");
+        }
+    }
+}

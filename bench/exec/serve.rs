@@ -1,0 +1,301 @@
+//! The worker: a child process that runs items one after another and reports the results.
+//!
+//! It keeps the scene of its last item, so that substrates and judge are built once for all items
+//! of a mesh. It ends when its standard input ends, even in the middle of an item, because nobody
+//! waits for the answer then.
+
+use std::io::BufRead;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::mpsc;
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+use std::{io, thread};
+
+use medial::complex::MedialMesh;
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, MethodInfo, RunContext, Simplification, SimplifyError};
+use medial_reports::{Record, Status};
+
+use crate::check::{Outcome, Subject};
+use crate::exec::protocol::{CheckItem, Event, Request, send};
+use crate::measure::answer::{Bounds, Fault, LevelRun, answer, panic_message};
+use crate::measure::{Scene, failure_record, judge, mesh_hash, record, repetition};
+use crate::plugin::SCRATCH;
+use crate::provenance::Provenance;
+use crate::study::external::GIVEN;
+use crate::study::item::{Item, MethodSpec};
+use crate::study::registry::{Entry, Registry};
+use crate::study::source::{Input, Source};
+use crate::{check, process_tree};
+
+/// Serves requests until standard input ends. `bytes` is the memory limit of this process.
+pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
+    limit(bytes);
+    process_tree::become_worker();
+    medial::heap::on_refusal(crate::exec::protocol::send_out_of_memory);
+    let mut scene = None;
+    for request in requests() {
+        let served = match request {
+            Request::Run { item, axes, provenance } => {
+                run(registry, &mut scene, &item, axes.as_deref(), &provenance)
+            }
+            Request::Probe { item } => probe(registry, &item),
+            Request::Again { item } => again(registry, &mut scene, &item),
+            Request::Check(item) => put_to(registry, &item),
+        };
+        if served.and_then(|()| send(&Event::Finished)).is_err() {
+            break;
+        }
+    }
+    process_tree::end_descendants();
+    ExitCode::SUCCESS
+}
+
+/// Forbids core files and limits the memory: an allocation beyond the limit fails at once, while
+/// the supervisor might notice too late. On systems without such a limit only the supervisor watches.
+fn limit(bytes: u64) {
+    #[cfg(unix)]
+    {
+        use rlimit::Resource;
+        let _ = Resource::CORE.set(0, 0);
+        // The hard limit stays: programs that the worker starts are watched by the supervisor alone.
+        #[cfg(target_os = "linux")]
+        let _ =
+            Resource::DATA.get_hard().and_then(|hard| Resource::DATA.set(bytes.min(hard), hard));
+    }
+    let _ = bytes;
+}
+
+/// The requests, until standard input ends. It is read by a thread of its own, so that its end is
+/// noticed in the middle of an item.
+fn requests() -> Receiver<Request> {
+    let (sender, receiver) = mpsc::channel();
+    thread::spawn(move || {
+        for line in io::stdin().lock().lines() {
+            let request = line.ok().and_then(|line| serde_json::from_str(&line).ok());
+            let Some(request) = request else { break };
+            if sender.send(request).is_err() {
+                break;
+            }
+        }
+        drop(sender);
+        // An idle worker gets the time to end by itself.
+        thread::sleep(Duration::from_millis(200));
+        process_tree::end_descendants();
+        // The supervisor removes it, too, unless it was killed.
+        if let Some(scratch) = std::env::var_os(SCRATCH) {
+            let _ = std::fs::remove_dir_all(scratch);
+        }
+        std::process::exit(0);
+    });
+    receiver
+}
+
+/// The scene of an item: the present one if it fits, else a new one.
+fn enter<'s>(scene: &'s mut Option<Scene>, item: &Item) -> Result<&'s mut Scene, String> {
+    if !scene.as_ref().is_some_and(|scene| scene.serves(&item.scene)) {
+        // Drop the old scene first, so that two never share the memory.
+        *scene = None;
+        *scene = Some(Scene::load(&item.scene)?);
+    }
+    let scene = scene.as_mut().expect("just made");
+    scene.set_noise(item.scene.noise)?;
+    Ok(scene)
+}
+
+fn run(
+    registry: &Registry,
+    scene: &mut Option<Scene>,
+    item: &Item,
+    axes: Option<&Path>,
+    provenance: &Provenance,
+) -> io::Result<()> {
+    send(&Event::Loading)?;
+    let scene = match enter(scene, item) {
+        Ok(scene) => scene,
+        Err(why) => return send(&Event::Refused(why)),
+    };
+    send(&Event::Preparing(scene.input.hash.clone()))?;
+    let report = |runs: &[LevelRun]| -> io::Result<()> {
+        send(&Event::Measuring)?;
+        for (run, verdict) in runs.iter().zip(judge(scene, runs)) {
+            let record = record(item, scene, run, verdict, provenance, axes);
+            let record =
+                if survives_json(&record) { record } else { unreadable(item, run, provenance) };
+            send(&Event::Record(Box::new(record)))?;
+        }
+        Ok(())
+    };
+    let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
+    if !levels.is_empty() {
+        report(&answer_levels(registry, item, scene, &levels))?;
+    }
+    // Each bound is recorded before the next, tighter one is searched: a method that ends its worker
+    // at a tight bound loses none of the looser ones.
+    answer_bounds(registry, item, scene, &mut |run| report(std::slice::from_ref(&run)))
+}
+
+/// Whether a record reads back as it is: JSON has no infinity and no NaN, and writes `null`.
+fn survives_json(record: &Record) -> bool {
+    let text = serde_json::to_string(record).unwrap_or_default();
+    serde_json::from_str::<Record>(&text).is_ok_and(|back| back == *record)
+}
+
+/// The record that replaces one that cannot be read back.
+fn unreadable(item: &Item, run: &LevelRun, provenance: &Provenance) -> Record {
+    let reason = "a number of its record is not finite".to_owned();
+    let fault = Fault { status: Status::InvalidOutput, reason };
+    failure_record(item, run.level, &fault, provenance)
+}
+
+fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Result<()> {
+    send(&Event::Loading)?;
+    let scene = match enter(scene, item) {
+        Ok(scene) => scene,
+        Err(why) => return send(&Event::Refused(why)),
+    };
+    send(&Event::Preparing(scene.input.hash.clone()))?;
+    let report = |LevelRun { level, outcome, times }: LevelRun| {
+        let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
+        send(&Event::Repeated(level, outcome))
+    };
+    let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
+    for run in answer_levels(registry, item, scene, &levels) {
+        report(run)?;
+    }
+    answer_bounds(registry, item, scene, &mut |run| report(run))
+}
+
+/// Prepares the method of an item on a very small shape.
+fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
+    let resolution = medial_datasets::find("sphere").map(|shape| *shape.resolutions().start());
+    let source = Source::BuiltIn { id: "sphere".into(), resolution };
+    let Ok(input) = Input::load(&source) else { return Ok(()) };
+    let Ok(shape) = input.shape(ShapeOptions::default()) else { return Ok(()) };
+    send(&Event::Preparing(input.hash))?;
+    let Ok(entry) = find(registry, &item.method) else { return Ok(()) };
+    let method = entry.method();
+    let context = RunContext::with_seed(item.seed);
+    // A panic is reported by the run itself, not here.
+    let prepared = catch_unwind(AssertUnwindSafe(|| {
+        method.prepare(&shape, &item.method.params, &context).map(|_| ())
+    }));
+    match prepared {
+        Ok(Err(error @ SimplifyError::Parameter(_))) => {
+            send(&Event::WrongParameter(error.to_string()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The results of an item's method at some of its levels.
+fn answer_levels(
+    registry: &Registry,
+    item: &Item,
+    scene: &Scene,
+    levels: &[Level],
+) -> Vec<LevelRun> {
+    let entry = find(registry, &item.method);
+    let context = RunContext::with_seed(item.seed);
+    let unknown = MethodInfo::default();
+    let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
+    let view = scene.shape().view();
+    let prepare = || match &entry {
+        Ok(entry) => entry.method().prepare(&view, &item.method.params, &context),
+        Err(why) => Err(SimplifyError::Failed(why.clone())),
+    };
+    // The supervisor notices by itself when the pipe is closed.
+    answer(&view, info, prepare, levels, |level| drop(send(&Event::Asked(level.into()))))
+}
+
+/// The results of an item's method for its error bounds, from the loosest to the tightest. Each goes
+/// to `each` before the next search begins.
+fn answer_bounds(
+    registry: &Registry,
+    item: &Item,
+    scene: &Scene,
+    each: &mut dyn FnMut(LevelRun) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut bounds: Vec<f64> =
+        item.levels.iter().filter_map(|target| target.level().err()).collect();
+    if bounds.is_empty() {
+        return Ok(());
+    }
+    bounds.sort_by(|a, b| b.total_cmp(a));
+    let entry = find(registry, &item.method);
+    let context = RunContext::with_seed(item.seed);
+    let prepare = preparing(|view| match &entry {
+        Ok(entry) => entry.method().prepare(view, &item.method.params, &context),
+        Err(why) => Err(SimplifyError::Failed(why.clone())),
+    });
+    let unknown = MethodInfo::default();
+    let measure = |mesh: &MedialMesh| {
+        let distances = scene.judge.distances(&scene.carried(mesh));
+        distances.map(|distances| distances.hausdorff).map_err(|error| error.to_string())
+    };
+    let search = Bounds {
+        shape: scene.shape(),
+        info: entry.as_ref().map_or(&unknown, |entry| entry.method().info()),
+        sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation().sweep),
+        prepare: &prepare,
+        measure: &measure,
+        searching: &|bound| drop(send(&Event::Searching(bound))),
+    };
+    search.answer(&bounds, each)
+}
+
+/// Returns its argument, a closure that starts a simplification on any view. Passing the closure
+/// through this function makes the compiler infer its lifetimes.
+fn preparing<F>(begin: F) -> F
+where
+    F: for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError>,
+{
+    begin
+}
+
+/// Runs one case of the conformance corpus on a method.
+fn put_to(registry: &Registry, item: &CheckItem) -> io::Result<()> {
+    send(&Event::Doing("starting".into()))?;
+    let outcome = match (find(registry, &item.method), check::find(&item.case)) {
+        (Err(why), _) => Outcome::Failed(why),
+        (_, None) => Outcome::Failed(format!("no case is called `{}`", item.case)),
+        (Ok(entry), Some(case)) => {
+            let subject = Subject {
+                method: entry.method(),
+                params: &item.method.params,
+                external: entry.fingerprint().is_some(),
+                // The supervisor notices by itself when the pipe is closed.
+                doing: &|what| drop(send(&Event::Doing(what.to_owned()))),
+            };
+            let run = catch_unwind(AssertUnwindSafe(|| case.run(&subject)));
+            run.unwrap_or_else(|payload| Outcome::Failed(panic_message(payload.as_ref())))
+        }
+    };
+    send(&Event::Checked(outcome))
+}
+
+/// The method of an item, which must be the one that it was planned with.
+fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, String> {
+    let id = &method.id;
+    let entry = registry.entry(id).ok_or_else(|| format!("no method is called `{id}`"))?;
+    let now = if id == GIVEN {
+        crate::study::external::fingerprint(&method.params)
+    } else {
+        entry.fingerprint().map(str::to_owned)
+    };
+    if now != method.fingerprint {
+        let what = if id == GIVEN { "its file" } else { "its plug-in file or program" };
+        let label = method.label();
+        return Err(format!("{label}: {what} has changed since the run was planned"));
+    }
+    Ok(entry)
+}
+
+impl Fault {
+    /// Whether a worker that reported this may be in a broken state.
+    pub fn taints(&self) -> bool {
+        self.status == Status::Panicked
+    }
+}

@@ -1,0 +1,190 @@
+//! A worker from the supervisor's side: a child process, its events, its last words, its end.
+
+use std::collections::VecDeque;
+use std::io::{Read, Write};
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::{Duration, Instant};
+use std::{io, thread};
+
+use tempfile::TempDir;
+
+use crate::exec::protocol::{Event, Request, receive};
+use crate::host;
+use crate::host::Host;
+use crate::plugin::SCRATCH;
+use crate::process_tree::Tree;
+
+/// Bytes kept of a worker's standard error: its last words.
+const LAST_WORDS: usize = 16 << 10;
+/// Longest wait for the end of standard error after the worker has ended.
+const LONGEST_DRAIN: Duration = Duration::from_secs(5);
+
+/// How a worker is started. Another item can use it only if its options are the same.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WorkerOptions {
+    /// The program; the running one unless given.
+    pub program: Option<PathBuf>,
+    /// Threads of its pool.
+    pub threads: usize,
+    /// Limit of memory, in bytes.
+    pub bytes: u64,
+    /// Plug-in files.
+    pub plugins: Vec<PathBuf>,
+}
+
+/// A running worker.
+pub struct Worker {
+    child: Child,
+    tree: Tree,
+    requests: Option<ChildStdin>,
+    events: Receiver<Event>,
+    last_words: Arc<Mutex<VecDeque<u8>>>,
+    /// Disconnected once standard error has ended.
+    closed: Receiver<()>,
+    /// Folder for the files of the programs that it starts; removed with the worker, however that
+    /// ends.
+    _scratch: TempDir,
+    /// How it was started.
+    pub options: WorkerOptions,
+}
+
+/// The next message of a worker.
+pub enum Said {
+    /// An event.
+    Event(Box<Event>),
+    /// Nothing yet.
+    Nothing,
+    /// Nothing any more: the process has ended, or closed its output.
+    Gone,
+}
+
+impl Worker {
+    /// Starts a worker: the running program, with the verb `worker`.
+    ///
+    /// # Errors
+    /// When the process cannot be started.
+    pub fn start(options: WorkerOptions) -> io::Result<Self> {
+        let mut command = match &options.program {
+            Some(program) => host::named(Command::new(program)),
+            None => Host::here()?.command(),
+        };
+        command.arg("worker").arg("--threads").arg(options.threads.to_string());
+        command.arg("--bytes").arg(options.bytes.to_string());
+        for file in &options.plugins {
+            command.arg("--plugins").arg(file);
+        }
+        let scratch = tempfile::Builder::new().prefix("medial-").tempdir()?;
+        command.env(SCRATCH, scratch.path());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn()?;
+        let pipe = || io::Error::other("a pipe of the worker is missing");
+        let requests = child.stdin.take().ok_or_else(pipe)?;
+        let output = child.stdout.take().ok_or_else(pipe)?;
+        let errors = child.stderr.take().ok_or_else(pipe)?;
+        let (sender, events) = mpsc::channel();
+        thread::spawn(move || {
+            receive(output, |event| {
+                // Nobody listens once the worker is given up.
+                let _ = sender.send(event);
+            });
+        });
+        let last_words = Arc::new(Mutex::new(VecDeque::new()));
+        let kept = Arc::clone(&last_words);
+        let (closing, closed) = mpsc::channel();
+        thread::spawn(move || {
+            keep_last(errors, &kept);
+            drop(closing);
+        });
+        let tree = Tree::of(&child);
+        let requests = Some(requests);
+        Ok(Self { child, tree, requests, events, last_words, closed, _scratch: scratch, options })
+    }
+
+    /// Sends a request.
+    ///
+    /// # Errors
+    /// When the worker no longer reads.
+    pub fn ask(&mut self, request: &Request) -> io::Result<()> {
+        let requests = self.requests.as_mut().ok_or(io::ErrorKind::BrokenPipe)?;
+        let mut line = serde_json::to_vec(request)?;
+        line.push(b'\n');
+        requests.write_all(&line)?;
+        requests.flush()
+    }
+
+    /// The next event, if it comes within `patience`.
+    pub fn listen(&self, patience: Duration) -> Said {
+        match self.events.recv_timeout(patience) {
+            Ok(event) => Said::Event(Box::new(event)),
+            Err(RecvTimeoutError::Timeout) => Said::Nothing,
+            Err(RecvTimeoutError::Disconnected) => Said::Gone,
+        }
+    }
+
+    /// Resident bytes of the worker and of all processes that it started.
+    pub fn resident_bytes(&mut self) -> u64 {
+        self.tree.resident_bytes()
+    }
+
+    /// Ends the worker and everything that it started, by force, and gives its exit status.
+    pub fn end(mut self) -> Option<ExitStatus> {
+        self.tree.end(&mut self.child)
+    }
+
+    /// The exit status and the last words, once its output has ended. A process that only closed its
+    /// output is killed.
+    pub fn collect(mut self) -> (Option<ExitStatus>, String) {
+        let deadline = Instant::now() + Duration::from_millis(500);
+        let mut status = None;
+        while status.is_none() && Instant::now() < deadline {
+            status = self.child.try_wait().ok().flatten();
+            if status.is_none() {
+                thread::sleep(Duration::from_millis(2));
+            }
+        }
+        let killed = self.tree.end(&mut self.child);
+        // Everything that could hold the pipe is dead, so its end comes at once; the bound is for a
+        // process that waits for a disk.
+        let _ = self.closed.recv_timeout(LONGEST_DRAIN);
+        (status.or(killed), self.last_words())
+    }
+
+    /// The end of what it wrote on standard error.
+    fn last_words(&self) -> String {
+        let kept = self.last_words.lock().expect("no panic while held");
+        let bytes: Vec<u8> = kept.iter().copied().collect();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+}
+
+impl Drop for Worker {
+    /// An idle worker ends by itself once its standard input ends; a busy one is ended.
+    fn drop(&mut self) {
+        drop(self.requests.take());
+        for _ in 0..100 {
+            if matches!(self.child.try_wait(), Ok(Some(_))) {
+                self.tree.end_orphans();
+                return;
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+        let _ = self.tree.end(&mut self.child);
+    }
+}
+
+fn keep_last(mut from: impl Read, kept: &Mutex<VecDeque<u8>>) {
+    let mut block = vec![0; 1 << 16];
+    while let Ok(read) = from.read(&mut block) {
+        if read == 0 {
+            return;
+        }
+        let mut kept = kept.lock().expect("no panic while held");
+        let new = &block[read.saturating_sub(LAST_WORDS)..read];
+        kept.extend(new);
+        let excess = kept.len().saturating_sub(LAST_WORDS);
+        kept.drain(..excess);
+    }
+}

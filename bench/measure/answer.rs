@@ -1,0 +1,327 @@
+//! First step of a run: a method answers, on the clock.
+//!
+//! This is the only place where methods are timed. [`answer`] prepares once and asks for every level,
+//! each guarded against panics. It gives a [`LevelRun`] for each: the mesh, the times, the memory.
+//! Measuring and writing come later and are not timed.
+
+use std::any::Any;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use medial::heap::Usage;
+use medial::shape::{Cost, Shape, Substrate};
+use medial::simplifier::{Level, MethodInfo, Simplification, Simplified, SimplifyError};
+use medial_reports::{Stages, Status, Target};
+use serde::{Deserialize, Serialize};
+
+use crate::measure::search::{Found, Measure, Search};
+
+/// The outcome of one level.
+pub struct LevelRun {
+    /// The target of the run.
+    pub level: Target,
+    /// The result, or why there is none.
+    pub outcome: Result<Simplified, Fault>,
+    /// The cost of the level, and of the substrates that it used.
+    pub times: Times,
+}
+
+/// Seconds and memory of one level, as if only this level had been asked.
+#[derive(Clone, Debug, Default)]
+pub struct Times {
+    /// The substrates that the method used, each with its cost, whoever built it.
+    pub substrates: Vec<(Substrate, Cost)>,
+    /// The method's own work that is the same for all levels.
+    pub prepare: Cost,
+    /// The work from there to this level.
+    pub simplify: Cost,
+    /// Peak of live bytes, with the substrates that the method used.
+    pub peak_bytes: u64,
+}
+
+impl Times {
+    /// Wall-clock seconds by stage.
+    pub fn seconds(&self) -> Stages {
+        self.stages(|cost| cost.seconds)
+    }
+
+    /// Processor seconds by stage.
+    pub fn cpu_seconds(&self) -> Stages {
+        self.stages(|cost| cost.cpu_seconds)
+    }
+
+    fn stages(&self, part: fn(&Cost) -> f64) -> Stages {
+        // A fold from +0, because an empty sum is -0 and prints as such.
+        let substrates = self.substrates.iter().fold(0.0, |sum, (_, cost)| sum + part(cost));
+        Stages::new(substrates, part(&self.prepare), part(&self.simplify))
+    }
+}
+
+/// Why a level has no result.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fault {
+    /// The kind of failure.
+    pub status: Status,
+    /// The reason, in a sentence.
+    pub reason: String,
+}
+
+impl From<SimplifyError> for Fault {
+    fn from(error: SimplifyError) -> Self {
+        let status = match &error {
+            SimplifyError::Unsupported { .. } => Status::Unsupported,
+            SimplifyError::Parameter(_) | SimplifyError::Level(_) => Status::Refused,
+            SimplifyError::InvalidOutput(_) => Status::InvalidOutput,
+            SimplifyError::Crashed(_) => Status::Panicked,
+            SimplifyError::Shape(_)
+            | SimplifyError::Hierarchy(_)
+            | SimplifyError::Failed(_)
+            | SimplifyError::Cancelled => Status::Failed,
+        };
+        Self { status, reason: error.to_string() }
+    }
+}
+
+/// Starts a simplification on a view of a shape and computes every level, given from fine to coarse
+/// within each kind. `on_level` gets each level before it is computed.
+///
+/// The seconds of a level are those of its call alone. Where `info` declares the method incremental,
+/// they are those of all calls since the preparation; levels of another kind, and a finer level after
+/// a coarser one, then get a preparation of their own, because they cannot continue.
+///
+/// The view must be fresh: everything that was used through it is listed as used.
+pub fn answer<'s>(
+    view: &Shape,
+    info: &MethodInfo,
+    start: impl Fn() -> Result<Box<dyn Simplification + 's>, SimplifyError>,
+    levels: &[Level],
+    on_level: impl Fn(Level),
+) -> Vec<LevelRun> {
+    let mut runs = Vec::new();
+    let mut rest = levels;
+    while let Some(&first) = rest.first() {
+        let mut previous = first;
+        let count = 1 + rest[1..]
+            .iter()
+            .take_while(|&&next| {
+                let goes_on = !info.incremental || continues(info, previous, next);
+                previous = next;
+                goes_on
+            })
+            .count();
+        let (together, others) = rest.split_at(count);
+        runs.extend(of_one_preparation(view, info.incremental, &start, together, &on_level));
+        rest = others;
+    }
+    runs
+}
+
+/// Whether a level can continue from another: one of the same kind that is no finer.
+fn continues(info: &MethodInfo, previous: Level, next: Level) -> bool {
+    match (previous, next) {
+        (Level::Spheres(before), Level::Spheres(count)) => count <= before,
+        (Level::Native(before), Level::Native(value)) => match &info.native {
+            Some(native) if native.larger_is_coarser => value >= before,
+            _ => value <= before,
+        },
+        _ => false,
+    }
+}
+
+/// Prepares once and computes all levels.
+fn of_one_preparation<'s>(
+    view: &Shape,
+    is_incremental: bool,
+    start: impl FnOnce() -> Result<Box<dyn Simplification + 's>, SimplifyError>,
+    levels: &[Level],
+    on_level: impl Fn(Level),
+) -> Vec<LevelRun> {
+    let before = view.spent();
+    let (started, mut prepare) = Cost::of(|| guarded(start));
+    // Substrates are shared between methods, so building them here is not the method's own work.
+    let built = view.spent();
+    prepare.seconds = (prepare.seconds - (built.seconds - before.seconds)).max(0.0);
+    prepare.cpu_seconds = (prepare.cpu_seconds - (built.cpu_seconds - before.cpu_seconds)).max(0.0);
+    // Substrates built here are still live; they are counted with those that were found.
+    prepare.usage = without(prepare.usage, without(built.usage, before.usage));
+    let held = prepare.usage.held_bytes;
+    let mut clock = Clock { view, is_incremental, prepare, so_far: Cost::default(), held };
+    let mut simplification = match started {
+        Ok(simplification) => simplification,
+        Err(fault) => {
+            let failed = |&level: &Level| LevelRun {
+                level: level.into(),
+                outcome: Err(fault.clone()),
+                times: clock.times(),
+            };
+            return levels.iter().map(failed).collect();
+        }
+    };
+    let mut broken: Option<Fault> = None;
+    let ask = |&level: &Level| {
+        let target = level.into();
+        if let Some(fault) = &broken {
+            return LevelRun { level: target, outcome: Err(fault.clone()), times: clock.times() };
+        }
+        on_level(level);
+        let (outcome, lap) = Cost::of(|| guarded(|| simplification.at(level)));
+        clock.add(lap);
+        let outcome = outcome.and_then(checked);
+        if matches!(&outcome, Err(fault) if fault.status == Status::Panicked) {
+            let reason = format!("not run: the method panicked at {level}");
+            broken = Some(Fault { status: Status::Panicked, reason });
+        }
+        LevelRun { level: target, outcome, times: clock.times() }
+    };
+    levels.iter().map(ask).collect()
+}
+
+/// The costs of levels, each as if it had been computed alone.
+struct Clock<'s> {
+    view: &'s Shape,
+    is_incremental: bool,
+    prepare: Cost,
+    so_far: Cost,
+    /// Live bytes of the method itself when the next level begins.
+    held: u64,
+}
+
+impl Clock<'_> {
+    fn add(&mut self, lap: Cost) {
+        let peak = self.held + lap.usage.peak_bytes;
+        self.held += lap.usage.held_bytes;
+        if self.is_incremental {
+            self.so_far.seconds += lap.seconds;
+            self.so_far.cpu_seconds += lap.cpu_seconds;
+            self.so_far.usage.peak_bytes = self.so_far.usage.peak_bytes.max(peak);
+        } else {
+            self.so_far = lap;
+            self.so_far.usage.peak_bytes = peak;
+        }
+    }
+
+    fn times(&self) -> Times {
+        let substrates = self.view.used();
+        // Built one after another: each adds its own bytes, and needs its peak on top of the others.
+        let mut built = Cost::default();
+        substrates.iter().for_each(|(_, cost)| built += *cost);
+        let Usage { held_bytes: held, peak_bytes: peak } = built.usage;
+        let own = self.prepare.usage.peak_bytes.max(self.so_far.usage.peak_bytes);
+        let peak_bytes = peak.max(held + own);
+        Times { substrates, prepare: self.prepare, simplify: self.so_far, peak_bytes }
+    }
+}
+
+fn without(all: Usage, part: Usage) -> Usage {
+    Usage {
+        held_bytes: all.held_bytes.saturating_sub(part.held_bytes),
+        peak_bytes: all.peak_bytes.saturating_sub(part.held_bytes),
+    }
+}
+
+/// A valid, non-empty result, or the fault.
+fn checked(simplified: Simplified) -> Result<Simplified, Fault> {
+    simplified.mesh.check().map_err(SimplifyError::from)?;
+    if simplified.mesh.spheres.is_empty() {
+        let why = simplified.diagnostics.warnings.join("; ");
+        let why = if why.is_empty() { why } else { format!(" ({why})") };
+        let reason = format!("the result has no sphere{why}; ask for a finer level");
+        return Err(Fault { status: Status::Failed, reason });
+    }
+    Ok(simplified)
+}
+
+/// The result of some work, with a panic turned into a fault.
+pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(outcome) => Ok(outcome?),
+        Err(payload) => {
+            Err(Fault { status: Status::Panicked, reason: panic_message(payload.as_ref()) })
+        }
+    }
+}
+
+/// The message of a panic.
+pub(crate) fn panic_message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
+    format!("panicked: {}", text.unwrap_or_else(|| "no message".into()))
+}
+
+/// Begins a simplification on a view.
+pub type Prepare<'a> =
+    dyn for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError> + 'a;
+
+/// A search for levels within error bounds.
+pub struct Bounds<'a> {
+    /// The shape.
+    pub shape: &'a Shape,
+    /// The description of the method.
+    pub info: &'a MethodInfo,
+    /// Native levels of its default comparison.
+    pub sweep: &'a [f64],
+    /// Starts the method.
+    pub prepare: &'a Prepare<'a>,
+    /// Measures results.
+    pub measure: &'a Measure<'a>,
+    /// Gets each bound before the search for it.
+    pub searching: &'a dyn Fn(Target),
+}
+
+impl Bounds<'_> {
+    /// A run for each bound, given from large to small: `each` gets it before the next search begins.
+    /// The seconds are those of the level found, without the search.
+    ///
+    /// # Errors
+    /// When `each` fails.
+    pub fn answer(
+        &self,
+        bounds: &[f64],
+        each: &mut dyn FnMut(LevelRun) -> io::Result<()>,
+    ) -> io::Result<()> {
+        let failed = |&bound: &f64, fault: &Fault| LevelRun {
+            level: Target::MaxError(bound),
+            outcome: Err(fault.clone()),
+            times: Times::default(),
+        };
+        let view = self.shape.view();
+        let begun = guarded(|| Ok((view.initial()?.spheres.len(), (self.prepare)(&view)?)));
+        let (most, mut simplification) = match begun {
+            Ok(begun) => begun,
+            Err(fault) => return bounds.iter().try_for_each(|bound| each(failed(bound, &fault))),
+        };
+        let mut search =
+            Search::new(simplification.as_mut(), self.sweep, most, self.measure, &|_| {});
+        let mut broken: Option<Fault> = None;
+        // The loosest bound first: the levels tried for it help the others.
+        for bound in bounds {
+            (self.searching)(Target::MaxError(*bound));
+            let found = match &broken {
+                Some(fault) => Err(fault.clone()),
+                None => guarded(|| search.within(*bound)),
+            };
+            let run = match found {
+                Ok(Found { within: Some(probe), .. }) => self.timed(probe.level, *bound),
+                Ok(found) => {
+                    let reason = found.refusal(*bound);
+                    failed(bound, &Fault { status: Status::BoundMissed, reason })
+                }
+                Err(fault) => {
+                    // A method that panicked is in no state to be asked again.
+                    broken = (fault.status == Status::Panicked).then(|| fault.clone());
+                    failed(bound, &fault)
+                }
+            };
+            each(run)?;
+        }
+        Ok(())
+    }
+
+    /// The timed run of the level that a search found.
+    fn timed(&self, level: Level, bound: f64) -> LevelRun {
+        let view = self.shape.view();
+        let runs = answer(&view, self.info, || (self.prepare)(&view), &[level], |_| {});
+        let run = runs.into_iter().next().expect("one level, one run");
+        LevelRun { level: Target::MaxError(bound), ..run }
+    }
+}

@@ -1,0 +1,406 @@
+//! From an output to a record: the scene of an item, the evaluation of its results, the record of each.
+//!
+//! Methods are timed in [`answer`](mod@answer) alone, and error bounds searched in [`search`]; nothing that is
+//! measured here counts as a method's time.
+
+pub mod answer;
+pub mod search;
+
+use std::path::Path;
+use std::time::Instant;
+
+use medial::complex::MedialMesh;
+use medial::metrics::{Evaluation, Judge, MetricError};
+use medial::shape::Shape;
+use medial::simplifier::Simplified;
+use medial::surface::{SurfaceReport, TriMesh};
+use medial::{complex, surface};
+use medial_reports::{
+    Conditions, Initial, Record, Repetition, Simplify, Stages, Status, Target, file_stem,
+};
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+
+use crate::measure::answer::{Fault, LevelRun, Times};
+use crate::plugin;
+use crate::plugin::ProgramPeak;
+use crate::provenance::{Provenance, hex};
+use crate::study::external::GIVEN;
+use crate::study::item::{Item, Measure, Noise, SceneSpec};
+use crate::study::source::Input;
+
+/// An input, ready to be simplified and measured, with noise or without.
+pub struct Scene {
+    /// What it was made from, noise aside.
+    spec: SceneSpec,
+    /// The input as it was read.
+    pub input: Input,
+    /// Measures results against the surface as it was read.
+    pub judge: Judge,
+    clean: Ready,
+    /// The shape with the noise that was asked last.
+    noisy: Option<(Noise, Ready)>,
+}
+
+/// A shape, and what is to be said of its initial medial mesh.
+struct Ready {
+    shape: Shape,
+    initial: Option<Initial>,
+}
+
+impl Ready {
+    fn new(shape: Shape) -> Self {
+        let initial = shape.view().initial().ok();
+        let initial = initial.map(|mesh| Initial::of(&mesh, shape.expected_betti()));
+        Self { shape, initial }
+    }
+}
+
+impl Scene {
+    /// Reads or makes the input, and builds what every item on it needs.
+    ///
+    /// # Errors
+    /// Why the input is refused, in a sentence that names it.
+    pub fn load(spec: &SceneSpec) -> Result<Self, String> {
+        let input = Input::load(&spec.source).map_err(|error| error.to_string())?;
+        if let Some(planned) = spec.hash.as_ref().filter(|&hash| *hash != input.hash) {
+            return Err(format!(
+                "{}: the file has changed since the run was planned (SHA-256 {}, not {planned})",
+                spec.source, input.hash
+            ));
+        }
+        let input = Input { name: spec.mesh.clone(), ..input };
+        let shape = input.shape(spec.shape_options()).map_err(|error| error.to_string())?;
+        let judge = shape
+            .judge(input.axis.as_ref(), spec.measure.judge_options())
+            .map_err(|error| error.to_string())?;
+        let clean = Ready::new(shape);
+        let spec = spec.without_noise();
+        Ok(Self { spec, input, judge, clean, noisy: None })
+    }
+
+    /// How results are measured.
+    pub fn measure(&self) -> Measure {
+        self.spec.measure
+    }
+
+    /// Whether items of this spec run here, noise aside.
+    pub fn serves(&self, spec: &SceneSpec) -> bool {
+        self.spec == spec.without_noise()
+    }
+
+    /// Displaces the vertices, or takes them as they are: without noise, or with one of 0.
+    ///
+    /// # Errors
+    /// Why the noisy surface is refused.
+    pub fn set_noise(&mut self, noise: Option<Noise>) -> Result<(), String> {
+        let noise = noise.filter(|noise| noise.eta > 0.0);
+        if self.noisy.as_ref().map(|(noise, _)| *noise) == noise {
+            return Ok(());
+        }
+        // The old one goes first, so that two are never there together.
+        self.noisy = None;
+        if let Some(noise) = noise {
+            let (mesh, report) = displaced(&self.input.mesh, noise)?;
+            let options = self.spec.shape_options();
+            let shape = Shape::new(self.input.name.clone(), &mesh, report, options);
+            let shape = shape.map_err(|error| error.to_string())?;
+            self.noisy = Some((noise, Ready::new(shape)));
+        }
+        Ok(())
+    }
+
+    /// The shape that methods run on.
+    pub fn shape(&self) -> &Shape {
+        &self.ready().shape
+    }
+
+    /// The initial medial mesh of that shape; `None` where there is none.
+    pub fn initial(&self) -> Option<Initial> {
+        self.ready().initial
+    }
+
+    fn ready(&self) -> &Ready {
+        self.noisy.as_ref().map_or(&self.clean, |(_, ready)| ready)
+    }
+
+    /// A result in the unit of the surface that it is measured against.
+    pub fn carried(&self, mesh: &MedialMesh) -> MedialMesh {
+        let Some((_, noisy)) = &self.noisy else { return mesh.clone() };
+        let (back, to) = (noisy.shape.normalisation(), self.clean.shape.normalisation());
+        mesh.transformed(back.diagonal / to.diagonal, |p| to.forward(back.backward(p)))
+    }
+
+    /// A result in the units of the input.
+    pub fn in_input_units(&self, mesh: &MedialMesh) -> MedialMesh {
+        let back = self.shape().normalisation();
+        mesh.transformed(back.diagonal, |p| back.backward(p))
+    }
+}
+
+/// A surface with its vertices displaced, or why that bounds no solid.
+fn displaced(mesh: &TriMesh, noise: Noise) -> Result<(TriMesh, SurfaceReport), String> {
+    let Noise { eta, seed } = noise;
+    let mesh = medial_datasets::add_noise(mesh, eta, seed);
+    let report = surface::validate(&mesh);
+    let report = report.map_err(|error| format!("with noise {eta}, seed {seed}: {error}"))?;
+    Ok((mesh, report))
+}
+
+impl SceneSpec {
+    fn without_noise(&self) -> Self {
+        Self { noise: None, ..self.clone() }
+    }
+}
+
+/// The measurements of one result.
+#[derive(Clone)]
+pub struct Verdict {
+    /// The evaluation; `None` if none was requested.
+    pub evaluation: Option<Result<Evaluation, MetricError>>,
+    /// Wall-clock seconds of the evaluation.
+    pub seconds: f64,
+    /// SHA-256 of the result.
+    pub hash: String,
+}
+
+/// Measures the results of all levels, in parallel. Equal results are measured once.
+pub fn judge(scene: &Scene, runs: &[LevelRun]) -> Vec<Option<Verdict>> {
+    let meshes: Vec<Option<&MedialMesh>> =
+        runs.iter().map(|run| run.outcome.as_ref().ok().map(|result| &result.mesh)).collect();
+    // The index of an earlier equal result, if there is one.
+    let first = |index: usize| meshes[..index].iter().position(|&m| m == meshes[index]);
+    let firsts: Vec<usize> = (0..meshes.len()).map(|index| first(index).unwrap_or(index)).collect();
+    let measure = |index: usize| {
+        let mesh = meshes[index].filter(|_| firsts[index] == index)?;
+        Some(judge_one(scene, mesh))
+    };
+    let measured: Vec<Option<Verdict>> = (0..meshes.len()).into_par_iter().map(measure).collect();
+    firsts.into_iter().map(|first| measured[first].clone()).collect()
+}
+
+fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
+    let measure = scene.measure();
+    let hash = mesh_hash(mesh);
+    let mesh = scene.carried(mesh);
+    let begun = Instant::now();
+    let evaluation = (measure.samples > 0).then(|| {
+        let certified =
+            measure.certify.map(|width| scene.judge.certify(&mesh, width)).transpose()?;
+        Ok(Evaluation { certified, ..scene.judge.evaluate(&mesh)? })
+    });
+    let seconds = begun.elapsed().as_secs_f64();
+    Verdict { evaluation, seconds, hash }
+}
+
+/// SHA-256 of spheres, edges and faces: equal for equal meshes only.
+pub fn mesh_hash(mesh: &MedialMesh) -> String {
+    let mut hasher = Sha256::new();
+    let counts = [mesh.spheres.len(), mesh.edges.len(), mesh.faces.len()];
+    counts.iter().for_each(|&count| hasher.update((count as u64).to_le_bytes()));
+    for sphere in &mesh.spheres {
+        let numbers = [sphere.centre.x, sphere.centre.y, sphere.centre.z, sphere.radius];
+        numbers.iter().for_each(|number| hasher.update(number.to_le_bytes()));
+    }
+    let indices = mesh.edges.as_flattened().iter().chain(mesh.faces.as_flattened());
+    indices.for_each(|index| hasher.update(index.to_le_bytes()));
+    hex(&hasher.finalize())
+}
+
+/// Largest relative difference between the number of spheres and the requested number at which a
+/// result still counts as having that number.
+const COUNT_TOLERANCE: f64 = 0.02;
+
+/// The record of a level that was not run, or did not finish.
+pub fn failure_record(
+    item: &Item,
+    level: Target,
+    fault: &Fault,
+    provenance: &Provenance,
+) -> Record {
+    let Fault { status, reason } = fault;
+    let simplify = Simplify {
+        variant: item.method.name.clone(),
+        params: item.method.params.clone(),
+        seed: item.seed,
+        threads: Some(item.threads),
+        version: provenance.version.clone(),
+        ..Simplify::asked(&item.method.id, level, *status)
+    };
+    let scene = &item.scene;
+    let seeds = [("method", item.seed), ("evaluation", scene.measure.seed)];
+    Record {
+        key: item.key(level),
+        mesh: scene.mesh.clone(),
+        dataset: scene.source.dataset().map(str::to_owned),
+        mesh_hash: scene.hash.clone(),
+        status: *status,
+        reason: Some(reason.clone()),
+        simplify,
+        evaluate: None,
+        evaluate_seconds: None,
+        initial: None,
+        conditions: Some(conditions(item)),
+        result_hash: None,
+        seeds: seeds.map(|(purpose, seed)| (purpose.to_owned(), seed)).into(),
+        repetitions: vec![],
+        machine: provenance.machine.clone(),
+        method_version: item.version.clone(),
+        binary_hash: item.binary.clone(),
+        command: provenance.command.clone(),
+        version: provenance.version.clone(),
+        artifact: None,
+    }
+}
+
+fn conditions(item: &Item) -> Conditions {
+    let scene = &item.scene;
+    Conditions {
+        sampling: scene.sampling.to_string(),
+        dual: scene.dual.to_string(),
+        samples: scene.measure.samples,
+        seconds_limit: item.limits.seconds,
+        bytes_limit: item.limits.bytes,
+        fingerprint: item.method.fingerprint.clone(),
+    }
+}
+
+/// The record of one level. If the folder `axes` is given, the result is saved there as `.ma` in input
+/// units; the path in the record begins with the name of this folder.
+pub fn record(
+    item: &Item,
+    scene: &Scene,
+    run: &LevelRun,
+    verdict: Option<Verdict>,
+    provenance: &Provenance,
+    axes: Option<&Path>,
+) -> Record {
+    let is_given = item.method.id == GIVEN;
+    let fault = match &run.outcome {
+        Ok(_) if is_given => Fault { status: Status::External, reason: String::new() },
+        Ok(result) => count_fault(run.level, result),
+        Err(fault) => fault.clone(),
+    };
+    let mut record = failure_record(item, run.level, &fault, provenance);
+    record.mesh_hash = Some(scene.input.hash.clone());
+    record.initial = scene.initial();
+    // To read a file says nothing of the time that its program took.
+    if !is_given {
+        fill_costs(&mut record, &run.times);
+    }
+    let Ok(result) = &run.outcome else { return record };
+    if record.status.is_ok() {
+        record.reason = None;
+    }
+    fill_result(&mut record.simplify, result);
+    record.simplify.warnings.extend(scene.shape().sampling_warning().map(str::to_owned));
+    if let Some(ProgramPeak(bytes)) = result.extras.get() {
+        // The program ran while this process held its input, so both peaks add up.
+        record.simplify.peak_bytes = Some(run.times.peak_bytes + bytes);
+    }
+    if let Some(Verdict { evaluation, seconds, hash }) = verdict {
+        record.result_hash = Some(hash);
+        match evaluation {
+            Some(Ok(evaluation)) => {
+                // The level found by a search was run again: only the error of this run counts.
+                if let Target::MaxError(bound) = run.level
+                    && evaluation.distances.hausdorff > bound
+                {
+                    let error = evaluation.distances.hausdorff;
+                    record.status = Status::BoundMissed;
+                    record.simplify.status = Status::BoundMissed;
+                    record.reason =
+                        Some(format!("the level found gives {error:.3e} when it is asked alone"));
+                }
+                record.evaluate = Some(evaluation);
+                record.evaluate_seconds = Some(seconds);
+            }
+            Some(Err(error)) => record.simplify.warnings.push(format!("not measured: {error}")),
+            None => {}
+        }
+    }
+    if let Some(axes) = axes {
+        match save(result, &record, scene, axes) {
+            Ok(artifact) => record.artifact = Some(artifact),
+            Err(error) => record.simplify.warnings.push(format!("not saved: {error}")),
+        }
+    }
+    record
+}
+
+/// Copies what the result cost.
+fn fill_costs(record: &mut Record, times: &Times) {
+    record.repetitions = vec![repetition(times)];
+    record.simplify.substrates =
+        times.substrates.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect();
+    record.simplify.seconds = Some(times.seconds());
+    record.simplify.cpu_seconds = Some(times.cpu_seconds());
+    record.simplify.peak_bytes = Some(times.peak_bytes);
+}
+
+/// Copies the facts of the result itself: counts, level, remarks.
+pub fn fill_result(simplify: &mut Simplify, result: &Simplified) {
+    let mesh = &result.mesh;
+    simplify.reached = Some(mesh.spheres.len());
+    simplify.native_level = result.native_level;
+    simplify.spheres = Some(mesh.spheres.len());
+    simplify.edges = Some(mesh.edges.len());
+    simplify.faces = Some(mesh.faces.len());
+    simplify.warnings.clone_from(&result.diagnostics.warnings);
+    simplify.diagnostics = result.diagnostics.counts.iter().cloned().collect();
+    simplify.own_seconds = result.extras.get().map(|&plugin::OwnSeconds { prepare, simplify }| {
+        medial_reports::OwnSeconds { prepare, simplify }
+    });
+}
+
+/// `ok`, or the fault of a result with another count than the requested one.
+fn count_fault(level: Target, result: &Simplified) -> Fault {
+    let reached = result.mesh.spheres.len();
+    match level {
+        Target::Spheres(asked)
+            if reached.abs_diff(asked) as f64 > COUNT_TOLERANCE * asked as f64 =>
+        {
+            let why = result.diagnostics.warnings.join("; ");
+            let why = if why.is_empty() { why } else { format!(": {why}") };
+            let reason = format!("{reached} spheres where {asked} were asked{why}");
+            Fault { status: Status::OtherCount, reason }
+        }
+        _ => Fault { status: Status::Ok, reason: String::new() },
+    }
+}
+
+/// One timed repetition.
+pub fn repetition(times: &Times) -> Repetition {
+    Repetition { seconds: times.seconds(), cpu_seconds: times.cpu_seconds() }
+}
+
+/// The stages of the repetition with the median total; the lower one of an even number.
+pub fn median(repetitions: &[Repetition], part: fn(&Repetition) -> Stages) -> Option<Stages> {
+    let mut stages: Vec<Stages> = repetitions.iter().map(part).collect();
+    stages.sort_by(|a, b| a.total.total_cmp(&b.total));
+    stages.get(stages.len().saturating_sub(1) / 2).copied()
+}
+
+/// Saves a result and returns its path from the folder above `axes`, with `/`.
+fn save(
+    result: &Simplified,
+    record: &Record,
+    scene: &Scene,
+    axes: &Path,
+) -> Result<String, Box<dyn std::error::Error>> {
+    let level = match record.simplify.level {
+        Target::Published => "published".to_owned(),
+        Target::Spheres(count) => count.to_string(),
+        Target::Native(value) => format!("level-{value}"),
+        Target::MaxError(bound) => format!("error-{bound}"),
+    };
+    let mesh = file_stem(&record.mesh);
+    let method = file_stem(record.simplify.variant.as_ref().unwrap_or(&record.simplify.method));
+    // The key covers everything else that affects the result: parameters, seed, sampling, build.
+    let key = &record.key[..12];
+    let name = format!("{method}-{level}-{key}.ma");
+    std::fs::create_dir_all(axes.join(&mesh))?;
+    complex::write(axes.join(&mesh).join(&name), &scene.in_input_units(&result.mesh))?;
+    let folder = axes.file_name().map_or_else(String::new, |name| name.to_string_lossy().into());
+    Ok(format!("{folder}/{mesh}/{name}"))
+}

@@ -1,0 +1,99 @@
+//! The origin of a record: machine, program, command line.
+
+use std::{env, fs, thread};
+
+use medial_reports::Machine;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::host::Host;
+use std::fmt::Write as _;
+
+/// The facts that are the same for every record of a run.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Provenance {
+    /// The machine.
+    pub machine: Machine,
+    /// SHA-256 of the running program.
+    pub binary_hash: String,
+    /// The command line.
+    pub command: String,
+    /// Version of the program.
+    pub version: String,
+}
+
+impl Provenance {
+    /// The provenance of the running process.
+    pub fn here() -> Self {
+        Self {
+            machine: machine(),
+            binary_hash: Host::here()
+                .and_then(|host| fs::read(&host.code))
+                .map_or_else(|_| String::new(), |bytes| hex_digest(&bytes)),
+            command: command_line(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
+}
+
+fn machine() -> Machine {
+    let memory = proc_field("/proc/meminfo", "MemTotal").and_then(|value| kibibytes(&value));
+    Machine {
+        cpu: proc_field("/proc/cpuinfo", "model name").unwrap_or_else(|| "unknown".into()),
+        cores: thread::available_parallelism().map_or(1, usize::from),
+        os: format!("{} {}", env::consts::OS, env::consts::ARCH),
+        memory: memory.unwrap_or(0),
+    }
+}
+
+/// Largest resident size of this process so far, in bytes; `None` if the system does not provide it.
+pub fn peak_bytes() -> Option<u64> {
+    proc_field("/proc/self/status", "VmHWM").and_then(|value| kibibytes(&value))
+}
+
+fn proc_field(path: &str, key: &str) -> Option<String> {
+    let text = fs::read_to_string(path).ok()?;
+    let value = |line: &str| {
+        let (name, value) = line.split_once(':')?;
+        (name.trim() == key).then(|| value.trim().to_owned())
+    };
+    text.lines().find_map(value)
+}
+
+fn kibibytes(value: &str) -> Option<u64> {
+    Some(value.strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}
+
+/// The command line with the program's bare name, quoted where a shell would need it.
+fn command_line() -> String {
+    let words = Host::here().map(|host| &host.words[..]).unwrap_or_default();
+    let words = words.iter().map(|word| word.to_string_lossy().into_owned());
+    let words: Vec<String> = std::iter::once("medial".to_owned()).chain(words).collect();
+    shell_line(&words)
+}
+
+/// Words as a shell command line, quoted where necessary.
+pub fn shell_line(words: &[String]) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
+    let quoted = words.iter().map(|word| {
+        if !word.is_empty() && word.chars().all(plain) {
+            word.clone()
+        } else {
+            format!("'{}'", word.replace('\'', r"'\''"))
+        }
+    });
+    quoted.collect::<Vec<_>>().join(" ")
+}
+
+/// SHA-256 in hexadecimal.
+pub fn hex_digest(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// Bytes in hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

@@ -1,0 +1,647 @@
+//! Results computed elsewhere: files and folders of a user as results of a named method.
+//!
+//! A file is a pseudo-method: on its mesh it answers one number of spheres, that which the file has, and is
+//! evaluated like the rest. A folder holds `MESH.ma` or `MESH-COUNT.ma` for the meshes of the study, and may
+//! hold `method.toml` with the claims of its authors. A surface in place of a medial mesh is the decimation
+//! baseline. Everything but the claimed seconds is measured here.
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use clap::ValueEnum;
+use medial::complex::{LoadedMa, MedialMesh, Radii, ReadOptions, Sphere};
+use medial::shape::{Fit, Shape, ShapeError};
+use medial::simplifier::{
+    Level, Method, MethodInfo, ParamInfo, Params, RunContext, Simplification, Simplified,
+    SimplifyError,
+};
+use medial::surface::Side;
+use medial::{complex, surface};
+use medial_reports::Target;
+use serde::{Deserialize, Serialize};
+
+use crate::plugin::OwnSeconds;
+use crate::provenance::hex_digest;
+use crate::study::item::{Item, MethodSpec, SceneSpec};
+use crate::study::{Here, Study, StudyError, hash_of};
+
+/// Id of the pseudo-method.
+pub const GIVEN: &str = "given";
+
+/// A file that stands in the tables under a name.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Given {
+    /// Name in tables.
+    pub name: String,
+    /// The medial mesh.
+    pub file: PathBuf,
+    /// Name of the mesh that it is an axis of; needed where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<String>,
+    /// How units are found.
+    #[serde(default = "auto")]
+    pub fit: FitBy,
+    /// Where radii come from.
+    #[serde(default)]
+    pub radii: RadiiFrom,
+    /// Whether lines are taken as they are where the header announces another number of them.
+    #[serde(default)]
+    pub lenient: bool,
+    /// Which medial mesh is meant of several in one file, from 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub block: Option<usize>,
+}
+
+/// Other programs write in other units, and no option of a command line says so for one file of many.
+fn auto() -> FitBy {
+    FitBy::Auto
+}
+
+impl Given {
+    /// Reads `NAME=FILE` or `NAME@MESH=FILE`.
+    ///
+    /// # Errors
+    /// In words, where there is no name or no file.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!("--given {text}: write NAME=FILE.ma, or NAME@MESH=FILE.ma with several meshes")
+        };
+        let (name, file) = text.split_once('=').ok_or_else(wrong)?;
+        let (name, mesh) = match name.split_once('@') {
+            Some((name, mesh)) => (name, Some(mesh.trim().to_owned())),
+            None => (name, None),
+        };
+        if name.trim().is_empty() || file.is_empty() || mesh.as_deref() == Some("") {
+            return Err(wrong());
+        }
+        let (name, file) = (name.trim().to_owned(), PathBuf::from(file));
+        let (radii, lenient, block) = (RadiiFrom::File, false, None);
+        Ok(Self { name, file, mesh, fit: FitBy::Auto, radii, lenient, block })
+    }
+}
+
+/// The claims in a folder's `method.toml`. Nothing else about its results is taken from it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Claims {
+    /// Full name of the method.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub title: String,
+    /// Its source.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub citation: String,
+    /// Claimed seconds by the name of the file without its extension.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub seconds: BTreeMap<String, f64>,
+}
+
+/// Name of the file with [`Claims`].
+const CLAIMS: &str = "method.toml";
+/// Extensions of external results.
+const EXTENSIONS: [&str; 5] = ["ma", "ply", "off", "obj", "stl"];
+
+impl Given {
+    /// The files of a folder with the meshes that they belong to, by name, and the claims; files of no
+    /// mesh of the study are passed over.
+    ///
+    /// # Errors
+    /// In words, when the folder or its claims cannot be read, or no file belongs to a mesh.
+    pub fn in_folder(
+        &self,
+        folder: &Path,
+        meshes: &[String],
+    ) -> Result<(Vec<Self>, Claims), String> {
+        let failed = |error: io::Error| format!("{}: {error}", folder.display());
+        let path = folder.join(CLAIMS);
+        let claims = match fs::read_to_string(&path) {
+            Ok(text) => {
+                toml::from_str(&text).map_err(|why| format!("{}: {why}", path.display()))?
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Claims::default(),
+            Err(error) => return Err(failed(error)),
+        };
+        let mut files = Vec::new();
+        for entry in fs::read_dir(folder).map_err(failed)? {
+            let file = entry.map_err(failed)?.path();
+            let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let of = |mesh: &&String| {
+                stem.strip_prefix(mesh.as_str()).is_some_and(|rest| {
+                    rest.is_empty() || rest.strip_prefix('-').is_some_and(is_number)
+                })
+            };
+            // `box-8` is a mesh of its own where the study has one: the longest name wins.
+            let mesh = meshes.iter().filter(of).max_by_key(|mesh| mesh.len());
+            if let Some(mesh) = mesh.filter(|_| EXTENSIONS.contains(&extension.as_str())) {
+                files.push(Self { file, mesh: Some(mesh.clone()), ..self.clone() });
+            }
+        }
+        files.sort_by(|a, b| a.file.cmp(&b.file));
+        if files.is_empty() {
+            let known = meshes.join(", ");
+            return Err(format!(
+                "{}: no file MESH.ma or MESH-COUNT.ma for a mesh of the study ({known})",
+                folder.display()
+            ));
+        }
+        Ok((files, claims))
+    }
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Parameters of the pseudo-method.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GivenParams {
+    /// The medial mesh.
+    pub file: PathBuf,
+    /// See [`Claims::title`].
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub title: String,
+    /// See [`Claims::citation`].
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub citation: String,
+    /// See [`Claims::seconds`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub claimed_seconds: Option<f64>,
+    /// Names under which the same bytes are given, too.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub same_as: String,
+    /// See [`Given::fit`].
+    pub fit: FitBy,
+    /// See [`Given::radii`].
+    pub radii: RadiiFrom,
+    /// See [`Given::lenient`].
+    pub lenient: bool,
+    /// See [`Given::block`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block: Option<usize>,
+}
+
+/// SHA-256 of the file that some parameters name; `None` where it cannot be read.
+pub fn fingerprint(params: &Params) -> Option<String> {
+    let file = params.0.get("file")?.as_str()?;
+    std::fs::read(file).ok().map(|bytes| hex_digest(&bytes))
+}
+
+/// The pseudo-method.
+pub fn method() -> Method<GivenParams> {
+    let info = MethodInfo::new(GIVEN, "A file of another program")
+        .summary(
+            "Simplifies nothing: a medial mesh from a file, judged like the results of methods.",
+        )
+        .published("the file as it is")
+        .param(ParamInfo::new("file", "", "path", "the medial mesh"))
+        .param(ParamInfo::new("title", "", "text", "full name of the method, as claimed"))
+        .param(ParamInfo::new("citation", "", "text", "source of the method, as claimed"))
+        .param(ParamInfo::new("claimed_seconds", "", "seconds", "seconds as claimed"))
+        .param(ParamInfo::new("same_as", "", "names", "who gave the same bytes"))
+        .param(ParamInfo::new("fit", "none", "none, similarity or auto", "how units are found"))
+        .param(ParamInfo::new("radii", "file", "file or surface", "where radii come from"))
+        .param(ParamInfo::new(
+            "lenient",
+            false,
+            "true or false",
+            "counts of the header may be wrong",
+        ))
+        .param(ParamInfo::new("block", "", "number", "which of several in one file, from 1"));
+    Method::new(info, prepare)
+}
+
+fn prepare<'s>(
+    shape: &'s Shape,
+    params: GivenParams,
+    _run: &RunContext,
+) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    let GivenParams { file, same_as, fit, radii, lenient, block, claimed_seconds, .. } = params;
+    let options = AxisOptions { lenient, block, radii, fit };
+    let read = read_axis(&file, shape, &options);
+    let (loaded, _) = read.map_err(|error| SimplifyError::Parameter(error.to_string()))?;
+    let (mesh, mut remarks) = loaded.with_remarks();
+    if !same_as.is_empty() {
+        remarks.push(format!("the same bytes are given as {same_as}, too"));
+    }
+    let units = *shape.normalisation();
+    let mesh = mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+    Ok(Box::new(move |level: Level| {
+        let spheres = mesh.spheres.len();
+        match level {
+            Level::Published => {}
+            Level::Spheres(count) if count == spheres => {}
+            _ => {
+                let why = format!("the file has {spheres} spheres, and no other level");
+                return Err(SimplifyError::unsupported(why));
+            }
+        }
+        let mut simplified = Simplified::new(mesh.clone(), level);
+        remarks.iter().for_each(|remark| simplified.diagnostics.warn(remark.clone()));
+        if claimed_seconds.is_some() {
+            let claimed = OwnSeconds { prepare: None, simplify: claimed_seconds };
+            simplified.extras.insert(claimed);
+        }
+        Ok(simplified)
+    }))
+}
+
+/// A file that was looked at.
+pub(crate) struct GivenFile {
+    /// Name of the mesh in tables.
+    pub mesh: String,
+    given: Given,
+    claims: Claims,
+    path: PathBuf,
+    /// SHA-256 of its bytes.
+    hash: String,
+    /// Number of spheres.
+    spheres: usize,
+    /// Names of those of the same mesh that have the same bytes.
+    same_as: Vec<String>,
+}
+
+impl Study {
+    /// The given files with the meshes that they belong to, of the names of all meshes.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`] for a file that cannot be read or belongs to no mesh, and for two of one name.
+    pub(crate) fn given_files(&self, meshes: &[String]) -> Result<Vec<GivenFile>, StudyError> {
+        let mut files: Vec<GivenFile> = Vec::new();
+        let mut all: Vec<(Given, Claims)> = Vec::new();
+        for given in &self.given {
+            let folder = self.resolved(&given.file);
+            if folder.is_dir() {
+                let wrong = |why| StudyError::Value(format!("given `{}`: {why}", given.name));
+                let (found, claims) = given.in_folder(&folder, meshes).map_err(wrong)?;
+                all.extend(found.into_iter().map(|given| (given, claims.clone())));
+            } else {
+                all.push((given.clone(), Claims::default()));
+            }
+        }
+        for (given, claims) in all {
+            let mesh = mesh_of(&given, meshes)?;
+            let named = self.methods.iter().filter_map(|method| method.name.as_ref());
+            let taken = named.clone().any(|name| *name == given.name);
+            let file = self.look_at(given, claims, mesh)?;
+            let same_row = |other: &GivenFile| {
+                (&other.mesh, &other.given.name, other.spheres)
+                    == (&file.mesh, &file.given.name, file.spheres)
+            };
+            if taken || files.iter().any(same_row) {
+                let GivenFile { given, mesh, spheres, .. } = &file;
+                let message = format!(
+                    "two methods are named `{}` on {mesh} at {spheres} spheres",
+                    given.name
+                );
+                return Err(StudyError::Value(message));
+            }
+            files.push(file);
+        }
+        for file in 0..files.len() {
+            let (mesh, hash) = (files[file].mesh.clone(), files[file].hash.clone());
+            let others = files.iter().enumerate().filter(|&(other, _)| other != file);
+            let same = others.filter(|(_, f)| f.mesh == mesh && f.hash == hash);
+            files[file].same_as = same.map(|(_, f)| f.given.name.clone()).collect();
+        }
+        Ok(files)
+    }
+
+    fn look_at(&self, given: Given, claims: Claims, mesh: String) -> Result<GivenFile, StudyError> {
+        let path = self.resolved(&given.file);
+        let path = std::path::absolute(&path).unwrap_or(path);
+        let radii = match given.radii {
+            RadiiFrom::File => Radii::Needed,
+            RadiiFrom::Surface => Radii::NotNeeded,
+        };
+        let options = ReadOptions { lenient: given.lenient, block: given.block, radii };
+        let wrong = |why: String| StudyError::Value(format!("given `{}`: {why}", given.name));
+        let loaded = read_external(&path, options).map_err(wrong)?;
+        let spheres = loaded.mesh.spheres.len();
+        if spheres == 0 {
+            return Err(wrong(format!("{}: no sphere", path.display())));
+        }
+        let hash = hash_of(&path)?;
+        Ok(GivenFile { mesh, given, claims, path, hash, spheres, same_as: vec![] })
+    }
+
+    /// The numbers of spheres of the given files, from many to few.
+    ///
+    /// # Errors
+    /// For a file that cannot be read.
+    pub fn given_counts(&self) -> Result<Vec<usize>, StudyError> {
+        let sources = self.sources()?;
+        let files = self.given_files(&crate::study::unique_names(&sources))?;
+        let mut counts: Vec<usize> = files.iter().map(|file| file.spheres).collect();
+        counts.sort_unstable_by(|a, b| b.cmp(a));
+        counts.dedup();
+        Ok(counts)
+    }
+
+    /// The item that judges a given file.
+    pub(crate) fn given_item(&self, scene: SceneSpec, file: &GivenFile, here: &Here) -> Item {
+        let Given { name, fit, radii, lenient, block, .. } = &file.given;
+        let mut params = Params::none();
+        let mut set = |key: &str, value: serde_json::Value| {
+            params.0.insert(key.to_owned(), value);
+        };
+        set("file", file.path.to_string_lossy().into());
+        set("fit", serde_json::to_value(fit).expect("a word"));
+        set("radii", serde_json::to_value(radii).expect("a word"));
+        if *lenient {
+            set("lenient", true.into());
+        }
+        if let Some(block) = block {
+            set("block", (*block).into());
+        }
+        let Claims { title, citation, seconds } = &file.claims;
+        for (key, text) in [("title", title), ("citation", citation)] {
+            if !text.is_empty() {
+                set(key, text.as_str().into());
+            }
+        }
+        let stem = file.path.file_stem().unwrap_or_default().to_string_lossy();
+        if let Some(seconds) = seconds.get(stem.as_ref()) {
+            set("claimed_seconds", (*seconds).into());
+        }
+        if !file.same_as.is_empty() {
+            set("same_as", file.same_as.join(", ").into());
+        }
+        Item {
+            scene,
+            method: MethodSpec {
+                id: GIVEN.to_owned(),
+                name: Some(name.clone()),
+                params,
+                fingerprint: Some(file.hash.clone()),
+            },
+            levels: vec![Target::Spheres(file.spheres)],
+            seed: self.seed,
+            repeat: 1,
+            threads: self.threads.unwrap_or(here.threads),
+            limits: self.limits(here),
+            // The program that measures it; its own hash is the fingerprint.
+            version: hex_digest(
+                format!("{} {}", medial::SOURCE_HASH, medial::geometry::SOURCE_HASH).as_bytes(),
+            ),
+            binary: here.binary.clone(),
+        }
+    }
+}
+
+/// The mesh that a file belongs to.
+fn mesh_of(given: &Given, meshes: &[String]) -> Result<String, StudyError> {
+    let name = &given.name;
+    let message = match (&given.mesh, meshes) {
+        (Some(mesh), _) if meshes.contains(mesh) => return Ok(mesh.clone()),
+        (Some(mesh), _) => {
+            format!("given `{name}`: no mesh is called `{mesh}`; there are: {}", meshes.join(", "))
+        }
+        (None, [mesh]) => return Ok(mesh.clone()),
+        (None, _) => format!(
+            "given `{name}`: there are {} meshes; say which it belongs to, as in --given {name}@{}={}",
+            meshes.len(),
+            meshes.first().map_or("MESH", String::as_str),
+            given.file.display()
+        ),
+    };
+    Err(StudyError::Value(message))
+}
+
+/// How far from the middle of its surface a medial mesh reaches, in diagonals, if it is no slip.
+const SMALLEST: f64 = 0.01;
+const LARGEST: f64 = 5.0;
+
+/// Medians of the difference between radii and distances to the surface, as fractions of the diagonal: from here on other
+/// units are tried, and from here on it is said that something is wrong though none fit.
+const DOUBTFUL: f64 = 0.01;
+const WRONG: f64 = 0.05;
+
+/// A radius below this fraction of the diagonal is that of a point on the surface.
+const ON_SURFACE: f64 = 1e-9;
+
+/// How a medial mesh from a file is read and brought to its surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AxisOptions {
+    /// Whether lines are taken as they are where the header announces another number of them.
+    pub lenient: bool,
+    /// Which medial mesh is meant of several in one file, from 1.
+    pub block: Option<usize>,
+    /// Where radii come from.
+    pub radii: RadiiFrom,
+    /// How units are found.
+    pub fit: FitBy,
+}
+
+/// Where radii come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RadiiFrom {
+    /// From the file.
+    #[default]
+    File,
+    /// From the surface.
+    Surface,
+}
+
+/// How units are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FitBy {
+    /// The file is in the units of the surface.
+    #[default]
+    None,
+    /// By the uniform scale and the shift under which spheres and surface fit.
+    Similarity,
+    /// The same, if the file does not fit as it is and does so then.
+    Auto,
+}
+
+/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it: next to its
+/// spheres the whole surface is less than a rounding error.
+const LARGEST_SPHERE: f64 = 1e12;
+
+/// How far a medial mesh in the unit of a shape's input reaches from the middle of the surface, in diagonals.
+///
+/// # Errors
+/// In words, which sphere is too far away to be measured.
+pub fn reach(mesh: &MedialMesh, shape: &Shape) -> Result<f64, String> {
+    let to_normal = shape.normalisation();
+    let mut reach = 0.0_f64;
+    for (id, sphere) in mesh.spheres.iter().enumerate() {
+        let centre = to_normal.forward(sphere.centre);
+        let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
+        reach = reach.max(size);
+        // An overflow gives a size that is infinite or not a number.
+        if size.is_nan() || size > LARGEST_SPHERE {
+            return Err(format!(
+                "sphere {id} reaches {size:.1e} diagonals of the surface away from it: the medial mesh is in other \
+                 units, or of another surface"
+            ));
+        }
+    }
+    Ok(reach)
+}
+
+/// Why a file gives no medial mesh for a surface, in words that name it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct AxisError(String);
+
+/// Reads a medial mesh that was made for a shape, in input units, and the change of units that brought it there, if one
+/// was asked for.
+///
+/// # Errors
+/// When it cannot be read, has no sphere, or cannot belong to the shape.
+pub fn read_axis(
+    path: &Path,
+    shape: &Shape,
+    options: &AxisOptions,
+) -> Result<(LoadedMa, Option<Fit>), AxisError> {
+    let named = |why: &dyn Display| AxisError(format!("{}: {why}", path.display()));
+    let from_surface = options.radii == RadiiFrom::Surface;
+    let radii = if from_surface { Radii::NotNeeded } else { Radii::Needed };
+    let read = ReadOptions { lenient: options.lenient, block: options.block, radii };
+    let mut loaded = read_external(path, read).map_err(AxisError)?;
+    if loaded.mesh.spheres.is_empty() {
+        return Err(named(&"no sphere"));
+    }
+    if from_surface {
+        // What stands in their place may be anything.
+        loaded.mesh.spheres.iter_mut().for_each(|sphere| sphere.radius = 0.0);
+    }
+    let reach = reach(&loaded.mesh, shape).map_err(|why| named(&why))?;
+    let fit = match (options.fit, from_surface) {
+        (FitBy::None, _) => None,
+        (FitBy::Similarity, false) => Some(shape.fit(&loaded.mesh).map_err(|error| named(&error))?),
+        (FitBy::Auto, false) => shape.fit_if_needed(&loaded.mesh).map_err(|error| named(&error))?,
+        (FitBy::Similarity | FitBy::Auto, true) => {
+            let fit = shape.fit_of_points(&loaded.mesh).map_err(|error| named(&error))?;
+            Some(fit.ok_or_else(|| named(&"without radii only the cubes that tools write are tried, and none of them fits the surface"))?)
+        }
+    };
+    if let Some(fit) = &fit {
+        loaded.mesh = fit.similarity.mesh(&loaded.mesh);
+        loaded.notes.push(format!("fitted: {fit}"));
+    }
+    if from_surface {
+        take_radii(&mut loaded, shape).map_err(|why| named(&why))?;
+    } else {
+        let doubts =
+            doubts(&loaded.mesh, shape, fit.is_some(), reach).map_err(|error| named(&error))?;
+        loaded.warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", path.display())));
+    }
+    Ok((loaded, fit))
+}
+
+/// Reads a medial mesh, or a surface as one of spheres without extent: the union of its slabs is the
+/// surface itself.
+///
+/// # Errors
+/// In words that name the file.
+pub(crate) fn read_external(path: &Path, options: ReadOptions) -> Result<LoadedMa, String> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let read = || complex::read_with(path, options).map_err(|error| error.to_string());
+    let surface = || -> Result<LoadedMa, String> {
+        let surface = surface::read_any(path).map_err(|error| error.to_string())?.mesh;
+        let spheres = surface.vertices.iter().map(|&v| Sphere::new(v, 0.0)).collect();
+        let mesh = MedialMesh::from_simplices(spheres, vec![], surface.faces);
+        let mesh = mesh.map_err(|error| format!("{}: {error}", path.display()))?;
+        let notes = vec!["a surface: measured as spheres of radius 0".to_owned()];
+        Ok(LoadedMa { mesh, notes, warnings: Vec::new() })
+    };
+    match extension.as_str() {
+        "off" | "stl" => surface(),
+        // Without radii it is a surface, and its first error is the more telling one if it is neither.
+        "ply" | "obj" => read().or_else(|why| surface().map_err(|_| why)),
+        _ => read(),
+    }
+}
+
+/// Gives every sphere the distance of its centre to the surface as its radius.
+fn take_radii(loaded: &mut LoadedMa, shape: &Shape) -> Result<(), String> {
+    let units = shape.normalisation();
+    let centres: Vec<_> = loaded.mesh.spheres.iter().map(|sphere| sphere.centre).collect();
+    let radii = shape.distances(&centres).map_err(|error| error.to_string())?;
+    if radii.iter().all(|&radius| radius <= ON_SURFACE * units.diagonal) {
+        return Err(
+            "every point is on the surface: it is that surface, or a sample of it".to_owned()
+        );
+    }
+    for (sphere, radius) in loaded.mesh.spheres.iter_mut().zip(radii) {
+        sphere.radius = radius;
+    }
+    loaded.notes.push("every radius is the distance of its centre to the surface".to_owned());
+    let normal: Vec<_> = centres.iter().map(|&centre| units.forward(centre)).collect();
+    let sides = shape.view().inside_test().sides(&normal);
+    let outside = sides.iter().filter(|side| **side == Side::Outside).count();
+    if outside > 0 {
+        let all = centres.len();
+        loaded.warnings.push(format!(
+            "{outside} of {all} centres are outside of the surface: is it in the same units? `--fit similarity` finds others"
+        ));
+    }
+    Ok(())
+}
+
+/// Why a medial mesh may not belong to its surface as it is, if there is a reason to think so.
+fn doubts(
+    mesh: &MedialMesh,
+    shape: &Shape,
+    is_fitted: bool,
+    reach: f64,
+) -> Result<Option<String>, ShapeError> {
+    let misfit = shape.misfit(mesh)?.unwrap_or_default();
+    if misfit <= DOUBTFUL {
+        return Ok(None);
+    }
+    let differ = format!(
+        "radii and distances to the surface differ by {} of the diagonal at the median",
+        percent(misfit)
+    );
+    if !is_fitted {
+        let fit = shape.fit(mesh)?;
+        if fit.misfit.is_some_and(|misfit| misfit <= DOUBTFUL) {
+            let found = percent(fit.misfit.unwrap_or_default());
+            return Ok(Some(format!(
+                "{differ}, by {found} in other units ({}; {}): `--fit similarity` takes those",
+                fit.similarity, fit.source
+            )));
+        }
+        // The middle of the surface is the origin.
+        if !(SMALLEST..=LARGEST).contains(&reach) {
+            return Ok(Some(format!(
+                "it reaches {reach:.2e} diagonals of the surface from the middle of that: is it in the same units? \
+                 No scale and shift was found that fits"
+            )));
+        }
+    }
+    Ok((misfit > WRONG).then(|| {
+        format!("{differ}: of another surface, or no radii (`--radii surface` takes the distances)")
+    }))
+}
+
+/// A fraction of the diagonal as a percentage with three decimals.
+pub fn percent(fraction: f64) -> String {
+    format!("{:.3} %", 100.0 * fraction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_names_the_method_the_mesh_and_the_file() {
+        let given = Given::parse("Q-MAT, authors@bear=out/x=1.ma").expect("a name and a file");
+        assert_eq!((given.name.as_str(), given.mesh.as_deref()), ("Q-MAT, authors", Some("bear")));
+        assert_eq!(given.file, PathBuf::from("out/x=1.ma"));
+        assert_eq!(Given::parse("a=b.ma").expect("both").mesh, None);
+        for wrong in ["a", "=b.ma", "a=", "a@=b.ma", " @x=b.ma"] {
+            assert!(Given::parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}

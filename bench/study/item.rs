@@ -1,0 +1,319 @@
+//! An item: everything that decides a record, as data.
+//!
+//! One method with its parameters on one input, at some levels. An item can be written to a file,
+//! carried to another machine and run there; what it gives is decided by nothing else. Each of its
+//! levels has a key, by which a store knows whether it was run before.
+
+use std::fmt;
+use std::time::Duration;
+
+use medial::complex::DualTriangulation;
+use medial::metrics::JudgeOptions;
+use medial::shape::ShapeOptions;
+use medial::simplifier::Params;
+use medial::surface::Sampling;
+use medial_reports::Target;
+use serde::{Deserialize, Serialize};
+
+use crate::provenance::hex_digest;
+use crate::study::source::Source;
+
+/// One method on one input at some levels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Item {
+    /// The input, and how results on it are measured.
+    pub scene: SceneSpec,
+    /// The method.
+    pub method: MethodSpec,
+    /// Levels, from fine to coarse.
+    pub levels: Vec<Target>,
+    /// Seed of the method's random choices.
+    pub seed: u64,
+    /// How often each level is timed, at least once.
+    pub repeat: usize,
+    /// Number of threads.
+    pub threads: usize,
+    /// What ends the item by force.
+    pub limits: Limits,
+    /// The version of the method: a stale one must not lend its numbers.
+    pub version: String,
+    /// SHA-256 of the program that runs it, recorded only.
+    pub binary: String,
+}
+
+/// What items that follow each other can share: the input with its substrates, and the judge.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// Name of the input in tables.
+    pub mesh: String,
+    /// Where the input comes from.
+    pub source: Source,
+    /// SHA-256 of the input's file; of a built-in shape its surface and known axis.
+    pub hash: Option<String>,
+    /// Displacements of the vertices of which results are measured against the input without them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<Noise>,
+    /// Boundary samples.
+    pub sampling: Sampling,
+    /// Triangulation of the dual Voronoi polygons.
+    pub dual: Dual,
+    /// How results are measured.
+    pub measure: Measure,
+}
+
+/// Random displacements of the vertices of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// The largest displacement, as a fraction of the bounding-box diagonal.
+    pub eta: f64,
+    /// Seed of the displacements.
+    pub seed: u64,
+}
+
+/// Triangulation of the dual Voronoi polygons.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Dual {
+    /// A fan, as published.
+    #[default]
+    Fan,
+    /// Planar Delaunay.
+    Delaunay,
+}
+
+/// How results are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measure {
+    /// Surface samples beside the vertices, and about as many on the union; 0: not measured.
+    pub samples: usize,
+    /// Levels of division of space for the volume difference; 0 leaves it out.
+    pub volume_depth: u32,
+    /// Seed of every sample.
+    pub seed: u64,
+    /// Width of the certified interval of the Hausdorff distance, a fraction of the diagonal, where
+    /// one is asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certify: Option<f64>,
+}
+
+/// A method, its parameters, and the name of this pair in tables.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MethodSpec {
+    /// Id of the method.
+    pub id: String,
+    /// Name of the variant in tables, where it has one of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Parameters; none stands for the paper's values.
+    pub params: Params,
+    /// What the method is made of, where it is not part of the program: the declaration and the
+    /// files of a plug-in, hashed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fingerprint: Option<String>,
+}
+
+/// What ends an item by force.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Wall-clock seconds of one item: of its reading, of all its levels together, and of measuring
+    /// them, each.
+    pub seconds: f64,
+    /// Bytes of memory of the worker and the programs that it started, together.
+    pub bytes: u64,
+}
+
+impl Item {
+    /// The key of one level: equal for equal work. Limits and the number of repetitions are not in
+    /// it, since a result that came in time is the same under any.
+    pub fn key(&self, level: Target) -> String {
+        self.keys_of(&[level]).remove(0)
+    }
+
+    /// The keys of all levels, in their order.
+    pub fn keys(&self) -> Vec<String> {
+        self.keys_of(&self.levels)
+    }
+
+    fn keys_of(&self, levels: &[Target]) -> Vec<String> {
+        // Parameters in the order of their names, however they were given.
+        let params: std::collections::BTreeMap<_, _> = self.method.params.0.iter().collect();
+        let source = match &self.scene.source {
+            // The same file in another place is the same input.
+            Source::File(_) | Source::Cached { .. } => None,
+            built_in @ Source::BuiltIn { .. } => Some(built_in),
+        };
+        let SceneSpec { mesh, hash, noise, sampling, dual, measure, .. } = &self.scene;
+        let MethodSpec { id, name, fingerprint, .. } = &self.method;
+        let scene = (mesh, source, hash, noise, sampling, dual, measure);
+        let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.version);
+        let common = serde_json::to_string(&rest).expect("plain data");
+        let key = |level: &Target| {
+            let level = serde_json::to_string(level).expect("plain data");
+            hex_digest(format!("{common}\n{level}").as_bytes())
+        };
+        levels.iter().map(key).collect()
+    }
+}
+
+impl SceneSpec {
+    /// How the substrates are built.
+    pub fn shape_options(&self) -> ShapeOptions {
+        ShapeOptions { sampling: self.sampling, dual: self.dual.into() }
+    }
+}
+
+impl MethodSpec {
+    /// The method for people: the name of the variant, or the id.
+    pub fn label(&self) -> &str {
+        self.name.as_deref().unwrap_or(&self.id)
+    }
+}
+
+impl Measure {
+    /// The options of the judge.
+    pub fn judge_options(&self) -> JudgeOptions {
+        JudgeOptions {
+            samples: self.samples.max(1),
+            volume_depth: self.volume_depth,
+            seed: self.seed,
+        }
+    }
+}
+
+impl From<JudgeOptions> for Measure {
+    fn from(options: JudgeOptions) -> Self {
+        let JudgeOptions { samples, volume_depth, seed } = options;
+        Self { samples, volume_depth, seed, certify: None }
+    }
+}
+
+impl fmt::Display for Dual {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fan => "fan",
+            Self::Delaunay => "delaunay",
+        })
+    }
+}
+
+impl From<Dual> for DualTriangulation {
+    fn from(dual: Dual) -> Self {
+        match dual {
+            Dual::Fan => Self::Fan,
+            Dual::Delaunay => Self::Delaunay,
+        }
+    }
+}
+
+impl Limits {
+    /// The limit of time.
+    pub fn time(&self) -> Duration {
+        Duration::try_from_secs_f64(self.seconds).unwrap_or(Duration::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+
+    fn item() -> Item {
+        Item {
+            scene: SceneSpec {
+                mesh: "bear".into(),
+                source: Source::File(PathBuf::from("bear.off")),
+                hash: Some("12ab".into()),
+                noise: None,
+                sampling: Sampling::default(),
+                dual: Dual::Fan,
+                measure: JudgeOptions::default().into(),
+            },
+            method: MethodSpec {
+                id: "qmat".into(),
+                name: None,
+                params: Params::none(),
+                fingerprint: None,
+            },
+            levels: vec![Target::Spheres(100), Target::Native(0.1), Target::Published],
+            seed: 0,
+            repeat: 1,
+            threads: 2,
+            limits: Limits { seconds: 300.0, bytes: 1 << 30 },
+            version: "34cd".into(),
+            binary: "56ef".into(),
+        }
+    }
+
+    #[test]
+    fn keys_tell_apart_what_decides_a_record_and_nothing_else() {
+        let key = |change: fn(&mut Item)| {
+            let mut changed = item();
+            change(&mut changed);
+            changed.key(Target::Spheres(100))
+        };
+        let plain = key(|_| ());
+        let same: [fn(&mut Item); 5] = [
+            // A rebuild that changed no method: the page, a verb.
+            |i| i.binary = "56f0".into(),
+            |i| i.limits.seconds = 1.0,
+            |i| i.repeat = 5,
+            |i| i.levels.clear(),
+            |i| i.scene.source = Source::File("elsewhere/bear.off".into()),
+        ];
+        for change in same {
+            assert_eq!(key(change), plain);
+        }
+        let other: [fn(&mut Item); 10] = [
+            |i| i.scene.mesh = "bear-2".into(),
+            |i| i.scene.hash = Some("12ac".into()),
+            |i| i.scene.noise = Some(Noise { eta: 0.01, seed: 1 }),
+            |i| i.scene.dual = Dual::Delaunay,
+            |i| i.scene.measure.samples += 1,
+            |i| i.method.id = "hem".into(),
+            |i| i.method.params.set("k", "0"),
+            |i| i.seed = 1,
+            |i| i.threads = 1,
+            |i| i.version = "34ce".into(),
+        ];
+        let mut keys: Vec<String> = other.into_iter().map(key).collect();
+        keys.push(plain);
+        keys.extend(item().keys().into_iter().skip(1));
+        keys.sort_unstable();
+        keys.dedup();
+        assert_eq!(keys.len(), 13);
+    }
+
+    #[test]
+    fn the_order_of_parameters_is_of_no_matter() {
+        let with = |keys: [&str; 2]| {
+            let mut item = item();
+            keys.iter().for_each(|key| item.method.params.set(key, "1"));
+            item.keys()
+        };
+        assert_eq!(with(["a", "b"]), with(["b", "a"]));
+    }
+
+    #[test]
+    fn numbers_survive_json() {
+        let numbers = (1..10_000).map(|k| f64::from(k).sqrt() * 1e-3);
+        for number in numbers {
+            let text = serde_json::to_string(&number).unwrap();
+            assert_eq!(serde_json::from_str::<f64>(&text).unwrap(), number, "{text}");
+        }
+    }
+
+    #[test]
+    fn items_survive_their_file() {
+        let text = serde_json::to_string(&item()).unwrap();
+        assert_eq!(serde_json::from_str::<Item>(&text).unwrap(), item());
+        let unknown = text.replacen("\"seed\"", "\"sead\"", 1);
+        assert!(serde_json::from_str::<Item>(&unknown).unwrap_err().to_string().contains("sead"));
+    }
+}

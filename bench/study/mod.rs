@@ -1,0 +1,567 @@
+//! What to run: the matrix of a comparison as data, and its items.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `mod` | [`Study`], what a study file can say; its items and shards |
+//! | `item` | [`Item`], all that decides a record, and its keys |
+//! | `source` | where meshes come from |
+//! | `library` | published meshes and those of the user, by name |
+//! | `external` | results computed elsewhere |
+//! | `registry` | the methods by id |
+
+pub mod external;
+pub mod item;
+pub mod library;
+pub mod registry;
+pub mod source;
+
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use medial::simplifier::Params;
+use medial::surface::Sampling;
+use medial_reports::Target;
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::provenance::{Provenance, hex_digest};
+use crate::study::external::Given;
+use crate::study::item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
+use crate::study::library::{Library, PublicError};
+use crate::study::registry::{Entry, INITIAL, Registry, RegistryError};
+use crate::study::source::{Input, InputError, Source, did_you_mean};
+
+/// Items are ended after so many seconds unless told otherwise.
+pub const TIMEOUT: f64 = 300.0;
+
+/// More repetitions than this are taken for a slip.
+pub const MOST_REPEATS: usize = 10_000;
+
+/// Surface samples of a comparison unless told otherwise: fewer than `evaluate` takes, since it
+/// measures hundreds of results.
+const SAMPLES: usize = 10_000;
+/// Depth of the volume difference in a comparison, likewise.
+pub const VOLUME_DEPTH: u32 = 5;
+
+/// The matrix of a comparison.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Study {
+    /// Folder where relative paths start; the study file's own unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub folder: Option<PathBuf>,
+    /// Surface files, `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
+    pub meshes: Vec<PathBuf>,
+    /// Sets of meshes beside those named: `builtin`, or what the library has. A text or a list of texts.
+    #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "one_or_more")]
+    pub dataset: Vec<String>,
+    /// Numbers of spheres.
+    pub spheres: Vec<usize>,
+    /// Error bounds, fractions of the diagonal, for each of which the fewest spheres are searched.
+    pub max_error: Vec<f64>,
+    /// Noise on the surfaces: each magnitude, the largest displacement of a vertex as a fraction of the
+    /// diagonal, adds a row of meshes whose results are measured against the clean surface.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub noise: Vec<f64>,
+    /// Counts alone: no levels of the methods' own but those given to them, and no row of the
+    /// initial medial mesh.
+    pub counts_only: bool,
+    /// Whether each method also runs at its published level.
+    pub published: bool,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// How often each level is timed.
+    pub repeat: usize,
+    /// Boundary samples.
+    pub sampling: Sampling,
+    /// Triangulation of the dual Voronoi polygons.
+    pub dual: Dual,
+    /// Surface samples of the evaluation, beside the vertices.
+    pub samples: usize,
+    /// Width of the certified interval of each Hausdorff error, a fraction of the diagonal; none
+    /// unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certify: Option<f64>,
+    /// Number of threads; all processors unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threads: Option<usize>,
+    /// Limit of time for each item, in seconds.
+    pub timeout: f64,
+    /// Limit of memory in megabytes; three quarters of the machine's unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<u64>,
+    /// Plug-in files.
+    pub plugins: Vec<PathBuf>,
+    /// Methods that start from what each filter leaves, beside those named.
+    pub after_filters: Vec<String>,
+    /// Methods with their parameters; all methods unless given.
+    #[serde(rename = "method")]
+    pub methods: Vec<StudyMethod>,
+    /// Files of other programs as results of named methods.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub given: Vec<Given>,
+}
+
+/// A method of a study: a row of its own in tables and plots.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StudyMethod {
+    /// Id of the method.
+    pub id: String,
+    /// Name in tables.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Parameters.
+    #[serde(default)]
+    pub params: Params,
+    /// Numbers of spheres, in place of the study's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spheres: Option<Vec<usize>>,
+    /// Levels of the method's own, beside the counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<f64>,
+    /// Whether it also runs at its published level, in place of the study's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub published: Option<bool>,
+}
+
+/// Reads a text, or a list of texts.
+fn one_or_more<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "a text or a list of texts")]
+    enum Words {
+        One(String),
+        More(Vec<String>),
+    }
+    Ok(match Words::deserialize(deserializer)? {
+        Words::One(word) => vec![word],
+        Words::More(words) => words,
+    })
+}
+
+impl Default for Study {
+    fn default() -> Self {
+        Self {
+            folder: None,
+            meshes: vec![],
+            dataset: vec![],
+            spheres: vec![1000, 500, 200, 100],
+            max_error: vec![],
+            noise: vec![],
+            counts_only: false,
+            published: false,
+            seed: 0,
+            repeat: 1,
+            sampling: Sampling::default(),
+            dual: Dual::default(),
+            samples: SAMPLES,
+            certify: None,
+            threads: None,
+            timeout: TIMEOUT,
+            memory: None,
+            plugins: vec![],
+            after_filters: vec![],
+            methods: vec![],
+            given: vec![],
+        }
+    }
+}
+
+impl Study {
+    /// Reads a study file. Relative paths in it start at its folder.
+    ///
+    /// # Errors
+    /// [`StudyError::File`], with the line where the text is at fault.
+    pub fn read(path: &Path) -> Result<Self, StudyError> {
+        let failed = |message: String| StudyError::File { path: path.to_owned(), message };
+        let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
+        let mut study: Self = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
+        let own = path.parent().filter(|own| !own.as_os_str().is_empty());
+        let own = own.unwrap_or(Path::new("."));
+        let folder = study.folder.map_or(own.to_owned(), |folder| own.join(folder));
+        study.folder = Some(std::path::absolute(&folder).unwrap_or(folder));
+        Ok(study)
+    }
+
+    /// The study as a file that [`Study::read`] reads.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`] for a number that TOML cannot hold, or a path that is not UTF-8.
+    pub fn to_text(&self) -> Result<String, StudyError> {
+        toml::to_string(self).map_err(|error| StudyError::Value(format!("study: {error}")))
+    }
+
+    /// A path as it is meant.
+    pub fn resolved(&self, path: &Path) -> PathBuf {
+        match &self.folder {
+            // A name is no path.
+            Some(folder) if !Source::is_name(path) => folder.join(path),
+            _ => path.to_owned(),
+        }
+    }
+
+    /// Refuses values that make no sense.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`].
+    pub fn check(&self) -> Result<(), StudyError> {
+        let wrong = |message: String| Err(StudyError::Value(message));
+        if !(1..=MOST_REPEATS).contains(&self.repeat) {
+            return wrong(format!(
+                "--repeat {}: time each item 1 to {MOST_REPEATS} times",
+                self.repeat
+            ));
+        }
+        if !(self.timeout > 0.0 && self.timeout.is_finite()) {
+            return wrong(format!("--timeout {}: a positive number of seconds", self.timeout));
+        }
+        if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
+            return wrong(format!("--certify {width}: a fraction of the diagonal from 1e-6 on"));
+        }
+        if self.memory == Some(0) {
+            return wrong("--memory 0: a positive number of megabytes".into());
+        }
+        if let Some(eta) = self.noise.iter().find(|&&eta| !(eta > 0.0 && eta <= 0.1)) {
+            return wrong(format!("noise {eta}: a fraction of the diagonal of at most 0.1"));
+        }
+        let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
+        if counts.chain([&self.spheres]).any(|counts| counts.contains(&0)) {
+            return wrong("--spheres 0: ask for at least one sphere".into());
+        }
+        if let Some(bound) = self.max_error.iter().find(|&&bound| !(bound > 0.0 && bound < 1.0)) {
+            return wrong(format!(
+                "--max-error {bound}: a fraction of the diagonal between 0 and 1 is meant"
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl StudyMethod {
+    /// A method with the paper's values.
+    pub fn of(id: &str) -> Self {
+        Self { id: id.to_owned(), ..Self::default() }
+    }
+
+    /// Reads `ID` or `ID:KEY=VALUE[:KEY=VALUE...]`.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`] where a part has no `=`.
+    pub fn parse(text: &str) -> Result<Self, StudyError> {
+        let mut parts = text.split(':');
+        let mut method = Self::of(parts.next().unwrap_or_default());
+        for part in parts {
+            let (key, value) = part.split_once('=').ok_or_else(|| {
+                StudyError::Value(format!("--methods {text}: write ID:KEY=VALUE"))
+            })?;
+            method.params.set(key, value);
+        }
+        Ok(method)
+    }
+}
+
+/// What is wrong with a study.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// The file cannot be read, or is no study.
+    #[error("{}: {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the line.
+        message: String,
+    },
+    /// A value makes no sense.
+    #[error("{0}")]
+    Value(String),
+    /// No such method.
+    #[error("{}", no_such_method(id, known))]
+    Method {
+        /// What was asked.
+        id: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// An input is wrong.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A set is unknown, or not here.
+    #[error(transparent)]
+    Library(#[from] PublicError),
+    /// A plug-in file is wrong.
+    #[error(transparent)]
+    Registry(#[from] RegistryError),
+}
+
+/// The message for an id that no method has, naming those that exist.
+pub fn no_such_method(id: &str, known: &[String]) -> String {
+    let meant = did_you_mean(id, known.iter().map(String::as_str));
+    format!("no method is called `{id}`{meant}; there are: {}", known.join(", "))
+}
+
+/// What is the same for all items of this process.
+#[derive(Clone, Debug)]
+pub struct Here {
+    /// SHA-256 of the program.
+    pub binary: String,
+    /// Threads where a study says nothing.
+    pub threads: usize,
+    /// Memory of the machine, in bytes; 0 where it is not known.
+    pub memory: u64,
+}
+
+impl Here {
+    /// What this process is.
+    pub fn of(provenance: &Provenance) -> Self {
+        Self {
+            binary: provenance.binary_hash.clone(),
+            threads: rayon::current_num_threads(),
+            memory: provenance.machine.memory,
+        }
+    }
+}
+
+impl Study {
+    /// The methods of the study: those named, or all there are.
+    ///
+    /// # Errors
+    /// [`StudyError::Method`] for an id that no method has; [`StudyError::Value`] for two rows of
+    /// one name.
+    pub fn entries<'r>(
+        &self,
+        registry: &'r Registry,
+    ) -> Result<Vec<(StudyMethod, &'r Entry)>, StudyError> {
+        let mut methods = self.methods.clone();
+        if methods.is_empty() {
+            methods = registry.usual().map(|e| StudyMethod::of(e.id())).collect();
+        }
+        for then in &self.after_filters {
+            let filters = registry.entries().iter().filter(|e| e.presentation().filter.is_some());
+            let chains = filters.map(|filter| format!("{}+{then}", filter.id()));
+            methods.extend(chains.map(|id| StudyMethod::of(&id)));
+        }
+        if !self.counts_only {
+            methods.insert(0, StudyMethod::of(INITIAL));
+        }
+        let mut found: Vec<(StudyMethod, &Entry)> = Vec::new();
+        for method in &methods {
+            let entry = registry.entry(&method.id).ok_or_else(|| StudyError::Method {
+                id: method.id.clone(),
+                known: registry.entries().iter().map(|entry| entry.id().to_owned()).collect(),
+            })?;
+            // The same row twice would be one row with twice the weight.
+            if found.iter().any(|(other, _)| other == method) {
+                continue;
+            }
+            if let Some(name) = &method.name
+                && found.iter().any(|(other, _)| other.name.as_ref() == Some(name))
+            {
+                return Err(StudyError::Value(format!("two methods are named `{name}`")));
+            }
+            found.push((method.clone(), entry));
+        }
+        Ok(found)
+    }
+
+    /// The inputs of the study: those named and those of the set; [`Source::built_ins`] where there
+    /// are none.
+    ///
+    /// # Errors
+    /// When one does not exist, or is no input.
+    pub fn sources(&self) -> Result<Vec<Source>, StudyError> {
+        let mut sources = Vec::new();
+        for mesh in &self.meshes {
+            sources.push(Source::parse(&self.resolved(mesh))?);
+        }
+        if sources.is_empty() && self.dataset.is_empty() {
+            sources = Source::built_ins();
+        }
+        for word in &self.dataset {
+            match word.as_str() {
+                "builtin" => sources.extend(Source::built_ins()),
+                word => sources.extend(Library::here().and_then(|library| library.sources(word))?),
+            }
+        }
+        sources.iter().try_for_each(Source::check)?;
+        // The same mesh twice would be one row with twice the weight.
+        let mut seen = HashSet::new();
+        sources.retain(|source| seen.insert(source.clone()));
+        Ok(sources)
+    }
+
+    /// All items, mesh by mesh.
+    ///
+    /// # Errors
+    /// As [`Study::check`], [`Study::entries`] and [`Study::sources`].
+    pub fn items(&self, registry: &Registry, here: &Here) -> Result<Vec<Item>, StudyError> {
+        self.check()?;
+        let methods = self.entries(registry)?;
+        let sources = self.sources()?;
+        let names = unique_names(&sources);
+        let files = self.given_files(&names)?;
+        let mut items = Vec::new();
+        for (source, mesh) in sources.iter().zip(names) {
+            let hash = match source.path() {
+                Some(path) => hash_of(path)?,
+                None => Input::load(source)?.hash,
+            };
+            let scene = SceneSpec {
+                mesh,
+                source: source.clone(),
+                hash: Some(hash),
+                noise: None,
+                sampling: self.sampling,
+                dual: self.dual,
+                measure: self.measure(),
+            };
+            for (method, entry) in &methods {
+                items.push(self.item(scene.clone(), method, entry, here));
+            }
+            for &eta in &self.noise {
+                let mesh = format!("{} noise {eta}", scene.mesh);
+                let noise = Some(Noise { eta, seed: self.seed });
+                let noisy = SceneSpec { mesh, noise, ..scene.clone() };
+                for (method, entry) in &methods {
+                    items.push(self.item(noisy.clone(), method, entry, here));
+                }
+            }
+            let of_mesh = files.iter().filter(|file| file.mesh == scene.mesh);
+            items.extend(of_mesh.map(|file| self.given_item(scene.clone(), file, here)));
+        }
+        Ok(items)
+    }
+
+    fn measure(&self) -> Measure {
+        Measure {
+            samples: self.samples,
+            volume_depth: VOLUME_DEPTH,
+            seed: self.seed,
+            certify: self.certify,
+        }
+    }
+
+    fn item(&self, scene: SceneSpec, method: &StudyMethod, entry: &Entry, here: &Here) -> Item {
+        Item {
+            scene,
+            method: MethodSpec {
+                id: method.id.clone(),
+                name: method.name.clone(),
+                params: method.params.clone(),
+                fingerprint: entry.fingerprint().map(str::to_owned),
+            },
+            levels: self.levels(method, entry),
+            seed: self.seed,
+            repeat: self.repeat,
+            threads: self.threads.unwrap_or(here.threads),
+            limits: self.limits(here),
+            version: entry.version(&here.binary),
+            binary: here.binary.clone(),
+        }
+    }
+
+    /// The limits of each item.
+    pub fn limits(&self, here: &Here) -> Limits {
+        let machine = if here.memory == 0 { u64::MAX } else { here.memory / 4 * 3 };
+        let bytes = self.memory.map_or(machine, |megabytes| megabytes.saturating_mul(1_000_000));
+        Limits { seconds: self.timeout, bytes }
+    }
+
+    /// The published level, the counts, the method's own levels and the error bounds, each from
+    /// fine to coarse.
+    fn levels(&self, method: &StudyMethod, entry: &Entry) -> Vec<Target> {
+        let info = entry.method().info();
+        if info.fixed {
+            return vec![Target::Published];
+        }
+        let mut levels = Vec::new();
+        if method.published.unwrap_or(self.published) {
+            levels.push(Target::Published);
+        }
+        let mut counts = method.spheres.as_ref().unwrap_or(&self.spheres).clone();
+        counts.sort_unstable_by(|a, b| b.cmp(a));
+        counts.dedup();
+        levels.extend(counts.into_iter().map(Target::Spheres));
+        let mut native = match method.levels.is_empty() && !self.counts_only {
+            true => entry.presentation().sweep.clone(),
+            false => method.levels.clone(),
+        };
+        native.sort_by(f64::total_cmp);
+        native.dedup();
+        if info.native.as_ref().is_some_and(|native| !native.larger_is_coarser) {
+            native.reverse();
+        }
+        levels.extend(native.into_iter().map(Target::Native));
+        // Last and from loose to tight, since a search that does not end must cost nothing else.
+        let mut bounds = self.max_error.clone();
+        bounds.sort_by(|a, b| b.total_cmp(a));
+        bounds.dedup();
+        levels.extend(bounds.into_iter().map(Target::MaxError));
+        levels
+    }
+}
+
+/// One of N shares of a study's items.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1 to `of`.
+    pub number: usize,
+    /// Number of shares.
+    pub of: usize,
+}
+
+impl Shard {
+    /// Reads `I/N`.
+    ///
+    /// # Errors
+    /// [`StudyError::Value`] where it is not two numbers, the first from 1 to the second.
+    pub fn parse(text: &str) -> Result<Self, StudyError> {
+        let wrong = || StudyError::Value(format!("--shard {text}: write I/N with I from 1 to N"));
+        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
+        let (number, of) = (number.parse().ok(), of.parse().ok());
+        let (number, of) = number.zip(of).ok_or_else(wrong)?;
+        if number == 0 || number > of { Err(wrong()) } else { Ok(Self { number, of }) }
+    }
+
+    /// Every Nth item. The place in the whole study decides, not what a store lacks: a shard that is
+    /// run again continues with its own items. The start moves from mesh to mesh, so that no shard
+    /// gets one method on all meshes.
+    pub fn share(self, items: Vec<Item>) -> Vec<Item> {
+        let mut shares = Vec::new();
+        for (mesh, of_mesh) in items.chunk_by(|a, b| a.scene == b.scene).enumerate() {
+            let own = |place: &usize| (place + mesh) % self.of == self.number - 1;
+            shares.extend((0..of_mesh.len()).filter(own).map(|place| of_mesh[place].clone()));
+        }
+        shares
+    }
+}
+
+pub(crate) fn hash_of(path: &Path) -> Result<String, StudyError> {
+    let read = std::fs::read(path);
+    let bytes = read.map_err(|error| InputError::Read { path: path.to_owned(), error })?;
+    Ok(hex_digest(&bytes))
+}
+
+/// A name for each source, unlike every other even as the stem of a file: the file's stem, where
+/// that is not enough its name with the extension, then with its folder, then a number.
+pub(crate) fn unique_names(sources: &[Source]) -> Vec<String> {
+    let key = |name: &str| medial_reports::file_stem(name).to_ascii_lowercase();
+    let mut names: Vec<String> = sources.iter().map(Source::name).collect();
+    for depth in 1..=2 {
+        let mut count: HashMap<String, usize> = HashMap::new();
+        names.iter().for_each(|name| *count.entry(key(name)).or_default() += 1);
+        for (name, source) in names.iter_mut().zip(sources) {
+            if count[&key(name)] > 1 {
+                *name = source.long_name(depth);
+            }
+        }
+    }
+    let mut taken = HashSet::new();
+    for name in &mut names {
+        let base = name.clone();
+        let mut number = 2;
+        while !taken.insert(key(name)) {
+            *name = format!("{base}-{number}");
+            number += 1;
+        }
+    }
+    names
+}

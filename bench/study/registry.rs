@@ -1,0 +1,208 @@
+//! The known methods: those of the program, and those of plug-in files.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use medial::simplifier::{Chain, Level, MedialSimplifier, MethodInfo, Presentation, Registered};
+use medial_methods::initial;
+use serde::{Serialize, Serializer};
+
+use crate::plugin;
+use crate::plugin::{PluginError, ScriptLoader, ScriptMethod};
+use crate::provenance::hex_digest;
+
+/// Id of the pseudo-method that returns the initial medial mesh.
+pub const INITIAL: &str = "initial";
+
+/// Raised when the runner's own work changes what stands in records.
+const RUNNER: u32 = 1;
+
+/// Methods by id, in the order of the tables.
+pub struct Registry {
+    entries: Vec<Entry>,
+    /// Entries that can be run but are not methods: the initial medial mesh as it is, files of other
+    /// programs, and every ordered pair of methods, run one after the other. Made eagerly, so that an id means the same in
+    /// a worker.
+    others: Vec<Entry>,
+    /// The plug-in files that were added, as absolute paths.
+    files: Vec<PathBuf>,
+    /// What loads plug-in files that are no declarations.
+    loader: Option<Box<dyn ScriptLoader>>,
+}
+
+/// A method, its presentation, and for a plug-in a hash of its files.
+pub struct Entry {
+    method: Arc<dyn MedialSimplifier>,
+    presentation: Presentation,
+    fingerprint: Option<String>,
+    /// See [`Registered::version`].
+    version: Option<String>,
+}
+
+/// The description and the presentation as one object.
+impl Serialize for Entry {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Described<'a> {
+            #[serde(flatten)]
+            info: &'a MethodInfo,
+            #[serde(flatten)]
+            presentation: &'a Presentation,
+        }
+        let (info, presentation) = (self.method.info(), &self.presentation);
+        Described { info, presentation }.serialize(to)
+    }
+}
+
+impl Entry {
+    /// The method.
+    pub fn method(&self) -> &dyn MedialSimplifier {
+        self.method.as_ref()
+    }
+
+    /// How it is presented.
+    pub fn presentation(&self) -> &Presentation {
+        &self.presentation
+    }
+
+    fn new(registered: Registered, fingerprint: Option<String>) -> Self {
+        let Registered { method, presentation, version } = registered;
+        let version = version.map(|version| version.into_owned());
+        Self { method: method.into(), presentation, fingerprint, version }
+    }
+
+    fn chain(first: &Self, then: &Self) -> Self {
+        let filter = first.presentation.filter.unwrap_or(Level::Published);
+        let chain = Chain::new(Arc::clone(&first.method), filter, Arc::clone(&then.method));
+        let parts = [&first.fingerprint, &then.fingerprint];
+        let fingerprint = parts
+            .iter()
+            .any(|part| part.is_some())
+            .then(|| parts.map(|part| part.as_deref().unwrap_or("built in")).join(" + "));
+        let registered = Registered::from(chain).sweep(&then.presentation.sweep);
+        let version = first.version.as_ref().zip(then.version.as_ref());
+        let version = version.map(|(first, then)| format!("{filter:?} {first} + {then}"));
+        Self { version, ..Self::new(registered, fingerprint) }
+    }
+
+    /// A hash that changes whenever the results of the method may. `binary` is the hash of the running
+    /// program, which stands for a method that came with it and has no version of its own.
+    pub fn version(&self, binary: &str) -> String {
+        let own = match (&self.version, &self.fingerprint) {
+            (Some(version), None) => version.clone(),
+            // The program gives a plug-in its input and measures its output.
+            (version, Some(fingerprint)) => {
+                let library = [medial::SOURCE_HASH, medial::geometry::SOURCE_HASH];
+                format!("{fingerprint} {} {}", library.join(" "), version.as_deref().unwrap_or(""))
+            }
+            (None, None) => binary.to_owned(),
+        };
+        hex_digest(format!("{RUNNER} {own}").as_bytes())
+    }
+
+    /// Its id.
+    pub fn id(&self) -> &str {
+        &self.method.info().id
+    }
+
+    /// Hash of the declaration and the files of a plug-in; `None` for a method of the program, which
+    /// the program's own hash covers.
+    pub fn fingerprint(&self) -> Option<&str> {
+        self.fingerprint.as_deref()
+    }
+}
+
+/// Why a registry cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RegistryError {
+    /// Two methods of the program have one id.
+    #[error("two methods are called `{0}`; give one of them another id")]
+    Duplicate(String),
+    /// A plug-in file is wrong.
+    #[error(transparent)]
+    Plugin(#[from] PluginError),
+}
+
+impl Registry {
+    /// The methods of a program.
+    ///
+    /// # Errors
+    /// [`RegistryError::Duplicate`] when two have one id.
+    pub fn new(methods: Vec<Registered>) -> Result<Self, RegistryError> {
+        let mut initial = Entry::new(initial::method().into(), None);
+        initial.version = medial_methods::version(INITIAL);
+        let given = Entry::new(crate::study::external::method().into(), None);
+        let (entries, others) = (Vec::new(), vec![initial, given]);
+        let mut registry = Self { entries, others, files: Vec::new(), loader: None };
+        for registered in methods {
+            let id = &registered.method.info().id;
+            if registry.entry(id).is_some() {
+                return Err(RegistryError::Duplicate(id.clone().into_owned()));
+            }
+            registry.add(Entry::new(registered, None));
+        }
+        Ok(registry)
+    }
+
+    /// The same with a loader for plug-in files of its language.
+    #[must_use]
+    pub fn with_loader(self, loader: Box<dyn ScriptLoader>) -> Self {
+        Self { loader: Some(loader), ..self }
+    }
+
+    /// Adds the methods of a plug-in file.
+    ///
+    /// # Errors
+    /// When the file is wrong, or an id is taken.
+    pub fn add_plugins(&mut self, file: &Path) -> Result<(), RegistryError> {
+        let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+        if self.files.contains(&file) {
+            return Ok(());
+        }
+        let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
+        let new: Vec<Entry> = if plugin::is_script(&file) {
+            let entry =
+                |ScriptMethod { method, fingerprint }| Entry::new(method, Some(fingerprint));
+            let methods = plugin::load_script(&file, self.loader.as_deref(), &taken)?;
+            methods.into_iter().map(entry).collect()
+        } else {
+            let entry = |external: plugin::External| {
+                let fingerprint = Some(external.fingerprint().to_owned());
+                Entry::new(external.into(), fingerprint)
+            };
+            plugin::load(&file, &taken)?.into_iter().map(entry).collect()
+        };
+        new.into_iter().for_each(|entry| self.add(entry));
+        self.files.push(file);
+        Ok(())
+    }
+
+    /// Adds a method, and its chains with the methods added before.
+    fn add(&mut self, new: Entry) {
+        for other in &self.entries {
+            self.others.push(Entry::chain(other, &new));
+            self.others.push(Entry::chain(&new, other));
+        }
+        self.entries.push(new);
+    }
+
+    /// The method with an id, the chain of two (`FIRST+THEN`), [`INITIAL`] or [`GIVEN`](super::GIVEN).
+    pub fn entry(&self, id: &str) -> Option<&Entry> {
+        self.entries.iter().chain(&self.others).find(|entry| entry.id() == id)
+    }
+
+    /// All methods, without chains and the initial medial mesh.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// The methods that run where none is named: all but those on request.
+    pub fn usual(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|entry| !entry.presentation.on_request)
+    }
+
+    /// The plug-in files that were added.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+}

@@ -1,0 +1,365 @@
+//! The inputs of a comparison: files of the user, meshes of the library by their names, or built-in shapes.
+
+use std::path::{Component, Path, PathBuf};
+use std::{fmt, fs, io};
+
+use medial::complex::MedialMesh;
+use medial::shape::{Shape, ShapeError, ShapeOptions};
+use medial::surface;
+use medial::surface::{SurfaceError, SurfaceReport, TriMesh};
+use medial_datasets::BuiltIn;
+use serde::{Deserialize, Serialize};
+
+use crate::provenance::hex_digest;
+use crate::study::library::{Library, PublicError};
+
+/// Where a mesh comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// A surface file.
+    File(PathBuf),
+    /// A built-in shape at its default or a chosen resolution.
+    BuiltIn {
+        /// Id in the catalogue.
+        id: String,
+        /// Resolution, in the shape's own meaning.
+        resolution: Option<u32>,
+    },
+    /// A mesh of the library.
+    Cached {
+        /// Its name there.
+        name: String,
+        /// The set that it belongs to.
+        set: String,
+        /// Its file.
+        path: PathBuf,
+    },
+}
+
+/// What an argument begins with that names a built-in shape.
+const BUILT_IN: &str = "builtin:";
+/// What an argument begins with that names a mesh of the library.
+const DATASET: &str = "dataset:";
+
+impl Source {
+    /// Whether an argument is a name rather than a path.
+    pub fn is_name(argument: &Path) -> bool {
+        let text = argument.to_string_lossy();
+        text.starts_with(BUILT_IN) || text.starts_with(DATASET)
+    }
+
+    /// The file, where it is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) | Self::Cached { path, .. } => Some(path),
+            Self::BuiltIn { .. } => None,
+        }
+    }
+
+    /// The same input with its file elsewhere; a built-in shape stays as it is.
+    #[must_use]
+    pub fn moved(&self, path: PathBuf) -> Self {
+        match self {
+            Self::File(_) => Self::File(path),
+            Self::Cached { name, set, .. } => {
+                Self::Cached { name: name.clone(), set: set.clone(), path }
+            }
+            Self::BuiltIn { .. } => self.clone(),
+        }
+    }
+
+    /// Reads an argument: `builtin:ID` or `builtin:ID:RESOLUTION`, `dataset:NAME`, else a path.
+    ///
+    /// # Errors
+    /// [`InputError::Resolution`] when the resolution is not a number; [`InputError::Library`] when the library has no
+    /// such mesh.
+    pub fn parse(argument: &Path) -> Result<Self, InputError> {
+        if let Some(name) = argument.to_str().and_then(|text| text.strip_prefix(DATASET)) {
+            return Ok(Library::here()?.source(name)?);
+        }
+        let Some(spec) = argument.to_str().and_then(|text| text.strip_prefix(BUILT_IN)) else {
+            return Ok(Self::File(argument.to_owned()));
+        };
+        let (id, resolution) = match spec.split_once(':') {
+            None => (spec, None),
+            Some((id, text)) => {
+                let resolution = text.parse().map_err(|_| InputError::Resolution(text.into()))?;
+                (id, Some(resolution))
+            }
+        };
+        Ok(Self::BuiltIn { id: id.to_owned(), resolution })
+    }
+
+    /// Refuses what cannot be an input before anything is run: a file that is not there or cannot be
+    /// read, a shape or a resolution that does not exist.
+    ///
+    /// # Errors
+    /// [`InputError`], which names it.
+    pub fn check(&self) -> Result<(), InputError> {
+        match self {
+            Self::File(path) | Self::Cached { path, .. } => {
+                let failed = |error| InputError::Read { path: path.clone(), error };
+                let kind = fs::metadata(path).map_err(failed)?;
+                // Opening one of these would wait for ever.
+                if !kind.is_file() {
+                    return Err(failed(io::Error::other("not a regular file")));
+                }
+                fs::File::open(path).map(|_| ()).map_err(failed)
+            }
+            Self::BuiltIn { id, resolution } => built_in(id, *resolution).map(|_| ()),
+        }
+    }
+
+    /// The built-in shapes that a comparison takes where none is named, at their default resolutions, in the
+    /// order of the catalogue.
+    pub fn built_ins() -> Vec<Self> {
+        let shapes = medial_datasets::catalogue();
+        shapes
+            .iter()
+            .filter(|shape| shape.in_default)
+            .map(|shape| Self::BuiltIn { id: shape.id.into(), resolution: None })
+            .collect()
+    }
+
+    /// Name for tables: the file's stem, the name in the library, or the id of the built-in shape.
+    pub fn name(&self) -> String {
+        match self {
+            Self::File(path) => path
+                .file_stem()
+                .map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into()),
+            Self::Cached { name, .. } => name.clone(),
+            Self::BuiltIn { id, resolution: None } => id.clone(),
+            Self::BuiltIn { id, resolution: Some(resolution) } => format!("{id}-{resolution}"),
+        }
+    }
+
+    /// The set that the mesh belongs to, where it does.
+    pub fn dataset(&self) -> Option<&str> {
+        match self {
+            Self::File(_) => None,
+            Self::Cached { set, .. } => Some(set),
+            Self::BuiltIn { .. } => Some("builtin"),
+        }
+    }
+
+    /// A longer name where [`Source::name`] is not unique: with the extension (depth 1), and with
+    /// the folder that holds the file (depth 2). For a name as it is written.
+    pub fn long_name(&self, depth: usize) -> String {
+        let Self::File(path) = self else { return self.to_string() };
+        let parts: Vec<_> = path
+            .components()
+            .filter_map(|part| match part {
+                Component::Normal(name) => Some(name.to_string_lossy()),
+                _ => None,
+            })
+            .collect();
+        parts[parts.len().saturating_sub(depth)..].join("/")
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => write!(f, "{}", path.display()),
+            Self::Cached { name, .. } => write!(f, "{DATASET}{name}"),
+            Self::BuiltIn { id, resolution: None } => write!(f, "builtin:{id}"),
+            Self::BuiltIn { id, resolution: Some(r) } => write!(f, "builtin:{id}:{r}"),
+        }
+    }
+}
+
+/// A mesh that was read and checked, or generated.
+pub struct Input {
+    /// Name for tables.
+    pub name: String,
+    /// SHA-256 of the file, or of the generated surface.
+    pub hash: String,
+    /// The surface, in input units.
+    pub mesh: TriMesh,
+    /// What was found and repaired.
+    pub report: SurfaceReport,
+    /// The exactly known medial axis, in input units.
+    pub axis: Option<MedialMesh>,
+}
+
+impl Input {
+    /// Reads or generates a mesh.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is refused, or no such built-in shape exists.
+    pub fn load(source: &Source) -> Result<Self, InputError> {
+        match source {
+            Source::File(path) | Source::Cached { path, .. } => {
+                // One read: the hash is that of the bytes that were parsed.
+                let bytes = surface::content(path)?;
+                let loaded = surface::read_content(path, &bytes)?;
+                Ok(Self {
+                    name: source.name(),
+                    hash: hex_digest(&bytes),
+                    mesh: loaded.mesh,
+                    report: loaded.report,
+                    axis: None,
+                })
+            }
+            Source::BuiltIn { id, resolution } => Self::generate(source, id, *resolution),
+        }
+    }
+
+    fn generate(source: &Source, id: &str, resolution: Option<u32>) -> Result<Self, InputError> {
+        let (shape, resolution) = built_in(id, resolution)?;
+        let mesh = shape.mesh(resolution);
+        let report = surface::validate(&mesh)?;
+        let axis = shape.axis().map(|axis| axis.mesh);
+        // Records hold distances to the known axis: a corrected axis is another input.
+        let mut bytes = surface_bytes(&mesh);
+        let spheres = axis.iter().flat_map(|axis| &axis.spheres);
+        for number in spheres.flat_map(|s| [s.centre.x, s.centre.y, s.centre.z, s.radius]) {
+            bytes.extend(number.to_le_bytes());
+        }
+        Ok(Self { name: source.name(), hash: hex_digest(&bytes), mesh, report, axis })
+    }
+
+    /// SHA-256 of the surface itself, whatever the format of its file.
+    pub fn surface_hash(&self) -> String {
+        surface_hash(&self.mesh)
+    }
+
+    /// The shape, normalised, with nothing built yet.
+    ///
+    /// # Errors
+    /// When the surface has no extent.
+    pub fn shape(&self, options: ShapeOptions) -> Result<Shape, ShapeError> {
+        Shape::new(self.name.clone(), &self.mesh, self.report.clone(), options)
+    }
+}
+
+/// A built-in shape and its resolution, the default one unless given.
+fn built_in(
+    id: &str,
+    resolution: Option<u32>,
+) -> Result<(medial_datasets::BuiltIn, u32), InputError> {
+    let shape = medial_datasets::find(id).ok_or_else(|| InputError::NoSuchShape(id.to_owned()))?;
+    let resolution = resolution.unwrap_or(shape.default_resolution);
+    let range = shape.resolutions();
+    if !range.contains(&resolution) {
+        let (least, most) = (*range.start(), *range.end());
+        return Err(InputError::OutOfRange { resolution, least, most });
+    }
+    let vertices = estimated_vertices(&shape, resolution);
+    if vertices > MAX_VERTICES {
+        return Err(InputError::TooManyVertices { resolution, vertices });
+    }
+    Ok((shape, resolution))
+}
+
+/// Built-in shapes of more vertices take hours in most verbs and are taken for a slip.
+const MAX_VERTICES: f64 = 2e6;
+
+/// A surface has vertices by the square of its resolution.
+fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
+    let times = f64::from(resolution) / f64::from(shape.default_resolution);
+    if times <= 1.0 {
+        return 0.0;
+    }
+    shape.mesh(shape.default_resolution).vertices.len() as f64 * times * times
+}
+
+/// The shape that may have been meant by an id that none has.
+/// Where the name of a file that is not there is that of a built-in shape.
+fn meant_shape(path: &Path) -> String {
+    let is_shape = |id: &&str| medial_datasets::catalogue().iter().any(|shape| shape.id == *id);
+    let name = path.file_name().and_then(|name| name.to_str());
+    let id = name.filter(is_shape);
+    id.map_or(String::new(), |id| format!("; the built-in shape is `builtin:{id}`"))
+}
+
+fn meant(id: &str) -> String {
+    let ids: Vec<_> = medial_datasets::catalogue().into_iter().map(|shape| shape.id).collect();
+    did_you_mean(id, ids)
+}
+
+/// SHA-256 of a surface: coordinates and faces in their order, after reading.
+pub(crate) fn surface_hash(mesh: &TriMesh) -> String {
+    hex_digest(&surface_bytes(mesh))
+}
+
+fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
+    let coordinates = mesh.vertices.iter().flat_map(|v| v.to_array());
+    let indices = mesh.faces.iter().flatten();
+    coordinates.flat_map(f64::to_le_bytes).chain(indices.flat_map(|i| i.to_le_bytes())).collect()
+}
+
+/// Why an input cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// The file cannot be read.
+    #[error("{}: {error}{}", path.display(), meant_shape(path))]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// The surface is refused.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// The library has no such mesh.
+    #[error(transparent)]
+    Library(#[from] PublicError),
+    /// The catalogue has no such shape.
+    #[error("no built-in shape is called `{0}`{meant}; `medial datasets list` names them all", meant = meant(.0))]
+    NoSuchShape(String),
+    /// A built-in shape would be too large at this resolution.
+    #[error(
+        "resolution {resolution} would make about {vertices:.1e} vertices, above the most of \
+         {MAX_VERTICES:.0e}: ask for a coarser one"
+    )]
+    TooManyVertices {
+        /// What was asked.
+        resolution: u32,
+        /// Estimated number of vertices.
+        vertices: f64,
+    },
+    /// The resolution of a built-in shape is not a number.
+    #[error("`{0}` is not a resolution: write builtin:ID:NUMBER")]
+    Resolution(String),
+    /// The resolution of a built-in shape is out of its range.
+    #[error("resolution {resolution} is out of range: this shape takes {least} to {most}")]
+    OutOfRange {
+        /// What was asked.
+        resolution: u32,
+        /// Coarsest resolution that shows every feature.
+        least: u32,
+        /// Finest resolution.
+        most: u32,
+    },
+}
+
+/// Smallest Jaro-Winkler similarity (1 for equal words) of a suggestion.
+const MIN_SIMILARITY: f64 = 0.8;
+
+/// `; did you mean ...?` for the known word that is most like the given one, or nothing.
+pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let word = word.to_lowercase();
+    let alike = known.into_iter().map(|known| (strsim::jaro_winkler(&word, known), known));
+    match alike.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((similarity, known)) if similarity >= MIN_SIMILARITY => {
+            format!("; did you mean `{known}`?")
+        }
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::did_you_mean;
+
+    #[test]
+    fn only_what_is_alike_is_proposed() {
+        let known = ["angle", "lambda", "qmat", "pmat"];
+        assert_eq!(did_you_mean("qamt", known), "; did you mean `qmat`?");
+        assert_eq!(did_you_mean("Lamda", known), "; did you mean `lambda`?");
+        assert_eq!(did_you_mean("nothing", known), "");
+    }
+}
