@@ -135,7 +135,15 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
     }
     // The first store's study stands for all; relative paths in it start at the folder it names.
     let studies: Vec<(&PathBuf, Study)> = (earlier.iter().chain(dirs))
-        .filter_map(|dir| Some((dir, Study::read(&dir.join(STUDY)).ok()?)))
+        .filter_map(|dir| {
+            let mut study = Study::read(&dir.join(STUDY)).ok()?;
+            // A study that names no folder reads as one of the folder that holds it.
+            study.folder = study
+                .folder
+                .take()
+                .filter(|own| Some(own) != std::path::absolute(dir).ok().as_ref());
+            Some((dir, study))
+        })
         .collect();
     if let Some((first, study)) = studies.first() {
         for (dir, _) in studies.iter().filter(|(_, other)| other != study) {

@@ -23,7 +23,7 @@ fn compare_leaves_a_row_for_every_run() {
         "--out",
         text_path(&out),
     ]);
-    assert_eq!(code, 3, "some counts are not met: {stderr}");
+    assert_eq!(code, 0, "counts that are missed are results: {stderr}");
     insta::assert_snapshot!("compare_summary_heads", heads(&stdout));
     let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
     assert_eq!(lines.lines().count(), 2 * usual_methods() * 2);
@@ -68,7 +68,7 @@ fn own_levels_bounds_chains_and_the_start_are_rows() {
         "--out",
         text_path(&out),
     ]);
-    assert_eq!(code, 3, "a bound below the error of the samples is missed: {object}");
+    assert_eq!(code, 0, "a bound below the error of the samples is missed: {object}");
     let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
     let records: Vec<Value> =
         lines.lines().map(|line| serde_json::from_str(line).expect("a record")).collect();

@@ -231,7 +231,8 @@ fn what_a_program_leaves_behind_is_ended_and_told() {
     // The second is a child of a shell that is gone, the third has also left the process group.
     let mut ways = vec!["sleep 1000 & echo $! > pid", "(sleep 1000 & echo $! > pid)"];
     if has_setsid {
-        ways.push("(setsid sh -c 'echo $$ > pid; exec sleep 1000' &) ; sleep 0.2");
+        // Outside a worker, which adopts orphans, it is known by having been seen below the program.
+        ways.push("(setsid sh -c 'echo $$ > pid; exec sleep 1000' & sleep 0.3)");
         // Nor does it have the environment any more, but it was seen.
         ways.push(
             "env -i PATH=\"$PATH\" setsid sh -c 'echo $$ > pid; exec sleep 1000' & sleep 0.3",
