@@ -20,7 +20,7 @@ use crate::study::source::{Input, Source};
 /// Arguments of `axis`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
+    /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// The medial mesh (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
     #[arg(short, long)]

@@ -26,7 +26,7 @@ use crate::study::{Here, Shard, Study, StudyMethod};
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface files (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: the built-in shapes that
+    /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: the built-in shapes that
     /// `datasets list` says].
     meshes: Vec<MeshArgument>,
     /// A set of meshes beside those named: `builtin`, `public`, `defective`, `small`, `papers`, `added`, a package as in

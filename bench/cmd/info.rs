@@ -11,7 +11,7 @@ use crate::study::source::{Input, Source};
 /// Arguments of `info`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
+    /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
 }
 

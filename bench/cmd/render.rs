@@ -24,7 +24,7 @@ use crate::study::source::{Input, Source};
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
+    /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// Medial meshes of it (.ma or .ply with radii). Several give a strip: a panel for each, from the same camera.
     axes: Vec<PathBuf>,

@@ -14,7 +14,7 @@ use crate::output::{print_json, print_line};
 /// Arguments of `repair`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface (OFF, OBJ, PLY, STL, GLB).
+    /// Surface (OFF, OBJ, PLY, STL).
     input: PathBuf,
     /// The repaired surface (OFF, OBJ, PLY).
     #[arg(short, long)]

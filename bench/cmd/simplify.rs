@@ -40,7 +40,7 @@ use crate::study::source::{Input, Source};
 /// Arguments of `simplify`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface file (OFF, OBJ, PLY, STL, GLB), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
+    /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
     /// Id of the method; `medial methods` lists them.
     #[arg(long, short, value_name = "ID")]

@@ -522,15 +522,20 @@ impl Shard {
     }
 
     /// Every Nth item. The place in the whole study decides, not what a store lacks: a shard that is
-    /// run again continues with its own items. The start moves from mesh to mesh, so that no shard
-    /// gets one method on all meshes.
+    /// run again continues with its own items. The start moves by one from mesh to mesh, so that no
+    /// shard gets one method on all meshes where N divides the number of methods.
     pub fn share(self, items: Vec<Item>) -> Vec<Item> {
-        let mut shares = Vec::new();
-        for (mesh, of_mesh) in items.chunk_by(|a, b| a.scene == b.scene).enumerate() {
-            let own = |place: &usize| (place + mesh) % self.of == self.number - 1;
-            shares.extend((0..of_mesh.len()).filter(own).map(|place| of_mesh[place].clone()));
+        let mut own = Vec::new();
+        let mut mesh = 0;
+        for (place, item) in items.iter().enumerate() {
+            if place > 0 && items[place - 1].scene != item.scene {
+                mesh += usize::from(place % self.of == 0);
+            }
+            if (place + mesh) % self.of == self.number - 1 {
+                own.push(item.clone());
+            }
         }
-        shares
+        own
     }
 }
 
