@@ -201,9 +201,10 @@ fn only_the_tree_of_the_worker_ends_with_it() {
     let dir = tempfile::tempdir().expect("a folder");
     let (out, program) = (dir.path().join("out"), example("faulty"));
     let pid = dir.path().join("pid");
-    // The shell's other child becomes a child of the command by `exec`.
+    // The shell's other child becomes a child of the command by `exec`. It must not hold the pipes of
+    // the command, whose end the test waits for.
     let script = format!(
-        "sleep 7777 & echo $! > '{}'; exec '{}' compare builtin:box:8 --methods loops --spheres 20 \
+        "sleep 7777 > /dev/null 2>&1 & echo $! > '{}'; exec '{}' compare builtin:box:8 --methods loops --spheres 20 \
          --counts-only --samples 100 --timeout 2 --quiet --out '{}'",
         pid.display(),
         program.display(),
