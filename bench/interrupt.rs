@@ -16,6 +16,7 @@ pub fn install() {
     let handle = || {
         let again = INTERRUPTED.swap(true, Ordering::Relaxed);
         if again || !LISTENING.load(Ordering::Relaxed) {
+            medial::remove_temporaries();
             std::process::exit(Exit::Interrupted as i32);
         }
     };

@@ -23,6 +23,7 @@ fn main() {
     let (target, level) = (setting("TARGET"), setting("OPT_LEVEL"));
     // A package has no lock file of its own: the one of the build is not known there.
     let lock = root.join("../Cargo.lock");
+    println!("cargo::rerun-if-changed=../Cargo.lock");
     let lock = if lock.exists() { digest(&root, &[lock]) } else { String::new() };
     println!("cargo::rustc-env=BUILD={compiler} {target} {level} {lock}");
 }

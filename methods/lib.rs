@@ -188,7 +188,7 @@ mod tests {
             assert_eq!(before[module] != *hash, module == "qmat", "{module}");
         }
         assert_eq!(edit("lib.rs"), after, "how methods are presented changes no result");
-        assert_ne!(edit("ties.rs")["shared"], after["shared"]);
+        assert_ne!(edit("ranked.rs")["shared"], after["shared"]);
     }
 
     #[test]

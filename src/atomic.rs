@@ -2,7 +2,11 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// Temporary files that are being written, for [`remove_temporaries`].
+static LIVE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Writes a file under a temporary name in the same folder and renames it when it is complete.
 ///
@@ -34,13 +38,42 @@ pub fn write_atomically(
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let temporary = builder.tempfile_in(folder.unwrap_or(Path::new(".")))?;
+    let path = temporary.path().to_owned();
+    live(|paths| paths.push(path.clone()));
+    let written = complete(temporary, &target, replaced, content);
+    live(|paths| paths.retain(|other| *other != path));
+    written
+}
+
+/// Removes the temporary files of writes in progress: what a process does that ends itself without
+/// unwinding, since no destructor runs then.
+pub fn remove_temporaries() {
+    live(|paths| {
+        for path in paths.drain(..) {
+            // It may have been renamed meanwhile.
+            let _ = fs::remove_file(path);
+        }
+    });
+}
+
+fn live(change: impl FnOnce(&mut Vec<PathBuf>)) {
+    // A list of paths is whole after any panic.
+    change(&mut LIVE.lock().unwrap_or_else(PoisonError::into_inner));
+}
+
+fn complete(
+    temporary: tempfile::NamedTempFile,
+    target: &Path,
+    replaced: Option<fs::Metadata>,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
     if let Some(replaced) = replaced {
         temporary.as_file().set_permissions(replaced.permissions())?;
     }
     fill(temporary.as_file(), content)?;
     // On the disk before the name: after a crash the name must not stand for an empty file.
     temporary.as_file().sync_all()?;
-    temporary.persist(&target)?;
+    temporary.persist(target)?;
     Ok(())
 }
 

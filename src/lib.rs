@@ -48,7 +48,7 @@ pub mod simplifier;
 mod sum;
 pub mod surface;
 
-pub use atomic::write_atomically;
+pub use atomic::{remove_temporaries, write_atomically};
 pub use colour::{ColourMap, decode_srgb};
 
 pub use geometry::Vec3;

@@ -235,9 +235,7 @@ fn list_all(global: &Global) -> Result<(), Failure> {
     }
     shapes.iter().for_each(print_shape);
     let in_default = shapes.iter().filter(|shape| shape.in_default).count();
-    print_line(&format!(
-        "compare takes the first {in_default} where no mesh is named"
-    ));
+    print_line(&format!("compare takes the first {in_default} where no mesh is named"));
     for set in Set::ALL {
         print_set(set, &states);
     }
