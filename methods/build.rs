@@ -9,6 +9,7 @@ use std::{env, fs};
 use sha2::{Digest, Sha256};
 
 #[allow(dead_code, reason = "a test includes this file")]
+#[allow(clippy::print_stdout, reason = "this is how a build script talks to cargo")]
 fn main() {
     println!("cargo::rerun-if-changed=.");
     let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("set by cargo"));

@@ -1,7 +1,7 @@
 //! The messages between the supervisor and a worker: JSON, one message per line.
 //!
 //! Requests go to the worker's standard input. Events come from its standard output, each on a line
-//! that begins with [`MARK`]. Methods may print there, too: lines without the mark are ignored.
+//! that begins with `MARK`. Methods may print there, too: lines without the mark are ignored.
 
 use std::io;
 use std::io::{Read, Write};

@@ -240,7 +240,7 @@ type Running<'i> = (&'i Item, [Vec<Record>; 2]);
 /// Runs on both sides what either lacks, mesh by mesh, all repetitions in turn, and keeps the records.
 ///
 /// # Errors
-/// As [`run_items`](super::run_items).
+/// As [`run_items`].
 pub fn run_alternately(
     items: &[Item],
     contenders: &mut [Contender<'_>; 2],

@@ -312,8 +312,6 @@ impl Directed {
 // With `u` from the nearest primitive so far to the point, one pass over the link vertices excludes
 // nearly all cones and slabs without error; the others are built when first needed.
 
-/// Absent index.
-
 /// Bound on the rounding error of an excess, for coordinates of at most 1.
 pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 

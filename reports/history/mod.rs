@@ -91,12 +91,15 @@ pub struct Findings<'a> {
     pub changes: Vec<Change>,
 }
 
+/// A quantity by its name.
+type Measured<T> = (&'static str, fn(&Point) -> T);
+
 /// The noisy quantities.
-const NOISY: [(&str, fn(&Point) -> Option<f64>); 2] =
+const NOISY: [Measured<Option<f64>>; 2] =
     [("seconds", |point| point.seconds), ("bytes", |point| point.bytes.map(|bytes| bytes as f64))];
 
 /// The exact quantities.
-const EXACT: [(&str, fn(&Point) -> Value); 6] = [
+const EXACT: [Measured<Value>; 6] = [
     ("status", |point| json!(point.status.to_string())),
     ("topology", |point| {
         point.topology.map_or(Value::Null, |t| json!(if t { "right" } else { "wrong" }))

@@ -39,9 +39,12 @@ const COLOURS: [RGBColor; 12] = [
     RGBColor(0xA6, 0x56, 0x28),
 ];
 
+/// Name, whether it is hollow, and its outline in pixels.
+type Marker = (&'static str, bool, &'static [(i32, i32)]);
+
 /// Markers: name of the page's symbol, whether it is hollow, and its outline in pixels.
 /// A disc has no outline, a cross has two strokes of two points.
-const MARKERS: [(&str, bool, &[(i32, i32)]); 11] = [
+const MARKERS: [Marker; 11] = [
     ("circle", false, &[]),
     ("square", false, &[(-7, -7), (7, -7), (7, 7), (-7, 7), (-7, -7)]),
     ("triangle", false, &[(0, -10), (9, 7), (-9, 7), (0, -10)]),

@@ -960,7 +960,7 @@ mod tests {
         assert_eq!((&*soup.lines, soup.vertices[2].y), (&[13][..], 0.1));
         assert_eq!(parse_ply(PLY.replace('\n', "\r\n").as_bytes()).unwrap().lines, [13]);
         let header = PLY.replace("ascii", "binary_big_endian");
-        let mut file = header[..header.find("0 0 0").unwrap()].as_bytes().to_vec();
+        let mut file = header.as_bytes()[..header.find("0 0 0").unwrap()].to_vec();
         for x in [0_f32, 0., 0., 1., 0., 0., 0., 1., 0.] {
             file.extend(x.to_be_bytes());
         }

@@ -352,7 +352,6 @@ fn a_union_whose_area_all_but_underflows_is_its_centres() {
 // Distances between surfaces against closed forms and brute force.
 
 /// The box of the given half sides around the origin.
-
 fn centred_cuboid(half: Vec3) -> TriMesh {
     crate::shapes::cuboid(-half, half)
 }
