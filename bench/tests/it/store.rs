@@ -410,6 +410,12 @@ fn shards_merge_into_what_one_run_gives() {
         .replace("\"result_hash\":\"", "\"result_hash\":\"0");
     fs::create_dir(at("4")).expect("made");
     fs::write(at("4/results.jsonl"), altered).expect("written");
+    for record in records(&at("4")) {
+        let artifact = record["artifact"].as_str().expect("a medial mesh");
+        let to = at("4").join(artifact);
+        fs::create_dir_all(to.parent().expect("a folder")).expect("made");
+        fs::copy(at("2").join(artifact), to).expect("copied");
+    }
     let (two, four, out) =
         (text(&at("2")).to_owned(), text(&at("4")).to_owned(), text(&at("both")).to_owned());
     let words = ["report", "--json", &two, &four, "--out", &out];
