@@ -326,6 +326,9 @@ pub enum SimplifyError {
     /// The method could not do it, and says why in its own words.
     #[error("failed: {0}")]
     Failed(String),
+    /// An allocation of the method failed, and the method survived it.
+    #[error("out of memory: {0}")]
+    OutOfMemory(String),
     /// The method's program was ended by a signal.
     #[error("crashed: {0}")]
     Crashed(String),

@@ -72,6 +72,7 @@ impl From<SimplifyError> for Fault {
             SimplifyError::Unsupported { .. } => Status::Unsupported,
             SimplifyError::Parameter(_) | SimplifyError::Level(_) => Status::Refused,
             SimplifyError::InvalidOutput(_) => Status::InvalidOutput,
+            SimplifyError::OutOfMemory(_) => Status::OutOfMemory,
             SimplifyError::Crashed(_) => Status::Panicked,
             SimplifyError::Shape(_)
             | SimplifyError::Hierarchy(_)

@@ -556,10 +556,17 @@ pub(crate) fn read_external(path: &Path, options: ReadOptions) -> Result<LoadedM
     };
     match extension.as_str() {
         "off" | "stl" => surface(),
+        // Lines `l` are the edges of a medial mesh. Taken for a surface, their radii would be 0.
+        "obj" if has_lines(path) => read(),
         // Without radii it is a surface, and its first error is the more telling one if it is neither.
         "ply" | "obj" => read().or_else(|why| surface().map_err(|_| why)),
         _ => read(),
     }
+}
+
+fn has_lines(obj: &Path) -> bool {
+    let text = fs::read(obj).unwrap_or_default();
+    text.split(|&byte| byte == b'\n').any(|line| line.starts_with(b"l "))
 }
 
 /// Gives every sphere the distance of its centre to the surface as its radius.

@@ -18,6 +18,7 @@ use medial_bench::plugin::ScriptLoader;
 use medial_bench::study::no_such_method;
 use medial_bench::study::registry::{Entry, Registry};
 use numpy::{PyArray1, PyReadonlyArray2};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError};
 use pyo3::prelude::*;
 use serde::Deserialize;
 
@@ -222,14 +223,16 @@ fn of_exception(error: PyErr) -> SimplifyError {
         if is_error(py, &error, "ParameterError") {
             return SimplifyError::Parameter(message);
         }
-        if is_error(py, &error, "CancelledError")
-            || error.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py)
+        if is_error(py, &error, "CancelledError") || error.is_instance_of::<PyKeyboardInterrupt>(py)
         {
             return SimplifyError::Cancelled;
         }
         // The type, the message and the innermost line of the user's file.
         let told = py.import(BETWEEN).and_then(|between| between.call_method1("tell", (&error,)));
         let told = told.and_then(|told| told.extract::<String>()).unwrap_or(message);
+        if error.is_instance_of::<PyMemoryError>(py) {
+            return SimplifyError::OutOfMemory(told);
+        }
         SimplifyError::Failed(told)
     })
 }
