@@ -106,7 +106,7 @@ fn substrates(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Queries of a hierarchy: the way between two stages, simplex by simplex, and one stage as a mesh.
+/// A stage of a hierarchy as a mesh.
 fn hierarchy(criterion: &mut Criterion) {
     let source = Source::BuiltIn { id: "blob".into(), resolution: None };
     let input = Input::load(&source).expect("a built-in shape");
@@ -118,30 +118,6 @@ fn hierarchy(criterion: &mut Criterion) {
     let hierarchy = end.extras.get_shared::<Hierarchy>().expect("PMAT has a hierarchy");
     let last = hierarchy.last_stage();
     let mut group = criterion.benchmark_group("hierarchy");
-    let ways = [
-        ("finest to coarsest", 0, last),
-        ("coarsest to finest", last, 0),
-        ("one step", last / 2, last / 2 + 1),
-    ];
-    for (name, from, to) in ways {
-        group.bench_function(name, |b| {
-            b.iter(|| {
-                let change = hierarchy.change(from, to);
-                change.edges_removed().for_each(|edge| {
-                    black_box(edge);
-                });
-                change.edges_added().for_each(|edge| {
-                    black_box(edge);
-                });
-                change.faces_removed().for_each(|face| {
-                    black_box(face);
-                });
-                change.faces_added().for_each(|face| {
-                    black_box(face);
-                });
-            });
-        });
-    }
     let half = hierarchy.stage(last / 2);
     group.bench_function("half as a mesh", |b| b.iter_with_large_drop(|| half.to_mesh()));
     group.finish();

@@ -27,7 +27,7 @@
 //! Every vertex has a stamp, which grows with each collapse at the vertex itself. A queued candidate
 //! remembers the stamps of its edge; if they differ when it is popped, it is out of date and dropped.
 
-pub use hierarchy::{Change, Hierarchy, HierarchyError, Stage, Step};
+pub use hierarchy::{Hierarchy, HierarchyError, Stage, Step};
 pub use link::CollapseError;
 pub use queue::{Candidate, CollapseQueue, LazyHeap, Prioritised};
 use queue::{List, Pool};

@@ -1,4 +1,4 @@
-//! All levels of detail of a medial mesh at once, and the changes from any level to any other.
+//! All levels of detail of a medial mesh at once.
 //!
 //! A sequence of collapses that do not move the kept spheres gives a hierarchy of meshes on subsets
 //! of the initial spheres (Hoppe 1996, *Progressive meshes*; Faraj, Thiery, Boubekeur 2013,
@@ -11,19 +11,15 @@
 //! removed. So every sphere, edge and face, initial or made by a collapse, exists in one interval
 //! of stages. A [`Hierarchy`] stores each of them once, in the order of their births, and their ids
 //! in the order of their deaths. The simplices of stage `t` are those born up to `t` that die later:
-//!
-//! - They are found by a scan of the births up to `t` or of the deaths after `t`, whichever are
-//!   fewer. In a mesh of bounded degree this takes time in proportion to the simplices of stage `t`.
-//! - Those that come and go between two stages, in either direction, are found by a scan of the
-//!   births and deaths between them, or by a scan as above where that is shorter.
+//! a scan of the births up to `t` or of the deaths after `t`, whichever are fewer, finds them. In a
+//! mesh of bounded degree this takes time in proportion to the simplices of stage `t`.
 //!
 //! A [`Stage`] is a view and costs nothing. Nothing is replayed to reach it and there is no current
 //! stage, so a stage is the same, bit for bit, whatever was asked for before.
 
-use std::ops::Range;
 use std::sync::Arc;
 
-pub use stage::{Change, Stage};
+pub use stage::Stage;
 
 use crate::complex::MedialMesh;
 
@@ -57,8 +53,7 @@ pub struct Step {
 /// let hierarchy = Hierarchy::new(Arc::new(path), vec![step])?;
 /// // Rank 0 is sphere 1, which is removed first.
 /// assert_eq!(hierarchy.by_rank(), [1, 0, 2]);
-/// assert_eq!(hierarchy.change(0, 1).edges_removed().collect::<Vec<_>>(), [[0, 1], [0, 2]]);
-/// assert_eq!(hierarchy.change(0, 1).edges_added().collect::<Vec<_>>(), [[1, 2]]);
+/// assert_eq!(hierarchy.stage(1).edges().collect::<Vec<_>>(), [[1, 2]]);
 /// assert_eq!(hierarchy.stage(1).to_mesh().edges, [[0, 1]]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -169,14 +164,6 @@ impl Hierarchy {
         Stage::new(self, stage)
     }
 
-    /// The difference between two stages, in either direction. Cost `O(1)`.
-    ///
-    /// # Panics
-    /// If there are fewer collapses.
-    pub fn change(&self, from: usize, to: usize) -> Change<'_> {
-        Change::new(self, from, to)
-    }
-
     /// How many of the first `stage` collapses violate the link condition of Dey, Edelsbrunner,
     /// Guha and Nekhayev (1999), and so may have closed a loop, or made a void.
     pub fn violations_until(&self, stage: usize) -> usize {
@@ -283,50 +270,27 @@ impl<const K: usize> Layer<K> {
         self.count[stage] as usize
     }
 
-    /// The simplices of a stage. Cost: those, and the births up to the stage or the deaths after
-    /// it, whichever are fewer.
+    fn end_stage(&mut self) {
+        self.born.push(self.simplices.len() as u32);
+        self.died.push(self.by_death.len() as u32);
+    }
+
+    /// The simplices of a stage: initial ones, then others. Cost: those, and the births up to the
+    /// stage or the deaths after it, whichever are fewer.
     fn at(&self, stage: usize) -> impl Iterator<Item = [u32; K]> + '_ {
-        let deaths = self.died[stage] as usize..self.by_death.len();
-        self.select(0..self.born[stage] as usize, deaths, stage..usize::MAX)
-    }
-
-    /// The simplices of stage `fine` that are not of the later stage `coarse`. Cost: those, and
-    /// the deaths between them or the births up to `fine`, whichever are fewer.
-    fn dying(&self, fine: usize, coarse: usize) -> impl Iterator<Item = [u32; K]> + '_ {
-        let deaths = self.died[fine] as usize..self.died[coarse] as usize;
-        self.select(0..self.born[fine] as usize, deaths, fine..coarse)
-    }
-
-    /// The simplices of stage `coarse` that are not of the earlier stage `fine`. Cost: those, and
-    /// the births between them or the deaths after `coarse`, whichever are fewer.
-    fn arising(&self, fine: usize, coarse: usize) -> impl Iterator<Item = [u32; K]> + '_ {
-        let births = self.born[fine] as usize..self.born[coarse] as usize;
-        let deaths = self.died[coarse] as usize..self.by_death.len();
-        self.select(births, deaths, coarse..usize::MAX)
-    }
-
-    /// The simplices with ids in `births` whose first vertices have ranks in `firsts`: initial
-    /// ones, then others. Requires that the range `deaths` of `by_death` holds the ids of all of
-    /// them, and no other id of `births`.
-    fn select(
-        &self,
-        births: Range<usize>,
-        deaths: Range<usize>,
-        firsts: Range<usize>,
-    ) -> impl Iterator<Item = [u32; K]> + '_ {
-        // Initial simplices lie in the order of their deaths: they are a slice.
-        let initial = self.born[0] as usize;
-        let among = &self.simplices[births.start.min(initial)..births.end.min(initial)];
-        let before = |rank: usize| among.partition_point(|s| (s[0] as usize) < rank);
-        let slice = &among[before(firsts.start)..before(firsts.end)];
-        let births = births.start.max(initial)..births.end.max(initial);
-        // Either range holds them all; scan the shorter one.
-        let by_birth = births.len() <= deaths.len();
-        let later = if by_birth { &self.simplices[births.clone()] } else { &[] };
-        let ids = if by_birth { &[] } else { &self.by_death[deaths] };
-        let later = later.iter().filter(move |s| firsts.contains(&(s[0] as usize)));
-        let ids = ids.iter().map(|&id| id as usize).filter(move |id| births.contains(id));
-        slice.iter().chain(later).chain(ids.map(|id| &self.simplices[id])).copied()
+        // Initial simplices lie in the order of their deaths: those that live are a suffix.
+        let (initial, later) =
+            self.simplices[..self.born[stage] as usize].split_at(self.born[0] as usize);
+        let living = initial.partition_point(|s| (s[0] as usize) < stage);
+        // Births and remaining deaths both hold all the others; scan the shorter list.
+        let deaths = &self.by_death[self.died[stage] as usize..];
+        let by_birth = later.len() <= deaths.len();
+        let (births, deaths) = if by_birth { (later, &[][..]) } else { (&[][..], deaths) };
+        let births = births.iter().filter(move |s| s[0] as usize >= stage);
+        // Ids before those of `later` are initial, ids behind them are not born yet.
+        let first = initial.len();
+        let ids = deaths.iter().filter_map(move |&id| later.get((id as usize).checked_sub(first)?));
+        initial[living..].iter().chain(births).chain(ids).copied()
     }
 }
 
@@ -472,12 +436,5 @@ impl<const K: usize> Builder<K> {
             self.layer.count.push(count);
         }
         (self.layer, self.moved)
-    }
-}
-
-impl<const K: usize> Layer<K> {
-    fn end_stage(&mut self) {
-        self.born.push(self.simplices.len() as u32);
-        self.died.push(self.by_death.len() as u32);
     }
 }

@@ -1,4 +1,4 @@
-//! Views of a hierarchy: one stage, and the difference between two.
+//! One stage of a hierarchy.
 
 use std::ops::Range;
 
@@ -17,11 +17,6 @@ impl<'h> Stage<'h> {
         let last = hierarchy.last_stage();
         assert!(stage <= last, "stage {stage} of {last}");
         Self { hierarchy, stage }
-    }
-
-    /// Number of collapses up to this stage.
-    pub fn index(&self) -> usize {
-        self.stage
     }
 
     /// Number of spheres. Cost `O(1)`, like the other counts.
@@ -128,74 +123,4 @@ fn in_order<const K: usize>(
         start = end as usize;
     }
     sorted
-}
-
-/// The difference between two stages, in either direction: the simplices that go and those that
-/// come, their vertices named by rank, in an unspecified but deterministic order. Cost: in proportion
-/// to the simplices that the collapses between the stages change, or to the finer stage, whichever
-/// are fewer.
-#[derive(Clone, Copy, Debug)]
-pub struct Change<'h> {
-    hierarchy: &'h Hierarchy,
-    fine: usize,
-    coarse: usize,
-    backward: bool,
-}
-
-impl<'h> Change<'h> {
-    pub(super) fn new(hierarchy: &'h Hierarchy, from: usize, to: usize) -> Self {
-        let last = hierarchy.last_stage();
-        assert!(from.max(to) <= last, "stages {from} and {to} of {last}");
-        Self { hierarchy, fine: from.min(to), coarse: from.max(to), backward: from > to }
-    }
-
-    /// The ranks of the spheres that go, in the order of the collapses.
-    pub fn spheres_removed(&self) -> Range<u32> {
-        self.spheres(!self.backward)
-    }
-
-    /// The ranks of the spheres that come, the last removed first.
-    pub fn spheres_added(&self) -> std::iter::Rev<Range<u32>> {
-        self.spheres(self.backward).rev()
-    }
-
-    /// The edges that go.
-    pub fn edges_removed(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
-        self.edges(!self.backward)
-    }
-
-    /// The edges that come.
-    pub fn edges_added(&self) -> impl Iterator<Item = [u32; 2]> + 'h {
-        self.edges(self.backward)
-    }
-
-    /// The faces that go.
-    pub fn faces_removed(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
-        self.faces(!self.backward)
-    }
-
-    /// The faces that come.
-    pub fn faces_added(&self) -> impl Iterator<Item = [u32; 3]> + 'h {
-        self.faces(self.backward)
-    }
-
-    /// The spheres that only the finer stage has, or only the coarser one.
-    fn spheres(&self, of_fine: bool) -> Range<u32> {
-        let end = if of_fine { self.coarse } else { self.fine };
-        self.fine as u32..end as u32
-    }
-
-    fn edges(&self, of_fine: bool) -> impl Iterator<Item = [u32; 2]> + 'h {
-        let (layer, Self { fine, coarse, .. }) = (&self.hierarchy.edges, *self);
-        let dying = of_fine.then(|| layer.dying(fine, coarse));
-        let arising = (!of_fine).then(|| layer.arising(fine, coarse));
-        dying.into_iter().flatten().chain(arising.into_iter().flatten())
-    }
-
-    fn faces(&self, of_fine: bool) -> impl Iterator<Item = [u32; 3]> + 'h {
-        let (layer, Self { fine, coarse, .. }) = (&self.hierarchy.faces, *self);
-        let dying = of_fine.then(|| layer.dying(fine, coarse));
-        let arising = (!of_fine).then(|| layer.arising(fine, coarse));
-        dying.into_iter().flatten().chain(arising.into_iter().flatten())
-    }
 }
