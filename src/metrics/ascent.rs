@@ -230,8 +230,9 @@ pub struct Peaks {
 impl Peaks {
     /// The largest distance of both directions: a lower bound of the Hausdorff distance.
     pub fn hausdorff(&self) -> f64 {
-        let first = |peaks: &[Peak]| peaks.first().map_or(0.0, |peak| peak.distance);
-        first(&self.forward).max(first(&self.reverse))
+        // The largest stands first in each list.
+        let firsts = [&self.forward, &self.reverse].into_iter().filter_map(|peaks| peaks.first());
+        firsts.fold(0.0, |largest, peak| largest.max(peak.distance))
     }
 }
 

@@ -69,17 +69,20 @@ pub(super) fn prepared_axis_distance(
     }
     let there = directed(computed, truth, options);
     let back = directed(truth, computed, options);
-    let span = |there: Extent, back: Extent| AxisSpan {
-        computed_to_true_max: there.max,
-        computed_to_true_mean: there.mean,
-        true_to_computed_max: back.max,
-        true_to_computed_mean: back.mean,
-    };
     Ok(AxisDistances {
         coverage: coverage(truth, &back),
         in_space: span(there.in_space, back.in_space),
         with_radius: span(there.with_radius, back.with_radius),
     })
+}
+
+fn span(there: Extent, back: Extent) -> AxisSpan {
+    AxisSpan {
+        computed_to_true_max: there.max,
+        computed_to_true_mean: there.mean,
+        true_to_computed_max: back.max,
+        true_to_computed_mean: back.mean,
+    }
 }
 
 /// For each triangle the smallest triangle of its sheet.
@@ -249,8 +252,7 @@ fn directed(from: &PreparedAxis, to: &PreparedAxis, options: &AxisOptions) -> Di
 
 /// `count` points, equally spaced along the list of segments; none when they have no length.
 fn sample_segments(segments: &[[DVec4; 2]], count: usize) -> Vec<DVec4> {
-    let extent = |[a, b]: &[DVec4; 2]| a.truncate().distance(b.truncate());
-    let total: f64 = segments.iter().map(extent).sum();
+    let total: f64 = segments.iter().map(length).sum();
     let mut points = Vec::new();
     if !(total > 0.0 && total.is_finite()) {
         return points;
@@ -258,7 +260,7 @@ fn sample_segments(segments: &[[DVec4; 2]], count: usize) -> Vec<DVec4> {
     let spacing = total / count as f64;
     let mut below = 0.0;
     for segment in segments {
-        let ([a, b], length) = (*segment, extent(segment));
+        let ([a, b], length) = (*segment, length(segment));
         while let at = (points.len() as f64 + 0.5) * spacing
             && at < below + length
         {
@@ -267,6 +269,11 @@ fn sample_segments(segments: &[[DVec4; 2]], count: usize) -> Vec<DVec4> {
         below += length;
     }
     points
+}
+
+/// The length in space: radii do not count.
+fn length([a, b]: &[DVec4; 2]) -> f64 {
+    a.truncate().distance(b.truncate())
 }
 
 // A medial axis as a set of spheres: points `(x, y, z, r)` of four-dimensional space.
@@ -291,8 +298,8 @@ pub(super) struct LiftedAxis {
 
 impl LiftedAxis {
     pub fn new(simplices: &[[DVec4; 3]]) -> Self {
-        let bounds = |s: &[DVec4; 3]| (Bounds::of_points(s.map(DVec4::truncate)), 0.0);
-        let boxes: Vec<_> = simplices.iter().map(bounds).collect();
+        let corners = simplices.iter().map(|simplex| simplex.map(DVec4::truncate));
+        let boxes: Vec<_> = corners.map(|corners| (Bounds::of_points(corners), 0.0)).collect();
         let tree = Tree::build(&boxes, Plan { max_leaf: 4, group: 1, padding: 0.0 });
         let simplices = tree.order().iter().map(|&s| simplices[s as usize]).collect();
         Self { tree, simplices }
@@ -301,20 +308,20 @@ impl LiftedAxis {
     /// Distances of some points, in their order, in parallel. Faster if each point is close to the one
     /// before, because that one's nearest simplex is tried first.
     pub fn distances(&self, points: &[DVec4]) -> Vec<f64> {
-        let along = |chunk: &[DVec4]| {
+        let chunks = points.par_chunks(256).flat_map_iter(|chunk| {
             let mut nearest = None;
-            let distance = |&p: &DVec4| {
+            chunk.iter().map(move |&p| {
                 let mut search = Nearest::of(self, p);
+                // A first bound close to the result prunes most of the tree.
                 if let Some(last) = nearest {
                     search.visit(last..last + 1);
                 }
                 self.tree.search(&mut search);
                 nearest = search.simplex;
                 search.distance
-            };
-            chunk.iter().map(distance).collect::<Vec<f64>>()
-        };
-        points.par_chunks(256).flat_map_iter(along).collect()
+            })
+        });
+        chunks.collect()
     }
 }
 
@@ -383,9 +390,14 @@ fn towards(p: DVec4, &[a, b, c]: &[DVec4; 3]) -> DVec4 {
             return s * u + t * v - w;
         }
     }
-    let shorter = |x: DVec4, y: DVec4| if y.length_squared() < x.length_squared() { y } else { x };
     let sides = shorter(towards_segment(p, a, b), towards_segment(p, c, a));
     shorter(sides, towards_segment(p, b, c))
+}
+
+/// The shorter vector, the first of equally long ones.
+#[inline]
+fn shorter(x: DVec4, y: DVec4) -> DVec4 {
+    if y.length_squared() < x.length_squared() { y } else { x }
 }
 
 /// The vector from a point to the nearest point of a segment.

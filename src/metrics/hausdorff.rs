@@ -334,10 +334,10 @@ pub(super) fn surface_distances_from(
     let other_tree = TriangleBvh::new(other).map_err(MetricError::Tree)?;
     let there = other_tree.distance_batch(&on_surface.points);
     let back = tree.distance_batch(&on_other.points);
-    let from_surface = |p, near: &mut usize| distance_from(&other_tree, p, near);
-    let forward = highest(tree, &on_surface.start(&there), from_surface);
-    let from_other = |p, near: &mut usize| distance_from(tree, p, near);
-    let reverse = highest(&other_tree, &on_other.start(&back), from_other);
+    let forward =
+        highest(tree, &on_surface.start(&there), |p, near| distance_from(&other_tree, p, near));
+    let reverse =
+        highest(&other_tree, &on_other.start(&back), |p, near| distance_from(tree, p, near));
     let mean = |values: &[f64], power: i32| {
         values.iter().map(|v| v.powi(power)).sum::<f64>() / values.len().max(1) as f64
     };

@@ -101,14 +101,21 @@ impl Judge {
         // In the order of the pose, since random numbers and sums follow the order of the spheres.
         let samples = self.samples()?;
         let (mesh, union) = &samples.ordered(mesh)?;
-        let axis = || self.true_axis.as_ref().map(|truth| self.axis_distances(mesh, truth));
-        let complex = || (triangle_quality(mesh), spikes(mesh), betti(mesh));
+        let options = self.distance_options();
         // In parallel with each other, because each has serial parts.
-        let distances =
-            || distances_with_envelope(&self.tree, mesh, union, samples, &self.distance_options());
         let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
-            || rayon::join(distances, || self.volume_error(mesh, union, &samples.pose)),
-            || rayon::join(axis, complex),
+            || {
+                rayon::join(
+                    || distances_with_envelope(&self.tree, mesh, union, samples, &options),
+                    || self.volume_error(mesh, union, &samples.pose),
+                )
+            },
+            || {
+                rayon::join(
+                    || self.true_axis.as_ref().map(|truth| self.axis_distances(mesh, truth)),
+                    || (triangle_quality(mesh), spikes(mesh), betti(mesh)),
+                )
+            },
         );
         let ((distances, envelope), axis) = (distances?, axis.transpose()?);
         let mut warnings = self.misfits(mesh, union, &distances);
@@ -195,8 +202,12 @@ impl Judge {
             return Ok(None);
         }
         let options = VolumeOptions { depth: self.options.volume_depth, seed: self.options.seed };
-        let inside = |p| self.inside.side(p) == Side::Inside;
-        let sides = Sides { surface: &self.surface, bvh: &self.tree, union, inside };
+        let sides = Sides {
+            surface: &self.surface,
+            bvh: &self.tree,
+            union,
+            inside: |p| self.inside.side(p) == Side::Inside,
+        };
         let bounds = box_in(pose, &self.surface, &mesh.spheres);
         volume_error_in(pose, bounds, &sides, &options).map(Some)
     }
@@ -272,8 +283,10 @@ impl Judge {
         let off_surface = mesh.spheres.iter().zip(depths).filter(|&(_, depth)| depth > ON_SURFACE);
         let mut ratios: Vec<f64> = off_surface.map(|(s, depth)| s.radius / depth).collect();
         ratios.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| ratios.get((share * ratios.len() as f64) as usize).copied();
-        Some([at(0.25)?, at(0.5)?, at(0.75)?])
+        if ratios.is_empty() {
+            return None;
+        }
+        Some([0.25, 0.5, 0.75].map(|share| ratios[(share * ratios.len() as f64) as usize]))
     }
 }
 
@@ -478,16 +491,14 @@ pub struct SheetCoverage {
 /// If the mesh is not in canonical form; see [`MedialMesh::check`].
 pub fn counts(mesh: &MedialMesh) -> Counts {
     let incidence = Incidence::of(mesh);
-    let edges_with = |wanted: fn(u32) -> bool| {
-        incidence.faces_at().iter().filter(|&&faces| wanted(faces)).count() as u64
-    };
+    let faces_at = incidence.faces_at();
     Counts {
         spheres: mesh.spheres.len() as u64,
         edges: mesh.edges.len() as u64,
         faces: mesh.faces.len() as u64,
-        lone_edges: edges_with(|faces| faces == 0),
+        lone_edges: faces_at.iter().filter(|&&faces| faces == 0).count() as u64,
         isolated: degrees(mesh).into_iter().filter(|&degree| degree == 0).count() as u64,
-        nonmanifold_edges: edges_with(|faces| faces >= 3),
+        nonmanifold_edges: faces_at.iter().filter(|&&faces| faces >= 3).count() as u64,
     }
 }
 

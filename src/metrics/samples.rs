@@ -70,13 +70,15 @@ impl SurfaceSamples {
 
 /// The area of a surface.
 fn area(surface: &TriMesh) -> f64 {
-    let twice = |face: usize| {
-        let [a, b, c] = surface.triangle(face);
-        (b - a).cross(c - a).length()
-    };
     let mut sum = Sum::default();
-    (0..surface.faces.len()).for_each(|face| sum.add(0.5 * twice(face)));
+    for face in 0..surface.faces.len() {
+        sum.add(area_of(&surface.triangle(face)));
+    }
     sum.value()
+}
+
+fn area_of([a, b, c]: &[Vec3; 3]) -> f64 {
+    (b - a).cross(c - a).length() * 0.5
 }
 
 /// Makes the random numbers differ from those of [`crate::surface::sample`] with the same seed. A
@@ -118,8 +120,7 @@ pub(super) fn place_on_triangles(
     count: usize,
     seed: u64,
 ) -> Option<Vec<Placed>> {
-    let area = |&[a, b, c]: &[Vec3; 3]| (b - a).cross(c - a).length() * 0.5;
-    let total: f64 = triangles.iter().map(area).sum();
+    let total: f64 = triangles.iter().map(area_of).sum();
     if !(total > 0.0 && total.is_finite()) {
         return None;
     }
@@ -128,7 +129,7 @@ pub(super) fn place_on_triangles(
     let (mut below, mut last) = (0.0, None);
     let mut target = rng.random::<f64>() / count as f64 * total;
     for (index, triangle) in triangles.iter().enumerate() {
-        let size = area(triangle);
+        let size = area_of(triangle);
         below += size;
         while placed.len() < count && target < below {
             placed.push(uniform_in(index, &mut rng));
@@ -247,19 +248,18 @@ impl Pose {
 
     /// The corners of the surface's triangles, along the curve, each from its first corner along it.
     pub fn triangles(&self, surface: &TriMesh) -> Vec<[Vec3; 3]> {
-        let place = |&v: &Vec3| self.place(v, 0.0);
         let mut triangles: Vec<(Place, [Vec3; 3])> = (0..surface.faces.len())
             .into_par_iter()
             .map(|face| {
                 let mut corners = surface.triangle(face);
-                let first = (0..3).min_by(|&i, &j| place(&corners[i]).cmp(&place(&corners[j])));
+                let first = (0..3).min_by_key(|&i| self.place_of(corners[i]));
                 corners.rotate_left(first.unwrap_or(0));
-                (self.place((corners[0] + corners[1] + corners[2]) / 3.0, 0.0), corners)
+                (self.place_of((corners[0] + corners[1] + corners[2]) / 3.0), corners)
             })
             .collect();
-        let bits = |corners: &[Vec3; 3]| corners.map(|c| c.to_array().map(f64::to_bits));
-        triangles.par_sort_unstable_by(|(place, a), (other, b)| {
-            place.cmp(other).then_with(|| bits(a).cmp(&bits(b)))
+        // Bits break ties of the place: an unstable sort needs a total order to be repeatable.
+        triangles.par_sort_unstable_by_key(|(place, corners)| {
+            (*place, corners.map(|c| c.to_array().map(f64::to_bits)))
         });
         triangles.into_iter().map(|(_, corners)| corners).collect()
     }
@@ -269,12 +269,10 @@ impl Pose {
     pub fn in_order(&self, mesh: &MedialMesh) -> MedialMesh {
         let mut order: Vec<(Place, u32)> =
             (0..).zip(&mesh.spheres).map(|(v, s)| (self.place(s.centre, s.radius), v)).collect();
-        let bits = |v: u32| {
+        // Spheres at one place differ in their bits, or are equal and keep their order.
+        order.par_sort_by_key(|&(place, v)| {
             let s = &mesh.spheres[v as usize];
-            [s.centre.x, s.centre.y, s.centre.z, s.radius].map(f64::to_bits)
-        };
-        order.par_sort_by(|(place, a), (other, b)| {
-            place.cmp(other).then_with(|| bits(*a).cmp(&bits(*b)))
+            (place, [s.centre.x, s.centre.y, s.centre.z, s.radius].map(f64::to_bits))
         });
         let order: Vec<u32> = order.into_iter().map(|(_, v)| v).collect();
         mesh.renumbered(&order)
@@ -376,11 +374,8 @@ fn mean(points: &[Vec3]) -> Vec3 {
 
 /// The centroids of a surface's triangles from the origin, in units of the size.
 fn centroids(surface: &TriMesh, origin: Vec3, size: f64) -> Vec<Vec3> {
-    let centroid = |f: usize| {
-        let [a, b, c] = surface.triangle(f);
-        ((a + b + c) / 3.0 - origin) / size
-    };
-    (0..surface.faces.len()).map(centroid).collect()
+    let faces = (0..surface.faces.len()).map(|f| surface.triangle(f));
+    faces.map(|[a, b, c]| ((a + b + c) / 3.0 - origin) / size).collect()
 }
 
 impl Corners {
@@ -429,18 +424,21 @@ fn least<'m, T: Copy + Send + Sync>(
     }
     let marks = marks();
     candidates.truncate((MAX_COMPARISONS / marks.len().max(1)).max(1));
-    let value = |candidate: &T| {
-        let mut sum = Sum::default();
-        for &d in marks {
-            let t = argument(candidate, d);
-            sum.add(t / (2.0 + t * t));
-        }
-        sum.value()
-    };
-    let values: Vec<f64> = candidates.par_iter().map(value).collect();
-    let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let is_least = |&(_, value): &(T, f64)| value <= smallest + SYMMETRIC;
-    candidates.into_iter().zip(values).filter(is_least).map(|(c, _)| c).collect()
+    let values: Vec<f64> = candidates
+        .par_iter()
+        .map(|candidate| {
+            // Corrected sums: equal frames must agree to SYMMETRIC over millions of triangles.
+            let mut sum = Sum::default();
+            for &d in marks {
+                let t = argument(candidate, d);
+                sum.add(t / (2.0 + t * t));
+            }
+            sum.value()
+        })
+        .collect();
+    let most = values.iter().copied().fold(f64::INFINITY, f64::min) + SYMMETRIC;
+    let pairs = candidates.into_iter().zip(values);
+    pairs.filter(|&(_, value)| value <= most).map(|(candidate, _)| candidate).collect()
 }
 
 #[cfg(test)]

@@ -78,18 +78,19 @@ impl EdgeFacts {
         for (edge, _) in mesh.edges.iter().zip(faces_at).filter(|&(_, &faces)| faces <= 1) {
             edge.iter().for_each(|&sphere| boundary_spheres[sphere as usize] = true);
         }
-        let length = |[a, b]: [Sphere; 2]| {
-            let d = a.centre.distance(b.centre);
-            if d < ZERO_LENGTH { 0.0 } else { d }
-        };
-        let lengths: Vec<f64> = ends().map(length).collect();
-        let is_dangling = |edge: usize| {
-            let loose = mesh.edges[edge].iter().any(|&sphere| degrees[sphere as usize] == 1);
-            lengths[edge] > 0.0 && faces_at[edge] == 0 && loose
-        };
+        // Shorter edges count as points: their direction and ratio are rounding.
+        let lengths: Vec<f64> = ends()
+            .map(|[a, b]| a.centre.distance(b.centre))
+            .map(|length| if length < ZERO_LENGTH { 0.0 } else { length })
+            .collect();
+        let mut dangling = vec![false; lengths.len()];
+        for (edge, ends) in mesh.edges.iter().enumerate() {
+            let is_loose = ends.iter().any(|&sphere| degrees[sphere as usize] == 1);
+            dangling[edge] = lengths[edge] > 0.0 && faces_at[edge] == 0 && is_loose;
+        }
         Self {
             ratios: ends().map(|[a, b]| stability_ratio(a, b)).collect(),
-            dangling: (0..lengths.len()).map(is_dangling).collect(),
+            dangling,
             lengths,
             boundary_spheres,
         }
@@ -98,15 +99,13 @@ impl EdgeFacts {
     fn by_ratio(&self, mesh: &MedialMesh, threshold: f64) -> RatioSpikes {
         let proper = || (0..self.lengths.len()).filter(|&edge| self.lengths[edge] > 0.0);
         let weak = || proper().filter(|&edge| self.ratios[edge] < threshold);
-        // A fold from zero, since the sum of nothing is minus zero.
-        let length = |edges: &mut dyn Iterator<Item = usize>| {
-            edges.fold(0.0, |sum, edge| sum + self.lengths[edge])
-        };
-        let share = |part: f64, all: f64| if all > 0.0 { part / all } else { 0.0 };
+        // Folds from zero, since the sum of nothing is minus zero.
+        let weak_length = weak().fold(0.0, |sum, edge| sum + self.lengths[edge]);
+        let length = proper().fold(0.0, |sum, edge| sum + self.lengths[edge]);
         RatioSpikes {
             threshold,
             edge_share: share(weak().count() as f64, proper().count() as f64),
-            length_share: share(length(&mut weak()), length(&mut proper())),
+            length_share: share(weak_length, length),
             spikes: self.spikes_on_the_boundary(mesh, threshold),
             dangling_edges: weak().filter(|&edge| self.dangling[edge]).count() as u64,
         }
@@ -132,16 +131,25 @@ impl EdgeFacts {
     }
 }
 
+/// A part of a whole, 0 where there is no whole.
+fn share(part: f64, all: f64) -> f64 {
+    if all > 0.0 { part / all } else { 0.0 }
+}
+
 /// Measure 4.
 fn fins(mesh: &MedialMesh, incidence: &Incidence) -> u64 {
-    let is_fin = |face: usize| {
-        let sides = incidence.face_edges()[face];
-        let boundary =
-            sides.iter().filter(|&&edge| incidence.faces_at()[edge as usize] == 1).count();
-        let angles = || extreme_angles(corners(mesh, &mesh.faces[face]));
-        boundary >= 2 && angles().is_some_and(|[smallest, _]| smallest < FIN_ANGLE)
-    };
-    (0..mesh.faces.len()).filter(|&face| is_fin(face)).count() as u64
+    let faces_at = incidence.faces_at();
+    let mut fins = 0;
+    for (face, sides) in mesh.faces.iter().zip(incidence.face_edges()) {
+        let boundary = sides.iter().filter(|&&edge| faces_at[edge as usize] == 1).count();
+        // A face without area has no angles, and is no fin.
+        if boundary >= 2
+            && extreme_angles(corners(mesh, face)).is_some_and(|[min, _]| min < FIN_ANGLE)
+        {
+            fins += 1;
+        }
+    }
+    fins
 }
 
 /// Measure 5.
@@ -167,12 +175,16 @@ fn is_idle_beside(ball: Sphere, neighbour: Sphere) -> bool {
 
 /// Measure 6. A sphere without radius touches everywhere at its centre and subtends nothing.
 fn angle_spikes(mesh: &MedialMesh, contacts: &Contacts) -> u64 {
-    let is_spike = |(sphere, samples): (&Sphere, &[u32; 4])| {
+    let mut spikes = 0;
+    for (sphere, samples) in mesh.spheres.iter().zip(&contacts.of_sphere) {
         let points = samples.map(|id| contacts.samples[id as usize]);
-        sphere.radius >= ZERO_LENGTH
+        if sphere.radius >= ZERO_LENGTH
             && separation_angle(sphere.centre, &points).to_degrees() < SPIKE_ANGLE
-    };
-    mesh.spheres.iter().zip(&contacts.of_sphere).filter(|&pair| is_spike(pair)).count() as u64
+        {
+            spikes += 1;
+        }
+    }
+    spikes
 }
 
 // How far the union of the medial primitives extends beyond the solid.

@@ -231,12 +231,14 @@ impl Hulls {
 
     /// The largest signed distance to a primitive over the convex hull of some points.
     fn largest_over(&self, primitive: Primitive, corners: &[Vec3]) -> f64 {
-        let signed = |p: Vec3| match primitive {
-            Primitive::Sphere(v) => self.spheres[v as usize].signed_distance(p),
-            Primitive::Edge(e) => self.cones[e as usize].signed_distance(p),
-            Primitive::Face(f) => self.slabs[f as usize].signed_distance(p),
-        };
-        corners.iter().fold(f64::NEG_INFINITY, |largest, &p| largest.max(signed(p)))
+        // A convex function is largest over a convex hull at one of its corners.
+        corners.iter().fold(f64::NEG_INFINITY, |largest, &p| {
+            largest.max(match primitive {
+                Primitive::Sphere(v) => self.spheres[v as usize].signed_distance(p),
+                Primitive::Edge(e) => self.cones[e as usize].signed_distance(p),
+                Primitive::Face(f) => self.slabs[f as usize].signed_distance(p),
+            })
+        })
     }
 }
 
@@ -303,8 +305,8 @@ impl SurfaceSide<'_> {
             let mut lowest = signed - reach;
             if length > MIN_ARM {
                 // The tangent plane of a convex function lies below it.
-                let rise = |&corner: &Vec3| signed + arm.dot(corner - centre) / length;
-                lowest = triangle.iter().map(rise).fold(f64::INFINITY, f64::min).max(lowest);
+                let heights = triangle.iter().map(|&c| signed + arm.dot(c - centre) / length);
+                lowest = heights.fold(f64::INFINITY, f64::min).max(lowest);
             }
             depth = depth.max(-lowest);
         });
@@ -403,23 +405,24 @@ impl<'a> UnionSide<'a> {
         let mut pieces = Vec::new();
         for v in 0..self.mesh.spheres.len() as u32 {
             for signs in 0..8 {
-                let sign = |k: u32| if signs >> k & 1 == 0 { 1.0 } else { -1.0 };
-                let corners = [sign(0) * Vec3::X, sign(1) * Vec3::Y, sign(2) * Vec3::Z];
-                pieces.push(Piece::Round(v, corners));
+                // Bit `k` of `signs` chooses the half space along axis `k`: one octant each.
+                let [x, y, z] = [0, 1, 2].map(|k| if signs >> k & 1 == 0 { 1.0 } else { -1.0 });
+                pieces.push(Piece::Round(v, [x * Vec3::X, y * Vec3::Y, z * Vec3::Z]));
             }
         }
         for (edge, frame) in (0..).zip(&self.frames) {
             if frame.is_some() {
-                let angle = |k: u32| TAU * f64::from(k) / f64::from(SECTORS);
-                let sectors = (0..SECTORS).map(|k| [angle(k), angle(k + 1)]);
-                pieces.extend(sectors.map(|sector| Piece::Lateral(edge, [0.0, 1.0], sector)));
+                pieces.extend((0..SECTORS).map(|k| {
+                    let sector = [k, k + 1].map(|k| TAU * f64::from(k) / f64::from(SECTORS));
+                    Piece::Lateral(edge, [0.0, 1.0], sector)
+                }));
             }
         }
         for corners in &self.mesh.faces {
             let corners = corners.map(|v| self.mesh.spheres[v as usize]);
             if let Some(planes) = Slab::new(corners).planes() {
-                let touched = |n: Vec3| corners.map(|m| m.centre + m.radius * n);
-                pieces.extend(planes.normals().map(|n| Piece::Flat(touched(n))));
+                let flat = planes.normals().map(|n| corners.map(|m| m.centre + m.radius * n));
+                pieces.extend(flat.map(Piece::Flat));
             }
         }
         pieces
@@ -503,8 +506,11 @@ impl Side for UnionSide<'_> {
             return Bound { reached: 0.0, centre, upper: lipschitz };
         }
         let deepest = self.union.deepest(centre);
-        let held = || self.hulls.largest_over(deepest.primitive, corners) < -EXPOSED;
-        if deepest.signed < -EXPOSED && (deepest.signed + reach < -EXPOSED || held()) {
+        // The Lipschitz bound first: it costs nothing.
+        if deepest.signed < -EXPOSED
+            && (deepest.signed + reach < -EXPOSED
+                || self.hulls.largest_over(deepest.primitive, corners) < -EXPOSED)
+        {
             return Bound { reached: 0.0, centre, upper: 0.0 };
         }
         let reached = if deepest.signed >= -EXPOSED { closest.distance } else { 0.0 };
@@ -512,8 +518,9 @@ impl Side for UnionSide<'_> {
             return Bound { reached, centre, upper: lipschitz };
         }
         let triangle = &self.triangles[closest.face as usize];
-        let squared = |&corner: &Vec3| triangle.distance_squared(corner);
-        let convex = corners.iter().map(squared).fold(0.0, f64::max).sqrt();
+        // The distance to one triangle is convex, so its largest value is at a corner.
+        let squared = corners.iter().map(|&corner| triangle.distance_squared(corner));
+        let convex = squared.fold(0.0, f64::max).sqrt();
         Bound { reached, centre, upper: lipschitz.min(convex) }
     }
 
@@ -523,8 +530,8 @@ impl Side for UnionSide<'_> {
                 parts.extend(quartered(triangle, Vec3::midpoint).map(Piece::Flat));
             }
             Piece::Round(v, corners) => {
-                let middle = |a: Vec3, b: Vec3| (a + b).normalize();
-                parts.extend(quartered(corners, middle).map(|c| Piece::Round(v, c)));
+                let parts_of = quartered(corners, |a, b| (a + b).normalize());
+                parts.extend(parts_of.map(|corners| Piece::Round(v, corners)));
             }
             Piece::Lateral(edge, [t0, t1], [from, to]) => {
                 let [(first, _), (second, _)] = [t0, t1].map(|t| self.interpolated(edge, t));
