@@ -1,9 +1,12 @@
 //! PLY, the polygon file format of Stanford, for surfaces and medial meshes: text, and binary of either byte order.
 //!
-//! `ply-rs-bw` parses the header and the rows. Around it:
+//! `ply-rs-bw` parses the header and binary rows. Around it:
+//! - The header reaches the crate as UTF-8 with LF line ends: files exist with CR alone and with comments in other
+//!   encodings, and the crate refuses both.
+//! - Text rows are read here, because the crate refuses numbers such as `1.`, `.5` and `nan`. All of them are read in
+//!   double precision, whatever precision the header declares.
 //! - Counts of the header are compared with the bytes that follow before a row is read.
 //! - Rows are handed on one by one, so that memory is that of the result, and faults name the line or the element.
-//! - Text is read in double precision, whatever precision the header declares.
 //!
 //! In a text file every element has a line of its own. Values behind the declared ones are ignored, as are other
 //! elements and properties, and lines or bytes after the last element.
@@ -13,6 +16,7 @@ use ply_rs_bw::ply::{
     ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
+use super::read::{Cursor, count, rename};
 use super::report::{Fault, Place};
 
 /// The values of one row that matter here, each 0 where the header does not declare it.
@@ -78,15 +82,30 @@ pub(crate) struct Ply<'a> {
 /// # Errors
 /// When it is not understood, or announces more rows than the file has bytes for.
 pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
-    let mut reader = Reader::new(bytes);
+    // The first line decides: in the bytes of binary rows LF and CR mean nothing.
+    let first = bytes.iter().position(|byte| b"\r\n".contains(byte)).unwrap_or(bytes.len());
+    let is_cr = bytes[first..].starts_with(b"\r") && !bytes[first..].starts_with(b"\r\n");
+    let line_end = if is_cr { b'\r' } else { b'\n' };
+    let mut length = 0;
+    for line in bytes.split_inclusive(|&byte| byte == line_end) {
+        length += line.len();
+        if line.trim_ascii() == b"end_header" {
+            break;
+        }
+    }
+    let (head, rows) = bytes.split_at(length);
+    let mut head = String::from_utf8_lossy(head).into_owned();
+    if is_cr {
+        head = head.replace('\r', "\n");
+    }
+    let mut reader = Reader::new(head.as_bytes());
     let header = Parser::<Row>::new()
         .read_header(&mut reader)
         .map_err(|error| fault(Place::Line(error.line().unwrap_or(1)), "a PLY header", &error))?;
     let line = reader.line();
-    let rows = reader.into_inner();
     let text = header.encoding == Encoding::Ascii;
-    let mut elements: Vec<ElementDef> = header.elements.into_values().collect();
-    for element in &mut elements {
+    let elements: Vec<ElementDef> = header.elements.into_values().collect();
+    for element in &elements {
         let sizes = element.properties.values().map(|property| match &property.data_type {
             PropertyType::List(scalar, _) | PropertyType::Scalar(scalar) => match scalar {
                 // A digit and a blank.
@@ -107,11 +126,6 @@ pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
             };
             let holds = format!("only {} bytes more", rows.len());
             return Err(Fault::Count { what, announced: element.count as u64, holds });
-        }
-        for property in element.properties.values_mut().filter(|_| text) {
-            if let PropertyType::Scalar(scalar) = &mut property.data_type {
-                *scalar = ScalarType::Double;
-            }
         }
     }
     Ok(Ply { elements, encoding: header.encoding, rows, line })
@@ -139,8 +153,7 @@ impl Ply<'_> {
     ) -> Result<(), E> {
         let parser = Parser::<Row>::new();
         let mut rest = self.rows;
-        let lines = (self.line..).zip(rest.split(|&byte| byte == b'\n'));
-        let mut lines = lines.filter(|(_, line)| !line.trim_ascii().is_empty());
+        let mut cursor = Cursor::at_line(self.rows, self.line);
         for element in &self.elements {
             // Static, for the places of faults.
             let name = match element.name.as_str() {
@@ -150,24 +163,17 @@ impl Ply<'_> {
                 _ => "element",
             };
             for row in 0..element.count {
-                let (place, values) = match self.encoding {
-                    Encoding::Ascii => {
-                        let Some((line, text)) = lines.next() else {
-                            let (expected, found) =
-                                (format!("{name} {row}"), "nothing more".into());
-                            return Err(Fault::Syntax { at: Place::End, expected, found }.into());
-                        };
-                        let text = String::from_utf8_lossy(text);
-                        (Place::Line(line), parser.read_ascii_element(text.trim(), element))
-                    }
-                    Encoding::BinaryLittleEndian => (
-                        Place::Element(name, row),
-                        parser.read_little_endian_element(&mut rest, element),
-                    ),
-                    Encoding::BinaryBigEndian => (
-                        Place::Element(name, row),
-                        parser.read_big_endian_element(&mut rest, element),
-                    ),
+                if self.encoding == Encoding::Ascii {
+                    let values = text_row(&mut cursor, element)
+                        .map_err(|fault| rename(fault, || format!("{name} {row}")))?;
+                    take(name, row, &Place::Line(cursor.line()), values)?;
+                    cursor.next_line();
+                    continue;
+                }
+                let place = Place::Element(name, row);
+                let values = match self.encoding {
+                    Encoding::BinaryBigEndian => parser.read_big_endian_element(&mut rest, element),
+                    _ => parser.read_little_endian_element(&mut rest, element),
                 };
                 let values = values
                     .map_err(|error| fault(place.clone(), &format!("{name} {row}"), &error))?;
@@ -176,6 +182,34 @@ impl Ply<'_> {
         }
         Ok(())
     }
+}
+
+/// The values of the next line that has any. The cursor stays on that line. Faults lack the expectation.
+fn text_row(cursor: &mut Cursor<'_>, element: &ElementDef) -> Result<Row, Fault> {
+    if !cursor.skip_empty_lines() {
+        return Err(cursor.expected("", None));
+    }
+    let mut row = Row::new();
+    for (name, property) in &element.properties {
+        if let PropertyType::Scalar(_) = property.data_type {
+            let value = Property::Double(cursor.number_on_line("")?);
+            row.set_property(name, value);
+            continue;
+        }
+        let length = cursor.token_on_line();
+        // No memory is reserved for the announced length, which may be anything.
+        for _ in 0..count(cursor, length, "")? {
+            if let "vertex_indices" | "vertex_index" = &**name {
+                let index = cursor.token_on_line();
+                // The largest index names no vertex, so that a larger number is refused, too.
+                let index = count(cursor, index, "")?.min(u32::MAX as usize);
+                row.corners.push(index as u32);
+            } else {
+                cursor.number_on_line("")?;
+            }
+        }
+    }
+    Ok(row)
 }
 
 /// A fault of the crate in one line: what is wrong and the text that is, without line number and Rust's debug output.

@@ -12,7 +12,7 @@
 //! - STL, text and binary, told apart by content: a binary file has 84 bytes and 50 for each announced triangle,
 //!   whatever its first words are. The crate `stl_io` takes a binary file that begins with `solid` for text, and reads
 //!   text in single precision.
-//! - PLY by the crate `ply-rs-bw` ([`super::ply`]).
+//! - PLY: [`super::ply`].
 //!
 //! Counts are compared with the size of the file before memory is reserved for them.
 
@@ -200,7 +200,7 @@ const MAX_FACES: usize = (u32::MAX - 1) as usize / 3;
 
 /// A position in a text file. Lines end with LF, CRLF or CR.
 #[derive(Clone)]
-struct Cursor<'a> {
+pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     line: usize,
@@ -212,7 +212,7 @@ struct Cursor<'a> {
 
 /// A run of bytes between blanks.
 #[derive(Clone, Copy)]
-struct Token<'a> {
+pub(super) struct Token<'a> {
     text: &'a [u8],
     line: usize,
 }
@@ -224,6 +224,11 @@ impl<'a> Cursor<'a> {
         Self { bytes, at: 0, line: 1, comment, joins: false }
     }
 
+    /// Rows whose first line has this number, without comments.
+    pub fn at_line(bytes: &'a [u8], line: usize) -> Self {
+        Self { bytes, at: 0, line, comment: None, joins: false }
+    }
+
     /// The same with backslashes joining lines.
     fn joining_lines(mut self) -> Self {
         self.joins = true;
@@ -231,7 +236,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Number of the current line, from 1.
-    fn line(&self) -> usize {
+    pub fn line(&self) -> usize {
         self.line
     }
 
@@ -287,7 +292,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next token of this line.
-    fn token_on_line(&mut self) -> Option<Token<'a>> {
+    pub fn token_on_line(&mut self) -> Option<Token<'a>> {
         self.skip_blanks();
         let start = self.at;
         while let Some(byte) = self.peek() {
@@ -316,7 +321,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Passes over the rest of this line; false at the end of the file.
-    fn next_line(&mut self) -> bool {
+    pub fn next_line(&mut self) -> bool {
         while self.at < self.bytes.len() {
             let join = self.line_join(self.at);
             let end = self.line_end(self.at);
@@ -332,7 +337,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Goes to the next line that holds a token, unless one is left on this line.
-    fn skip_empty_lines(&mut self) -> bool {
+    pub fn skip_empty_lines(&mut self) -> bool {
         loop {
             self.skip_blanks();
             if self.at >= self.bytes.len() {
@@ -357,7 +362,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A fault for what stands here instead of what belongs here.
-    fn expected(&self, expected: impl Into<String>, found: Option<Token<'_>>) -> Fault {
+    pub fn expected(&self, expected: impl Into<String>, found: Option<Token<'_>>) -> Fault {
         match found {
             Some(token) => {
                 let at = Place::Line(token.line);
@@ -375,7 +380,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next token of this line as a number.
-    fn number_on_line(&mut self, what: &str) -> Result<f64, Fault> {
+    pub fn number_on_line(&mut self, what: &str) -> Result<f64, Fault> {
         let token = self.token_on_line();
         token.and_then(|t| t.number()).ok_or_else(|| self.expected(what, token))
     }
@@ -508,7 +513,12 @@ fn split_keyword(text: &[u8]) -> Option<(&[u8], &[u8])> {
     ((left.is_empty() || swapped) && rest.iter().all(u8::is_ascii_digit)).then_some((prefix, rest))
 }
 
-fn count(cursor: &Cursor<'_>, token: Option<Token<'_>>, what: &str) -> Result<usize, Fault> {
+/// A token as a number of things.
+pub(super) fn count(
+    cursor: &Cursor<'_>,
+    token: Option<Token<'_>>,
+    what: &str,
+) -> Result<usize, Fault> {
     token
         .and_then(|t| t.integer())
         .and_then(|n| usize::try_from(n).ok())
@@ -562,7 +572,7 @@ fn parse_vertices(
 }
 
 /// Fills in what was expected, without building the sentence for every number that is fine.
-fn rename(fault: Fault, what: impl FnOnce() -> String) -> Fault {
+pub(super) fn rename(fault: Fault, what: impl FnOnce() -> String) -> Fault {
     match fault {
         Fault::Syntax { at, found, .. } => Fault::Syntax { at, expected: what(), found },
         other => other,
@@ -979,6 +989,33 @@ mod tests {
     }
 
     #[test]
+    fn ply_as_other_programs_write_it() {
+        let short = PLY.replace("1 0 0\n0 0.1 0", "1. -.0 +0\n0 .1 0.e1");
+        let soup = parse_ply(short.as_bytes()).unwrap();
+        assert_eq!(soup.vertices[1..], [Vec3::X, Vec3::new(0.0, 0.1, 0.0)]);
+        let cr = short.replace('\n', "\r");
+        assert_eq!(parse_ply(cr.as_bytes()).unwrap().lines, [13]);
+        let error = parse_ply(cr.replace("3 0 1 2", "3 0 1 x").as_bytes()).unwrap_err();
+        assert_eq!(error.to_string(), "line 13: expected face 0, found \"x\"");
+        // A comment in Latin-1, and in binary files rows that begin with the byte of a line end.
+        for end in ["\n", "\r\n", "\r"] {
+            let header = PLY.replace("element vertex", "comment caf@\nelement vertex");
+            let mut file = header.replace("ascii", "binary_little_endian").into_bytes();
+            file.truncate(header.replace("ascii", "binary_little_endian").find("0 0 0").unwrap());
+            let mut file = String::from_utf8(file).unwrap().replace('\n', end).into_bytes();
+            *file.iter_mut().find(|byte| **byte == b'@').unwrap() = 0xe9;
+            let first = f32::from_le_bytes([b'\n', b'\r', b'\n', 0]);
+            for x in [first, 0., 0., 1., 0., 0., 0., 1., 0.] {
+                file.extend(x.to_le_bytes());
+            }
+            file.push(3);
+            file.extend([0_i32, 1, 2].iter().flat_map(|i| i.to_le_bytes()));
+            let soup = parse_ply(&file).unwrap_or_else(|error| panic!("{end:?}: {error}"));
+            assert_eq!((soup.vertices[0].x, soup.polygon(0)), (first.into(), &[0, 1, 2][..]));
+        }
+    }
+
+    #[test]
     fn errors_name_the_line() {
         for (text, expected) in [
             ("", "end of file: expected the keyword OFF, found nothing more"),
@@ -1072,7 +1109,12 @@ mod tests {
             ("3 0 1 2", "3 0 1 1.5", "line 13: expected face 0, found "),
             ("3 0 1 2", "2 0 1", "line 13: face 0 has 2 corners; three are the least"),
             ("3 0 1 2", "-1 0 1", "line 13: expected face 0, found "),
-            ("0 0.1 0\n", "0 nan 0\n", "line 12: expected vertex 2, found "),
+            (
+                "0 0.1 0\n",
+                "0 nan 0\n",
+                "line 12: vertex 2 has the coordinate NaN, which is not finite",
+            ),
+            ("1 0 0\n", "1 0 0..\n", "line 11: expected vertex 1, found \"0..\""),
             ("3 0 1 2\n", "", "end of file: expected face 0, found nothing more"),
             (
                 "vertex 3",
