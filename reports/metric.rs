@@ -64,6 +64,13 @@ impl Mean {
     }
 }
 
+/// The upper median.
+pub(crate) fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
+}
+
 /// Lengths and seconds span orders of magnitude. Below the floor (% of the diagonal, seconds) they count as the floor,
 /// so that a single zero does not make a geometric mean zero.
 const GEOMETRIC: Mean = Mean::Geometric { floor: 1e-6 };

@@ -169,14 +169,14 @@ impl Diff {
 }
 
 fn side(name: String, records: &[Record]) -> Side {
-    let all = |of: fn(&Record) -> String| -> BTreeSet<String> {
-        records.iter().map(of).filter(|text| !text.is_empty()).collect()
-    };
-    Side {
-        name,
-        records: records.len(),
-        versions: all(|record| record.version.clone()),
-        builds: all(|record| record.binary_hash.clone()),
-        machines: all(|record| record.machine.to_string()),
+    let [mut versions, mut builds, mut machines] = [const { BTreeSet::new() }; 3];
+    for record in records {
+        versions.insert(record.version.clone());
+        builds.insert(record.binary_hash.clone());
+        machines.insert(record.machine.to_string());
     }
+    // Records of external results know no build.
+    builds.remove("");
+    versions.remove("");
+    Side { name, records: records.len(), versions, builds, machines }
 }

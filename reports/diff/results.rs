@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use super::{Change, DiffOptions, ItemName, Meaning, Unlike};
 use crate::Target;
@@ -81,6 +81,7 @@ impl<'a> Pairs<'a> {
                     None => self.both.push(Pair { item, old, new }),
                     Some(why) => self.unlike.push(Unlike { item, why }),
                 },
+                // The newer set has this result under other settings alone: name the first difference found.
                 (None, Some((others, _))) => {
                     self.unlike.push(Unlike { item, why: settings.differences(others) });
                 }
@@ -118,8 +119,8 @@ fn name(record: &Record) -> ItemName {
 
 fn other_mesh(old: &Record, new: &Record) -> Option<String> {
     let (a, b) = (old.mesh_hash.as_deref()?, new.mesh_hash.as_deref()?);
-    let short = |hash: &str| -> String { hash.chars().take(12).collect() };
-    (a != b).then(|| format!("the mesh has other content: {}, {} before", short(b), short(a)))
+    // Twelve digits name a content as surely as all 64.
+    (a != b).then(|| format!("the mesh has other content: {b:.12}, {a:.12} before"))
 }
 
 impl<'a> Settings<'a> {
@@ -135,17 +136,20 @@ impl<'a> Settings<'a> {
 
     /// In words, what another one has otherwise.
     fn differences(&self, other: &Self) -> String {
-        let threads = |count: Option<usize>| count.map_or("unknown".to_owned(), |n| n.to_string());
-        let all = [
-            ("sampling", self.sampling.to_owned(), other.sampling.to_owned()),
-            ("dual", self.dual.to_owned(), other.dual.to_owned()),
-            ("samples", self.samples.to_string(), other.samples.to_string()),
-            ("threads", threads(self.threads), threads(other.threads)),
-        ];
-        let told = all.iter().filter(|(_, old, new)| old != new);
-        let told: Vec<String> =
-            told.map(|(what, old, new)| format!("{what} {new}, {old} before")).collect();
-        told.join("; ")
+        let differing = self.named().into_iter().zip(other.named()).filter(|(old, new)| old != new);
+        let lines: Vec<String> = differing
+            .map(|((what, old), (_, new))| format!("{what} {new}, {old} before"))
+            .collect();
+        lines.join("; ")
+    }
+
+    fn named(&self) -> [(&'static str, String); 4] {
+        [
+            ("sampling", self.sampling.to_owned()),
+            ("dual", self.dual.to_owned()),
+            ("samples", self.samples.to_string()),
+            ("threads", self.threads.map_or("unknown".to_owned(), |n| n.to_string())),
+        ]
     }
 }
 
@@ -173,7 +177,7 @@ pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
     changes
 }
 
-/// Whether nothing deterministic differs: most pairs, told without taking them apart.
+/// Whether nothing deterministic differs: so with most pairs, and comparing them is faster than taking them apart.
 fn alike(old: &Record, new: &Record) -> bool {
     let (a, b) = (&old.simplify, &new.simplify);
     (old.status, &old.evaluate, old.initial, &old.result_hash)
@@ -195,21 +199,23 @@ fn change(pair: &Pair<'_>, what: String, old: Value, new: Value, options: &DiffO
 /// What a change of a quantity means.
 fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffOptions) -> Meaning {
     let key = what.strip_prefix("evaluate.").unwrap_or(what);
-    let demanded = |record: &Record| record.evaluate.as_ref().and_then(|e| e.expected_betti);
-    let is_right = |record: &Record, betti: &Value| {
-        demanded(record).is_some_and(|demanded| *betti == Value::from(demanded.to_vec()))
-    };
     let is_bounded = matches!(pair.old.simplify.level, Target::MaxError(_));
     match key {
         "status" => of_truth(pair.old.status.is_ok(), pair.new.status.is_ok()),
-        "betti" | "union.betti" => of_truth(is_right(pair.old, old), is_right(pair.new, new)),
-        // Of an error bound the number of spheres is the answer.
+        "betti" | "union.betti" => of_truth(is_expected(pair.old, old), is_expected(pair.new, new)),
+        // Under an error bound the number of spheres is the result.
         "simplify.spheres" if is_bounded => of_size(old, new, 0.0, 0.5),
         key if METRICS.iter().any(|metric| metric.is_gate && metric.path == key) => {
             of_size(old, new, options.error, NEGLIGIBLE)
         }
         _ => Meaning::Changed,
     }
+}
+
+/// Whether Betti numbers are those of the solid.
+fn is_expected(record: &Record, betti: &Value) -> bool {
+    let expected = record.evaluate.as_ref().and_then(|evaluation| evaluation.expected_betti);
+    expected.is_some_and(|expected| *betti == Value::from(expected.to_vec()))
 }
 
 fn of_truth(before: bool, now: bool) -> Meaning {
@@ -239,50 +245,43 @@ fn memory(pair: &Pair<'_>, options: &DiffOptions) -> Option<Change> {
     let enough = options.memory.max(LEAST_MEMORY / old.as_f64()?.max(1.0));
     let meaning = of_size(&old, &new, enough, 0.0);
     let relative = Some(new.as_f64()? / old.as_f64()?.max(1.0) - 1.0);
-    let what = "simplify.peak_bytes".to_owned();
-    (meaning != Meaning::Changed).then(|| Change {
-        item: pair.item.clone(),
-        what,
-        old,
-        new,
-        relative,
-        meaning,
-    })
+    let (item, what) = (pair.item.clone(), "simplify.peak_bytes".to_owned());
+    let change = Change { item, what, old, new, relative, meaning };
+    (meaning != Meaning::Changed).then_some(change)
 }
 
 /// Every deterministic number of a record, by its key.
 fn facts(record: &Record) -> BTreeMap<String, Value> {
     let mut facts = BTreeMap::new();
-    let plain = |value: serde_json::Result<Value>| value.unwrap_or(Value::Null);
     let simplify = &record.simplify;
+    // Named one by one: seconds and memory stand between them, and differ from run to run.
     let whole = [
-        ("status", plain(serde_json::to_value(record.status))),
-        ("result_hash", plain(serde_json::to_value(&record.result_hash))),
-        ("simplify.reached", plain(serde_json::to_value(simplify.reached))),
-        ("simplify.native_level", plain(serde_json::to_value(simplify.native_level))),
-        ("simplify.spheres", plain(serde_json::to_value(simplify.spheres))),
-        ("simplify.edges", plain(serde_json::to_value(simplify.edges))),
-        ("simplify.faces", plain(serde_json::to_value(simplify.faces))),
-        ("simplify.warnings", plain(serde_json::to_value(&simplify.warnings))),
-        ("simplify.diagnostics", plain(serde_json::to_value(&simplify.diagnostics))),
-        ("evaluate", plain(serde_json::to_value(&record.evaluate))),
-        ("initial", plain(serde_json::to_value(record.initial))),
+        ("status", serde_json::to_value(record.status)),
+        ("result_hash", serde_json::to_value(&record.result_hash)),
+        ("simplify.reached", serde_json::to_value(simplify.reached)),
+        ("simplify.native_level", serde_json::to_value(simplify.native_level)),
+        ("simplify.spheres", serde_json::to_value(simplify.spheres)),
+        ("simplify.edges", serde_json::to_value(simplify.edges)),
+        ("simplify.faces", serde_json::to_value(simplify.faces)),
+        ("simplify.warnings", serde_json::to_value(&simplify.warnings)),
+        ("simplify.diagnostics", serde_json::to_value(&simplify.diagnostics)),
+        ("evaluate", serde_json::to_value(&record.evaluate)),
+        ("initial", serde_json::to_value(record.initial)),
     ];
     for (key, value) in whole {
-        take_apart(key, value, &mut facts);
+        take_apart(key, value.unwrap_or(Value::Null), &mut facts);
     }
     facts
 }
 
 /// Objects by their keys, lists of objects by their places; other lists are one value.
 fn take_apart(key: &str, value: Value, facts: &mut BTreeMap<String, Value>) {
-    let fields = |map: Map<String, Value>, facts: &mut BTreeMap<String, Value>| {
-        for (field, value) in map {
-            take_apart(&format!("{key}.{field}"), value, facts);
-        }
-    };
     match value {
-        Value::Object(map) => fields(map, facts),
+        Value::Object(map) => {
+            for (field, value) in map {
+                take_apart(&format!("{key}.{field}"), value, facts);
+            }
+        }
         Value::Array(list) if list.iter().any(Value::is_object) => {
             for (place, value) in list.into_iter().enumerate() {
                 take_apart(&format!("{key}.{place}"), value, facts);

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::{Change, Diff, ItemName, Meaning, Timing, Unlike};
-use crate::tables::{Cell, Column, Row, Table, escape, to_markdown};
+use crate::tables::{Cell, Column, Row, Table, escape, left_out, to_markdown};
 use crate::text::{counted, significant};
 
 /// Rows of a table of changes; the JSON has all.
@@ -61,35 +61,30 @@ fn heading(diff: &Diff) -> String {
 /// What is compared with what.
 fn sides(diff: &Diff) -> String {
     let lines = diff.sides.iter().zip(["old", "new"]).map(|(side, which)| {
-        let all = |set: &std::collections::BTreeSet<String>, length: usize| {
-            let short = set.iter().map(|text| text.chars().take(length).collect::<String>());
-            short.collect::<Vec<_>>().join(", ")
-        };
-        let name = escape(&side.name);
-        let machines = escape(&all(&side.machines, usize::MAX));
-        let (versions, builds) = (all(&side.versions, usize::MAX), all(&side.builds, 12));
-        format!("- {which}: {name}, version {}, build {builds}, on {machines}", escape(&versions))
+        let builds: Vec<String> = side.builds.iter().map(|hash| format!("{hash:.12}")).collect();
+        let [versions, machines] = [&side.versions, &side.machines]
+            .map(|set| escape(&set.iter().map(String::as_str).collect::<Vec<_>>().join(", ")));
+        let (name, builds) = (escape(&side.name), builds.join(", "));
+        format!("- {which}: {name}, version {versions}, build {builds}, on {machines}")
     });
     lines.collect::<Vec<_>>().join("\n")
 }
 
 fn change_table(caption: &str, changes: &[&Change]) -> Table {
     let titles = ["mesh", "method", "level", "what", "old", "new", "change"];
-    let row = |change: &&Change| {
+    let rows = changes.iter().take(MOST_ROWS).map(|change| {
         let ItemName { mesh, method, level } = &change.item;
         let relative = change.relative.map(|share| format!("{:+.2} %", 100.0 * share));
         let texts = [mesh, method, level, &change.what].map(|text| Cell::new(text.as_str()));
         let values = [&change.old, &change.new].map(|value| Cell::new(shown(value)));
         let cells = texts.into_iter().chain(values).chain([Cell::optional(relative)]).collect();
         Row { cells, starts_group: false }
-    };
-    let left = changes.len().saturating_sub(MOST_ROWS);
-    let notes = if left > 0 { vec![format!("{left} more are in the JSON.")] } else { vec![] };
+    });
     Table {
         caption: format!("{caption}: {}", counted(changes.len(), "change", "changes")),
-        notes,
+        notes: left_out(changes.len(), MOST_ROWS),
         columns: titles.map(Column::text).into(),
-        rows: changes.iter().take(MOST_ROWS).map(row).collect(),
+        rows: rows.collect(),
     }
 }
 
@@ -113,7 +108,7 @@ fn timing_table(diff: &Diff) -> Table {
         "agree",
         "",
     ];
-    let row = |timing: &Timing| {
+    let rows = diff.timings.iter().map(|timing| {
         let Timing { method, mesh, clock, results, repetitions, ratio, interval, .. } = timing;
         let [low, high] = interval;
         let meaning = match timing.meaning {
@@ -133,7 +128,7 @@ fn timing_table(diff: &Diff) -> Table {
         let mut cells: Vec<Cell> = texts.into_iter().map(Cell::new).collect();
         cells.push(Cell { best: timing.meaning.is_some(), ..Cell::new(meaning) });
         Row { cells, starts_group: false }
-    };
+    });
     let options = &diff.options;
     let together = match options.alternating {
         true => "Both builds ran alternately.",
@@ -153,7 +148,7 @@ fn timing_table(diff: &Diff) -> Table {
         caption: "Seconds".to_owned(),
         notes: vec![note],
         columns: titles.map(Column::text).into(),
-        rows: diff.timings.iter().map(row).collect(),
+        rows: rows.collect(),
     }
 }
 
@@ -162,8 +157,10 @@ fn results(count: usize, what: &str) -> String {
 }
 
 fn listed(names: &[ItemName]) -> String {
-    let name = |item: &ItemName| format!("{} / {} / {}", item.mesh, item.method, item.level);
-    let mut all: Vec<String> = names.iter().take(MOST_NAMES).map(name).collect();
+    let first = names.iter().take(MOST_NAMES);
+    let mut all: Vec<String> = first
+        .map(|ItemName { mesh, method, level }| format!("{mesh} / {method} / {level}"))
+        .collect();
     if names.len() > MOST_NAMES {
         all.push(format!("and {} more", names.len() - MOST_NAMES));
     }
@@ -175,11 +172,12 @@ fn unlike(unlike: &[Unlike]) -> String {
     let mut reasons: Vec<&str> = unlike.iter().map(|unlike| unlike.why.as_str()).collect();
     reasons.sort_unstable();
     reasons.dedup();
-    let line = |why: &&str| {
+    let mut text = String::new();
+    for why in reasons {
         let names: Vec<ItemName> =
-            unlike.iter().filter(|u| u.why == *why).map(|u| u.item.clone()).collect();
+            unlike.iter().filter(|u| u.why == why).map(|u| u.item.clone()).collect();
         let count = results(names.len(), "not compared");
-        format!("{count} ({}): {}.\n\n", escape(why), listed(&names))
-    };
-    reasons.iter().map(line).collect()
+        text.push_str(&format!("{count} ({}): {}.\n\n", escape(why), listed(&names)));
+    }
+    text
 }

@@ -23,7 +23,8 @@ use medial::geometry::hash::splitmix;
 use serde::Serialize;
 
 use super::results::Pair;
-use super::{DiffOptions, Meaning};
+use super::{DiffOptions, ItemName, Meaning};
+use crate::metric::median;
 use crate::record::{Record, Repetition, Stages};
 
 /// With fewer repetitions nothing is said.
@@ -98,8 +99,8 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
             pairs.len()
         ));
     }
-    let enough = |pair: &&&Pair<'_>| repetitions(pair) >= LEAST_REPETITIONS;
-    let repeated: Vec<&Pair<'_>> = timed.iter().filter(enough).copied().collect();
+    let mut repeated = timed.clone();
+    repeated.retain(|pair| repetitions(pair) >= LEAST_REPETITIONS);
     let with_result = timed.iter().filter(|pair| repetitions(pair) > 0).count();
     if repeated.len() < with_result {
         untimed.push(format!(
@@ -111,16 +112,14 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
     let rows = groups(&repeated)
         .into_iter()
         .flat_map(|group| CLOCKS.iter().filter_map(move |clock| group.timing(clock, options)));
-    let is_told = |row: &Timing| row.mesh.is_none() || row.meaning.is_some();
-    (rows.filter(is_told).collect(), untimed)
+    // Rows of single meshes that mean nothing would bury the others.
+    (rows.filter(|row| row.mesh.is_none() || row.meaning.is_some()).collect(), untimed)
 }
 
 fn same_machine(pair: &Pair<'_>) -> bool {
-    let machine = |record: &Record| {
-        let machine = record.machine.clone();
-        (machine.cpu, machine.cores, machine.os)
-    };
-    machine(pair.old) == machine(pair.new)
+    let (old, new) = (&pair.old.machine, &pair.new.machine);
+    // Memory as the kernel reports it differs from boot to boot.
+    (&old.cpu, old.cores, &old.os) == (&new.cpu, new.cores, &new.os)
 }
 
 fn repetitions(pair: &Pair<'_>) -> usize {
@@ -129,56 +128,58 @@ fn repetitions(pair: &Pair<'_>) -> usize {
 
 /// The pairs by method, and by method and mesh where there are several; the substrates likewise.
 fn groups<'p, 'a>(pairs: &[&'p Pair<'a>]) -> Vec<Group<'p, 'a>> {
-    let own: Part = |stages| stages.prepare + stages.simplify;
-    let shared: Part = |stages| stages.substrate;
     let mut rows: BTreeMap<(&str, Option<&str>), Vec<&'p Pair<'a>>> = BTreeMap::new();
-    for pair in pairs {
-        rows.entry((&pair.item.method, None)).or_default().push(pair);
-        rows.entry((&pair.item.method, Some(&pair.item.mesh))).or_default().push(pair);
-    }
-    let is_several =
-        |pairs: &[&Pair<'_>]| pairs.iter().any(|pair| pair.item.mesh != pairs[0].item.mesh);
-    let several: Vec<&str> = (rows.iter())
-        .filter(|((_, mesh), pairs)| mesh.is_none() && is_several(pairs))
-        .map(|((method, _), _)| *method)
-        .collect();
-    rows.retain(|(method, mesh), _| mesh.is_none() || several.contains(method));
-    let group = |((method, mesh), pairs): ((&str, Option<&str>), Vec<&'p Pair<'a>>)| Group {
-        method: method.to_owned(),
-        mesh: mesh.map(str::to_owned),
-        part: own,
-        pairs,
-    };
     // Of each mesh the method that uses most of what is shared.
     let mut largest: BTreeMap<&str, &'p Pair<'a>> = BTreeMap::new();
     for pair in pairs {
-        let size = |pair: &Pair<'_>| median(pair.old, |r| r.cpu_seconds, shared);
-        let most = largest.entry(&pair.item.mesh).or_insert(pair);
-        if size(pair) > size(most) {
+        let ItemName { mesh, method, .. } = &pair.item;
+        rows.entry((method, None)).or_default().push(pair);
+        rows.entry((method, Some(mesh))).or_default().push(pair);
+        let most = largest.entry(mesh).or_insert(pair);
+        if cpu_of_substrates(pair.old) > cpu_of_substrates(most.old) {
             *most = pair;
         }
     }
-    let substrates = largest.into_values().collect();
-    let substrates =
-        Group { method: SUBSTRATES.to_owned(), mesh: None, part: shared, pairs: substrates };
-    rows.into_iter().map(group).chain([substrates]).collect()
+    let mut groups = vec![];
+    for (&(method, mesh), pairs) in &rows {
+        // The row of the only mesh would repeat that of the method.
+        let all = &rows[&(method, None)];
+        if mesh.is_some() && all.len() == pairs.len() {
+            continue;
+        }
+        groups.push(Group {
+            method: method.to_owned(),
+            mesh: mesh.map(str::to_owned),
+            part: |stages| stages.prepare + stages.simplify,
+            pairs: pairs.clone(),
+        });
+    }
+    groups.push(Group {
+        method: SUBSTRATES.to_owned(),
+        mesh: None,
+        part: |stages| stages.substrate,
+        pairs: largest.into_values().collect(),
+    });
+    groups
+}
+
+fn cpu_of_substrates(record: &Record) -> f64 {
+    typical(record, |repetition| repetition.cpu_seconds, |stages| stages.substrate)
 }
 
 /// The median of a time over the repetitions of a record.
-fn median(record: &Record, clock: Clock, part: Part) -> f64 {
-    let mut all: Vec<f64> = record.repetitions.iter().map(|r| part(&clock(r))).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(0.0)
+fn typical(record: &Record, clock: Clock, part: Part) -> f64 {
+    let all: Vec<f64> = record.repetitions.iter().map(|r| part(&clock(r))).collect();
+    median(&all).unwrap_or(0.0)
 }
 
 impl<'a> Group<'_, 'a> {
     /// The pairs that take long enough on both sides.
     fn long(&self, clock: Clock) -> Vec<&Pair<'a>> {
-        let shortest = |pair: &Pair<'_>| {
-            let sides = [pair.old, pair.new].map(|record| median(record, clock, self.part));
-            sides[0].min(sides[1])
-        };
-        let long = self.pairs.iter().filter(|pair| shortest(pair) >= LEAST_SECONDS);
+        let long = self.pairs.iter().filter(|pair| {
+            let sides = [pair.old, pair.new].map(|record| typical(record, clock, self.part));
+            sides.iter().all(|&seconds| seconds >= LEAST_SECONDS)
+        });
         long.copied().collect()
     }
 
@@ -221,11 +222,13 @@ impl<'a> Group<'_, 'a> {
 
     /// The mean logarithm of new over old seconds, of the fastest repetitions alone.
     fn fastest_shift(&self, pairs: &[&Pair<'_>], clock: Clock) -> f64 {
-        let fastest = |record: &Record| {
-            let seconds = record.repetitions.iter().map(|r| (self.part)(&clock(r)));
-            seconds.fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE).ln()
-        };
-        let shifts = pairs.iter().map(|pair| fastest(pair.new) - fastest(pair.old));
+        let shifts = pairs.iter().map(|pair| {
+            let [old, new] = [pair.old, pair.new].map(|record| {
+                let seconds = record.repetitions.iter().map(|r| (self.part)(&clock(r)));
+                seconds.fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE).ln()
+            });
+            new - old
+        });
         shifts.sum::<f64>() / pairs.len().max(1) as f64
     }
 
@@ -247,31 +250,38 @@ struct Shift {
 impl Shift {
     /// In pairs, or each side by itself.
     fn new(old: &[f64], new: &[f64], in_pairs: bool) -> Self {
-        let average = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let mean = average(new) - average(old);
+        let count = old.len(); // the same on both sides
+        let mean = mean_of(new.iter()) - mean_of(old.iter());
         let mut means: Vec<f64> = (0..RESAMPLES)
             .map(|resample| {
-                let draw = |side: usize, k: usize| {
-                    let number = ((resample * 2 + side) * old.len() + k) as u64;
-                    (splitmix(number) % old.len() as u64) as usize
-                };
-                let taken = |side: usize, values: &[f64]| {
-                    (0..values.len()).map(|k| values[draw(side, k)]).sum::<f64>()
-                        / values.len().max(1) as f64
-                };
-                taken(usize::from(!in_pairs), new) - taken(0, old)
+                // In pairs both sides draw the same repetitions. Splitmix instead of a generator: no state, no seed.
+                let [old, new] = [(0, old), (usize::from(!in_pairs), new)].map(|(side, values)| {
+                    mean_of((0..count).map(|k| {
+                        let number = ((resample * 2 + side) * count + k) as u64;
+                        &values[(splitmix(number) % count as u64) as usize]
+                    }))
+                });
+                new - old
             })
             .collect();
         means.sort_by(f64::total_cmp);
         let tail = (0.5 * (1.0 - CONFIDENCE) * RESAMPLES as f64) as usize;
-        let agrees = |(a, b): (&f64, &f64)| (b - a) * mean > 0.0;
-        let share = |agreeing: usize, all: usize| agreeing as f64 / all.max(1) as f64;
-        let agreement = if in_pairs {
-            share(old.iter().zip(new).filter(|&pair| agrees(pair)).count(), old.len())
-        } else {
-            let all = old.iter().flat_map(|a| new.iter().map(move |b| (a, b)));
-            share(all.filter(|&pair| agrees(pair)).count(), old.len() * new.len())
-        };
+        let (mut agreeing, mut compared) = (0, 0);
+        for (i, a) in old.iter().enumerate() {
+            for (k, b) in new.iter().enumerate() {
+                // Without pairs any repetition of one side may meet any of the other.
+                if i == k || !in_pairs {
+                    agreeing += usize::from((b - a) * mean > 0.0);
+                    compared += 1;
+                }
+            }
+        }
+        let agreement = agreeing as f64 / compared.max(1) as f64;
         Self { mean, interval: [means[tail], means[RESAMPLES - 1 - tail]], agreement }
     }
+}
+
+fn mean_of<'a>(values: impl ExactSizeIterator<Item = &'a f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    values.sum::<f64>() / count
 }

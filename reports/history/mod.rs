@@ -1,7 +1,7 @@
 //! The results of many runs: at which run and commits a series changed.
 //!
 //! A series is compared with itself alone, on one machine, under one set of conditions, on one content of its mesh: such
-//! runs make a [`Track`]. Machines that take turns have a track each.
+//! runs make a `Track`. Machines that take turns have a track each.
 //!
 //! - Seconds and memory are noisy: [`change_points`] finds their steps. A step that most series of the same runs make is
 //!   that of the machine or of the compiler, and raises no alarm.
@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 pub use change_points::{ChangePoint, change_points};
 pub use run::{HistoryError, Point, Run, read_runs};
 
-use change_points::median;
+use crate::metric::median;
 
 /// A change point that is found one run later may lie this many runs beside its earlier place.
 const SAME_PLACE: usize = 3;
@@ -38,19 +38,16 @@ pub struct RunName {
 
 /// The runs of one series that are compared with each other.
 #[derive(Clone, Debug)]
-pub struct Track<'a> {
+struct Track<'a> {
     /// Machine and conditions.
-    pub setting: [&'a str; 2],
+    setting: [&'a str; 2],
     /// Indices of the runs, and what they measured.
-    pub points: Vec<(usize, &'a Point)>,
+    points: Vec<(usize, &'a Point)>,
 }
 
 /// Where a track changed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Index of the track.
-    #[serde(skip)]
-    pub track: usize,
     /// Index of the first run after it.
     #[serde(skip)]
     pub run: usize,
@@ -94,6 +91,12 @@ pub struct Findings<'a> {
 /// A quantity by its name.
 type Measured<T> = (&'static str, fn(&Point) -> T);
 
+/// A noisy quantity; `None` where a run did not measure it.
+type Noisy = fn(&Point) -> Option<f64>;
+
+/// Fewest values on either side of a run that make a level.
+const FEWEST: usize = 3;
+
 /// The noisy quantities.
 const NOISY: [Measured<Option<f64>>; 2] =
     [("seconds", |point| point.seconds), ("bytes", |point| point.bytes.map(|bytes| bytes as f64))];
@@ -123,10 +126,8 @@ impl<'a> Findings<'a> {
                 track.points.push((index, point));
             }
         }
-        let names =
-            runs.iter().map(|run| RunName { date: run.date.clone(), commit: run.commit.clone() });
         let mut findings = Self {
-            runs: names.collect(),
+            runs: runs.iter().map(Run::name).collect(),
             tracks: tracks.into_values().collect(),
             regressions: 0,
             change_points: vec![],
@@ -158,65 +159,47 @@ impl<'a> Findings<'a> {
     fn steps(
         &self,
         track: usize,
-        (what, of): (&'static str, fn(&Point) -> Option<f64>),
+        (what, of): (&'static str, Noisy),
         least_step: f64,
     ) -> Vec<Change> {
         let measured = measured(&self.tracks[track], of);
         let values: Vec<f64> = measured.iter().map(|(_, value)| *value).collect();
         let Some(&(newest, last)) = measured.last() else { return vec![] };
-        let found = change_points(&values, least_step);
+        let mut changes = vec![];
         // A change point is news on one run alone: where it was not found without that run.
-        let is_newest = newest + 1 == self.runs.len() && !found.is_empty();
-        let earlier = match is_newest {
-            true => change_points(&values[..values.len() - 1], least_step),
-            false => vec![],
-        };
-        let was_found = |step: &ChangePoint| {
-            earlier.iter().any(|other| {
+        let mut earlier = None;
+        for step in change_points(&values, least_step) {
+            let earlier = earlier
+                .get_or_insert_with(|| change_points(&values[..values.len() - 1], least_step));
+            let was_found = earlier.iter().any(|other| {
                 other.at.abs_diff(step.at) <= SAME_PLACE
                     && (other.ratio > 1.0) == (step.ratio > 1.0)
-            })
-        };
-        let change = |step: ChangePoint| Change {
-            from: json!(values[step.at - 1]),
-            to: json!(last),
-            ratio: Some(step.ratio),
-            worse: step.ratio > 1.0,
-            shared: self.is_shared(track, of, measured[step.at].0, step.ratio),
-            news: is_newest && !was_found(&step),
-            ..self.change(track, what, [measured[step.at - 1].0, measured[step.at].0])
-        };
-        found.into_iter().map(change).collect()
+            });
+            let [before, after] = [measured[step.at - 1], measured[step.at]];
+            changes.push(Change {
+                from: json!(before.1),
+                to: json!(last),
+                ratio: Some(step.ratio),
+                worse: step.ratio > 1.0,
+                shared: self.is_shared(track, of, after.0, step.ratio),
+                // A series that the newest run lacks has its change points from an earlier run.
+                news: newest + 1 == self.runs.len() && !was_found,
+                ..self.change(track, what, [before.0, after.0])
+            });
+        }
+        changes
     }
 
     /// Whether the series that ran with this one moved alike at a run, by at least half as much in the median. All are
     /// compared, not only those with a change point of their own: some are found a few runs later.
-    fn is_shared(
-        &self,
-        track: usize,
-        of: fn(&Point) -> Option<f64>,
-        run: usize,
-        ratio: f64,
-    ) -> bool {
-        const AROUND: usize = 10;
-        const FEWEST: usize = 3;
+    fn is_shared(&self, track: usize, of: Noisy, run: usize, ratio: f64) -> bool {
         let setting = self.tracks[track].setting;
-        let shift = |other: &Track<'_>| {
-            let measured = measured(other, of);
-            let at = measured.partition_point(|(index, _)| *index < run);
-            let (before, after) = measured.split_at(at);
-            let level = |some: &[(usize, f64)]| {
-                let values: Vec<f64> = some.iter().map(|(_, value)| value.ln()).collect();
-                median(&values).filter(|_| values.len() >= FEWEST)
-            };
-            let before = level(&before[before.len().saturating_sub(AROUND)..])?;
-            Some(level(&after[..after.len().min(AROUND)])? - before)
-        };
         let alike = self.tracks.iter().filter(|other| other.setting == setting);
-        let shifts: Vec<f64> = alike.filter_map(shift).collect();
+        let shifts: Vec<f64> = alike.filter_map(|other| shift(&measured(other, of), run)).collect();
         let needed = 0.5 * ratio.ln();
-        let moved = |shift: f64| shift * needed > 0.0 && shift.abs() >= needed.abs();
-        shifts.len() > FEWEST && median(&shifts).is_some_and(moved)
+        shifts.len() > FEWEST
+            && median(&shifts)
+                .is_some_and(|shift| shift * needed > 0.0 && shift.abs() >= needed.abs())
     }
 
     /// The differences of exact quantities between neighbouring runs.
@@ -234,7 +217,7 @@ impl<'a> Findings<'a> {
                     "status" => old.status.is_ok() && !new.status.is_ok(),
                     "topology" => old.topology == Some(true) && new.topology == Some(false),
                     "hausdorff" | "mean" => ratio.is_some_and(|ratio| ratio > 1.0 + LEAST_RISE),
-                    _ => false,
+                    _ => false, // other spheres or bytes are neither better nor worse
                 };
                 let news = after + 1 == self.runs.len();
                 let change = self.change(track, what, [before, after]);
@@ -246,10 +229,10 @@ impl<'a> Findings<'a> {
 
     /// A change of a track between two runs, of which nothing else is known yet.
     fn change(&self, track: usize, what: &'static str, [before, after]: [usize; 2]) -> Change {
+        let first = self.tracks[track].points[0].1; // a track begins with its first point
         Change {
-            track,
             run: after,
-            series: self.tracks[track].name(),
+            series: format!("{} · {} · {}", first.mesh, first.method, first.level),
             what,
             from: Value::Null,
             to: Value::Null,
@@ -263,18 +246,20 @@ impl<'a> Findings<'a> {
     }
 }
 
-impl Track<'_> {
-    /// Mesh, method and level.
-    fn name(&self) -> String {
-        let named = |(_, point): &(usize, &Point)| {
-            format!("{} · {} · {}", point.mesh, point.method, point.level)
-        };
-        self.points.first().map(named).unwrap_or_default()
-    }
+/// The logarithm by which values moved at a run: the median after it less that before it.
+fn shift(measured: &[(usize, f64)], run: usize) -> Option<f64> {
+    const AROUND: usize = 10;
+    let (before, after) = measured.split_at(measured.partition_point(|(index, _)| *index < run));
+    let near = [&before[before.len().saturating_sub(AROUND)..], &after[..after.len().min(AROUND)]];
+    let [before, after] = near.map(|near| {
+        let values: Vec<f64> = near.iter().map(|(_, value)| value.ln()).collect();
+        median(&values).filter(|_| values.len() >= FEWEST)
+    });
+    Some(after? - before?)
 }
 
 /// The positive values of a quantity by run.
-fn measured(track: &Track<'_>, of: fn(&Point) -> Option<f64>) -> Vec<(usize, f64)> {
+fn measured(track: &Track<'_>, of: Noisy) -> Vec<(usize, f64)> {
     let points = track.points.iter();
     points.filter_map(|&(run, p)| Some((run, of(p).filter(|value| *value > 0.0)?))).collect()
 }

@@ -1,7 +1,7 @@
 //! The findings as Markdown for terminals, and as a page.
 
 use super::{Change, Findings};
-use crate::tables::{Cell, Column, Row, Table, to_html, to_markdown};
+use crate::tables::{Cell, Column, Row, Table, left_out, to_html, to_markdown};
 use crate::text::{counted, escape_html, significant};
 
 /// More rows of one kind are counted, not listed: the JSON has them all.
@@ -63,10 +63,13 @@ impl Findings<'_> {
         let mut settings: Vec<_> = self.tracks.iter().map(|track| track.setting).collect();
         settings.sort_unstable();
         settings.dedup();
-        let line = |[machine, conditions]: [&str; 2]| {
+        if settings.len() == 1 {
+            return vec![];
+        }
+        let lines = settings.iter().map(|[machine, conditions]| {
             format!("{machine}; {conditions}: compared with itself alone")
-        };
-        if settings.len() > 1 { settings.into_iter().map(line).collect() } else { vec![] }
+        });
+        lines.collect()
     }
 
     fn tables(&self) -> Vec<Table> {
@@ -80,39 +83,38 @@ impl Findings<'_> {
 }
 
 fn table((caption, changes): (&str, Vec<&Change>)) -> Table {
-    let row = |change: &&Change| {
-        let text = |value: &serde_json::Value| match value.as_str() {
-            Some(text) => text.to_owned(),
-            None => value.as_f64().map_or("–".to_owned(), |number| significant(number, 4)),
-        };
-        let size = change.ratio.map_or(String::new(), percent);
-        let meaning = match (change.shared, change.worse) {
-            (true, _) => "most series: the machine or the compiler",
-            (false, true) => "worse",
-            (false, false) => "",
-        };
-        let commits = [&change.last_before, &change.first_after].map(|run| short(&run.commit));
-        let cells = [
-            change.first_after.date.clone(),
-            commits.join(".."),
-            change.series.clone(),
-            change.what.to_owned(),
-            format!("{} → {}", text(&change.from), text(&change.to)),
-            size,
-        ];
-        let mut cells: Vec<Cell> = cells.into_iter().map(Cell::new).collect();
-        cells.push(Cell { best: change.worse && !change.shared, ..Cell::new(meaning) });
-        Row { cells, starts_group: false }
-    };
-    let left = changes.len().saturating_sub(MOST_ROWS);
     Table {
         caption: format!("{caption}: {}", changes.len()),
-        notes: if left > 0 { vec![format!("{left} more are in the JSON.")] } else { vec![] },
+        notes: left_out(changes.len(), MOST_ROWS),
         columns: ["run", "commits", "series", "what", "change", "size", ""]
             .map(Column::text)
             .into(),
-        rows: changes.iter().take(MOST_ROWS).map(row).collect(),
+        rows: changes.iter().take(MOST_ROWS).map(|change| row(change)).collect(),
     }
+}
+
+fn row(change: &Change) -> Row {
+    let [from, to] = [&change.from, &change.to].map(|value| match value.as_str() {
+        Some(text) => text.to_owned(),
+        None => value.as_f64().map_or("–".to_owned(), |number| significant(number, 4)),
+    });
+    let meaning = match (change.shared, change.worse) {
+        (true, _) => "most series: the machine or the compiler",
+        (false, true) => "worse",
+        (false, false) => "",
+    };
+    let commits = [&change.last_before, &change.first_after].map(|run| short(&run.commit));
+    let cells = [
+        change.first_after.date.clone(),
+        commits.join(".."),
+        change.series.clone(),
+        change.what.to_owned(),
+        format!("{from} → {to}"),
+        change.ratio.map_or(String::new(), percent),
+    ];
+    let mut cells: Vec<Cell> = cells.into_iter().map(Cell::new).collect();
+    cells.push(Cell { best: change.worse && !change.shared, ..Cell::new(meaning) });
+    Row { cells, starts_group: false }
 }
 
 /// A ratio as a change in percent: `+10.3 %`.

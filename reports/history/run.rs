@@ -9,8 +9,9 @@ use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
 
-use super::change_points::median;
+use super::RunName;
 use crate::comparison::row_name;
+use crate::metric::median;
 use crate::record::{Machine, Record, Stages, Status};
 use crate::text::printable;
 
@@ -96,12 +97,11 @@ impl Run {
             return invalid(format!("--commit {commit}: expected 8 to 64 hexadecimal digits"));
         }
         // The date is sorted as text and is part of a file name.
-        let is_day = |day: &str| {
+        let has_day = date.get(..10).is_some_and(|day| {
             let mut bytes = day.bytes().enumerate();
             bytes.all(|(k, b)| if k == 4 || k == 7 { b == b'-' } else { b.is_ascii_digit() })
-        };
-        let is_plain = date.bytes().all(|b| b.is_ascii_alphanumeric() || b"-+:.".contains(&b));
-        if !date.get(..10).is_some_and(is_day) || !is_plain {
+        });
+        if !has_day || !date.bytes().all(|b| b.is_ascii_alphanumeric() || b"-+:.".contains(&b)) {
             return invalid(format!("--date {date}: expected YYYY-MM-DD or YYYY-MM-DDTHH:MM:SSZ"));
         }
         let Some(last) = records.last() else { return invalid("no record".to_owned()) };
@@ -137,6 +137,10 @@ impl Run {
         Ok(run)
     }
 
+    pub(super) fn name(&self) -> RunName {
+        RunName { date: self.date.clone(), commit: self.commit.clone() }
+    }
+
     fn file_name(&self) -> String {
         format!("{}-{}.json", &self.date[..10], &self.commit[..8])
     }
@@ -148,21 +152,24 @@ impl Run {
     /// When the folder cannot be written, or has another run of this date and commit.
     pub fn add_to(&self, folder: &Path) -> Result<(PathBuf, bool), HistoryError> {
         let path = folder.join(self.file_name());
-        let failed = |error: io::Error| HistoryError::file(&path, error);
-        let text = serde_json::to_string(self).map_err(|error| failed(error.into()))? + "\n";
-        fs::create_dir_all(folder).map_err(failed)?;
-        match fs::read_to_string(&path) {
-            Ok(old) if old == text => Ok((path, false)),
-            Ok(_) => {
-                let message =
-                    "this run is stored with other content; remove the file to replace it";
-                Err(HistoryError::file(&path, message))
-            }
+        self.store(folder, &path)
+            .map_err(|error| HistoryError::file(&path, error))
+            .map(|is_new| (path, is_new))
+    }
+
+    fn store(&self, folder: &Path, path: &Path) -> io::Result<bool> {
+        let text = serde_json::to_string(self)? + "\n";
+        fs::create_dir_all(folder)?;
+        match fs::read_to_string(path) {
+            Ok(old) if old == text => Ok(false),
+            Ok(_) => Err(io::Error::other(
+                "this run is stored with other content; remove the file to replace it",
+            )),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let written = medial::write_atomically(&path, |out| out.write_all(text.as_bytes()));
-                written.map_err(failed).map(|()| (path, true))
+                medial::write_atomically(path, |out| out.write_all(text.as_bytes()))?;
+                Ok(true)
             }
-            Err(error) => Err(failed(error)),
+            Err(error) => Err(error),
         }
     }
 
@@ -202,13 +209,10 @@ pub fn read_runs(folder: &Path) -> Result<(Vec<Run>, Vec<HistoryError>), History
 impl Point {
     fn of(record: &Record) -> Self {
         let evaluation = record.evaluate.as_ref();
-        let own = |stages: &Stages| match record.simplify.method.as_str() {
-            "initial" => stages.total,
-            _ => stages.prepare + stages.simplify,
-        };
-        let repetitions: Vec<f64> =
-            record.repetitions.iter().map(|r| own(&r.cpu_seconds)).collect();
-        let seconds = median(&repetitions).or(record.simplify.cpu_seconds.as_ref().map(own));
+        let method = record.simplify.method.as_str();
+        let repetitions = record.repetitions.iter().map(|r| own_seconds(method, &r.cpu_seconds));
+        let seconds = median(&repetitions.collect::<Vec<f64>>())
+            .or(record.simplify.cpu_seconds.map(|stages| own_seconds(method, &stages)));
         Self {
             mesh: printable(&record.mesh),
             mesh_hash: record.mesh_hash.as_deref().map(first_digits).unwrap_or_default(),
@@ -226,7 +230,12 @@ impl Point {
     }
 }
 
-/// A finite number with so many significant digits, which is what makes the files small.
+/// Seconds of a method itself. The substrates are the work of the initial medial mesh.
+fn own_seconds(method: &str, stages: &Stages) -> f64 {
+    if method == "initial" { stages.total } else { stages.prepare + stages.simplify }
+}
+
+/// A finite number with `digits` significant digits: more would only make the files large.
 fn rounded(value: f64, digits: usize) -> Option<f64> {
     format!("{:.*e}", digits - 1, value).parse().ok().filter(|value: &f64| value.is_finite())
 }
@@ -243,6 +252,7 @@ fn machine(machine: &Machine) -> String {
 }
 
 fn conditions(record: &Record) -> String {
+    // Old records have none.
     let given = record.conditions.clone().unwrap_or_default();
     let seeds: Vec<String> = record.seeds.iter().map(|(of, seed)| format!("{of} {seed}")).collect();
     let threads = record.simplify.threads.map_or("unknown".to_owned(), |n| n.to_string());

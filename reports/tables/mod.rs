@@ -38,6 +38,12 @@ impl Table {
     }
 }
 
+/// A note on the rows that a table of `count` changes leaves out.
+pub(crate) fn left_out(count: usize, most: usize) -> Vec<String> {
+    let left = count.saturating_sub(most);
+    (left > 0).then(|| format!("{left} more are in the JSON.")).into_iter().collect()
+}
+
 /// The head of a column.
 #[derive(Clone, Serialize)]
 pub(crate) struct Column {
