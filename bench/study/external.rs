@@ -5,7 +5,7 @@
 //! hold `method.toml` with the claims of its authors. A surface in place of a medial mesh is the decimation
 //! baseline. Everything but the claimed seconds is measured here.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use crate::plugin::OwnSeconds;
 use crate::provenance::hex_digest;
 use crate::study::item::{Item, MethodSpec, SceneSpec};
-use crate::study::{Here, Study, StudyError, hash_of};
+use crate::study::{Here, Study, StudyError};
 
 /// Id of the pseudo-method.
 pub const GIVEN: &str = "given";
@@ -319,12 +319,14 @@ impl Study {
         };
         let options = ReadOptions { lenient: given.lenient, block: given.block, radii };
         let wrong = |why: String| StudyError::Value(format!("given `{}`: {why}", given.name));
-        let loaded = read_external(&path, options).map_err(wrong)?;
+        // One read: the hash is that of the bytes whose spheres are counted.
+        let bytes = surface::content(&path).map_err(|error| wrong(error.to_string()))?;
+        let loaded = read_external(&path, &bytes, options).map_err(wrong)?;
         let spheres = loaded.mesh.spheres.len();
         if spheres == 0 {
             return Err(wrong(format!("{}: no sphere", path.display())));
         }
-        let hash = hash_of(&path)?;
+        let hash = hex_digest(&bytes);
         Ok(GivenFile { mesh, given, claims, path, hash, spheres, same_as: vec![] })
     }
 
@@ -506,7 +508,8 @@ pub fn read_axis(
     let from_surface = options.radii == RadiiFrom::Surface;
     let radii = if from_surface { Radii::NotNeeded } else { Radii::Needed };
     let read = ReadOptions { lenient: options.lenient, block: options.block, radii };
-    let mut loaded = read_external(path, read).map_err(AxisError)?;
+    let bytes = surface::content(path).map_err(|error| AxisError(error.to_string()))?;
+    let mut loaded = read_external(path, &bytes, read).map_err(AxisError)?;
     if loaded.mesh.spheres.is_empty() {
         return Err(named(&"no sphere"));
     }
@@ -539,34 +542,55 @@ pub fn read_axis(
 }
 
 /// Reads a medial mesh, or a surface as one of spheres without extent: the union of its slabs is the
-/// surface itself.
+/// surface itself. The bytes are those of the file `path`, which is not opened.
 ///
 /// # Errors
 /// In words that name the file.
-pub(crate) fn read_external(path: &Path, options: ReadOptions) -> Result<LoadedMa, String> {
+fn read_external(path: &Path, bytes: &[u8], options: ReadOptions) -> Result<LoadedMa, String> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    let read = || complex::read_with(path, options).map_err(|error| error.to_string());
-    let surface = || -> Result<LoadedMa, String> {
-        let surface = surface::read_any(path).map_err(|error| error.to_string())?.mesh;
-        let spheres = surface.vertices.iter().map(|&v| Sphere::new(v, 0.0)).collect();
-        let mesh = MedialMesh::from_simplices(spheres, vec![], surface.faces);
-        let mesh = mesh.map_err(|error| format!("{}: {error}", path.display()))?;
-        let notes = vec!["a surface: measured as spheres of radius 0".to_owned()];
-        Ok(LoadedMa { mesh, notes, warnings: Vec::new() })
+    let is_surface = match extension.as_str() {
+        "off" | "stl" => return read_surface(path, bytes),
+        "ply" => true,
+        // Taken for a surface, a medial mesh without radii would have spheres of radius 0.
+        "obj" => !lists_edges(bytes),
+        _ => false,
     };
-    match extension.as_str() {
-        "off" | "stl" => surface(),
-        // Lines `l` are the edges of a medial mesh. Taken for a surface, their radii would be 0.
-        "obj" if has_lines(path) => read(),
-        // Without radii it is a surface, and its first error is the more telling one if it is neither.
-        "ply" | "obj" => read().or_else(|why| surface().map_err(|_| why)),
-        _ => read(),
+    let read = complex::read_content(path, bytes, options).map_err(|error| error.to_string());
+    match read {
+        // Without radii it is a surface. If it is neither, the first error is the more telling one.
+        Err(why) if is_surface => read_surface(path, bytes).map_err(|_| why),
+        read => read,
     }
 }
 
-fn has_lines(obj: &Path) -> bool {
-    let text = fs::read(obj).unwrap_or_default();
-    text.split(|&byte| byte == b'\n').any(|line| line.starts_with(b"l "))
+fn read_surface(path: &Path, bytes: &[u8]) -> Result<LoadedMa, String> {
+    let surface = surface::read_any(path, bytes).map_err(|error| error.to_string())?.mesh;
+    let spheres = surface.vertices.iter().map(|&v| Sphere::new(v, 0.0)).collect();
+    let mesh = MedialMesh::from_simplices(spheres, vec![], surface.faces);
+    let mesh = mesh.map_err(|error| format!("{}: {error}", path.display()))?;
+    let notes = vec!["a surface: measured as spheres of radius 0".to_owned()];
+    Ok(LoadedMa { mesh, notes, warnings: Vec::new() })
+}
+
+/// Whether the lines `l` of an `.obj` file are the edges of a medial mesh: there is no face, or a line is
+/// the side of one. In a surface they are the edges without a face, which some modellers leave behind.
+fn lists_edges(obj: &[u8]) -> bool {
+    let (mut edges, mut sides) = (HashSet::new(), Vec::new());
+    for line in obj.split(|&byte| byte == b'\n') {
+        let line = String::from_utf8_lossy(line);
+        let mut words = line.split_whitespace();
+        let keyword = words.next();
+        // Behind a slash stand texture coordinates and normals.
+        let corners = words.map_while(|word| word.split('/').next()?.parse().ok());
+        let corners: Vec<u32> = corners.collect();
+        let pairs = corners.windows(2).map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])]);
+        match keyword {
+            Some("l") => edges.extend(pairs),
+            Some("f") => sides.extend(pairs),
+            _ => {}
+        }
+    }
+    !edges.is_empty() && (sides.is_empty() || sides.iter().any(|side| edges.contains(side)))
 }
 
 /// Gives every sphere the distance of its centre to the surface as its radius.
@@ -640,6 +664,23 @@ pub fn percent(fraction: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_obj_without_radii_is_a_surface_unless_its_lines_are_sides_of_faces() {
+        let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 0 2\n\
+                           f 1/1 3/1 2/1\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+        for (lines, is_surface) in [("", true), ("l 4 5\n", true), ("l 4 5\nl 3 1\n", false)] {
+            let text = format!("{tetrahedron}{lines}");
+            let read = read_external(Path::new("a.obj"), text.as_bytes(), ReadOptions::default());
+            match read {
+                Ok(loaded) => assert!(is_surface && loaded.mesh.faces.len() == 4, "{lines}"),
+                Err(why) => assert!(!is_surface && why.contains("without radii"), "{why}"),
+            }
+        }
+        let curve = b"v 0 0 0\nv 1 0 0\nl 1 2\n";
+        let why = read_external(Path::new("a.obj"), curve, ReadOptions::default()).unwrap_err();
+        assert!(why.contains("without radii"), "{why}");
+    }
 
     #[test]
     fn a_word_names_the_method_the_mesh_and_the_file() {

@@ -349,9 +349,9 @@ impl Library {
         name: Option<&str>,
     ) -> Result<(Added, Option<&Published>), PublicError> {
         // First, since it refuses what is no regular file and would never end.
-        let loaded = surface::read_any(file)?;
+        let bytes = surface::content(file)?;
+        let loaded = surface::read_any(file, &bytes)?;
         let refused = surface::inspect(file)?.refused.map(|error| error.fault.to_string());
-        let bytes = fs::read(file).map_err(io_error(file))?;
         let sha256 = hex_digest(&bytes);
         let known = self.catalogue.meshes.iter().find(|mesh| mesh.sha256 == sha256);
         let name = match (name, known) {

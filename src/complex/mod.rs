@@ -14,8 +14,8 @@ pub use contour::{
 };
 pub use formats::{
     LoadedMa, Look, MaError, MaErrorKind, Radii, ReadOptions, SphereValues, parse_ma,
-    parse_ma_with, parse_obj, parse_ply, parse_ply_with, read, read_with, single_precision_loss,
-    write, write_with,
+    parse_ma_with, parse_obj, parse_ply, parse_ply_with, read, read_content, read_with,
+    single_precision_loss, write, write_with,
 };
 pub use mesh::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};

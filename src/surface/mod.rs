@@ -91,13 +91,15 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
 }
 
 /// Reads a surface that need not bound a solid, such as one that a simplifier tore: the triangles
-/// after the same repairs, oriented as far as that is possible.
+/// after the same repairs, oriented as far as that is possible. The bytes are those of the file
+/// `path`, which is not opened.
 ///
 /// # Errors
-/// When the file cannot be read, is not what its extension says, or has no triangle with an area.
-pub fn read_any(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
+/// When the bytes are not what the extension says, or have no triangle with an area.
+pub fn read_any(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Loaded, SurfaceError> {
     let path = path.as_ref();
-    let examined = load(path).map_err(|fault| in_file(path, fault))?;
+    let examined = Format::of(path).and_then(|format| examine(bytes, format));
+    let examined = examined.map_err(|fault| in_file(path, fault))?;
     Ok(Loaded { mesh: examined.mesh, report: examined.report })
 }
 

@@ -8,6 +8,7 @@ mod cli_simplify;
 mod command;
 mod common;
 mod diff;
+mod external_results;
 mod faults;
 mod fuzz_inputs;
 mod history;

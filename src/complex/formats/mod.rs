@@ -231,19 +231,37 @@ pub fn read(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
 /// As [`read`], but for what the options allow.
 pub fn read_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<LoadedMa, MaError> {
     let path = path.as_ref();
-    type Parser = fn(Vec<u8>, &str, ReadOptions) -> Result<LoadedMa, MaError>;
-    let parse: Parser = match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => parse_ma_with,
-        "ply" => parse_ply_with,
-        "obj" => parse_obj,
+    parser(path)?;
+    let bytes = fs::read(path).map_err(|error| MaError::of(path.display(), error))?;
+    read_content(path, &bytes, options)
+}
+
+/// [`read_with`] for the bytes of the file `path`, which is not opened.
+///
+/// # Errors
+/// As [`read_with`].
+pub fn read_content(
+    path: impl AsRef<Path>,
+    bytes: &[u8],
+    options: ReadOptions,
+) -> Result<LoadedMa, MaError> {
+    let path = path.as_ref();
+    parser(path)?(bytes, &path.display().to_string(), options)
+}
+
+type Parser<'a> = fn(&'a [u8], &str, ReadOptions) -> Result<LoadedMa, MaError>;
+
+fn parser<'a>(path: &Path) -> Result<Parser<'a>, MaError> {
+    match extension(path).as_str() {
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(parse_ma_with),
+        "ply" => Ok(parse_ply_with),
+        "obj" => Ok(parse_obj),
         other => {
             let known = ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj";
             let extension = other.to_owned();
-            return Err(MaError::of(path.display(), MaErrorKind::Extension { extension, known }));
+            Err(MaError::of(path.display(), MaErrorKind::Extension { extension, known }))
         }
-    };
-    let bytes = fs::read(path).map_err(|error| MaError::of(path.display(), error))?;
-    parse(bytes, &path.display().to_string(), options)
+    }
 }
 
 /// Writes a medial mesh as `.ma`, `.ply`, `.obj`, `.vtp` or `.glb`, told apart by the extension.
