@@ -155,8 +155,8 @@ impl Goal {
     pub fn depths(&self, points: &[Vec3]) -> Vec<Depth> {
         let closest = self.tree.closest_batch(points);
         let sides = self.inside.sides(points);
-        let depth = |((&p, closest), side)| self.signed(p, closest, side);
-        points.iter().zip(&closest).zip(sides).map(depth).collect()
+        let found = points.iter().zip(&closest).zip(sides);
+        found.map(|((&p, closest), side)| self.signed(p, closest, side)).collect()
     }
 
     fn signed(&self, p: Vec3, closest: &Closest, side: Side) -> Depth {
@@ -208,14 +208,13 @@ impl Goal {
 
     /// A point next to the surface for each centre that is outside of the solid, the closest but for rounding.
     pub fn clamped(&self, centres: &[Vec3]) -> Vec<Option<Vec3>> {
-        let outside = |side| side == Side::Outside;
-        let sides = self.inside.sides(centres);
-        let onto = |c| {
-            let closest = self.tree.closest(c);
-            closest.point - WITHIN * self.normal(closest.face)
-        };
-        let clamp = |(&c, side)| outside(side).then(|| onto(c));
-        centres.iter().zip(sides).map(clamp).collect()
+        let clamped = centres.iter().zip(self.inside.sides(centres)).map(|(&centre, side)| {
+            (side == Side::Outside).then(|| {
+                let closest = self.tree.closest(centre);
+                closest.point - WITHIN * self.normal(closest.face)
+            })
+        });
+        clamped.collect()
     }
 
     /// The largest ball inside the solid that touches the surface next to a point (Ma, Bae, Choi 2012,
@@ -254,11 +253,11 @@ impl Goal {
         let side = extent.max_element() / GRID as f64;
         let cells = (extent / side).ceil().max(Vec3::ONE);
         let [nx, ny, nz] = cells.to_array().map(|n| n as usize);
-        let middle = |i: usize| {
+        let middles = (0..nx * ny * nz).map(|i| {
             let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)].map(|k| k as f64 + 0.5);
             lo + side * Vec3::new(x, y, z)
-        };
-        let middles: Vec<Vec3> = (0..nx * ny * nz).map(middle).collect();
+        });
+        let middles: Vec<Vec3> = middles.collect();
         let depths = self.depths(&middles);
         // A cell farther outside than its half diagonal holds nothing.
         let reach = side * 0.75_f64.sqrt();
@@ -274,16 +273,22 @@ impl Goal {
             }
         }
         let depths = self.depths(&points);
-        let inside = points.iter().zip(depths).filter(|(_, depth)| depth.value > 0.0);
-        let point =
-            |(&point, depth): (&Vec3, Depth)| Interior { point, depth: depth.value, weight: ASIDE };
-        let all: Vec<Interior> = inside.map(point).collect();
-        // Rarely more than asked: thinned evenly.
-        let keep = |k: usize| k * count / all.len() != (k + 1) * count / all.len();
-        if all.len() <= count {
-            return all;
+        let points = points.into_iter().zip(depths);
+        let points = points.map(|(point, Depth { value: depth, .. })| Interior {
+            point,
+            depth,
+            weight: ASIDE,
+        });
+        let mut inside: Vec<Interior> = points.filter(|point| point.depth > 0.0).collect();
+        let (all, mut k) = (inside.len(), 0);
+        if all > count {
+            // Thinned evenly, so that no region loses more than another.
+            inside.retain(|_| {
+                k += 1;
+                (k - 1) * count / all != k * count / all
+            });
         }
-        (0..all.len()).filter(|&k| keep(k)).map(|k| all[k]).collect()
+        inside
     }
 }
 
@@ -389,14 +394,15 @@ fn interpolated(mesh: &MedialMesh, held: &Held) -> Sphere {
 /// About so many points of the medial mesh, but all spheres: the rest spread evenly over edges and faces, so
 /// that not each small one has a point.
 fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
-    let centre = |v: u32| mesh.spheres[v as usize].centre;
-    let length = |e: &[u32; 2]| centre(e[0]).distance(centre(e[1]));
-    let area = |f: &[u32; 3]| {
-        let [a, b, c] = f.map(centre);
+    let lengths = mesh.edges.iter().map(|edge| {
+        let [a, b] = edge.map(|v| mesh.spheres[v as usize].centre);
+        a.distance(b)
+    });
+    let areas = mesh.faces.iter().map(|face| {
+        let [a, b, c] = face.map(|v| mesh.spheres[v as usize].centre);
         0.5 * (b - a).cross(c - a).length()
-    };
-    let (total_length, total_area) =
-        (mesh.edges.iter().map(length).sum::<f64>(), mesh.faces.iter().map(area).sum::<f64>());
+    });
+    let (total_length, total_area) = (lengths.clone().sum::<f64>(), areas.clone().sum::<f64>());
     // The spacing `h` with length / h + area / h^2 = count.
     let count = count as f64;
     let root = (total_length * total_length + 4.0 * total_area * count).sqrt();
@@ -404,35 +410,35 @@ fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
     let mut all: Vec<Held> = (0..mesh.spheres.len() as u32)
         .map(|v| Held { primitive: Primitive::Sphere(v), weights: [1.0, 0.0, 0.0], known: None })
         .collect();
-    // What a simplex is too small for is left to the next one.
     let mut left = 0.5;
-    let mut points = |size: f64| {
-        left += if size.is_finite() { size } else { 0.0 };
-        let whole = left.floor();
-        left -= whole;
-        (whole as usize).min(1000)
-    };
-    for (e, edge) in (0..).zip(&mesh.edges) {
-        let n = points(length(edge) / h);
-        let at = |k: usize| {
+    for (e, length) in (0..).zip(lengths) {
+        let n = whole_points(length / h, &mut left);
+        all.extend((0..n).map(|k| {
             let t = (k as f64 + 0.5) / n as f64;
             Held { primitive: Primitive::Edge(e), weights: [1.0 - t, t, 0.0], known: None }
-        };
-        all.extend((0..n).map(at));
+        }));
     }
-    for (f, face) in (0..).zip(&mesh.faces) {
-        let n = points(area(face) / (h * h));
-        let at = |k: usize| {
+    for (f, area) in (0..).zip(areas) {
+        let n = whole_points(area / (h * h), &mut left);
+        all.extend((0..n).map(|k| {
             let [mut s, mut t] = PLASTIC.map(|step| ((k as f64 + 1.0) * step + GOLDEN).fract());
             // The sequence fills a parallelogram; its other half is reflected into the triangle.
             if s + t > 1.0 {
                 (s, t) = (1.0 - s, 1.0 - t);
             }
             Held { primitive: Primitive::Face(f), weights: [1.0 - s - t, s, t], known: None }
-        };
-        all.extend((0..n).map(at));
+        }));
     }
     all
+}
+
+/// The points of a simplex of some size, in spacings, at most 1,000. `left` carries its fraction to the next one.
+fn whole_points(size: f64, left: &mut f64) -> usize {
+    // Without spacing, as in a mesh of one place, the size is no number.
+    *left += if size.is_finite() { size } else { 0.0 };
+    let whole = left.floor();
+    *left -= whole;
+    (whole as usize).min(1000)
 }
 
 /// Points whose balls are watched for protruding, for a mesh that is a `share` of the whole.
@@ -460,50 +466,41 @@ pub(super) fn residuals(
     let places: Vec<Vec3> = surface.chain(points.interior.iter().map(|x| x.point)).collect();
     let count = points.samples.len();
     // What holds an interior point deeply enough holds it: no deeper primitive is looked for.
-    let enough = |i: usize| i.checked_sub(count).map(|i| held_from(points.interior[i].depth));
-    let nearest = union.deepest_batch_near(&places, near, enough);
+    let nearest = union.deepest_batch_near(&places, near, |i| {
+        i.checked_sub(count).map(|i| held_from(points.interior[i].depth))
+    });
     let hulls = Hulls::new(mesh);
-    let limit = |i: usize| limits.get(i).copied().unwrap_or(f64::INFINITY);
-    let row = |i: usize, point: Vec3, found: &NearestPrimitive, slope: f64| {
-        let primitive = found.primitive;
-        if limit(i) < found.signed {
-            // No sphere of this mesh decides.
-            return (limit(i), ([0.0; 3], [0.0; 4]), primitive);
-        }
-        let (weights, direction) = hulls.derivative(mesh, point, primitive);
-        (found.signed, (weights, direction.map(|d| slope * d)), primitive)
-    };
+    let limits = limits.iter().copied().chain(std::iter::repeat(f64::INFINITY));
     let mut rows = Vec::with_capacity(nearest.len());
-    for (i, (sample, found)) in points.samples.iter().zip(&nearest).enumerate() {
-        let (error, (weights, direction), primitive) = row(i, sample.point, found, 1.0);
-        let Sample { point, weight } = *sample;
+    for (i, (found, limit)) in nearest.iter().zip(limits).enumerate() {
+        let signed = found.signed.min(limit);
+        let (point, weight, error, slope) = match points.samples.get(i) {
+            Some(&Sample { point, weight }) => (point, weight, signed, 1.0),
+            None => {
+                let Interior { point, depth, weight } = points.interior[i - count];
+                (point, weight, uncovered(depth, signed), 2.0)
+            }
+        };
+        if i >= count && error <= 0.0 {
+            continue;
+        }
+        // Where the limit is less, no sphere of this mesh decides.
+        let (weights, direction) = if limit < found.signed {
+            ([0.0; 3], [0.0; 4])
+        } else {
+            let (weights, direction) = hulls.derivative(mesh, point, found.primitive);
+            (weights, direction.map(|d| slope * d))
+        };
         rows.push(Row {
-            primitive,
+            primitive: found.primitive,
             weights,
             direction,
             error,
             weight,
             point,
-            covered: error < 0.0,
+            covered: i < count && error < 0.0,
             protrudes: false,
         });
-    }
-    for (i, (inside, found)) in points.interior.iter().zip(&nearest[count..]).enumerate() {
-        let Interior { point, depth, weight } = *inside;
-        if uncovered(depth, found.signed.min(limit(count + i))) > 0.0 {
-            let (signed, (weights, direction), primitive) = row(count + i, point, found, 2.0);
-            let error = uncovered(depth, signed);
-            rows.push(Row {
-                primitive,
-                weights,
-                direction,
-                error,
-                weight,
-                point,
-                covered: false,
-                protrudes: false,
-            });
-        }
     }
     let protruding = held.par_iter_mut().map(|held| {
         let ball = interpolated(mesh, held);
@@ -539,11 +536,12 @@ struct Hulls {
 
 impl Hulls {
     fn new(mesh: &MedialMesh) -> Self {
-        let sphere = |v: u32| mesh.spheres[v as usize];
-        let cone = |e: &[u32; 2]| Cone::new(sphere(e[0]), sphere(e[1]));
-        let slab = |f: &[u32; 3]| Slab::new(f.map(sphere));
-        let cones = mesh.edges.iter().map(cone).collect();
-        Self { cones, slabs: mesh.faces.iter().map(slab).collect() }
+        let cones = mesh.edges.iter().map(|edge| {
+            let [a, b] = edge.map(|v| mesh.spheres[v as usize]);
+            Cone::new(a, b)
+        });
+        let slabs = mesh.faces.iter().map(|face| Slab::new(face.map(|v| mesh.spheres[v as usize])));
+        Self { cones: cones.collect(), slabs: slabs.collect() }
     }
 
     /// The weights of the sphere that attains the distance of a point, and the derivative by it.
