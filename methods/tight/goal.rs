@@ -473,7 +473,8 @@ pub(super) fn residuals(
     let limits = limits.iter().copied().chain(std::iter::repeat(f64::INFINITY));
     let mut rows = Vec::with_capacity(nearest.len());
     for (i, (found, limit)) in nearest.iter().zip(limits).enumerate() {
-        let signed = found.signed.min(limit);
+        // No `min`: a distance that is not a number stays one.
+        let signed = if limit < found.signed { limit } else { found.signed };
         let (point, weight, error, slope) = match points.samples.get(i) {
             Some(&Sample { point, weight }) => (point, weight, signed, 1.0),
             None => {

@@ -8,15 +8,15 @@
 //! 1. *Start.* The medial mesh of blue-noise samples, twice as many until its Betti numbers are the
 //!    solid's, simplified by another method (Q-MAT) to `start` spheres or three times the target,
 //!    whichever is more (`start.rs`).
-//! 2. *Residuals* (`rows.rs`): at samples of the surface `sigma`; at points of the primitives how far their
+//! 2. *Residuals* (`goal.rs`): at samples of the surface `sigma`; at points of the primitives how far their
 //!    ball protrudes; at interior points how far they are from being held.
-//! 3. *Descent* (`descent.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
-//!    with a sparse Cholesky factorisation (`normal.rs`). A step that would take a centre out of the
-//!    solid, fold a face over or make one cross another is taken back there (`guard.rs`).
+//! 3. *Descent* (`rounds.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
+//!    with a sparse Cholesky factorisation. A step that would take a centre out of the
+//!    solid, fold a face over or make one cross another is taken back there (`collapse.rs`).
 //! 4. *Collapse* (`collapse.rs`): passes of the cheapest edges, priced by the samples that their stars
 //!    serve; a few steps of 3 after each pass, at the power 4.
-//! 5. *Swap* (`insert.rs`): spheres are inserted where the error is largest, and as many edges collapsed
-//!    where it hurts least. Only the spheres around them move then (`patch.rs`).
+//! 5. *Swap* (`start.rs`): spheres are inserted where the error is largest, and as many edges collapsed
+//!    where it hurts least. Only the spheres around them move then (`Patch`).
 //! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
 //!    local ascent on both sides, join the samples; then swaps as in 5, and rounds again. The state
 //!    with the least measured error is the answer.
@@ -33,12 +33,12 @@
 //!   of the start. Those of the union are not looked at.
 //! - The error is measured at samples and by ascent from them; it is not certified. `lambda` weighs the
 //!   mean against the maximum.
-//! - No collapse, insertion or step makes two faces cross that did not (`sheets.rs`, `guard.rs`); those that cross at
+//! - No collapse, insertion or step makes two faces cross that did not (`Sheets`, `Guard`); those that cross at
 //!   the start may go on.
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   says how much.
 //! - The native level `error` is a bound of the two-sided error, a fraction of the diagonal, held by a
-//!   certificate (`bound.rs`). It takes several times as long as a number of spheres.
+//!   certificate. It takes several times as long as a number of spheres.
 //!
 //! # Starting from a given mesh
 //!

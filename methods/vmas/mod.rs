@@ -8,17 +8,17 @@
 //!
 //! 0. *Points* (`points.rs`): area-uniform samples, 100 for each sphere and at least 20,000, adjacent to their
 //!    10 nearest ones; or the vertices of the mesh. One sphere to begin with.
-//! 1. *Cluster* (`cluster.rs`): every point goes to the sphere with the least error (`energy.rs`). Spheres
+//! 1. *Cluster* (`sampling.rs`): every point goes to the sphere with the least error. Spheres
 //!    with fewer than 5 points (4 vertices) are dropped; these points have no sphere in this round.
-//! 2. *Refit* (`residuals.rs`, `refit.rs`): Gauss-Newton on the points of each sphere.
-//! 3. *Correct* (`correct.rs`): the fitted centre is pushed back to the medial axis, to the shrinking ball
+//! 2. *Refit* (`refit.rs`): Gauss-Newton on the points of each sphere.
+//! 3. *Correct* (`sampling.rs`): the fitted centre is pushed back to the medial axis, to the shrinking ball
 //!    (`shrinking_ball.rs`) of the nearest surface point. The fitted radius is not used.
-//! 4. *Errors* (`split.rs`): `E_s` for each sphere; their sum is the total error.
-//! 5. *Split* (`split.rs`): where the total error is at rest, and every 10 rounds, the spheres with the largest
+//! 4. *Errors* (`sampling.rs`): `E_s` for each sphere; their sum is the total error.
+//! 5. *Split* (`sampling.rs`): where the total error is at rest, and every 10 rounds, the spheres with the largest
 //!    `E_s` are split, at most 20 % of them and at most 10, no two adjacent ones: the shrinking ball
 //!    of the worst point joins.
 //! 6. The rounds end with the target reached and the error at rest. Spheres are joined where their
-//!    clusters are adjacent, and faces are all triples that are adjacent in pairs (`connect.rs`).
+//!    clusters are adjacent, and faces are all triples that are adjacent in pairs (this file).
 //!
 //! # Notation
 //!
@@ -336,11 +336,11 @@ impl VmasParams {
 
 /// The pairs of spheres of which some points are adjacent, ascending, in ascending order.
 fn edges(points: &SurfacePoints, labels: &[u32]) -> Vec<[u32; 2]> {
-    let joined = |&[v, w]: &[u32; 2]| {
-        let (a, b) = (labels[v as usize], labels[w as usize]);
+    let joined = points.links.par_iter().filter_map(|link| {
+        let [a, b] = link.map(|v| labels[v as usize]);
         (a != b && a != NONE && b != NONE).then(|| [a.min(b), a.max(b)])
-    };
-    let mut edges: Vec<[u32; 2]> = points.links.par_iter().filter_map(joined).collect();
+    });
+    let mut edges: Vec<[u32; 2]> = joined.collect();
     edges.par_sort_unstable();
     edges.dedup();
     edges
@@ -358,8 +358,8 @@ fn faces(
         (Connect::Faces, Locality::Faces(faces)) => of_labels(faces, labels),
         (Connect::Faces, Locality::Nearest { .. }) => {
             // Links within a cluster are in no triangle of three labels.
-            let differ = |&&[v, w]: &&[u32; 2]| labels[v as usize] != labels[w as usize];
-            let between: Vec<[u32; 2]> = points.links.iter().filter(differ).copied().collect();
+            let mut between = points.links.clone();
+            between.retain(|&[v, w]| labels[v as usize] != labels[w as usize]);
             of_labels(&triangles(&between), labels)
         }
     }
@@ -367,13 +367,12 @@ fn faces(
 
 /// The triangles of a graph whose edges are ascending pairs in ascending order.
 fn triangles(edges: &[[u32; 2]]) -> Vec<[u32; 3]> {
-    let later = |a: u32| {
-        let from = edges.partition_point(|edge| edge[0] < a);
-        let to = edges.partition_point(|edge| edge[0] <= a);
-        edges[from..to].iter().map(|edge| edge[1])
-    };
-    let on_edge = |&[a, b]: &[u32; 2]| {
-        let (mut of_a, mut of_b) = (later(a).peekable(), later(b).peekable());
+    let on_edges = edges.par_iter().flat_map_iter(|&[a, b]| {
+        let [mut of_a, mut of_b] = [a, b].map(|v| {
+            let from = edges.partition_point(|edge| edge[0] < v);
+            let to = edges.partition_point(|edge| edge[0] <= v);
+            edges[from..to].iter().map(|edge| edge[1]).peekable()
+        });
         let mut found = Vec::new();
         while let (Some(&c), Some(&d)) = (of_a.peek(), of_b.peek()) {
             if c == d {
@@ -384,18 +383,19 @@ fn triangles(edges: &[[u32; 2]]) -> Vec<[u32; 3]> {
             of_b.next_if(|&d| d <= c);
         }
         found
-    };
-    edges.par_iter().flat_map_iter(on_edge).collect()
+    });
+    on_edges.collect()
 }
 
 /// The labels of point triples with three different ones, ascending, in ascending order.
 fn of_labels(triples: &[[u32; 3]], labels: &[u32]) -> Vec<[u32; 3]> {
-    let labelled = |triple: &[u32; 3]| {
+    let labelled = triples.iter().filter_map(|triple| {
         let mut face = triple.map(|v| labels[v as usize]);
         face.sort_unstable();
+        // `NONE` is the largest label, so it can only be the last one.
         (face[0] < face[1] && face[1] < face[2] && face[2] != NONE).then_some(face)
-    };
-    let mut faces: Vec<[u32; 3]> = triples.iter().filter_map(labelled).collect();
+    });
+    let mut faces: Vec<[u32; 3]> = labelled.collect();
     faces.sort_unstable();
     faces.dedup();
     faces

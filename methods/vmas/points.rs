@@ -122,9 +122,10 @@ impl SurfacePoints {
             let area: f64 = vectors.iter().map(|v| v.length()).sum();
             let normal = vectors.iter().sum::<Vec3>().normalize_or_zero();
             let before = planes.len();
-            let plane =
-                |v: &Vec3| Plane { normal: v.normalize_or_zero(), share: v.length() / area };
-            planes.extend(vectors.iter().map(plane));
+            planes.extend(vectors.iter().map(|vector| Plane {
+                normal: vector.normalize_or_zero(),
+                share: vector.length() / area,
+            }));
             unplaced.push(Unplaced {
                 position,
                 area: area / 3.0,
@@ -133,8 +134,8 @@ impl SurfacePoints {
             });
         }
         let (mut points, place_of) = Self::placed(&unplaced, &planes);
-        let place = |face: &[u32; 3]| face.map(|v| place_of[v as usize]);
-        let mut faces: Vec<_> = mesh.faces.iter().map(place).collect();
+        let mut faces: Vec<[u32; 3]> =
+            mesh.faces.iter().map(|face| face.map(|v| place_of[v as usize])).collect();
         faces.retain(|face| !face.contains(&u32::MAX));
         points.links = sides_of(&faces);
         points.local = Locality::Faces(faces);
@@ -151,18 +152,18 @@ impl SurfacePoints {
             morton_order(&positions).iter().map(|&(_, k)| kept[k as usize]).collect();
         let mut place_of = vec![u32::MAX; unplaced.len()];
         (0..).zip(&order).for_each(|(place, &v)| place_of[v as usize] = place);
-        let ordered = || order.iter().map(|&v| &unplaced[v as usize]);
-        let positions: Vec<Vec3> = ordered().map(|point| point.position).collect();
+        let ordered = order.iter().map(|&v| &unplaced[v as usize]);
+        let positions: Vec<Vec3> = ordered.clone().map(|point| point.position).collect();
         let mut first_plane = vec![0];
         let mut placed_planes = Vec::with_capacity(planes.len());
-        for point in ordered() {
+        for point in ordered.clone() {
             placed_planes.extend_from_slice(&planes[point.planes.clone()]);
             first_plane.push(placed_planes.len() as u32);
         }
         let groups: Vec<Sphere> = positions.chunks(GROUP).map(ball_around).collect();
         let points = Self {
-            areas: ordered().map(|point| point.area).collect(),
-            normals: ordered().map(|point| point.normal).collect(),
+            areas: ordered.clone().map(|point| point.area).collect(),
+            normals: ordered.map(|point| point.normal).collect(),
             first_plane,
             planes: placed_planes,
             links: Vec::new(),
@@ -207,9 +208,8 @@ pub(super) fn ball_around(points: &[Vec3]) -> Sphere {
 
 /// The sides of faces, as ascending pairs in ascending order.
 fn sides_of(faces: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
-    let ascending = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-    let mut links: Vec<_> = faces.iter().flat_map(sides).map(ascending).collect();
+    let sides = faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let mut links: Vec<_> = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
     links.sort_unstable();
     links.dedup();
     links
@@ -249,27 +249,20 @@ impl PointGroups {
     /// Points along a curve, by the order of which ties are decided.
     pub fn new(positions: &[Vec3]) -> Self {
         let balls: Vec<Sphere> = positions.chunks(NEAR_GROUP).map(ball_around).collect();
-        let lane = |four: &[Vec3], axis: usize| {
-            f64x4::new([0, 1, 2, 3].map(|k| four.get(k).map_or(FAR, |p| p[axis])))
-        };
         let mut points = Vec::with_capacity(balls.len() * LANES);
         for group in positions.chunks(NEAR_GROUP) {
-            points.extend(group.chunks(4).map(|four| [0, 1, 2].map(|axis| lane(four, axis))));
+            points.extend(
+                group.chunks(4).map(|four| {
+                    [0, 1, 2].map(|axis| in_lanes(four, FAR, |point: &Vec3| point[axis]))
+                }),
+            );
             points.resize(points.len().next_multiple_of(LANES), [f64x4::splat(FAR); 3]);
         }
-        let of_four = |four: &[Sphere]| {
-            let value = |value: &dyn Fn(&Sphere) -> f64, none: f64| {
-                f64x4::new([0, 1, 2, 3].map(|k| four.get(k).map_or(none, value)))
-            };
-            [
-                value(&|ball| ball.centre.x, FAR),
-                value(&|ball| ball.centre.y, FAR),
-                value(&|ball| ball.centre.z, FAR),
-                value(&|ball| ball.radius, 0.0),
-            ]
-        };
-        let balls = balls.chunks(4).map(of_four).collect();
-        Self { positions: positions.to_vec(), points, balls }
+        let balls = balls.chunks(4).map(|four| {
+            let [x, y, z] = [0, 1, 2].map(|k| in_lanes(four, FAR, |ball: &Sphere| ball.centre[k]));
+            [x, y, z, in_lanes(four, 0.0, |ball| ball.radius)]
+        });
+        Self { positions: positions.to_vec(), points, balls: balls.collect() }
     }
 
     /// The nearest point, that of the smallest id among equally near ones, and its squared distance; `None`
@@ -296,11 +289,8 @@ impl PointGroups {
     }
 
     fn nearest_group(&self, at: &[f64x4; 3]) -> usize {
-        let bound = |(four, ball)| {
-            let in_lanes = lower_bounds(ball, at).to_array().into_iter().enumerate();
-            in_lanes.map(move |(k, bound)| (bound, 4 * four + k))
-        };
-        let bounds = self.balls.iter().enumerate().flat_map(bound);
+        let bounds = self.balls.iter().flat_map(|ball| lower_bounds(ball, at).to_array());
+        let bounds = bounds.zip(0..);
         bounds.fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a }).1
     }
 
@@ -327,6 +317,12 @@ impl PointGroups {
     }
 }
 
+/// A value of up to four things, and `none` in the lanes that are left.
+#[inline]
+pub(super) fn in_lanes<T>(four: &[T], none: f64, value: impl Fn(&T) -> f64) -> f64x4 {
+    f64x4::new([0, 1, 2, 3].map(|k| four.get(k).map_or(none, &value)))
+}
+
 /// Lower bounds of the squared distances to the points in four balls.
 fn lower_bounds([x, y, z, radius]: &[f64x4; 4], at: &[f64x4; 3]) -> f64x4 {
     let u = [at[0] - *x, at[1] - *y, at[2] - *z];
@@ -347,7 +343,7 @@ const AMPLE: f64 = 1.8;
 pub(super) fn nearest(points: &[Vec3], area: f64, count: usize) -> Vec<u32> {
     let tree = PointTree::new(points);
     let guess = AMPLE * count as f64 * area / (PI * points.len() as f64);
-    let of_point = |&p: &Vec3| {
+    let ids = points.par_iter().flat_map_iter(|&p| {
         let mut squared = guess.max(f64::MIN_POSITIVE);
         let mut near = tree.within(p, squared);
         while near.len() < count {
@@ -358,22 +354,17 @@ pub(super) fn nearest(points: &[Vec3], area: f64, count: usize) -> Vec<u32> {
             near.into_iter().map(|id| (points[id as usize].distance_squared(p), id)).collect();
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         near.truncate(count);
-        near
-    };
-    points.par_iter().flat_map_iter(|p| of_point(p).into_iter().map(|(_, id)| id)).collect()
+        near.into_iter().map(|(_, id)| id)
+    });
+    ids.collect()
 }
 
 /// The pairs of points of which one is among the nearest of the other, ascending, in ascending order.
 pub(super) fn links_of(nearest: &[u32], count: usize) -> Vec<[u32; 2]> {
-    let lists = nearest.chunks(count.max(1)).enumerate();
-    let of_point = |(v, list): (usize, &[u32])| {
-        let v = v as u32;
-        list.iter()
-            .filter(move |&&w| w != v)
-            .map(move |&w| [v.min(w), v.max(w)])
-            .collect::<Vec<_>>()
-    };
-    let mut links: Vec<[u32; 2]> = lists.flat_map(of_point).collect();
+    let mut links = Vec::with_capacity(nearest.len());
+    for (v, list) in (0..).zip(nearest.chunks(count.max(1))) {
+        links.extend(list.iter().filter(|&&w| w != v).map(|&w| [v.min(w), v.max(w)]));
+    }
     links.par_sort_unstable();
     links.dedup();
     links

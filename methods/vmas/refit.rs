@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use wide::f64x4;
 
 use super::Refit;
-use super::points::{Locality, SurfacePoints};
+use super::points::{Locality, SurfacePoints, in_lanes};
 use super::sampling::Energy;
 
 /// Steps at most.
@@ -97,24 +97,21 @@ impl ClusterSum {
         let mut planes = System::default();
         let mut squares = 0.0;
         let factor = residuals.euclidean();
-        let position = |v: u32| points.positions[v as usize] - origin;
-        let weight = |v: u32| factor * points.areas[v as usize];
         for &v in cluster {
             residuals.each_plane(points, v as usize, |PlaneSum { normal, ties, level }, weight| {
                 planes.add(normal, ties, level - normal.dot(origin), weight);
             });
-            squares += points.areas[v as usize] * position(v).length_squared();
+            let position = points.positions[v as usize] - origin;
+            squares += points.areas[v as usize] * position.length_squared();
         }
-        let lane = |four: &[u32], value: &dyn Fn(u32) -> f64| {
-            f64x4::new([0, 1, 2, 3].map(|k| four.get(k).map_or(0.0, |&v| value(v))))
-        };
-        let axis = |four: &[u32], axis: usize| lane(four, &|v| position(v)[axis]);
-        Self {
-            planes,
-            points: cluster.chunks(4).map(|four| [0, 1, 2].map(|k| axis(four, k))).collect(),
-            weights: cluster.chunks(4).map(|four| lane(four, &weight)).collect(),
-            rounding: ROUNDING * squares,
-        }
+        let lanes = cluster.chunks(4).map(|four| {
+            let position = [0, 1, 2].map(|axis| {
+                in_lanes(four, 0.0, |&v| points.positions[v as usize][axis] - origin[axis])
+            });
+            (position, in_lanes(four, 0.0, |&v| factor * points.areas[v as usize]))
+        });
+        let (points, weights) = lanes.unzip();
+        Self { planes, points, weights, rounding: ROUNDING * squares }
     }
 
     /// The step from a sphere and the value there.
@@ -185,13 +182,15 @@ impl System {
 
     /// The same linear residuals `y` farther: `s^T A s - 2 b . s + c` in the paper's words.
     fn moved_to(&self, y: &[f64; 4]) -> Self {
-        let entry = |i: usize, j: usize| self.matrix[i.max(j)][i.min(j)];
-        let image = [0, 1, 2, 3].map(|i| (0..4).map(|j| entry(i, j) * y[j]).sum::<f64>());
-        let dot = |x: &[f64; 4]| (0..4).map(|k| x[k] * y[k]).sum::<f64>();
+        // Only the lower triangle is filled.
+        let image = [0, 1, 2, 3]
+            .map(|i| (0..4).map(|j| self.matrix[i.max(j)][i.min(j)] * y[j]).sum::<f64>());
+        let [quadratic, linear] =
+            [&image, &self.right].map(|x| (0..4).map(|k| x[k] * y[k]).sum::<f64>());
         Self {
             matrix: self.matrix,
             right: [0, 1, 2, 3].map(|k| self.right[k] - image[k]),
-            value: self.value - 2.0 * dot(&self.right) + dot(&image),
+            value: self.value - 2.0 * linear + quadratic,
         }
     }
 
@@ -247,15 +246,14 @@ pub(super) struct PlaneSum {
 }
 
 impl PlaneSum {
-    /// The distance to one plane.
-    fn of(normal: Vec3, point: Vec3) -> Self {
-        Self { normal, ties: 1.0, level: normal.dot(point) }
-    }
-
-    fn add(&mut self, weight: f64, normal: Vec3, point: Vec3) {
-        self.normal += weight * normal;
-        self.ties += weight;
-        self.level += weight * normal.dot(point);
+    /// Adds the planes of a point, each weighted by the root of its area times a factor.
+    fn add_planes(&mut self, points: &SurfacePoints, v: usize, factor: f64) {
+        for plane in points.planes(v) {
+            let weight = factor * (points.areas[v] * plane.share).sqrt();
+            self.normal += weight * plane.normal;
+            self.ties += weight;
+            self.level += weight * plane.normal.dot(points.positions[v]);
+        }
     }
 }
 
@@ -271,28 +269,21 @@ impl Residuals {
     /// `sum_f sqrt(a_f) (n_f . (v - c) - r)` for a vertex (the authors); for a sample the sum over itself
     /// and its nearest ones, so over itself twice, with weights `sqrt(a) / (k + 1)` (CGAL).
     fn published(points: &SurfacePoints, energy: Energy) -> Self {
-        let own = |v: usize, factor: f64, sum: &mut PlaneSum| {
-            for plane in points.planes(v) {
-                let weight = factor * (points.areas[v] * plane.share).sqrt();
-                sum.add(weight, plane.normal, points.positions[v]);
-            }
-        };
-        let of_point = |v: usize| {
+        let sums = (0..points.len()).into_par_iter().map(|v| {
             let mut sum = PlaneSum::default();
             match &points.local {
-                Locality::Faces(_) => own(v, 1.0, &mut sum),
+                Locality::Faces(_) => sum.add_planes(points, v, 1.0),
                 Locality::Nearest { count, ids } => {
                     let factor = 1.0 / (count + 1) as f64;
-                    own(v, factor, &mut sum);
+                    sum.add_planes(points, v, factor);
                     for &near in &ids[v * count..(v + 1) * count] {
-                        own(near as usize, factor, &mut sum);
+                        sum.add_planes(points, near as usize, factor);
                     }
                 }
             }
             sum
-        };
-        let sums = (0..points.len()).into_par_iter().map(of_point).collect();
-        Self::Published { sums, energy }
+        });
+        Self::Published { sums: sums.collect(), energy }
     }
 
     /// The weight of the squared distance to the sphere, for each unit of area.
@@ -314,7 +305,8 @@ impl Residuals {
         match self {
             Self::Energy(_) => {
                 for plane in points.planes(v) {
-                    let distance = PlaneSum::of(plane.normal, points.positions[v]);
+                    let level = plane.normal.dot(points.positions[v]);
+                    let distance = PlaneSum { normal: plane.normal, ties: 1.0, level };
                     take(distance, points.areas[v] * plane.share);
                 }
             }

@@ -10,7 +10,7 @@ use medial::surface::{InsideTest, Side, TriangleBvh};
 use rayon::prelude::*;
 use wide::f64x4;
 
-use super::points::{GROUP, SurfacePoints, area_vector};
+use super::points::{GROUP, SurfacePoints, area_vector, in_lanes};
 use super::refit::{Residuals, refit};
 use super::shrinking_ball::{Ball, End, Touched, shrinking_ball};
 use super::{Connect, Points, VmasParams, edges, faces};
@@ -82,8 +82,8 @@ impl<'a> VariationalSampling<'a> {
         };
         ball.iter().for_each(|ball| tally.count(ball));
         // Any sphere will do: the first refit leaves nothing of it but its basin of attraction.
-        let somewhere = || Sphere::new(points.positions[points.first as usize], 0.0);
-        let spheres = vec![ball.map_or_else(somewhere, |ball| ball.sphere)];
+        let somewhere = Sphere::new(points.positions[points.first as usize], 0.0);
+        let spheres = vec![ball.map_or(somewhere, |ball| ball.sphere)];
         Self { points, solid, energy, residuals, params, spheres, labels, tally }
     }
 
@@ -139,11 +139,11 @@ impl<'a> VariationalSampling<'a> {
     fn refit_and_correct(&mut self, clusters: &Clusters) {
         let Self { points, solid, residuals, .. } = self;
         let shortest = SHORTEST_STEP * solid.side;
-        let of_sphere = |(s, &sphere): (usize, &Sphere)| {
+        let balls = self.spheres.par_iter().enumerate().map(|(s, &sphere)| {
             let fitted = refit(points, residuals, clusters.of(s), sphere, shortest);
             solid.corrected(points, fitted.centre)
-        };
-        let balls: Vec<Option<Ball>> = self.spheres.par_iter().enumerate().map(of_sphere).collect();
+        });
+        let balls: Vec<Option<Ball>> = balls.collect();
         for (sphere, ball) in self.spheres.iter_mut().zip(balls) {
             match ball {
                 Some(ball) => {
@@ -220,9 +220,8 @@ pub(super) fn assign(
     spheres: &[Sphere],
     labels: &mut [u32],
 ) {
-    let search = || (Vec::new(), Lanes::default());
     labels.par_chunks_mut(GROUP).zip(&points.groups).enumerate().for_each_init(
-        search,
+        || (Vec::new(), Lanes::default()),
         |(near, lanes), (place, (labels, group))| {
             let first = place * GROUP;
             let worst = bound(points, energy, spheres, first, labels);
@@ -255,8 +254,8 @@ fn bound(
 
 /// The spheres that may have an error of at most `worst` at a point of the group, ascending.
 fn candidates(group: &Sphere, worst: f64, lambda: f64, spheres: &[Sphere], near: &mut Vec<u32>) {
-    let reach = |weight: f64| (worst / weight).sqrt() * SLACK.0 + SLACK.1 + group.radius;
-    let (outside, inside) = (reach(lambda), reach(1.0 + lambda));
+    let [outside, inside] = [lambda, 1.0 + lambda]
+        .map(|weight| (worst / weight).sqrt() * SLACK.0 + SLACK.1 + group.radius);
     near.clear();
     for (id, sphere) in (0..).zip(spheres) {
         let distance = group.centre.distance(sphere.centre) - sphere.radius;
@@ -270,14 +269,14 @@ impl Clusters {
     /// Sorts the points by label; those without one are in no cluster.
     pub fn of_labels(labels: &[u32], spheres: usize) -> Self {
         let mut start = vec![0; spheres + 1];
-        let labelled = || (0..).zip(labels).filter(|&(_, &label)| label != NONE);
-        labelled().for_each(|(_, &label)| start[label as usize + 1] += 1);
+        let labelled = (0..).zip(labels).filter(|&(_, &label)| label != NONE);
+        labelled.clone().for_each(|(_, &label)| start[label as usize + 1] += 1);
         for sphere in 0..spheres {
             start[sphere + 1] += start[sphere];
         }
         let mut next = start.clone();
         let mut members = vec![0; start[spheres] as usize];
-        for (v, &label) in labelled() {
+        for (v, &label) in labelled {
             members[next[label as usize] as usize] = v;
             next[label as usize] += 1;
         }
@@ -294,14 +293,13 @@ impl Clusters {
 /// largest cluster stays whatever its size. Returns the clusters that are left.
 pub(super) fn drop_small(spheres: &mut Vec<Sphere>, labels: &mut [u32], least: usize) -> Clusters {
     let clusters = Clusters::of_labels(labels, spheres.len());
-    let size = |s: usize| clusters.of(s).len();
-    let largest = (0..spheres.len()).rev().max_by_key(|&s| size(s));
-    let keeps = |s: usize| size(s) >= least || Some(s) == largest;
-    if (0..spheres.len()).all(keeps) {
+    let largest = (0..spheres.len()).rev().max_by_key(|&s| clusters.of(s).len());
+    let mut kept: Vec<usize> = (0..spheres.len()).collect();
+    kept.retain(|&s| clusters.of(s).len() >= least || Some(s) == largest);
+    if kept.len() == spheres.len() {
         return clusters;
     }
     let mut renamed = vec![NONE; spheres.len()];
-    let kept: Vec<usize> = (0..spheres.len()).filter(|&s| keeps(s)).collect();
     (0..).zip(&kept).for_each(|(new, &old)| renamed[old] = new);
     for label in labels.iter_mut().filter(|label| **label != NONE) {
         *label = renamed[*label as usize];
@@ -333,7 +331,7 @@ pub(super) fn misfits(
     spheres: &[Sphere],
     clusters: &Clusters,
 ) -> Vec<Misfit> {
-    let of_sphere = |(s, sphere): (usize, &Sphere)| {
+    let found = spheres.par_iter().enumerate().map(|(s, sphere)| {
         let cluster = clusters.of(s);
         let (mut sum, mut area) = (0.0, 0.0);
         let (mut largest, mut worst) = (f64::NEG_INFINITY, cluster[0]);
@@ -347,8 +345,8 @@ pub(super) fn misfits(
             }
         }
         Misfit { mean: sum / area, worst }
-    };
-    spheres.par_iter().enumerate().map(of_sphere).collect()
+    });
+    found.collect()
 }
 
 /// The spheres to split, those with the largest errors first: at most so many as are missing, and none of
@@ -450,21 +448,11 @@ impl Lanes {
         self.spheres.clear();
         self.ids.clear();
         for four in ids.chunks(4) {
-            let lane = |value: &dyn Fn(&Sphere) -> f64, none: f64| {
-                f64x4::new(
-                    [0, 1, 2, 3]
-                        .map(|k| four.get(k).map_or(none, |&s| value(&spheres[s as usize]))),
-                )
-            };
-            self.spheres.push([
-                lane(&|s| s.centre.x, 0.0),
-                lane(&|s| s.centre.y, 0.0),
-                lane(&|s| s.centre.z, 0.0),
-                lane(&|s| s.radius, NO_SPHERE),
-            ]);
-            self.ids.push(f64x4::new(
-                [0, 1, 2, 3].map(|k| four.get(k).map_or(f64::MAX, |&s| f64::from(s))),
-            ));
+            let [x, y, z] =
+                [0, 1, 2].map(|axis| in_lanes(four, 0.0, |&s| spheres[s as usize].centre[axis]));
+            let radius = in_lanes(four, NO_SPHERE, |&s| spheres[s as usize].radius);
+            self.spheres.push([x, y, z, radius]);
+            self.ids.push(in_lanes(four, f64::MAX, |&s| f64::from(s)));
         }
     }
 }
@@ -501,8 +489,10 @@ impl<'s> Solid<'s> {
     /// The medial ball of a surface point; `None` where the faces around a vertex cancel.
     pub fn ball_at(&self, points: &SurfacePoints, v: usize) -> Option<Ball> {
         let (p, n) = (points.positions[v], points.normals[v]);
-        let ball = || shrinking_ball(p, n, self.side, self.touched(points));
-        (n != Vec3::ZERO).then(ball).filter(is_medial)
+        if n == Vec3::ZERO {
+            return None;
+        }
+        Some(shrinking_ball(p, n, self.side, self.touched(points))).filter(is_medial)
     }
 
     /// The medial ball of the surface point nearest to a fitted centre; `None` where there is none. The fitted

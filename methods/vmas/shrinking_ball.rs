@@ -76,36 +76,33 @@ pub(super) enum End {
 /// The ball that touches at `p`, with outward unit normal `n`. `side` is the longest side of the bounding
 /// box: no ball inside is as large.
 pub(super) fn shrinking_ball(p: Vec3, n: Vec3, side: f64, touched: Touched<'_>) -> Ball {
-    let mut radius = side;
-    let ball = |radius: f64, steps: usize, end: End| Ball {
-        sphere: Sphere::new(p - radius * n, radius),
-        steps,
-        end,
-    };
     let half_separation = (0.5 * SEPARATION.to_radians()).sin();
-    for steps in 0..STEPS {
+    let (mut radius, mut steps) = (side, 0);
+    let end = loop {
+        if steps == STEPS {
+            break End::StepLimit;
+        }
         let nearest = touched.nearest(p - radius * n);
-        let Some((q, distance)) = nearest.filter(|&(q, _)| q != p) else {
-            return ball(radius, steps, End::Empty);
-        };
+        let Some((q, distance)) = nearest.filter(|&(q, _)| q != p) else { break End::Empty };
         if distance >= radius - EMPTY * side {
-            return ball(radius, steps, End::Empty);
+            break End::Empty;
         }
         let chord = p - q;
         let depth = n.dot(chord);
+        // The quotient below would be negative, or mostly the rounding error of `depth`.
         if depth <= IN_FRONT * chord.length() {
-            return ball(radius, steps, End::InFront);
+            break End::InFront;
         }
         let smaller = chord.length_squared() / (2.0 * depth);
         if smaller >= radius {
-            return ball(radius, steps, End::Empty);
+            break End::Empty;
         }
         if steps > 0 && chord.length() < 2.0 * smaller * half_separation {
-            return ball(radius, steps, End::Noise);
+            break End::Noise;
         }
-        radius = smaller;
-    }
-    ball(radius, STEPS, End::StepLimit)
+        (radius, steps) = (smaller, steps + 1);
+    };
+    Ball { sphere: Sphere::new(p - radius * n, radius), steps, end }
 }
 
 #[cfg(test)]
