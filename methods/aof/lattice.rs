@@ -369,12 +369,12 @@ pub struct Tally {
     pub dismissed: Vec<u64>,
     /// Spheres evaluated at each level.
     pub evaluated: Vec<u64>,
-    /// Largest distance of a finest voxel's centre that was met inside; 0 for none.
-    pub deepest: f64,
 }
 
 /// The outcome of a descent.
 pub struct Descent {
+    /// The lattice.
+    pub grid: Grid,
     /// The voxels.
     pub voxels: Bricks,
     /// Counts of what happened to them.
@@ -387,26 +387,26 @@ pub struct Descent {
 /// When the run was cancelled.
 pub fn coarse_to_fine(
     surface: &Surface,
-    grid: &Grid,
+    grid: Grid,
     params: &AofParams,
     wanted: Wanted,
     run: &RunContext,
 ) -> Result<Descent, SimplifyError> {
-    let levels = Levels::new(grid, params)?;
-    let blocks = blocks(surface, grid);
+    let levels = Levels::new(&grid, params)?;
+    let blocks = blocks(surface, &grid);
     let done = AtomicUsize::new(0);
     let parts: Result<Vec<_>, SimplifyError> = blocks
         .par_iter()
         .map(|block| {
             run.step(done.fetch_add(1, Ordering::Relaxed), blocks.len())?;
             let (voxels, tally) = (Vec::new(), levels.tally());
-            let mut walk = Walk { surface, grid, levels: &levels, wanted, voxels, tally };
+            let mut walk = Walk { surface, grid: &grid, levels: &levels, wanted, voxels, tally };
             walk.block(block);
             Ok((walk.voxels, walk.tally))
         })
         .collect();
     run.step(blocks.len(), blocks.len())?;
-    let mut descent = Descent { voxels: Bricks::new(grid.size), tally: levels.tally() };
+    let mut descent = Descent { grid, voxels: Bricks::new(grid.size), tally: levels.tally() };
     // In the order of the blocks: brick numbers, and with them every later order, are deterministic.
     for (voxels, tally) in parts? {
         voxels.into_iter().for_each(|voxel| descent.voxels.insert(voxel));
@@ -452,7 +452,6 @@ impl Levels {
 impl Tally {
     fn add(&mut self, other: &Self) {
         self.start += other.start;
-        self.deepest = self.deepest.max(other.deepest);
         let pairs =
             [(&mut self.dismissed, &other.dismissed), (&mut self.evaluated, &other.evaluated)];
         for (mine, theirs) in pairs {
@@ -515,8 +514,8 @@ struct Walk<'a> {
 /// The facts about a voxel that follow from its ancestors.
 #[derive(Clone, Copy)]
 struct Known {
-    /// Whether it and its descendants are inside, if that is the same for all.
-    inside: Option<bool>,
+    /// Whether it and its descendants are known to be inside.
+    is_inside: bool,
     dismissed: bool,
     /// The closest face of the parent.
     face: u32,
@@ -528,7 +527,11 @@ impl Walk<'_> {
             for y in block.lo[1]..block.hi[1] {
                 for x in block.lo[0]..block.hi[0] {
                     let base = [x, y, z].map(|i| i * self.grid.split);
-                    self.visit(0, base, Known { inside: None, dismissed: false, face: block.face });
+                    self.visit(
+                        0,
+                        base,
+                        Known { is_inside: false, dismissed: false, face: block.face },
+                    );
                 }
             }
         }
@@ -545,22 +548,18 @@ impl Walk<'_> {
         // Farthest centre of a descendant.
         let spread = HALF_DIAGONAL * (sigma - self.grid.side);
         let finest = level + 1 == self.levels.sizes.len();
-        // The sphere does not fit. Only the depth of the solid, for messages, may need the side.
+        // The sphere does not fit, whatever the side.
         if finest && distance < sigma {
-            if distance > self.tally.deepest && self.is_inside(known, centre) {
-                self.tally.deepest = distance;
-            }
             return;
         }
         // Farther from the surface than any descendant's centre is away: all have this side.
-        if distance > spread {
-            if !self.is_inside(known, centre) {
+        if distance > spread && !known.is_inside {
+            if self.surface.inside.side(centre) != Side::Inside {
                 return;
             }
-            known.inside = Some(true);
+            known.is_inside = true;
         }
         if level == 0 && self.levels.start == Start::Coarse && distance < sigma {
-            self.tally.deepest = self.tally.deepest.max(distance);
             return;
         }
         let evaluate = !known.dismissed && self.wanted != Wanted::Places && distance >= sigma;
@@ -598,13 +597,8 @@ impl Walk<'_> {
         }
     }
 
-    fn is_inside(&self, known: Known, centre: Vec3) -> bool {
-        known.inside.unwrap_or_else(|| self.surface.inside.side(centre) == Side::Inside)
-    }
-
     fn emit(&mut self, place: [u32; 3], distance: f64, flux: f64) {
         self.tally.start += 1;
-        self.tally.deepest = self.tally.deepest.max(distance);
         let place = place.map(|i| i as u16);
         self.voxels.push(Voxel { place, distance: distance as f32, flux: flux as f32 });
     }

@@ -130,7 +130,7 @@ fn prepare<'s>(
     let run = run.clone();
     Ok(Box::new(move |level: Level| {
         // The published level has a lattice of its own, unless all parameters are set.
-        if level == Level::Published && settings.at(level) != *solid.params() {
+        if level == Level::Published && settings.at(level) != solid.params {
             let (solid, base) = solid::published(shape, &settings, &run)?;
             return at(&solid, &base, level);
         }
@@ -142,7 +142,7 @@ fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified, Simpli
     let mut diagnostics = base.diagnostics.clone();
     let angle = match level {
         Level::Native(angle) => angle,
-        Level::Spheres(_) | Level::Published => solid.params().angle,
+        Level::Spheres(_) | Level::Published => solid.params.angle,
     };
     let axis = match level {
         Level::Spheres(0) => {
@@ -151,16 +151,22 @@ fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified, Simpli
         Level::Spheres(count) => solid.with_count(base, count, &mut diagnostics)?,
         Level::Native(_) | Level::Published => {
             check_angle(angle).map_err(SimplifyError::Level)?;
-            solid.say_what_is_lost(base, base.resolution, &mut diagnostics)?;
-            solid.axis(base.resolution, &base.descent, angle)?
+            solid.warn_of(base.loss, base.resolution, &mut diagnostics);
+            solid.axis(&base.descent, angle)?
         }
     };
-    solid.check_output(base, &axis)?;
+    solid.check_memory(base.resolution, solid.megabytes_with_output(base, &axis))?;
     let mesh = solid.medial_mesh(&axis)?;
     mesh.check()?;
-    axis.diagnose(angle, &mut diagnostics);
+    if axis.voxels.is_empty() {
+        diagnostics.warn(format!("no voxel passes an object angle of {angle} degrees"));
+    }
+    let voxels = axis.lattice_voxels();
+    for (name, number) in ["voxel_b0", "voxel_b1", "voxel_b2"].into_iter().zip(voxels.betti()) {
+        diagnostics.count(name, number as usize);
+    }
     let native_level = (!matches!(level, Level::Spheres(_))).then_some(angle);
-    let extras = Extras::with(axis.lattice_voxels());
+    let extras = Extras::with(voxels);
     Ok(Simplified { native_level, diagnostics, extras, ..Simplified::new(mesh, level) })
 }
 

@@ -323,36 +323,16 @@ const PER_SIMPLEX: [f64; 3] = [16.0, 50.0, 40.0];
 const RESIDENT: f64 = 1.75;
 
 impl Solid<'_> {
-    /// Refuses a result whose medial mesh does not fit into memory beside the voxels of its base.
-    pub(super) fn check_output(&self, base: &Base, axis: &Axis) -> Result<(), SimplifyError> {
-        let limit = self.params().max_memory;
-        let needed = self.megabytes_with_output(base, axis);
-        if needed <= limit {
-            return Ok(());
-        }
-        // Voxels of sheets grow with the square of the resolution.
-        let fits = f64::from(base.resolution) * (limit / needed).sqrt() * 0.97;
-        Err(SimplifyError::Parameter(format!(
-            "resolution = {}: about {needed:.0} MB for {} voxels and the medial mesh of {}, above \
-             max_memory = {limit}; about resolution = {} fits, or raise max_memory",
-            base.resolution,
-            base.descent.tally.start,
-            axis.len(),
-            fits.max(1.0) as u32
-        )))
-    }
-
     /// Memory for the voxels of a base and for the medial mesh of an axis, in megabytes.
     pub(super) fn megabytes_with_output(&self, base: &Base, axis: &Axis) -> f64 {
-        let mut voxels = Bricks::new(axis.grid.size);
-        axis.voxels.iter().for_each(|&voxel| voxels.insert(voxel));
+        let voxels = axis.bricks();
         let mut numbers = [0_u64; 3];
         for voxel in &axis.voxels {
             let own = simplices(voxels.neighbourhood(voxel.place));
             numbers.iter_mut().zip(own).for_each(|(all, own)| *all += u64::from(own));
         }
         let simplices = numbers.iter().zip(PER_SIMPLEX).map(|(&n, bytes)| n as f64 * bytes);
-        let output = axis.len() as f64 * PER_VOXEL + simplices.sum::<f64>();
+        let output = axis.voxels.len() as f64 * PER_VOXEL + simplices.sum::<f64>();
         let start = base.descent.tally.start as f64 * BYTES_PER_VOXEL;
         RESIDENT * (output + start) / 1e6
     }
