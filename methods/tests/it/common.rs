@@ -1,5 +1,6 @@
-//! What the tests of the filters share: their variants, shapes, and how a level is asked.
+//! Shapes and levels that several test modules use, and the variants of the filters.
 
+use medial::Vec3;
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Params, RunContext, Simplified, SimplifyError};
@@ -46,4 +47,23 @@ pub fn at(shape: &Shape, method: &str, set: &[(&str, &str)], level: Level) -> Me
     let mesh = levels(shape, method, set, &[level]).remove(0).expect("a level").mesh;
     mesh.check().expect("a valid complex");
     mesh
+}
+
+/// A box around the origin with half sides `half`, as twelve triangles.
+pub fn cuboid(half: Vec3) -> TriMesh {
+    let signs = [-1.0, 1.0];
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    TriMesh {
+        vertices: (0..8)
+            .map(|i| half * Vec3::new(signs[i & 1], signs[i >> 1 & 1], signs[i >> 2]))
+            .collect(),
+        faces: quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+    }
+}
+
+/// The result of a function on a pool of this number of threads.
+pub fn with_threads<R: Send>(threads: usize, function: impl FnOnce() -> R + Send) -> R {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.expect("a pool").install(function)
 }
