@@ -184,7 +184,6 @@ fn fans(mesh: &TriMesh) -> Vec<u8> {
         }
     }
     sides.sort_unstable();
-    let normal = |face: u32| PlanarFrame::new(mesh.triangle(face as usize)).0.normal;
     let mut fans = vec![0_u8; mesh.faces.len()];
     let mut ends_concave = vec![false; mesh.vertices.len()];
     for edge in sides.chunk_by(|a, b| a.0 == b.0) {
@@ -192,7 +191,7 @@ fn fans(mesh: &TriMesh) -> Vec<u8> {
             [(_, f, k), (_, g, _)] => {
                 let corners = mesh.faces[f as usize];
                 let [a, b] = [k, (k + 1) % 3].map(|k| mesh.vertices[corners[k] as usize]);
-                let (n, m) = (normal(f), normal(g));
+                let [n, m] = [f, g].map(|f| PlanarFrame::new(mesh.triangle(f as usize)).0.normal);
                 let sine = n.cross(m).dot((b - a).normalize_or_zero());
                 sine < -COPLANAR || (sine <= COPLANAR && n.dot(m) < 0.0)
             }
@@ -230,6 +229,13 @@ pub struct Refined {
     /// Two closest points, the second within the tolerance; the same point twice if the centre was
     /// not moved.
     pub contacts: [Vec3; 2],
+}
+
+impl Refined {
+    /// Distance of the contacts in radii: it grows with the angle that they subtend.
+    fn subtended(&self) -> f64 {
+        self.contacts[0].distance(self.contacts[1]) / self.ball.radius
+    }
 }
 
 impl Surface {
@@ -282,12 +288,10 @@ impl Surface {
                 Some(Refined { ball: Ball::new(centre, distance), contacts })
             })
             .take(FOLLOWED_SAMPLES);
-        let subtended = |r: &Refined| r.contacts[0].distance(r.contacts[1]) / r.ball.radius;
-        let better = |best, next| if subtended(&next) > subtended(&best) { next } else { best };
-        found.reduce(better).unwrap_or_else(|| Refined {
-            ball: Ball::new(centre, own.distance),
-            contacts: [own.point; 2],
-        })
+        // The first of equal ones.
+        found
+            .reduce(|best, next| if next.subtended() > best.subtended() { next } else { best })
+            .unwrap_or(Refined { ball: Ball::new(centre, own.distance), contacts: [own.point; 2] })
     }
 }
 
@@ -341,6 +345,8 @@ impl Ray<'_> {
 
 #[cfg(test)]
 mod tests {
+    use medial::shape::ShapeOptions;
+
     use super::*;
 
     /// Two boxes joined to an L, with one reflex edge in four pieces and flat edges between.
@@ -369,16 +375,11 @@ mod tests {
     #[test]
     fn only_the_reflex_edge_and_its_vertices_are_fans() {
         let mesh = bracket();
-        let tree = TriangleBvh::new(&mesh).expect("faces");
-        let fans = fans(&mesh);
-        let is_fan = |p| {
-            let Closest { face, feature, .. } = tree.closest(p);
-            match feature {
-                Feature::Face => false,
-                Feature::Edge(k) => fans[face as usize] >> k & 1 == 1,
-                Feature::Vertex(k) => fans[face as usize] >> (3 + k) & 1 == 1,
-            }
-        };
+        let report = medial::surface::validate(&mesh).expect("a solid");
+        let shape = Shape::new("bracket", &mesh, report, ShapeOptions::default());
+        let shape = shape.expect("an extent");
+        let surface = Surface::of(&shape).expect("faces");
+        let is_fan = |p| surface.is_fan(&surface.closest(shape.normalisation().forward(p), None));
         // Over the reflex edge at (1, 1), between its vertices and at one of them.
         assert!(is_fan(Vec3::new(0.9, 1.1, 0.9)) && is_fan(Vec3::new(0.9, 1.0, 0.9)));
         // Under the top of the wall; next to the inner wall, over a flat edge too.
@@ -392,8 +393,8 @@ mod tests {
     fn error_on_planes(spiral: Spiral, count: usize) -> f64 {
         let points = spiral.directions(count);
         let normals = Spiral::EqualArea.directions(4001);
-        let flux = |n: &Vec3| -points.iter().map(|p| p.dot(*n).abs()).sum::<f64>() / count as f64;
-        normals.iter().map(|n| (flux(n) + 0.5).abs()).fold(0.0, f64::max)
+        let inward = normals.iter().map(|n| points.iter().map(|p| p.dot(*n).abs()).sum::<f64>());
+        inward.map(|sum| (0.5 - sum / count as f64).abs()).fold(0.0, f64::max)
     }
 
     #[test]

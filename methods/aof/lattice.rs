@@ -13,7 +13,7 @@
 //!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, by default up
 //!    to the flux of the samples themselves in a constant field.
 //! 4. At the finest level: `AOF'` of every voxel whose sphere lies inside. The final threshold is
-//!    applied later, as it depends on the level that is asked.
+//!    applied later, as it depends on the requested level.
 //!
 //! Blocks are independent; they run in parallel and are collected in order.
 
@@ -57,6 +57,11 @@ impl Grid {
             voxels.next_multiple_of(split)
         });
         Self { origin: lo, side, size, split }
+    }
+
+    /// Lower corner of a coarse voxel.
+    fn coarse_corner(&self, place: [u32; 3]) -> Vec3 {
+        self.origin + Vec3::from(place.map(f64::from)) * f64::from(self.split) * self.side
     }
 
     /// Centre of a voxel of the finest level.
@@ -200,11 +205,6 @@ impl Bricks {
             })
         })
     }
-
-    /// Approximate number of bytes in memory.
-    pub fn bytes(&self) -> usize {
-        self.there.bytes() + (size_of::<Values>() + size_of::<usize>()) * self.values.len()
-    }
 }
 
 /// A mark for each place of a set of bricks.
@@ -258,10 +258,6 @@ impl Bits {
         Self { size, table, at: Vec::new(), words: Vec::new() }
     }
 
-    fn bytes(&self) -> usize {
-        4 * self.table.len() + (size_of::<Place>() + 64) * self.words.len()
-    }
-
     #[inline]
     fn slot(&self, [x, y, z]: Place) -> usize {
         let [width, depth, _] = self.size.map(|n| n as usize);
@@ -294,8 +290,7 @@ impl Bits {
     #[inline]
     fn neighbourhood(&self, place: Place) -> u32 {
         // All neighbours in one brick: three words instead of nine rows. Most voxels are inside.
-        let within = |v: u16| (1..7).contains(&(v % 8));
-        if place.into_iter().all(within) {
+        if place.iter().all(|v| (1..7).contains(&(v % 8))) {
             let Some(brick) = self.brick(place) else {
                 return 0;
             };
@@ -312,12 +307,11 @@ impl Bits {
     fn across_bricks(&self, [x, y, z]: [i32; 3]) -> u32 {
         (0..9).fold(0, |bits, k| {
             let (y, z) = (y + k % 3 - 1, z + k / 3 - 1);
-            let row = |x: i32| u32::from(self.row([x, y, z]));
-            // The row with one bit of room on either side, for neighbours in the bricks beside.
-            let mut ten = row(x) << 1;
+            // The row with one bit of room on either side, for neighbours in the next bricks.
+            let mut ten = self.row([x, y, z]) << 1;
             match x % 8 {
-                0 => ten |= row(x - 1) >> 7,
-                7 => ten |= (row(x + 1) & 1) << 9,
+                0 => ten |= self.row([x - 1, y, z]) >> 7,
+                7 => ten |= (self.row([x + 1, y, z]) & 1) << 9,
                 _ => {}
             }
             bits | (ten >> (x % 8) & 7) << (3 * k)
@@ -326,13 +320,15 @@ impl Bits {
 
     /// The row of a brick that holds a place; empty outside.
     #[inline]
-    fn row(&self, place: [i32; 3]) -> u8 {
+    fn row(&self, place: [i32; 3]) -> u32 {
         if (0..3).any(|axis| place[axis] < 0 || place[axis] >= (self.size[axis] * SIDE) as i32) {
             return 0;
         }
         let place = place.map(|x| x as u16);
-        let brick = self.brick(place);
-        brick.map_or(0, |brick| (self.words[brick][inside(place).0] >> (8 * (place[1] % 8))) as u8)
+        self.brick(place).map_or(0, |brick| {
+            let layer = self.words[brick][inside(place).0];
+            u32::from((layer >> (8 * (place[1] % 8))) as u8)
+        })
     }
 }
 
@@ -428,18 +424,17 @@ struct Levels {
 
 impl Levels {
     fn new(grid: &Grid, params: &AofParams) -> Result<Self, SimplifyError> {
-        let counts = params.sample_counts()?;
-        let sizes: Vec<u32> =
-            (0..params.levels).map(|level| params.d.pow(params.levels - 1 - level)).collect();
-        let spheres = sizes.iter().zip(counts);
-        let spheres: Vec<Sphere> = spheres
-            .map(|(&size, n)| Sphere::new(params.spiral, n, grid.side * f64::from(size)))
-            .collect();
-        let from = |sphere: &Sphere| match params.dismiss {
-            Dismiss::Zero => 0.0,
-            Dismiss::Bias => -sphere.bias,
-        };
-        let dismissed_from = spheres.iter().map(from).collect();
+        let (mut spheres, mut sizes, mut dismissed_from) = (Vec::new(), Vec::new(), Vec::new());
+        for (level, count) in (0..params.levels).zip(params.sample_counts()?) {
+            let size = params.d.pow(params.levels - 1 - level);
+            let sphere = Sphere::new(params.spiral, count, grid.side * f64::from(size));
+            dismissed_from.push(match params.dismiss {
+                Dismiss::Zero => 0.0,
+                Dismiss::Bias => -sphere.bias,
+            });
+            spheres.push(sphere);
+            sizes.push(size);
+        }
         Ok(Self { spheres, sizes, dismissed_from, d: params.d, start: params.start })
     }
 
@@ -472,9 +467,6 @@ fn blocks(surface: &Surface, grid: &Grid) -> Vec<Block> {
     let whole = Block { lo: [0; 3], hi: grid.size.map(|n| n / grid.split), face: 0 };
     let longest = whole.hi.into_iter().max().unwrap_or(0);
     let most = (longest / BLOCKS).clamp(1, BLOCK);
-    let corner = |c: [u32; 3]| {
-        grid.origin + Vec3::from(c.map(f64::from)) * f64::from(grid.split) * grid.side
-    };
     let (mut open, mut done) = (vec![whole], Vec::new());
     while let Some(block) = open.pop() {
         let extent = [0, 1, 2].map(|axis| block.hi[axis] - block.lo[axis]);
@@ -488,8 +480,9 @@ fn blocks(surface: &Surface, grid: &Grid) -> Vec<Block> {
         low[longest] = middle;
         high[longest] = middle;
         for (lo, hi) in [(block.lo, low), (high, block.hi)] {
-            let centre = (corner(lo) + corner(hi)) * 0.5;
-            let half = (corner(hi) - corner(lo)).length() * 0.5;
+            let (low, high) = (grid.coarse_corner(lo), grid.coarse_corner(hi));
+            let centre = (low + high) * 0.5;
+            let half = (high - low).length() * 0.5;
             let Closest { distance, face, .. } = surface.closest(centre, Some(block.face));
             // A block farther from the surface than its own corners is on one side as a whole.
             if distance <= half || surface.inside.side(centre) == Side::Inside {

@@ -95,7 +95,8 @@ const BIBTEX: &str = "\
 
 /// The average outward flux as a method.
 ///
-/// Answers every level, the published one with the paper's parameters where none are set. Cost `O(V N)` closest points for `V` voxels, memory `O(V)`.
+/// The published level has the paper's parameters where none are set. Cost `O(V N)` closest points for
+/// `V` voxels, memory `O(V)`.
 pub fn method() -> Method<AofSettings> {
     let info = MethodInfo::new("aof", "Average outward flux")
         .citation(
@@ -146,7 +147,7 @@ fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified, Simpli
     };
     let axis = match level {
         Level::Spheres(0) => {
-            return Err(SimplifyError::Level("ask for at least one sphere".into()));
+            return Err(SimplifyError::Level("give at least one sphere".into()));
         }
         Level::Spheres(count) => solid.with_count(base, count, &mut diagnostics)?,
         Level::Native(_) | Level::Published => {
@@ -369,52 +370,47 @@ pub enum Dismiss {
 impl AofParams {
     /// The parameters if they are in their ranges.
     fn validate(self) -> Result<Self, SimplifyError> {
-        let refuse = |message: String| Err(SimplifyError::Parameter(message));
-        if !(1..=MAX_RESOLUTION).contains(&self.resolution) {
-            return refuse(format!(
+        let split = self.d.checked_pow(self.levels.saturating_sub(1));
+        let problem = if !(1..=MAX_RESOLUTION).contains(&self.resolution) {
+            format!(
                 "resolution = {}: give 1 to {MAX_RESOLUTION} voxels along the longest side",
                 self.resolution
-            ));
-        }
-        if self.levels == 0 || (self.levels > 1 && self.d < 2) {
-            return refuse(format!(
+            )
+        } else if self.levels == 0 || (self.levels > 1 && self.d < 2) {
+            format!(
                 "levels = {}, d = {}: give at least one level, and 2 or more for d",
                 self.levels, self.d
-            ));
-        }
-        let split = self.d.checked_pow(self.levels - 1).filter(|&split| split <= MAX_SPLIT);
-        if split.is_none() {
-            return refuse(format!(
+            )
+        } else if split.is_none_or(|split| split > MAX_SPLIT) {
+            format!(
                 "levels = {}, d = {}: d^(levels - 1) is above {MAX_SPLIT}; give fewer levels",
                 self.levels, self.d
-            ));
-        }
-        check_angle(self.angle).map_err(SimplifyError::Parameter)?;
-        if !(self.mu >= 0.0 && self.mu <= 0.75) {
-            return refuse(format!(
-                "mu = {:?}: give a number in [0, 0.75], such as 0.125",
-                self.mu
-            ));
-        }
-        if !(self.max_memory > 0.0 && self.max_memory.is_finite()) {
-            return refuse(format!("max_memory = {:?}: give megabytes, above 0", self.max_memory));
-        }
-        self.sample_counts()?;
-        Ok(self)
+            )
+        } else if !(self.mu >= 0.0 && self.mu <= 0.75) {
+            format!("mu = {:?}: give a number in [0, 0.75], such as 0.125", self.mu)
+        } else if !(self.max_memory > 0.0 && self.max_memory.is_finite()) {
+            format!("max_memory = {:?}: give megabytes, above 0", self.max_memory)
+        } else {
+            check_angle(self.angle).map_err(SimplifyError::Parameter)?;
+            self.sample_counts()?;
+            return Ok(self);
+        };
+        Err(SimplifyError::Parameter(problem))
     }
 
     /// Samples of each level, from coarse to fine.
     pub(super) fn sample_counts(&self) -> Result<Vec<usize>, SimplifyError> {
-        let refuse = || {
-            SimplifyError::Parameter(format!(
+        let counts: Result<Vec<usize>, _> =
+            self.samples.split('/').map(|word| word.trim().parse()).collect();
+        let levels = self.levels as usize;
+        let Some(mut counts) =
+            counts.ok().filter(|counts| counts.iter().all(|count| (8..=10_000).contains(count)))
+        else {
+            return Err(SimplifyError::Parameter(format!(
                 "samples = {}: give 8 to 10000 for each level, such as 70/60/50",
                 self.samples
-            ))
+            )));
         };
-        let counts: Option<Vec<usize>> =
-            self.samples.split('/').map(|word| word.trim().parse().ok()).collect();
-        let mut counts = counts.ok_or_else(refuse)?;
-        let levels = self.levels as usize;
         // The default is made for its own number of levels; of fewer, the coarse ones are left out.
         if self.samples == SAMPLES {
             counts.drain(..counts.len().saturating_sub(levels));
@@ -426,11 +422,7 @@ impl AofParams {
                 counts.len()
             )));
         }
-        let last = *counts.last().ok_or_else(refuse)?;
-        counts.resize(levels, last);
-        if counts.iter().any(|count| !(8..=10_000).contains(count)) {
-            return Err(refuse());
-        }
+        counts.resize(levels, counts[counts.len() - 1]);
         Ok(counts)
     }
 

@@ -66,26 +66,19 @@ pub fn medial_mesh(
 ) -> Result<MedialMesh, SimplifyError> {
     assert_eq!(voxels.len(), balls.len(), "one ball for each voxel");
     let keys: Vec<[u16; 3]> = voxels.iter().map(|voxel| key(voxel.place)).collect();
-    let neighbour = |k: u32, bit: u32| {
-        let [dx, dy, dz] = offset(bit);
-        let [z, y, x] = keys[k as usize].map(i32::from);
-        let at = [z + dz, y + dy, x + dx];
-        let at = at.iter().all(|i| (0..=i32::from(u16::MAX)).contains(i)).then_some(at)?;
-        keys.binary_search(&at.map(|i| i as u16)).ok().map(|found| found as u32)
-    };
-    let around =
-        |k: u32| -> [Option<u32>; 27] { std::array::from_fn(|bit| neighbour(k, bit as u32)) };
-    let around: Vec<[Option<u32>; 27]> =
-        (0..keys.len() as u32).into_par_iter().map(around).collect();
+    let around: Vec<Around> = (0..keys.len())
+        .into_par_iter()
+        .map(|k| std::array::from_fn(|bit| neighbour(&keys, k, bit as u32)))
+        .collect();
     run.step(0, 1)?;
-    // Voxels are sorted like bits, so the later bits are the later voxels: each simplex once.
-    let after = |k: u32| around[k as usize][CENTRE as usize + 1..].iter().flatten().copied();
     let (mut edges, mut faces, mut first) = (Vec::new(), Vec::new(), vec![0]);
     let mut lengths = Vec::new();
     for a in 0..keys.len() as u32 {
-        for b in after(a) {
+        // Voxels are sorted like bits, so the later bits are the later voxels: each simplex once.
+        let after = &around[a as usize][AFTER_CENTRE..];
+        for &b in after.iter().flatten() {
             edges.push([a, b]);
-            for c in after(a).filter(|&c| c > b && are_adjacent(&keys, b, c)) {
+            for &c in after.iter().flatten().filter(|&&c| c > b && are_adjacent(&keys, b, c)) {
                 faces.push([a, b, c]);
                 lengths
                     .push([[a, b], [a, c], [b, c]].map(|pair| squared(&keys, pair)).iter().sum());
@@ -93,17 +86,18 @@ pub fn medial_mesh(
         }
         first.push(faces.len() as u32);
     }
-    let of = |k: u32| {
-        let near = around[k as usize];
-        let there = (0..27).fold(0, |bits, bit| bits | u32::from(near[bit].is_some()) << bit);
-        let mut after = near;
-        after[..=CENTRE as usize].fill(None);
-        (there, after)
-    };
-    let left_out = left_out(&Triangles { faces: &faces, first: &first }, &lengths, of, run)?;
+    let left_out = left_out(&Triangles { faces: &faces, first: &first }, &lengths, &around, run)?;
     let mut left_out = left_out.into_iter();
     faces.retain(|_| left_out.next() == Some(false));
     Ok(MedialMesh { spheres: balls, edges, faces, contacts: None })
+}
+
+/// The voxel at a bit of the neighbourhood of voxel `k`.
+fn neighbour(keys: &[[u16; 3]], k: usize, bit: u32) -> Option<u32> {
+    let [dx, dy, dz] = offset(bit);
+    let [z, y, x] = keys[k].map(i32::from);
+    let [Ok(z), Ok(y), Ok(x)] = [z + dz, y + dy, x + dx].map(u16::try_from) else { return None };
+    keys.binary_search(&[z, y, x]).ok().map(|found| found as u32)
 }
 
 fn are_adjacent(keys: &[[u16; 3]], a: u32, b: u32) -> bool {
@@ -116,16 +110,18 @@ fn squared(keys: &[[u16; 3]], [a, b]: [u32; 2]) -> u8 {
     (0..3).map(|axis| a[axis].abs_diff(b[axis]).pow(2) as u8).sum()
 }
 
-/// Neighbours of a voxel in ascending order of the voxels: bits as in `thinning.rs`, in the order of
-/// `z`, `y`, `x`; `None` for those that come before the voxel or are not there.
-pub type After = [Option<u32>; 27];
+/// The voxels around and at a voxel, ascending: bits as in `thinning.rs`, in the order of `z`, `y`, `x`.
+type Around = [Option<u32>; 27];
+
+/// The first bit of voxels that come after the voxel itself.
+const AFTER_CENTRE: usize = CENTRE as usize + 1;
 
 /// Triangles, by their voxels.
-pub struct Triangles<'a> {
+struct Triangles<'a> {
     /// Ascending.
-    pub faces: &'a [[u32; 3]],
+    faces: &'a [[u32; 3]],
     /// For each voxel the first triangle of which it is the first corner, and one more at the end.
-    pub first: &'a [u32],
+    first: &'a [u32],
 }
 
 impl Triangles<'_> {
@@ -138,16 +134,13 @@ impl Triangles<'_> {
 }
 
 /// For each triangle whether it is left out. `lengths` are sums of the squared sides.
-///
-/// # Errors
-/// When the run was cancelled.
-pub fn left_out(
+fn left_out(
     triangles: &Triangles<'_>,
     lengths: &[u8],
-    after: impl Fn(u32) -> (u32, After),
+    around: &[Around],
     run: &RunContext,
 ) -> Result<Vec<bool>, SimplifyError> {
-    let tetrahedra = tetrahedra(triangles, after, run)?;
+    let tetrahedra = tetrahedra(triangles, around, run)?;
     let mut collapse = Collapse::new(&tetrahedra, lengths);
     collapse.run(run)?;
     let Collapse { is_open, mut left_out, .. } = collapse;
@@ -179,25 +172,26 @@ const fn blocks() -> [u32; 8] {
 /// Step 1: each tetrahedron as its four triangles.
 fn tetrahedra(
     triangles: &Triangles<'_>,
-    after: impl Fn(u32) -> (u32, After),
+    around: &[Around],
     run: &RunContext,
 ) -> Result<Vec<[u32; 4]>, SimplifyError> {
     let before = (1_u32 << CENTRE) - 1;
-    let voxels = triangles.first.len() as u32 - 1;
     let (mut found, mut own): (Vec<[u32; 4]>, Vec<[u32; 3]>) = (Vec::new(), Vec::new());
-    for voxel in 0..voxels {
+    for (voxel, near) in (0_u32..).zip(around) {
         if voxel.is_multiple_of(65_536) {
-            run.step(voxel as usize, voxels as usize)?;
+            run.step(voxel as usize, around.len())?;
         }
-        let (there, after) = after(voxel);
+        let there = (0..27).fold(0, |bits, bit| bits | u32::from(near[bit].is_some()) << bit);
         own.clear();
         for block in BLOCKS {
             // Another voxel of the block comes first; the block is listed there.
             if there & block & before != 0 {
                 continue;
             }
-            let others: Vec<u32> =
-                (0..27).filter(|bit| block >> bit & 1 == 1).filter_map(|bit| after[bit]).collect();
+            let others: Vec<u32> = (AFTER_CENTRE..27)
+                .filter(|bit| block >> bit & 1 == 1)
+                .filter_map(|bit| near[bit])
+                .collect();
             for (i, &a) in others.iter().enumerate() {
                 for (j, &b) in others.iter().enumerate().skip(i + 1) {
                     own.extend(others[j + 1..].iter().map(|&c| [a, b, c]));
@@ -278,13 +272,13 @@ fn reduce(
     run: &RunContext,
 ) -> Result<(), SimplifyError> {
     // The longest triangles are the last ones.
-    let rank = |triangle: u32| (lengths[triangle as usize], triangle);
     let mut by_last: BTreeMap<u32, Vec<(u8, u32)>> = BTreeMap::new();
     for (steps, tetrahedron) in tetrahedra.enumerate() {
         if steps.is_multiple_of(4096) {
             run.step(steps, usize::MAX)?;
         }
-        let mut boundary: Vec<(u8, u32)> = tetrahedron.map(rank).to_vec();
+        let mut boundary: Vec<(u8, u32)> =
+            tetrahedron.map(|triangle| (lengths[triangle as usize], triangle)).to_vec();
         boundary.sort_unstable();
         while let Some(&(_, last)) = boundary.last() {
             let Some(other) = by_last.get(&last) else {

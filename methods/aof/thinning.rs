@@ -77,24 +77,12 @@ impl Order {
     }
 
     fn may_go(self, voxel: &Voxel) -> bool {
-        match self {
-            Self::OutermostFirst { threshold } => voxel.flux > threshold,
-            Self::ByFlux { .. } | Self::Down { .. } => true,
-        }
+        !matches!(self, Self::OutermostFirst { threshold } if voxel.flux <= threshold)
     }
 
     fn stays(self, voxel: &Voxel, neighbourhood: u32) -> bool {
-        match self {
-            Self::ByFlux { threshold } => voxel.flux <= threshold && is_end_point(neighbourhood),
-            Self::OutermostFirst { .. } | Self::Down { .. } => false,
-        }
-    }
-
-    fn leaves(self) -> usize {
-        match self {
-            Self::Down { to } => to,
-            Self::OutermostFirst { .. } | Self::ByFlux { .. } => 0,
-        }
+        matches!(self, Self::ByFlux { threshold }
+            if voxel.flux <= threshold && is_end_point(neighbourhood))
     }
 }
 
@@ -104,6 +92,7 @@ impl Order {
 /// When the run was cancelled.
 pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), SimplifyError> {
     let total = voxels.len();
+    let least = if let Order::Down { to } = order { to } else { 0 };
     let mut queue = BucketQueue::new(order.keys(voxels));
     // Places in the queue, and end points that must not be queued again.
     let mut barred = Marks::of(voxels);
@@ -117,7 +106,7 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), S
     }
     let mut steps = 0_usize;
     while let Some(place) = queue.pop() {
-        if voxels.len() <= order.leaves() {
+        if voxels.len() <= least {
             break;
         }
         steps += 1;
