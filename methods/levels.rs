@@ -70,6 +70,15 @@ impl Knob {
         let value = value.clamp(*self.range.start(), *self.range.end());
         (value * self.steps).round() / self.steps
     }
+
+    /// The value at which the count should be met, at least one step from the only end so far.
+    fn stepped(&self, end: End) -> f64 {
+        let longest = MAX_STEP.ln();
+        let by = (-end.excess / self.exponent).clamp(-longest, longest);
+        let value = self.snapped(end.value * by.exp());
+        let least = self.snapped(end.value - end.excess.signum() / self.steps);
+        if end.excess > 0.0 { value.min(least) } else { value.max(least) }
+    }
 }
 
 /// A result at one value of the knob.
@@ -91,7 +100,7 @@ impl SizeSearch {
         Self { knob, run: run.clone() }
     }
 
-    /// The result with the nearest count from below that the search meets. `native` tells the native
+    /// The result with the nearest count from below that the search meets. `native` returns the native
     /// level of a value.
     ///
     /// # Errors
@@ -110,8 +119,13 @@ impl SizeSearch {
             let probe = or_empty(make(value))?;
             let size = probe.mesh.spheres.len();
             path.tell(value, size);
-            let rank = |size: usize| (size == 0, size > count, size.abs_diff(count));
-            if best.as_ref().is_none_or(|(_, b)| rank(size) < rank(b.mesh.spheres.len())) {
+            let is_better = best.as_ref().is_none_or(|(_, best)| {
+                // Nothing is worst, then too many, then the distance from the count.
+                let [new, old] = [size, best.mesh.spheres.len()]
+                    .map(|size| (size == 0, size > count, size.abs_diff(count)));
+                new < old
+            });
+            if is_better {
                 best = Some((value, probe));
             }
         }
@@ -176,6 +190,12 @@ struct End {
     excess: f64,
 }
 
+impl End {
+    fn pulled(self, pull: f64) -> Self {
+        Self { excess: pull * self.excess, ..self }
+    }
+}
+
 impl<'a> Path<'a> {
     fn new(knob: &'a Knob, count: usize) -> Self {
         let first = (count as f64 / knob.rate).powf(1.0 / knob.exponent);
@@ -205,31 +225,22 @@ impl<'a> Path<'a> {
         let end = End { value, excess: ((size as f64).max(0.5) / aim).ln() };
         // Illinois: an end that stays twice counts half.
         let pull = if self.last_was_above == Some(is_above) { 0.5 } else { 1.0 };
-        let halved = |end: End| End { excess: pull * end.excess, ..end };
         if self.outward > 0 {
             // The values that have met stay where they are.
         } else if is_above {
-            (self.above, self.below) = (Some(end), self.below.map(halved));
+            (self.above, self.below) = (Some(end), self.below.map(|end| end.pulled(pull)));
         } else {
-            (self.below, self.above) = (Some(end), self.above.map(halved));
+            (self.below, self.above) = (Some(end), self.above.map(|end| end.pulled(pull)));
         }
         self.last_was_above = Some(is_above);
         self.next = if self.tried.len() < MAX_PROBES { self.proposed() } else { None };
     }
 
     fn proposed(&mut self) -> Option<f64> {
-        let Knob { steps, exponent, .. } = *self.knob;
-        let stepped = |end: End| {
-            let longest = MAX_STEP.ln();
-            let by = (-end.excess / exponent).clamp(-longest, longest);
-            let value = self.knob.snapped(end.value * by.exp());
-            let least = self.knob.snapped(end.value - end.excess.signum() / steps);
-            if end.excess > 0.0 { value.min(least) } else { value.max(least) }
-        };
         match (self.below, self.above) {
             (Some(below), Some(above)) => self.between(below, above),
             (Some(end), None) | (None, Some(end)) => {
-                Some(stepped(end)).filter(|&value| value != end.value)
+                Some(self.knob.stepped(end)).filter(|&value| value != end.value)
             }
             (None, None) => None,
         }
@@ -325,13 +336,12 @@ impl<'s> ByKnob<'s> {
     ) -> Result<Self, SimplifyError> {
         shape.surface_tree()?;
         shape.inside_test();
-        let at = move |samples: Option<f64>| -> Result<Prepared<'s>, SimplifyError> {
-            match samples {
-                None => Ok(prepare(shape)?),
-                Some(samples) => Ok(prepare(&resampled(shape, samples))?),
-            }
-        };
-        Ok(Self::new(Knob::samples(), native, run, at))
+        Ok(Self::new(Knob::samples(), native, run, move |samples| {
+            Ok(match samples {
+                None => prepare(shape)?,
+                Some(samples) => prepare(&resampled(shape, samples))?,
+            })
+        }))
     }
 }
 
@@ -383,13 +393,14 @@ pub(crate) fn perturbed(
     seed: u64,
 ) -> Vec<Sphere> {
     let mut rng = Pcg64::seed_from_u64(seed);
-    let mut offset = || rng.random_range(-1.0..=1.0);
-    let moved = |ball: &Sphere| {
-        let offset = Vec3::new(offset(), offset(), offset());
-        let centre = ball.centre + jitter * ball.radius * offset;
-        Sphere::new(centre, ball.radius * radius_factor)
-    };
-    balls.iter().map(moved).collect()
+    balls
+        .iter()
+        .map(|ball| {
+            let offset = Vec3::from([0; 3].map(|_| rng.random_range(-1.0..=1.0)));
+            let centre = ball.centre + jitter * ball.radius * offset;
+            Sphere::new(centre, ball.radius * radius_factor)
+        })
+        .collect()
 }
 
 #[cfg(test)]

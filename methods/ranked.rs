@@ -8,7 +8,7 @@ use medial::Vec3;
 use medial::complex::{DualTriangulation, MedialMesh, Sphere, VoronoiFacets};
 use medial::geometry::trees::spread_order;
 use medial::shape::Shape;
-use medial::simplifier::{Diagnostics, Extras, Level, Simplification, Simplified, SimplifyError};
+use medial::simplifier::{Diagnostics, Level, Simplification, Simplified, SimplifyError};
 use rayon::prelude::*;
 
 /// An initial medial mesh with a value for each sphere; larger values are kept longer.
@@ -63,8 +63,9 @@ impl Ranked {
     }
 
     fn by_level(&self, level: f64) -> (Vec<bool>, f64) {
-        let kept = |&value: &f64| value > level || (self.scale.inclusive && value == level);
-        (self.value.iter().map(kept).collect(), level)
+        let inclusive = self.scale.inclusive;
+        let kept = self.value.iter().map(|&value| value > level || inclusive && value == level);
+        (kept.collect(), level)
     }
 }
 
@@ -82,13 +83,8 @@ impl Simplification for Ranked {
             diagnostics
                 .warn(format!("no sphere passes {name} = {native}: the largest is {largest}"));
         }
-        Ok(Simplified {
-            mesh,
-            asked: level,
-            native_level: Some(native),
-            diagnostics,
-            extras: Extras::default(),
-        })
+        let native_level = Some(native);
+        Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }
 }
 
@@ -202,8 +198,8 @@ pub(crate) fn break_ties<T: Copy>(
 }
 
 fn order_of_equals<T: Copy>(run: &mut [T], sphere: &impl Fn(T) -> Sphere) {
-    let class = |&item: &T| (sphere(item).radius.log2() * CLASSES).floor();
-    let mut keyed: Vec<(f64, T)> = run.iter().map(|item| (class(item), *item)).collect();
+    let mut keyed: Vec<(f64, T)> =
+        run.iter().map(|&item| ((sphere(item).radius.log2() * CLASSES).floor(), item)).collect();
     keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut rest = run.iter_mut();
     for equals in keyed.chunk_by(|a, b| a.0 == b.0) {
@@ -331,12 +327,14 @@ impl<'s> RankedFacets<'s> {
     fn by_level(&self, level: f64) -> Vec<u32> {
         let (value, inclusive) = (&self.value, self.scale.inclusive);
         let is_above = value.is_above(level);
-        let kept = |&facet: &u32| {
-            let facet = facet as usize;
-            is_above(facet) || (inclusive && value.value(facet) == level)
-        };
-        let facets = (0..self.set.facets.len() as u32).into_par_iter().with_min_len(256);
-        facets.filter(kept).collect()
+        (0..self.set.facets.len() as u32)
+            .into_par_iter()
+            .with_min_len(256)
+            .filter(|&facet| {
+                let facet = facet as usize;
+                is_above(facet) || (inclusive && value.value(facet) == level)
+            })
+            .collect()
     }
 
     /// The facets that a number of spheres allows, ascending, and the value of the best of the
@@ -379,13 +377,8 @@ impl Simplification for RankedFacets<'_> {
             )),
             _ => {}
         }
-        Ok(Simplified {
-            mesh,
-            asked: level,
-            native_level: Some(native),
-            diagnostics,
-            extras: Extras::default(),
-        })
+        let native_level = Some(native);
+        Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }
 }
 
@@ -408,27 +401,27 @@ pub(crate) struct Sheets {
     bare_spheres: Vec<u32>,
 }
 
+fn edge_id(mesh: &MedialMesh, a: u32, b: u32) -> u32 {
+    let found = mesh.edges.binary_search(&[a.min(b), a.max(b)]);
+    found.expect("a side of a facet is an edge") as u32
+}
+
 impl Sheets {
     /// The facets of a Voronoi medial mesh. `O(n log n)`.
     ///
     /// # Panics
     /// If a side of a facet is no edge of the mesh.
     pub(crate) fn of(mesh: &MedialMesh, facets: &VoronoiFacets) -> Self {
-        let edge_id = |a: u32, b: u32| {
-            let found = mesh.edges.binary_search(&[a.min(b), a.max(b)]);
-            found.expect("a side of a facet is an edge") as u32
-        };
-        let sorted = |ids: &mut dyn Iterator<Item = u32>| {
-            let mut ids: Vec<u32> = ids.collect();
-            ids.sort_unstable();
-            ids
-        };
         let (mut edges, mut vertices) = (Vec::new(), Vec::new());
         for facet in 0..facets.len() {
             let v = facets.polygon(facet);
-            let mut sides = (0..v.len()).map(|k| edge_id(v[k], v[(k + 1) % v.len()]));
-            edges.push(sorted(&mut sides));
-            vertices.push(sorted(&mut v.iter().copied()));
+            let mut sides: Vec<u32> =
+                (0..v.len()).map(|k| edge_id(mesh, v[k], v[(k + 1) % v.len()])).collect();
+            let mut corners = v.to_vec();
+            sides.sort_unstable();
+            corners.sort_unstable();
+            edges.push(sides);
+            vertices.push(corners);
         }
         let count = edges.len();
         let mut sheets_at_edge = vec![Vec::new(); mesh.edges.len()];
@@ -441,7 +434,7 @@ impl Sheets {
         let mut in_face = vec![false; mesh.edges.len()];
         for &[a, b, c] in &mesh.faces {
             for [u, v] in [[a, b], [a, c], [b, c]] {
-                in_face[edge_id(u, v) as usize] = true;
+                in_face[edge_id(mesh, u, v) as usize] = true;
             }
         }
         let bare = mesh.edges.iter().zip(&in_face).filter(|&(_, &in_face)| !in_face);
@@ -494,16 +487,15 @@ pub(crate) struct Without<'a> {
 impl<'a> Without<'a> {
     /// All sheets are there.
     pub(crate) fn none(sheets: &'a Sheets) -> Self {
-        let number = |lists: &[Vec<u32>]| -> Vec<u32> {
-            lists.iter().map(|list| list.len() as u32).collect()
-        };
-        let mut at_sphere = number(&sheets.sheets_at_sphere);
-        for (count, &bare) in at_sphere.iter_mut().zip(&sheets.has_bare_edge) {
-            *count += u32::from(bare);
-        }
+        let at_sphere: Vec<u32> = sheets
+            .sheets_at_sphere
+            .iter()
+            .zip(&sheets.has_bare_edge)
+            .map(|(sheets, &bare)| sheets.len() as u32 + u32::from(bare))
+            .collect();
         Self {
             gone: vec![false; sheets.len()],
-            at_edge: number(&sheets.sheets_at_edge),
+            at_edge: sheets.sheets_at_edge.iter().map(|sheets| sheets.len() as u32).collect(),
             spheres: at_sphere.len(),
             at_sphere,
             sheets,

@@ -21,7 +21,7 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, RunContext, Simplification, Simplified, SimplifyError,
+    Diagnostics, Level, RunContext, Simplification, Simplified, SimplifyError,
 };
 use medial::surface::{InsideTest, Side, TriangleBvh};
 use rayon::prelude::*;
@@ -67,8 +67,10 @@ impl Grid {
         let (lo, hi) = shape.mesh().bounding_box().expect("a shape has vertices");
         let side = (hi - lo).max_element() / resolution;
         // Rounding must not add a voxel to a side that is a whole number of voxels.
-        let voxels = |length: f64| (length / side * (1.0 - 1e-9)).ceil().max(1.0) as usize;
-        Self { origin: lo, side, size: (hi - lo).to_array().map(voxels) }
+        let size = (hi - lo)
+            .to_array()
+            .map(|length| (length / side * (1.0 - 1e-9)).ceil().max(1.0) as usize);
+        Self { origin: lo, side, size }
     }
 
     fn len(&self) -> usize {
@@ -79,6 +81,10 @@ impl Grid {
     fn voxel(&self, index: usize) -> [usize; 3] {
         let [x, y, _] = self.size;
         [index % x, index / x % y, index / (x * y)]
+    }
+
+    fn centre(&self, index: usize) -> Vec3 {
+        self.origin + self.side * Vec3::from(self.voxel(index).map(|n| n as f64 + 0.5))
     }
 
     fn corner_id(&self, [x, y, z]: [usize; 3]) -> u32 {
@@ -122,12 +128,17 @@ pub(super) fn prepare(
         )));
     }
     faces.par_sort_by(|a, b| b.angle.total_cmp(&a.angle));
-    let corner = |id: u32| Sphere::new(grid.corner(id), radius[id as usize]);
-    let middle = |face: Face| mean(inner(&radius, face).iter().map(|&id| corner(id)));
-    break_ties(&mut faces, |face| face.angle, middle);
     let mut diagnostics = Diagnostics::default();
     diagnostics.count("faces_left_out_at_the_surface", before - faces.len());
-    Ok(Faces { grid, faces, radius, scale: super::scale(theta), diagnostics })
+    let mut found =
+        Faces { grid, faces: Vec::new(), radius, scale: super::scale(theta), diagnostics };
+    break_ties(
+        &mut faces,
+        |face| face.angle,
+        |face| mean(inner(&found.radius, face).iter().map(|&id| found.sphere(id))),
+    );
+    found.faces = faces;
+    Ok(found)
 }
 
 /// Step 2: zero for voxels outside.
@@ -142,11 +153,7 @@ fn directions(
     for slice in 0..z {
         run.step(slice, z)?;
         let first = slice * x * y;
-        let centre = |index: usize| {
-            let place = grid.voxel(index).map(|n| n as f64 + 0.5);
-            grid.origin + grid.side * Vec3::from(place)
-        };
-        let centres: Vec<Vec3> = (first..first + x * y).map(centre).collect();
+        let centres: Vec<Vec3> = (first..first + x * y).map(|index| grid.centre(index)).collect();
         let sides = inside.sides(&centres);
         let kept: Vec<Vec3> = centres
             .iter()
@@ -155,47 +162,59 @@ fn directions(
             .map(|(&c, _)| c)
             .collect();
         let mut found = kept.iter().zip(tree.closest_batch(&kept));
-        let direction = |&side: &Side| match side {
+        toward.extend(sides.iter().map(|side| match side {
             Side::Inside => found.next().map_or([0.0; 3], |(&c, near)| {
                 (near.point - c).normalize_or_zero().as_vec3().to_array()
             }),
             Side::On | Side::Outside => [0.0; 3],
-        };
-        toward.extend(sides.iter().map(direction));
+        }));
     }
     Ok(toward)
 }
 
 /// Step 3, in the order of the voxels.
 fn diverging(grid: &Grid, toward: &[[f32; 3]]) -> Vec<Face> {
-    let strides = [1, grid.size[0], grid.size[0] * grid.size[1]];
-    let of_voxel = |here: usize| {
-        let place = grid.voxel(here);
-        (0..3).filter_map(move |axis| {
-            if place[axis] + 1 == grid.size[axis] {
-                return None;
-            }
-            let [a, b] = [here, here + strides[axis]].map(|v| vector(toward[v]));
-            if a == Vec3::ZERO || b == Vec3::ZERO || b[axis] <= a[axis] {
-                return None;
-            }
-            let sum = (a + b).length();
-            let sum = if sum > OPPOSITE { sum } else { 0.0 };
-            let angle = 2.0 * (a - b).length().atan2(sum);
-            let corner = |u: usize, v: usize| {
-                let mut at = place;
-                at[axis] += 1;
-                at[(axis + 1) % 3] += u;
-                at[(axis + 2) % 3] += v;
-                grid.corner_id(at)
-            };
-            let corners = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
-            // Directions are kept in single precision: what agrees to this is one angle.
-            let angle = (angle.to_degrees() / ANGLE_STEP).round() * ANGLE_STEP;
-            Some(Face { angle, corners })
+    (0..grid.len())
+        .into_par_iter()
+        .flat_map_iter(|voxel| {
+            let place = grid.voxel(voxel);
+            (0..3).filter_map(move |axis| grid.face(toward, voxel, place, axis))
         })
-    };
-    (0..grid.len()).into_par_iter().flat_map_iter(of_voxel).collect()
+        .collect()
+}
+
+impl Grid {
+    /// The face between a voxel and the next along an axis, if their directions diverge.
+    #[inline]
+    fn face(
+        &self,
+        toward: &[[f32; 3]],
+        voxel: usize,
+        place: [usize; 3],
+        axis: usize,
+    ) -> Option<Face> {
+        if place[axis] + 1 == self.size[axis] {
+            return None;
+        }
+        let stride = self.size[..axis].iter().product::<usize>();
+        let [a, b] = [voxel, voxel + stride].map(|v| vector(toward[v]));
+        if a == Vec3::ZERO || b == Vec3::ZERO || b[axis] <= a[axis] {
+            return None;
+        }
+        let sum = (a + b).length();
+        let sum = if sum > OPPOSITE { sum } else { 0.0 };
+        let angle = 2.0 * (a - b).length().atan2(sum);
+        // Directions are kept in single precision: what agrees to this is one angle.
+        let angle = (angle.to_degrees() / ANGLE_STEP).round() * ANGLE_STEP;
+        let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[u, v]| {
+            let mut at = place;
+            at[axis] += 1;
+            at[(axis + 1) % 3] += u;
+            at[(axis + 2) % 3] += v;
+            self.corner_id(at)
+        });
+        Some(Face { angle, corners })
+    }
 }
 
 /// Degrees; a power of two, so that angles are exact multiples.
@@ -233,6 +252,11 @@ fn inner(radius: &[f64], face: Face) -> Vec<u32> {
 }
 
 impl Faces {
+    /// The sphere at a corner inside.
+    fn sphere(&self, corner: u32) -> Sphere {
+        Sphere::new(self.grid.corner(corner), self.radius[corner as usize])
+    }
+
     /// The number of best faces that together have at most `spheres` corners; at least one.
     fn faces_for(&self, spheres: usize) -> usize {
         let mut seen = std::collections::HashSet::new();
@@ -252,18 +276,19 @@ impl Faces {
         let mut ids = kept.concat();
         ids.sort_unstable();
         ids.dedup();
-        let number = |id: u32| ids.binary_search(&id).expect("a corner of a kept face") as u32;
-        let sphere = |&id: &u32| Sphere::new(self.grid.corner(id), self.radius[id as usize]);
         let (mut edges, mut triangles) = (Vec::new(), Vec::new());
         for corners in &kept {
-            let corners: Vec<u32> = corners.iter().map(|&id| number(id)).collect();
+            let corners: Vec<u32> = corners
+                .iter()
+                .map(|id| ids.binary_search(id).expect("a corner of a kept face") as u32)
+                .collect();
             match corners[..] {
                 [a, b] => edges.push([a, b]),
                 _ => triangles
                     .extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]])),
             }
         }
-        let spheres = ids.iter().map(sphere).collect();
+        let spheres = ids.iter().map(|&id| self.sphere(id)).collect();
         MedialMesh::from_simplices(spheres, edges, triangles)
             .expect("finite spheres and ids in range")
     }
@@ -293,13 +318,8 @@ impl Simplification for Faces {
             )),
             _ => {}
         }
-        Ok(Simplified {
-            mesh,
-            asked: level,
-            native_level: Some(native),
-            diagnostics,
-            extras: Extras::default(),
-        })
+        let native_level = Some(native);
+        Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }
 }
 
@@ -332,10 +352,8 @@ pub(super) fn prepare_by_resolution<'s>(
         exponent: 2.0,
     };
     let run_again = run.clone();
-    let at = move |value: Option<f64>| -> Result<Box<dyn Simplification>, SimplifyError> {
+    Ok(ByKnob::new(knob, params.theta, run, move |value| {
         let resolution = value.unwrap_or(params.resolution);
-        let lattice = AngleParams { resolution, ..params };
-        Ok(Box::new(prepare(shape, &lattice, &run_again)?))
-    };
-    Ok(ByKnob::new(knob, params.theta, run, at))
+        Ok(Box::new(prepare(shape, &AngleParams { resolution, ..params }, &run_again)?))
+    }))
 }

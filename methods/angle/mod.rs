@@ -38,8 +38,8 @@ use medial::complex::MedialMesh;
 use medial::geometry::separation_angle;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -203,7 +203,7 @@ fn prepare<'s>(
 //
 // # Deviations from the papers
 // - Attali and Montanvert, and Foskey et al., filter the facets of a Voronoi diagram and of a
-//   grid. This variant filters Voronoi vertices, so that it can be asked for a number of spheres
+//   grid. This variant filters Voronoi vertices, so that it reaches any number of spheres
 //   like every other method.
 // - A sphere that touches the boundary at its own centre (radius zero), or in fewer than two points,
 //   has no angle; it gets `S = 0` and goes first.
@@ -245,19 +245,21 @@ fn rank_facets(
 ) -> Result<RankedFacets<'static>, SimplifyError> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
-    let value = |facet: usize| {
-        let ends = set.facets.ends(facet).map(|v| delaunay.point(v));
-        let vertices =
-            set.facets.polygon(facet).iter().map(|&s| set.mesh.spheres[s as usize].centre);
-        match at {
-            FacetAngle::Barycentre => {
-                let mean = vertices.clone().sum::<Vec3>() / vertices.len() as f64;
-                angle_from(mean, ends)
+    let values: Vec<f64> = (0..set.facets.len())
+        .into_par_iter()
+        .map(|facet| {
+            let ends = set.facets.ends(facet).map(|v| delaunay.point(v));
+            let vertices =
+                set.facets.polygon(facet).iter().map(|&s| set.mesh.spheres[s as usize].centre);
+            match at {
+                FacetAngle::Barycentre => {
+                    let mean = vertices.clone().sum::<Vec3>() / vertices.len() as f64;
+                    angle_from(mean, ends)
+                }
+                FacetAngle::Minimum => vertices.map(|x| angle_from(x, ends)).fold(180.0, f64::min),
             }
-            FacetAngle::Minimum => vertices.map(|x| angle_from(x, ends)).fold(180.0, f64::min),
-        }
-    };
-    let values: Vec<f64> = (0..set.facets.len()).into_par_iter().map(value).collect();
+        })
+        .collect();
     Ok(RankedFacets::new(set, values, scale, Diagnostics::default()))
 }
 
@@ -332,10 +334,9 @@ fn peel_by_samples<'s>(
 ) -> Result<ByKnob<'s>, SimplifyError> {
     FacetSet::refuse_given(shape)?;
     let run_again = run.clone();
-    let at = move |shape: &Shape| -> Result<Box<dyn Simplification>, SimplifyError> {
+    ByKnob::of_samples(shape, theta, run, move |shape| {
         Ok(Box::new(peel(shape, scale(theta), &run_again)?))
-    };
-    ByKnob::of_samples(shape, theta, run, at)
+    })
 }
 
 /// Steps 1 to 3. `O(n log n)` in the number of facets, and as often over the sides of a sheet as a
@@ -343,13 +344,17 @@ fn peel_by_samples<'s>(
 fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled, SimplifyError> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
-    let widest = |facet: usize| {
-        let ends = set.facets.ends(facet).map(|v| delaunay.point(v));
-        let polygon = set.facets.polygon(facet).iter();
-        let vertices: Vec<Vec3> = polygon.map(|&s| set.mesh.spheres[s as usize].centre).collect();
-        angle_from(nearest_of_polygon(&vertices, ends[0].midpoint(ends[1])), ends)
-    };
-    let value: Vec<f64> = (0..set.facets.len()).into_par_iter().map(widest).collect();
+    let value: Vec<f64> = (0..set.facets.len())
+        .into_par_iter()
+        .map(|facet| {
+            // The angle is largest where the sheet is nearest to the middle of its two samples.
+            let ends = set.facets.ends(facet).map(|v| delaunay.point(v));
+            let polygon = set.facets.polygon(facet).iter();
+            let vertices: Vec<Vec3> =
+                polygon.map(|&s| set.mesh.spheres[s as usize].centre).collect();
+            angle_from(nearest_of_polygon(&vertices, ends[0].midpoint(ends[1])), ends)
+        })
+        .collect();
     let sheets = Sheets::of(&set.mesh, &set.facets);
     let mut without = Without::none(&sheets);
     let (mut removed, mut left) = (Vec::new(), vec![without.spheres()]);
@@ -382,20 +387,26 @@ fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled, Simplif
 /// the thick parts. All that hold the middle of their two samples have 180 degrees.
 fn in_order(set: &FacetSet, value: &[f64]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..value.len() as u32).collect();
-    let of = |sheet: u32| value[sheet as usize];
-    order.par_sort_unstable_by(|&a, &b| of(b).total_cmp(&of(a)).then(a.cmp(&b)));
-    break_ties(&mut order, of, |sheet| set.middle(sheet));
+    order.par_sort_unstable_by(|&a, &b| {
+        value[b as usize].total_cmp(&value[a as usize]).then(a.cmp(&b))
+    });
+    break_ties(&mut order, |sheet| value[sheet as usize], |sheet| set.middle(sheet));
     order.reverse();
     order
 }
 
 /// The point of a convex planar polygon nearest to `m`, which need not lie in its plane.
 fn nearest_of_polygon(polygon: &[Vec3], m: Vec3) -> Vec3 {
-    let fan =
-        polygon[1..].windows(2).map(|pair| nearest_of_triangle([polygon[0], pair[0], pair[1]], m));
-    let nearer =
-        |a: Vec3, b: Vec3| if b.distance_squared(m) < a.distance_squared(m) { b } else { a };
-    fan.reduce(nearer).unwrap_or(polygon[0])
+    polygon[1..]
+        .windows(2)
+        .map(|pair| nearest_of_triangle([polygon[0], pair[0], pair[1]], m))
+        .reduce(|a, b| nearer(a, b, m))
+        .unwrap_or(polygon[0])
+}
+
+/// The point nearer to `m`, the first of two equally near ones.
+fn nearer(a: Vec3, b: Vec3, m: Vec3) -> Vec3 {
+    if b.distance_squared(m) < a.distance_squared(m) { b } else { a }
 }
 
 /// Ericson, *Real-Time Collision Detection*, section 5.1.5, with the regions in another order: inside
@@ -410,15 +421,14 @@ fn nearest_of_triangle([a, b, c]: [Vec3; 3], m: Vec3) -> Vec3 {
             return a * weights[0] + b * weights[1] + c * weights[2];
         }
     }
-    let on_side = |u: Vec3, v: Vec3| {
-        let (along, length) = ((m - u).dot(v - u), (v - u).length_squared());
-        let t = if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 };
-        u.lerp(v, t)
-    };
-    let sides = [on_side(a, b), on_side(b, c), on_side(c, a)];
-    let nearer =
-        |a: Vec3, b: Vec3| if b.distance_squared(m) < a.distance_squared(m) { b } else { a };
-    sides.into_iter().reduce(nearer).expect("three sides")
+    let [on_a, on_b, on_c] = [(a, b), (b, c), (c, a)].map(|(u, v)| nearest_of_segment(u, v, m));
+    nearer(nearer(on_a, on_b, m), on_c, m)
+}
+
+fn nearest_of_segment(u: Vec3, v: Vec3, m: Vec3) -> Vec3 {
+    let (along, length) = ((m - u).dot(v - u), (v - u).length_squared());
+    let t = if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 };
+    u.lerp(v, t)
 }
 
 impl Peeled {
@@ -440,14 +450,15 @@ impl Peeled {
 impl Simplification for Peeled {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         let mut diagnostics = self.diagnostics.clone();
-        let by_level = |theta: f64| self.removed.partition_point(|&(_, value)| value <= theta);
         let (count, native) = match self.scale.wanted(level, &mut diagnostics)? {
             Wanted::Spheres(spheres) => {
                 let enough = self.left.partition_point(|&left| left > spheres);
                 let count = enough.min(self.removed.len());
                 (count, count.checked_sub(1).map_or(0.0, |last| self.removed[last].1))
             }
-            Wanted::Native(theta) => (by_level(theta), theta),
+            Wanted::Native(theta) => {
+                (self.removed.partition_point(|&(_, value)| value <= theta), theta)
+            }
         };
         let mesh = self.mesh(count);
         if let Level::Spheres(asked) = level
@@ -460,13 +471,8 @@ impl Simplification for Peeled {
             diagnostics.warn(format!("{} spheres instead of {asked}: {why}", mesh.spheres.len()));
         }
         diagnostics.count("sheets_removed", count);
-        Ok(Simplified {
-            mesh,
-            asked: level,
-            native_level: Some(native),
-            diagnostics,
-            extras: Extras::default(),
-        })
+        let native_level = Some(native);
+        Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }
 }
 

@@ -147,7 +147,7 @@ fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified, Simpli
     };
     let axis = match level {
         Level::Spheres(0) => {
-            return Err(SimplifyError::Level("give at least one sphere".into()));
+            return Err(SimplifyError::Level("ask for at least one sphere".into()));
         }
         Level::Spheres(count) => solid.with_count(base, count, &mut diagnostics)?,
         Level::Native(_) | Level::Published => {

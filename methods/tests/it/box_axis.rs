@@ -9,25 +9,13 @@ use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::{Contacts, MedialMesh, Sphere};
-use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, Params, RunContext};
-use medial::surface::{self, TriMesh};
+use medial::shape::Shape;
+use medial::simplifier::Level;
+use medial::surface::TriMesh;
+
+use crate::common::{at, cuboid, shape_of};
 
 const HALF: Vec3 = Vec3::new(1.5, 1.0, 0.5);
-
-/// The box as twelve triangles.
-fn box_surface() -> TriMesh {
-    let corner = |i: u32| {
-        let side = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        HALF * Vec3::new(side(0), side(1), side(2))
-    };
-    let quads =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    TriMesh {
-        vertices: (0..8).map(corner).collect(),
-        faces: quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-    }
-}
 
 /// A medial sphere of the box with its exact contacts.
 struct Exact {
@@ -76,18 +64,12 @@ fn exact_shape(exact: &[Exact]) -> Shape {
     let mut mesh = MedialMesh::from_simplices(spheres, vec![], vec![]).expect("valid spheres");
     let of_sphere = (0..exact.len() as u32).map(|i| [2 * i, 2 * i + 1, 2 * i, 2 * i + 1]).collect();
     mesh.contacts = Some(Contacts { samples, of_sphere });
-    let surface = box_surface();
-    let report = surface::validate(&surface).expect("a box is a solid");
-    let shape = Shape::new("box", &surface, report, ShapeOptions::default()).expect("a shape");
-    shape.with_initial(&mesh)
+    shape_of(&cuboid(HALF)).with_initial(&mesh)
 }
 
 /// Whether each exact sphere survives a method at a level, by its centre.
 fn kept(shape: &Shape, exact: &[Exact], method: &str, level: f64) -> Vec<bool> {
-    let method = medial_methods::find(method).expect("registered");
-    let run = RunContext::default();
-    let mut simplification = method.prepare(shape, &Params::none(), &run).expect("prepared");
-    let result = simplification.at(Level::Native(level)).expect("a level in range").mesh;
+    let result = at(shape, method, &[], Level::Native(level));
     let normal = shape.normalisation();
     let centres: Vec<Vec3> = result.spheres.iter().map(|s| normal.backward(s.centre)).collect();
     let survives = |e: &Exact| centres.iter().any(|c| c.distance(e.sphere.centre) < 1e-9);
@@ -156,13 +138,8 @@ fn sampled_box(per_unit: usize) -> TriMesh {
 fn angle_filter_on_a_sampled_box_finds_the_central_rectangle() {
     let per_unit = 40;
     let h = 1.0 / per_unit as f64;
-    let surface = sampled_box(per_unit);
-    let report = surface::validate(&surface).expect("a box is a solid");
-    let shape = Shape::new("box", &surface, report, ShapeOptions::default()).expect("a shape");
-    let method = medial_methods::find("angle").expect("registered");
-    let mut filter =
-        method.prepare(&shape, &Params::none(), &RunContext::default()).expect("prepared");
-    let result = filter.at(Level::Native(100.0)).expect("in range").mesh;
+    let shape = shape_of(&sampled_box(per_unit));
+    let result = at(&shape, "angle", &[], Level::Native(100.0));
     let normal = shape.normalisation();
     let centres: Vec<Vec3> = result.spheres.iter().map(|s| normal.backward(s.centre)).collect();
     assert!(!centres.is_empty());

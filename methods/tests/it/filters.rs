@@ -8,7 +8,7 @@ use medial::simplifier::{Level, RunContext, Simplified, SimplifyError};
 use medial::surface::TriMesh;
 use medial::{Vec3, surface};
 
-use crate::common::{ANGLE, LAMBDA, at, built_in, levels, params, shape_of};
+use crate::common::{ANGLE, LAMBDA, at, built_in, levels, params, shape_of, with_threads};
 
 /// Numbers of spheres by ranking instead of sampling.
 const BY_RANKING: [[(&str, &str); 2]; 2] =
@@ -264,8 +264,7 @@ fn scale_by_a_power_of_two_and_threads_change_nothing() {
         let scaled = TriMesh { vertices, faces: mesh.faces.clone() };
         assert_eq!(plain, at(&shape_of(&scaled), method, set, level), "{method} {set:?}");
         for threads in [1, 3] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let again = pool.expect("a pool").install(|| at(&shape_of(&mesh), method, set, level));
+            let again = with_threads(threads, || at(&shape_of(&mesh), method, set, level));
             assert_eq!(plain, again, "{method} {set:?}");
         }
     }

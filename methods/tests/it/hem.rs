@@ -3,24 +3,25 @@
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, betti};
 use medial::metrics::{EnvelopeOptions, sample_envelope};
-use medial::shape::{Shape, ShapeOptions};
+use medial::shape::Shape;
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError,
 };
-use medial::surface;
 use medial_methods::hem;
 
+use crate::common::{params, shape_of, with_threads};
+
 fn shape(id: &str, resolution: u32) -> Shape {
-    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
-    let mesh = built_in.mesh(resolution);
-    let report = surface::validate(&mesh).expect("built-in shapes are solids");
-    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
+    shape_of(&medial_datasets::find(id).expect("in the catalogue").mesh(resolution))
 }
 
 fn prepare<'s>(shape: &'s Shape, inside: &str) -> Box<dyn Simplification + 's> {
-    let mut params = Params::none();
-    params.set("inside", inside);
-    hem::method().prepare(shape, &params, &RunContext::default()).expect("prepared")
+    prepare_with(shape, "inside", inside)
+}
+
+fn prepare_with<'s>(shape: &'s Shape, key: &str, value: &str) -> Box<dyn Simplification + 's> {
+    let set = params(&[(key, value)]);
+    hem::method().prepare(shape, &set, &RunContext::default()).expect("prepared")
 }
 
 fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified {
@@ -150,10 +151,7 @@ fn a_two_sided_bound_holds_for_the_boundary_of_the_union_too() {
     let (mut held, mut missed) = (0, 0);
     for epsilon in [0.02, 0.03, 0.04, 0.05, 0.06, 0.08] {
         let answers = ["one", "both"].map(|sides| {
-            let mut params = Params::none();
-            params.set("sides", sides);
-            let prepared = hem::method().prepare(&shape, &params, &RunContext::default());
-            let result = prepared.expect("prepared").at(Level::Native(epsilon)).ok()?;
+            let result = prepare_with(&shape, "sides", sides).at(Level::Native(epsilon)).ok()?;
             Some((result.mesh.spheres.len(), farthest(&result.mesh)))
         });
         if let [Some(one), Some(both)] = answers {
@@ -173,10 +171,8 @@ fn common_neighbours_block_holes_alone() {
     for (id, resolution, loops) in [("torus", 26, 1), ("hollow-sphere", 20, 0)] {
         let shape = shape(id, resolution);
         let [homotopy, neighbours] = ["homotopy", "neighbours"].map(|blocking| {
-            let mut params = Params::none();
-            params.set("blocking", blocking);
-            let prepared = hem::method().prepare(&shape, &params, &RunContext::default());
-            betti(&spheres(prepared.expect("prepared").as_mut(), 1).mesh)
+            let mut prepared = prepare_with(&shape, "blocking", blocking);
+            betti(&spheres(prepared.as_mut(), 1).mesh)
         });
         assert_eq!(homotopy, [1, loops, 1 - loops], "{id}");
         assert_eq!(neighbours[1..], [loops, 0], "{id}");
@@ -235,8 +231,7 @@ fn levels_continue_start_anew_and_say_what_they_cannot_do() {
 fn the_number_of_threads_changes_nothing() {
     for inside in ["depth", "surface"] {
         let results = [1, 2].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("a pool").install(|| {
+            with_threads(threads, || {
                 let shape = shape("blob", 14);
                 let mut simplification = prepare(&shape, inside);
                 [1000, 100, 10].map(|count| {

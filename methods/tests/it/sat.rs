@@ -5,27 +5,17 @@ use std::f64::consts::{PI, TAU};
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified};
+use medial::simplifier::{Level, Simplified};
 use medial::surface::{self, TriMesh};
-use medial_methods::sat;
 
-fn shape_of(name: &str, mesh: &TriMesh) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    Shape::new(name, mesh, report, ShapeOptions::default()).expect("an extent")
-}
+use crate::common::{self, levels, shape_of, with_threads};
 
 fn built_in(id: &str) -> Shape {
-    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
-    shape_of(id, &built_in.mesh(built_in.default_resolution))
+    shape_of(&common::built_in(id))
 }
 
-fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
-    let mut all = Params::none();
-    for (key, value) in params {
-        all.set(key, value);
-    }
-    let mut sat = sat::method().prepare(shape, &all, &RunContext::default()).expect("prepared");
-    sat.at(level).expect("a scale axis")
+fn at(shape: &Shape, set: &[(&str, &str)], level: Level) -> Simplified {
+    levels(shape, "sat", set, &[level]).remove(0).expect("a scale axis")
 }
 
 fn of_spheres(spheres: &[Sphere]) -> MedialUnion {
@@ -149,7 +139,7 @@ fn the_gap_of_an_open_ring_closes_at_the_scale_of_elementary_geometry() {
     // The ends are 2 sin(alpha) apart and touch when their balls have half of that as radius.
     for (alpha, r) in [(0.3, 0.2), (0.25, 0.15)] {
         let expected = f64::sin(alpha) / r;
-        let ring = shape_of("open ring", &open_ring(alpha, r, 160));
+        let ring = shape_of(&open_ring(alpha, r, 160));
         let found = closing_scale(&ring);
         assert!((found / expected - 1.0).abs() < 0.02, "samples: {found} but {expected}");
         // The same with exact balls along the circle.
@@ -158,7 +148,7 @@ fn the_gap_of_an_open_ring_closes_at_the_scale_of_elementary_geometry() {
             Sphere::new(Vec3::new(angle.cos(), angle.sin(), 0.0), r)
         });
         let chain = MedialMesh::from_simplices(balls.collect(), vec![], vec![]).expect("balls");
-        let ring = shape_of("open ring", &open_ring(alpha, r, 160)).with_initial(&chain);
+        let ring = shape_of(&open_ring(alpha, r, 160)).with_initial(&chain);
         let found = closing_scale(&ring);
         assert!((found / expected - 1.0).abs() < 0.005, "balls: {found} but {expected}");
     }
@@ -167,7 +157,7 @@ fn the_gap_of_an_open_ring_closes_at_the_scale_of_elementary_geometry() {
 #[test]
 fn all_built_in_shapes_have_valid_axes() {
     for built_in in medial_datasets::catalogue() {
-        let shape = shape_of(built_in.id, &built_in.mesh(built_in.default_resolution));
+        let shape = shape_of(&built_in.mesh(built_in.default_resolution));
         for scale in [1.0, 1.1, 2.0] {
             let result = at(&shape, &[], Level::Native(scale));
             result.mesh.check().expect("a valid complex");
@@ -188,8 +178,7 @@ fn shared_meshes_have_valid_axes_for_any_number_of_threads() {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         let surface::Loaded { mesh, report } = surface::read(&path).expect("a solid");
         let results = [1, 2].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("a pool").install(|| {
+            with_threads(threads, || {
                 let shape = Shape::new(&name, &mesh, report.clone(), ShapeOptions::default());
                 at(&shape.expect("an extent"), &[], Level::Native(1.1))
             })
@@ -217,9 +206,8 @@ fn larger_scales_leave_fewer_spheres_and_counts_are_met() {
 
 #[test]
 fn a_number_by_density_is_the_published_scale_of_fewer_samples() {
-    let built_in = medial_datasets::find("blob").expect("in the catalogue");
-    let mesh = built_in.mesh(built_in.default_resolution);
-    let shape = shape_of("blob", &mesh);
+    let mesh = common::built_in("blob");
+    let shape = shape_of(&mesh);
     let found = at(&shape, &[("size", "density")], Level::Spheres(500));
     let reached = found.mesh.spheres.len();
     assert!((490..=500).contains(&reached), "{reached}");
