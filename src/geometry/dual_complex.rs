@@ -614,31 +614,17 @@ impl DualComplex<'_> {
 
 /// The first violation that [`DualComplex::check`] met.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum DualViolation {
     /// A simplex is in the complex and one of its faces is not.
     #[error("{simplex:?} is in the complex but its face {face:?} is not")]
-    Open {
-        /// The simplex.
-        simplex: Vec<VertexId>,
-        /// Its face.
-        face: Vec<VertexId>,
-    },
+    Open { simplex: Vec<VertexId>, face: Vec<VertexId> },
     /// The class of a simplex is not what its cofaces say.
     #[error("{simplex:?} is recorded as {found:?}, its cofaces make it {expected:?}")]
-    Class {
-        /// The simplex.
-        simplex: Vec<VertexId>,
-        /// The class recorded.
-        found: Option<Class>,
-        /// The class that follows.
-        expected: Option<Class>,
-    },
+    Class { simplex: Vec<VertexId>, found: Option<Class>, expected: Option<Class> },
     /// An anchor, or a point that is no vertex, is in the complex.
     #[error("{vertex:?} is in the complex but no visible ball")]
-    Vertex {
-        /// The point.
-        vertex: VertexId,
-    },
+    Vertex { vertex: VertexId },
 }
 
 /// The class that follows from the cofaces; `singular` is that of a simplex without any.

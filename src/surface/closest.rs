@@ -72,18 +72,14 @@ pub enum Feature {
 
 /// Why no tree can be built over a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum BvhError {
     /// There is nothing to be near to.
     #[error("the mesh has no faces")]
     Empty,
     /// A corner is not a number or too large to be squared.
     #[error("face {face} has the corner {corner}, which is not finite or exceeds 1e150")]
-    Corner {
-        /// Index of the face.
-        face: usize,
-        /// The corner.
-        corner: Vec3,
-    },
+    Corner { face: usize, corner: Vec3 },
 }
 
 /// Checks that there are triangles, with finite corners that can be squared.

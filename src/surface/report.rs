@@ -63,9 +63,10 @@ impl fmt::Display for Place {
     }
 }
 
-/// A place in front of a sentence that names the element, so that binary files do not say it twice.
+/// A place in front of a sentence that names the element itself.
 fn before(at: &Place) -> String {
     match at {
+        // In a binary file the place is the element: it would stand in the message twice.
         Place::Element(..) => String::new(),
         place => format!("{place}: "),
     }
@@ -89,231 +90,122 @@ impl fmt::Display for VertexName {
 
 /// A defect of a surface. Elements are counted from 0, lines from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum Fault {
     /// The file could not be opened, read or written.
     #[error("{0}")]
     Io(String),
     /// The extension names no format that is known here.
     #[error("unknown extension {extension:?}; use .off, .obj, .ply or .stl")]
-    UnknownFormat {
-        /// The extension, without the dot.
-        extension: String,
-    },
+    UnknownFormat { extension: String },
     /// The format is known, but not this variant or not in this direction.
     #[error("{0}")]
     Unsupported(String),
     /// Something else stands where the format demands a certain thing.
     #[error("{at}: expected {expected}, found {found}")]
-    Syntax {
-        /// Where.
-        at: Place,
-        /// What belongs there.
-        expected: String,
-        /// What is there, shortened.
-        found: String,
-    },
+    Syntax { at: Place, expected: String, found: String },
     /// The header announces more than the file holds, or less.
     #[error("the header announces {announced} {what}, but the file holds {holds}")]
-    Count {
-        /// What is counted.
-        what: &'static str,
-        /// As many as the header says.
-        announced: u64,
-        /// What there is or room for, in words.
-        holds: String,
-    },
+    Count { what: &'static str, announced: u64, holds: String },
     /// A coordinate is not a number or infinite.
     #[error("{}vertex {vertex} has the coordinate {value}, which is not finite", before(.at))]
-    Coordinate {
-        /// Where.
-        at: Place,
-        /// Index of the vertex.
-        vertex: usize,
-        /// The offending value.
-        value: f64,
-    },
+    Coordinate { at: Place, vertex: usize, value: f64 },
     /// A face names a vertex that does not exist.
     #[error("{}face {face} names the vertex {index} of {}", before(.at), counted(*.vertices, "vertex"))]
     Index {
-        /// Where.
         at: Place,
-        /// Index of the face.
         face: usize,
         /// The vertex as the file writes it (OBJ counts from 1 and backwards from -1).
         index: i64,
-        /// Number of vertices.
         vertices: usize,
     },
     /// A face with fewer than three corners.
     #[error("{}face {face} has {}; three are the least", before(.at), counted(*.corners, "corner"))]
-    TooFewCorners {
-        /// Where.
-        at: Place,
-        /// Index of the face.
-        face: usize,
-        /// Number of its corners.
-        corners: usize,
-    },
+    TooFewCorners { at: Place, face: usize, corners: usize },
     /// A polygon so intricate that cutting it into triangles takes too long.
     #[error(
         "{}face {face} with {corners} corners is too intricate to triangulate; \
          export the surface as triangles",
         before(.at)
     )]
-    Polygon {
-        /// Where.
-        at: Place,
-        /// Index of the face.
-        face: usize,
-        /// Number of its corners.
-        corners: usize,
-    },
+    Polygon { at: Place, face: usize, corners: usize },
     /// More elements than 32-bit indices can name.
     #[error("{count} {what} are more than 32-bit indices can name")]
-    TooLarge {
-        /// What is counted.
-        what: &'static str,
-        /// How many there are.
-        count: u64,
-    },
+    TooLarge { what: &'static str, count: u64 },
     /// Points without a surface.
     #[error("no face among {}; a closed surface is needed, not a point set", counted(*.vertices, "vertex"))]
-    NoFaces {
-        /// Number of vertices.
-        vertices: usize,
-    },
+    NoFaces { vertices: usize },
     /// Every face has corners at the same position.
     #[error(
         "no face is left of {}: each has corners at the same position; if that is not meant, the \
          surface is too small for its distance from the origin: move it there before writing it",
         counted(*.faces, "face")
     )]
-    Collapsed {
-        /// Number of faces.
-        faces: usize,
-    },
+    Collapsed { faces: usize },
     /// The bounding box has no size, or one that overflows or has lost digits to underflow.
     #[error(
         "the bounding box has the diagonal {diagonal:?}; move and scale the surface to about 1"
     )]
-    Extent {
-        /// Its diagonal, in the unit of the file.
-        diagonal: f64,
-    },
+    Extent { diagonal: f64 },
     /// Edges with one face only.
     #[error(
         "the surface is open: {} with one face only, the first from {} to {}; fill its holes \
          (`medial repair --fill-holes`)",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
-    Open {
-        /// Number of boundary edges.
-        edges: usize,
-        /// The first of them.
-        first: [VertexName; 2],
-    },
+    Open { edges: usize, first: [VertexName; 2] },
     /// A hole that is too long to be filled.
     #[error("the hole at {first} has {edges} edges, and holes of up to {most} are filled")]
-    LongHole {
-        /// Number of edges around it.
-        edges: usize,
-        /// The longest that would be filled.
-        most: usize,
-        /// The vertex around it with the lowest index.
-        first: VertexName,
-    },
+    LongHole { edges: usize, most: usize, first: VertexName },
     /// A hole that no triangles close.
     #[error(
         "the hole at {first} meets itself or an inner wall, or only edges that are there already \
          would close it"
     )]
-    TangledHole {
-        /// A vertex around it.
-        first: VertexName,
-    },
+    TangledHole { first: VertexName },
     /// Edges with more than two faces.
     #[error(
         "the surface is not manifold: {} with more than two faces, the first ({faces} faces) \
          from {} to {}; inner walls and doubled parts have to go, and which they are only its maker knows",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
-    NonManifoldEdge {
-        /// Number of such edges.
-        edges: usize,
-        /// The first of them.
-        first: [VertexName; 2],
-        /// Number of faces of the first.
-        faces: usize,
-    },
+    NonManifoldEdge { edges: usize, first: [VertexName; 2], faces: usize },
     /// Vertices whose faces form more than one fan.
     #[error(
         "the surface is not manifold: {} where parts touch in a point, the first is {first}; \
          separate the parts (`medial repair --separate`)",
         counted(*.vertices, "vertex")
     )]
-    NonManifoldVertex {
-        /// Number of such vertices.
-        vertices: usize,
-        /// The first of them.
-        first: VertexName,
-    },
+    NonManifoldVertex { vertices: usize, first: VertexName },
     /// One-sided, such as a Klein bottle.
     #[error("the component of face {face} is one-sided; no orientation of its faces is consistent")]
-    NonOrientable {
-        /// A face where the two orientations meet.
-        face: usize,
-    },
+    NonOrientable { face: usize },
     /// A component whose two sides coincide.
     #[error(
         "the component of face {face} ({}) encloses no volume; \
          leave it out (`medial repair --components largest`) or give it thickness",
         counted(*.faces, "face")
     )]
-    ZeroVolume {
-        /// Its first face.
-        face: usize,
-        /// Number of its faces.
-        faces: usize,
-    },
+    ZeroVolume { face: usize, faces: usize },
     /// So many components around one another that it takes too long to tell solid from cavity.
     #[error("{components} components lie too densely around one another to tell their nesting")]
-    TooManyNested {
-        /// Number of components.
-        components: usize,
-    },
+    TooManyNested { components: usize },
     /// Only from [`crate::surface::validate`]: a face that names a vertex twice.
     #[error("face {face} names a vertex twice")]
-    RepeatedCorner {
-        /// Index of the face.
-        face: usize,
-    },
+    RepeatedCorner { face: usize },
     /// Only from [`crate::surface::validate`]: two faces with the same vertices.
     #[error("faces {first} and {second} have the same three vertices")]
-    DuplicateFace {
-        /// The smaller index.
-        first: usize,
-        /// The larger one.
-        second: usize,
-    },
+    DuplicateFace { first: usize, second: usize },
     /// Only from [`crate::surface::validate`]: a vertex without a face.
     #[error("vertex {vertex} belongs to no face")]
-    Unreferenced {
-        /// Index of the vertex.
-        vertex: usize,
-    },
+    Unreferenced { vertex: usize },
     /// Only from [`crate::surface::validate`]: neighbours that disagree about inside and outside.
     #[error("face {face} and a neighbour of it are oriented against each other")]
-    Inconsistent {
-        /// Index of the face.
-        face: usize,
-    },
+    Inconsistent { face: usize },
     /// Only from [`crate::surface::validate`]: an outer shell that points inward, or a cavity
     /// that points outward.
     #[error("the component of face {face} is oriented the wrong way")]
-    WrongWay {
-        /// Its first face.
-        face: usize,
-    },
+    WrongWay { face: usize },
 }
 
 /// The properties of a surface: the answer of `medial info`.
@@ -368,115 +260,70 @@ pub struct SurfaceReport {
     pub warnings: Vec<String>,
 }
 
-/// One kind of change made to what the file holds.
+/// One kind of change to the surface in a file, with the numbers of elements concerned.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "repair", rename_all = "snake_case")]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum Repair {
     /// Coordinates below 2^-150 of the largest were set to zero.
-    FlushedCoordinates {
-        /// How many.
-        coordinates: usize,
-    },
+    FlushedCoordinates { coordinates: usize },
     /// Vertices at exactly the same position were merged.
-    WeldedVertices {
-        /// How many vertices disappeared.
-        vertices: usize,
-    },
+    WeldedVertices { vertices: usize },
     /// Faces left with fewer than three distinct corners were dropped.
-    DroppedDegenerateFaces {
-        /// How many.
-        faces: usize,
-    },
+    DroppedDegenerateFaces { faces: usize },
     /// Faces with the same corners as an earlier one were dropped.
-    DroppedDuplicateFaces {
-        /// How many.
-        faces: usize,
-    },
+    DroppedDuplicateFaces { faces: usize },
     /// Polygons were cut into triangles.
-    TriangulatedPolygons {
-        /// How many polygons with more than three corners.
-        polygons: usize,
-        /// Into how many triangles.
-        triangles: usize,
-    },
+    TriangulatedPolygons { polygons: usize, triangles: usize },
     /// Vertices that belong to no face were dropped.
-    DroppedUnreferencedVertices {
-        /// How many.
-        vertices: usize,
-    },
+    DroppedUnreferencedVertices { vertices: usize },
     /// Faces that disagreed with their neighbours were turned over.
-    ReorientedFaces {
-        /// How many.
-        faces: usize,
-    },
+    ReorientedFaces { faces: usize },
     /// Parts beside the largest were left out, on demand.
-    DroppedComponents {
-        /// How many.
-        components: usize,
-        /// Their faces.
-        faces: usize,
-    },
+    DroppedComponents { components: usize, faces: usize },
     /// Parts that touched in a vertex were drawn back from it, on demand.
     SeparatedVertices {
-        /// How many vertices were touched by several parts.
         vertices: usize,
         /// The longest way that one was moved, in the unit of the file.
         largest_move: f64,
     },
     /// A hole was closed by triangles between its vertices, on demand.
-    FilledHole {
-        /// Edges around the hole.
-        edges: usize,
-        /// Triangles that were added.
-        triangles: usize,
-    },
+    FilledHole { edges: usize, triangles: usize },
     /// Outer shells that pointed inward as a whole were turned over.
-    TurnedOutward {
-        /// How many components.
-        components: usize,
-    },
+    TurnedOutward { components: usize },
     /// Shells of cavities that pointed outward were turned over.
-    TurnedInward {
-        /// How many components.
-        components: usize,
-    },
+    TurnedInward { components: usize },
 }
 
 impl Repair {
     /// How many elements were changed.
     pub fn count(&self) -> usize {
+        self.changed().0
+    }
+
+    /// The number of changed elements, and the noun for one of them.
+    fn changed(&self) -> (usize, &'static str) {
         match *self {
-            Self::FlushedCoordinates { coordinates: n }
-            | Self::WeldedVertices { vertices: n }
-            | Self::DroppedDegenerateFaces { faces: n }
-            | Self::DroppedDuplicateFaces { faces: n }
-            | Self::TriangulatedPolygons { polygons: n, .. }
-            | Self::DroppedUnreferencedVertices { vertices: n }
-            | Self::SeparatedVertices { vertices: n, .. }
-            | Self::ReorientedFaces { faces: n }
-            | Self::TurnedOutward { components: n }
-            | Self::TurnedInward { components: n }
-            | Self::DroppedComponents { components: n, .. }
-            | Self::FilledHole { triangles: n, .. } => n,
+            Self::FlushedCoordinates { coordinates } => (coordinates, "coordinate"),
+            Self::WeldedVertices { vertices }
+            | Self::SeparatedVertices { vertices, .. }
+            | Self::DroppedUnreferencedVertices { vertices } => (vertices, "vertex"),
+            Self::DroppedDegenerateFaces { faces }
+            | Self::DroppedDuplicateFaces { faces }
+            | Self::ReorientedFaces { faces } => (faces, "face"),
+            Self::TriangulatedPolygons { polygons, .. } => (polygons, "polygon"),
+            Self::TurnedOutward { components }
+            | Self::TurnedInward { components }
+            | Self::DroppedComponents { components, .. } => (components, "component"),
+            Self::FilledHole { triangles, .. } => (triangles, "triangle"),
         }
     }
 }
 
 impl fmt::Display for Repair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let noun = match self {
-            Self::FlushedCoordinates { .. } => "coordinate",
-            Self::WeldedVertices { .. }
-            | Self::SeparatedVertices { .. }
-            | Self::DroppedUnreferencedVertices { .. } => "vertex",
-            Self::TriangulatedPolygons { .. } => "polygon",
-            Self::TurnedOutward { .. }
-            | Self::TurnedInward { .. }
-            | Self::DroppedComponents { .. } => "component",
-            Self::FilledHole { .. } => "triangle",
-            _ => "face",
-        };
-        let what = counted(self.count(), noun);
+        let (count, noun) = self.changed();
+        let what = counted(count, noun);
         match *self {
             Self::FlushedCoordinates { .. } => {
                 write!(f, "set {what} below 2^-150 of the largest to zero")

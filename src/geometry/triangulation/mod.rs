@@ -139,80 +139,40 @@ fn filter_of<M: Metric>(sites: &[Site]) -> Filter {
 
 /// Why points have no triangulation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum TriangulationError {
     /// A coordinate is infinite or not a number.
     #[error("point {index} has a coordinate that is not finite: {point}")]
-    NotFinite {
-        /// Index of the first such point.
-        index: usize,
-        /// The point.
-        point: Vec3,
-    },
+    NotFinite { index: usize, point: Vec3 },
     /// A coordinate is so large that products of coordinates overflow.
     #[error(
         "point {index} ({point}) exceeds {MAX_COORDINATE:e} in absolute value, \
          beyond which products of coordinates overflow: scale the points down"
     )]
-    OutOfRange {
-        /// Index of the first such point.
-        index: usize,
-        /// The point.
-        point: Vec3,
-    },
+    OutOfRange { index: usize, point: Vec3 },
     /// A weight is infinite, not a number, or beyond the square of the largest coordinate.
     #[error("point {index} has the unusable weight {weight:e}")]
-    Weight {
-        /// Index of the first such point.
-        index: usize,
-        /// Its weight.
-        weight: f64,
-    },
+    Weight { index: usize, weight: f64 },
     /// A ball's radius is negative, infinite, or not a number.
     #[error("ball {index} has the unusable radius {radius:e}")]
-    Radius {
-        /// Index of the first such ball.
-        index: usize,
-        /// Its radius.
-        radius: f64,
-    },
+    Radius { index: usize, radius: f64 },
     /// There is not one weight for each point.
     #[error("{points} points but {weights} weights")]
-    WeightCount {
-        /// Number of points.
-        points: usize,
-        /// Number of weights.
-        weights: usize,
-    },
+    WeightCount { points: usize, weights: usize },
     /// Fewer than four distinct points.
     #[error("{distinct} distinct points among {points}: a tetrahedron needs four")]
-    TooFewPoints {
-        /// Number of points given.
-        points: usize,
-        /// Number of distinct positions among them.
-        distinct: usize,
-    },
+    TooFewPoints { points: usize, distinct: usize },
     /// All points lie on one line.
     #[error("all {distinct} distinct points lie on one line: there is no tetrahedron")]
-    Collinear {
-        /// Number of distinct positions.
-        distinct: usize,
-    },
+    Collinear { distinct: usize },
     /// All points lie in one plane. Triangulations of the plane are not offered here;
     /// [`DualComplex::of_balls`](crate::DualComplex::of_balls) takes flat input, and fewer points,
     /// too.
     #[error("all {distinct} distinct points lie in one plane: there is no tetrahedron")]
-    Coplanar {
-        /// Number of distinct positions.
-        distinct: usize,
-    },
+    Coplanar { distinct: usize },
     /// More points or cells than 32-bit ids can name.
     #[error("{points} points need more than {limit} cells, the most that 32-bit ids can name")]
-    TooLarge {
-        /// Number of points given.
-        points: usize,
-        /// Largest number of cells.
-        limit: usize,
-    },
+    TooLarge { points: usize, limit: usize },
 }
 
 // Cells as flat records, four vertices and four neighbours, 32 bytes.

@@ -219,56 +219,30 @@ impl Iterator for EdgeRing<'_> {
 
 /// The first violation that a check found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum Violation {
     /// The vertex at infinity is where it must not be, or a vertex does not exist.
     #[error("cell {cell:?} has the vertices {vertices:?}")]
-    Vertices {
-        /// The cell.
-        cell: CellId,
-        /// Its vertices.
-        vertices: [VertexId; 4],
-    },
+    Vertices { cell: CellId, vertices: [VertexId; 4] },
     /// A neighbour does not lead back, or does not have the same facet.
     #[error("facet {facet:?} does not match its mirror {mirror:?}")]
-    Adjacency {
-        /// The facet.
-        facet: Facet,
-        /// The mirror facet that the cell records.
-        mirror: Facet,
-    },
+    Adjacency { facet: Facet, mirror: Facet },
     /// Euler's relation fails, or the cells around a vertex are not connected.
     #[error("Euler characteristic {found} of the closed triangulation, 0 expected")]
-    Euler {
-        /// Vertices minus edges plus facets minus cells.
-        found: i64,
-    },
+    Euler { found: i64 },
     /// A vertex's incident cell lacks the vertex.
     #[error("vertex {vertex:?} is recorded with a cell that lacks it")]
-    Incident {
-        /// The vertex.
-        vertex: VertexId,
-    },
+    Incident { vertex: VertexId },
     /// A finite cell is flat or inside out.
     #[error("cell {cell:?} has orientation {sign:?}")]
-    Orientation {
-        /// The cell.
-        cell: CellId,
-        /// Its orientation.
-        sign: Sign,
-    },
+    Orientation { cell: CellId, sign: Sign },
     /// The vertex opposite to a facet is inside the perturbed orthosphere of the cell; for an
     /// infinite cell, the hull is not convex there.
     #[error("facet {facet:?} is not locally regular")]
-    Regularity {
-        /// The facet, from the cell that is in conflict.
-        facet: Facet,
-    },
+    Regularity { facet: Facet },
     /// A point that is not a vertex should be one, or is recorded wrongly.
     #[error("point {point} is wrongly recorded as repeated or hidden")]
-    Missing {
-        /// Index of the point.
-        point: usize,
-    },
+    Missing { point: usize },
 }
 
 impl Triangulation {
