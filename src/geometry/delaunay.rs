@@ -10,13 +10,10 @@ use rayon::prelude::*;
 
 use super::Sphere;
 use super::triangulation::{
-    CellId, Facet, Triangulated, Triangulation, TriangulationError, VertexId, Violation,
-    triangulate,
+    CellId, Triangulated, Triangulation, TriangulationError, VertexId, Violation, triangulate,
 };
 use crate::Vec3;
-use crate::predicates::{
-    Filter, MAX_COORDINATE, Sign, Site, Unweighted, circumsphere, lexicographic,
-};
+use crate::predicates::{Filter, MAX_COORDINATE, Site, Unweighted, circumsphere, lexicographic};
 
 /// The Delaunay triangulation of points in space.
 ///
@@ -43,21 +40,6 @@ pub struct Delaunay {
     sites: Vec<Site>,
     duplicates: Vec<(VertexId, VertexId)>,
     filter: Filter,
-}
-
-/// Where a position is in a triangulation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Location {
-    /// On a vertex.
-    Vertex(VertexId),
-    /// In the interior of an edge: a cell and the indices of the edge's vertices in it.
-    Edge(CellId, usize, usize),
-    /// In the interior of a facet.
-    Facet(Facet),
-    /// In the interior of a finite cell.
-    Cell(CellId),
-    /// Strictly outside the convex hull, beyond the facet of this infinite cell.
-    Outside(CellId),
 }
 
 impl Delaunay {
@@ -162,39 +144,6 @@ impl Delaunay {
                 (centre.is_finite() && radius.is_finite()).then_some(Sphere::new(centre, radius))
             })
             .collect()
-    }
-
-    /// Where a position is; `hint` is a cell near it, if one is known.
-    ///
-    /// Costs a walk through the cells between the hint and the position.
-    ///
-    /// # Panics
-    /// If a coordinate is not finite or exceeds [`MAX_COORDINATE`].
-    pub fn locate(&self, position: Vec3, hint: Option<CellId>) -> Location {
-        assert!(
-            position.abs().max_element() <= MAX_COORDINATE && position.is_finite(),
-            "{position} cannot be located"
-        );
-        let p = &position.to_array();
-        let cell = self.walk(&self.sites, hint.unwrap_or(CellId(0)), p);
-        if self.is_infinite(cell) {
-            return Location::Outside(cell);
-        }
-        // The vertices whose opposite facet's plane does not contain the position.
-        let mut support = Vec::with_capacity(4);
-        for opposite in 0..4 {
-            let [a, b, c] = self.facet_vertices(Facet { cell, opposite });
-            let [a, b, c] = [a, b, c].map(|v| &self.sites[v.index()].p);
-            if Filter::ANY.orient3d(a, b, c, p) != Sign::Zero {
-                support.push(opposite);
-            }
-        }
-        match support[..] {
-            [i] => Location::Vertex(self.vertices(cell)[i]),
-            [i, j] => Location::Edge(cell, i, j),
-            [i, j, k] => Location::Facet(Facet { cell, opposite: 6 - i - j - k }),
-            _ => Location::Cell(cell),
-        }
     }
 
     /// Checks every invariant: [`check_combinatorics`](Triangulation::check_combinatorics), then

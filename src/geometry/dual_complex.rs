@@ -165,13 +165,6 @@ impl DualComplex<'_> {
         &self.regular
     }
 
-    /// The number of balls, hidden ones included; points of the triangulation from this index on are
-    /// anchors.
-    #[inline]
-    pub fn ball_count(&self) -> usize {
-        self.balls
-    }
-
     /// Whether a cell is in the complex; never an infinite one.
     #[inline]
     pub fn contains(&self, cell: CellId) -> bool {

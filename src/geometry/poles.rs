@@ -118,11 +118,6 @@ impl Poles {
         &self.balls
     }
 
-    /// The index of the polar ball of a cell; `None` if the cell's circumcentre is no pole.
-    pub fn ball_of(&self, cell: CellId) -> Option<usize> {
-        self.balls.binary_search_by_key(&cell, |b| b.cell).ok()
-    }
-
     /// The polar balls of the cells labelled as inside, by ascending cell. Poles at infinity are
     /// outside.
     pub fn inner_balls(&self, is_inside: impl Fn(CellId) -> bool) -> Vec<PolarBall> {

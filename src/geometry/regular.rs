@@ -34,10 +34,9 @@ use crate::Vec3;
 /// # The power diagram
 /// Each face of the power diagram is dual to a simplex of the triangulation:
 ///
-/// * The power cell of a vertex `v` has the orthocentres ([`Regular::orthosphere`]) of
-///   [`incident_cells`](Triangulation::incident_cells)`(v)` as its corners. It is bounded if and
-///   only if none of these cells is infinite, that is if `v` is not on the convex hull. Hidden
-///   points have no power cell.
+/// * The power cell of a vertex has the orthocentres ([`Regular::orthosphere`]) of the cells at the
+///   vertex as its corners. It is bounded if and only if none of these cells is infinite, that is
+///   if the vertex is not on the convex hull. Hidden points have no power cell.
 /// * The power facet between two vertices that an edge joins has the orthocentres of the cells
 ///   around the edge ([`edge_ring`](Triangulation::edge_ring)) as its corners, in rotational order.
 /// * Two orthocentres are joined by an edge of the diagram if their cells are
@@ -55,14 +54,14 @@ use crate::Vec3;
 /// let mut points = vec![Vec3::ZERO];
 /// points.extend(axes.into_iter().flat_map(|a| [2.0 * a, -2.0 * a]));
 /// let regular = Regular::new(&points, &[1.0; 7])?;
-/// let middle = regular.incident_cells(VertexId(0));
-/// assert!(middle.iter().all(|&cell| !regular.is_infinite(cell)));
-/// let corner = |&cell| regular.orthosphere(cell).expect("representable").0;
-/// let corners: Vec<Vec3> = middle.iter().map(corner).collect();
+/// let regular = &regular;
+/// let at = |v| regular.cells().filter(move |&c| regular.vertices(c).contains(&VertexId(v)));
+/// assert!(at(0).all(|cell| !regular.is_infinite(cell)));
+/// let corner = |cell| regular.orthosphere(cell).expect("representable").0;
+/// let corners: Vec<Vec3> = at(0).map(corner).collect();
 /// assert_eq!(corners.len(), 8);
 /// assert!(corners.iter().all(|c| c.abs() == Vec3::ONE)); // the corners of a cube
-/// let outer = regular.incident_cells(VertexId(1));
-/// assert!(outer.iter().any(|&cell| regular.is_infinite(cell))); // unbounded
+/// assert!(at(1).any(|cell| regular.is_infinite(cell))); // unbounded
 /// # Ok::<(), medial_geometry::TriangulationError>(())
 /// ```
 #[derive(Clone, Debug)]

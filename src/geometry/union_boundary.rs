@@ -67,7 +67,6 @@ pub struct UnionBoundary {
     quality: Vec<f64>,
     /// Pairs of vertices that are one point.
     coincident: Vec<[u32; 2]>,
-    clamped: usize,
 }
 
 impl UnionBoundary {
@@ -82,15 +81,11 @@ impl UnionBoundary {
                 let triangle = regular.facet_vertices(facet);
                 let meeting = Meeting::of(triangle.map(|v| regular.site(v)));
                 let (position, balls) = (meeting.position(), triangle.map(|v| v.0));
-                (UnionVertex { position, balls, facet }, meeting.sine2, meeting.height2 < 0.0)
+                (UnionVertex { position, balls, facet }, meeting.sine2)
             })
             .collect();
-        Self {
-            vertices: found.iter().map(|f| f.0).collect(),
-            quality: found.iter().map(|f| f.1).collect(),
-            coincident: coincident(complex, sides),
-            clamped: found.iter().filter(|f| f.2).count(),
-        }
+        let (vertices, quality) = found.into_iter().unzip();
+        Self { vertices, quality, coincident: coincident(complex, sides) }
     }
 
     /// The vertices; those of one triangle follow each other.
@@ -104,13 +99,6 @@ impl UnionBoundary {
     #[inline]
     pub fn coincident(&self) -> &[[u32; 2]] {
         &self.coincident
-    }
-
-    /// How many vertices have a squared height above their triangle's plane that rounding made
-    /// negative; it is zero then.
-    #[inline]
-    pub fn clamped(&self) -> usize {
-        self.clamped
     }
 }
 
@@ -175,6 +163,7 @@ impl Meeting {
     }
 
     fn position(&self) -> Vec3 {
+        // Where the spheres touch, rounding can make the squared height negative.
         self.foot + self.height2.max(0.0).sqrt() * self.normal
     }
 }

@@ -182,11 +182,6 @@ impl TriangleBvh {
         })
     }
 
-    /// The closest point to `p` that is not farther away than `bound`, if there is one.
-    pub fn closest_within(&self, p: Vec3, bound: f64) -> Option<Closest> {
-        self.closest_within_from(p, bound, None)
-    }
-
     /// The closest point to `p` that is not farther away than `bound`, if there is one. A face `start` near to it
     /// speeds up the search; the answer does not depend on it.
     ///

@@ -83,11 +83,10 @@ fn closest_points_match_brute_force() {
         assert_eq!(batch[k], closest);
         assert_eq!(distances[k], closest.distance);
         assert_eq!(bvh.closest_from(p, Some(k as u32 % 400)), closest);
-        assert_eq!(bvh.closest_within(p, closest.distance), Some(closest));
-        assert_eq!(bvh.closest_within(p, closest.distance * 0.999 - 1e-12), None);
-        let last = Some(bvh.face_count() as u32 - 1);
-        assert_eq!(bvh.closest_within_from(p, closest.distance, last), Some(closest));
-        assert_eq!(bvh.closest_within_from(p, closest.distance * 0.999 - 1e-12, last), None);
+        for start in [None, Some(399)] {
+            assert_eq!(bvh.closest_within_from(p, closest.distance, start), Some(closest));
+            assert_eq!(bvh.closest_within_from(p, closest.distance * 0.999 - 1e-12, start), None);
+        }
         assert!(bvh.any_within(p, closest.distance));
         assert!(!bvh.any_within(p, closest.distance * 0.999 - 1e-12));
     }
@@ -127,7 +126,7 @@ fn unusable_meshes_are_refused_by_name() {
     assert!(bvh.closest(Vec3::NAN).distance.is_nan());
     assert!(!bvh.closest(Vec3::splat(f64::INFINITY)).distance.is_finite());
     assert!(!bvh.any_within(Vec3::NAN, 1.0) && !bvh.any_within(Vec3::ZERO, f64::NAN));
-    assert_eq!(bvh.closest_within(Vec3::ZERO, -1.0), None);
+    assert_eq!(bvh.closest_within_from(Vec3::ZERO, -1.0, None), None);
 }
 
 /// A random complex with faces, lone edges, isolated spheres, contained edges and steep faces.

@@ -148,11 +148,6 @@ impl Tree {
         &self.order
     }
 
-    /// Number of nodes.
-    pub fn node_count(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// For each node the places of the items below it.
     pub fn ranges(&self) -> Vec<Range<usize>> {
         let mut ranges = vec![0..0; self.nodes.len()];

@@ -33,17 +33,6 @@ impl Triangulation {
         self.vertices
     }
 
-    /// The number of finite facets.
-    pub fn finite_facet_count(&self) -> usize {
-        // Each finite cell has four, those of the hull counted once and the others twice.
-        (4 * self.finite + self.infinite_cell_count()) / 2
-    }
-
-    /// The number of finite edges, by Euler's relation for a 3-ball.
-    pub fn finite_edge_count(&self) -> usize {
-        self.vertices + self.finite_facet_count() - self.finite - 1
-    }
-
     /// Whether a cell has the vertex at infinity, its last.
     #[inline]
     pub fn is_infinite(&self, cell: CellId) -> bool {
@@ -96,15 +85,6 @@ impl Triangulation {
         (self.finite as u32..self.cells.len() as u32).map(CellId)
     }
 
-    /// The finite facets, each once, from the cell with the smaller id, which is finite.
-    pub fn finite_facets(&self) -> impl Iterator<Item = Facet> + '_ {
-        self.finite_cells().flat_map(move |cell| {
-            (0..4)
-                .map(move |opposite| Facet { cell, opposite })
-                .filter(move |&f| self.mirror(f).cell > cell)
-        })
-    }
-
     /// The finite edges, each once, as a cell and the indices of its two vertices there; the cell
     /// is the one with the smallest id around the edge.
     ///
@@ -133,31 +113,6 @@ impl Triangulation {
         let at = f.iter().position(|&k| k == j).unwrap_or(0);
         let (x, y) = (f[(at + 1) % 3], f[(at + 2) % 3]);
         EdgeRing { triangulation: self, start: cell.0, next: Some((cell.0, x)), hinge: v[y] }
-    }
-
-    /// The cells of a vertex, in ascending order; none for a point that is not a vertex.
-    ///
-    /// The vertex at infinity has the infinite cells.
-    pub fn incident_cells(&self, vertex: VertexId) -> Vec<CellId> {
-        if vertex == VertexId::INFINITE {
-            return self.infinite_cells().collect();
-        }
-        let Some(first) = self.incident_cell(vertex) else { return Vec::new() };
-        let mut found = vec![first];
-        let mut seen = std::collections::HashSet::from([first]);
-        let mut next = 0;
-        while next < found.len() {
-            let cell = &self.cells[found[next].index()];
-            next += 1;
-            for i in (0..4).filter(|&i| cell.v[i] != vertex.0) {
-                let neighbour = CellId(cell.n[i].cell());
-                if seen.insert(neighbour) {
-                    found.push(neighbour);
-                }
-            }
-        }
-        found.sort_unstable();
-        found
     }
 
     /// The cell of a vertex with the smallest id; `None` for a point that is not a vertex.

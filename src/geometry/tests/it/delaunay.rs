@@ -1,11 +1,13 @@
 //! The Delaunay triangulation against brute force, on points of every degenerate kind.
 
 use medial_geometry::Vec3;
-use medial_geometry::delaunay::{Delaunay, Location};
+use medial_geometry::delaunay::Delaunay;
 use medial_geometry::predicates::{Sign, in_sphere, orient3d};
-use medial_geometry::triangulation::{CellId, Facet, TriangulationError, VertexId};
-use rand::{Rng, RngExt, SeedableRng};
+use medial_geometry::triangulation::{TriangulationError, VertexId};
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+
+use crate::{in_cube, lattice, on_threads, shuffle};
 
 fn check(points: &[Vec3]) -> Delaunay {
     let delaunay = Delaunay::new(points).expect("the points span space");
@@ -25,16 +27,6 @@ fn cell_set(d: &Delaunay) -> Vec<[[u64; 3]; 4]> {
         .collect();
     cells.sort_unstable();
     cells
-}
-
-fn lattice(n: u32, scale: f64) -> Vec<Vec3> {
-    let n3 = (0..n * n * n).map(|i| [i % n, i / n % n, i / n / n]);
-    n3.map(|c| Vec3::from(c.map(|x| f64::from(x) * scale))).collect()
-}
-
-fn unit(rng: &mut impl Rng) -> Vec3 {
-    let mut x = || rng.random_range(-1.0..1.0);
-    Vec3::new(x(), x(), x())
 }
 
 fn cylinder(around: u32, along: u32) -> Vec<Vec3> {
@@ -57,10 +49,10 @@ fn small_input(rng: &mut Pcg64) -> Vec<Vec3> {
         .map(|_| match kind {
             0 => Vec3::new(coarse(rng), coarse(rng), coarse(rng)),
             1 => Vec3::new(coarse(rng), coarse(rng), coarse(rng)) / 100.0,
-            2 => unit(rng).normalize(),
+            2 => in_cube(rng).normalize(),
             3 => Vec3::new(coarse(rng), coarse(rng), 0.25),
             4 => Vec3::new(1.0, 2.0, -1.0) * coarse(rng),
-            5 => unit(rng),
+            5 => in_cube(rng),
             6 => {
                 // The sphere of squared radius 9 or 2 around the origin, in integers.
                 let v = [Vec3::new(1.0, 2.0, 2.0), Vec3::new(3.0, 0.0, 0.0)];
@@ -73,14 +65,12 @@ fn small_input(rng: &mut Pcg64) -> Vec<Vec3> {
                 let angle = f64::from(rng.random_range(0..8u32)) * std::f64::consts::FRAC_PI_4;
                 Vec3::new(angle.cos(), angle.sin(), coarse(rng))
             }
-            _ => {
-                // A line, a plane and a few points off them.
-                match rng.random_range(0..5) {
-                    0 | 1 => Vec3::new(coarse(rng), 0.0, 0.0),
-                    2 | 3 => Vec3::new(coarse(rng), coarse(rng), 0.0),
-                    _ => Vec3::new(coarse(rng), coarse(rng), coarse(rng)),
-                }
-            }
+            // A line, a plane and a few points off them.
+            _ => match rng.random_range(0..5) {
+                0 | 1 => Vec3::new(coarse(rng), 0.0, 0.0),
+                2 | 3 => Vec3::new(coarse(rng), coarse(rng), 0.0),
+                _ => Vec3::new(coarse(rng), coarse(rng), coarse(rng)),
+            },
         })
         .collect()
 }
@@ -152,9 +142,7 @@ fn ten_thousand_small_inputs_are_valid_or_refused() {
         valid += 1;
         delaunay.check().unwrap_or_else(|e| panic!("round {round}: {e}"));
         check_by_brute_force(&delaunay);
-        for i in (1..points.len()).rev() {
-            points.swap(i, rng.random_range(0..=i));
-        }
+        shuffle(&mut points, &mut rng);
         let shuffled = Delaunay::new(&points).expect("a permutation of points that span space");
         assert_eq!(cell_set(&delaunay), cell_set(&shuffled), "round {round}");
     }
@@ -164,15 +152,12 @@ fn ten_thousand_small_inputs_are_valid_or_refused() {
 #[test]
 fn cells_and_their_order_do_not_depend_on_the_number_of_threads() {
     let mut rng = Pcg64::seed_from_u64(8);
-    let random: Vec<Vec3> = (0..30_000).map(|_| unit(&mut rng)).collect();
+    let random: Vec<Vec3> = (0..30_000).map(|_| in_cube(&mut rng)).collect();
     let sphere = random.iter().map(|p| p.normalize_or(Vec3::X)).collect();
     for points in [random, sphere, cylinder(170, 170)] {
-        let built = [1, 2, 3, 7].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("threads").install(|| Delaunay::new(&points).expect("they span space"))
-        });
-        let [one, others @ ..] = &built;
-        for other in others {
+        let one = Delaunay::new(&points).expect("they span space");
+        for threads in [1, 2, 3, 7] {
+            let other = on_threads(threads, || Delaunay::new(&points).expect("they span space"));
             assert_eq!(one.cell_count(), other.cell_count());
             for cell in one.cells() {
                 assert_eq!(one.vertices(cell), other.vertices(cell));
@@ -201,15 +186,12 @@ fn a_lattice_is_cut_into_positive_cells() {
 #[test]
 fn surfaces_with_cospherical_points_are_valid() {
     for scale in [1.0 / 128.0, 0.01] {
-        let side = 21;
-        let points: Vec<_> = lattice(side, scale)
-            .into_iter()
-            .filter(|p: &Vec3| p.to_array().iter().any(|&x| x == 0.0 || x == 20.0 * scale))
-            .collect();
+        let mut points = lattice(21, scale);
+        points.retain(|p| p.to_array().iter().any(|&x| x == 0.0 || x == 20.0 * scale));
         check(&points);
     }
     let mut rng = Pcg64::seed_from_u64(3);
-    let sphere: Vec<_> = (0..3_000).map(|_| unit(&mut rng).normalize()).collect();
+    let sphere: Vec<_> = (0..3_000).map(|_| in_cube(&mut rng).normalize()).collect();
     check(&sphere);
     check(&cylinder(64, 50));
 }
@@ -226,16 +208,16 @@ fn duplicates_are_recorded_with_their_first_occurrence() {
         assert_eq!(d.representative(VertexId(i)), VertexId(i % 64));
     }
     assert_eq!(d.representative(VertexId(128)), VertexId(0));
-    assert!(d.incident_cells(VertexId(64)).is_empty());
+    assert!(!d.is_vertex(VertexId(64)));
 }
 
 #[test]
 fn clusters_and_huge_ranges_are_valid() {
     let mut rng = Pcg64::seed_from_u64(5);
-    let mut points: Vec<_> = (0..400).map(|_| unit(&mut rng) * 1e-9).collect();
-    points.extend((0..100).map(|_| unit(&mut rng) * 1e9));
-    points.extend((0..100).map(|_| unit(&mut rng) * 1e-40));
-    points.extend((0..20).map(|_| unit(&mut rng) * 1e-220));
+    let mut points: Vec<_> = (0..400).map(|_| in_cube(&mut rng) * 1e-9).collect();
+    points.extend((0..100).map(|_| in_cube(&mut rng) * 1e9));
+    points.extend((0..100).map(|_| in_cube(&mut rng) * 1e-40));
+    points.extend((0..20).map(|_| in_cube(&mut rng) * 1e-220));
     check(&points);
     // A cone of slivers: one apex, a thousand points of a circle, a large conflict zone.
     let mut fan = cylinder(1000, 1);
@@ -257,9 +239,7 @@ fn unusable_points_are_named() {
 #[test]
 fn rings_turn_around_edges() {
     let d = check(&lattice(4, 1.0));
-    let mut edges = 0;
     for (cell, i, j) in d.finite_edges() {
-        edges += 1;
         let (a, b) = (d.vertices(cell)[i], d.vertices(cell)[j]);
         let ring: Vec<_> = d.edge_ring(cell, i, j).collect();
         assert!(ring.len() >= 3 && ring[0] == cell);
@@ -282,32 +262,11 @@ fn rings_turn_around_edges() {
             assert_eq!(orient3d(p, q, d.point(left), d.point(hinge)), Sign::Positive);
         }
     }
-    assert_eq!(edges, d.finite_edge_count());
-    assert_eq!(d.finite_facets().count(), d.finite_facet_count());
-    for v in 0..64 {
-        let by_scan: Vec<_> = d.cells().filter(|&c| d.vertices(c).contains(&VertexId(v))).collect();
-        assert_eq!(d.incident_cells(VertexId(v)), by_scan);
-    }
-}
-
-#[test]
-fn positions_are_located() {
-    let d = check(&lattice(5, 1.0));
-    assert_eq!(d.locate(Vec3::new(2.0, 3.0, 1.0), None), Location::Vertex(VertexId(2 + 15 + 25)));
-    let Location::Edge(cell, i, j) = d.locate(Vec3::new(2.5, 3.0, 1.0), None) else {
-        panic!("on an edge of the lattice")
-    };
-    let ends = [i, j].map(|k| d.point(d.vertices(cell)[k]));
-    assert_eq!(ends[0] + ends[1], Vec3::new(5.0, 6.0, 2.0));
-    assert!(matches!(d.locate(Vec3::new(2.3, 3.1, 1.0), None), Location::Facet(_)));
-    let Location::Cell(cell) = d.locate(Vec3::new(2.31, 3.17, 1.4), Some(CellId(9))) else {
-        panic!("inside a cell")
-    };
-    for opposite in 0..4 {
-        let [a, b, c] = d.facet_vertices(Facet { cell, opposite }).map(|v| d.point(v));
-        assert_eq!(orient3d(a, b, c, Vec3::new(2.31, 3.17, 1.4)), Sign::Negative);
-    }
-    assert!(matches!(d.locate(Vec3::splat(-0.001), None), Location::Outside(_)));
+    // Euler's relation for a ball counts each edge once.
+    let hull = d.infinite_cell_count();
+    let facets = (4 * d.finite_cell_count() + hull) / 2;
+    let edges = d.finite_edges().count();
+    assert_eq!(d.vertex_count() + facets, edges + d.finite_cell_count() + 1);
 }
 
 #[test]
@@ -324,7 +283,7 @@ fn points_that_are_flat_but_for_their_exponents_take_no_longer_than_others() {
         flat.check().expect("valid");
     }
     // Cospherical by fours and more: every test is exact.
-    let lattice: Vec<Vec3> =
-        lattice(10, 1.0).into_iter().map(|p| p * Vec3::new(1.0, 1.0, 1e-100)).collect();
-    check(&lattice);
+    let mut flat = lattice(10, 1.0);
+    flat.iter_mut().for_each(|p| p.z *= 1e-100);
+    check(&flat);
 }

@@ -10,23 +10,10 @@ use medial_geometry::{
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Their dual complex, checked.
-fn checked(balls: &[Sphere]) -> DualComplex<'static> {
-    let complex = DualComplex::of_balls(balls).expect("admissible balls");
-    complex.check().expect("a simplicial complex with consistent classes");
-    assert_eq!(complex.ball_count(), balls.len());
-    complex
-}
+use crate::{dual_complex, in_cube, lattice, on_threads, shuffle};
 
-/// A ball.
 fn ball(x: f64, y: f64, z: f64, r: f64) -> Sphere {
     Sphere::new(Vec3::new(x, y, z), r)
-}
-
-/// A point of the cube from -1 to 1.
-fn unit(rng: &mut Pcg64) -> Vec3 {
-    let mut x = || rng.random_range(-1.0..1.0);
-    Vec3::new(x(), x(), x())
 }
 
 fn as_set(s: &Simplices) -> BTreeSet<Vec<usize>> {
@@ -42,13 +29,13 @@ fn random_balls(rng: &mut Pcg64, n: usize) -> Vec<Sphere> {
     let mut balls: Vec<Sphere> = Vec::new();
     for i in 0..n {
         // Every third near another, where it may be hidden.
-        let centre = if i % 3 == 2 { balls[i - 1].centre + 0.15 * unit(rng) } else { unit(rng) };
+        let centre =
+            if i % 3 == 2 { balls[i - 1].centre + 0.15 * in_cube(rng) } else { in_cube(rng) };
         balls.push(Sphere::new(centre, rng.random_range(0.02..largest)));
     }
     balls
 }
 
-// ---------------------------------------------------------------------------------------------
 // Definitions, in rounded arithmetic and without a triangulation.
 
 /// A decision that rounding could have changed ends a trial.
@@ -158,7 +145,7 @@ fn random_balls_agree_with_the_definitions() {
             continue;
         };
         trials += 1;
-        let complex = checked(&balls);
+        let complex = dual_complex(&balls);
         assert_eq!(as_set(&complex.simplices()), expected, "{balls:?}");
         hidden += complex.regular().hidden().iter().filter(|v| v.index() < n).count();
         let visible = (0..n as u32).map(VertexId).filter(|&v| complex.regular().is_vertex(v));
@@ -186,11 +173,10 @@ fn boundary_vertices_of_many_balls_are_on_the_boundary() {
     let mut rng = Pcg64::seed_from_u64(22);
     for radius in [0.1, 0.3, 0.5] {
         let balls: Vec<_> = (0..600)
-            .map(|_| Sphere::new(unit(&mut rng), radius * rng.random_range(0.2..1.0)))
+            .map(|_| Sphere::new(in_cube(&mut rng), radius * rng.random_range(0.2..1.0)))
             .collect();
-        let complex = checked(&balls);
+        let complex = dual_complex(&balls);
         let boundary = UnionBoundary::new(&complex);
-        assert_eq!(boundary.clamped(), 0);
         assert!(radius < 0.2 || boundary.vertices().len() > 300);
         for v in boundary.vertices() {
             for i in v.balls {
@@ -201,12 +187,11 @@ fn boundary_vertices_of_many_balls_are_on_the_boundary() {
     }
 }
 
-// ---------------------------------------------------------------------------------------------
 // Small and lower-dimensional inputs.
 
 #[test]
 fn no_balls_have_an_empty_complex() {
-    let complex = checked(&[]);
+    let complex = dual_complex(&[]);
     assert_eq!((complex.counts(), complex.betti(), complex.euler()), ([0; 4], [0; 3], 0));
     assert!(UnionBoundary::new(&complex).vertices().is_empty());
 }
@@ -219,7 +204,7 @@ fn one_ball_is_one_vertex() {
         ball(7.0, -5.0, 3.0, 0.0),
         ball(1e-200, 0.0, 0.0, 1e-210),
     ] {
-        let complex = checked(&[b]);
+        let complex = dual_complex(&[b]);
         assert_eq!(complex.counts(), [1, 0, 0, 0]);
         assert_eq!(complex.vertex_class(VertexId(0)), Some(Class::Singular));
     }
@@ -229,7 +214,7 @@ fn one_ball_is_one_vertex() {
 fn two_balls_are_joined_if_they_meet() {
     let pair = |distance: f64, r: f64, s: f64| {
         let balls = [ball(1.0, 2.0, 3.0, r), ball(1.0 + distance, 2.0, 3.0, s)];
-        let complex = checked(&balls);
+        let complex = dual_complex(&balls);
         (complex.counts(), complex.simplices().vertices)
     };
     assert_eq!(pair(3.0, 1.0, 1.0), ([2, 0, 0, 0], vec![0, 1]));
@@ -252,18 +237,18 @@ fn two_balls_are_joined_if_they_meet() {
 fn balls_on_a_line_are_a_chain() {
     let direction = Vec3::new(1.0, -2.0, 2.0);
     let row: Vec<_> = (0..7).map(|k| Sphere::new(f64::from(k) * direction, 1.5)).collect();
-    let complex = checked(&row);
+    let complex = dual_complex(&row);
     assert_eq!((complex.counts(), complex.betti()), ([7, 6, 0, 0], [1, 0, 0]));
     assert!(complex.edges().all(|(_, class)| class == Class::Singular));
     let apart: Vec<_> = row.iter().map(|b| Sphere::new(b.centre, 1.5f64.next_down())).collect();
-    assert_eq!(checked(&apart).betti(), [7, 0, 0]);
+    assert_eq!(dual_complex(&apart).betti(), [7, 0, 0]);
 }
 
 #[test]
 fn three_balls_have_the_arrangement_s_complex() {
     let three = |r: f64| {
         let balls = [ball(0.0, 0.0, 0.0, r), ball(6.0, 0.0, 0.0, r), ball(0.0, 8.0, 0.0, r)];
-        let complex = checked(&balls);
+        let complex = dual_complex(&balls);
         (complex.counts(), UnionBoundary::new(&complex).vertices().len())
     };
     assert_eq!(three(2.0), ([3, 0, 0, 0], 0));
@@ -283,7 +268,7 @@ fn balls_in_a_plane_may_leave_holes() {
                 Sphere::new(Vec3::new(6.0 * x, 8.0 * y, 0.0) + tilt * x, r)
             })
             .collect();
-        let complex = checked(&balls);
+        let complex = dual_complex(&balls);
         (complex.betti(), UnionBoundary::new(&complex).merge(|_| None).points().len())
     };
     assert_eq!(grid(2.5, Vec3::ZERO), ([16, 0, 0], 0));
@@ -306,36 +291,33 @@ fn unusable_balls_are_named() {
     assert!(matches!(error, TriangulationError::NotFinite { index: 0, .. }));
 }
 
-// ---------------------------------------------------------------------------------------------
 // Arrangements with known topology.
 
 /// Betti numbers and the number of distinct boundary vertices of equal balls on a 3 x 3 x 3 lattice.
-fn lattice(weight: f64) -> ([u64; 3], usize) {
-    let points: Vec<_> =
-        (0..27).map(|i: u32| Vec3::from([i % 3, i / 3 % 3, i / 9].map(f64::from))).collect();
-    let regular = Regular::new(&points, &[weight; 27]).expect("spans space");
-    let complex = DualComplex::new(&regular);
-    complex.check().expect("a complex");
-    (complex.betti(), UnionBoundary::new(&complex).merge(|_| None).points().len())
-}
-
 #[test]
 fn equal_balls_on_a_lattice_pass_their_thresholds_exactly() {
-    assert_eq!(lattice(-1.0), ([0, 0, 0], 0));
-    assert_eq!(lattice(0.0), ([27, 0, 0], 0));
-    assert_eq!(lattice(0.25f64.next_down()), ([27, 0, 0], 0));
-    // 54 edges of the lattice close.
-    assert_eq!(lattice(0.25), ([1, 28, 0], 0));
-    assert_eq!(lattice(0.5f64.next_down()), ([1, 28, 0], 0));
-    // Each of 36 squares is filled in a point, which leaves eight voids; then it has two
-    // points, one on either side.
-    assert_eq!(lattice(0.5), ([1, 0, 8], 36));
-    assert_eq!(lattice(0.5f64.next_up()), ([1, 0, 8], 72));
-    assert_eq!(lattice(0.6), ([1, 0, 8], 72));
-    assert_eq!(lattice(0.75f64.next_down()), ([1, 0, 8], 72));
-    // The voids close in points; only the outer squares have vertices.
-    assert_eq!(lattice(0.75), ([1, 0, 0], 24));
-    assert_eq!(lattice(2.0), ([1, 0, 0], 24));
+    for (weight, betti, vertices) in [
+        (-1.0, [0, 0, 0], 0),
+        (0.0, [27, 0, 0], 0),
+        (0.25f64.next_down(), [27, 0, 0], 0),
+        // 54 edges of the lattice close.
+        (0.25, [1, 28, 0], 0),
+        (0.5f64.next_down(), [1, 28, 0], 0),
+        // Each of 36 squares is filled in a point, which leaves eight voids; then it has two
+        // points, one on either side.
+        (0.5, [1, 0, 8], 36),
+        (0.5f64.next_up(), [1, 0, 8], 72),
+        (0.75f64.next_down(), [1, 0, 8], 72),
+        // The voids close in points; only the outer squares have vertices.
+        (0.75, [1, 0, 0], 24),
+        (2.0, [1, 0, 0], 24),
+    ] {
+        let regular = Regular::new(&lattice(3, 1.0), &[weight; 27]).expect("spans space");
+        let complex = DualComplex::new(&regular);
+        complex.check().expect("a complex");
+        assert_eq!(complex.betti(), betti, "weight {weight}");
+        assert_eq!(UnionBoundary::new(&complex).merge(|_| None).points().len(), vertices);
+    }
 }
 
 #[test]
@@ -344,29 +326,29 @@ fn rings_and_shells_have_their_loops_and_voids() {
         .map(|k| f64::from(k) * std::f64::consts::TAU / 40.0)
         .map(|t| ball(t.cos(), t.sin(), 0.3 * t.sin(), 0.15))
         .collect();
-    assert_eq!(checked(&ring).betti(), [1, 1, 0]);
+    assert_eq!(dual_complex(&ring).betti(), [1, 1, 0]);
     // Two rings, and one point away from them.
     let mut two = ring.clone();
     two.extend(ring.iter().map(|b| Sphere::new(b.centre + 5.0 * Vec3::Z, 0.15)));
     two.push(ball(0.0, 0.0, 2.0, 0.0));
-    assert_eq!(checked(&two).betti(), [3, 2, 0]);
+    assert_eq!(dual_complex(&two).betti(), [3, 2, 0]);
     let mut rng = Pcg64::seed_from_u64(23);
-    let shell: Vec<_> = (0..400).map(|_| Sphere::new(unit(&mut rng).normalize(), 0.3)).collect();
-    let complex = checked(&shell);
+    let shell: Vec<_> = (0..400).map(|_| Sphere::new(in_cube(&mut rng).normalize(), 0.3)).collect();
+    let complex = dual_complex(&shell);
     assert_eq!((complex.betti(), complex.euler()), ([1, 0, 1], 2));
     // A ball inside the void, then one that fills it.
     let mut more = shell.clone();
     more.push(ball(0.0, 0.0, 0.0, 0.2));
-    assert_eq!(checked(&more).betti(), [2, 0, 1]);
+    assert_eq!(dual_complex(&more).betti(), [2, 0, 1]);
     more.push(ball(0.0, 0.0, 0.0, 0.9));
-    assert_eq!(checked(&more).betti(), [1, 0, 0]);
+    assert_eq!(dual_complex(&more).betti(), [1, 0, 0]);
 }
 
 // Changes that change nothing.
 
 /// Simplices as sets of balls by position, so that numbering does not matter.
 fn geometric(balls: &[Sphere]) -> BTreeSet<Vec<[u64; 4]>> {
-    let simplices = as_set(&checked(balls).simplices());
+    let simplices = as_set(&dual_complex(balls).simplices());
     simplices
         .into_iter()
         .map(|s: Vec<usize>| {
@@ -392,26 +374,24 @@ fn order_scale_and_translation_do_not_matter() {
         let steps = [2.0, 64.0, 1048576.0][round % 3];
         let balls: Vec<_> = (0..n)
             .map(|_| {
-                let c = unit(&mut rng).to_array().map(|x| dyadic(x, steps));
+                let c = in_cube(&mut rng).to_array().map(|x| dyadic(x, steps));
                 Sphere::new(Vec3::from(c), dyadic(rng.random_range(0.0..0.8), steps))
             })
             .collect();
         let mut shuffled = balls.clone();
-        for i in (1..n).rev() {
-            shuffled.swap(i, rng.random_range(0..=i));
-        }
+        shuffle(&mut shuffled, &mut rng);
         assert_eq!(geometric(&balls), geometric(&shuffled));
-        let expected = checked(&balls).simplices();
+        let expected = dual_complex(&balls).simplices();
         for scale in [f64::powi(2.0, 40), f64::powi(2.0, -40)] {
             let scaled: Vec<_> =
                 balls.iter().map(|b| Sphere::new(b.centre * scale, b.radius * scale)).collect();
-            assert_eq!(checked(&scaled).simplices(), expected);
+            assert_eq!(dual_complex(&scaled).simplices(), expected);
         }
         let moved: Vec<_> = balls
             .iter()
             .map(|b| Sphere::new(b.centre + Vec3::new(1024.0, -65536.0, 2.0), b.radius))
             .collect();
-        assert_eq!(checked(&moved).simplices(), expected);
+        assert_eq!(dual_complex(&moved).simplices(), expected);
     }
 }
 
@@ -419,21 +399,18 @@ fn order_scale_and_translation_do_not_matter() {
 fn the_number_of_threads_does_not_matter() {
     let mut rng = Pcg64::seed_from_u64(27);
     let balls: Vec<_> =
-        (0..6_000).map(|_| Sphere::new(unit(&mut rng), rng.random_range(0.0..0.15))).collect();
-    let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| {
-            let complex = checked(&balls);
+        (0..6_000).map(|_| Sphere::new(in_cube(&mut rng), rng.random_range(0.0..0.15))).collect();
+    let [one, two, five] = [1, 2, 5].map(|threads| {
+        on_threads(threads, || {
+            let complex = dual_complex(&balls);
             let classes: Vec<_> = complex.edges().collect();
             let boundary = UnionBoundary::new(&complex);
             (complex.simplices(), classes, boundary.vertices().to_vec(), boundary.merge(|_| None))
         })
-    };
-    let alone = with(1);
-    assert!(alone == with(2) && alone == with(5));
+    });
+    assert!(one == two && one == five);
 }
 
-// ---------------------------------------------------------------------------------------------
 // Exact coincidence.
 
 #[test]

@@ -8,6 +8,8 @@ use medial_geometry::triangulation::{TriangulationError, VertexId};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use crate::{in_cube, lattice, shuffle};
+
 fn check(points: &[Vec3], weights: &[f64]) -> Regular {
     let regular = Regular::new(points, weights).expect("the points span space");
     regular.check().expect("valid");
@@ -40,8 +42,7 @@ fn small_input(rng: &mut Pcg64) -> (Vec<Vec3>, Vec<f64>) {
     for _ in 0..n {
         let mut coarse = || f64::from(rng.random_range(0..4u32));
         let grid = Vec3::new(coarse(), coarse(), coarse());
-        let mut fine = || rng.random_range(-1.0..1.0);
-        let free = Vec3::new(fine(), fine(), fine());
+        let free = in_cube(rng);
         let p = match kind {
             0 => grid,
             1 => grid / 10.0,
@@ -117,11 +118,9 @@ fn small_weighted_inputs_agree_with_brute_force() {
         hidden += regular.hidden().len();
         regular.check().unwrap_or_else(|e| panic!("round {round}: {e}"));
         check_by_brute_force(&regular);
-        for i in (1..points.len()).rev() {
-            let j = rng.random_range(0..=i);
-            points.swap(i, j);
-            weights.swap(i, j);
-        }
+        let mut pairs: Vec<_> = points.into_iter().zip(weights).collect();
+        shuffle(&mut pairs, &mut rng);
+        (points, weights) = pairs.into_iter().unzip();
         let shuffled = Regular::new(&points, &weights).expect("a permutation");
         assert_eq!(cell_set(&regular), cell_set(&shuffled), "round {round}");
     }
@@ -131,16 +130,8 @@ fn small_weighted_inputs_agree_with_brute_force() {
 #[test]
 fn equal_weights_give_the_delaunay_triangulation() {
     let mut rng = Pcg64::seed_from_u64(13);
-    let mut unit = || {
-        let mut x = || rng.random_range(-1.0..1.0);
-        Vec3::new(x(), x(), x())
-    };
-    let sphere: Vec<_> = (0..1_000).map(|_| unit().normalize()).collect();
-    let lattice: Vec<_> = (0..1_000u32)
-        .map(|i| [i % 10, i / 10 % 10, i / 100])
-        .map(|c| Vec3::from(c.map(|x| f64::from(x) / 100.0)))
-        .collect();
-    for points in [sphere, lattice] {
+    let sphere: Vec<_> = (0..1_000).map(|_| in_cube(&mut rng).normalize()).collect();
+    for points in [sphere, lattice(10, 0.01)] {
         let delaunay = Delaunay::new(&points).expect("spans space");
         for weight in [0.0, 0.1, -3.0, 1e-300, 1e20] {
             let regular = check(&points, &vec![weight; points.len()]);
@@ -157,10 +148,7 @@ fn equal_weights_give_the_delaunay_triangulation() {
 #[test]
 fn weights_that_flatten_the_paraboloid_leave_the_hull() {
     // With w = |p|^2 every lift is zero, and lower weights inside lift above the plane.
-    let mut points = Vec::new();
-    for i in 0..343u32 {
-        points.push(Vec3::new(f64::from(i % 7), f64::from(i / 7 % 7), f64::from(i / 49)));
-    }
+    let points = lattice(7, 1.0);
     let inner = |p: &Vec3| p.to_array().iter().any(|&x| x != 0.0 && x != 6.0);
     let weights: Vec<_> =
         points.iter().map(|p| p.length_squared() - f64::from(u8::from(inner(p)))).collect();
