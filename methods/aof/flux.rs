@@ -310,7 +310,7 @@ impl Ray<'_> {
     fn other(&self, t: f64) -> Option<Vec3> {
         let bound = (self.closest.distance + t) * (1.0 - SAME_ON_RAY);
         let q = self.start + self.gradient * t;
-        self.surface.tree.closest_within(q, bound).map(|other| other.point)
+        self.surface.tree.closest_within_from(q, bound, None).map(|other| other.point)
     }
 
     /// The parameter at which the ray is equally far from the foot and from another point.

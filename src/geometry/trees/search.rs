@@ -106,7 +106,7 @@ impl Tree {
 
     /// Shows the leaves below all nodes that pass `enter`, from left to right, as places in
     /// [`Tree::order`], until `visit` breaks. `enter` gets the number of a node, below
-    /// [`Tree::node_count`], and the node.
+    /// the number of nodes, and the node.
     #[inline]
     pub fn descend(
         &self,
