@@ -11,9 +11,10 @@ use medial::surface::Sampling;
 
 use crate::exit::Failure;
 use crate::progress::Verbosity;
-use crate::study::Study;
 use crate::study::external::{AxisOptions, FitBy, RadiiFrom};
 use crate::study::item::Dual;
+use crate::study::registry::{Entry, Registry};
+use crate::study::{Study, no_such_method};
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]
@@ -194,4 +195,15 @@ pub fn params(words: &[String]) -> Result<Params, Failure> {
         params.set(key, value);
     }
     Ok(params)
+}
+
+/// The method with an id.
+///
+/// # Errors
+/// When no method has it; the message lists the ids.
+pub fn method<'r>(registry: &'r Registry, id: &str) -> Result<&'r Entry, Failure> {
+    registry.entry(id).ok_or_else(|| {
+        let known: Vec<String> = registry.entries().iter().map(|e| e.id().to_owned()).collect();
+        Failure::usage(no_such_method(id, &known))
+    })
 }

@@ -77,6 +77,10 @@ pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
 /// Extensions of medial meshes that are written.
 const MEDIAL_MESHES: [&str; 5] = ["ma", "ply", "obj", "vtp", "glb"];
 
+/// Corners of a power crust that are nearer than this along it become one in the surface that is written, as a
+/// fraction of the diagonal.
+pub const COINCIDENT: f64 = 1e-6;
+
 /// Extensions of surfaces that are written.
 pub const SURFACES: [&str; 3] = ["ply", "off", "obj"];
 
@@ -106,6 +110,15 @@ pub fn check_folder(path: &Path) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// Writes a file, complete or not at all.
+///
+/// # Errors
+/// When it cannot be written; the message names it.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    medial::write_atomically(path, |out| out.write_all(bytes))
+        .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
 }
 
 /// Lower-case extension of a path, or nothing.

@@ -4,7 +4,7 @@
 //!
 //! From below: [`host`] is the process that it runs in; [`process_tree`] ends what was started; [`plugin`] makes methods of external programs; [`check`] is what
 //! every method must do; [`study`] is what to run, [`measure`] the path from an output to its record, [`store`] the folder of
-//! records, [`exec`] the workers; [`args`], [`exit`], [`output`], [`files`] and
+//! records, [`exec`] the workers, [`rebuild`] the report of a store; [`args`], [`exit`], [`output`], [`files`] and
 //! [`interrupt`] are what verbs share; [`cmd`] holds one file for each verb; [`cli`] lists them.
 
 pub mod args;
@@ -22,6 +22,7 @@ pub mod plugin;
 pub mod process_tree;
 pub mod progress;
 pub mod provenance;
+pub mod rebuild;
 pub mod store;
 pub mod study;
 

@@ -7,7 +7,6 @@ use clap::Args;
 use medial_reports::{Record, Status};
 use serde_json::json;
 
-use super::report::{self, Rebuilt};
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::exec::queue::{PlanError, Tally, count, missing, refused_params, run_items};
 use crate::exec::{RunError, Supervisor};
@@ -16,6 +15,7 @@ use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::progress::Progress;
 use crate::provenance::Provenance;
+use crate::rebuild::{self, Rebuilt};
 use crate::store::{AXES, RESULTS, Store};
 use crate::study::external::Given;
 use crate::study::item::Item;
@@ -140,7 +140,7 @@ pub fn run(
         store.clear(RESULTS)?;
     }
     if !left.is_empty() {
-        report::write_study(&arguments.out, &study)?;
+        rebuild::write_study(&arguments.out, &study)?;
     }
     let mut progress = Progress::new(global.progress(), left.len());
     let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Record]| {
@@ -154,7 +154,7 @@ pub fn run(
         ended => ended?,
     }
     let Rebuilt { records, files, undrawn, .. } =
-        report::refresh(&arguments.out, registry, &provenance, tally.run)?;
+        rebuild::refresh(&arguments.out, registry, &provenance, tally.run)?;
     undrawn.iter().for_each(|why| note(global, why));
     finish(&of_items(records, &items), tally, &arguments.out, &files, global)
 }

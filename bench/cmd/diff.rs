@@ -6,19 +6,21 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use medial::write_atomically;
+use medial_reports::Record;
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
-use medial_reports::{Record, read_records};
 
 use crate::args::Global;
 use crate::exec::queue::{Build, Contender, PlanError, missing_in_either, run_alternately};
 use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
+use crate::files;
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_raw};
 use crate::progress::Progress;
 use crate::provenance::Provenance;
+use crate::rebuild::records;
 use crate::store::{AXES, RESULTS, Store};
+use crate::study::item::Item;
 use crate::study::registry::Registry;
 use crate::study::{Here, Study};
 
@@ -78,7 +80,7 @@ pub fn run(
             Some(sides) => sides,
             None => return Ok(Exit::Interrupted),
         },
-        false => [records(&arguments.old, global)?, records(&arguments.new, global)?],
+        false => [some_records(&arguments.old, global)?, some_records(&arguments.new, global)?],
     };
     let names = [&arguments.old, &arguments.new].map(|path| path.display().to_string());
     let options = DiffOptions {
@@ -91,8 +93,8 @@ pub fn run(
     let markdown = diff.to_markdown();
     if arguments.run {
         let json = serde_json::to_string_pretty(&diff).map_err(Failure::input)?;
-        write(&arguments.out.join("diff.md"), &markdown)?;
-        write(&arguments.out.join("diff.json"), &json)?;
+        files::write(&arguments.out.join("diff.md"), markdown.as_bytes())?;
+        files::write(&arguments.out.join("diff.json"), json.as_bytes())?;
     }
     if global.json {
         print_json(&diff, &[]);
@@ -106,18 +108,18 @@ pub fn run(
     })
 }
 
-/// The records of a folder or of a file.
-fn records(path: &Path, global: &Global) -> Result<Vec<Record>, Failure> {
+/// The records of a folder or of a file, of which there must be some.
+fn some_records(path: &Path, global: &Global) -> Result<Vec<Record>, Failure> {
+    let (records, bad_lines) = records(path)?;
     let file = if path.is_dir() { path.join(RESULTS) } else { path.to_owned() };
-    let journaled = read_records(&file).map_err(Failure::input)?;
-    if let Some(bad) = journaled.bad_lines.first() {
-        let count = journaled.bad_lines.len();
+    if let Some(bad) = bad_lines.first() {
+        let count = bad_lines.len();
         note(global, &format!("{}: {count} unreadable lines; {bad}", file.display()));
     }
-    if journaled.records.is_empty() {
+    if records.is_empty() {
         return Err(Failure::input(format!("{}: no record", file.display())));
     }
-    Ok(journaled.records)
+    Ok(records)
 }
 
 /// Runs the study with both builds; the records of both, or nothing where the user interrupted.
@@ -163,17 +165,19 @@ fn alternate(
         }
         ended => ended?,
     }
-    // Other studies and other builds may have left theirs in the folder.
-    let asked = |contender: &Contender<'_>| -> Result<Vec<Record>, Failure> {
-        let keys = items.iter().flat_map(|item| contender.build.own(item).keys());
-        let keys: HashSet<String> = keys.collect();
-        let all = records(contender.store.dir(), global)?;
-        Ok(all.into_iter().filter(|record| keys.contains(&record.key)).collect())
-    };
-    Ok(Some([asked(&contenders[0])?, asked(&contenders[1])?]))
+    let [old, new] = contenders.map(|contender| requested_records(&contender, &items, global));
+    Ok(Some([old?, new?]))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let written = write_atomically(path, |out| out.write_all(text.as_bytes()));
-    written.map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+/// The records of one side. Other studies and other builds may have left theirs in the folder.
+fn requested_records(
+    contender: &Contender<'_>,
+    items: &[Item],
+    global: &Global,
+) -> Result<Vec<Record>, Failure> {
+    let keys = items.iter().flat_map(|item| contender.build.own(item).keys());
+    let keys: HashSet<String> = keys.collect();
+    let mut records = some_records(contender.store.dir(), global)?;
+    records.retain(|record| keys.contains(&record.key));
+    Ok(records)
 }

@@ -57,8 +57,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let findings = Findings::of(&runs, *least_step);
     if let Some(page) = output {
         let html = findings.to_html(&warnings);
-        medial::write_atomically(page, |out| out.write_all(html.as_bytes()))
-            .map_err(|error| Failure::input(format!("{}: {error}", page.display())))?;
+        files::write(page, html.as_bytes())?;
     }
     if global.json {
         let mut object = to_value(&findings).map_err(Failure::input)?;

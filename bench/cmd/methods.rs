@@ -3,10 +3,9 @@
 use clap::Args;
 use serde_json::json;
 
-use crate::args::Global;
+use crate::args::{Global, method};
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
-use crate::study::no_such_method;
 use crate::study::registry::{Entry, Registry};
 
 /// Arguments of `methods`.
@@ -21,11 +20,10 @@ pub struct Arguments {
 /// # Errors
 /// When no method has the id.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
-    let wanted = |entry: &&Entry| arguments.id.as_ref().is_none_or(|id| entry.id() == *id);
-    let entries: Vec<&Entry> = registry.entries().iter().filter(wanted).collect();
-    if let (Some(id), true) = (&arguments.id, entries.is_empty()) {
-        return Err(unknown_method(registry, id));
-    }
+    let entries: Vec<&Entry> = match &arguments.id {
+        Some(id) => vec![method(registry, id)?],
+        None => registry.entries().iter().collect(),
+    };
     if global.json {
         print_json(&json!({ "methods": entries }), &[]);
     } else if arguments.id.is_some() {
@@ -40,20 +38,6 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         }
     }
     Ok(Exit::Done)
-}
-
-/// The method with an id.
-///
-/// # Errors
-/// When no method has it; those that exist are named.
-pub fn method<'r>(registry: &'r Registry, id: &str) -> Result<&'r Entry, Failure> {
-    registry.entry(id).ok_or_else(|| unknown_method(registry, id))
-}
-
-/// The failure for an id that no method has, naming those that exist.
-fn unknown_method(registry: &Registry, id: &str) -> Failure {
-    let known: Vec<String> = registry.entries().iter().map(|e| e.id().to_owned()).collect();
-    Failure::usage(no_such_method(id, &known))
 }
 
 fn describe(entry: &Entry) {

@@ -11,7 +11,6 @@ pub mod evaluate;
 pub mod history;
 pub mod info;
 pub mod methods;
-mod pictures;
 pub mod reconstruct;
 pub mod render;
 pub mod repair;

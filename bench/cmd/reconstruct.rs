@@ -15,7 +15,7 @@ use serde_json::{Map, Value, json};
 
 use crate::args::{AxisArguments, Global, MeshArgument, SubstrateArguments, shape_options};
 use crate::exit::{Exit, Failure};
-use crate::files::{SURFACES, check_extension, check_folder, medial_mesh_for};
+use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, medial_mesh_for};
 use crate::output::{counted, print_json, print_line};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
@@ -327,10 +327,6 @@ fn deviation(shape: &Shape, mesh: &TriMesh) -> Result<[f64; 2], Failure> {
     let max = distances.iter().copied().fold(0.0, f64::max);
     Ok([max, distances.iter().sum::<f64>() / distances.len() as f64])
 }
-
-/// Corners of the power crust that are nearer than this along it are one, as a fraction of the
-/// diagonal.
-pub const COINCIDENT: f64 = 1e-6;
 
 /// The power crust of the spheres of the medial mesh, or of all inner poles, and of the outer poles.
 fn power_crust_of(

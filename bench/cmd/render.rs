@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use medial::Vec3;
 use medial::complex::{ContourError, MedialMesh, union_surface};
 use medial::shape::{Cost, Shape, ShapeOptions};
 use medial::surface::{SignedDistance, TriMesh};
-use medial::{Vec3, write_atomically};
 use medial_reports::render::{
     Background, Bar, Camera, ColourBy, Errors, Frame, Layer, Panel, Picture, RenderError, Scale,
     Scene, Strip, strip,
@@ -15,7 +15,7 @@ use serde_json::json;
 
 use crate::args::{AxisArguments, Global, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::{check_extension, check_folder, medial_mesh_for};
+use crate::files::{self, check_extension, check_folder, medial_mesh_for};
 use crate::output::{counted, print_json, print_line};
 use crate::progress::StageLine;
 use crate::study::external::percent;
@@ -116,8 +116,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let picture = picture.map_err(usage)?;
     let bytes = picture.to_png().map_err(Failure::input)?;
     let output = &arguments.output;
-    write_atomically(output, |out| out.write_all(&bytes))
-        .map_err(|error| Failure::input(format!("{}: {error}", output.display())))?;
+    files::write(output, &bytes)?;
     drop(line);
     let (width, height) = (picture.width(), picture.height());
     if global.json {

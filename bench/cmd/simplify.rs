@@ -22,12 +22,12 @@ use serde_json::json;
 
 use crate::args::{
     AxisArguments, Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options,
-    params, shape_options,
+    method, params, shape_options,
 };
-use crate::cmd::methods::method;
-use crate::cmd::reconstruct::COINCIDENT;
 use crate::exit::{Exit, Failure};
-use crate::files::{SURFACES, check_extension, check_folder, check_output, medial_mesh_for};
+use crate::files::{
+    COINCIDENT, SURFACES, check_extension, check_folder, check_output, medial_mesh_for,
+};
 use crate::measure::answer::{Fault, LevelRun, answer};
 use crate::measure::fill_result;
 use crate::measure::search::{Probe, Search};

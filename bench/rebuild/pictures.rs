@@ -19,8 +19,7 @@ const ACROSS: usize = 4;
 /// it shows.
 pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
     let mut strips = picture_strips(records);
-    let is_there = |file: &str| dir.join(file).exists();
-    strips.retain(|strip| !is_there(&strip.file) || !is_there(&strip.view_file()));
+    strips.retain(|strip| !dir.join(&strip.file).exists() || !dir.join(strip.view_file()).exists());
     if strips.is_empty() {
         return vec![];
     }
@@ -28,30 +27,28 @@ pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
         .filter_map(|source| Input::load(source).ok())
         .map(|input| (input.hash.clone(), input))
         .collect();
-    let drawn = strips.iter().map(|wanted| {
-        let input = wanted.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
-        let input = input.ok_or("its surface is not at hand as it was measured")?;
-        let axes = axes(dir, wanted)?;
-        let captions = wanted.panels.iter().map(|(_, caption)| caption.clone());
-        let view = View3d::new(&input.mesh, captions.zip(&axes).collect())?;
-        write(&dir.join(&wanted.file), &picture(wanted, input, &axes, &view)?)?;
-        write(&dir.join(wanted.view_file()), view.script(&wanted.view)?.as_bytes())
-    });
-    let failed = drawn.zip(&strips).filter_map(|(drawn, wanted)| {
-        let why: String = drawn.err()?;
-        Some(format!("no pictures of {}: {why}", wanted.mesh))
-    });
-    failed.collect()
+    (strips.iter())
+        .filter_map(|wanted| {
+            // The hash tells whether the file still holds the surface that was measured.
+            let input = wanted.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
+            let why = draw_strip(dir, wanted, input).err()?;
+            Some(format!("no pictures of {}: {why}", wanted.mesh))
+        })
+        .collect()
 }
 
-/// The medial meshes of the panels.
-fn axes(dir: &Path, wanted: &PictureStrip) -> Result<Vec<MedialMesh>, String> {
-    let read = |(artifact, _): &(String, String)| {
+fn draw_strip(dir: &Path, wanted: &PictureStrip, input: Option<&Input>) -> Result<(), String> {
+    let input = input.ok_or("its surface is not at hand as it was measured")?;
+    let mut axes = Vec::new();
+    for (artifact, _) in &wanted.panels {
         let path = dir.join(artifact);
         let loaded = medial::complex::read(&path);
-        Ok(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh)
-    };
-    wanted.panels.iter().map(read).collect()
+        axes.push(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh);
+    }
+    let captions = wanted.panels.iter().map(|(_, caption)| caption.clone());
+    let view = View3d::new(&input.mesh, captions.zip(&axes).collect())?;
+    write(&dir.join(&wanted.file), &picture(wanted, input, &axes, &view)?)?;
+    write(&dir.join(wanted.view_file()), view.script(&wanted.view)?.as_bytes())
 }
 
 /// The strip as PNG: medial meshes, and below them the surface with the errors of each.
