@@ -4,14 +4,6 @@
 //! processes nor limits; the runner gives it a worker of its own, so that a case that panics, hangs
 //! or takes all memory is one that failed. What the contract leaves open is a commented exception
 //! beside the demand.
-//!
-//! | file | demands |
-//! |---|---|
-//! | `solids` | the shapes that all cases are about |
-//! | `valid`, `counts`, `levels` | what a result is, and how far it goes |
-//! | `same` | what must change nothing: the order of questions, threads, scale, a second run |
-//! | `said` | what a method says of itself is true |
-//! | `cancel`, `given` | cancelled runs, medial meshes from elsewhere |
 
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
@@ -20,14 +12,9 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
-mod cancel;
-mod counts;
-mod given;
-mod levels;
-mod said;
-mod same;
-mod solids;
-mod valid;
+mod demands;
+
+use demands::*;
 
 /// One demand, by its name.
 pub struct Case {
@@ -81,41 +68,39 @@ pub fn cases() -> &'static [Case] {
         Case { name, demands, run }
     }
     const CASES: &[Case] = &[
-        case("report", "has an id, a title, a citation, and parameters with units", said::report),
-        case("unknown-parameter", "refuses a parameter that it does not have", said::unknown),
-        case("defaults", "does with its documented defaults what it does without", said::defaults),
-        case("valid-sphere", "gives valid results on a sphere", |s| valid::on(s, "sphere")),
-        case("valid-box", "gives valid results on a box", |s| valid::on(s, "box")),
-        case("valid-capsule", "gives valid results on a capsule", |s| valid::on(s, "capsule")),
-        case("valid-torus", "gives valid results on a torus", |s| valid::on(s, "torus")),
+        case("report", "has an id, a title, a citation, and parameters with units", description),
+        case("unknown-parameter", "refuses a parameter that it does not have", unknown_parameter),
+        case("defaults", "does with its documented defaults what it does without", defaults),
+        case("valid-sphere", "gives valid results on a sphere", |s| valid_on(s, "sphere")),
+        case("valid-box", "gives valid results on a box", |s| valid_on(s, "box")),
+        case("valid-capsule", "gives valid results on a capsule", |s| valid_on(s, "capsule")),
+        case("valid-torus", "gives valid results on a torus", |s| valid_on(s, "torus")),
         case("valid-hollow", "gives valid results on a hollow sphere", |s| {
-            valid::on(s, "hollow-sphere")
+            valid_on(s, "hollow-sphere")
         }),
-        case("valid-bracket", "gives valid results on a bracket", |s| valid::on(s, "bracket")),
-        case("valid-parts", "gives valid results on two boxes apart", |s| {
-            valid::on(s, solids::PARTS)
-        }),
+        case("valid-bracket", "gives valid results on a bracket", |s| valid_on(s, "bracket")),
+        case("valid-parts", "gives valid results on two boxes apart", |s| valid_on(s, PARTS)),
         case("valid-plate", "answers or refuses a plate of a ten-thousandth", |s| {
-            valid::or_refused(s, solids::PLATE)
+            valid_or_refused(s, PLATE)
         }),
         case("valid-tetrahedron", "answers or refuses a solid of four vertices", |s| {
-            valid::or_refused(s, solids::TETRAHEDRON)
+            valid_or_refused(s, TETRAHEDRON)
         }),
         case("valid-cube", "answers or refuses a solid of eight vertices", |s| {
-            valid::or_refused(s, solids::CUBE)
+            valid_or_refused(s, CUBE)
         }),
-        case("counts", "meets numbers of spheres to 2 %, or warns why not", counts::met),
-        case("counts-above", "gives all it has where more is asked", counts::above),
-        case("no-spheres", "refuses to give no sphere", counts::none),
-        case("native", "refuses senseless native levels, or says that it has none", levels::native),
-        case("published", "answers its published level, or says why not", levels::published),
-        case("continuing", "gives after other levels what it gives alone", same::continuing),
-        case("repeated", "gives the same medial mesh each time, bit by bit", same::repeated),
-        case("threads", "gives the same medial mesh with 1, 2 and 5 threads", same::threads),
-        case("scale", "gives the same medial mesh in other units", same::scale),
-        case("cancelled-before", "ends soon when it is cancelled from the start", cancel::before),
-        case("cancelled-within", "ends soon when it is cancelled at work", cancel::within),
-        case("given-initial", "starts from a given medial mesh, or says why not", given::initial),
+        case("counts", "meets numbers of spheres to 2 %, or warns why not", counts_met),
+        case("counts-above", "gives all it has where more is asked", counts_above),
+        case("no-spheres", "refuses to give no sphere", no_spheres),
+        case("native", "refuses senseless native levels, or says that it has none", native_level),
+        case("published", "answers its published level, or says why not", published_level),
+        case("continuing", "gives after other levels what it gives alone", continuing),
+        case("repeated", "gives the same medial mesh each time, bit by bit", repeated),
+        case("threads", "gives the same medial mesh with 1, 2 and 5 threads", threads),
+        case("scale", "gives the same medial mesh in other units", scale),
+        case("cancelled-before", "ends soon when it is cancelled from the start", cancelled_before),
+        case("cancelled-within", "ends soon when it is cancelled at work", cancelled_within),
+        case("given-initial", "starts from a given medial mesh, or says why not", given_initial),
     ];
     CASES
 }
@@ -143,18 +128,11 @@ fn failed<T>(why: impl Into<String>) -> Result<T, Miss> {
 impl Subject<'_> {
     /// The method on a shape, with nothing asked yet.
     fn prepare<'s>(&self, shape: &'s Shape) -> Result<Box<dyn Simplification + 's>, Miss> {
-        self.prepare_as(shape, self.params, &RunContext::default())
-    }
-
-    fn prepare_as<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        context: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, Miss> {
-        (self.doing)(&format!("preparing the {}", shape.name()));
-        let prepared = self.method.prepare(shape, params, context);
-        prepared.map_err(|error| miss(&format!("preparing the {}", shape.name()), &error))
+        let place = format!("preparing the {}", shape.name());
+        (self.doing)(&place);
+        self.method
+            .prepare(shape, self.params, &RunContext::default())
+            .map_err(|error| miss(&place, &error))
     }
 
     /// A sound result at a level.
@@ -167,7 +145,7 @@ impl Subject<'_> {
         let place = format!("{level} of the {}", shape.name());
         (self.doing)(&place);
         let result = simplification.at(level).map_err(|error| miss(&place, &error))?;
-        valid::sound(&result, level).map_err(|why| Miss::Failed(format!("{place}: {why}")))?;
+        sound(&result, level).map_err(|why| Miss::Failed(format!("{place}: {why}")))?;
         Ok(result)
     }
 

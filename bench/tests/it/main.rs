@@ -10,7 +10,6 @@ mod common;
 mod diff;
 mod external_results;
 mod faults;
-mod fuzz_inputs;
 mod history;
 mod hostile;
 mod layers;

@@ -1,0 +1,590 @@
+//! The demands of the corpus in the order of [`super::cases`], then the shapes that they are about.
+
+use std::sync::atomic::Ordering;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use medial::Vec3;
+use medial::complex::MedialMesh;
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, RunContext, Simplification, Simplified, SimplifyError};
+use medial::surface::{self, TriMesh};
+
+use super::{Answer, Miss, Subject, failed, miss};
+use crate::plugin::is_id;
+
+/// A name that no parameter has.
+const UNKNOWN: &str = "no_such_parameter";
+
+/// A description that tables and command lines can use.
+pub(super) fn description(subject: &Subject<'_>) -> Answer {
+    let info = subject.method.info();
+    if !is_id(&info.id) {
+        return failed(format!("the id `{}`: use lower-case letters, digits and hyphens", info.id));
+    }
+    if info.title.trim().is_empty() {
+        return failed("it has no title");
+    }
+    if let Some(native) = info.native.as_ref().filter(|n| n.name.is_empty() || n.unit.is_empty()) {
+        return failed(format!("its native level `{}` has no name or no unit", native.name));
+    }
+    for (place, param) in info.params.iter().enumerate() {
+        if param.unit.trim().is_empty() {
+            return failed(format!("the parameter `{}` has no unit; write `none`", param.name));
+        }
+        if info.params[..place].iter().any(|other| other.name == param.name) {
+            return failed(format!("two parameters are called `{}`", param.name));
+        }
+    }
+    // Exception: a method that is being written has no paper yet.
+    let uncited = info.citation.trim().is_empty();
+    Ok(if uncited { vec!["warning: it has no citation".into()] } else { vec![] })
+}
+
+/// A misspelt parameter must not run with the default.
+pub(super) fn unknown_parameter(subject: &Subject<'_>) -> Answer {
+    let shape = corpus_shape("sphere");
+    let mut params = subject.params.clone();
+    params.set(UNKNOWN, "1");
+    (subject.doing)("preparing with an unknown parameter");
+    match subject.method.prepare(&shape, &params, &RunContext::default()) {
+        Err(SimplifyError::Parameter(_)) => Ok(vec![]),
+        Err(error) => failed(format!("`{UNKNOWN}` is no wrong `Parameter` to it, but {error}")),
+        Ok(_) => failed(format!("it takes a parameter `{UNKNOWN}`, which it does not have")),
+    }
+}
+
+/// Defaults spelt out, and left out.
+pub(super) fn defaults(subject: &Subject<'_>) -> Answer {
+    let shape = corpus_shape("sphere");
+    let mut params = subject.params.clone();
+    for param in &subject.method.info().params {
+        // What the user sets is not the default.
+        if !params.0.contains_key(&*param.name) {
+            params.set(&param.name, &param.default);
+        }
+    }
+    let spelt = Subject { params: &params, ..*subject };
+    let (plain, spelt) = (subject.mesh(&shape.view(), 50)?, spelt.mesh(&shape.view(), 50)?);
+    same(&plain, &spelt, 0.0, "its documented defaults are not those it runs with")
+}
+
+/// Numbers of spheres, from fine to coarse, down to the least that can be asked.
+pub(super) const COUNTS: [usize; 4] = [400, 100, 20, 1];
+
+/// A sphere that reaches farther, in diagonals of the surface, is of another shape or in other units.
+const FARTHEST: f64 = 1e12;
+
+/// Why a result is none: not a valid complex, empty, far outside, or the answer to another question.
+pub(super) fn sound(result: &Simplified, level: Level) -> Result<(), String> {
+    result.mesh.check().map_err(|error| format!("the medial mesh is not valid: {error}"))?;
+    if result.mesh.spheres.is_empty() {
+        return Err("the medial mesh has no sphere".into());
+    }
+    for (id, sphere) in result.mesh.spheres.iter().enumerate() {
+        let reach = sphere.centre.abs().max_element().max(sphere.radius);
+        if reach > FARTHEST {
+            return Err(format!("sphere {id} reaches {reach:.1e} diagonals away"));
+        }
+    }
+    // Published numbers could be compared with those of another level otherwise.
+    if result.asked != level {
+        return Err(format!("the result says that {} was asked", result.asked));
+    }
+    Ok(())
+}
+
+/// Sound results on an ordinary solid.
+pub(super) fn valid_on(subject: &Subject<'_>, name: &str) -> Answer {
+    let shape = corpus_shape(name);
+    let mut simplification = subject.prepare(&shape)?;
+    // Asking once decides what kind of level the method takes.
+    if subject.level(simplification.as_mut(), COUNTS[0])? == Level::Published {
+        subject.ask(simplification.as_mut(), &shape, Level::Published)?;
+        return Ok(vec!["at its published level: it is not asked for numbers".into()]);
+    }
+    let mut simplification = subject.prepare(&shape)?;
+    for count in COUNTS {
+        subject.ask(simplification.as_mut(), &shape, Level::Spheres(count))?;
+    }
+    Ok(vec![])
+}
+
+/// Sound results on a solid that is at the edge of what can be resolved.
+///
+/// Exception: it may be refused in words, also by the name of the parameter that would resolve it. A
+/// panic, a crash, an invalid or an empty result is no refusal.
+pub(super) fn valid_or_refused(subject: &Subject<'_>, name: &str) -> Answer {
+    let shape = corpus_shape(name);
+    (subject.doing)(&format!("preparing the {name}"));
+    let prepared = subject.method.prepare(&shape, subject.params, &Default::default());
+    let mut simplification = match prepared {
+        Ok(simplification) => simplification,
+        Err(error) => return refusal(&format!("preparing the {name}"), &error),
+    };
+    let mut remarks = Vec::new();
+    for count in COUNTS {
+        let level = Level::Spheres(count);
+        let place = format!("{level} of the {name}");
+        (subject.doing)(&place);
+        match simplification.at(level) {
+            Ok(result) => {
+                sound(&result, level).map_err(|why| Miss::Failed(format!("{place}: {why}")))?
+            }
+            // One remark is enough: the others are alike.
+            Err(error) if remarks.is_empty() => remarks = refusal(&place, &error)?,
+            Err(error) => drop(refusal(&place, &error)?),
+        }
+    }
+    Ok(remarks)
+}
+
+/// That a solid is refused, where the error says so in words.
+fn refusal(place: &str, error: &SimplifyError) -> Answer {
+    match error {
+        SimplifyError::Unsupported { .. }
+        | SimplifyError::Shape(_)
+        | SimplifyError::Parameter(_)
+        | SimplifyError::Level(_)
+        | SimplifyError::Failed(_) => Ok(vec![format!("refused, {place}: {error}")]),
+        error => failed(format!("{place}: {error}")),
+    }
+}
+
+/// Shapes that differ in kind: thin, round, looped, hollow, sharp.
+const SHAPES: [&str; 6] = ["sphere", "box", "capsule", "torus", "hollow-sphere", "bracket"];
+
+/// A result with so much more or less than was asked is one at another count.
+const TOLERANCE: f64 = 0.02;
+
+/// No medial mesh here has as many spheres.
+const HUGE: usize = 1_000_000_000;
+
+/// The count is reached, or a warning says why not.
+pub(super) fn counts_met(subject: &Subject<'_>) -> Answer {
+    for name in SHAPES {
+        let shape = corpus_shape(name);
+        let view = shape.view();
+        let mut simplification = subject.prepare(&view)?;
+        for count in COUNTS {
+            at_count(subject, simplification.as_mut(), &shape, count)?;
+        }
+    }
+    Ok(vec![])
+}
+
+/// More than there is, by one sphere and by many.
+pub(super) fn counts_above(subject: &Subject<'_>) -> Answer {
+    for name in ["capsule", TETRAHEDRON] {
+        let shape = corpus_shape(name);
+        let initial = shape.view().initial().map_or(1, |mesh| mesh.spheres.len());
+        let view = shape.view();
+        let mut simplification = match subject.prepare(&view) {
+            Ok(simplification) => simplification,
+            // Exception: a solid of four vertices may be refused; the case about it says how.
+            Err(_) if name == TETRAHEDRON => continue,
+            Err(miss) => return Err(miss),
+        };
+        let one = simplification.at(Level::Spheres(1));
+        if name == TETRAHEDRON && one.is_err() {
+            continue;
+        }
+        for count in [HUGE, initial + 1] {
+            at_count(subject, simplification.as_mut(), &shape, count)?;
+        }
+    }
+    Ok(vec![])
+}
+
+/// No sphere at all is refused, by name.
+pub(super) fn no_spheres(subject: &Subject<'_>) -> Answer {
+    let shape = corpus_shape("sphere");
+    let mut simplification = subject.prepare(&shape)?;
+    (subject.doing)("asking for 0 spheres");
+    match simplification.at(Level::Spheres(0)) {
+        Err(SimplifyError::Level(_) | SimplifyError::Unsupported { .. }) => Ok(vec![]),
+        Err(error) => failed(format!("0 spheres are no `Level` to it, but {error}")),
+        Ok(result) => {
+            let spheres = result.mesh.spheres.len();
+            failed(format!("0 spheres were asked, and {spheres} given: refuse that as a `Level`"))
+        }
+    }
+}
+
+fn at_count(
+    subject: &Subject<'_>,
+    simplification: &mut dyn Simplification,
+    shape: &Shape,
+    count: usize,
+) -> Result<Simplified, Miss> {
+    let result = subject.ask(simplification, shape, Level::Spheres(count))?;
+    let reached = result.mesh.spheres.len();
+    let near = reached.abs_diff(count) as f64 <= TOLERANCE * count as f64;
+    if near || !result.diagnostics.warnings.is_empty() {
+        return Ok(result);
+    }
+    // Exception: all spheres of the initial medial mesh need no warning where more are requested.
+    let initial = shape.view().initial().map_or(usize::MAX, |mesh| mesh.spheres.len());
+    if count > initial && reached == initial {
+        return Ok(result);
+    }
+    failed(format!(
+        "{count} spheres of the {}: it gives {reached}, and no warning says why",
+        shape.name()
+    ))
+}
+
+/// The method's own level: senseless values are refused, the one that it names is taken.
+pub(super) fn native_level(subject: &Subject<'_>) -> Answer {
+    let shape = corpus_shape("capsule");
+    let mut simplification = subject.prepare(&shape)?;
+    if subject.method.info().native.is_none() {
+        (subject.doing)("asking for level 1 of its own");
+        return match simplification.at(Level::Native(1.0)) {
+            Err(SimplifyError::Unsupported { .. }) => Ok(vec![]),
+            Err(error) => failed(format!("a level of its own, which it has not: {error}")),
+            Ok(_) => failed("it answers a level of its own, but its description has none"),
+        };
+    }
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0] {
+        let level = Level::Native(value);
+        (subject.doing)(&level.to_string());
+        match simplification.at(level) {
+            Err(SimplifyError::Level(_) | SimplifyError::Unsupported { .. }) => {}
+            // Exception: only the program itself knows the range of its level, and says so by its
+            // exit code.
+            Err(SimplifyError::Failed(_)) if subject.external && value == -1.0 => {}
+            Err(error) => return failed(format!("{level} is no `Level` to it, but {error}")),
+            Ok(_) => return failed(format!("it answers {level}: refuse that as a `Level`")),
+        }
+    }
+    let near = subject.level(simplification.as_mut(), 20)?;
+    let used = subject.ask(simplification.as_mut(), &shape, near)?.native_level;
+    let Some(value) = used else {
+        return Ok(vec!["its results do not say which native level was used".into()]);
+    };
+    taken(subject, simplification.as_mut(), Level::Native(value))
+}
+
+/// A level that the method has named itself. It need not lead to the same result: a number of
+/// spheres can divide those that tie for a level, and a bound may be held for the whole only.
+fn taken(subject: &Subject<'_>, simplification: &mut dyn Simplification, level: Level) -> Answer {
+    (subject.doing)(&level.to_string());
+    match simplification.at(level) {
+        // Exception: the bound of a number of spheres may be below what can be held.
+        Err(SimplifyError::Level(why)) => Ok(vec![format!("{level}, its own, is refused: {why}")]),
+        Err(error) => failed(format!("{level}, which it has named itself: {error}")),
+        Ok(result) => {
+            // Exception: where all tie, none is beyond the level. It has to be said.
+            if result.mesh.spheres.is_empty() && !result.diagnostics.warnings.is_empty() {
+                return Ok(vec![]);
+            }
+            sound(&result, level).map_err(|why| Miss::Failed(format!("{level}: {why}")))?;
+            Ok(vec![])
+        }
+    }
+}
+
+/// The published level, which not every paper has.
+pub(super) fn published_level(subject: &Subject<'_>) -> Answer {
+    let shape = corpus_shape("capsule");
+    let mut simplification = subject.prepare(&shape)?;
+    (subject.doing)("asking for the published level");
+    match simplification.at(Level::Published) {
+        Err(SimplifyError::Unsupported { why }) if why.trim().is_empty() => {
+            failed("its published level is unsupported, and it does not say why")
+        }
+        Err(SimplifyError::Unsupported { why }) => Ok(vec![format!("unsupported: {why}")]),
+        _ => {
+            subject.ask(simplification.as_mut(), &shape, Level::Published)?;
+            Ok(vec![])
+        }
+    }
+}
+
+/// A program's files hold the input's units: what it reads is rounded otherwise in others.
+const ROUNDING: f64 = 1e-9;
+
+/// A level is the same whatever was computed before it: finer, coarser, and the same again.
+pub(super) fn continuing(subject: &Subject<'_>) -> Answer {
+    let shape = corpus_shape("torus");
+    let view = shape.view();
+    let mut simplification = subject.prepare(&view)?;
+    for count in [300, 100, 200, 100] {
+        let level = Level::Spheres(count);
+        let continued = subject.ask(simplification.as_mut(), &view, level)?;
+        let alone = subject.ask(subject.prepare(&shape.view())?.as_mut(), &shape, level)?;
+        if let Some(difference) = difference(&alone.mesh, &continued.mesh, 0.0) {
+            return failed(format!(
+                "{level} of the torus after other levels differ from those alone: {difference}"
+            ));
+        }
+    }
+    Ok(vec![])
+}
+
+/// The whole way twice, with nothing shared.
+pub(super) fn repeated(subject: &Subject<'_>) -> Answer {
+    let first = subject.mesh(&corpus_shape("bracket"), 150)?;
+    let second = subject.mesh(&corpus_shape("bracket"), 150)?;
+    same(&first, &second, 0.0, "a second run of the bracket gives another medial mesh")
+}
+
+/// Other numbers of threads, for substrates and method alike.
+pub(super) fn threads(subject: &Subject<'_>) -> Answer {
+    let mut results: Vec<MedialMesh> = Vec::new();
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|error| Miss::Skipped(error.to_string()))?;
+        // What the caller is told stays in this thread: the method runs in the pool.
+        (subject.doing)(&format!("150 spheres of the bracket with {threads} threads"));
+        let (method, params) = (subject.method, subject.params);
+        let result = pool.install(|| {
+            let shape = corpus_shape("bracket");
+            let mut simplification = method.prepare(&shape, params, &Default::default())?;
+            match simplification.at(Level::Spheres(150)) {
+                Err(SimplifyError::Unsupported { .. }) => simplification.at(Level::Published),
+                result => result,
+            }
+        });
+        let place = format!("the bracket with {threads} threads");
+        results.push(result.map_err(|error| miss(&place, &error))?.mesh);
+        let changed = format!("{place} gives another medial mesh");
+        same(&results[0], &results[results.len() - 1], 0.0, &changed)?;
+    }
+    Ok(vec![])
+}
+
+/// Powers of two, so that normalised coordinates are the same bits.
+pub(super) fn scale(subject: &Subject<'_>) -> Answer {
+    let plain = subject.mesh(&corpus_shape("capsule"), 100)?;
+    for scale in [1.0 / 1024.0, 4096.0] {
+        let result = subject.mesh(&scaled_shape("capsule", scale), 100)?;
+        // Exception: a program is given the units of the input, and its arithmetic is its own.
+        let tolerance = if subject.external { ROUNDING } else { 0.0 };
+        let changed = format!("{scale} times the capsule gives another medial mesh");
+        same(&plain, &result, tolerance, &changed)?;
+    }
+    Ok(vec![])
+}
+
+fn same(first: &MedialMesh, second: &MedialMesh, tolerance: f64, otherwise: &str) -> Answer {
+    match difference(first, second, tolerance) {
+        None => Ok(vec![]),
+        Some(difference) => failed(format!("{otherwise}: {difference}")),
+    }
+}
+
+/// The first difference of two meshes; 0 tolerates none, not even that of the two zeros.
+pub(super) fn difference(
+    first: &MedialMesh,
+    second: &MedialMesh,
+    tolerance: f64,
+) -> Option<String> {
+    let [numbers, others] =
+        [first, second].map(|m| [m.spheres.len(), m.edges.len(), m.faces.len()]);
+    if numbers != others {
+        return Some(format!("{numbers:?} spheres, edges and faces, then {others:?}"));
+    }
+    for (id, (a, b)) in first.spheres.iter().zip(&second.spheres).enumerate() {
+        let [a, b] = [a, b].map(|s| [s.centre.x, s.centre.y, s.centre.z, s.radius]);
+        if a.into_iter().zip(b).any(|(a, b)| match tolerance {
+            0.0 => a.to_bits() != b.to_bits(),
+            _ => (a - b).abs() > tolerance,
+        }) {
+            return Some(format!("sphere {id} is {a:?}, then {b:?}"));
+        }
+    }
+    if (&first.edges, &first.faces) != (&second.edges, &second.faces) {
+        return Some("the spheres are the same, but edges or faces differ".into());
+    }
+    let contacts = tolerance > 0.0 || first.contacts == second.contacts;
+    (!contacts).then(|| "all is the same but the contact points".into())
+}
+
+/// So long after the flag was set a person still waits.
+const SOON: Duration = Duration::from_secs(10);
+/// Methods are at work by then, or done.
+const AT_WORK: Duration = Duration::from_millis(50);
+
+/// The flag is set before anything is asked.
+pub(super) fn cancelled_before(subject: &Subject<'_>) -> Answer {
+    cancelled(subject, Duration::ZERO)
+}
+
+/// The flag is set while the method works.
+pub(super) fn cancelled_within(subject: &Subject<'_>) -> Answer {
+    cancelled(subject, AT_WORK)
+}
+
+fn cancelled(subject: &Subject<'_>, delay: Duration) -> Answer {
+    let shape = corpus_shape("bracket");
+    // Substrates are nobody's method, and take what they take.
+    let _ = shape.view().initial();
+    let context = RunContext::default();
+    let flag = context.cancel_flag();
+    let begun = Instant::now();
+    if delay.is_zero() {
+        flag.store(true, Ordering::Relaxed);
+    } else {
+        thread::spawn(move || {
+            thread::sleep(delay);
+            flag.store(true, Ordering::Relaxed);
+        });
+    }
+    (subject.doing)("a cancelled run of the bracket");
+    let outcome = run_two_levels(subject, &shape, &context);
+    let late = begun.elapsed().saturating_sub(delay);
+    if late > SOON {
+        return failed(format!("it ended {:.0} s after it was cancelled", late.as_secs_f64()));
+    }
+    // Exception: a method that is quick enough may give its result all the same.
+    match outcome {
+        Ok(()) | Err(SimplifyError::Cancelled | SimplifyError::Unsupported { .. }) => Ok(vec![]),
+        Err(error) => failed(format!("a cancelled run is not `Cancelled`, but {error}")),
+    }
+}
+
+fn run_two_levels(
+    subject: &Subject<'_>,
+    shape: &Shape,
+    context: &RunContext,
+) -> Result<(), SimplifyError> {
+    let mut simplification = subject.method.prepare(shape, subject.params, context)?;
+    for count in [200, 20] {
+        let level = Level::Spheres(count);
+        let result = simplification.at(level)?;
+        sound(&result, level).map_err(SimplifyError::InvalidOutput)?;
+    }
+    Ok(())
+}
+
+/// A plain medial mesh, as a file holds it: without contact points.
+pub(super) fn given_initial(subject: &Subject<'_>) -> Answer {
+    let shape = corpus_shape("capsule");
+    let initial = shape.view().initial().map_err(|error| Miss::Skipped(error.to_string()))?;
+    let plain = MedialMesh { contacts: None, ..(*initial).clone() };
+    let back = *shape.normalisation();
+    let plain = plain.transformed(back.diagonal, |p| back.backward(p));
+    let shape = corpus_shape("capsule").with_initial(&plain);
+    let level = Level::Spheres(50);
+    (subject.doing)("50 spheres from a given medial mesh of the capsule");
+    let answer = subject
+        .method
+        .prepare(&shape, subject.params, &Default::default())
+        .and_then(|mut simplification| simplification.at(level));
+    match answer {
+        Ok(result) => {
+            sound(&result, level).map_err(Miss::Failed)?;
+            Ok(vec![])
+        }
+        // Exception: what a method needs beside a medial mesh, it may say.
+        Err(SimplifyError::Unsupported { why }) => Ok(vec![format!("unsupported: {why}")]),
+        Err(error) => Err(Miss::Failed(format!("from a given medial mesh: {error}"))),
+    }
+}
+
+/// Two boxes, a diagonal apart.
+pub(super) const PARTS: &str = "pair of boxes";
+/// A box whose thickness is a ten-thousandth of its length.
+pub(super) const PLATE: &str = "very thin plate";
+/// Four vertices: one Delaunay cell.
+pub(super) const TETRAHEDRON: &str = "tetrahedron";
+/// Eight vertices on one sphere: every triangulation of them is a degenerate one.
+pub(super) const CUBE: &str = "cube of eight vertices";
+
+/// A shape of the corpus, in units that are `scale` times smaller.
+pub(super) fn scaled_shape(name: &str, scale: f64) -> Shape {
+    let mut mesh = mesh(name);
+    mesh.vertices.iter_mut().for_each(|v| *v *= scale);
+    let report = surface::validate(&mesh).expect("the shapes of the corpus are solids");
+    Shape::new(name, &mesh, report, ShapeOptions::default()).expect("they have an extent")
+}
+
+/// A shape of the corpus.
+pub(super) fn corpus_shape(name: &str) -> Shape {
+    scaled_shape(name, 1.0)
+}
+
+fn mesh(name: &str) -> TriMesh {
+    match name {
+        PARTS => two(&built_in("box", 12)),
+        PLATE => {
+            let mut mesh = built_in("box", 12);
+            mesh.vertices.iter_mut().for_each(|v| v.z *= 3e-4);
+            mesh
+        }
+        TETRAHEDRON => solid(
+            &[[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]],
+            &[[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+        ),
+        CUBE => solid(
+            &[
+                [0, 0, 0],
+                [1, 0, 0],
+                [0, 1, 0],
+                [1, 1, 0],
+                [0, 0, 1],
+                [1, 0, 1],
+                [0, 1, 1],
+                [1, 1, 1],
+            ],
+            &[
+                [0, 2, 1],
+                [1, 2, 3],
+                [4, 5, 6],
+                [5, 7, 6],
+                [0, 1, 4],
+                [1, 5, 4],
+                [2, 6, 3],
+                [3, 6, 7],
+                [0, 4, 2],
+                [2, 4, 6],
+                [1, 3, 5],
+                [3, 7, 5],
+            ],
+        ),
+        id => {
+            let shape = medial_datasets::find(id).expect("a shape of the catalogue");
+            shape.mesh(shape.default_resolution)
+        }
+    }
+}
+
+fn built_in(id: &str, resolution: u32) -> TriMesh {
+    medial_datasets::find(id).expect("a shape of the catalogue").mesh(resolution)
+}
+
+/// A mesh and a copy of it, moved by twice its width.
+fn two(one: &TriMesh) -> TriMesh {
+    let (low, high) = one.bounding_box().expect("it has vertices");
+    let offset = Vec3::new(2.0 * (high.x - low.x), 0.0, 0.0);
+    let count = one.vertices.len() as u32;
+    let vertices = one.vertices.iter().copied();
+    let faces = one.faces.iter().copied();
+    TriMesh {
+        vertices: vertices.clone().chain(vertices.map(|v| v + offset)).collect(),
+        faces: faces.clone().chain(faces.map(|face| face.map(|i| i + count))).collect(),
+    }
+}
+
+fn solid(vertices: &[[i32; 3]], faces: &[[u32; 3]]) -> TriMesh {
+    let vertices = vertices.iter().map(|&v| Vec3::from_array(v.map(f64::from))).collect();
+    TriMesh { vertices, faces: faces.to_vec() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shapes_made_here_are_what_they_are_called() {
+        for (name, components, vertices) in
+            [(PARTS, 2, None), (PLATE, 1, None), (TETRAHEDRON, 1, Some(4)), (CUBE, 1, Some(8))]
+        {
+            let shape = corpus_shape(name);
+            assert_eq!(shape.expected_betti(), Some([components, 0, 0]), "{name}");
+            assert!(vertices.is_none_or(|count| shape.mesh().vertices.len() == count), "{name}");
+        }
+    }
+}
