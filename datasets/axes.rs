@@ -9,12 +9,10 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::glam::DVec2;
 
-use crate::profiles::{around_hole, triangle};
+use crate::profiles::around_hole;
 use crate::shapes::{
-    BLIND_HOLE, BLIND_HOLE_RADIUS, BOX_HALF, BRACKET, BRACKET_ELBOW, CAVITY, CHAIN, COIL,
-    CORE_HALF, ELLIPSOID, FILLETED_ELBOW, FRUSTUM, HOLE, HOLED_HALF, PAIR_BALL, PAIR_CAPSULE,
-    PLATE_HALF, RIB, RIB_HALF, ROD_APEX, ROD_HALF, ROD_RADIUS, ROUNDING, TORUS, TUBE, TUBE_RADIUS,
-    WEDGE, coil_centre, coil_length,
+    CAVITY, CHAIN, COIL, CORE_HALF, ELLIPSOID, HOLE, HOLED_HALF, PAIR_BALL, PAIR_CAPSULE, ROD_APEX,
+    ROD_HALF, ROD_RADIUS, ROUNDING, TORUS, TUBE, TUBE_RADIUS, coil_centre, coil_length,
 };
 use crate::solids::{Curve, sin_cos_of_part, unit_sphere};
 
@@ -125,7 +123,7 @@ fn disc_vertex(ring: u32, i: u32) -> u32 {
 /// The 13 sheets of a box with half sides `A > B > C`, from the core outward: the rectangle
 /// `|x| <= A - C, |y| <= B - C` at `r = C`, a trapezoid to each horizontal edge of the box, a
 /// triangle to each vertical one, all down to `r = 0`; `grown` is added to every radius.
-fn box_axis(half: Vec3, grown: f64) -> KnownAxis {
+pub(crate) fn box_axis(half: Vec3, grown: f64) -> KnownAxis {
     let signs = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let inner = signs.map(|[x, y]| {
         let centre = Vec3::new(x * (half.x - half.z), y * (half.y - half.z), 0.0);
@@ -146,23 +144,25 @@ fn box_axis(half: Vec3, grown: f64) -> KnownAxis {
     known(spheres, vec![], faces, 0.0)
 }
 
-pub(crate) fn cuboid() -> KnownAxis {
-    box_axis(BOX_HALF, 0.0)
-}
-
-pub(crate) fn plate() -> KnownAxis {
-    box_axis(PLATE_HALF, 0.0)
-}
-
 /// Growing a convex solid by a ball adds to the distance to its surface everywhere inside, and no
 /// point outside the core has two nearest points.
 pub(crate) fn rounded_box() -> KnownAxis {
     box_axis(CORE_HALF, ROUNDING)
 }
 
+/// A ball with its centre on the z axis.
+fn on_z(z: f64, radius: f64) -> Sphere {
+    Sphere::new(Vec3::new(0.0, 0.0, z), radius)
+}
+
+/// Balls along a curve, each joined to the next.
+fn path(spheres: Vec<Sphere>, tolerance: f64) -> KnownAxis {
+    let edges = (1..spheres.len() as u32).map(|i| [i - 1, i]).collect();
+    known(spheres, edges, vec![], tolerance)
+}
+
 pub(crate) fn capsule() -> KnownAxis {
-    let ends = [-ROD_HALF, ROD_HALF].map(|z| Sphere::new(Vec3::new(0.0, 0.0, z), ROD_RADIUS));
-    known(ends.to_vec(), vec![[0, 1]], vec![], 0.0)
+    path([-ROD_HALF, ROD_HALF].map(|z| on_z(z, ROD_RADIUS)).to_vec(), 0.0)
 }
 
 pub(crate) fn pair() -> KnownAxis {
@@ -199,7 +199,7 @@ pub(crate) fn rod() -> KnownAxis {
         }));
         faces.extend(disc_faces.iter().map(|face| face.map(|v| v + first)));
         edges.push([first, spheres.len() as u32]);
-        spheres.push(Sphere::new(Vec3::new(0.0, 0.0, side * ROD_APEX), 0.0));
+        spheres.push(on_z(side * ROD_APEX, 0.0));
     }
     edges.push([0, spheres.len() as u32 / 2]);
     known(spheres, edges, faces, 1.5 * sagitta(ROD_RADIUS, DISC_SECTORS * DISC_RINGS))
@@ -223,12 +223,11 @@ pub(crate) fn coil() -> KnownAxis {
     let (length, last) = (coil_length(), 2 * CIRCLE_EDGES);
     let along = (0..=last).map(|i| length * (f64::from(i) / f64::from(last) - 0.5));
     let spheres = along.map(|along| Sphere::new(coil_centre(along), pipe)).collect();
-    let edges = (0..last).map(|i| [i, i + 1]).collect();
     // The circle that osculates the helix has the radius R + (P / 2 pi)^2 / R.
     let rise = pitch / TAU;
     let osculating = radius + rise * rise / radius;
     let sides = TAU * osculating / (turns * (TAU * radius).hypot(pitch)) * f64::from(last);
-    known(spheres, edges, vec![], sagitta(osculating, sides as u32))
+    path(spheres, sagitta(osculating, sides as u32))
 }
 
 /// The sphere halfway between outer surface and cavity.
@@ -246,39 +245,6 @@ pub(crate) fn hollow_sphere() -> KnownAxis {
     let radius = (1.0 - CAVITY) / 2.0;
     let spheres = mesh.vertices.iter().map(|&v| Sphere::new(v * middle, radius)).collect();
     known(spheres, vec![], mesh.faces, middle * (1.0 - nearest))
-}
-
-/// Three sheets along the edges of the prism, and three below each end.
-pub(crate) fn wedge() -> KnownAxis {
-    let Vec3 { x: half, y: half_length, z: height } = WEDGE;
-    triangle(half, height).prism(0.0, half_length)
-}
-
-/// Flat middle sheets of the two plates, a sheet from the outer edge, and between them two parabolic cylinders
-/// about the reflex edge.
-pub(crate) fn bracket() -> KnownAxis {
-    BRACKET_ELBOW.profile().prism(BRACKET.y / 2.0, BRACKET.y / 2.0)
-}
-
-/// As of the bracket; the parabolas' focus is the centre of the fillet.
-pub(crate) fn fillet() -> KnownAxis {
-    FILLETED_ELBOW.profile().prism(BRACKET.y / 2.0, BRACKET.y / 2.0)
-}
-
-/// The middle sheets of plate and rib, joined below the rib by parabolic cylinders about both reflex edges.
-pub(crate) fn rib() -> KnownAxis {
-    RIB.profile().prism(0.0, RIB_HALF)
-}
-
-/// A segment and, at each end, a cone out to the crease.
-pub(crate) fn frustum() -> KnownAxis {
-    FRUSTUM.half_profile().revolved()
-}
-
-/// The middle disc of the bottom and the middle cylinder of the wall, joined by two surfaces of revolution of
-/// parabolas about the reflex edge, and cones to the creases.
-pub(crate) fn blind_hole() -> KnownAxis {
-    BLIND_HOLE.mirrored(BLIND_HOLE_RADIUS).revolved()
 }
 
 /// Parts of each side of the rectangles of the holed plate.
@@ -316,9 +282,7 @@ pub(crate) fn holed_plate() -> KnownAxis {
 
 /// The balls along the segment of their centres; radii are linear between neighbours.
 pub(crate) fn chain() -> KnownAxis {
-    let spheres = CHAIN.map(|(z, radius)| Sphere::new(Vec3::new(0.0, 0.0, z), radius)).to_vec();
-    let edges = (1..spheres.len() as u32).map(|i| [i - 1, i]).collect();
-    known(spheres, edges, vec![], 0.0)
+    path(CHAIN.map(|(z, radius)| on_z(z, radius)).to_vec(), 0.0)
 }
 
 /// The centre curve: its curvature is below one over the tube's radius, and it stays away from itself.
@@ -329,10 +293,9 @@ pub(crate) fn tube() -> KnownAxis {
     let shares = (0..=2 * parts).map(|i| f64::from(i) / f64::from(2 * parts));
     let points: Vec<Vec3> = shares.map(|share| place(start + (end - start) * share)).collect();
     let spheres = points.iter().step_by(2).map(|&point| Sphere::new(point, TUBE_RADIUS)).collect();
-    let edges = (0..parts).map(|i| [i, i + 1]).collect();
     let chords = points.windows(3).step_by(2);
     let sagging = chords.map(|p| p[1].distance(p[0].midpoint(p[2]))).fold(0.0, f64::max);
-    known(spheres, edges, vec![], 2.0 * sagging)
+    path(spheres, 2.0 * sagging)
 }
 
 // Medial axes of planar profiles, and of the prisms and solids of revolution over them.
@@ -558,7 +521,7 @@ impl Builder {
     /// The vertices of a revolved knot: one on the axis of revolution, else a circle.
     fn circle(&mut self, knot: &Knot) -> Vec<u32> {
         if knot.at.x < WELD {
-            return vec![self.vertex(Sphere::new(Vec3::new(0.0, 0.0, knot.at.y), knot.radius))];
+            return vec![self.vertex(on_z(knot.at.y, knot.radius))];
         }
         // A circle whose first vertex is known is known.
         let first = self.vertex(Sphere::new(Vec3::new(knot.at.x, 0.0, knot.at.y), knot.radius));
@@ -593,8 +556,6 @@ impl Builder {
     }
 
     fn finish(self, tolerance: f64) -> KnownAxis {
-        let Self { spheres, edges, faces } = self;
-        let mesh = MedialMesh::from_simplices(spheres, edges, faces).expect("a generated complex");
-        KnownAxis { mesh, tolerance }
+        known(self.spheres, self.edges, self.faces, tolerance)
     }
 }

@@ -1,10 +1,16 @@
 //! The list of built-in shapes.
 
+use medial::Vec3;
 use medial::surface::TriMesh;
 use serde::Serialize;
 
-use crate::axes::{self, KnownAxis};
-use crate::shapes::{self, diagonal_of};
+use crate::axes::{self, KnownAxis, box_axis};
+use crate::profiles::triangle;
+use crate::shapes::{
+    self, BLIND_HOLE, BLIND_HOLE_RADIUS, BOX_HALF, BRACKET, BRACKET_ELBOW, FILLETED_ELBOW, FRUSTUM,
+    PLATE_HALF, RIB, RIB_HALF, ROD_HALF, ROD_RADIUS, TUBE, TUBE_RADIUS, WEDGE, capsule_of,
+    diagonal_of, grid_box,
+};
 
 /// Finest resolution that is generated: some four million vertices.
 pub const MAX_RESOLUTION: u32 = 2000;
@@ -84,40 +90,40 @@ macro_rules! shapes {
 pub fn catalogue() -> Vec<BuiltIn> {
     shapes! {
         "sphere", "Sphere", betti [1, 0, 0], resolution 40 from 8,
-            shapes::sphere, Some(axes::sphere), shapes::SPHERE_DIAGONAL, true,
+            shapes::sphere, Some(axes::sphere), diagonal_of(Vec3::ONE), true,
             "Unit sphere on a geodesic grid; its axis is one point.";
         "ellipsoid", "Ellipsoid", betti [1, 0, 0], resolution 40 from 8,
-            shapes::ellipsoid, Some(axes::ellipsoid), shapes::ellipsoid_diagonal(), true,
+            shapes::ellipsoid, Some(axes::ellipsoid), diagonal_of(shapes::ELLIPSOID), true,
             "Semi-axes 1, 0.7, 0.45; its axis is a flat elliptic disc with a smooth rim.";
         "box", "Box", betti [1, 0, 0], resolution 30 from 8,
-            shapes::cuboid, Some(axes::cuboid), diagonal_of(shapes::BOX_HALF), true,
+            |edge| grid_box(BOX_HALF, edge), Some(|| box_axis(BOX_HALF, 0.0)), diagonal_of(BOX_HALF), true,
             "3 by 2 by 1 on regular grids, sharp edges sampled; 13 flat sheets, known exactly.";
         "rounded-box", "Rounded box", betti [1, 0, 0], resolution 32 from 12,
-            shapes::rounded_box, Some(axes::rounded_box), diagonal_of(shapes::rounded_half()), true,
+            shapes::rounded_box, Some(axes::rounded_box), diagonal_of(shapes::ROUNDED_EXTENT), true,
             "2 by 1.2 by 0.5 grown by 0.25; the axis of the core box with larger radii.";
         "plate", "Thin plate", betti [1, 0, 0], resolution 40 from 25,
-            shapes::plate, Some(axes::plate), diagonal_of(shapes::PLATE_HALF), true,
+            |edge| grid_box(PLATE_HALF, edge), Some(|| box_axis(PLATE_HALF, 0.0)), diagonal_of(PLATE_HALF), true,
             "2 by 1.5 by 0.1: nearly all of the axis is one sheet, and spikes are thin.";
         "bracket", "L-bracket", betti [1, 0, 0], resolution 32 from 8,
-            shapes::bracket, Some(axes::bracket), shapes::bracket_diagonal(), true,
+            shapes::bracket, Some(|| BRACKET_ELBOW.profile().prism(BRACKET.y / 2.0, BRACKET.y / 2.0)), diagonal_of(shapes::BRACKET_EXTENT), true,
             "Two plates of 0.4 at a right angle: convex edges and one reflex edge.";
         "capsule", "Capsule", betti [1, 0, 0], resolution 36 from 10,
-            shapes::capsule, Some(axes::capsule), shapes::capsule_diagonal(), true,
+            |edge| capsule_of(ROD_HALF, ROD_RADIUS, edge), Some(axes::capsule), diagonal_of(shapes::ROD_EXTENT), true,
             "Cylinder of radius 0.4 with round ends; its axis is one segment.";
         "rod", "Cone-ended rod", betti [1, 0, 0], resolution 36 from 10,
-            shapes::rod, Some(axes::rod), shapes::rod_diagonal(), true,
+            shapes::rod, Some(axes::rod), diagonal_of(shapes::ROD_EXTENT), true,
             "Cylinder of radius 0.4 with conical ends of 45 degrees; a segment and two cones.";
         "pair", "Ball and capsule", betti [2, 0, 0], resolution 50 from 20,
-            shapes::pair, Some(axes::pair), shapes::pair_diagonal(), true,
+            shapes::pair, Some(axes::pair), diagonal_of(shapes::PAIR_EXTENT), true,
             "Two separate bodies: the axis is a point and a segment.";
         "torus", "Torus", betti [1, 1, 0], resolution 36 from 16,
-            shapes::torus, Some(axes::torus), shapes::torus_diagonal(), true,
+            shapes::torus, Some(axes::torus), diagonal_of(shapes::TORUS_EXTENT), true,
             "Radii 1 and 0.4 on a regular grid; its axis is a circle.";
         "coil", "Coiled pipe", betti [1, 0, 0], resolution 34 from 28,
-            shapes::coil, Some(axes::coil), shapes::coil_diagonal(), true,
+            shapes::coil, Some(axes::coil), diagonal_of(shapes::COIL_EXTENT), true,
             "Two turns of a pipe with round ends and a narrow gap; its axis is a helix.";
         "hollow-sphere", "Hollow sphere", betti [1, 0, 1], resolution 36 from 16,
-            shapes::hollow_sphere, Some(axes::hollow_sphere), shapes::SPHERE_DIAGONAL, true,
+            shapes::hollow_sphere, Some(axes::hollow_sphere), diagonal_of(Vec3::ONE), true,
             "Between spheres of radii 1 and 0.5; its axis is the sphere of radius 0.75.";
         "double-torus", "Double torus", betti [1, 2, 0], resolution 44 from 30,
             shapes::double_torus, None, shapes::DOUBLE_TORUS_DIAGONAL, true,
@@ -129,28 +135,28 @@ pub fn catalogue() -> Vec<BuiltIn> {
             shapes::blob, None, shapes::BLOB_DIAGONAL, true,
             "A smooth body with head, tail and four limbs, from an implicit function.";
         "wedge", "Wedge", betti [1, 0, 0], resolution 30 from 8,
-            shapes::wedge, Some(axes::wedge), shapes::wedge_diagonal(), false,
+            shapes::wedge, Some(|| triangle(WEDGE.x, WEDGE.z).prism(0.0, WEDGE.y)), diagonal_of(shapes::WEDGE_EXTENT), false,
             "Triangular prism with edges of 40 and 70 degrees; nine flat sheets, known exactly.";
         "frustum", "Cone frustum", betti [1, 0, 0], resolution 34 from 10,
-            shapes::frustum, Some(axes::frustum), shapes::frustum_diagonal(), false,
+            shapes::frustum, Some(|| FRUSTUM.half_profile().revolved()), diagonal_of(shapes::FRUSTUM_EXTENT), false,
             "Radii 0.8 and 0.4, height 2, sharp creases; its axis is a segment and two cones.";
         "chain", "Chain of balls", betti [1, 0, 0], resolution 40 from 12,
-            shapes::chain, Some(axes::chain), shapes::chain_diagonal(), false,
+            shapes::chain, Some(axes::chain), diagonal_of(shapes::CHAIN_EXTENT), false,
             "Hull of four balls in a row; its axis is a segment, the radius linear between centres.";
         "tube", "Swept tube", betti [1, 0, 0], resolution 44 from 20,
-            shapes::tube, Some(axes::tube), shapes::tube_diagonal(), false,
+            |edge| TUBE.tube(TUBE_RADIUS, edge), Some(axes::tube), diagonal_of(shapes::TUBE_EXTENT), false,
             "Radius 0.22 about a curve of varying curvature, round ends; its axis is the curve.";
         "fillet", "Filleted bracket", betti [1, 0, 0], resolution 32 from 12,
-            shapes::fillet, Some(axes::fillet), shapes::bracket_diagonal(), false,
+            shapes::fillet, Some(|| FILLETED_ELBOW.profile().prism(BRACKET.y / 2.0, BRACKET.y / 2.0)), diagonal_of(shapes::BRACKET_EXTENT), false,
             "The bracket with a fillet of radius 0.3 in place of its reflex edge.";
         "rib", "Plate with a rib", betti [1, 0, 0], resolution 40 from 16,
-            shapes::rib, Some(axes::rib), shapes::rib_diagonal(), false,
+            shapes::rib, Some(|| RIB.profile().prism(0.0, RIB_HALF)), diagonal_of(shapes::RIB_EXTENT), false,
             "A plate of 0.3 with a thin rib of 0.12 across it: two reflex edges close to each other.";
         "holed-plate", "Plate with a hole", betti [1, 1, 0], resolution 40 from 16,
             shapes::holed_plate, Some(axes::holed_plate), diagonal_of(shapes::HOLED_HALF), false,
             "2.4 by 0.3 by 1.8 with a round hole of radius 0.5 through it, genus 1.";
         "blind-hole", "Cylinder with a blind hole", betti [1, 0, 0], resolution 28 from 10,
-            shapes::blind_hole, Some(axes::blind_hole), shapes::blind_hole_diagonal(), false,
+            shapes::blind_hole, Some(|| BLIND_HOLE.mirrored(BLIND_HOLE_RADIUS).revolved()), diagonal_of(shapes::BLIND_HOLE_EXTENT), false,
             "Radius 0.8 and height 1.2, a coaxial hole of radius 0.4 down to 0.45 above the bottom.";
     }
 }

@@ -7,12 +7,10 @@ use std::str::FromStr;
 use medial::Vec3;
 use medial::geometry::predicates::projection_axis;
 use medial::geometry::triangles_meet;
-use medial::surface::{Normalisation, TriMesh};
+use medial::surface::{Normalisation, TriMesh, validate};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
-
-use crate::implicit::first_defect;
 
 /// What noise does to a mesh, and what its magnitude is a fraction of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -69,8 +67,8 @@ pub enum NoiseError {
         /// What was asked.
         magnitude: f64,
     },
-    /// The mesh is not the closed, oriented manifold that vertices can be dropped from.
-    #[error("no vertex can be dropped: {0}; medial repair may help")]
+    /// The mesh does not bound a solid.
+    #[error("no vertex can be dropped: {0}")]
     NotManifold(String),
     /// No further vertex can go without a crossing, a fold or a loss of topology.
     #[error(
@@ -194,9 +192,7 @@ pub(crate) fn without_share(mesh: &TriMesh, share: f64, seed: u64) -> Result<Tri
     if asked == 0 {
         return Ok(mesh.clone());
     }
-    if let Some(defect) = first_defect(mesh) {
-        return Err(NoiseError::NotManifold(defect));
-    }
+    validate(mesh).map_err(|error| NoiseError::NotManifold(error.to_string()))?;
     let mut surface = Surface::new(mesh);
     let mut waiting = VecDeque::from(shuffled(vertices, seed));
     // Ends when every vertex that waits was refused since the last one that went.
@@ -365,7 +361,7 @@ fn smallest_sine([a, b, c]: [Vec3; 3]) -> f64 {
     (b - a).cross(c - a).length() / (sides[1] * sides[2])
 }
 
-fn mean_edge(mesh: &TriMesh) -> f64 {
+pub(crate) fn mean_edge(mesh: &TriMesh) -> f64 {
     let perimeters = (0..mesh.faces.len()).map(|face| {
         let [a, b, c]: [Vec3; 3] = mesh.triangle(face);
         a.distance(b) + b.distance(c) + c.distance(a)

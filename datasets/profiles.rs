@@ -6,11 +6,9 @@ use medial::surface::TriMesh;
 
 use crate::axes::{Profile, Site};
 use crate::shapes::HOLED_HALF;
-use crate::solids::{parts, split};
+use crate::solids::{between, parts, share, split};
 
-// Profiles of the built-in prisms and solids of revolution, with their medial axes in closed form.
-//
-// Each head names the junctions: the points with three nearest sites.
+// Medial axes. Each head names the junctions: the points with three nearest sites.
 
 fn point(x: f64, z: f64) -> DVec2 {
     DVec2::new(x, z)
@@ -227,8 +225,7 @@ pub(crate) fn strip(lines: &[Across], layers: u32, closed: bool) -> Flat {
     let mut mesh = TriMesh::default();
     for &[outer, inner] in lines {
         mesh.vertices.extend((0..=layers).map(|k| {
-            let t = f64::from(k) / f64::from(layers);
-            let [x, z] = [0, 1].map(|axis| outer[axis] * (1.0 - t) + inner[axis] * t);
+            let [x, z] = [0, 1].map(|i| between(outer[i], inner[i], share(k, layers)));
             Vec3::new(x, 0.0, z)
         }));
     }
@@ -284,22 +281,13 @@ pub(crate) fn around_hole(radius: f64, half: [f64; 2], sides: [u32; 2]) -> Vec<A
     let mut lines = Vec::new();
     for (from, to, start, end, n) in quarters {
         for i in 0..n {
-            let t = f64::from(i) / f64::from(n);
+            let t = share(i, n);
             let (sin, cos) = between(from, to, t).sin_cos();
             let outer = [0, 1].map(|axis| between(start[axis], end[axis], t));
             lines.push([outer, [radius * cos, radius * sin]]);
         }
     }
     lines
-}
-
-/// The weighted sum meets both ends exactly.
-fn between(a: f64, b: f64, t: f64) -> f64 {
-    a * (1.0 - t) + b * t
-}
-
-fn share(i: u32, n: u32) -> f64 {
-    f64::from(i) / f64::from(n)
 }
 
 /// Lines across an elbow with a fillet, from the top of its leg to the end of its foot.
@@ -340,8 +328,7 @@ impl Flat {
         // Vertex of each layer: all of the profile in the first and the last, its boundary between.
         let mut layer_ids: Vec<Vec<u32>> = Vec::new();
         for layer in 0..=layers {
-            let t = f64::from(layer) / f64::from(layers);
-            let y = (middle - half) * (1.0 - t) + (middle + half) * t;
+            let y = between(middle - half, middle + half, share(layer, layers));
             let ids = (0..flat.vertices.len()).map(|v| {
                 if layer > 0 && layer < layers && !side.on_it[v] {
                     return u32::MAX;

@@ -81,7 +81,35 @@ pub(crate) const TUBE: Curve = Curve {
 };
 pub(crate) const TUBE_RADIUS: f64 = 0.22;
 
-pub(crate) const SPHERE_DIAGONAL: f64 = 3.464_101_615_137_754_6;
+// Half the sides of bounding boxes, where they are not the dimensions themselves.
+
+pub(crate) const ROUNDED_EXTENT: Vec3 =
+    Vec3::new(CORE_HALF.x + ROUNDING, CORE_HALF.y + ROUNDING, CORE_HALF.z + ROUNDING);
+pub(crate) const BRACKET_EXTENT: Vec3 =
+    Vec3::new(BRACKET.x / 2.0, BRACKET.y / 2.0, BRACKET.z / 2.0);
+/// The cones of the rod are as high as the hemispheres of the capsule.
+pub(crate) const ROD_EXTENT: Vec3 = Vec3::new(ROD_RADIUS, ROD_RADIUS, ROD_APEX);
+/// From the far side of the ball to that of the capsule; the capsule is longer than the ball is thick.
+pub(crate) const PAIR_EXTENT: Vec3 = Vec3::new(
+    (PAIR_CAPSULE.0.x + PAIR_CAPSULE.2 - (PAIR_BALL.0.x - PAIR_BALL.1)) / 2.0,
+    PAIR_BALL.1,
+    PAIR_CAPSULE.1 + PAIR_CAPSULE.2,
+);
+pub(crate) const TORUS_EXTENT: Vec3 = Vec3::new(TORUS.0 + TORUS.1, TORUS.0 + TORUS.1, TORUS.1);
+pub(crate) const COIL_EXTENT: Vec3 =
+    Vec3::new(COIL.0 + COIL.3, COIL.0 + COIL.3, COIL.1 * COIL.2 / 2.0 + COIL.3);
+pub(crate) const WEDGE_EXTENT: Vec3 = Vec3::new(WEDGE.x, WEDGE.y, WEDGE.z / 2.0);
+pub(crate) const RIB_EXTENT: Vec3 = Vec3::new(RIB.half, RIB_HALF, RIB.height / 2.0);
+pub(crate) const FRUSTUM_EXTENT: Vec3 = Vec3::new(FRUSTUM.below, FRUSTUM.below, FRUSTUM.half);
+pub(crate) const BLIND_HOLE_EXTENT: Vec3 =
+    Vec3::new(BLIND_HOLE_RADIUS, BLIND_HOLE_RADIUS, BLIND_HOLE.height / 2.0);
+/// The third ball is the largest.
+pub(crate) const CHAIN_EXTENT: Vec3 =
+    Vec3::new(CHAIN[2].1, CHAIN[2].1, (CHAIN[0].0 + CHAIN[0].1 - (CHAIN[3].0 - CHAIN[3].1)) / 2.0);
+/// The ends reach farthest along x; the crests of both waves farthest across.
+pub(crate) const TUBE_EXTENT: Vec3 =
+    Vec3::new(1.6 + TUBE_RADIUS, 0.4 + TUBE_RADIUS, 0.15 + TUBE_RADIUS);
+
 /// Bounding-box diagonals of the blended shapes, as measured on fine meshes.
 pub(crate) const DOUBLE_TORUS_DIAGONAL: f64 = 4.017;
 pub(crate) const FRAME_DIAGONAL: f64 = 3.166;
@@ -89,72 +117,6 @@ pub(crate) const BLOB_DIAGONAL: f64 = 3.189;
 
 pub(crate) fn diagonal_of(half: Vec3) -> f64 {
     2.0 * half.length()
-}
-
-pub(crate) fn rounded_half() -> Vec3 {
-    CORE_HALF + Vec3::splat(ROUNDING)
-}
-
-pub(crate) fn ellipsoid_diagonal() -> f64 {
-    diagonal_of(ELLIPSOID)
-}
-
-pub(crate) fn bracket_diagonal() -> f64 {
-    BRACKET.length()
-}
-
-pub(crate) fn capsule_diagonal() -> f64 {
-    diagonal_of(Vec3::new(ROD_RADIUS, ROD_RADIUS, ROD_HALF + ROD_RADIUS))
-}
-
-pub(crate) fn rod_diagonal() -> f64 {
-    diagonal_of(Vec3::new(ROD_RADIUS, ROD_RADIUS, ROD_APEX))
-}
-
-pub(crate) fn pair_diagonal() -> f64 {
-    let (ball, radius) = PAIR_BALL;
-    let (centre, half, capsule_radius) = PAIR_CAPSULE;
-    let length = centre.x + capsule_radius - (ball.x - radius);
-    Vec3::new(length, 2.0 * radius, 2.0 * radius.max(half + capsule_radius)).length()
-}
-
-pub(crate) fn torus_diagonal() -> f64 {
-    let (major, minor) = TORUS;
-    diagonal_of(Vec3::new(major + minor, major + minor, minor))
-}
-
-pub(crate) fn coil_diagonal() -> f64 {
-    let (radius, pitch, turns, pipe) = COIL;
-    let wide = radius + pipe;
-    diagonal_of(Vec3::new(wide, wide, pitch * turns / 2.0 + pipe))
-}
-
-pub(crate) fn wedge_diagonal() -> f64 {
-    Vec3::new(2.0 * WEDGE.x, 2.0 * WEDGE.y, WEDGE.z).length()
-}
-
-pub(crate) fn rib_diagonal() -> f64 {
-    Vec3::new(2.0 * RIB.half, 2.0 * RIB_HALF, RIB.height).length()
-}
-
-pub(crate) fn frustum_diagonal() -> f64 {
-    diagonal_of(Vec3::new(FRUSTUM.below, FRUSTUM.below, FRUSTUM.half))
-}
-
-pub(crate) fn blind_hole_diagonal() -> f64 {
-    let wide = 2.0 * BLIND_HOLE_RADIUS;
-    Vec3::new(wide, wide, BLIND_HOLE.height).length()
-}
-
-pub(crate) fn chain_diagonal() -> f64 {
-    let widest = CHAIN.iter().map(|ball| ball.1).fold(0.0, f64::max);
-    let (top, bottom) = (CHAIN[0], CHAIN[CHAIN.len() - 1]);
-    Vec3::new(2.0 * widest, 2.0 * widest, top.0 + top.1 - (bottom.0 - bottom.1)).length()
-}
-
-/// The ends reach farthest along x; the crests of both waves farthest across.
-pub(crate) fn tube_diagonal() -> f64 {
-    diagonal_of(Vec3::new(1.6, 0.4, 0.15) + Vec3::splat(TUBE_RADIUS))
 }
 
 pub(crate) fn sphere(edge: f64) -> TriMesh {
@@ -170,17 +132,9 @@ pub(crate) fn ellipsoid(edge: f64) -> TriMesh {
     mesh
 }
 
-fn grid_box(half: Vec3, edge: f64) -> TriMesh {
+pub(crate) fn grid_box(half: Vec3, edge: f64) -> TriMesh {
     let ticks = half.to_array().map(|h| divided(&[-h, h], edge));
     boundary(&ticks, |_| true, |p| p)
-}
-
-pub(crate) fn cuboid(edge: f64) -> TriMesh {
-    grid_box(BOX_HALF, edge)
-}
-
-pub(crate) fn plate(edge: f64) -> TriMesh {
-    grid_box(PLATE_HALF, edge)
 }
 
 /// A grid on the box of the same size, pushed onto the rounded box along the direction from the
@@ -264,10 +218,6 @@ pub(crate) fn capsule_of(half: f64, radius: f64, edge: f64) -> TriMesh {
 fn stacks(half: f64, radius: f64, cap_steps: u32) -> u32 {
     let side = TAU * radius / f64::from(SECTORS * cap_steps);
     parts(2.0 * half, side, 1)
-}
-
-pub(crate) fn capsule(edge: f64) -> TriMesh {
-    capsule_of(ROD_HALF, ROD_RADIUS, edge)
 }
 
 pub(crate) fn rod(edge: f64) -> TriMesh {
@@ -359,10 +309,6 @@ pub(crate) fn chain(edge: f64) -> TriMesh {
         pieces.push(zone);
     }
     surface(&rings(&pieces, edge))
-}
-
-pub(crate) fn tube(edge: f64) -> TriMesh {
-    TUBE.tube(TUBE_RADIUS, edge)
 }
 
 pub(crate) fn double_torus(edge: f64) -> TriMesh {

@@ -15,11 +15,7 @@ pub(crate) fn divided(breaks: &[f64], edge: f64) -> Vec<f64> {
     let mut ticks = vec![breaks[0]];
     for pair in breaks.windows(2) {
         let n = parts(pair[1] - pair[0], edge, 1);
-        // The weighted sum meets both breaks exactly.
-        ticks.extend((1..=n).map(|k| {
-            let t = f64::from(k) / f64::from(n);
-            pair[0] * (1.0 - t) + pair[1] * t
-        }));
+        ticks.extend((1..=n).map(|k| between(pair[0], pair[1], share(k, n))));
     }
     ticks
 }
@@ -257,7 +253,7 @@ fn around((count, first): (u32, u32), i: u32) -> u32 {
 /// A cap of `steps` rings from a pole outward; `profile` gives radius and z at `t` in 0..=1.
 pub(crate) fn cap(steps: u32, profile: impl Fn(f64) -> (f64, f64)) -> Vec<Ring> {
     let rings = (0..=steps).map(|k| {
-        let (radius, z) = profile(f64::from(k) / f64::from(steps));
+        let (radius, z) = profile(share(k, steps));
         Ring { count: if k == 0 { 1 } else { SECTORS * k }, radius, z }
     });
     rings.collect()
@@ -293,11 +289,9 @@ impl Piece {
     /// Radius and z at a share of the way.
     pub(crate) fn at(&self, t: f64) -> (f64, f64) {
         match *self {
-            Self::Line { from, to } => {
-                (from.0 * (1.0 - t) + to.0 * t, from.1 * (1.0 - t) + to.1 * t)
-            }
+            Self::Line { from, to } => (between(from.0, to.0, t), between(from.1, to.1, t)),
             Self::Zone { z, radius, from, to } => {
-                let (sin, cos) = (from * (1.0 - t) + to * t).sin_cos();
+                let (sin, cos) = between(from, to, t).sin_cos();
                 (radius * sin, z + radius * cos)
             }
         }
@@ -317,7 +311,7 @@ pub(crate) fn rings(pieces: &[Piece], edge: f64) -> Vec<Ring> {
     let mut points = vec![pieces[0].at(0.0)];
     for piece in pieces {
         let n = parts(piece.length(), edge, 1);
-        points.extend((1..=n).map(|k| piece.at(f64::from(k) / f64::from(n))));
+        points.extend((1..=n).map(|k| piece.at(share(k, n))));
     }
     let last = points.len() - 1;
     let rings = points.into_iter().enumerate().map(|(i, (radius, z))| match i {
@@ -326,6 +320,16 @@ pub(crate) fn rings(pieces: &[Piece], edge: f64) -> Vec<Ring> {
         _ => Ring { count: SECTORS * parts(TAU * radius / f64::from(SECTORS), edge, 1), radius, z },
     });
     rings.collect()
+}
+
+/// The weighted sum meets both ends exactly, for shares from 0 to 1.
+pub(crate) fn between(a: f64, b: f64, share: f64) -> f64 {
+    a * (1.0 - share) + b * share
+}
+
+/// `i` of `n` equal parts.
+pub(crate) fn share(i: u32, n: u32) -> f64 {
+    f64::from(i) / f64::from(n)
 }
 
 /// Sine and cosine of `i` of `n` equal parts of a full turn.
@@ -355,8 +359,7 @@ const LENGTH_STEPS: u32 = 4000;
 
 impl Curve {
     fn parameter(&self, step: f64) -> f64 {
-        let t = step / f64::from(LENGTH_STEPS);
-        self.start * (1.0 - t) + self.end * t
+        between(self.start, self.end, step / f64::from(LENGTH_STEPS))
     }
 
     /// Arc length from the start to each step, by the midpoint rule.
