@@ -8,7 +8,7 @@
 //!    than the radius of the union's balls there if that is less (file `bisection.rs`).
 //! 2. Marching tetrahedra: a closed manifold with its vertices on the boundary (file `march.rs`).
 //! 3. Edges shorter than a quarter of the tetrahedron's edge are contracted: a closed manifold stays one,
-//!    and vertices stay on the boundary ([`contract_short_edges_while`]).
+//!    and vertices stay on the boundary ([`contract_short_edges`]).
 //!
 //! # What the tolerance means
 //!
@@ -34,7 +34,7 @@ use rayon::prelude::*;
 use super::{MedialMesh, MedialUnion, UnionError};
 use crate::Vec3;
 use crate::geometry::hash::splitmix;
-use crate::surface::{Folds, TriMesh, contract_short_edges_while};
+use crate::surface::{Folds, TriMesh, contract_short_edges};
 
 /// The boundary surface of a union, see [`union_surface`].
 #[derive(Clone, Debug, PartialEq)]
@@ -194,7 +194,7 @@ pub fn union_surface_while(
         return Err(ContourError::TooThin { smallest, feasible });
     }
     let limits: Vec<f64> = edges.iter().map(|length| CONTRACTED * length).collect();
-    let contracted = contract_short_edges_while(&raw, &limits, Folds::Refused, go_on);
+    let contracted = contract_short_edges(&raw, &limits, Folds::Refused, go_on);
     let mesh_of = contracted.ok_or(ContourError::Cancelled)?.mesh;
     let lost = mesh.spheres.iter().filter(|m| m.radius < smallest).count();
     Ok(UnionSurface { mesh: mesh_of, tetrahedra: grid.leaves.len(), lost, smallest })

@@ -198,8 +198,7 @@ impl Evidence<'_> {
             intersecting_pairs: found.pairs,
             intersecting_pairs_complete: found.complete,
             degenerate_faces: found.degenerate_faces,
-            diagonal: Normalisation::of(self.mesh)
-                .map_or_else(|| raw_diagonal(self.mesh), |n| n.diagonal),
+            diagonal: raw_diagonal(self.mesh),
             boundary_edges: t.boundary_edges,
             nonmanifold_edges: t.nonmanifold_edges,
             nonmanifold_vertices: t.nonmanifold_vertices,

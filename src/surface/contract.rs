@@ -44,9 +44,9 @@ pub enum Folds {
 /// Contracts the edges of a closed manifold that are shorter than the limits of both ends.
 ///
 /// `limits` has one length for each vertex, in the unit of the mesh. No vertex moves farther than its
-/// limit, so the surface moves no farther than the largest; it stays closed and
-/// manifold with the same genus. Components that are smaller than the limits disappear. Serial;
-/// `O(F log F)`.
+/// limit, so the surface moves no farther than the largest; it stays closed and manifold with the same
+/// genus. Components that are smaller than the limits disappear. `go_on` runs every few thousand
+/// edges; the result is `None` once it returns false. Serial; `O(F log F)`.
 ///
 /// ```
 /// use medial::Vec3;
@@ -60,22 +60,13 @@ pub enum Folds {
 ///         [1, 3, 2], [1, 4, 3], [1, 5, 4], [1, 2, 5],
 ///     ],
 /// };
-/// let whole = contract_short_edges(&split, &[1e-6; 6], Folds::Ignored);
+/// let whole = contract_short_edges(&split, &[1e-6; 6], Folds::Ignored, || true).unwrap();
 /// assert_eq!((whole.mesh.vertices.len(), whole.mesh.faces.len()), (5, 6));
 /// ```
 ///
 /// # Panics
 /// If there are fewer limits than vertices, or a face names a vertex that does not exist.
-pub fn contract_short_edges(mesh: &TriMesh, limits: &[f64], folds: Folds) -> Contraction {
-    contract_short_edges_while(mesh, limits, folds, || true).expect("nobody stops it")
-}
-
-/// [`contract_short_edges`] for as long as `go_on` says so, which is asked every few thousand edges;
-/// `None` if it was stopped.
-///
-/// # Panics
-/// As [`contract_short_edges`].
-pub fn contract_short_edges_while(
+pub fn contract_short_edges(
     mesh: &TriMesh,
     limits: &[f64],
     folds: Folds,
@@ -86,12 +77,12 @@ pub fn contract_short_edges_while(
     let mut contracted = 0;
     loop {
         let mut refused = Vec::new();
-        let (before, mut asked) = (contracted, 0);
+        let (before, mut popped) = (contracted, 0);
         while let Some(Reverse(edge)) = queue.pop() {
-            if asked % 4096 == 0 && !go_on() {
+            if popped % 4096 == 0 && !go_on() {
                 return None;
             }
-            asked += 1;
+            popped += 1;
             let (_, a, b) = edge;
             if !surface.is_edge(a, b) {
                 continue;
@@ -252,10 +243,8 @@ impl<'a> Shrinking<'a> {
                 continue;
             }
             let corners = [v, others[0], others[1], others[2]];
-            let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-            let is_short =
-                |&(i, j): &(usize, usize)| self.short_edge(corners[i], corners[j]).is_some();
-            if pairs.iter().all(is_short) {
+            let mut pairs = (0..4).flat_map(|j| (0..j).map(move |i| [corners[i], corners[j]]));
+            if pairs.all(|[a, b]| self.short_edge(a, b).is_some()) {
                 corners.into_iter().for_each(|c| self.stars[c as usize].clear());
                 dropped += 1;
             }
@@ -294,16 +283,6 @@ impl From<&PowerCrust> for TriMesh {
 /// rounding, which flat groups of balls amplify to some 1e-8 of the diagonal, any value well below
 /// the distance of samples will do. `O(n log n)`.
 pub fn crust_surface(crust: &PowerCrust, coincident: f64) -> Contraction {
-    crust_surface_while(crust, coincident, || true).expect("nobody stops it")
-}
-
-/// [`crust_surface`] for as long as `go_on` says so, which is asked every few thousand edges;
-/// `None` if it was stopped.
-pub fn crust_surface_while(
-    crust: &PowerCrust,
-    coincident: f64,
-    go_on: impl FnMut() -> bool,
-) -> Option<Contraction> {
     let limits = vec![coincident; crust.corners().len()];
-    contract_short_edges_while(&crust.into(), &limits, Folds::Ignored, go_on)
+    contract_short_edges(&crust.into(), &limits, Folds::Ignored, || true).expect("never stopped")
 }

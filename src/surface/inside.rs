@@ -218,31 +218,17 @@ fn contains(triangle: [Vec3; 3], p: Vec3) -> bool {
         // A segment or a point: in the box, so it holds `p` if `p` is on its line along every axis.
         None => {
             let Bounds { lo, hi } = Bounds::of_points(triangle);
-            (0..3).all(|axis| {
-                orient2d(
-                    project(lo_end(triangle), axis),
-                    project(hi_end(triangle), axis),
-                    project(p, axis),
-                )
-                .is_zero()
-            }) && p.cmpge(lo).all()
-                && p.cmple(hi).all()
+            let mut ends = triangle;
+            ends.sort_by(|p, q| {
+                p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z))
+            });
+            let is_on_line = (0..3).all(|axis| {
+                let [a, b, p] = [ends[0], ends[2], p].map(|v| project(v, axis));
+                orient2d(a, b, p).is_zero()
+            });
+            is_on_line && p.cmpge(lo).all() && p.cmple(hi).all()
         }
     }
-}
-
-/// The lexicographically smallest corner: an end of a collapsed triangle.
-fn lo_end([a, b, c]: [Vec3; 3]) -> Vec3 {
-    [b, c].into_iter().fold(a, |p, q| if lexicographic(q, p).is_lt() { q } else { p })
-}
-
-/// The lexicographically largest corner: the other end.
-fn hi_end([a, b, c]: [Vec3; 3]) -> Vec3 {
-    [b, c].into_iter().fold(a, |p, q| if lexicographic(q, p).is_gt() { q } else { p })
-}
-
-fn lexicographic(p: Vec3, q: Vec3) -> std::cmp::Ordering {
-    p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z))
 }
 
 /// Signed distances of points to one surface: negative inside, zero on it, positive outside, in the

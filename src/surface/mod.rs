@@ -29,10 +29,7 @@ use serde::Serialize;
 use crate::Vec3;
 
 pub use closest::{BvhError, Closest, Feature, TriangleBvh};
-pub use contract::{
-    Contraction, Folds, contract_short_edges, contract_short_edges_while, crust_surface,
-    crust_surface_while,
-};
+pub use contract::{Contraction, Folds, contract_short_edges, crust_surface};
 pub use inside::{InsideTest, Side, SignedDistance};
 pub use mend::{Components, MendOptions, mend, mend_bytes};
 pub use mesh::{Normalisation, TriMesh, write};
@@ -141,26 +138,6 @@ pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
     let examined = load(path).map_err(|fault| in_file(path, fault))?;
     let refused = examined.fault.map(|fault| in_file(path, fault));
     Ok(Inspection { report: examined.report, refused })
-}
-
-/// [`inspect`] for the content of a file.
-///
-/// # Errors
-/// As [`inspect`], without the name of a file.
-///
-/// ```
-/// use medial::surface::{Fault, Format, inspect_bytes};
-///
-/// let triangle = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-/// let inspection = inspect_bytes(triangle, Format::Off)?;
-/// assert_eq!(inspection.report.boundary_edges, 3);
-/// let refused = inspection.refused.map(|error| error.fault);
-/// assert!(matches!(refused, Some(Fault::Open { edges: 3, .. })));
-/// # Ok::<(), medial::surface::SurfaceError>(())
-/// ```
-pub fn inspect_bytes(bytes: &[u8], format: Format) -> Result<Inspection, SurfaceError> {
-    let examined = examine(bytes, format)?;
-    Ok(Inspection { report: examined.report, refused: examined.fault.map(SurfaceError::from) })
 }
 
 /// [`read`] for arrays: the same repairs, the same orientation, the same refusals.

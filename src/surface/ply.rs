@@ -11,12 +11,14 @@
 //! In a text file every element has a line of its own. Values behind the declared ones are ignored, as are other
 //! elements and properties, and lines or bytes after the last element.
 
+use std::fmt;
+
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
-use super::read::{Cursor, count, rename};
+use super::read::{Cursor, count};
 use super::report::{Fault, Place};
 
 /// The values of one row that matter here, each 0 where the header does not declare it.
@@ -164,9 +166,8 @@ impl Ply<'_> {
             };
             for row in 0..element.count {
                 if self.encoding == Encoding::Ascii {
-                    let values = text_row(&mut cursor, element)
-                        .map_err(|fault| rename(fault, || format!("{name} {row}")))?;
-                    take(name, row, &Place::Line(cursor.line()), values)?;
+                    let values = text_row(&mut cursor, element, format_args!("{name} {row}"))?;
+                    take(name, row, &Place::Line(cursor.line), values)?;
                     cursor.next_line();
                     continue;
                 }
@@ -184,28 +185,32 @@ impl Ply<'_> {
     }
 }
 
-/// The values of the next line that has any. The cursor stays on that line. Faults lack the expectation.
-fn text_row(cursor: &mut Cursor<'_>, element: &ElementDef) -> Result<Row, Fault> {
+/// The values of the next line that has any. The cursor stays on that line.
+fn text_row(
+    cursor: &mut Cursor<'_>,
+    element: &ElementDef,
+    what: fmt::Arguments<'_>,
+) -> Result<Row, Fault> {
     if !cursor.skip_empty_lines() {
-        return Err(cursor.expected("", None));
+        return Err(cursor.expected(what, None));
     }
     let mut row = Row::new();
     for (name, property) in &element.properties {
         if let PropertyType::Scalar(_) = property.data_type {
-            let value = Property::Double(cursor.number_on_line("")?);
+            let value = Property::Double(cursor.number_on_line(what)?);
             row.set_property(name, value);
             continue;
         }
         let length = cursor.token_on_line();
         // No memory is reserved for the announced length, which may be anything.
-        for _ in 0..count(cursor, length, "")? {
+        for _ in 0..count(cursor, length, what)? {
             if let "vertex_indices" | "vertex_index" = &**name {
                 let index = cursor.token_on_line();
                 // The largest index names no vertex, so that a larger number is refused, too.
-                let index = count(cursor, index, "")?.min(u32::MAX as usize);
+                let index = count(cursor, index, what)?.min(u32::MAX as usize);
                 row.corners.push(index as u32);
             } else {
-                cursor.number_on_line("")?;
+                cursor.number_on_line::<f64>(what)?;
             }
         }
     }

@@ -19,6 +19,7 @@
 use std::fmt;
 use std::fs;
 use std::path::Path;
+use std::str::FromStr;
 
 use super::ply;
 use super::report::{Fault, Place};
@@ -203,7 +204,8 @@ const MAX_FACES: usize = (u32::MAX - 1) as usize / 3;
 pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
-    line: usize,
+    /// Number of the current line, from 1.
+    pub line: usize,
     /// Starts a comment that lasts to the end of the line.
     comment: Option<u8>,
     /// Whether a backslash at the end of a line joins it with the next.
@@ -227,22 +229,6 @@ impl<'a> Cursor<'a> {
     /// Rows whose first line has this number, without comments.
     pub fn at_line(bytes: &'a [u8], line: usize) -> Self {
         Self { bytes, at: 0, line, comment: None, joins: false }
-    }
-
-    /// The same with backslashes joining lines.
-    fn joining_lines(mut self) -> Self {
-        self.joins = true;
-        self
-    }
-
-    /// Number of the current line, from 1.
-    pub fn line(&self) -> usize {
-        self.line
-    }
-
-    /// Number of bytes not read.
-    fn bytes_left(&self) -> usize {
-        self.bytes.len() - self.at
     }
 
     fn peek(&self) -> Option<u8> {
@@ -361,57 +347,39 @@ impl<'a> Cursor<'a> {
         count
     }
 
-    /// A fault for what stands here instead of what belongs here.
-    pub fn expected(&self, expected: impl Into<String>, found: Option<Token<'_>>) -> Fault {
-        match found {
-            Some(token) => {
-                let at = Place::Line(token.line);
-                Fault::Syntax { at, expected: expected.into(), found: quote(token.text) }
-            }
-            None if self.at >= self.bytes.len() => {
-                let found = "nothing more".to_owned();
-                Fault::Syntax { at: Place::End, expected: expected.into(), found }
-            }
-            None => {
-                let at = Place::Line(self.line);
-                Fault::Syntax { at, expected: expected.into(), found: "the end of the line".into() }
-            }
-        }
+    /// A fault: another text, or none, in place of the expected one.
+    pub fn expected(&self, expected: impl fmt::Display, found: Option<Token<'_>>) -> Fault {
+        let (at, found) = match found {
+            Some(token) => (Place::Line(token.line), quote(token.text)),
+            None if self.at >= self.bytes.len() => (Place::End, "nothing more".to_owned()),
+            None => (Place::Line(self.line), "the end of the line".to_owned()),
+        };
+        Fault::Syntax { at, expected: expected.to_string(), found }
     }
+
+    // Expectations are formatted for faults alone: millions of numbers are as expected.
 
     /// The next token of this line as a number.
-    pub fn number_on_line(&mut self, what: &str) -> Result<f64, Fault> {
+    pub fn number_on_line<T: FromStr>(&mut self, what: impl fmt::Display) -> Result<T, Fault> {
         let token = self.token_on_line();
-        token.and_then(|t| t.number()).ok_or_else(|| self.expected(what, token))
+        token.and_then(|t| t.parse()).ok_or_else(|| self.expected(what, token))
     }
 
-    /// The next token, on whatever line, as a number.
-    fn number(&mut self, what: &str) -> Result<f64, Fault> {
+    /// The next token, on this line or a later one, as a number.
+    fn number<T: FromStr>(&mut self, what: impl fmt::Display) -> Result<T, Fault> {
         let token = self.token();
-        token.and_then(|t| t.number()).ok_or_else(|| self.expected(what, token))
+        token.and_then(|t| t.parse()).ok_or_else(|| self.expected(what, token))
     }
 
-    /// The next token of this line as an integer.
-    fn integer_on_line(&mut self, what: &str) -> Result<i64, Fault> {
-        let token = self.token_on_line();
-        token.and_then(|t| t.integer()).ok_or_else(|| self.expected(what, token))
-    }
-
-    /// The next token, on whatever line, as an integer.
-    fn integer(&mut self, what: &str) -> Result<i64, Fault> {
-        let token = self.token();
-        token.and_then(|t| t.integer()).ok_or_else(|| self.expected(what, token))
+    /// The next three tokens of this line as numbers.
+    fn position_on_line(&mut self, what: &str) -> Result<[f64; 3], Fault> {
+        Ok([self.number_on_line(what)?, self.number_on_line(what)?, self.number_on_line(what)?])
     }
 }
 
 impl Token<'_> {
-    /// The token as a floating-point number; `nan` and `inf` are numbers here.
-    fn number(&self) -> Option<f64> {
-        std::str::from_utf8(self.text).ok()?.parse().ok()
-    }
-
-    /// The token as a decimal integer.
-    fn integer(&self) -> Option<i64> {
+    /// The token as a number; `nan` and `inf` are floating-point numbers here.
+    fn parse<T: FromStr>(&self) -> Option<T> {
         std::str::from_utf8(self.text).ok()?.parse().ok()
     }
 
@@ -448,10 +416,11 @@ fn parse_off(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
     parse_faces(&mut cursor, &header, &mut soup)?;
     let last = soup.lines.last().copied().unwrap_or(0);
     if cursor.skip_empty_lines() {
-        let line = cursor.line();
+        let line = cursor.line;
         let token = cursor.token_on_line();
-        if token.is_some_and(|t| t.number().is_some()) {
-            let expected = format!("no number after the {} announced faces", header.faces);
+        if token.is_some_and(|t| t.parse::<f64>().is_some()) {
+            let faces = header.faces;
+            let expected = format_args!("no number after the {faces} announced faces");
             return Err(cursor.expected(expected, token));
         }
         soup.warnings
@@ -472,7 +441,7 @@ fn parse_off_header(cursor: &mut Cursor<'_>) -> Result<OffHeader, Fault> {
     }
     let first = match glued {
         [] => cursor.token(),
-        text => Some(Token { text, line: cursor.line() }),
+        text => Some(Token { text, line: cursor.line }),
     };
     if first.is_some_and(|t| t.is("BINARY")) {
         return Err(Fault::Unsupported("binary OFF is not read; write the surface as text".into()));
@@ -485,7 +454,7 @@ fn parse_off_header(cursor: &mut Cursor<'_>) -> Result<OffHeader, Fault> {
     if edges.is_some() {
         count(cursor, edges, "the number of edges")?;
     }
-    let room = cursor.bytes_left();
+    let room = cursor.bytes.len() - cursor.at;
     // The shortest vertex is `0 0 0`, the shortest face `3 0 1 2`, with a blank after each.
     for (what, announced, least) in [("vertices", vertices, 6), ("faces", faces, 8)] {
         if announced > (room + 1) / least {
@@ -517,10 +486,10 @@ fn split_keyword(text: &[u8]) -> Option<(&[u8], &[u8])> {
 pub(super) fn count(
     cursor: &Cursor<'_>,
     token: Option<Token<'_>>,
-    what: &str,
+    what: impl fmt::Display,
 ) -> Result<usize, Fault> {
     token
-        .and_then(|t| t.integer())
+        .and_then(|t| t.parse::<i64>())
         .and_then(|n| usize::try_from(n).ok())
         .ok_or_else(|| cursor.expected(what, token))
 }
@@ -551,32 +520,20 @@ fn parse_vertices(
             cursor.skip_empty_lines();
         }
         for x in &mut xyz {
-            *x = if by_line { cursor.number_on_line("") } else { cursor.number("") }.map_err(
-                |fault| {
-                    let all = header.vertices;
-                    rename(fault, || format!("3 coordinates of vertex {vertex} of {all}"))
-                },
-            )?;
+            let what = format_args!("3 coordinates of vertex {vertex} of {}", header.vertices);
+            *x = if by_line { cursor.number_on_line(what)? } else { cursor.number(what)? };
         }
-        let line = cursor.line();
+        let line = cursor.line;
         soup.push_vertex(xyz, || Place::Line(line))?;
         if by_line {
             finish_vertex_line(cursor, header, extra)?;
         } else {
             for _ in 0..extra {
-                cursor.number("a normal or texture coordinate")?;
+                cursor.number::<f64>("a normal or texture coordinate")?;
             }
         }
     }
     Ok(())
-}
-
-/// Fills in what was expected, without building the sentence for every number that is fine.
-pub(super) fn rename(fault: Fault, what: impl FnOnce() -> String) -> Fault {
-    match fault {
-        Fault::Syntax { at, found, .. } => Fault::Syntax { at, expected: what(), found },
-        other => other,
-    }
 }
 
 /// Passes over normal, colour and texture coordinates. The number of colour components is free.
@@ -586,7 +543,7 @@ fn finish_vertex_line(
     extra: usize,
 ) -> Result<(), Fault> {
     for _ in 0..extra {
-        cursor.number_on_line("a normal or texture coordinate")?;
+        cursor.number_on_line::<f64>("a normal or texture coordinate")?;
     }
     let more = cursor.token_on_line();
     if more.is_some() && !header.colours {
@@ -609,15 +566,11 @@ fn parse_faces(
         if by_line {
             cursor.skip_empty_lines();
         }
-        let corners = cursor
-            .integer("")
-            .map_err(|fault| rename(fault, || format!("face {face} of {}", header.faces)))?;
-        let line = cursor.line();
+        let corners: i64 = cursor.number(format_args!("face {face} of {}", header.faces))?;
+        let line = cursor.line;
         for corner in 0..corners.max(0) {
-            let index = if by_line { cursor.integer_on_line("") } else { cursor.integer("") };
-            let index = index.map_err(|fault| {
-                rename(fault, || format!("{corners} vertices of face {face}, got {corner}"))
-            })?;
+            let what = format_args!("{corners} vertices of face {face}, got {corner}");
+            let index = if by_line { cursor.number_on_line(what)? } else { cursor.number(what)? };
             soup.corners.push(checked_index(index, soup.vertices.len(), &Place::Line(line), face)?);
         }
         soup.end_polygon(Some(line))?;
@@ -658,7 +611,7 @@ const PASSED_OVER: &str = " vn vt vp g o s l p usemtl mtllib usemap maplib mg vc
     cstype ctech curv curv2 d_interp deg end hole lod parm res scrv shadow_obj sp stech step trace_obj trim ";
 
 fn parse_obj(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
-    let mut cursor = Cursor::new(bytes, Some(b'#')).joining_lines();
+    let mut cursor = Cursor { joins: true, ..Cursor::new(bytes, Some(b'#')) };
     let mut soup = PolygonSoup::default();
     // The largest corner so far, from 1, and the face that names it: vertices may follow their faces.
     let mut largest = (0, 0);
@@ -666,12 +619,8 @@ fn parse_obj(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
     while let Some(keyword) = cursor.token() {
         match keyword.text {
             b"v" => {
-                let line = cursor.line();
-                let mut xyz = [0.0; 3];
-                for x in &mut xyz {
-                    *x = cursor.number_on_line("3 coordinates after v")?;
-                }
-                soup.push_vertex(xyz, || Place::Line(line))?;
+                let xyz = cursor.position_on_line("3 coordinates after v")?;
+                soup.push_vertex(xyz, || Place::Line(keyword.line))?;
             }
             b"f" | b"fo" => {
                 let (face, vertices) = (soup.len(), soup.vertices.len());
@@ -724,9 +673,10 @@ fn parse_obj(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
 /// The first of the up to three indices of a corner; all have to be integers where present.
 fn obj_index(token: Token<'_>) -> Option<i64> {
     let mut parts = token.text.split(|&b| b == b'/').map(|text| Token { text, line: token.line });
-    let vertex = parts.next()?.integer()?;
+    let vertex = parts.next()?.parse()?;
     let others: Vec<Token<'_>> = parts.collect();
-    let are_indices = others.iter().all(|part| part.text.is_empty() || part.integer().is_some());
+    let are_indices =
+        others.iter().all(|part| part.text.is_empty() || part.parse::<i64>().is_some());
     (others.len() <= 2 && are_indices).then_some(vertex)
 }
 
@@ -779,7 +729,7 @@ fn parse_stl_text(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
     let mut soup = PolygonSoup::default();
     let mut is_inside = false;
     while let Some(token) = cursor.token() {
-        let line = cursor.line();
+        let line = cursor.line;
         if is_inside && token.is("facet") {
             // The normal may be anything, also `-nan(ind)`.
             keyword(&mut cursor, "normal")?;
@@ -792,11 +742,8 @@ fn parse_stl_text(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
             keyword(&mut cursor, "loop")?;
             for _ in 0..3 {
                 keyword(&mut cursor, "vertex")?;
-                let mut xyz = [0.0; 3];
-                for x in &mut xyz {
-                    *x = cursor.number_on_line("3 coordinates after vertex")?;
-                }
-                soup.push_corner(xyz, || Place::Line(cursor.line()))?;
+                let xyz = cursor.position_on_line("3 coordinates after vertex")?;
+                soup.push_corner(xyz, || Place::Line(cursor.line))?;
             }
             keyword(&mut cursor, "endloop")?;
             keyword(&mut cursor, "endfacet")?;
@@ -882,11 +829,11 @@ mod tests {
             assert_eq!(tokens, [(&b"a"[..], 1), (b"b", 1), (b"d", 4), (b"f", 5)]);
         }
         let text = b"f 1 2\\\n 3 \\ \r\n4\ng";
-        let mut cursor = Cursor::new(text, Some(b'#')).joining_lines();
+        let mut cursor = Cursor { joins: true, ..Cursor::new(text, Some(b'#')) };
         let line: Vec<_> = std::iter::from_fn(|| cursor.token_on_line()).map(|t| t.text).collect();
         assert_eq!(line, [&b"f"[..], b"1", b"2", b"3", b"4"]);
         assert!(cursor.next_line());
-        assert_eq!(cursor.line(), 4);
+        assert_eq!(cursor.line, 4);
         let mut cursor = Cursor::new(text, None);
         assert_eq!(std::iter::from_fn(|| cursor.token()).count(), 7);
     }

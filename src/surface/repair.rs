@@ -173,8 +173,8 @@ fn duplicates(polygons: &PolygonSoup) -> Vec<bool> {
     });
     let mut duplicate = vec![false; polygons.len()];
     let mut pairs = Vec::new();
-    let same = |&i: &u32, &j: &u32| sorted.polygon(i as usize) == sorted.polygon(j as usize);
-    for group in order.chunk_by(same).filter(|group| group.len() > 1) {
+    let groups = order.chunk_by(|&i, &j| sorted.polygon(i as usize) == sorted.polygon(j as usize));
+    for group in groups.filter(|group| group.len() > 1) {
         group[1..].iter().for_each(|&i| duplicate[i as usize] = true);
         if let &[first, second] = group {
             pairs.push([first, second]);
@@ -276,22 +276,15 @@ impl Triangulator {
         if let (&[a, b, c, d], &[p, q, r, s]) = (polygon, &flat[..]) {
             let [first, second] = [[[p, q, r], [p, r, s]], [[q, r, s], [q, s, p]]]
                 .map(|cut| cut.iter().all(|&[a, b, c]| orient2d(a, b, c) == Sign::Positive));
-            let length =
-                |i: u32, j: u32| (points[i as usize] - points[j as usize]).length_squared();
-            match (first, second) {
-                (true, true) if length(b, d) < length(a, c) => {
-                    triangles.extend([[b, c, d], [b, d, a]]);
-                    return Ok(());
-                }
-                (true, _) => {
-                    triangles.extend([[a, b, c], [a, c, d]]);
-                    return Ok(());
-                }
-                (false, true) => {
-                    triangles.extend([[b, c, d], [b, d, a]]);
-                    return Ok(());
-                }
-                (false, false) => {}
+            let [ac, bd] = [(a, c), (b, d)]
+                .map(|(i, j)| points[i as usize].distance_squared(points[j as usize]));
+            if second && (!first || bd < ac) {
+                triangles.extend([[b, c, d], [b, d, a]]);
+                return Ok(());
+            }
+            if first {
+                triangles.extend([[a, b, c], [a, c, d]]);
+                return Ok(());
             }
         }
         self.clip_ears(polygon, &flat, triangles)

@@ -15,7 +15,7 @@ use crate::geometry::DisjointSets;
 use crate::sum::Sum;
 
 /// Adjacency, defects and components of a triangle mesh, whatever its defects.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Topology {
     /// The half-edge across each half-edge, or [`NONE`] where there is none or more than one.
     across: Vec<u32>,
@@ -43,19 +43,7 @@ const NONE: u32 = u32::MAX;
 impl Topology {
     /// Analyses faces whose three corners differ. `O(F log F)`.
     pub fn new(vertices: usize, faces: &[[u32; 3]]) -> Self {
-        let mut topology = Self {
-            across: vec![NONE; 3 * faces.len()],
-            edges: 0,
-            boundary_edges: 0,
-            first_boundary: None,
-            nonmanifold_edges: 0,
-            first_nonmanifold: None,
-            nonmanifold_vertices: 0,
-            first_nonmanifold_vertex: None,
-            first_inconsistent: None,
-            component: Vec::new(),
-            first_face: Vec::new(),
-        };
+        let mut topology = Self { across: vec![NONE; 3 * faces.len()], ..Self::default() };
         let mut fans = DisjointSets::singletons(3 * faces.len());
         let mut parts = DisjointSets::singletons(faces.len());
         topology.pair_half_edges(faces, &mut fans, &mut parts);

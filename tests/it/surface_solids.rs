@@ -119,7 +119,10 @@ fn validation_repairs_nothing() {
 fn inspection_reports_what_reading_refuses() {
     let mut open = cube();
     open.faces.truncate(10);
-    let inspection = surface::inspect_bytes(to_off(&open).as_bytes(), Format::Off).unwrap();
+    let path = std::env::temp_dir().join(format!("medial-open-{}.off", std::process::id()));
+    surface::write(&path, &open).unwrap();
+    let inspection = surface::inspect(&path).unwrap();
+    std::fs::remove_file(&path).unwrap();
     assert!(matches!(inspection.refused.as_ref().unwrap().fault, Fault::Open { edges: 4, .. }));
     let json = serde_json::to_value(&inspection).unwrap();
     for (key, value) in [
@@ -138,7 +141,8 @@ fn inspection_reports_what_reading_refuses() {
     ] {
         assert_eq!(json[key], value, "{key}");
     }
-    assert!(json["refused"].as_str().unwrap().starts_with("the surface is open: 4 edges"));
+    let refused = json["refused"].as_str().unwrap();
+    assert!(refused.contains(".off: the surface is open: 4 edges"), "{refused}");
 }
 
 #[test]
@@ -227,19 +231,8 @@ proptest! {
 const FILL: MendOptions =
     MendOptions { fill_holes: true, separate: false, components: Components::All };
 
-fn off(mesh: &TriMesh) -> String {
-    let mut text = format!("OFF\n{} {} 0\n", mesh.vertices.len(), mesh.faces.len());
-    for v in &mesh.vertices {
-        text += &format!("{:?} {:?} {:?}\n", v.x, v.y, v.z);
-    }
-    for [a, b, c] in &mesh.faces {
-        text += &format!("3 {a} {b} {c}\n");
-    }
-    text
-}
-
 fn mend(mesh: &TriMesh, options: MendOptions) -> Result<Loaded, SurfaceError> {
-    mend_bytes(off(mesh).as_bytes(), Format::Off, options)
+    mend_bytes(to_off(mesh).as_bytes(), Format::Off, options)
 }
 
 /// A lattice box of `n` cells along each side, without the faces that `dropped` names by centroid.

@@ -105,8 +105,8 @@ impl Tree {
     }
 
     /// Shows the leaves below all nodes that pass `enter`, from left to right, as places in
-    /// [`Tree::order`], until `visit` breaks. `enter` gets the number of a node, below
-    /// the number of nodes, and the node.
+    /// [`Tree::order`], until `visit` breaks. `enter` gets the index of a node, and
+    /// the node.
     #[inline]
     pub fn descend(
         &self,
