@@ -20,13 +20,15 @@ static DECODED: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| decode_srgb(code as f64 / 255.0) as f32));
 
 static ENCODED: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    let code = |k: usize| {
-        let light = k as f64 / ENCODING_STEPS as f64;
-        let low = light <= 0.003_130_8;
-        let unit = if low { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
-        (255.0 * unit).round() as u8
-    };
-    (0..=ENCODING_STEPS).map(code).collect()
+    (0..=ENCODING_STEPS)
+        .map(|k| {
+            // IEC 61966-2-1: a straight piece near black, where a power would have no slope.
+            let light = k as f64 / ENCODING_STEPS as f64;
+            let low = light <= 0.003_130_8;
+            let unit = if low { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+            (255.0 * unit).round() as u8
+        })
+        .collect()
 });
 
 /// The light of an sRGB colour.
@@ -132,14 +134,15 @@ const DEPTH_OF_SHADE: f32 = 0.8;
 /// <https://doi.org/10.1145/1141911.1142016>, with pairs in place of the blurred depth.
 pub(super) fn crevices(pixels: &[PixelLight], [width, height]: [usize; 2]) -> Vec<f32> {
     let reach = REACH * width.min(height) as f32;
-    let offset = |k: usize| {
-        let radius = reach * (k / PAIRS + 1) as f32 / RINGS as f32;
+    let mut offsets = Vec::new();
+    for (ring, pair) in (0..RINGS).flat_map(|ring| (0..PAIRS).map(move |pair| (ring, pair))) {
+        let radius = reach * (ring + 1) as f32 / RINGS as f32;
         // Rings are turned against each other, so that they leave no spokes.
-        let turn = ((k % PAIRS) as f32 + (k / PAIRS) as f32 / RINGS as f32) / PAIRS as f32;
+        let turn = (pair as f32 + ring as f32 / RINGS as f32) / PAIRS as f32;
+        // Half a turn: the opposite place of each pair is on the other half.
         let (sin, cos) = (std::f32::consts::PI * turn).sin_cos();
-        (radius, [(radius * cos).round() as i64, (radius * sin).round() as i64])
-    };
-    let offsets: Vec<(f32, [i64; 2])> = (0..RINGS * PAIRS).map(offset).collect();
+        offsets.push((radius, [(radius * cos).round() as i64, (radius * sin).round() as i64]));
+    }
     // Not a number where nothing is: compact, since every pixel reads many.
     let depths: Vec<f32> =
         pixels.iter().map(|p| if p.covered > 0.0 { p.depth } else { f32::NAN }).collect();
@@ -147,37 +150,21 @@ pub(super) fn crevices(pixels: &[PixelLight], [width, height]: [usize; 2]) -> Ve
         let inside = x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height;
         if inside { depths[y as usize * width + x as usize] } else { f32::NAN }
     };
-    let share = |index: usize| {
-        let here = &pixels[index];
+    let share = |(index, here): (usize, &PixelLight)| {
         if here.covered == 0.0 {
             return 1.0;
         }
         let (x, y) = ((index % width) as i64, (index / width) as i64);
-        let hidden = |&(radius, [dx, dy]): &(f32, [i64; 2])| {
-            let (a, b) = (depth_at(x + dx, y + dy), depth_at(x - dx, y - dy));
-            // Next to the background the other side is unknown.
-            if a.is_nan() || b.is_nan() {
-                return 0.0;
-            }
+        let mut hidden = 0.0;
+        for &(radius, [dx, dy]) in &offsets {
             // Of a pixel that shows two parts the farther one counts: the edge between them would shine. Depth counts
             // to the ring's radius only: a far edge must not be darker than a near one.
-            let above = |depth: f32| ((here.farthest - depth) / radius).clamp(-1.0, 1.0);
-            (above(a) + above(b)).max(0.0)
-        };
-        let mean = offsets.iter().map(hidden).sum::<f32>() / offsets.len() as f32;
-        1.0 - DEPTH_OF_SHADE * mean.min(1.0)
-    };
-    (0..pixels.len()).into_par_iter().map(share).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_code_comes_back() {
-        for code in 0..=255 {
-            assert_eq!(encode(decode([code; 3])), [code; 3]);
+            let [a, b] = [depth_at(x + dx, y + dy), depth_at(x - dx, y - dy)]
+                .map(|depth| ((here.farthest - depth) / radius).clamp(-1.0, 1.0));
+            // Next to the background the other side is unknown: `max` drops a sum that is not a number.
+            hidden += (a + b).max(0.0);
         }
-    }
+        1.0 - DEPTH_OF_SHADE * (hidden / offsets.len() as f32).min(1.0)
+    };
+    pixels.par_iter().enumerate().map(share).collect()
 }

@@ -100,15 +100,27 @@ pub(super) fn rasterise(batches: Vec<Batch>, frame: &Frame, size: [usize; 2]) ->
     let mut facets: Vec<PlacedFacet> = Vec::new();
     let mut looks = Vec::new();
     for (id, Batch { facets: some, look }) in batches.into_iter().enumerate() {
-        let place = |facet| PlacedFacet::new(&project, id as u32, facet);
-        facets.par_extend(some.into_par_iter().filter_map(place));
+        // An indexed iterator that is filtered keeps its order: facets of equal depth always meet in the same order.
+        facets.par_extend(
+            some.into_par_iter().filter_map(|f| PlacedFacet::new(&project, id as u32, f)),
+        );
         looks.push(look);
     }
     let picture = FacetPicture { facets: &facets, looks: &looks, lamp: Lamp::new(frame) };
     let rows: Vec<Vec<PixelLight>> = (by_band(&facets, size[1]).into_par_iter().enumerate())
         .map(|(band, list)| {
-            let rows = band * BAND..((band + 1) * BAND).min(size[1]);
-            Band::new(rows, size[0]).draw(&picture, &list)
+            // The last band is cut off at the lower edge of the picture.
+            let rows = band * BAND * SIDE..((band + 1) * BAND).min(size[1]) * SIDE;
+            let columns = size[0] * SIDE;
+            let count = rows.len() * columns;
+            let band = Band {
+                rows,
+                columns,
+                nearness: vec![f64::NEG_INFINITY; count],
+                front: vec![NONE; count],
+                through: vec![1.0; count],
+            };
+            band.draw(&picture, &list)
         })
         .collect();
     rows.concat()
@@ -144,15 +156,14 @@ impl FacetPicture<'_> {
     fn light(&self, share: &FacetShare, corner: [usize; 2]) -> Light {
         let facet = &self.facets[share.id as usize];
         let (look, sides) = (self.look(facet), Sides::new(facet));
-        let samples = || share.samples(corner);
-        let sum = samples().fold([0; 2], |sum, at| [sum[0] + at[0], sum[1] + at[1]]);
+        let sum = share.samples(corner).fold([0; 2], |sum, at| [sum[0] + at[0], sum[1] + at[1]]);
         let count = i64::from(share.mask.count_ones());
         let w = sides.weights(sum.map(|sum| sum / count));
         let normal = w[0] * facet.normals[0] + w[1] * facet.normals[1] + w[2] * facet.normals[2];
         let light = self.lamp.shade(normal, look.paint.at(weighted(&w, facet.places)));
         let Some(lines) = look.lines.filter(|_| facet.lines != [0; 3]) else { return light };
         let ends = sides.line_ends(facet, lines);
-        let on_line = samples().filter(|at| sides.is_on_line(&ends, *at)).count();
+        let on_line = share.samples(corner).filter(|at| sides.is_on_line(&ends, *at)).count();
         mix(light, LINE, lines.opacity * on_line as f32 / count as f32)
     }
 }
@@ -173,27 +184,16 @@ struct Band {
 }
 
 impl Band {
-    fn new(rows: Range<usize>, width: usize) -> Self {
-        let (rows, columns) = (rows.start * SIDE..rows.end * SIDE, width * SIDE);
-        let count = rows.len() * columns;
-        Self {
-            rows,
-            columns,
-            nearness: vec![f64::NEG_INFINITY; count],
-            front: vec![NONE; count],
-            through: vec![1.0; count],
-        }
-    }
-
     fn draw(mut self, picture: &FacetPicture<'_>, list: &[u32]) -> Vec<PixelLight> {
-        let facet = |id: u32| &picture.facets[id as usize];
-        let is_solid = |&&id: &&u32| picture.look(facet(id)).kind == Kind::Solid;
-        for &id in list.iter().filter(is_solid) {
-            self.bring_forward(facet(id), id);
+        let (solid, glass): (Vec<u32>, Vec<u32>) = (list.iter())
+            .partition(|&&id| picture.look(&picture.facets[id as usize]).kind == Kind::Solid);
+        for id in solid {
+            self.bring_forward(&picture.facets[id as usize], id);
         }
         // Glass comes last: behind solid facets it does not show.
-        for &id in list.iter().filter(|id| !is_solid(id)) {
-            self.lay_over(facet(id), picture.look(facet(id)));
+        for id in glass {
+            let facet = &picture.facets[id as usize];
+            self.lay_over(facet, picture.look(facet));
         }
         let (rows, columns) = (self.rows.len() / SIDE, self.columns / SIDE);
         let pixels = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
@@ -245,10 +245,12 @@ impl Band {
             if id == NONE {
                 continue;
             }
+            // As many shares as samples: there is always one that has this facet or none.
             if let Some(share) = shares.iter_mut().find(|share| share.id == id || share.id == NONE)
             {
-                *share =
-                    FacetShare { id, through: share.through + through, mask: share.mask | 1 << k };
+                share.id = id;
+                share.through += through;
+                share.mask |= 1 << k;
             }
             let depth = -self.nearness[sample] as f32;
             sum.covered += 1.0;
@@ -346,10 +348,13 @@ impl PlacedFacet {
     /// The sample rows or columns whose middles the corners may enclose, cut to a range.
     fn samples(&self, axis: usize, range: Range<usize>) -> Range<usize> {
         let [a, b, c] = self.at.map(|at| at[axis]);
-        let cut = |x: i64| x.clamp(range.start as i64, range.end as i64) as usize;
+        // The middles lie half a step count inside their samples; one more on either side costs nothing, since the
+        // edge functions decide.
         let least = (a.min(b).min(c) - STEPS / 2).div_euclid(STEPS);
         let most = (a.max(b).max(c) + STEPS / 2).div_euclid(STEPS);
-        cut(least)..cut(most + 1)
+        let [from, to] = [least, most + 1]
+            .map(|sample| sample.clamp(range.start as i64, range.end as i64) as usize);
+        from..to
     }
 
     /// Calls `hit` for each sample in a range of rows that is inside, with its column and nearness.
@@ -370,7 +375,10 @@ impl PlacedFacet {
         let columns = self.samples(0, 0..columns);
         for row in self.samples(1, rows) {
             let [first, y] = middle(row, columns.start);
-            let mut w = sides.inclusive(first, y);
+            let mut w = sides.at([first, y]);
+            for k in 0..3 {
+                w[k] -= sides.excluded[k];
+            }
             let z_row = self.nearness[0] + zy * (y - a[1]) as f64;
             let mut entered = false;
             for column in columns.clone() {
@@ -380,6 +388,7 @@ impl PlacedFacet {
                     let [x, _] = middle(0, column);
                     hit(row, column, z_row + zx * (x - a[0]) as f64);
                 } else if entered {
+                    // A triangle is convex: a row leaves it once.
                     break;
                 }
                 for k in 0..3 {
@@ -409,25 +418,19 @@ impl Sides {
             sides.along_x[k] = -dy;
             sides.along_y[k] = dx;
             sides.at_origin[k] = dy * a[0] - dx * a[1];
-            // Exactly one of a side and its reverse is included.
+            // Exactly one of a side and its reverse is included: facets that share it share no sample.
             sides.excluded[k] = i64::from(!(dy > 0 || (dy == 0 && dx > 0)));
         }
         sides
     }
 
-    fn at(&self, x: i64, y: i64) -> [i64; 3] {
+    fn at(&self, [x, y]: [i64; 2]) -> [i64; 3] {
         std::array::from_fn(|k| self.at_origin[k] + self.along_x[k] * x + self.along_y[k] * y)
     }
 
-    /// Not negative where the point belongs to the facet.
-    fn inclusive(&self, x: i64, y: i64) -> [i64; 3] {
-        let w = self.at(x, y);
-        std::array::from_fn(|k| w[k] - self.excluded[k])
-    }
-
     /// Weights of the corners at a point; their sum is 1.
-    fn weights(&self, [x, y]: [i64; 2]) -> [f64; 3] {
-        let w = self.at(x, y).map(|w| w as f64);
+    fn weights(&self, at: [i64; 2]) -> [f64; 3] {
+        let w = self.at(at).map(|w| w as f64);
         let sum = w[0] + w[1] + w[2];
         // Corner k lies across side k + 1.
         [w[1] / sum, w[2] / sum, w[0] / sum]
@@ -437,6 +440,7 @@ impl Sides {
     fn line_ends(&self, facet: &PlacedFacet, lines: Lines) -> [f64; 3] {
         let half = f64::from(lines.half_width) * (STEPS * SIDE as i64) as f64;
         std::array::from_fn(|k| {
+            // An edge function is the distance from the side times its length.
             let (dx, dy) = (self.along_y[k] as f64, self.along_x[k] as f64);
             match facet.lines[k] {
                 0 => -1.0,
@@ -445,8 +449,8 @@ impl Sides {
         })
     }
 
-    fn is_on_line(&self, ends: &[f64; 3], [x, y]: [i64; 2]) -> bool {
-        let w = self.at(x, y);
+    fn is_on_line(&self, ends: &[f64; 3], at: [i64; 2]) -> bool {
+        let w = self.at(at);
         (0..3).any(|k| (w[k] as f64) < ends[k])
     }
 }

@@ -144,6 +144,13 @@ fn sheets_curves_and_isolated_spheres_show_inside_glass() {
     assert_eq!(at(0.9, 0.9)[3], 0);
 }
 
+#[test]
+fn every_srgb_code_survives_decoding() {
+    for code in 0..=255 {
+        assert_eq!(encode(decode([code; 3])), [code; 3]);
+    }
+}
+
 /// A ghost adds nothing to what is there, and shows where nothing is.
 #[test]
 fn a_ghost_is_what_is_missing() {
