@@ -11,9 +11,9 @@
 use std::cmp::Ordering;
 
 use crate::comparison::{Comparison, Entry, reached};
-use crate::metric::{HAUSDORFF, MIN_ANGLE, Mean, TOTAL_SECONDS};
+use crate::metric::{HAUSDORFF, MIN_ANGLE, Mean, TOTAL_SECONDS, median};
 use crate::plots::{Curve, Figure, Point, Scale};
-use crate::record::{Status, Target};
+use crate::record::{Record, Status, Target};
 use crate::summary::{Ratio, reference, topology};
 use crate::tables::{Cell, Column, Row, Table};
 use crate::text::{counted, grouped, significant};
@@ -38,26 +38,19 @@ struct Question {
     title: String,
     /// The values of a series.
     values: Vec<Values>,
-    /// A value as text, from many: median or mean.
+    /// A median of them as text.
     text: fn(f64) -> String,
-    /// What is said of the best: `0.62 of the error`.
-    lead: fn(f64) -> String,
+    /// The quantity of the runner-up that the ratio is a share of: `its error`.
+    of: &'static str,
 }
 
 /// The table of answers; `None` where nothing can be compared.
 pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
-    let mut rows = usual_level(comparison)
-        .map_or_else(Vec::new, |(level, spheres)| at_count(comparison, level, spheres));
+    let mut rows = vec![];
+    if let Some((level, spheres)) = usual_level(comparison) {
+        rows.extend(at_count(comparison, level, spheres));
+    }
     rows.extend(within_bound(comparison));
-    let titles = [
-        "criterion",
-        "method",
-        "median",
-        "meshes",
-        "runner-up",
-        "ratio to it",
-        "better, equal, worse",
-    ];
     (!rows.is_empty()).then(|| Table {
         caption: "Which method?".to_owned(),
         notes: vec![
@@ -71,7 +64,17 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
                 100.0 * EQUAL
             ),
         ],
-        columns: titles.map(Column::text).into(),
+        columns: [
+            "criterion",
+            "method",
+            "median",
+            "meshes",
+            "runner-up",
+            "ratio to it",
+            "better, equal, worse",
+        ]
+        .map(Column::text)
+        .into(),
         rows,
     })
 }
@@ -80,17 +83,15 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
 fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Row> {
     let spheres = counted(spheres, "sphere", "spheres");
     let error = error_question(errors_at(comparison, level), format!("lowest error at {spheres}"));
-    let asked = |entry: &Entry<'_>| entry.level == level;
-    let usable = |entry: &Entry<'_>| {
-        entry.comparable() && HAUSDORFF.of(entry.record).is_some_and(|error| error <= USABLE)
-    };
-    // The distance from the angles of an equilateral triangle.
-    let missing = |entry: &Entry<'_>| Some(60.0 - MIN_ANGLE.of(entry.record)?);
     let triangles = Question {
         title: format!("best triangles at {spheres}, of errors up to {USABLE} %"),
-        values: values(comparison, asked, usable, missing),
+        values: values(comparison, Some(level), |entry| {
+            HAUSDORFF.of(entry.record).filter(|&e| entry.comparable() && e <= USABLE)?;
+            // Less must be better: the distance from the angles of an equilateral triangle.
+            Some(60.0 - MIN_ANGLE.of(entry.record)?)
+        }),
         text: |value| format!("least angle {:.1}°", 60.0 - value),
-        lead: |ratio| format!("{} of its distance from 60°", significant(ratio, 2)),
+        of: "its distance from 60°",
     };
     let mut rows: Vec<Row> = answers(comparison, &error);
     rows.push(right_everywhere(comparison, level, &spheres));
@@ -103,77 +104,84 @@ fn error_question(values: Vec<Values>, title: String) -> Question {
         title,
         values,
         text: |value| format!("{} %", significant(value, 3)),
-        lead: |ratio| format!("{} of its error", significant(ratio, 2)),
+        of: "its error",
     }
 }
 
-/// What an error of at most [`BOUND`] costs.
+/// The cost of an error of at most [`BOUND`], at whichever level costs least on a mesh.
 fn within_bound(comparison: &Comparison<'_>) -> Vec<Row> {
-    let within = |entry: &Entry<'_>| {
-        entry.measured() && HAUSDORFF.of(entry.record).is_some_and(|error| error <= BOUND)
-    };
-    let least = |value: &dyn Fn(&Entry<'_>) -> Option<f64>| {
-        values(comparison, |_: &Entry<'_>| true, within, value)
-    };
-    let bound = format!("within {BOUND} % error");
-    let questions = [
-        Question {
-            title: format!("fewest spheres {bound}"),
-            values: least(&|entry| Some(reached(entry.record)? as f64)),
-            text: |value| counted(value.round() as usize, "sphere", "spheres"),
-            lead: |ratio| format!("{} of its spheres", significant(ratio, 2)),
-        },
-        Question {
-            title: format!("smallest file {bound}"),
-            values: least(&|entry| Some(entry.record.evaluate.as_ref()?.counts.numbers() as f64)),
-            text: |value| format!("{} numbers", grouped(value.round() as u64)),
-            lead: |ratio| format!("{} of its numbers", significant(ratio, 2)),
-        },
-        Question {
-            title: format!("fastest {bound}"),
-            values: least(&|entry| TOTAL_SECONDS.of(entry.record)),
-            text: |value| format!("{} s", significant(value, 2)),
-            lead: |ratio| format!("{} of its time", significant(ratio, 2)),
-        },
+    type Cost = (&'static str, fn(&Record) -> Option<f64>, fn(f64) -> String, &'static str);
+    let costs: [Cost; 3] = [
+        (
+            "fewest spheres",
+            |record| Some(reached(record)? as f64),
+            |value| counted(value.round() as usize, "sphere", "spheres"),
+            "its spheres",
+        ),
+        (
+            "smallest file",
+            stored_numbers,
+            |value| format!("{} numbers", grouped(value.round() as u64)),
+            "its numbers",
+        ),
+        (
+            "fastest",
+            |record| TOTAL_SECONDS.of(record),
+            |value| format!("{} s", significant(value, 2)),
+            "its time",
+        ),
     ];
-    questions.iter().flat_map(|question| answers(comparison, question)).collect()
+    let mut rows = vec![];
+    for (title, cost, text, of) in costs {
+        let values = values(comparison, None, |entry| {
+            HAUSDORFF.of(entry.record).filter(|&e| entry.measured() && e <= BOUND)?;
+            cost(entry.record)
+        });
+        let title = format!("{title} within {BOUND} % error");
+        rows.extend(answers(comparison, &Question { title, values, text, of }));
+    }
+    rows
+}
+
+/// Floats of the medial mesh as a file.
+fn stored_numbers(record: &Record) -> Option<f64> {
+    Some(record.evaluate.as_ref()?.counts.numbers() as f64)
 }
 
 /// The asked number of spheres that is nearest to [`USUAL`], of those that any method reached.
 pub(crate) fn usual_level(comparison: &Comparison<'_>) -> Option<(usize, usize)> {
-    let reached = |level: usize| {
-        comparison.entries.iter().filter(|e| e.level == level && e.comparable()).count()
-    };
-    let far = |spheres: usize| (spheres.max(1) as f64 / USUAL).ln().abs();
-    let counts = comparison.counts().filter(|&(level, _)| reached(level) > 0);
-    counts.min_by(|a, b| far(a.1).total_cmp(&far(b.1)))
+    comparison
+        .counts()
+        .filter(|&(level, _)| comparison.entries.iter().any(|e| e.level == level && e.comparable()))
+        // By ratio: 50 and 200 are equally far from 100. Of two the larger one, which comes first.
+        .min_by(|a, b| {
+            let [a, b] = [a, b].map(|count| (count.1.max(1) as f64 / USUAL).ln().abs());
+            a.total_cmp(&b)
+        })
 }
 
-/// For each series and mesh the least value of the results that count, of those that were asked.
+/// For each series and mesh the least value of its results, at one level or at all of them.
 fn values(
     comparison: &Comparison<'_>,
-    is_asked: impl Fn(&Entry<'_>) -> bool,
-    counts: impl Fn(&Entry<'_>) -> bool,
+    level: Option<usize>,
     value: impl Fn(&Entry<'_>) -> Option<f64>,
 ) -> Vec<Values> {
-    let mut all = vec![vec![None; comparison.meshes.len()]; comparison.series.len()];
-    for entry in comparison.entries.iter().filter(|entry| is_asked(entry)) {
-        let place: &mut Option<f64> = &mut all[entry.series][entry.mesh];
-        let found = if counts(entry) { value(entry) } else { None };
-        *place = Some(place.unwrap_or(f64::INFINITY).min(found.unwrap_or(f64::INFINITY)));
+    let mut all: Vec<Values> = vec![vec![None; comparison.meshes.len()]; comparison.series.len()];
+    for entry in &comparison.entries {
+        if level.is_none_or(|level| entry.level == level) {
+            let least = all[entry.series][entry.mesh].get_or_insert(f64::INFINITY);
+            // A run without a result counts as infinitely bad, a mesh without a run not at all.
+            *least = least.min(value(entry).unwrap_or(f64::INFINITY));
+        }
     }
     all
 }
 
 /// The errors of the results at a count.
 fn errors_at(comparison: &Comparison<'_>, level: usize) -> Vec<Values> {
-    let asked = |entry: &Entry<'_>| entry.level == level;
-    values(
-        comparison,
-        asked,
-        |entry: &Entry<'_>| entry.comparable(),
-        |entry| HAUSDORFF.of(entry.record),
-    )
+    values(comparison, Some(level), |entry| {
+        HAUSDORFF.of(entry.record).filter(|_| entry.comparable())
+    })
 }
 
 /// What a series is ranked by.
@@ -198,21 +206,23 @@ impl Rank {
             [Some(low), Some(high)] if high.is_finite() && low != high => Some((low * high).sqrt()),
             [low, _] => low.filter(|value| value.is_finite()),
         };
-        let results: Vec<f64> = known.iter().copied().filter(|value| value.is_finite()).collect();
-        let logarithms = results.iter().map(|value| value.max(1e-9).ln());
+        // Infinite values are sorted to the end. A perfect result is zero and has no logarithm.
+        let results = &known[..known.partition_point(|value| value.is_finite())];
+        let sum: f64 = results.iter().map(|value| value.max(1e-9).ln()).sum();
         Self {
             series,
             median,
             missed: known.len() - results.len(),
-            mean: logarithms.sum::<f64>() / results.len().max(1) as f64,
+            mean: sum / results.len().max(1) as f64,
         }
     }
 }
 
 /// The best median first.
 fn by_median(a: &Rank, b: &Rank) -> Ordering {
-    let medians = a.median.unwrap_or(f64::INFINITY).total_cmp(&b.median.unwrap_or(f64::INFINITY));
-    medians
+    let [medians_a, medians_b] = [a, b].map(|rank| rank.median.unwrap_or(f64::INFINITY));
+    medians_a
+        .total_cmp(&medians_b)
         .then(a.missed.cmp(&b.missed))
         .then(a.mean.total_cmp(&b.mean))
         .then(a.series.cmp(&b.series))
@@ -234,9 +244,12 @@ struct Lead {
 
 impl Lead {
     fn of(first: &Values, second: &Values) -> Option<Self> {
-        let both = first.iter().zip(second).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
-        let both: Vec<(f64, f64)> = both.filter(|(a, b)| a.is_finite() && b.is_finite()).collect();
-        let ratios: Vec<f64> = both.iter().map(|(a, b)| a.max(1e-9) / b.max(1e-9)).collect();
+        let ratios: Vec<f64> = (first.iter().zip(second))
+            .filter_map(|(a, b)| Some(((*a)?, (*b)?)))
+            .filter(|(a, b)| a.is_finite() && b.is_finite())
+            // Floors: a quotient of zeros is no number.
+            .map(|(a, b)| a.max(1e-9) / b.max(1e-9))
+            .collect();
         let ratio = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
         let equal = ratios.iter().filter(|ratio| ratio.ln().abs() <= EQUAL).count();
         let better = ratios.iter().filter(|ratio| ratio.ln() < -EQUAL).count();
@@ -268,36 +281,43 @@ fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Row> {
 /// The row of the first of the ranked methods.
 fn answer(comparison: &Comparison<'_>, question: &Question, title: String, ranks: &[Rank]) -> Row {
     let first = ranks[0].series;
-    let mut cells = vec![Cell::new(title), Cell { best: true, ..name(comparison, first) }];
-    cells.push(Cell::optional(ranks[0].median.map(question.text)));
-    cells.push(Cell::new(on_meshes(&question.values[first])));
-    let next = ranks.get(1).map(|rank| rank.series);
-    cells.extend(lead_cells(comparison, next, |second| {
-        let lead = Lead::of(&question.values[first], &question.values[second])?;
-        Some([(question.lead)(lead.ratio), lead.counts()])
-    }));
+    let known = question.values[first].iter().flatten();
+    let met = known.clone().filter(|value| value.is_finite()).count();
+    let mut cells = vec![
+        Cell::new(title),
+        Cell { best: true, ..name(comparison, first) },
+        Cell::optional(ranks[0].median.map(question.text)),
+        Cell::new(format!("{met} of {}", counted(known.count(), "mesh", "meshes"))),
+    ];
+    let runner_up = ranks.get(1).and_then(|rank| {
+        let lead = Lead::of(&question.values[first], &question.values[rank.series])?;
+        Some((rank.series, lead))
+    });
+    cells.extend(match runner_up {
+        Some((second, lead)) => [
+            name(comparison, second),
+            Cell::new(format!("{} of {}", significant(lead.ratio, 2), question.of)),
+            Cell::new(lead.counts()),
+        ],
+        None => [Cell::new("no other"), Cell::optional(None), Cell::optional(None)],
+    });
     Row { cells, starts_group: false }
 }
 
 /// The row of the methods with the topology of the solid on every mesh, the one of the lowest error first.
 fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) -> Row {
-    let at = |entry: &Entry<'_>| entry.level == level && entry.comparable();
-    let is_right = |entry: &Entry<'_>| {
-        let evaluate = entry.record.evaluate.as_ref()?;
-        Some(evaluate.betti == evaluate.expected_betti?)
-    };
     let errors = errors_at(comparison, level);
-    let right = |series: usize| {
-        let own = comparison.entries.iter().filter(|e| e.series == series && at(e));
-        let known: Vec<bool> = own.filter_map(is_right).collect();
-        let asked = errors[series].iter().flatten().count();
-        (known.iter().filter(|&&right| right).count(), asked)
-    };
-    let mut ranks: Vec<Rank> = (0..comparison.series.len())
-        .filter(|&series| matches!(right(series), (right, asked) if right == asked && asked > 0))
-        .map(|series| Rank::of(series, &errors[series]))
-        .filter(|rank| rank.median.is_some())
-        .collect();
+    let mut ranks = vec![];
+    for (series, errors) in errors.iter().enumerate() {
+        let mut own = comparison.at(series, level);
+        own.retain(|entry| entry.comparable());
+        let (right, _) = topology(&own);
+        // Of all meshes that it ran on: one without a result is not right.
+        if right > 0 && right == errors.iter().flatten().count() {
+            ranks.push(Rank::of(series, errors));
+        }
+    }
+    ranks.retain(|rank| rank.median.is_some());
     ranks.sort_by(by_median);
     let title = format!("topology right everywhere, lowest error at {spheres}");
     if ranks.is_empty() {
@@ -312,48 +332,29 @@ fn name(comparison: &Comparison<'_>, series: usize) -> Cell {
     Cell::new(comparison.series[series].as_str())
 }
 
-/// On how many meshes there is a result, of those asked.
-fn on_meshes(values: &Values) -> String {
-    let known = values.iter().flatten();
-    let met = known.clone().filter(|value| value.is_finite()).count();
-    format!("{met} of {}", counted(known.count(), "mesh", "meshes"))
-}
-
-fn lead_cells(
-    comparison: &Comparison<'_>,
-    next: Option<usize>,
-    lead: impl Fn(usize) -> Option<[String; 2]>,
-) -> Vec<Cell> {
-    let next = next.and_then(|second| Some((second, lead(second)?)));
-    match next {
-        Some((second, [by, counts])) => {
-            vec![name(comparison, second), Cell::new(by), Cell::new(counts)]
-        }
-        None => vec![Cell::new("no other"), Cell::optional(None), Cell::optional(None)],
-    }
-}
-
 /// For each two methods, on how many meshes the one of the row has the lower error, an equal one, the higher one.
 pub(crate) fn wins_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
     let (level, spheres) = usual_level(comparison)?;
     let errors = errors_at(comparison, level);
-    let has = |values: &Values| values.iter().flatten().any(|value| value.is_finite());
-    let shown: Vec<usize> = (0..errors.len()).filter(|&series| has(&errors[series])).collect();
+    let shown: Vec<usize> = (0..errors.len())
+        .filter(|&series| errors[series].iter().flatten().any(|error| error.is_finite()))
+        .collect();
     if shown.len() < 2 {
         return None;
     }
     let mut columns = vec![Column::text("method")];
     columns.extend(shown.iter().map(|&s| Column::text(comparison.series[s].as_str())));
-    let row = |&first: &usize| {
+    let mut rows = vec![];
+    for &first in &shown {
         let mut cells = vec![name(comparison, first)];
-        cells.extend(shown.iter().map(|&second| {
-            let lead = (first != second).then(|| Lead::of(&errors[first], &errors[second]));
-            let lead = lead.flatten();
+        for &second in &shown {
+            // No method has a lead on itself.
+            let lead = Lead::of(&errors[first], &errors[second]).filter(|_| first != second);
             let best = lead.as_ref().is_some_and(|lead| lead.worse == 0 && lead.better > 0);
-            Cell { best, ..Cell::optional(lead.map(|lead| lead.counts())) }
-        }));
-        Row { cells, starts_group: false }
-    };
+            cells.push(Cell { best, ..Cell::optional(lead.map(|lead| lead.counts())) });
+        }
+        rows.push(Row { cells, starts_group: false });
+    }
     Some(Table {
         caption: format!("Method against method at {}", counted(spheres, "sphere", "spheres")),
         notes: vec![
@@ -364,7 +365,7 @@ pub(crate) fn wins_table(comparison: &Comparison<'_>, how: &str) -> Option<Table
                 100.0 * EQUAL
             ),
         ],
-        rows: shown.iter().map(row).collect(),
+        rows,
         columns,
     })
 }
@@ -397,53 +398,52 @@ pub(crate) struct BoundRow {
 /// Summaries for every bound that was searched for, from loose to tight.
 pub(crate) fn by_bound(comparison: &Comparison<'_>) -> Vec<BoundSummary> {
     let reference = reference(comparison);
-    let bounds = comparison.levels.iter().enumerate().filter_map(|(index, level)| match level {
-        Target::MaxError(bound) => Some((index, *bound)),
-        _ => None,
-    });
-    let at_bound = |(level, bound): (usize, f64)| {
-        let of_series = |series: usize| -> Vec<&Entry<'_>> {
-            let here = |entry: &&Entry<'_>| entry.level == level && entry.series == series;
-            comparison.entries.iter().filter(here).collect()
-        };
-        let yardstick = reference.map(of_series).unwrap_or_default();
-        let rows = (0..comparison.series.len()).map(|series| (series, of_series(series)));
-        let rows = rows.filter(|(_, entries)| !entries.is_empty());
-        let rows = rows.map(|(series, entries)| bound_row(series, &entries, &yardstick)).collect();
-        BoundSummary { percent: (bound * 1e12).round() / 1e10, rows }
-    };
-    bounds.map(at_bound).collect()
+    let mut summaries = vec![];
+    for (level, target) in comparison.levels.iter().enumerate() {
+        let Target::MaxError(bound) = target else { continue };
+        let yardstick = reference.map_or(vec![], |series| comparison.at(series, level));
+        let rows = (0..comparison.series.len())
+            .map(|series| (series, comparison.at(series, level)))
+            .filter(|(_, entries)| !entries.is_empty())
+            .map(|(series, entries)| bound_row(series, &entries, &yardstick))
+            .collect();
+        // In percent, without the digits that a fraction of two cannot hold: 0.3 %, not 0.30000000000000004 %.
+        summaries.push(BoundSummary { percent: (bound * 1e12).round() / 1e10, rows });
+    }
+    summaries
 }
 
 fn bound_row(series: usize, entries: &[&Entry<'_>], yardstick: &[&Entry<'_>]) -> BoundRow {
     let met: Vec<&Entry<'_>> = entries.iter().copied().filter(|entry| entry.measured()).collect();
     let missed = entries.iter().filter(|e| e.record.status == Status::BoundMissed).count();
-    let median = |of: &dyn Fn(&Entry<'_>) -> Option<f64>| {
-        let mut values: Vec<f64> = met.iter().filter_map(|entry| of(entry)).collect();
-        values.resize(entries.len(), f64::INFINITY);
-        values.sort_by(f64::total_cmp);
-        // The upper median: at least half of the meshes need no more.
-        values.get(values.len() / 2).copied().filter(|value| value.is_finite())
-    };
-    let spheres = |entry: &Entry<'_>| reached(entry.record).map(|spheres| spheres as f64);
     let ratios = met.iter().filter_map(|entry| {
         let other = yardstick.iter().find(|o| o.mesh == entry.mesh && o.measured())?;
-        Some(spheres(entry)? / spheres(other)?)
+        Some(reached(entry.record)? as f64 / reached(other.record)? as f64)
     });
-    let ratios: Vec<f64> = ratios.collect();
+    let asked = entries.len();
     BoundRow {
         series,
-        asked: entries.len(),
+        asked,
         met: met.len(),
-        failed: entries.len() - met.len() - missed,
-        spheres: median(&spheres),
-        numbers: median(&|e| Some(e.record.evaluate.as_ref()?.counts.numbers() as f64)),
-        seconds: median(&|entry| TOTAL_SECONDS.of(entry.record)),
-        ratio: Mean::Geometric { floor: f64::MIN_POSITIVE }
-            .of(&ratios)
-            .map(|value| Ratio { value, meshes: ratios.len() }),
+        failed: asked - met.len() - missed,
+        spheres: median_of(&met, asked, |record| reached(record).map(|spheres| spheres as f64)),
+        numbers: median_of(&met, asked, stored_numbers),
+        seconds: median_of(&met, asked, |record| TOTAL_SECONDS.of(record)),
+        ratio: Ratio::of(ratios),
         topology: topology(&met),
     }
+}
+
+/// The median over the `asked` meshes, where one without a value counts as infinite.
+fn median_of(
+    met: &[&Entry<'_>],
+    asked: usize,
+    value: impl Fn(&Record) -> Option<f64>,
+) -> Option<f64> {
+    let mut values: Vec<f64> = met.iter().filter_map(|entry| value(entry.record)).collect();
+    values.resize(asked, f64::INFINITY);
+    // The upper median: at least half of the meshes need no more.
+    median(&values).filter(|value| value.is_finite())
 }
 
 /// The table of all bounds; `None` where nothing was searched for.
@@ -456,8 +456,11 @@ pub(crate) fn equal_error_table(
     let mut rows = Vec::new();
     for bound in bounds {
         let mut sorted: Vec<&BoundRow> = bound.rows.iter().collect();
-        let order = |row: &BoundRow| row.spheres.unwrap_or(f64::INFINITY);
-        sorted.sort_by(|a, b| order(a).total_cmp(&order(b)).then(b.met.cmp(&a.met)));
+        // Fewest spheres first. Rows without a median follow, the one that keeps the error most often first.
+        sorted.sort_by(|a, b| {
+            let [few, many] = [a, b].map(|row| row.spheres.unwrap_or(f64::INFINITY));
+            few.total_cmp(&many).then(b.met.cmp(&a.met))
+        });
         for (index, row) in sorted.into_iter().enumerate() {
             rows.push(Row { cells: bound_cells(comparison, bound, row), starts_group: index == 0 });
         }
@@ -491,18 +494,18 @@ pub(crate) fn equal_error_table(
 }
 
 fn bound_cells(comparison: &Comparison<'_>, bound: &BoundSummary, row: &BoundRow) -> Vec<Cell> {
-    let whole = |value: Option<f64>| Cell::optional(value.map(|v| grouped(v.round() as u64)));
-    let (right, known) = row.topology;
+    let [spheres, numbers] = [row.spheres, row.numbers]
+        .map(|value| Cell::optional(value.map(|value| grouped(value.round() as u64))));
     vec![
         Cell::new(bound.percent.to_string()),
         Cell::new(comparison.series[row.series].as_str()),
         Cell::new(format!("{} of {}", row.met, row.asked)),
-        whole(row.spheres),
+        spheres,
         Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3))),
         Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes"))),
-        whole(row.numbers),
+        numbers,
         Cell::optional(row.seconds.map(|seconds| significant(seconds, 3))),
-        Cell::optional((known > 0).then(|| format!("{right} of {known}"))),
+        Cell::share(row.topology),
         Cell::new(if row.failed > 0 { row.failed.to_string() } else { "none".to_owned() }),
     ]
 }
@@ -512,19 +515,18 @@ pub(crate) fn equal_error_figure(
     comparison: &Comparison<'_>,
     bounds: &[BoundSummary],
 ) -> Option<Figure> {
-    let curve = |series: usize| {
-        let point = |bound: &BoundSummary| {
-            let row = bound.rows.iter().find(|row| row.series == series)?;
-            Some(Point { n: Some(row.asked), ..Point::at(bound.percent, row.spheres?) })
-        };
-        Curve {
-            series,
-            label: comparison.series[series].clone(),
-            name: comparison.series[series].clone(),
-            of: "median".to_owned(),
-            points: bounds.iter().filter_map(point).collect(),
-            ..Curve::default()
-        }
+    let curve = |series: usize| Curve {
+        series,
+        label: comparison.series[series].clone(),
+        name: comparison.series[series].clone(),
+        of: "median".to_owned(),
+        points: (bounds.iter())
+            .filter_map(|bound| {
+                let row = bound.rows.iter().find(|row| row.series == series)?;
+                Some(Point { n: Some(row.asked), ..Point::at(bound.percent, row.spheres?) })
+            })
+            .collect(),
+        ..Curve::default()
     };
     let figure = Figure {
         stem: "overview-equal-error".to_owned(),

@@ -88,18 +88,14 @@ pub(crate) fn row_name(record: &Record) -> String {
 /// Sphere counts from many to few, error bounds from large to small, published, native levels
 /// ascending.
 fn compare_levels(a: Target, b: Target) -> Ordering {
-    let rank = |level| match level {
-        Target::Spheres(_) => 0,
-        Target::MaxError(_) => 1,
-        Target::Published => 2,
-        Target::Native(_) => 3,
-    };
-    match (a, b) {
-        (Target::Spheres(a), Target::Spheres(b)) => b.cmp(&a),
-        (Target::Native(a), Target::Native(b)) => a.total_cmp(&b),
-        (Target::MaxError(a), Target::MaxError(b)) => b.total_cmp(&a),
-        _ => rank(a).cmp(&rank(b)),
-    }
+    // Numbers that fall along the order are negated.
+    let [a, b] = [a, b].map(|level| match level {
+        Target::Spheres(count) => (0, -(count as f64)),
+        Target::MaxError(bound) => (1, -bound),
+        Target::Published => (2, 0.0),
+        Target::Native(value) => (3, value),
+    });
+    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
 }
 
 impl<'a> Comparison<'a> {
@@ -119,14 +115,13 @@ impl<'a> Comparison<'a> {
             let mesh = mesh_keys.1[&hashes.key(record)];
             let series = series_keys.1[&SeriesKey::of(record)];
             let level = levels
-                .iter()
-                .position(|&level| compare_levels(level, record.simplify.level).is_eq())
-                .unwrap_or_default();
+                .partition_point(|&level| compare_levels(level, record.simplify.level).is_lt());
             by_item.insert((mesh, level, series), record);
         }
-        let entries: Vec<Entry<'a>> = by_item
-            .iter()
-            .map(|(&(mesh, level, series), &record)| Entry { mesh, series, level, record })
+        // The order of the map is that of the tables: by mesh, level and series.
+        let entries = by_item
+            .into_iter()
+            .map(|((mesh, level, series), record)| Entry { mesh, series, level, record })
             .collect();
         Self {
             meshes: mesh_labels(&mesh_keys.0),
@@ -145,6 +140,12 @@ impl<'a> Comparison<'a> {
         self.entries[begin..].iter().take_while(move |entry| entry.mesh == mesh)
     }
 
+    /// The entries of one series at one level, by mesh.
+    pub(crate) fn at(&self, series: usize, level: usize) -> Vec<&Entry<'a>> {
+        let here = self.entries.iter().filter(|e| e.series == series && e.level == level);
+        here.collect()
+    }
+
     /// The sphere counts that were asked, with their level indices, from many to few.
     pub(crate) fn counts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.levels.iter().enumerate().filter_map(|(index, level)| match level {
@@ -160,36 +161,29 @@ impl<'a> Comparison<'a> {
 
     /// What the reader must know before trusting a comparison of these records.
     pub(crate) fn cautions(&self) -> Vec<String> {
-        let distinct = |of: fn(&'a Record) -> &'a str| -> usize {
-            let values: BTreeSet<&str> =
-                self.entries.iter().map(|entry| of(entry.record)).collect();
-            values.len()
-        };
+        let records = || self.entries.iter().map(|entry| entry.record);
         let mut cautions = Vec::new();
-        if self.superseded > 0 {
-            let replaced = match self.superseded {
-                1 => "An earlier record was replaced by a later one of the same item.".to_owned(),
-                many => {
-                    format!("{many} earlier records were replaced by later ones of the same items.")
-                }
-            };
-            cautions.push(replaced);
+        match self.superseded {
+            0 => {}
+            1 => cautions
+                .push("An earlier record was replaced by a later one of the same item.".to_owned()),
+            many => cautions.push(format!(
+                "{many} earlier records were replaced by later ones of the same items."
+            )),
         }
-        let binaries = distinct(|record| &record.binary_hash);
-        if binaries > 1 {
-            cautions.push(format!("The results come from {binaries} different builds."));
+        let builds: BTreeSet<&str> = records().map(|r| r.binary_hash.as_str()).collect();
+        if builds.len() > 1 {
+            cautions.push(format!("The results come from {} different builds.", builds.len()));
         }
-        let machines = distinct(|record| &record.machine.cpu);
-        if machines > 1 {
+        let processors: BTreeSet<&str> = records().map(|r| r.machine.cpu.as_str()).collect();
+        if processors.len() > 1 {
             cautions.push(format!(
-                "The results come from {machines} different processors: their seconds do not compare."
+                "The results come from {} different processors: their seconds do not compare.",
+                processors.len()
             ));
         }
-        let unmeasured = self
-            .entries
-            .iter()
-            .filter(|entry| entry.record.status.has_result() && !entry.measured())
-            .count();
+        let with_result = records().filter(|record| record.status.has_result()).count();
+        let unmeasured = with_result - self.measured();
         if unmeasured > 0 {
             cautions.push(format!("{unmeasured} results were never evaluated."));
         }
@@ -244,22 +238,29 @@ impl<'a> Hashes<'a> {
     /// The mesh of a record. A run that ended before its input was read has no hash: it belongs to
     /// the one mesh of its name, where there is just one.
     fn key(&self, record: &'a Record) -> MeshKey<'a> {
-        let only = || {
-            let all = self.0.get(record.mesh.as_str()).filter(|all| all.len() == 1)?;
-            all.first().copied()
-        };
-        MeshKey { name: &record.mesh, hash: record.mesh_hash.as_deref().or_else(only) }
+        let known = self.0.get(record.mesh.as_str()).filter(|known| known.len() == 1);
+        let only = known.and_then(|known| known.first().copied());
+        MeshKey { name: &record.mesh, hash: record.mesh_hash.as_deref().or(only) }
     }
 }
 
 /// Names, with a piece of the hash where one name stands for several meshes.
 fn mesh_labels(keys: &[MeshKey<'_>]) -> Vec<String> {
-    let label = |key: &MeshKey<'_>| {
+    let mut labels = vec![];
+    for key in keys {
         let shared = keys.iter().filter(|other| other.name == key.name).count() > 1;
-        let hash: String = key.hash.unwrap_or("no hash").chars().take(8).collect();
-        printable(&if shared { format!("{} ({hash})", key.name) } else { key.name.to_owned() })
-    };
-    keys.iter().map(label).collect()
+        let hash = short(key.hash.unwrap_or("no hash"));
+        labels.push(printable(&match shared {
+            true => format!("{} ({hash})", key.name),
+            false => key.name.to_owned(),
+        }));
+    }
+    labels
+}
+
+/// Enough of a hash to tell a few apart.
+fn short(hash: &str) -> String {
+    hash.chars().take(8).collect()
 }
 
 /// What makes a row of its own: the method with its parameters, and the conditions under which it
@@ -282,10 +283,10 @@ struct SeriesKey<'a> {
 impl<'a> SeriesKey<'a> {
     fn of(record: &'a Record) -> Self {
         let simplify = &record.simplify;
+        // By name: the order in which parameters were set makes no row of its own.
         let params: BTreeMap<&String, String> =
             simplify.params.0.iter().map(|(key, value)| (key, value.to_string())).collect();
-        let params: Vec<String> = params
-            .iter()
+        let params: Vec<String> = (params.iter())
             .map(|(key, value)| format!("{key}={}", value.trim_matches('"')))
             .collect();
         let conditions = record.conditions.as_ref();
@@ -318,17 +319,20 @@ impl<'a> SeriesKey<'a> {
 /// The name that was given, or method and parameters; and each condition in which rows of one name
 /// differ.
 fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
-    let label = |key: &SeriesKey<'_>| {
-        let name = key.name();
-        let namesakes: Vec<_> = keys.iter().filter(|other| other.name() == name).collect();
-        let namesakes: Vec<_> = namesakes.into_iter().map(SeriesKey::conditions).collect();
-        let own = key.conditions().into_iter().enumerate();
-        let telling =
-            own.filter(|(index, own)| namesakes.iter().any(|other| other[*index] != *own));
-        let label = telling.fold(name, |label, (_, condition)| label + ", " + &condition);
-        printable(&label)
-    };
-    keys.iter().map(label).collect()
+    let mut labels = vec![];
+    for key in keys {
+        let mut label = key.name();
+        let namesakes: Vec<[String; 8]> =
+            keys.iter().filter(|other| other.name() == label).map(SeriesKey::conditions).collect();
+        for (index, condition) in key.conditions().into_iter().enumerate() {
+            // A condition that all rows of the name share does not tell them apart.
+            if namesakes.iter().any(|other| other[index] != condition) {
+                label = label + ", " + &condition;
+            }
+        }
+        labels.push(printable(&label));
+    }
+    labels
 }
 
 impl SeriesKey<'_> {
@@ -342,7 +346,6 @@ impl SeriesKey<'_> {
 
     /// What tells rows of one name apart, in words.
     fn conditions(&self) -> [String; 8] {
-        let short = |hash: &str| -> String { hash.chars().take(8).collect() };
         [
             self.method_and_params(),
             format!("seed {}", self.seed),

@@ -73,7 +73,7 @@ pub(crate) fn median(values: &[f64]) -> Option<f64> {
 
 /// Lengths and seconds span orders of magnitude. Below the floor (% of the diagonal, seconds) they count as the floor,
 /// so that a single zero does not make a geometric mean zero.
-const GEOMETRIC: Mean = Mean::Geometric { floor: 1e-6 };
+pub(crate) const GEOMETRIC: Mean = Mean::Geometric { floor: 1e-6 };
 
 /// How a number is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

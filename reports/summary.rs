@@ -13,9 +13,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
-use crate::metric::{COMPARED, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
+use crate::metric::{COMPARED, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::plots::{Curve, Figure, Scale, native_points};
-use crate::record::{Status, Target};
+use crate::record::{Record, Status, Target};
 use crate::tables::{Cell, Column, Row, Table};
 use crate::text::{counted, file_stems, grouped, significant};
 
@@ -67,6 +67,16 @@ pub(crate) struct Ratio {
     pub(crate) meshes: usize,
 }
 
+impl Ratio {
+    /// The mean of one ratio for each mesh; `None` without any.
+    pub(crate) fn of(ratios: impl Iterator<Item = f64>) -> Option<Self> {
+        let ratios: Vec<f64> = ratios.collect();
+        // Ratios are positive: the floor is none.
+        let value = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
+        Some(Self { value, meshes: ratios.len() })
+    }
+}
+
 impl SeriesSummary {
     /// The mean of one of [`COMPARED`].
     pub(crate) fn mean(&self, metric: &Metric) -> Option<f64> {
@@ -85,12 +95,7 @@ impl SeriesSummary {
 }
 
 impl CountSummary {
-    /// Whether a row's means are over all meshes, and so read beside others of that kind.
-    pub(crate) fn is_whole(&self, row: &SeriesSummary) -> bool {
-        row.over == self.meshes && row.over > 0
-    }
-
-    /// Whether a row's mean of a metric is over all meshes.
+    /// Whether a row's mean of a metric is over all meshes, and so compares with others of that kind.
     pub(crate) fn is_whole_of(&self, row: &SeriesSummary, metric: &Metric) -> bool {
         row.over(metric) == self.meshes && self.meshes > 0
     }
@@ -99,15 +104,22 @@ impl CountSummary {
 /// The series that others are put in relation to: Q-MAT as it is by default, or else the first
 /// series that reached a count.
 pub(crate) fn reference(comparison: &Comparison<'_>) -> Option<usize> {
+    // Every series has an entry: its label comes from a record.
     let plain = comparison.series.iter().position(|label| label == REFERENCE);
-    let first = || comparison.entries.iter().filter(|e| e.comparable()).map(|e| e.series).min();
-    plain.filter(|&series| comparison.entries.iter().any(|e| e.series == series)).or_else(first)
+    plain.or_else(|| {
+        comparison.entries.iter().filter(|e| e.comparable()).map(|entry| entry.series).min()
+    })
 }
 
 /// Summaries for every number of spheres that was asked, from many to few.
 pub(crate) fn by_count(comparison: &Comparison<'_>) -> Vec<CountSummary> {
-    let sets: Vec<OwnSet> =
-        (0..comparison.series.len()).map(|s| OwnSet::at_counts(comparison, s)).collect();
+    let counts: BTreeSet<usize> = comparison.counts().map(|(level, _)| level).collect();
+    let mut sets = vec![];
+    for series in 0..comparison.series.len() {
+        let own = comparison.entries.iter().filter(|entry| entry.series == series);
+        let own = own.filter(|entry| counts.contains(&entry.level));
+        sets.push(OwnSet::of(own.map(|entry| (entry.level, entry.mesh, entry.comparable()))));
+    }
     let reference = reference(comparison);
     let counts = comparison.counts();
     counts.map(|(level, count)| at_count(comparison, &sets, reference, (level, count))).collect()
@@ -152,19 +164,14 @@ impl OwnSet {
         series: usize,
         metric: &Metric,
     ) -> BTreeSet<usize> {
-        let own = comparison.entries.iter().filter(|entry| entry.series == series);
-        let own = own.filter(|entry| self.levels.contains(&entry.level));
-        let unknown: BTreeSet<usize> =
-            own.filter(|entry| metric.of(entry.record).is_none()).map(|entry| entry.mesh).collect();
-        &self.meshes - &unknown
-    }
-
-    /// The set of a series for its counts.
-    fn at_counts(comparison: &Comparison<'_>, series: usize) -> Self {
-        let counts: BTreeSet<usize> = comparison.counts().map(|(level, _)| level).collect();
-        let own = comparison.entries.iter().filter(|entry| entry.series == series);
-        let own = own.filter(|entry| counts.contains(&entry.level));
-        Self::of(own.map(|entry| (entry.level, entry.mesh, entry.comparable())))
+        let mut known = self.meshes.clone();
+        for entry in &comparison.entries {
+            let is_own = entry.series == series && self.levels.contains(&entry.level);
+            if is_own && metric.of(entry.record).is_none() {
+                known.remove(&entry.mesh);
+            }
+        }
+        known
     }
 }
 
@@ -174,42 +181,35 @@ fn at_count(
     reference: Option<usize>,
     (level, count): (usize, usize),
 ) -> CountSummary {
-    let of_series = |series: usize| -> Vec<&Entry<'_>> {
-        let here = |entry: &&Entry<'_>| entry.level == level && entry.series == series;
-        comparison.entries.iter().filter(here).collect()
-    };
-    let all: Vec<(usize, Vec<&Entry<'_>>)> = (0..comparison.series.len())
-        .map(|series| (series, of_series(series)))
-        .filter(|(_, entries)| !entries.is_empty())
-        .collect();
-    let meshes: BTreeSet<usize> =
-        all.iter().flat_map(|(_, entries)| entries.iter().map(|entry| entry.mesh)).collect();
-    let yardstick = reference.map(of_series).unwrap_or_default();
-    let row = |(series, entries): &(usize, Vec<&Entry<'_>>)| {
-        let set = &sets[*series];
-        let kept = entries.iter().copied().filter(|entry| {
+    let yardstick = reference.map_or(vec![], |series| comparison.at(series, level));
+    let mut meshes = BTreeSet::new();
+    let mut rows = vec![];
+    for (series, set) in sets.iter().enumerate() {
+        let entries = comparison.at(series, level);
+        if entries.is_empty() {
+            continue;
+        }
+        meshes.extend(entries.iter().map(|entry| entry.mesh));
+        // A count that has no mean leaves no entry.
+        let mut kept = entries.clone();
+        kept.retain(|entry| {
             set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
         });
-        let known = |metric: &Metric| set.known(comparison, *series, metric);
-        let mut row = summarise(*series, entries, &kept.collect::<Vec<_>>(), &known);
-        row.ratio = ratio(entries, &yardstick);
-        row
-    };
-    CountSummary { count, meshes: meshes.len(), rows: all.iter().map(row).collect() }
+        let ratio = ratio(&entries, &yardstick);
+        let known = COMPARED.map(|metric| set.known(comparison, series, metric));
+        rows.push(SeriesSummary { ratio, ..summarise(series, &entries, &kept, &known) });
+    }
+    CountSummary { count, meshes: meshes.len(), rows }
 }
 
 /// Hausdorff errors in relation to those of the reference, on the meshes where both reached a count.
 fn ratio(entries: &[&Entry<'_>], reference: &[&Entry<'_>]) -> Option<Ratio> {
-    let error = |entry: &Entry<'_>| {
-        HAUSDORFF.of(entry.record).filter(|&error| entry.comparable() && error > 0.0)
-    };
-    let pair = |entry: &&Entry<'_>| {
+    Ratio::of(entries.iter().filter_map(|entry| {
         let other = reference.iter().find(|other| other.mesh == entry.mesh)?;
-        Some(error(entry)? / error(other)?)
-    };
-    let ratios: Vec<f64> = entries.iter().filter_map(pair).collect();
-    let value = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
-    Some(Ratio { value, meshes: ratios.len() })
+        let [own, others] = [entry, other]
+            .map(|e| HAUSDORFF.of(e.record).filter(|&error| e.comparable() && error > 0.0));
+        Some(own? / others?)
+    }))
 }
 
 /// The row of one series from all its entries and those that are averaged.
@@ -217,13 +217,13 @@ fn summarise(
     series: usize,
     entries: &[&Entry<'_>],
     kept: &[&Entry<'_>],
-    known: &dyn Fn(&Metric) -> BTreeSet<usize>,
+    known: &[BTreeSet<usize>; COMPARED.len()],
 ) -> SeriesSummary {
-    let number = |of: &dyn Fn(&Entry<'_>) -> bool| entries.iter().filter(|entry| of(entry)).count();
-    let reached: Vec<&Entry<'_>> =
-        entries.iter().copied().filter(|entry| entry.comparable()).collect();
-    let failed = number(&|entry| entry.record.status.is_failure());
-    let unsupported = number(&|entry| entry.record.status == Status::Unsupported);
+    let mut reached = entries.to_vec();
+    reached.retain(|entry| entry.comparable());
+    let statuses = || entries.iter().map(|entry| entry.record.status);
+    let failed = statuses().filter(|status| status.is_failure()).count();
+    let unsupported = statuses().filter(|&status| status == Status::Unsupported).count();
     SeriesSummary {
         series,
         over: kept.len(),
@@ -232,9 +232,9 @@ fn summarise(
         missed: entries.len() - reached.len() - failed - unsupported,
         failed,
         unsupported,
-        means: COMPARED.map(|metric| {
-            let known = known(metric);
-            let values = kept.iter().filter(|entry| known.contains(&entry.mesh));
+        means: std::array::from_fn(|index| {
+            let metric = COMPARED[index];
+            let values = kept.iter().filter(|entry| known[index].contains(&entry.mesh));
             let values: Vec<f64> = values.filter_map(|entry| metric.of(entry.record)).collect();
             // A mean over less than half of the meshes tells of others than those that were asked for.
             let enough = 2 * values.len() >= entries.len();
@@ -249,13 +249,14 @@ fn summarise(
 /// Arithmetic means of the stages, which add up as stages must.
 fn mean_stages(entries: &[&Entry<'_>]) -> Option<[f64; 3]> {
     let stages: Vec<_> = entries.iter().filter_map(|entry| entry.record.simplify.seconds).collect();
-    if stages.is_empty() {
-        return None;
+    let mut sums = [0.0; 3];
+    for stage in &stages {
+        for (sum, seconds) in sums.iter_mut().zip([stage.substrate, stage.prepare, stage.simplify])
+        {
+            *sum += seconds;
+        }
     }
-    let mean = |of: fn(&crate::record::Stages) -> f64| {
-        stages.iter().map(of).sum::<f64>() / stages.len() as f64
-    };
-    Some([mean(|s| s.substrate), mean(|s| s.prepare), mean(|s| s.simplify)])
+    (!stages.is_empty()).then(|| sums.map(|sum| sum / stages.len() as f64))
 }
 
 /// Results with the solid's Betti numbers, and results where both are known.
@@ -308,18 +309,16 @@ pub(crate) fn native_curves(comparison: &Comparison<'_>) -> Vec<NativeCurve> {
 }
 
 fn native_curve(comparison: &Comparison<'_>, series: usize) -> Option<NativeCurve> {
-    let is_own =
-        |level: usize| matches!(comparison.levels[level], Target::Native(_) | Target::Published);
-    let own: Vec<&Entry<'_>> =
-        comparison.entries.iter().filter(|e| e.series == series && is_own(e.level)).collect();
+    let mut own: Vec<&Entry<'_>> =
+        comparison.entries.iter().filter(|entry| entry.series == series).collect();
+    own.retain(|entry| {
+        matches!(comparison.levels[entry.level], Target::Native(_) | Target::Published)
+    });
     let set = OwnSet::of(own.iter().map(|entry| (entry.level, entry.mesh, entry.measured())));
     let mut points = Vec::new();
     for &level in &set.levels {
-        let kept: Vec<&Entry<'_>> = own
-            .iter()
-            .copied()
-            .filter(|entry| entry.level == level && set.meshes.contains(&entry.mesh))
-            .collect();
+        let mut kept = comparison.at(series, level);
+        kept.retain(|entry| set.meshes.contains(&entry.mesh));
         points.extend(native_point(comparison.levels[level], &kept));
     }
     points.sort_by(|a, b| b.spheres.total_cmp(&a.spheres));
@@ -328,18 +327,20 @@ fn native_curve(comparison: &Comparison<'_>, series: usize) -> Option<NativeCurv
 }
 
 fn native_point(level: Target, entries: &[&Entry<'_>]) -> Option<NativePoint> {
-    let mean = |of: &dyn Fn(&Entry<'_>) -> Option<f64>| {
-        let values: Option<Vec<f64>> = entries.iter().map(|entry| of(entry)).collect();
-        Mean::Geometric { floor: 1e-6 }.of(&values?)
-    };
     Some(NativePoint {
         level,
-        spheres: mean(&|entry| reached(entry.record).map(|spheres| spheres as f64))?,
-        hausdorff: mean(&|entry| HAUSDORFF.of(entry.record))?,
-        mean: mean(&|entry| MEAN_ERROR.of(entry.record))?,
-        seconds: mean(&|entry| TOTAL_SECONDS.of(entry.record))?,
+        spheres: mean_of(entries, |record| Some(reached(record)? as f64))?,
+        hausdorff: mean_of(entries, |record| HAUSDORFF.of(record))?,
+        mean: mean_of(entries, |record| MEAN_ERROR.of(record))?,
+        seconds: mean_of(entries, |record| TOTAL_SECONDS.of(record))?,
         topology: topology(entries),
     })
+}
+
+/// The geometric mean of a value that every entry must have: all means of a point are over the same meshes.
+fn mean_of(entries: &[&Entry<'_>], value: fn(&Record) -> Option<f64>) -> Option<f64> {
+    let values: Option<Vec<f64>> = entries.iter().map(|entry| value(entry.record)).collect();
+    GEOMETRIC.of(&values?)
 }
 
 /// The table of all methods at levels of their own.
@@ -349,30 +350,27 @@ pub(crate) fn native_table(
     axis: &dyn Fn(&str) -> Option<String>,
     how: &str,
 ) -> Table {
-    let rows = curves.iter().flat_map(|curve| {
-        let method = comparison.methods[curve.series];
-        let axis = axis(method);
-        curve.points.iter().enumerate().map(move |(index, point)| {
+    let mut rows = vec![];
+    for curve in curves {
+        let axis = axis(comparison.methods[curve.series]);
+        for (index, point) in curve.points.iter().enumerate() {
             let level = match (point.level, &axis) {
                 (Target::Native(value), Some(axis)) => format!("{value} {axis}"),
                 (level, _) => level_label(level),
             };
-            let (right, known) = point.topology;
-            Row {
-                cells: vec![
-                    Cell::new(comparison.series[curve.series].as_str()),
-                    Cell::new(level),
-                    Cell::new(format!("{} of {}", curve.over, curve.asked)),
-                    Cell::new(grouped(point.spheres.round() as u64)),
-                    Cell::new(significant(point.hausdorff, 3)),
-                    Cell::new(significant(point.mean, 3)),
-                    Cell::new(significant(point.seconds, 3)),
-                    Cell::optional((known > 0).then(|| format!("{right} of {known}"))),
-                ],
-                starts_group: index == 0,
-            }
-        })
-    });
+            let cells = vec![
+                Cell::new(comparison.series[curve.series].as_str()),
+                Cell::new(level),
+                Cell::share((curve.over, curve.asked)),
+                Cell::new(grouped(point.spheres.round() as u64)),
+                Cell::new(significant(point.hausdorff, 3)),
+                Cell::new(significant(point.mean, 3)),
+                Cell::new(significant(point.seconds, 3)),
+                Cell::share(point.topology),
+            ];
+            rows.push(Row { cells, starts_group: index == 0 });
+        }
+    }
     Table {
         caption: "Every method at levels of its own".to_owned(),
         notes: vec![
@@ -383,7 +381,7 @@ pub(crate) fn native_table(
              bounding-box diagonal."
                 .to_owned(),
         ],
-        rows: rows.collect(),
+        rows,
         columns: vec![
             Column::text("method"),
             Column::text("level"),
@@ -404,32 +402,36 @@ pub(crate) fn native_figures(
     axis: &dyn Fn(&str) -> Option<String>,
 ) -> Vec<Figure> {
     let stems = file_stems(comparison.series.iter().map(String::as_str));
-    let figure = |native: &NativeCurve| {
+    let mut figures = vec![];
+    for native in natives {
         let mut points = native_points(comparison, native, |point| match point.level {
             Target::Native(value) => Some((value, point.hausdorff)),
             _ => None,
         });
-        let ends = points.iter().map(|point| (point.x, point.x));
-        let (least, most) = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        if points.len() < 2 {
+            continue;
+        }
+        let levels = || points.iter().map(|point| point.x);
+        let least = levels().fold(f64::INFINITY, f64::min);
+        let most = levels().fold(f64::NEG_INFINITY, f64::max);
         let is_log = least > 0.0 && most > 20.0 * least;
-        // Tags a tenth of the axis apart do not cover each other.
-        let place = |x: f64| match is_log {
-            true => (x / least).ln() / (most / least).ln(),
-            false => (x - least) / (most - least),
-        };
         let mut last = f64::NEG_INFINITY;
         for point in &mut points {
-            if (place(point.x) - last).abs() >= 0.125 {
+            let place = match is_log {
+                true => (point.x / least).ln() / (most / least).ln(),
+                false => (point.x - least) / (most - least),
+            };
+            // Tags an eighth of the axis apart do not cover each other.
+            if (place - last).abs() >= 0.125 {
                 point.tag = point.spheres.map(|spheres| grouped(spheres.round() as u64));
-                last = place(point.x);
+                last = place;
             }
         }
         let name = comparison.series[native.series].clone();
-        let title = format!("{name}: Hausdorff error against its native level");
         let native_axis = axis(comparison.methods[native.series]);
-        (points.len() > 1).then(|| Figure {
+        figures.push(Figure {
             stem: format!("overview-level-{}", stems[native.series]),
-            title,
+            title: format!("{name}: Hausdorff error against its native level"),
             x: (
                 native_axis.unwrap_or_else(|| "native level".to_owned()),
                 if is_log { Scale::Log } else { Scale::Linear },
@@ -446,9 +448,9 @@ pub(crate) fn native_figures(
             }],
             front: false,
             leading: false,
-        })
-    };
-    natives.iter().filter_map(figure).collect()
+        });
+    }
+    figures
 }
 
 /// Caption of the table of means.
@@ -460,13 +462,14 @@ pub(crate) fn means_table(
     summaries: &[CountSummary],
     how: &str,
 ) -> Table {
-    let mut columns =
-        vec![Column::number("spheres"), Column::text("method"), Column::text("means over")];
     let yardstick = reference(comparison).map(|series| comparison.series[series].as_str());
-    columns.extend([
+    let mut columns = vec![
+        Column::number("spheres"),
+        Column::text("method"),
+        Column::text("means over"),
         Column::number(format!("Hausdorff ÷ {}", yardstick.unwrap_or("reference"))),
         Column::text("on"),
-    ]);
+    ];
     columns.extend(COMPARED.iter().map(|metric| Column::number(metric.heading())));
     columns.extend(["substrate (s)", "prepare (s)", "simplify (s)"].map(Column::number));
     columns.extend([Column::text("topology right"), Column::text("without a result")]);
@@ -498,12 +501,10 @@ pub(crate) fn means_table(
 }
 
 fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummary) -> Vec<Cell> {
-    let is_whole = summary.is_whole(row);
-    let framed = |text: String| if is_whole { text } else { format!("({text})") };
     let mut cells = vec![
         Cell::new(grouped(summary.count as u64)),
         Cell::new(comparison.series[row.series].as_str()),
-        Cell::new(format!("{} of {}", row.over, row.asked)),
+        Cell::share((row.over, row.asked)),
         Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3))),
         Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes"))),
     ];
@@ -511,6 +512,7 @@ fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummar
         let Some(mean) = row.mean(metric) else { return Cell::optional(None) };
         let (text, over) = (metric.format_mean(mean), row.over(metric));
         let is_whole = summary.is_whole_of(row, metric);
+        // Two means that read the same are equally good.
         let best =
             is_whole && best(summary, metric).is_some_and(|best| metric.format_mean(best) == text);
         let text = match is_whole {
@@ -520,26 +522,25 @@ fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummar
         };
         Cell { text, best }
     }));
-    match row.stages {
-        Some(stages) => {
-            cells.extend(stages.map(|seconds| Cell::new(framed(significant(seconds, 3)))));
-        }
-        None => cells.extend([(); 3].map(|()| Cell::optional(None))),
+    for stage in 0..3 {
+        cells.push(Cell::optional(row.stages.map(|stages| {
+            let seconds = significant(stages[stage], 3);
+            if row.over == summary.meshes { seconds } else { format!("({seconds})") }
+        })));
     }
-    let (right, known) = row.topology;
-    cells.push(Cell::optional((known > 0).then(|| format!("{right} of {known}"))));
-    cells.push(Cell::new(without_result(row)));
+    cells.extend([Cell::share(row.topology), Cell::new(without_result(row))]);
     cells
 }
 
 /// What became of the meshes that are in no mean.
 pub(crate) fn without_result(row: &SeriesSummary) -> String {
-    let parts =
-        [(row.failed, "failed"), (row.unsupported, "unsupported"), (row.missed, "other count")];
-    let parts: Vec<String> = parts
-        .iter()
-        .filter(|(count, _)| *count > 0)
-        .map(|(count, what)| format!("{count} {what}"))
-        .collect();
+    let mut parts = vec![];
+    for (count, what) in
+        [(row.failed, "failed"), (row.unsupported, "unsupported"), (row.missed, "other count")]
+    {
+        if count > 0 {
+            parts.push(format!("{count} {what}"));
+        }
+    }
     if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
 }

@@ -86,6 +86,11 @@ impl Cell {
     pub(crate) fn optional(text: Option<String>) -> Self {
         Self::new(text.unwrap_or_else(|| "–".to_owned()))
     }
+
+    /// `3 of 4`; a dash of none.
+    pub(crate) fn share((part, all): (usize, usize)) -> Self {
+        Self::optional((all > 0).then(|| format!("{part} of {all}")))
+    }
 }
 
 impl Serialize for Cell {
