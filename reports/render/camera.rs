@@ -70,15 +70,13 @@ fn around(across: Vec3, up: Vec3, towards: Vec3, (azimuth, elevation): (f64, f64
 
 /// Across, up, and towards the eye, for a shape as it seems to stand.
 fn standing_axes(mesh: &TriMesh) -> [Vec3; 3] {
-    let extent = |axis: Vec3| {
-        let along = || mesh.vertices.iter().map(|p| p.dot(axis));
-        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-    };
-    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(extent);
+    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| extent(mesh, axis));
     let principal = principal_axes(mesh);
-    if principal.map(extent).iter().product::<f64>() < ASKEW * (x * y * z) {
-        // The longest extent lies across, the shortest is looked along.
-        let [across, up] = principal.first_chunk().copied().unwrap_or([Vec3::X, Vec3::Y]);
+    let volume: f64 = principal.map(|axis| extent(mesh, axis)).iter().product();
+    if volume < ASKEW * (x * y * z) {
+        // The longest extent lies across, the shortest is looked along. Signs were chosen one by one, so the third
+        // axis as found may make a left-handed system.
+        let [across, up, _] = principal;
         return [across, up, across.cross(up)];
     }
     // y is up in most files of shapes. Where a shape is flat along y, z must be.
@@ -91,10 +89,16 @@ fn standing_axes(mesh: &TriMesh) -> [Vec3; 3] {
     }
 }
 
+/// Length of a surface along an axis.
+fn extent(mesh: &TriMesh, axis: Vec3) -> f64 {
+    let along = || mesh.vertices.iter().map(|p| p.dot(axis));
+    along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+}
+
 /// The principal axes of a surface's area, from the longest to the shortest, by power iteration. Each points along the
 /// coordinate that it is nearest to, so that signs do not depend on rounding.
 fn principal_axes(mesh: &TriMesh) -> [Vec3; 3] {
-    const ITERATIONS: usize = 256;
+    // Each face by its area and centre.
     let faces: Vec<(f64, Vec3)> = (0..mesh.faces.len())
         .map(|face| {
             let [a, b, c] = mesh.triangle(face);
@@ -103,23 +107,29 @@ fn principal_axes(mesh: &TriMesh) -> [Vec3; 3] {
         .collect();
     let area: f64 = faces.iter().map(|(area, _)| area).sum();
     let middle = faces.iter().map(|(area, centre)| area * centre).sum::<Vec3>() / area;
-    let outer = |v: Vec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
-    let add = |sum: DMat3, (area, centre): &(f64, Vec3)| sum + outer(centre - middle) * *area;
-    let covariance = faces.iter().fold(DMat3::ZERO, add);
-    let longest = |m: DMat3| {
-        // No shape of ours is exactly at right angles to this start.
-        let start = Vec3::new(0.61, 0.53, 0.59).normalize();
-        (0..ITERATIONS).fold(m.mul_vec3(start).normalize_or(start), |v, _| (m * v).normalize_or(v))
-    };
-    let first = longest(covariance);
-    let across = DMat3::IDENTITY - outer(first);
-    let second = longest(across * covariance * across).reject_from_normalized(first);
+    let covariance = faces.iter().fold(DMat3::ZERO, |sum, (area, centre)| {
+        let v = centre - middle;
+        sum + DMat3::from_cols(v.x * v, v.y * v, v.z * v) * *area
+    });
+    let first = dominant_axis(covariance);
+    // The projection across the first axis takes its share out of the matrix.
+    let across =
+        DMat3::IDENTITY - DMat3::from_cols(first.x * first, first.y * first, first.z * first);
+    let second = dominant_axis(across * covariance * across).reject_from_normalized(first);
     let second = second.normalize_or(first.any_orthonormal_vector());
     [first, second, first.cross(second)].map(|axis| {
         let largest = axis.abs().max_element();
         let nearest = axis.to_array().into_iter().find(|c| c.abs() == largest).unwrap_or(1.0);
         if nearest < 0.0 { -axis } else { axis }
     })
+}
+
+/// The direction that a symmetric matrix lengthens most.
+fn dominant_axis(matrix: DMat3) -> Vec3 {
+    const ITERATIONS: usize = 256;
+    // A start at right angles to the axis would never reach it: no axis of a usual shape is.
+    let start = Vec3::new(0.61, 0.53, 0.59).normalize();
+    (0..=ITERATIONS).fold(start, |v, _| (matrix * v).normalize_or(v))
 }
 
 /// A camera that was set up before a shape.
@@ -142,9 +152,9 @@ impl Frame {
     /// # Errors
     /// When the camera has no direction or its zoom is out of range, or there is no point.
     pub fn fit(camera: &Camera, points: &[Vec3]) -> Result<Self, RenderError> {
-        let words = |v: Vec3| format!("{},{},{}", v.x, v.y, v.z);
         let &Camera { direction, up, zoom } = camera;
         let back = direction.try_normalize().ok_or(RenderError::Direction(words(direction)))?;
+        // Nearly along the line of sight, rounding would decide what is up.
         let across = up.try_normalize().map_or(Vec3::ZERO, |up| up.cross(back));
         if across.length() < 1e-3 {
             return Err(RenderError::Up(words(up)));
@@ -154,11 +164,10 @@ impl Frame {
         }
         let right = across.normalize();
         let up = back.cross(right);
-        let range = |axis: Vec3| {
+        let ranges = [right, up, back].map(|axis| {
             let along = points.iter().filter(|p| p.is_finite()).map(|p| p.dot(axis));
             along.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), x| (lo.min(x), hi.max(x)))
-        };
-        let ranges = [right, up, back].map(range);
+        });
         if ranges.iter().any(|(lo, hi)| lo > hi) {
             return Err(RenderError::Empty);
         }
@@ -186,6 +195,11 @@ impl Frame {
             [x, y, scale * (p.dot(back) - middle[2])]
         }
     }
+}
+
+/// A vector as the command line takes it.
+fn words(v: Vec3) -> String {
+    format!("{},{},{}", v.x, v.y, v.z)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The scene: what can be drawn, and the facets that it becomes.
 
-use medial::complex::MedialMesh;
+use medial::complex::{MedialMesh, Sphere};
 use medial::surface::TriMesh;
 use medial::{ColourMap, Vec3};
 use rayon::prelude::*;
@@ -121,12 +121,14 @@ impl Scene<'_> {
         };
         let mut batches = Vec::new();
         for layer in &self.layers {
-            batches.extend(layer.batches(&canvas)?);
+            layer.add_to(&mut batches, &canvas)?;
         }
         let lights = rasterise(batches, frame, self.size);
+        // Crevices need the depth of neighbours, so they come after all facets are drawn.
         let shares = crevices(&lights, self.size);
-        let over = |(light, share): (&PixelLight, &f32)| composed(light, *share, self.background);
-        let pixels = lights.par_iter().zip(&shares).map(over).collect();
+        let pixels = (lights.par_iter().zip(&shares))
+            .map(|(light, &share)| composed(light, share, self.background))
+            .collect();
         Ok(Picture::of(self.size, pixels))
     }
 
@@ -148,6 +150,7 @@ fn composed(light: &PixelLight, share: f32, background: Background) -> [u8; 4] {
     match background {
         Background::Transparent if seen <= 0.0 => background.pixel(),
         Background::Transparent => {
+            // Straight alpha: the colour is that of the covered part alone.
             let [r, g, b] = encode(sum.map(|s| s / seen));
             [r, g, b, (255.0 * seen.min(1.0)).round() as u8]
         }
@@ -210,89 +213,110 @@ impl Layer<'_> {
         }
     }
 
-    /// The facets of the layer.
-    fn batches(&self, canvas: &Canvas<'_>) -> Result<Vec<Batch>, RenderError> {
-        let glass = |mesh, kind| {
-            let mut facets = surface_facets(mesh, |_| [0.0; 3]);
-            facets.par_iter_mut().for_each(|facet| {
-                let facing = facet.normals.map(|normal| canvas.frame.back.dot(normal).abs() as f32);
-                facet.places = facing;
-            });
-            let look = Look { paint: Paint::Plain([0.0; 3]), lines: canvas.lines(GLASS_INK), kind };
-            vec![Batch { facets, look }]
-        };
-        Ok(match *self {
+    /// Adds the facets of the layer.
+    fn add_to(&self, batches: &mut Vec<Batch>, canvas: &Canvas<'_>) -> Result<(), RenderError> {
+        let (facets, look) = match *self {
             Self::Surface(mesh) => {
                 let paint = Paint::Plain(decode(GREY));
                 let look = Look { paint, lines: canvas.lines(SHARP_INK), kind: Kind::Solid };
-                vec![Batch { facets: surface_facets(mesh, |_| [0.5; 3]), look }]
+                (surface_facets(mesh, |_, _| 0.5), look)
             }
-            Self::Glass(mesh) => glass(mesh, Kind::Glass),
-            Self::Ghost(mesh) => glass(mesh, Kind::Ghost),
+            Self::Glass(mesh) | Self::Ghost(mesh) => {
+                // Rims are more opaque: what varies along a facet is how much it faces the eye.
+                let facing = |_, normal| canvas.frame.back.dot(normal).abs() as f32;
+                let kind = if matches!(self, Self::Ghost(_)) { Kind::Ghost } else { Kind::Glass };
+                let paint = Paint::Plain([0.0; 3]);
+                (surface_facets(mesh, facing), Look { paint, lines: canvas.lines(GLASS_INK), kind })
+            }
             Self::Values { mesh, values, scale } => {
                 let (vertices, given) = (mesh.vertices.len(), values.len());
                 if vertices != given {
                     return Err(RenderError::Values { values: given, vertices });
                 }
-                let places =
-                    |face: usize| mesh.faces[face].map(|v| scale.place(values[v as usize]));
-                let facets = surface_facets(mesh, places);
+                // No lines: ink would be taken for a value.
                 let look = Look { paint: Paint::map(scale.map), lines: None, kind: Kind::Solid };
-                vec![Batch { facets, look }]
+                (surface_facets(mesh, |v, _| scale.place(values[v as usize])), look)
             }
-            Self::Axis { mesh, colour } => axis_batches(mesh, colour, canvas).into(),
-        })
+            Self::Axis { mesh, colour } => {
+                batches.extend(axis_batches(mesh, colour, canvas));
+                return Ok(());
+            }
+        };
+        batches.push(Batch { facets, look });
+        Ok(())
     }
 }
 
-/// The facets of a surface: smooth, with lines along its sharp edges.
-fn surface_facets(mesh: &TriMesh, places: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<Facet> {
+/// The facets of a surface: smooth, with lines along its sharp edges. `place` in the colour map is by vertex and normal.
+fn surface_facets(mesh: &TriMesh, place: impl Fn(u32, Vec3) -> f32 + Sync) -> Vec<Facet> {
     let creases = creases(mesh);
-    let facet = |face: usize| Facet {
-        corners: mesh.triangle(face),
-        normals: creases.normals[face],
-        places: places(face),
-        lines: creases.sharp[face].map(u8::from),
-    };
-    (0..mesh.faces.len()).into_par_iter().map(facet).collect()
+    (mesh.faces.par_iter().enumerate())
+        .map(|(face, corners)| {
+            let normals = creases.normals[face];
+            Facet {
+                corners: mesh.triangle(face),
+                normals,
+                places: std::array::from_fn(|k| place(corners[k], normals[k])),
+                lines: creases.sharp[face].map(u8::from),
+            }
+        })
+        .collect()
+}
+
+impl AxisColour {
+    /// Where a sphere is in the colour map.
+    fn place(self, sphere: &Sphere) -> f32 {
+        match self {
+            Self::Radius(scale) => scale.place(sphere.radius),
+            Self::Plain => 1.0,
+        }
+    }
+
+    fn paint(self, plain: [u8; 3]) -> Paint {
+        match self {
+            Self::Radius(scale) => Paint::map(scale.map),
+            Self::Plain => Paint::Plain(decode(plain)),
+        }
+    }
+}
+
+/// The number of an edge in a medial mesh, whose edges are sorted.
+fn edge_of(mesh: &MedialMesh, a: u32, b: u32) -> Option<usize> {
+    mesh.edges.binary_search(&[a.min(b), a.max(b)]).ok()
 }
 
 /// Faces as flat facets with lines along their sides; edges without a face as tubes, spheres without an edge as balls.
 fn axis_batches(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> [Batch; 2] {
-    let centre = |v: u32| mesh.spheres[v as usize].centre;
-    let place = |v: u32| match colour {
-        AxisColour::Radius(scale) => scale.place(mesh.spheres[v as usize].radius),
-        AxisColour::Plain => 1.0,
-    };
-    let paint = |plain| match colour {
-        AxisColour::Radius(scale) => Paint::map(scale.map),
-        AxisColour::Plain => Paint::Plain(decode(plain)),
-    };
-    let edge = |a: u32, b: u32| mesh.edges.binary_search(&[a.min(b), a.max(b)]).ok();
     // How many faces each edge has.
     let mut uses = vec![0; mesh.edges.len()];
     for &[a, b, c] in &mesh.faces {
-        [edge(a, b), edge(b, c), edge(a, c)].into_iter().flatten().for_each(|e| uses[e] += 1);
+        for edge in [edge_of(mesh, a, b), edge_of(mesh, b, c), edge_of(mesh, a, c)] {
+            edge.into_iter().for_each(|edge| uses[edge] += 1);
+        }
     }
-    let sheet = |corners: &[u32; 3]| {
-        let points = corners.map(centre);
-        let flat = (points[1] - points[0]).cross(points[2] - points[0]).normalize_or_zero();
+    let sheet = |face: &[u32; 3]| {
+        let spheres = face.map(|v| &mesh.spheres[v as usize]);
+        let corners = spheres.map(|sphere| sphere.centre);
+        let flat = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
         let lines = std::array::from_fn(|k| {
             // Along a border only one facet draws its half.
-            let used = edge(corners[k], corners[(k + 1) % 3]).map_or(0, |e| uses[e]);
+            let used = edge_of(mesh, face[k], face[(k + 1) % 3]).map_or(0, |edge| uses[edge]);
             if used == 1 { 2 } else { 1 }
         });
-        Facet { corners: points, normals: [flat; 3], places: corners.map(place), lines }
+        Facet { corners, normals: [flat; 3], places: spheres.map(|s| colour.place(s)), lines }
     };
-    let mut lengths: Vec<f64> =
-        mesh.edges.iter().map(|&[a, b]| centre(a).distance(centre(b))).collect();
+    let mut lengths: Vec<f64> = (mesh.edges.iter())
+        .map(|edge| edge.map(|v| mesh.spheres[v as usize].centre))
+        .map(|[a, b]| a.distance(b))
+        .collect();
     lengths.sort_by(f64::total_cmp);
+    // By the median, so that the lines of one mesh are all alike.
     let median = lengths.get(lengths.len() / 2).map_or(0.0, |length| length * canvas.scale);
     let fade = (median - LINE_FADE[0]) / (LINE_FADE[1] - LINE_FADE[0]);
     let lines = canvas.lines(SHEET_INK * fade.clamp(0.0, 1.0) as f32);
     let sheets = Batch {
         facets: mesh.faces.par_iter().map(sheet).collect(),
-        look: Look { paint: paint(SHEET), lines, kind: Kind::Solid },
+        look: Look { paint: colour.paint(SHEET), lines, kind: Kind::Solid },
     };
 
     let radius = TUBE * canvas.shorter / canvas.scale;
@@ -301,21 +325,23 @@ fn axis_batches(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> [
     let mut has_tube = has_edge.clone();
     for (ends, used) in mesh.edges.iter().zip(uses) {
         if used == 0 {
-            tube(ends.map(centre), radius, ends.map(place), &mut facets);
+            let spheres = ends.map(|v| &mesh.spheres[v as usize]);
+            let places = spheres.map(|sphere| colour.place(sphere));
+            tube(spheres.map(|sphere| sphere.centre), radius, places, &mut facets);
         }
         for &v in ends {
             has_edge[v as usize] = true;
             has_tube[v as usize] |= used == 0;
         }
     }
-    for v in 0..mesh.spheres.len() {
+    for (v, sphere) in mesh.spheres.iter().enumerate() {
         // Balls close the ends of tubes.
         let size = if has_tube[v] { 1.0 } else { DOT };
         if has_tube[v] || !has_edge[v] {
-            ball(centre(v as u32), size * radius, place(v as u32), &mut facets);
+            ball(sphere.centre, size * radius, colour.place(sphere), &mut facets);
         }
     }
-    let look = Look { paint: paint(CURVE), lines: None, kind: Kind::Solid };
+    let look = Look { paint: colour.paint(CURVE), lines: None, kind: Kind::Solid };
     [sheets, Batch { facets, look }]
 }
 
@@ -326,12 +352,12 @@ const TUBE_SIDES: usize = 10;
 fn tube(ends: [Vec3; 2], radius: f64, places: [f32; 2], into: &mut Vec<Facet>) {
     let Some(along) = (ends[1] - ends[0]).try_normalize() else { return };
     let (u, v) = along.any_orthonormal_pair();
-    let spoke = |k: usize| {
-        let turn = std::f64::consts::TAU * (k % TUBE_SIDES) as f64 / TUBE_SIDES as f64;
-        turn.cos() * u + turn.sin() * v
-    };
     for k in 0..TUBE_SIDES {
-        let n = [spoke(k), spoke(k + 1)];
+        // The last side ends exactly where the first one begins.
+        let n = [k, (k + 1) % TUBE_SIDES].map(|spoke| {
+            let turn = std::f64::consts::TAU * spoke as f64 / TUBE_SIDES as f64;
+            turn.cos() * u + turn.sin() * v
+        });
         // Corners are a side and an end.
         for corners in [[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]] {
             into.push(Facet {
@@ -349,21 +375,21 @@ const BALL_CUTS: usize = 4;
 
 fn ball(centre: Vec3, radius: f64, place: f32, into: &mut Vec<Facet>) {
     for octant in 0..8 {
-        let sign = |bit: usize| if octant >> bit & 1 == 0 { 1.0 } else { -1.0 };
-        let signs = Vec3::new(sign(0), sign(1), sign(2));
-        let at = |i: usize, j: usize| {
-            let k = BALL_CUTS - i - j;
-            (signs * Vec3::new(i as f64, j as f64, k as f64)).normalize()
-        };
-        let mut push = |normals: [Vec3; 3]| {
-            let corners = normals.map(|n| centre + radius * n);
-            into.push(Facet { corners, normals, places: [place; 3], lines: [0; 3] });
-        };
+        let signs = [0, 1, 2].map(|bit| if octant >> bit & 1 == 0 { 1.0 } else { -1.0 });
         for i in 0..BALL_CUTS {
             for j in 0..BALL_CUTS - i {
-                push([at(i, j), at(i + 1, j), at(i, j + 1)]);
-                if i + j + 1 < BALL_CUTS {
-                    push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+                let up = [[i, j], [i + 1, j], [i, j + 1]];
+                let down = [[i + 1, j], [i + 1, j + 1], [i, j + 1]];
+                // The last triangle of a row has none beside it that points down.
+                let has_down = i + j + 1 < BALL_CUTS;
+                for triangle in std::iter::once(up).chain(has_down.then_some(down)) {
+                    let normals = triangle.map(|[i, j]| {
+                        let k = BALL_CUTS - i - j;
+                        let at = Vec3::new(i as f64, j as f64, k as f64);
+                        (Vec3::from_array(signs) * at).normalize()
+                    });
+                    let corners = normals.map(|n| centre + radius * n);
+                    into.push(Facet { corners, normals, places: [place; 3], lines: [0; 3] });
                 }
             }
         }
@@ -397,21 +423,15 @@ struct Creases {
 /// sine of their angle there over the lengths of its sides, which is exact on a sphere (N. Max, "Weights for computing
 /// vertex normals from facet normals", J. Graphics Tools 4 (1999)).
 fn creases(mesh: &TriMesh) -> Creases {
-    let normal = |face: usize| {
-        let [a, b, c] = mesh.triangle(face);
-        // Of unit sides: the square of a tiny length would vanish.
-        let (u, v) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
-        u.cross(v).normalize_or_zero()
-    };
-    let flat: Vec<Vec3> = (0..mesh.faces.len()).into_par_iter().map(normal).collect();
-    let weight = |[face, corner]: [u32; 2]| {
-        let points = mesh.triangle(face as usize);
-        let [a, b, c] = [0, 1, 2].map(|k| points[(corner as usize + k) % 3]);
-        let (u, v) = (b - a, c - a);
-        let lengths = u.length() * v.length();
-        let sine = u.cross(v).length() / lengths;
-        if sine.is_finite() { sine / lengths } else { 0.0 }
-    };
+    let flat: Vec<Vec3> = (0..mesh.faces.len())
+        .into_par_iter()
+        .map(|face| {
+            let [a, b, c] = mesh.triangle(face);
+            // Of unit sides: the square of a tiny length would vanish.
+            let (u, v) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
+            u.cross(v).normalize_or_zero()
+        })
+        .collect();
     // The faces around vertex v, and which of their corners it is: around[start[v]..start[v + 1]].
     let mut start = vec![0_u32; mesh.vertices.len() + 1];
     mesh.faces.iter().flatten().for_each(|&vertex| start[vertex as usize + 1] += 1);
@@ -433,9 +453,18 @@ fn creases(mesh: &TriMesh) -> Creases {
         if to - from > MOST_AROUND {
             return flat[face];
         }
-        let alike =
-            around[from..to].iter().filter(|at| flat[face].dot(flat[at[0] as usize]) > smooth);
-        let sum: Vec3 = alike.map(|&at| weight(at) * flat[at[0] as usize]).sum();
+        let sum: Vec3 = (around[from..to].iter())
+            .filter(|at| flat[face].dot(flat[at[0] as usize]) > smooth)
+            .map(|&[face, corner]| {
+                let points = mesh.triangle(face as usize);
+                let [a, b, c] = [0, 1, 2].map(|k| points[(corner as usize + k) % 3]);
+                let (u, v) = (b - a, c - a);
+                let lengths = u.length() * v.length();
+                let sine = u.cross(v).length() / lengths;
+                // Zero lengths: a face without area has no say.
+                if sine.is_finite() { sine / lengths * flat[face as usize] } else { Vec3::ZERO }
+            })
+            .sum();
         sum.normalize_or(flat[face])
     };
     let normals = (0..mesh.faces.len()).into_par_iter();
@@ -456,6 +485,7 @@ fn sharp_sides(mesh: &TriMesh, flat: &[Vec3], smooth: f64) -> Vec<[bool; 3]> {
         .collect();
     sides.par_sort_unstable();
     let mut sharp = vec![[false; 3]; mesh.faces.len()];
+    // An edge with one face, or with more than two, is always sharp.
     for edge in sides.chunk_by(|a, b| a.0 == b.0) {
         let is_smooth = match edge {
             [(_, a), (_, b)] => flat[*a as usize / 3].dot(flat[*b as usize / 3]) > smooth,
@@ -478,6 +508,7 @@ fn drop_short(mesh: &TriMesh, sharp: &mut [[bool; 3]]) {
             [face, k, corners[k] as usize, corners[(k + 1) % 3] as usize]
         })
         .collect();
+    // Connected by common vertices: a forest whose roots are the least vertex of each set.
     let mut parent: Vec<usize> = (0..mesh.vertices.len()).collect();
     for &[_, _, a, b] in &sides {
         let (a, b) = (root(&mut parent, a), root(&mut parent, b));

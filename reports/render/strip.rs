@@ -56,16 +56,16 @@ impl Errors<'_> {
     /// The end of a scale for several surfaces, in their unit: 99 % of the vertices of the median one are within it,
     /// so that a single bad one does not make all others look alike. Round as a percentage of a diagonal.
     pub fn common_scale(all: &[&Self], diagonal: f64) -> f64 {
-        let spanned = |errors: &&Self| {
-            let mut sizes: Vec<f64> = errors.values.iter().copied().map(f64::abs).collect();
-            if sizes.is_empty() {
-                return 0.0;
-            }
-            let place = ((sizes.len() - 1) as f64 * SPANNED) as usize;
-            *sizes.select_nth_unstable_by(place, f64::total_cmp).1
-        };
-        let mut ends: Vec<f64> = all.iter().map(spanned).collect();
+        let mut ends: Vec<f64> = (all.iter())
+            .map(|errors| {
+                let mut sizes: Vec<f64> = errors.values.iter().map(|value| value.abs()).collect();
+                sizes.sort_by(f64::total_cmp);
+                let place = (sizes.len().saturating_sub(1) as f64 * SPANNED) as usize;
+                sizes.get(place).copied().unwrap_or(0.0)
+            })
+            .collect();
         ends.sort_by(f64::total_cmp);
+        // The lower median: of two the one that shows more of the smaller errors.
         let median = ends.get(ends.len().saturating_sub(1) / 2).map_or(0.0, |end| end / diagonal);
         let percent = if median > 0.0 && median.is_finite() { 100.0 * median } else { 1.0 };
         round_up(percent) * diagonal / 100.0
@@ -135,28 +135,34 @@ pub fn strip<'a>(panels: &'a [Panel<'a>], strip: &'a Strip<'a>) -> Result<Pictur
     let (colour, bar) = strip.colour.of(&meshes, strip.diagonal);
     let across = strip.across.max(1);
     let mut rows = vec![];
-    for (line, some) in panels.chunks(across).enumerate() {
-        let cell = |panel: &'a Panel<'a>| {
+    for some in panels.chunks(across) {
+        let mut row = PanelRow { cells: vec![], bar: None };
+        for panel in some {
             let axis = Layer::Axis { mesh: panel.axis, colour };
-            Some((vec![axis, Layer::Glass(strip.surface)], panel.caption.clone()))
-        };
-        // One bar explains all lines.
-        let bar = bar.clone().filter(|_| line == 0);
-        rows.push(PanelRow { cells: some.iter().map(cell).collect(), bar });
+            let layers = vec![axis, Layer::Glass(strip.surface)];
+            row.cells.push(Some((layers, panel.caption.clone())));
+        }
+        rows.push(row);
     }
+    // One bar explains all lines.
+    rows[0].bar = bar;
     let errors: Vec<&Errors<'_>> = panels.iter().filter_map(|p| p.errors.as_ref()).collect();
     if !errors.is_empty() {
-        let chosen = || Errors::common_scale(&errors, strip.diagonal);
-        let end = strip.max_error.unwrap_or_else(chosen);
-        for (line, some) in panels.chunks(across).enumerate() {
-            let cell = |panel: &'a Panel<'a>| {
-                let Errors { mesh, values, caption } = panel.errors.clone()?;
-                let layer = Layer::Values { mesh, values, scale: Scale::errors(end) };
-                Some((vec![layer, Layer::Ghost(strip.surface)], caption))
-            };
-            let bar = (line == 0).then(|| Errors::bar(&errors, end, strip.diagonal));
-            rows.push(PanelRow { cells: some.iter().map(cell).collect(), bar });
+        let first = rows.len();
+        let end = strip.max_error.unwrap_or_else(|| Errors::common_scale(&errors, strip.diagonal));
+        for some in panels.chunks(across) {
+            let mut row = PanelRow { cells: vec![], bar: None };
+            for panel in some {
+                // A panel without errors keeps its place empty: columns stay one medial mesh each.
+                row.cells.push(panel.errors.as_ref().map(|errors| {
+                    let &Errors { mesh, values, .. } = errors;
+                    let layer = Layer::Values { mesh, values, scale: Scale::errors(end) };
+                    (vec![layer, Layer::Ghost(strip.surface)], errors.caption.clone())
+                }));
+            }
+            rows.push(row);
         }
+        rows[first].bar = Some(Errors::bar(&errors, end, strip.diagonal));
     }
     draw(rows, strip, &frame)
 }
@@ -171,6 +177,7 @@ fn draw(rows: Vec<PanelRow<'_>>, strip: &Strip<'_>, frame: &Frame) -> Result<Pic
     let &Strip { size, background, .. } = strip;
     let ([width, height], ink) = (size, background.ink());
     let letter = letter_size(size);
+    // A caption is one line of text with some room below.
     let caption = (LINE * letter * 1.3).ceil() as usize;
     let column = if rows.iter().any(|row| row.bar.is_some()) { Bar::column(size) } else { 0 };
     let columns = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
