@@ -45,10 +45,9 @@ pub(super) fn by_regions(
              lost; more samples would find them"
         ));
     }
-    let owner = |v: u32| anchor_of[v as usize];
-    let edges = initial.edges.iter().map(|edge| edge.map(owner));
+    let edges = initial.edges.iter().map(|edge| edge.map(|v| anchor_of[v as usize]));
     let edges = edges.filter(|&[a, b]| a != b).collect();
-    let faces = initial.faces.iter().map(|face| face.map(owner));
+    let faces = initial.faces.iter().map(|face| face.map(|v| anchor_of[v as usize]));
     let faces = faces.filter(|&[a, b, c]| a != b && b != c && a != c).collect();
     Ok(MedialMesh::from_simplices(chosen, edges, faces)?)
 }
@@ -73,16 +72,16 @@ pub(super) fn anchors(
     let tree = PointTree::new(&initial.spheres.iter().map(|ball| ball.centre).collect::<Vec<_>>());
     let mut is_taken = vec![false; vertices];
     let mut moved = 0;
-    let mut anchor = |ball: &Sphere| -> u32 {
+    let mut anchors = Vec::with_capacity(chosen.len());
+    for ball in chosen {
         let (mut vertex, squared) = tree.nearest(ball.centre).expect("a mesh has vertices");
         if is_taken[vertex as usize] {
             vertex = nearest_free(&tree, initial, &is_taken, (ball.centre, squared));
             moved += 1;
         }
         is_taken[vertex as usize] = true;
-        vertex
-    };
-    let anchors = chosen.iter().map(&mut anchor).collect();
+        anchors.push(vertex);
+    }
     Ok((anchors, moved))
 }
 
@@ -94,14 +93,18 @@ fn nearest_free(
     is_taken: &[bool],
     (place, nearest): (Vec3, f64),
 ) -> u32 {
-    let squared = |v: u32| initial.spheres[v as usize].centre.distance_squared(place);
     let mut reach = nearest.max(1e-12);
     loop {
         let found = tree.within(place, reach);
         let free = found.into_iter().filter(|&v| !is_taken[v as usize]);
-        if let Some((_, vertex)) = free.map(|v| (length(squared(v)), v)).min() {
+        let free = free.map(|v| {
+            let squared = initial.spheres[v as usize].centre.distance_squared(place);
+            (length(squared), v)
+        });
+        if let Some((_, vertex)) = free.min() {
             return vertex;
         }
+        // Twice the radius: the sphere searched holds eight times the volume.
         reach *= 4.0;
     }
 }
@@ -111,7 +114,6 @@ fn nearest_free(
 pub(super) fn regions(initial: &MedialMesh, anchors: &[u32]) -> Vec<u32> {
     let count = initial.spheres.len();
     let (start, neighbours) = adjacency(&initial.edges, count);
-    let centre = |v: u32| initial.spheres[v as usize].centre;
     let mut reached: Vec<(f64, u32)> = vec![(f64::INFINITY, NOBODY); count];
     let mut heap = BinaryHeap::new();
     for (label, &vertex) in anchors.iter().enumerate() {
@@ -120,11 +122,13 @@ pub(super) fn regions(initial: &MedialMesh, anchors: &[u32]) -> Vec<u32> {
     }
     while let Some(Reverse((distance, label, vertex))) = heap.pop() {
         let (best, owner) = reached[vertex as usize];
+        // A shorter way was found after this one was queued.
         if (distance, label) != (length(best), owner) {
             continue;
         }
         for &next in &neighbours[start[vertex as usize]..start[vertex as usize + 1]] {
-            let further = best + centre(vertex).distance(centre(next)) + LEAST_LENGTH;
+            let [from, to] = [vertex, next].map(|v| initial.spheres[v as usize].centre);
+            let further = best + from.distance(to) + LEAST_LENGTH;
             if (further, label) < reached[next as usize] {
                 reached[next as usize] = (further, label);
                 heap.push(Reverse((length(further), label, next)));

@@ -40,9 +40,10 @@ impl Coverage {
                 let reach = ball.radius + delta;
                 // A word at a time in a register: the loop over its samples has no branch.
                 for (word, samples) in row.iter_mut().zip(samples.chunks(WORD)) {
-                    let covers = |p: &Vec3| p.distance_squared(ball.centre) < reach * reach;
-                    let bits = samples.iter().enumerate().map(|(i, p)| u64::from(covers(p)) << i);
-                    *word = bits.fold(0, |word, bit| word | bit);
+                    *word = samples.iter().enumerate().fold(0, |word, (i, p)| {
+                        let is_covered = p.distance_squared(ball.centre) < reach * reach;
+                        word | u64::from(is_covered) << i
+                    });
                 }
             }
         });
@@ -215,17 +216,19 @@ fn best(
     let by_count = Standard::of(counts.iter().map(|&count| f64::from(count)));
     // Nothing is chosen in the first step, so no distance counts.
     let by_distance = match is_first {
-        true => Standard::constant(),
+        true => Standard { mean: 0.0, deviation: 0.0 },
         false => Standard::of(nearest.iter().map(|squared| squared.sqrt())),
     };
-    let value = |ball: usize| {
-        let distance = if is_first { 0.0 } else { nearest[ball].sqrt() };
-        by_count.score(f64::from(counts[ball])) + score.uniformity * by_distance.score(distance)
-            - score.penalties[ball]
-    };
     let free = (0..counts.len()).filter(|&ball| !is_chosen[ball]);
+    let scored = free.map(|ball| {
+        let distance = if is_first { 0.0 } else { nearest[ball].sqrt() };
+        let value = by_count.score(f64::from(counts[ball]))
+            + score.uniformity * by_distance.score(distance)
+            - score.penalties[ball];
+        (value, ball)
+    });
     // `max_by` takes the last of equals, the authors' `argmax` the first.
-    let best = free.map(|ball| (value(ball), ball)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+    let best = scored.reduce(|a, b| if b.0 > a.0 { b } else { a });
     best.expect("fewer are chosen than there are").1
 }
 
@@ -242,11 +245,6 @@ impl Standard {
         let mean = values.clone().sum::<f64>() / count;
         let squares: f64 = values.map(|value| (value - mean) * (value - mean)).sum();
         Self { mean, deviation: (squares / (count - 1.0).max(1.0)).sqrt() }
-    }
-
-    /// Of a value that has no part in the score.
-    fn constant() -> Self {
-        Self { mean: 0.0, deviation: 0.0 }
     }
 
     /// 0 where all values are equal: the quotient of the formula is then 0/0.

@@ -96,20 +96,22 @@ fn solve(
     options.node_limit = Some(NODES_OF_A_SLICE);
     // Numbers of balls are whole: a gap below one ball is none.
     options.mip_gap = 0.999 / first.len() as f64;
-    let start = |place: usize| if first.binary_search(&(place as u32)).is_ok() { 1.0 } else { 0.0 };
-    options.warm_start =
-        Some(balls.iter().enumerate().map(|(place, &ball)| (ball, start(place))).collect());
+    let start = balls
+        .iter()
+        .zip(0_u32..)
+        .map(|(&ball, place)| (ball, if first.binary_search(&place).is_ok() { 1.0 } else { 0.0 }));
+    options.warm_start = Some(start.collect());
     let outcome = search(&problem, options, params, run)?;
     let stats = outcome.stats();
-    let is_chosen = |solution: &microlp::Solution, ball| solution.var_value(ball).round() == 1.0;
     let mut places: Vec<u32> = match outcome.solution() {
         None => first.clone(),
-        Some(solution) => {
-            (0..balls.len() as u32).filter(|&p| is_chosen(solution, balls[p as usize])).collect()
-        }
+        Some(solution) => (0..balls.len() as u32)
+            .filter(|&place| solution.var_value(balls[place as usize]).round() == 1.0)
+            .collect(),
     };
-    let covers = |row: &Vec<u32>| row.iter().any(|ball| places.binary_search(ball).is_ok());
-    if places.len() > first.len() || !reduced.rows.iter().all(covers) {
+    let mut rows = reduced.rows.iter();
+    let covers = rows.all(|row| row.iter().any(|ball| places.binary_search(ball).is_ok()));
+    if places.len() > first.len() || !covers {
         // Rounding may cost the solver's answer a row; the cover that it began with has all.
         places = first;
     }
@@ -135,15 +137,8 @@ fn search(
     params: &CoverageAxisParams,
     run: &RunContext,
 ) -> Result<SolveOutcome, SimplifyError> {
-    let failed = |error: microlp::Error| {
-        SimplifyError::unsupported(format!("the solver of the set cover gave up: {error}"))
-    };
     let began = Instant::now();
-    let left = || match params.time_limit {
-        0.0 => None,
-        limit => Some(Duration::from_secs_f64(limit).saturating_sub(began.elapsed())),
-    };
-    options.time_limit = left();
+    options.time_limit = time_left(params, began);
     let gap = options.mip_gap;
     let mut outcome = problem.solve_with(options).map_err(failed)?;
     while outcome.termination_reason() == TerminationReason::NodeLimit {
@@ -155,10 +150,22 @@ fn search(
         let mut options = ResumeOptions::default();
         options.node_limit = Some(NODES_OF_A_SLICE);
         options.mip_gap = Some(gap);
-        options.time_limit = left();
+        options.time_limit = time_left(params, began);
         outcome = outcome.resume_with(options).map_err(failed)?;
     }
     Ok(outcome)
+}
+
+fn failed(error: microlp::Error) -> SimplifyError {
+    SimplifyError::unsupported(format!("the solver of the set cover gave up: {error}"))
+}
+
+/// `None` without a limit.
+fn time_left(params: &CoverageAxisParams, began: Instant) -> Option<Duration> {
+    match params.time_limit {
+        0.0 => None,
+        limit => Some(Duration::from_secs_f64(limit).saturating_sub(began.elapsed())),
+    }
 }
 
 /// A cover to begin with: the ball that covers most of what is left, again and again. Places in
@@ -171,9 +178,10 @@ pub(super) fn largest_first(reduced: &Reduced) -> Vec<u32> {
     let mut is_covered = vec![false; reduced.rows.len()];
     let mut chosen = Vec::new();
     while is_covered.contains(&false) {
-        let gain = |ball: &Vec<u32>| ball.iter().filter(|&&row| !is_covered[row as usize]).count();
-        // Of equal gains the first.
-        let best = (0..rows_of.len()).rev().max_by_key(|&ball| gain(&rows_of[ball]));
+        // Backwards, as `max_by_key` takes the last of equals: the first of equal gains.
+        let best = (0..rows_of.len())
+            .rev()
+            .max_by_key(|&ball| rows_of[ball].iter().filter(|&&r| !is_covered[r as usize]).count());
         let best = best.expect("every row has a ball");
         rows_of[best].iter().for_each(|&row| is_covered[row as usize] = true);
         chosen.push(best as u32);
@@ -217,11 +225,10 @@ struct State {
 /// For each ball, the balls that cover its rarest sample are compared with it; for samples likewise.
 pub(super) fn reduce(coverage: &Coverage) -> Reduced {
     let transposed = coverage.transposed();
-    let rows = |matrix: &Coverage| -> Vec<Vec<u64>> {
-        (0..matrix.rows()).map(|row| matrix.row(row).to_vec()).collect()
-    };
-    let mut state =
-        State { samples_of: rows(coverage), balls_of: rows(&transposed), forced: Vec::new() };
+    let [samples_of, balls_of] = [coverage, &transposed]
+        .map(|matrix| (0..matrix.rows()).map(|row| matrix.row(row).to_vec()).collect());
+    let mut state = State { samples_of, balls_of, forced: Vec::new() };
+    // No short circuit: each round applies all three.
     while state.force() | state.drop_balls() | state.drop_samples() {}
     state.finish()
 }
@@ -266,22 +273,21 @@ impl State {
 
     fn finish(mut self) -> Reduced {
         self.forced.sort_unstable();
-        let left = |rows: &[Vec<u64>]| -> Vec<u32> {
-            (0..rows.len() as u32).filter(|&row| size(&rows[row as usize]) > 0).collect()
-        };
-        let mut balls = left(&self.samples_of);
+        let [mut balls, samples] = [&self.samples_of, &self.balls_of].map(|rows| {
+            let left = (0..rows.len() as u32).filter(|&row| size(&rows[row as usize]) > 0);
+            left.collect::<Vec<u32>>()
+        });
         // The solver's answer depends on the order of its columns.
         balls.sort_by_key(|&ball| (usize::MAX - size(&self.samples_of[ball as usize]), ball));
         let mut place = vec![0; self.samples_of.len()];
         balls.iter().enumerate().for_each(|(at, &ball)| place[ball as usize] = at as u32);
-        let row = |&sample: &u32| -> Vec<u32> {
-            let mut row: Vec<u32> =
-                ones(&self.balls_of[sample as usize]).map(|ball| place[ball]).collect();
+        let rows = samples.into_iter().map(|sample| {
+            let balls = ones(&self.balls_of[sample as usize]);
+            let mut row: Vec<u32> = balls.map(|ball| place[ball]).collect();
             row.sort_unstable();
             row
-        };
-        let rows = left(&self.balls_of).iter().map(row).collect();
-        Reduced { forced: self.forced, balls, rows }
+        });
+        Reduced { rows: rows.collect(), forced: self.forced, balls }
     }
 }
 
@@ -298,32 +304,27 @@ fn dominated(rows: &[Vec<u64>], columns: &[Vec<u64>], order: Order) -> Vec<usize
     let column_sizes: Vec<usize> = columns.par_iter().map(|column| size(column)).collect();
     // A total order, so that of equal rows one stays, and all rows can be judged at once: what is
     // dropped for a row that is dropped itself is needless beside that which makes both so.
-    let goes = |row: usize| -> bool {
-        let comes_before = |other: usize| match order {
-            Order::LargerStays => (sizes[other], row) > (sizes[row], other),
-            Order::SmallerStays => (sizes[other], other) < (sizes[row], row),
-        };
-        match order {
-            // A row that contains this one has all of its columns: the rarest has the fewest rows.
-            Order::LargerStays => {
-                let rarest = ones(&rows[row]).min_by_key(|&column| column_sizes[column]);
-                let rarest = rarest.expect("an empty row is not asked");
-                let mut others = ones(&columns[rarest]);
-                others.any(|other| comes_before(other) && is_subset(&rows[row], &rows[other]))
-            }
-            // A row within this one has one of its columns, any.
-            Order::SmallerStays => {
-                let mut tried = vec![0_u64; columns.first().map_or(0, |column| column.len())];
-                ones(&rows[row]).any(|column| {
-                    let fresh: Vec<usize> = new_ones(&columns[column], &mut tried);
-                    let within =
-                        |&other: &usize| comes_before(other) && is_subset(&rows[other], &rows[row]);
-                    fresh.iter().any(within)
-                })
-            }
+    let needless = (0..rows.len()).into_par_iter().filter(|&row| match order {
+        _ if sizes[row] == 0 => false,
+        // A row that contains this one has all of its columns: the rarest has the fewest rows.
+        Order::LargerStays => {
+            let rarest = ones(&rows[row]).min_by_key(|&column| column_sizes[column]);
+            let rarest = rarest.expect("the row is not empty");
+            ones(&columns[rarest]).any(|other| {
+                (sizes[other], row) > (sizes[row], other) && is_subset(&rows[row], &rows[other])
+            })
         }
-    };
-    (0..rows.len()).into_par_iter().filter(|&row| sizes[row] > 0 && goes(row)).collect()
+        // A row within this one has one of its columns, any.
+        Order::SmallerStays => {
+            let mut tried = vec![0_u64; columns.first().map_or(0, |column| column.len())];
+            ones(&rows[row]).any(|column| {
+                new_ones(&columns[column], &mut tried).into_iter().any(|other| {
+                    (sizes[other], other) < (sizes[row], row) && is_subset(&rows[other], &rows[row])
+                })
+            })
+        }
+    });
+    needless.collect()
 }
 
 /// The members of a set that were not tried before; they are now.

@@ -193,8 +193,7 @@ impl Simplification for Prepared {
             }
             Level::Spheres(count) if by_picks => (dilation, count),
             Level::Spheres(count) => {
-                let inverse = |value: f64| 1.0 / value;
-                return search.at(count, inverse, |value| axis.at(inverse(value), max_iter));
+                return search.at(count, f64::recip, |value| axis.at(value.recip(), max_iter));
             }
             Level::Native(delta) if DILATIONS.contains(&delta) => (delta, max_iter),
             Level::Native(delta) => {
@@ -488,8 +487,9 @@ impl Instance {
             Candidates::Poles => shape.inner_balls()?.spheres.clone(),
             Candidates::Random => random(shape, (low, high), params.points, seed)?,
         };
-        let is_large = |&place: &u32| all[place as usize].radius >= LEAST_RADIUS;
-        let places: Vec<u32> = (0..all.len() as u32).filter(is_large).collect();
+        let places: Vec<u32> = (0..all.len() as u32)
+            .filter(|&place| all[place as usize].radius >= LEAST_RADIUS)
+            .collect();
         let spheres: Vec<Sphere> = places.iter().map(|&place| all[place as usize]).collect();
         let (all, too_small) = (all.len(), all.len() - spheres.len());
         if spheres.is_empty() {

@@ -60,7 +60,7 @@ use medial::simplifier::{
     Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
     SimplifyError,
 };
-use medial::surface::Side;
+use medial::surface::{InsideTest, Side};
 use serde::{Deserialize, Serialize};
 use umbrella::{Place, Umbrellas};
 
@@ -177,10 +177,9 @@ fn prepare<'s>(
     Ok(match params.size {
         Size::Density => {
             FacetSet::refuse_given(shape)?;
-            let at = move |shape: &Shape| -> Result<Box<dyn Simplification>, SimplifyError> {
+            Box::new(ByKnob::of_samples(shape, PUBLISHED, run, move |shape| {
                 Ok(Box::new(selection(shape, params)?))
-            };
-            Box::new(ByKnob::of_samples(shape, PUBLISHED, run, at)?)
+            })?)
         }
         Size::Ranking => Box::new(selection(shape, params)?),
     })
@@ -246,8 +245,8 @@ impl FacetValue for Strength {
             let [p, q] = self.ends(facet);
             let edge = self.umbrellas.position(q) - self.umbrellas.position(p);
             let length = edge.length();
-            let passes = |p, q| self.passes_from(p, q, edge, length, &threshold);
-            passes(p, q) || passes(q, p)
+            self.passes_from(p, q, edge, length, &threshold)
+                || self.passes_from(q, p, edge, length, &threshold)
         })
     }
 }
@@ -313,28 +312,32 @@ impl Strength {
         if normals.is_empty() {
             return false;
         }
-        let is_steep = || {
-            let bound = threshold.cosine * length;
-            let mut least = length;
-            for normal in normals {
-                least = f64::min(least, normal.dot(edge).abs());
-                // One normal suffices to fail, and most edges fail at the first.
-                if least <= bound * (1.0 - ROUNDING) {
-                    return false;
-                }
-            }
-            least > bound * (1.0 + ROUNDING) || self.by_angle(least, length) > threshold.level
-        };
-        let is_long = || {
-            let bound = threshold.ratio * self.umbrellas.largest_circumradius(p);
-            length > bound * (1.0 - ROUNDING)
-                && (length > bound * (1.0 + ROUNDING) || self.by_ratio(p, length) > threshold.level)
-        };
         // The ratio first: one comparison against a product per normal. The search through the rim
         // last, since few edges pass.
-        let passes = (condition != Condition::Angle && is_long())
-            || (condition != Condition::Ratio && is_steep());
+        let passes = (condition != Condition::Angle && self.is_long(p, length, threshold))
+            || (condition != Condition::Ratio && self.is_steep(normals, edge, length, threshold));
         passes && !(threshold.rims && self.umbrellas.has_edge(p, q))
+    }
+
+    #[inline]
+    fn is_steep(&self, normals: &[Vec3], edge: Vec3, length: f64, threshold: &Threshold) -> bool {
+        let bound = threshold.cosine * length;
+        let mut least = length;
+        for normal in normals {
+            least = f64::min(least, normal.dot(edge).abs());
+            // One normal suffices to fail, and most edges fail at the first.
+            if least <= bound * (1.0 - ROUNDING) {
+                return false;
+            }
+        }
+        least > bound * (1.0 + ROUNDING) || self.by_angle(least, length) > threshold.level
+    }
+
+    #[inline]
+    fn is_long(&self, p: Place, length: f64, threshold: &Threshold) -> bool {
+        let bound = threshold.ratio * self.umbrellas.largest_circumradius(p);
+        length > bound * (1.0 - ROUNDING)
+            && (length > bound * (1.0 + ROUNDING) || self.by_ratio(p, length) > threshold.level)
     }
 
     /// The strength by the angle condition: `least` is the smallest product of the edge with a normal,
@@ -364,35 +367,39 @@ fn restrict(
 ) -> Result<(), ShapeError> {
     let delaunay = shape.delaunay()?;
     let inside = shape.inside_test();
-    let are_enclosed = |edges: &[[VertexId; 2]]| -> Vec<bool> {
-        let middle = |&[p, q]: &[VertexId; 2]| delaunay.point(p).midpoint(delaunay.point(q));
-        let middles: Vec<Vec3> = edges.iter().map(middle).collect();
-        inside.sides(&middles).into_iter().map(|side| side == Side::Inside).collect()
-    };
-    let passes = |&[p, q]: &[VertexId; 2]| strength.of_edge(p, q) > PUBLISHED;
     let dual: Vec<[VertexId; 2]> =
         (0..strength.facets.len()).map(|facet| strength.facets.ends(facet)).collect();
-    let enclosed = are_enclosed(&dual);
-    let outside = dual.iter().zip(&enclosed).filter(|&(edge, &enclosed)| !enclosed && passes(edge));
+    let enclosed = are_enclosed(&dual, &delaunay, &inside);
+    let outside = dual
+        .iter()
+        .zip(&enclosed)
+        .filter(|&(&[p, q], &enclosed)| !enclosed && strength.of_edge(p, q) > PUBLISHED);
     diagnostics.count("facets_of_edges_not_enclosed", outside.count());
-    let others: Vec<[VertexId; 2]> =
-        edges_but(&delaunay, &dual).into_iter().filter(passes).collect();
-    let bare = are_enclosed(&others).into_iter().filter(|&enclosed| enclosed);
+    let mut others = edges_but(&delaunay, &dual);
+    others.retain(|&[p, q]| strength.of_edge(p, q) > PUBLISHED);
+    let bare = are_enclosed(&others, &delaunay, &inside).into_iter().filter(|&enclosed| enclosed);
     diagnostics.count("enclosed_edges_without_facet", bare.count());
     strength.enclosed = Some(enclosed);
     Ok(())
 }
 
+/// For each edge whether its middle is inside.
+fn are_enclosed(edges: &[[VertexId; 2]], delaunay: &Delaunay, inside: &InsideTest) -> Vec<bool> {
+    let middles: Vec<Vec3> =
+        edges.iter().map(|&[p, q]| delaunay.point(p).midpoint(delaunay.point(q))).collect();
+    inside.sides(&middles).into_iter().map(|side| side == Side::Inside).collect()
+}
+
 /// The finite Delaunay edges, each once, except `some`.
 fn edges_but(delaunay: &Delaunay, some: &[[VertexId; 2]]) -> Vec<[VertexId; 2]> {
-    let ordered = |[p, q]: [VertexId; 2]| if p.0 < q.0 { [p, q] } else { [q, p] };
-    let mut known: Vec<[u32; 2]> = some.iter().map(|&edge| ordered(edge).map(|v| v.0)).collect();
+    let mut known: Vec<[u32; 2]> =
+        some.iter().map(|&[p, q]| [p.0.min(q.0), p.0.max(q.0)]).collect();
     known.sort_unstable();
     let mut edges: Vec<[u32; 2]> = Vec::new();
     for cell in delaunay.finite_cells() {
         let v = delaunay.vertices(cell);
         let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-        edges.extend(pairs.map(|[i, j]| ordered([v[i], v[j]]).map(|v| v.0)));
+        edges.extend(pairs.map(|[i, j]| [v[i].0.min(v[j].0), v[i].0.max(v[j].0)]));
     }
     edges.sort_unstable();
     edges.dedup();

@@ -51,11 +51,11 @@ impl Umbrellas {
 
     /// Groups the triangles by sample, with a counting sort.
     fn of_triangles(places: Vec<Place>, positions: Vec<Vec3>, parts: &[Crossing]) -> Self {
-        let triangles = || parts.iter().flat_map(|part| &part.triangles);
+        let triangles = parts.iter().flat_map(|part| &part.triangles);
         // Starts are stored one entry further on. Filling advances each to the next start, so that at
         // the end every start is where it belongs.
         let mut start = vec![0_u32; positions.len() + 2];
-        for triangle in triangles() {
+        for triangle in triangles.clone() {
             for (k, p) in triangle.corners.into_iter().enumerate() {
                 start[p as usize + 2] += u32::from(triangle.members >> k & 1);
             }
@@ -67,7 +67,7 @@ impl Umbrellas {
         let mut normals = vec![Vec3::ZERO; all];
         let mut rims = vec![[0; 2]; all];
         let mut largest = vec![0.0; positions.len()];
-        for triangle in triangles() {
+        for triangle in triangles {
             let [a, b, c] = triangle.corners;
             for (k, (p, rim)) in [(a, [b, c]), (b, [c, a]), (c, [a, b])].into_iter().enumerate() {
                 if triangle.members >> k & 1 == 0 {
@@ -184,8 +184,10 @@ fn with_poles(
             reach[p as usize] = reach[p as usize].max(radius);
         }
     }
-    let plain = |&v: &VertexId| Sample { position: delaunay.point(v), pole_vector: Vec3::ZERO };
-    let mut with_poles: Vec<Sample> = samples.iter().map(plain).collect();
+    let mut with_poles: Vec<Sample> = samples
+        .iter()
+        .map(|&v| Sample { position: delaunay.point(v), pole_vector: Vec3::ZERO })
+        .collect();
     // Backwards, so that of equally far vertices the one of the smallest cell is written last.
     for (sphere, corners) in spheres.iter().zip(corners).rev() {
         let Some(Sphere { centre, radius }) = *sphere else { continue };
@@ -221,7 +223,8 @@ fn sides_of_cells(
     corners: Vec<[Place; 4]>,
     samples: &[Sample],
 ) -> Vec<Sides> {
-    let finite = |(sides, sphere): (&mut Sides, &Option<Sphere>)| match sphere {
+    let mut sides = corners;
+    sides.par_iter_mut().zip(spheres).with_min_len(1024).for_each(|(sides, sphere)| match sphere {
         Some(Sphere { centre, .. }) => {
             *sides = sides.map(|p| {
                 let Sample { position, pole_vector } = samples[p as usize];
@@ -229,9 +232,7 @@ fn sides_of_cells(
             });
         }
         None => *sides = [NO_CORNER; 4],
-    };
-    let mut sides = corners;
-    sides.par_iter_mut().zip(spheres).with_min_len(1024).for_each(finite);
+    });
     for sides in &mut sides[spheres.len()..] {
         let [a, b, c, _] = *sides;
         let [p, q, r] = [a, b, c].map(|p| samples[p as usize].position);

@@ -57,16 +57,13 @@ use medial::complex::collapse::{Hierarchy, LazyHeap, Prioritised, Step};
 use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, NoParams, Params,
-    RunContext, Simplification, Simplified, SimplifyError,
+    Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, NoParams, RunContext,
+    Simplification, Simplified, SimplifyError,
 };
 use rayon::prelude::*;
 
 /// The scale of [`Level::Published`]: the least of the paper's Table 1.
 const PUBLISHED: f64 = 1.18;
-
-/// Name of the extra that holds all levels as a [`Hierarchy`], for [`resume`].
-pub const HIERARCHY: &str = "hierarchy";
 
 /// The source as BibTeX.
 const BIBTEX: &str = "\
@@ -99,7 +96,7 @@ pub fn method() -> Method<NoParams> {
             "s = 1.18, the least scale of the paper's Table 1, with the whole hierarchy; the paper \
              picks scales by eye for each shape",
         )
-        .extra(Capability::new(HIERARCHY, "all levels at once, to go on from without the shape"));
+        .extra(Capability::new("hierarchy", "all levels at once, to go on from without the shape"));
     Method::new(info, prepare)
 }
 
@@ -119,42 +116,6 @@ fn prepare<'s>(
     Ok(Box::new(Levels::new(Arc::new(hierarchy))))
 }
 
-/// The levels of a hierarchy that an earlier run gave among its extras, without the shape.
-///
-/// # Errors
-/// [`SimplifyError::Hierarchy`] when it is not one of this method, [`SimplifyError::Parameter`]
-/// when a parameter is set.
-pub fn resume(
-    hierarchy: Arc<Hierarchy>,
-    params: &Params,
-) -> Result<Box<dyn Simplification>, SimplifyError> {
-    let NoParams {} = params.typed()?;
-    check_origin(&hierarchy).map_err(SimplifyError::Hierarchy)?;
-    Ok(Box::new(Levels::new(hierarchy)))
-}
-
-/// Whether the steps of a hierarchy are those of this method, as far as each tells for itself.
-fn check_origin(hierarchy: &Hierarchy) -> Result<(), String> {
-    let spheres = &hierarchy.initial().spheres;
-    for (index, step) in hierarchy.steps().iter().enumerate() {
-        let ends = [step.removed, step.kept];
-        let [removed, kept] = absorbed_first(ends, |v| spheres[v as usize].radius);
-        let cost = Key::of(ends.map(|v| spheres[v as usize])).cost();
-        if ends != [removed, kept] || step.cost.to_bits() != cost.to_bits() {
-            return Err(format!(
-                "step {index} absorbs sphere {} in {} at the scale {}; PMAT absorbs {removed} in \
-                 {kept} at {cost}",
-                step.removed, step.kept, step.cost
-            ));
-        }
-    }
-    let left = hierarchy.stage(hierarchy.last_stage()).edge_count();
-    if left > 0 {
-        return Err(format!("it stops while {left} edges are left, and PMAT goes on"));
-    }
-    Ok(())
-}
-
 /// A hierarchy and the scales of its levels.
 struct Levels {
     hierarchy: Arc<Hierarchy>,
@@ -165,12 +126,11 @@ struct Levels {
 impl Levels {
     fn new(hierarchy: Arc<Hierarchy>) -> Self {
         let mut largest = 0.0_f64;
-        let running = |step: &medial::complex::collapse::Step| {
+        let scales = hierarchy.steps().iter().map(|step| {
             largest = largest.max(step.cost);
             largest
-        };
-        let scales = hierarchy.steps().iter().map(running).collect();
-        Self { hierarchy, scales }
+        });
+        Self { scales: scales.collect(), hierarchy }
     }
 
     /// The number of collapses that a level asks for.
@@ -271,6 +231,13 @@ impl Candidate {
     fn new([a, b]: [u32; 2], spheres: [Sphere; 2]) -> Self {
         Self { key: Key::of(spheres), ends: [a.min(b), a.max(b)] }
     }
+
+    /// Key and ends as one number in the order of both.
+    #[inline]
+    fn whole(&self) -> u128 {
+        let ends = u64::from(self.ends[0]) << 32 | u64::from(self.ends[1]);
+        u128::from(self.key.0) << 64 | u128::from(ends)
+    }
 }
 
 impl Prioritised for Candidate {
@@ -282,11 +249,7 @@ impl Prioritised for Candidate {
     #[inline]
     fn is_before(&self, other: &Self) -> bool {
         // Compared as one number, because a branch per field would be unpredictable.
-        let whole = |c: &Self| {
-            let ends = u64::from(c.ends[0]) << 32 | u64::from(c.ends[1]);
-            u128::from(c.key.bits()) << 64 | u128::from(ends)
-        };
-        whole(self) < whole(other)
+        self.whole() < other.whole()
     }
 }
 
@@ -298,9 +261,9 @@ impl Prioritised for Candidate {
 fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>, SimplifyError> {
     let spheres = &mesh.spheres;
     let total = spheres.len();
-    let evaluate = |&ends: &[u32; 2]| Candidate::new(ends, ends.map(|v| spheres[v as usize]));
-    let candidates = mesh.edges.par_iter().with_min_len(TASK).map(evaluate).collect();
-    let mut queue = LazyHeap::from_items(candidates);
+    let edges = mesh.edges.par_iter().with_min_len(TASK);
+    let candidates = edges.map(|&ends| Candidate::new(ends, ends.map(|v| spheres[v as usize])));
+    let mut queue = LazyHeap::from_items(candidates.collect());
     let mut graph = Graph::new(mesh);
     let mut steps = Vec::with_capacity(total);
     let mut left = Bits::ones(total);
@@ -386,12 +349,12 @@ impl Graph {
             degrees[v as usize] += 1;
         }
         let mut start = 0;
-        let node = |((v, &sphere), degree)| {
+        let nodes = (0..).zip(&mesh.spheres).zip(degrees).map(|((v, &sphere), degree)| {
             let segment = Segment { start, len: 0, next: NONE, last: v };
             start += degree;
             Node { sphere, parent: v, met_by: NONE, segment }
-        };
-        let mut nodes: Vec<_> = (0..).zip(&mesh.spheres).zip(degrees).map(node).collect();
+        });
+        let mut nodes: Vec<Node> = nodes.collect();
         let mut entries = vec![0; total];
         for &[a, b] in &mesh.edges {
             for [v, neighbour] in [[a, b], [b, a]] {
@@ -514,11 +477,6 @@ impl Key {
         } else {
             Self(LENGTH | a.centre.distance(b.centre).to_bits())
         }
-    }
-
-    #[inline]
-    fn bits(self) -> u64 {
-        self.0
     }
 
     /// The cost.

@@ -19,7 +19,6 @@ fn steps(mesh: &MedialMesh) -> Vec<Step> {
 fn levels(mesh: &MedialMesh) -> Levels {
     let hierarchy =
         Hierarchy::new(Arc::new(mesh.clone()), steps(mesh)).expect("collapses of edges");
-    check_origin(&hierarchy).expect("of this method");
     Levels::new(Arc::new(hierarchy))
 }
 

@@ -278,9 +278,9 @@ impl Contraction {
     /// whose id is returned.
     fn merge(&mut self, [a, b]: [u32; 2], sphere: Sphere) -> u32 {
         let Self { params, complex, quadrics, queue, kept: marks, tally, .. } = self;
-        let degree = |v| complex.neighbours(v).len();
         // Rename the smaller star, so that a growing hub is not rewritten at every collapse.
-        let [kept, removed] = if degree(a) >= degree(b) { [a, b] } else { [b, a] };
+        let [of_a, of_b] = [a, b].map(|v| complex.neighbours(v).len());
+        let [kept, removed] = if of_a >= of_b { [a, b] } else { [b, a] };
         complex.collapse(kept, removed, sphere);
         marks.merge(kept, removed);
         let gone = quadrics[removed as usize];

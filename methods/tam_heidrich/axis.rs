@@ -4,7 +4,7 @@ use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{CellSpheres, Contacts, Incidence, MedialMesh, Sphere, UnionAxis, betti};
 use medial::geometry::predicates::{Sign, orient3d};
-use medial::geometry::{CellId, Delaunay, PolarBall, Poles, PowerCrust, UnionVertex};
+use medial::geometry::{CellId, Delaunay, PolarBall, Poles, PowerCrust};
 use medial::metrics::enclosed_volume;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
@@ -38,12 +38,12 @@ impl Axis {
         let incidence = Incidence::of(&mesh);
         // Spheres without edges stay as well as the ends of edges without faces.
         let mut on_curve = vec![true; mesh.spheres.len()];
-        let edges = || mesh.edges.iter().zip(incidence.faces_at());
-        for v in edges().filter(|e| *e.1 > 0).flat_map(|e| e.0) {
-            on_curve[*v as usize] = false;
-        }
-        for v in edges().filter(|e| *e.1 == 0).flat_map(|e| e.0) {
-            on_curve[*v as usize] = true;
+        // Second those without faces, so that a sphere with both kinds of edges stays.
+        for is_curve in [false, true] {
+            let edges = mesh.edges.iter().zip(incidence.faces_at());
+            for v in edges.filter(|e| (*e.1 == 0) == is_curve).flat_map(|e| e.0) {
+                on_curve[*v as usize] = is_curve;
+            }
         }
         let at_sphere = vec![0.0; mesh.spheres.len()];
         let at_face = vec![0.0; mesh.faces.len()];
@@ -97,16 +97,17 @@ impl Axis {
         }
         let delaunay = shape.delaunay()?;
         let cells = shape.cells()?;
-        let centre = |v: u32| self.mesh.spheres[v as usize].centre;
-        let mut targets: Vec<[Vec3; 3]> =
-            self.mesh.faces.iter().map(|face| face.map(centre)).collect();
-        // Curves take part in the search, since a tetrahedron nearest to a curve belongs to no part.
         let curves = self.mesh.edges.iter().zip(self.incidence.faces_at()).filter(|e| *e.1 == 0);
-        targets.extend(curves.map(|(&[a, b], _)| [centre(a), centre(b), centre(b)]));
+        // Curves take part in the search, since a tetrahedron nearest to a curve belongs to no part.
+        let corners = self.mesh.faces.iter().copied().chain(curves.map(|(&[a, b], _)| [a, b, b]));
+        let targets: Vec<[Vec3; 3]> =
+            corners.map(|face| face.map(|v| self.mesh.spheres[v as usize].centre)).collect();
         let tree = TriangleBvh::from_triangles(&targets).map_err(ShapeError::from)?;
         let inside: Vec<_> = delaunay.finite_cells().filter(|&c| cells.is_inside(c)).collect();
-        let circumcentre = |&c| delaunay.circumsphere(c).map_or(Vec3::ZERO, |s| s.0);
-        let centres: Vec<Vec3> = inside.iter().map(circumcentre).collect();
+        let centres: Vec<Vec3> = inside
+            .iter()
+            .map(|&cell| delaunay.circumsphere(cell).map_or(Vec3::ZERO, |sphere| sphere.0))
+            .collect();
         for (cell, nearest) in inside.iter().zip(tree.closest_batch(&centres)) {
             if let Some(volume) = self.at_face.get_mut(nearest.face as usize) {
                 *volume += tetrahedron(delaunay.vertices(*cell).map(|v| delaunay.point(v)));
@@ -139,12 +140,12 @@ fn of_union(
     let (mesh, into) = merged(&finless, params.merge, run)?;
     let mut axis = Axis::of_mesh(mesh);
     // The first vertices of the axis are centres of balls.
-    let on_axis = || union.balls().iter().zip(&first_into).map(|(&b, &v)| (b, into[v as usize]));
-    for (ball, sphere) in on_axis() {
+    let on_axis = union.balls().iter().zip(&first_into).map(|(&b, &v)| (b, into[v as usize]));
+    for (ball, sphere) in on_axis.clone() {
         axis.at_sphere[sphere as usize] += poles.volumes[ball as usize];
     }
     if !shape.has_given_initial() {
-        axis.poles = Some(AxisPoles::of(shape.samples().len(), &poles, on_axis()));
+        axis.poles = Some(AxisPoles::of(shape.samples().len(), &poles, on_axis));
     }
     diagnostics.count("fins", is_fin.iter().filter(|&&fin| fin).count());
     diagnostics.count("fins_left", fins_left);
@@ -170,9 +171,10 @@ fn of_union(
 
 /// For each triangle of the axis of a union whether it lies between two corners at the same sample.
 fn fins_of(mesh: &MedialMesh, union: &UnionAxis, at: &[Option<u32>]) -> Vec<bool> {
-    let sample = |corner: u32| at.get(corner as usize).copied().flatten();
-    let is_between = |[a, b]: [u32; 2]| sample(a).is_some() && sample(a) == sample(b);
-    let facets = union.facets().filter(|f| is_between(f.between));
+    let facets = union.facets().filter(|facet| {
+        let [a, b] = facet.between.map(|corner| at.get(corner as usize).copied().flatten());
+        a.is_some() && a == b
+    });
     let mut fins: Vec<[u32; 3]> = facets.flat_map(|f| f.fan()).collect();
     fins.iter_mut().for_each(|fin| fin.sort_unstable());
     fins.sort_unstable();
@@ -181,8 +183,9 @@ fn fins_of(mesh: &MedialMesh, union: &UnionAxis, at: &[Option<u32>]) -> Vec<bool
 
 /// The volumes of the Delaunay tetrahedra of some poles.
 fn volumes(contacts: &Contacts, poles: impl Iterator<Item = usize>) -> Vec<f64> {
-    let corners = |pole: usize| contacts.of_sphere[pole].map(|s| contacts.samples[s as usize]);
-    poles.map(|pole| tetrahedron(corners(pole))).collect()
+    poles
+        .map(|pole| tetrahedron(contacts.of_sphere[pole].map(|s| contacts.samples[s as usize])))
+        .collect()
 }
 
 // ----------------------------------------------------------------------------
@@ -230,12 +233,12 @@ impl RemainingPoles {
     /// # Errors
     /// When the samples have no triangulation.
     pub fn outer(&self, shape: &Shape, which: OuterPoles) -> Result<Vec<Sphere>, ShapeError> {
-        let is_of_remaining = |ball: &PolarBall| {
-            let mut samples = ball.samples.iter().map(|&s| s as usize);
-            samples.any(|s| self.is_touched.get(s).copied().unwrap_or(false))
-        };
         let mut balls = outer_balls(shape)?;
-        balls.retain(|ball| which == OuterPoles::All || is_of_remaining(ball));
+        balls.retain(|ball| {
+            let mut samples = ball.samples.iter().map(|&s| s as usize);
+            which == OuterPoles::All
+                || samples.any(|s| self.is_touched.get(s).copied().unwrap_or(false))
+        });
         Ok(balls.into_iter().map(|ball| ball.sphere).collect())
     }
 }
@@ -346,7 +349,7 @@ pub(super) fn merged(
 
 /// The short edges at some spheres as ascending pairs, the shortest first.
 fn short_edges(complex: &CollapseComplex, at: &[u32], merge: f64) -> Vec<[u32; 2]> {
-    let of_sphere = |&v: &u32| {
+    let short = at.par_iter().with_min_len(1 << 10).flat_map_iter(|&v| {
         let a = complex.sphere(v);
         let lengths = complex.neighbours(v).iter().map(move |&w| {
             let b = complex.sphere(w);
@@ -355,9 +358,8 @@ fn short_edges(complex: &CollapseComplex, at: &[u32], merge: f64) -> Vec<[u32; 2
         let short = lengths.filter(|&(length, most, _)| length <= most);
         // The bits of numbers that are not negative are in their order.
         short.map(move |(length, _, w)| (length.to_bits(), [v.min(w), v.max(w)]))
-    };
-    let mut short: Vec<(u64, [u32; 2])> =
-        at.par_iter().with_min_len(1 << 10).flat_map_iter(of_sphere).collect();
+    });
+    let mut short: Vec<(u64, [u32; 2])> = short.collect();
     short.par_sort_unstable();
     short.dedup();
     short.into_iter().map(|s| s.1).collect()
@@ -451,56 +453,52 @@ impl DistinctBalls {
         union: &UnionAxis,
     ) -> Vec<Option<u32>> {
         let positions = shape.samples();
-        let at = |vertex| {
-            shared_sample(
-                vertex,
-                |ball| moved[ball as usize].centre,
-                |ball| &self.samples[ball as usize],
-                |sample| positions[sample as usize],
-            )
-        };
-        union.corners().iter().map(at).collect()
+        let found = union.corners().iter().map(|vertex| {
+            let lists = vertex.balls.map(|ball| &self.samples[ball as usize][..]);
+            let centres = vertex.balls.map(|ball| moved[ball as usize].centre);
+            shared_sample(vertex.position, lists, centres, &positions)
+        });
+        found.collect()
     }
 }
 
 /// The sample in which the three polar balls of a vertex meet on its side of their centres' plane:
 /// a key for `UnionBoundary::merge`. `None` if they have no sample in common there.
 ///
-/// `centre` gives the centre of a ball, `samples` the samples that it passes through, and `position` that of
-/// a sample. Balls that were grown no longer pass through their samples.
-fn shared_sample<S: AsRef<[u32]>>(
-    vertex: &UnionVertex,
-    centre: impl Fn(u32) -> Vec3,
-    samples: impl Fn(u32) -> S,
-    position: impl Fn(u32) -> Vec3,
+/// The balls have the samples `a`, `b` and `c`, and the centres `p`, `q` and `r`. Balls that were grown no
+/// longer pass through their samples.
+fn shared_sample(
+    vertex: Vec3,
+    [a, b, c]: [&[u32]; 3],
+    [p, q, r]: [Vec3; 3],
+    positions: &[Vec3],
 ) -> Option<u32> {
-    let lists = vertex.balls.map(&samples);
-    let [a, b, c] = lists.each_ref().map(AsRef::as_ref);
-    let [p, q, r] = vertex.balls.map(centre);
-    let distance = |s: &u32| position(*s).distance_squared(vertex.position);
-    a.iter()
-        .copied()
-        .filter(|s| b.contains(s) && c.contains(s))
+    let common = a.iter().filter(|s| b.contains(s) && c.contains(s));
+    common
+        .map(|&s| (positions[s as usize], s))
         // Three spheres meet in a point and its mirror image, so the side tells which.
-        .filter(|&s| orient3d(p, q, r, position(s)) != Sign::Negative)
-        .min_by(|s, t| distance(s).total_cmp(&distance(t)).then(s.cmp(t)))
+        .filter(|&(position, _)| orient3d(p, q, r, position) != Sign::Negative)
+        .map(|(position, s)| (position.distance_squared(vertex), s))
+        .min_by(|s, t| s.0.total_cmp(&t.0).then(s.1.cmp(&t.1)))
+        .map(|(_, s)| s)
 }
 
 /// For each finite cell whether it is an inner pole: no Voronoi vertex inside is farther from one of its
 /// samples.
 fn poles(delaunay: &Delaunay, cells: &CellSpheres) -> Vec<bool> {
     let spheres = cells.circumspheres();
-    let inside = |c: &CellId| cells.is_inside(*c);
-    let radius = |c: CellId| spheres[c.index()].map_or(0.0, |s| s.radius);
+    let inside = delaunay.finite_cells().filter(|&cell| cells.is_inside(cell));
+    let inside: Vec<(CellId, f64)> =
+        inside.map(|cell| (cell, spheres[cell.index()].map_or(0.0, |s| s.radius))).collect();
     let mut farthest = vec![0.0_f64; delaunay.point_count()];
-    for cell in delaunay.finite_cells().filter(inside) {
+    for &(cell, radius) in &inside {
         for v in delaunay.vertices(cell) {
-            farthest[v.index()] = farthest[v.index()].max(radius(cell));
+            farthest[v.index()] = farthest[v.index()].max(radius);
         }
     }
     let mut is_pole = vec![false; spheres.len()];
-    for cell in delaunay.finite_cells().filter(inside) {
-        let enough = radius(cell) * (1.0 + COINCIDENT);
+    for (cell, radius) in inside {
+        let enough = radius * (1.0 + COINCIDENT);
         is_pole[cell.index()] =
             delaunay.vertices(cell).iter().any(|v| farthest[v.index()] <= enough);
     }

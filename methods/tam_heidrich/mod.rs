@@ -292,7 +292,7 @@ fn by_size(parts: &Parts) -> Vec<usize> {
 
 fn describe(parts: &Parts, remaining: &Remaining<'_>) -> Vec<PartInfo> {
     let levels = parts::levels(parts, remaining);
-    let info = |(id, part): (u32, usize)| PartInfo {
+    let described = (0..).zip(by_size(parts)).map(|(id, part)| PartInfo {
         id,
         level: levels[part],
         triangles: parts.faces(part).len(),
@@ -300,8 +300,8 @@ fn describe(parts: &Parts, remaining: &Remaining<'_>) -> Vec<PartInfo> {
         centre: centroid(&remaining.axis.mesh, parts.faces(part)).to_array(),
         removable: parts.free[part] && parts.is_removable(part),
         removed: false,
-    };
-    (0..).zip(by_size(parts)).map(info).collect()
+    });
+    described.collect()
 }
 
 /// The centroid of some faces by area, or the mean of their corners where they have none.
@@ -412,12 +412,14 @@ where
     type Error = String;
 
     fn try_from(written: Written<T>) -> Result<Self, String> {
-        let parse = |word: &str| word.trim().parse().map_err(|error| format!("`{word}`: {error}"));
         Ok(Self(match written {
             Written::One(number) => vec![number],
             Written::Many(numbers) => numbers,
             Written::Text(text) if text.trim().is_empty() => vec![],
-            Written::Text(text) => text.split(',').map(parse).collect::<Result<_, String>>()?,
+            Written::Text(text) => text
+                .split(',')
+                .map(|word| word.trim().parse().map_err(|error| format!("`{word}`: {error}")))
+                .collect::<Result<_, String>>()?,
         }))
     }
 }
@@ -459,10 +461,9 @@ fn kept_part(
     let mut number = vec![u32::MAX; whole.spheres.len()];
     let kept = (0..number.len()).filter(|&v| sphere_kept[v]);
     kept.zip(0..).for_each(|(old, new)| number[old] = new);
-    let number = |v: u32| number[v as usize];
     let edges = whole.edges.iter().zip(edge_kept).filter(|e| *e.1);
-    mesh.edges = edges.map(|(edge, _)| edge.map(number)).collect();
+    mesh.edges = edges.map(|(edge, _)| edge.map(|v| number[v as usize])).collect();
     let faces = whole.faces.iter().zip(face_kept).filter(|f| *f.1);
-    mesh.faces = faces.map(|(face, _)| face.map(number)).collect();
+    mesh.faces = faces.map(|(face, _)| face.map(|v| number[v as usize])).collect();
     mesh
 }

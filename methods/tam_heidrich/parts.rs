@@ -341,13 +341,13 @@ pub(super) fn without_fins(mesh: &MedialMesh, is_fin: &[bool]) -> (MedialMesh, V
     let mut number = vec![u32::MAX; into.len()];
     let kept = (0..into.len()).filter(|&v| into[v] == v as u32);
     kept.zip(0..).for_each(|(old, new)| number[old] = new);
-    let last = |mut v: u32| {
+    let into_new = (0..into.len() as u32).map(|mut v| {
         while into[v as usize] != v {
             v = into[v as usize];
         }
         number[v as usize]
-    };
-    let into_new = (0..into.len() as u32).map(last).collect();
+    });
+    let into_new = into_new.collect();
     let sphere_kept: Vec<bool> = number.iter().map(|&n| n != u32::MAX).collect();
     let Shrinking { edge_kept, face_kept, .. } = &shrinking;
     (kept_part(mesh, &sphere_kept, edge_kept, face_kept), into_new, left)

@@ -297,17 +297,13 @@ impl<'a> Stars<'a> {
         let mut all = Vec::<Served>::new();
         all.extend(&self.of_sphere[a]);
         all.extend(&self.of_sphere[b]);
-        let merged = |of_a: &[u32], of_b: &[u32]| {
-            let mut ids: Vec<u32> = of_a.iter().chain(of_b).copied().collect();
+        let simplices = [(&self.edges, &self.of_edge), (&self.faces, &self.of_face)];
+        for (simplices, of_simplex) in simplices {
+            // A simplex with both ends is at both.
+            let mut ids = [&simplices[a][..], &simplices[b]].concat();
             ids.sort_unstable();
             ids.dedup();
-            ids
-        };
-        for e in merged(&self.edges[a], &self.edges[b]) {
-            all.extend(&self.of_edge[e as usize]);
-        }
-        for f in merged(&self.faces[a], &self.faces[b]) {
-            all.extend(&self.of_face[f as usize]);
+            ids.into_iter().for_each(|id| all.extend(&of_simplex[id as usize]));
         }
         // A few of all come first, so that a bad place is given up early.
         let spread = (0..ROUGH).flat_map(|k| all[k.min(all.len())..].iter().step_by(ROUGH));
@@ -369,10 +365,11 @@ impl Ring {
         sides.retain(|side| !side.contains(&a) && !side.contains(&b));
         sides.sort_unstable();
         sides.dedup();
-        let sphere = |v: u32| complex.sphere(v);
-        let sides: Vec<[Sphere; 2]> = sides.into_iter().map(|side| side.map(sphere)).collect();
+        let sides: Vec<[Sphere; 2]> =
+            sides.into_iter().map(|side| side.map(|v| complex.sphere(v))).collect();
         let rims = sides.iter().map(|&[p, q]| Cone::new(p, q)).collect();
-        Self { neighbours: around.into_iter().map(sphere).collect(), sides, rims }
+        let neighbours = around.into_iter().map(|v| complex.sphere(v)).collect();
+        Self { neighbours, sides, rims }
     }
 
     /// The energy of some samples if the merged sphere is at a place; given up beyond `limit`.
@@ -496,12 +493,12 @@ impl Guard {
                     Pair::Still([face, _]) => back.push(before.faces[face as usize]),
                 }
             }
-            let moved = |v: &u32| {
+            let mut back: BTreeSet<u32> = back.into_iter().flatten().collect();
+            back.retain(|&v| {
                 // Radii play no part in either.
-                let of = |mesh: &MedialMesh| mesh.spheres.get(*v as usize).map(|s| s.centre);
-                of(before) != of(after)
-            };
-            let back: BTreeSet<u32> = back.into_iter().flatten().filter(moved).collect();
+                let [old, new] = [before, &*after].map(|mesh| mesh.spheres.get(v as usize));
+                old.map(|sphere| sphere.centre) != new.map(|sphere| sphere.centre)
+            });
             if back.is_empty() {
                 break;
             }
@@ -524,13 +521,14 @@ impl Guard {
         mesh: &MedialMesh,
         is_asked: impl Fn(&[u32; 3]) -> bool + Sync,
     ) -> Vec<Pair> {
-        let of = |face: u32| corners(mesh, mesh.faces[face as usize]);
-        let moving = Crossings::new(mesh.faces.clone(), of);
+        let moving =
+            Crossings::new(mesh.faces.clone(), |face| corners(mesh, mesh.faces[face as usize]));
         let moving = moving.pairs_with(|face| is_asked(&mesh.faces[face as usize]));
         let moving = moving.into_iter().map(Pair::Moving);
         let asked = (0..mesh.faces.len() as u32).filter(|&f| is_asked(&mesh.faces[f as usize]));
         let still = asked.flat_map(|face| {
-            let others = self.still.of(mesh.faces[face as usize], of(face));
+            let own = mesh.faces[face as usize];
+            let others = self.still.of(own, corners(mesh, own));
             others.into_iter().map(move |other| Pair::Still([face, other]))
         });
         moving.chain(still).collect()
@@ -600,15 +598,12 @@ impl Patch<'_> {
     /// The samples that the moving part serves or may come to serve, and their distances to the rest.
     fn nearby(&self, part: &MedialUnion, rest: Option<&MedialUnion>) -> (Points, Vec<f64>) {
         let (lo, hi) = part.bounding_box();
-        let places = || {
-            let samples = self.points.samples.iter().map(|sample| sample.point);
-            samples.chain(self.points.interior.iter().map(|x| x.point))
-        };
-        let is_in_box =
-            |p: medial::Vec3| (p - lo).min_element() > -REACH && (hi - p).min_element() > -REACH;
-        let kept: Vec<usize> =
-            places().enumerate().filter(|&(_, p)| is_in_box(p)).map(|(i, _)| i).collect();
-        let all: Vec<medial::Vec3> = places().filter(|&p| is_in_box(p)).collect();
+        let samples = self.points.samples.iter().map(|sample| sample.point);
+        let places = samples.chain(self.points.interior.iter().map(|inside| inside.point));
+        let (kept, all): (Vec<usize>, Vec<medial::Vec3>) = places
+            .enumerate()
+            .filter(|&(_, p)| (p - lo).min_element() > -REACH && (hi - p).min_element() > -REACH)
+            .unzip();
         let moving = part.signed_batch(&all);
         let staying =
             rest.map_or_else(|| vec![f64::INFINITY; all.len()], |rest| rest.signed_batch(&all));
@@ -662,12 +657,11 @@ impl Part {
         faces.iter().for_each(|f| f.iter().for_each(|&v| used[v as usize] = true));
         // The side of a face opposite to its moving corner is part of the rest.
         let sides = mesh.edges.iter().filter(|&&[a, b]| {
-            let is_side = |f: &&[u32; 3]| f.contains(&a) && f.contains(&b);
             !is_moving(&a)
                 && !is_moving(&b)
                 && used[a as usize]
                 && used[b as usize]
-                && faces.iter().any(is_side)
+                && faces.iter().any(|f| f.contains(&a) && f.contains(&b))
         });
         let mut kept: Vec<[u32; 2]> = edges.into_iter().chain(sides).copied().collect();
         kept.sort_unstable();

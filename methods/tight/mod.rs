@@ -248,8 +248,7 @@ fn swapped_often<'a>(
     let judge = Objective::power(8.0, descent.largest());
     for _ in 0..SWAPS {
         let trial = start::swapped(&descent, each, 0, run)?;
-        let lower = |trial: &Descent<'_>| trial.value(&judge) < descent.value(&judge);
-        match trial.filter(lower) {
+        match trial.filter(|trial| trial.value(&judge) < descent.value(&judge)) {
             Some(trial) => descent = trial,
             None if each > 1 => each /= 2,
             None => break,

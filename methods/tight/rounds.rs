@@ -15,7 +15,7 @@ use std::collections::{BTreeSet, HashSet};
 
 use medial::Vec3;
 use medial::complex::MedialMesh;
-use medial::metrics::{Peak, PeakSearch};
+use medial::metrics::PeakSearch;
 use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 
 use super::TightParams;
@@ -213,21 +213,21 @@ impl Witnesses<'_> {
         let Self { goal, search, .. } = self;
         let peaks = search.of(mesh).map_err(refused)?;
         let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
-        let enough = |i: usize| Some(held_from(goal.pool[i].depth));
-        let nearest = union_of(mesh)?.deepest_batch_near(&pool, &[], enough);
+        let nearest =
+            union_of(mesh)?.deepest_batch_near(&pool, &[], |i| Some(held_from(goal.pool[i].depth)));
         let signed: Vec<f64> = nearest.iter().map(|nearest| nearest.signed).collect();
         // The union's boundary at a distance `sigma` from a point that it does not hold is as deep as that
         // point, less `sigma`. This finds pockets that samples of the boundary miss.
         let pockets = goal.pool.iter().zip(&signed).filter(|&(_, &signed)| signed > 0.0);
         let pockets = pockets.map(|(inside, signed)| inside.depth - signed);
         let error = pockets.fold(peaks.hausdorff(), f64::max);
-        let large = |peaks: &[Peak]| -> Vec<Vec3> {
+        let [forward, reverse] = [&peaks.forward, &peaks.reverse].map(|peaks| {
             let large = peaks.iter().take_while(|peak| peak.distance > WITNESS * error);
             large.map(|peak| peak.point).collect()
-        };
-        let on_surface = self.new_ones(0, large(&peaks.forward));
+        });
+        let on_surface = self.new_ones(0, forward);
         points.samples.extend(on_surface.into_iter().map(|point| Sample { point, weight: 1.0 }));
-        let exposed = self.new_ones(1, large(&peaks.reverse));
+        let exposed = self.new_ones(1, reverse);
         for (&point, depth) in exposed.iter().zip(self.goal.depths(&exposed)) {
             // Boundary inside the solid is a pocket. Boundary outside protrudes, which other residuals see.
             if depth.value > 0.0 {
@@ -251,8 +251,10 @@ impl Witnesses<'_> {
 
     /// The first witnesses of a kind, of each cube one.
     fn new_ones(&mut self, kind: u8, points: Vec<Vec3>) -> Vec<Vec3> {
-        let cube = |p: &Vec3| (kind, (*p / APART).floor().to_array().map(|x| x as i64));
-        let new = points.into_iter().filter(|p| self.seen.insert(cube(p)));
+        let new = points.into_iter().filter(|&point| {
+            let cube = (point / APART).floor().to_array().map(|x| x as i64);
+            self.seen.insert((kind, cube))
+        });
         new.take(WITNESSES).collect()
     }
 }
@@ -304,11 +306,11 @@ impl Objective {
 
     fn value(&self, rows: &[Row]) -> f64 {
         let Self { power, mean, scale } = *self;
-        let one = |row: &Row| {
+        let counted = rows.iter().filter(|row| self.counts(row)).map(|row| {
             let x = row.error.abs() / scale;
             row.weight * (x.powf(power) + mean * x * x)
-        };
-        rows.iter().filter(|row| self.counts(row)).map(one).sum()
+        });
+        counted.sum()
     }
 
     /// How far a ball may protrude: what hardly counts at a high power need not be looked for.

@@ -172,16 +172,17 @@ pub(super) fn joined(mesh: &mut MedialMesh, shape: &Shape, parts: u64) -> usize 
 
 /// The shortest edge from some spheres to any other one, if it is inside the solid.
 fn bridge(mesh: &MedialMesh, shape: &Shape, own: &[u32]) -> Option<[u32; 2]> {
-    let centre = |v: u32| mesh.spheres[v as usize].centre;
+    let centres: Vec<Vec3> = mesh.spheres.iter().map(|sphere| sphere.centre).collect();
     let is_own: BTreeSet<u32> = own.iter().copied().collect();
     let others: Vec<u32> = (0..mesh.spheres.len() as u32).filter(|v| !is_own.contains(v)).collect();
-    let tree = PointTree::new(&others.iter().map(|&v| centre(v)).collect::<Vec<_>>());
+    let tree = PointTree::new(&others.iter().map(|&v| centres[v as usize]).collect::<Vec<_>>());
     let nearest = own.iter().filter_map(|&v| {
-        let (place, squared) = tree.nearest(centre(v))?;
+        let (place, squared) = tree.nearest(centres[v as usize])?;
         Some((squared, [v, others[place as usize]]))
     });
     let (_, [a, b]) = nearest.min_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)))?;
-    let between = (1..BETWEEN).map(|k| centre(a).lerp(centre(b), k as f64 / BETWEEN as f64));
+    let [from, to] = [a, b].map(|v| centres[v as usize]);
+    let between = (1..BETWEEN).map(|k| from.lerp(to, k as f64 / BETWEEN as f64));
     let sides = shape.inside_test().sides(&between.collect::<Vec<_>>());
     sides.iter().all(|&side| side == Side::Inside).then_some([a, b])
 }
@@ -231,13 +232,14 @@ impl<'a> Sheets<'a> {
                 return true;
             }
             let bounds = Bounds::of_points(own);
-            let near = |corners: [Vec3; 3]| bounds.overlaps(&Bounds::of_points(corners));
             let moved = self.moved.iter().filter(|other| !is_star(other));
             let mut moved = moved.map(|&other| (other, other.map(place)));
             let mut star = star[i + 1..].iter().map(|&other| (other, other.map(place)));
             moved.any(|(other, corners)| {
                 let [p, q, r] = other;
-                near(corners) && complex.has_face(p, q, r) && crosses(other, corners)
+                bounds.overlaps(&Bounds::of_points(corners))
+                    && complex.has_face(p, q, r)
+                    && crosses(other, corners)
             }) || star.any(|(other, corners)| crosses(other, corners))
         })
     }
@@ -254,14 +256,13 @@ impl<'a> Sheets<'a> {
 
     /// Whether a pair of faces, or two that the collapse of an edge maps to them, cross already.
     fn is_known(&self, [a, b]: [u32; 2], face: Face, other: Face) -> bool {
-        let mapped = |mut face: Face| {
-            face.iter_mut().filter(|v| **v == b).for_each(|v| *v = a);
-            face.sort_unstable();
-            face
-        };
         let pair = [face, other];
         self.known.iter().any(|known| {
-            let [f, g] = known.map(mapped);
+            let [f, g] = known.map(|mut face| {
+                face.iter_mut().filter(|v| **v == b).for_each(|v| *v = a);
+                face.sort_unstable();
+                face
+            });
             pair == [f, g] || pair == [g, f]
         })
     }
@@ -425,8 +426,10 @@ impl Edit {
             && self.crosses([a, b], ball.centre)
         {
             // Over the corner alone that serves the place most.
-            let weight = |v: u32| corners.iter().zip(row.weights).find(|&(&w, _)| w == v);
-            let [x, y] = [a, b].map(|v| weight(v).map_or(0.0, |(_, weight)| weight));
+            let [x, y] = [a, b].map(|v| {
+                let own = corners.iter().zip(row.weights).find(|&(&w, _)| w == v);
+                own.map_or(0.0, |(_, weight)| weight)
+            });
             base.retain(|&v| v == if x < y { b } else { a });
         }
         let new = self.push(ball);

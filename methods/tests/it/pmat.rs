@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use medial::complex::betti;
 use medial::complex::collapse::{Collapse, CollapseComplex};
 use medial::complex::collapse::{Hierarchy, Step, replay};
-use medial::complex::{MedialMesh, betti};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError,
@@ -105,35 +105,6 @@ fn one_thread_and_two_build_the_same_hierarchy() {
         pool.install(|| hierarchy(&shape("bracket", 8)))
     });
     assert_eq!(built[0], built[1]);
-}
-
-#[test]
-fn a_hierarchy_is_resumed_where_it_is_of_this_method() {
-    let shape = shape("capsule", 24);
-    let built = hierarchy(&shape);
-    let resume = |hierarchy: &Arc<Hierarchy>| pmat::resume(Arc::clone(hierarchy), &Params::none());
-    let mut resumed = resume(&built).expect("its own");
-    for level in [Level::Spheres(70), Level::Native(1.5), Level::Published] {
-        let [here, there] =
-            [&mut resumed, &mut prepare(&shape)].map(|s| s.at(level).expect("a level"));
-        assert_eq!(here.mesh, there.mesh);
-        assert_eq!(here.native_level, there.native_level);
-        assert_eq!(here.diagnostics, there.diagnostics);
-    }
-    let other = |steps: Vec<Step>| {
-        let initial: Arc<MedialMesh> = Arc::clone(built.initial());
-        Arc::new(Hierarchy::new(initial, steps).expect("collapses of edges"))
-    };
-    let mut dearer = built.steps().to_vec();
-    dearer[7].cost += 1.0;
-    let short = built.steps()[..9].to_vec();
-    for (steps, part) in [(dearer, "step 7"), (short, "edges are left")] {
-        let refused = resume(&other(steps)).err().expect("refused").to_string();
-        assert!(refused.contains(part), "{refused}");
-    }
-    let mut params = Params::none();
-    params.set("scale", "2");
-    assert!(matches!(pmat::resume(built, &params), Err(SimplifyError::Parameter(_))));
 }
 
 #[test]
