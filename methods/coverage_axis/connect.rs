@@ -46,6 +46,7 @@ pub(super) fn by_regions(
         ));
     }
     let edges = initial.edges.iter().map(|edge| edge.map(|v| anchor_of[v as usize]));
+    // Simplices within one region shrink to a sphere or an edge that others give.
     let edges = edges.filter(|&[a, b]| a != b).collect();
     let faces = initial.faces.iter().map(|face| face.map(|v| anchor_of[v as usize]));
     let faces = faces.filter(|&[a, b, c]| a != b && b != c && a != c).collect();
@@ -147,6 +148,7 @@ fn adjacency(edges: &[[u32; 2]], count: usize) -> (Vec<usize>, Vec<u32>) {
     let mut start = vec![0; count + 1];
     edges.iter().flatten().for_each(|&v| start[v as usize + 1] += 1);
     (0..count).for_each(|v| start[v + 1] += start[v]);
+    // Where the next neighbour of each vertex goes; `start` itself must stay.
     let mut next = start.clone();
     let mut neighbours = vec![0; 2 * edges.len()];
     for &[a, b] in edges {

@@ -32,6 +32,7 @@ impl Coverage {
     /// # Cost
     /// `O(samples * balls)` and a bit each, in parallel.
     pub fn new(samples: &[Vec3], balls: &[Sphere], delta: f64) -> Self {
+        // Bits beyond the last sample stay 0, so that counts of bits are counts of samples.
         let width = samples.len().div_ceil(WORD);
         let mut words = vec![0; width * balls.len()];
         let rows = words.par_chunks_mut(width.max(1) * ROWS).zip(balls.par_chunks(ROWS));

@@ -69,6 +69,7 @@ pub(super) fn cover(
         )));
     }
     let mut found = solve(&reduced, params, run)?;
+    // Forced balls are in every cover of the samples that they alone cover: they raise the bound too.
     let forced = reduced.forced.len();
     found.chosen.extend(&reduced.forced);
     found.chosen.sort_unstable();
@@ -244,6 +245,7 @@ impl State {
             }
             let ball = ones(&self.balls_of[sample]).next().expect("one is left");
             self.forced.push(ball as u32);
+            // Collected first, since dropping a sample clears bits of this row.
             let covered: Vec<usize> = ones(&self.samples_of[ball]).collect();
             covered.into_iter().for_each(|sample| self.drop_sample(sample));
             changed = true;
@@ -336,6 +338,7 @@ fn new_ones(set: &Bits, tried: &mut Bits) -> Vec<usize> {
 
 /// Removes a row, here and where the matrix is transposed.
 fn clear_row(rows: &mut [Vec<u64>], columns: &mut [Vec<u64>], row: usize) {
+    // Both directions of the matrix must agree, since each step reads both.
     for column in ones(&rows[row]) {
         columns[column][row / WORD] &= !(1 << (row % WORD));
     }

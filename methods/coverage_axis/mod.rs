@@ -145,6 +145,7 @@ impl MedialSimplifier for CoverageAxis {
         run: &RunContext,
     ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
         let params = params.typed::<CoverageAxisParams>()?.validate()?;
+        // For all kinds of candidates, since the connection needs it.
         let initial = shape.initial()?;
         run.step(0, initial.spheres.len())?;
         let instance = Instance::new(shape, &params, run.seed)?;
@@ -193,6 +194,7 @@ impl Simplification for Prepared {
             }
             Level::Spheres(count) if by_picks => (dilation, count),
             Level::Spheres(count) => {
+                // The search expects more spheres at larger values: it gets the inverse dilation.
                 return search.at(count, f64::recip, |value| axis.at(value.recip(), max_iter));
             }
             Level::Native(delta) if DILATIONS.contains(&delta) => (delta, max_iter),
@@ -307,6 +309,7 @@ impl Axis {
         let spheres: Vec<Sphere> =
             chosen.iter().map(|&ball| self.instance.spheres[ball as usize]).collect();
         let anchors = match &self.instance.vertices {
+            // Candidates that are vertices of the initial mesh are their own anchors.
             Some(vertices) => chosen.iter().map(|&ball| vertices[ball as usize]).collect(),
             None => {
                 let (anchors, moved) = connect::anchors(&self.initial, &spheres)?;

@@ -234,6 +234,7 @@ impl FacetValue for Strength {
 
     fn is_above(&self, level: f64) -> Box<dyn Fn(usize) -> bool + Sync + '_> {
         let DeyZhaoParams { theta, rho, .. } = self.params;
+        // Angles to a normal are compared by their cosine, so the threshold is a sine of `theta`.
         let cosine = (level * theta.to_radians()).min(FRAC_PI_2).sin();
         // An edge of an umbrella is perpendicular to a normal and no longer than two circumradii.
         let rims = cosine < 1e-6 || level * rho < 2.0 + 1e-6;
@@ -288,6 +289,7 @@ impl Strength {
         }
         let edge = self.umbrellas.position(q) - self.umbrellas.position(p);
         let length = edge.length();
+        // Normals have either sign: the angle of the condition is that of two lines.
         let least = normals.iter().map(|n| n.dot(edge).abs()).fold(length, f64::min);
         let [by_angle, by_ratio] = [self.by_angle(least, length), self.by_ratio(p, length)];
         match self.params.condition {
@@ -309,6 +311,7 @@ impl Strength {
     ) -> bool {
         let condition = self.params.condition;
         let normals = self.umbrellas.normals(p);
+        // Without an umbrella there is no condition, and nothing is kept from this end.
         if normals.is_empty() {
             return false;
         }

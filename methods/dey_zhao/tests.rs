@@ -180,5 +180,5 @@ fn edges_that_are_not_enclosed_are_dropped_and_counted() {
     };
     assert!(some.mesh.faces.len() <= all.mesh.faces.len());
     assert_eq!(some.mesh == all.mesh, count("facets_of_edges_not_enclosed") == 0);
-    let _ = count("enclosed_edges_without_facet");
+    count("enclosed_edges_without_facet");
 }

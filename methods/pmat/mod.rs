@@ -126,6 +126,7 @@ struct Levels {
 impl Levels {
     fn new(hierarchy: Arc<Hierarchy>) -> Self {
         let mut largest = 0.0_f64;
+        // Costs may fall along the record: the running maximum ascends, as `partition_point` needs.
         let scales = hierarchy.steps().iter().map(|step| {
             largest = largest.max(step.cost);
             largest
@@ -141,6 +142,7 @@ impl Levels {
             }
             Level::Spheres(count) => {
                 let excess = self.hierarchy.initial().spheres.len().saturating_sub(count);
+                // Each collapse removes one sphere; components without edges remain.
                 Ok(excess.min(self.hierarchy.last_stage()))
             }
             Level::Native(scale) if scale >= 1.0 && scale.is_finite() => {

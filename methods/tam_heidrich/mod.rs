@@ -243,6 +243,7 @@ impl Prepared {
                     order.len().saturating_sub(1)
                 )));
             };
+            // An id that is listed twice is removed once.
             if !std::mem::replace(&mut part.removed, true) {
                 parts.remove(order[id as usize], remaining);
             }

@@ -65,6 +65,7 @@ impl<'a> Pruning<'a> {
         let before = self.remaining.spheres;
         let after = before - self.parts.own_spheres(part, &self.remaining);
         let is_last = after < self.enough;
+        // Of the two numbers around the requested one the nearer is kept; of equal ones the smaller.
         if is_last && before - self.enough < self.enough - after {
             self.other_side = Some(after);
             return false;
@@ -133,6 +134,7 @@ impl<'a> Pruning<'a> {
             if self.is_enough() {
                 break;
             }
+            // A round may visit thousands of parts, and a cancelled run has to end soon.
             if done % 4096 == 4095 {
                 self.run.step(done, candidates.len())?;
             }
@@ -158,6 +160,7 @@ impl<'a> Pruning<'a> {
             let of_graph = [("nodes", graph.nodes), ("graph_loops", graph.loops)];
             counts.extend(of_graph.into_iter().chain([("refused_leaves", leaves)]));
         }
+        // Parts that lost a neighbour may have merged, or have a free edge now.
         if removed > 0 {
             self.parts = Parts::of(&self.remaining);
         }
@@ -173,6 +176,7 @@ impl<'a> Pruning<'a> {
             Measure::Triangles(most) => {
                 let mut small: Vec<usize> =
                     free.filter(|&p| parts.faces(p).len() <= most).collect();
+                // Ties by id, so that the order of removal is unique.
                 small.sort_by_key(|&p| (parts.faces(p).len(), p));
                 small
             }

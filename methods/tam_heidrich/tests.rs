@@ -59,15 +59,11 @@ fn homology(all: &Simplices) -> [usize; 3] {
 /// What is left, read off the flags.
 fn left(remaining: &Remaining<'_>) -> Simplices {
     let whole = &remaining.axis.mesh;
-    let kept = |flags: &[bool], i: usize| flags[i];
-    let mut all = Simplices::new();
-    let v = (0..whole.spheres.len()).filter(|&i| kept(&remaining.sphere_kept, i));
-    all.extend(v.map(|i| vec![i as u32]));
-    let e = (0..whole.edges.len()).filter(|&i| kept(&remaining.edge_kept, i));
-    all.extend(e.map(|i| whole.edges[i].to_vec()));
-    let f = (0..whole.faces.len()).filter(|&i| kept(&remaining.face_kept, i));
-    all.extend(f.map(|i| whole.faces[i].to_vec()));
-    all
+    let vertices = (0..).zip(&remaining.sphere_kept).filter(|v| *v.1).map(|(v, _)| vec![v]);
+    let edges = whole.edges.iter().zip(&remaining.edge_kept).filter(|e| *e.1);
+    let faces = whole.faces.iter().zip(&remaining.face_kept).filter(|f| *f.1);
+    let simplices = vertices.chain(edges.map(|(e, _)| e.to_vec()));
+    simplices.chain(faces.map(|(f, _)| f.to_vec())).collect()
 }
 
 /// The subcomplex without a set of faces, by definition: the closure of the other faces, and the edges
@@ -106,16 +102,30 @@ fn random_complex(rng: &mut Pcg64) -> MedialMesh {
     complex(n as usize, edges, faces)
 }
 
-/// A strip or disc, folded so that pieces of a surface are common in the corpus.
-fn random_sheets(rng: &mut Pcg64) -> MedialMesh {
-    let (w, h) = (rng.random_range(2..6u32), rng.random_range(2..4u32));
+/// A regular grid of `w` times `h` vertices from `first`, two triangles to a cell.
+fn grid(first: u32, w: u32, h: u32) -> Vec<[u32; 3]> {
     let mut faces = Vec::new();
     for i in 0..w - 1 {
         for j in 0..h - 1 {
-            let v = |di: u32, dj: u32| (j + dj) * w + i + di;
+            let v = |di: u32, dj: u32| first + (j + dj) * w + i + di;
             faces.extend([[v(0, 0), v(1, 0), v(1, 1)], [v(0, 0), v(1, 1), v(0, 1)]]);
         }
     }
+    faces
+}
+
+fn random_balls(rng: &mut Pcg64) -> Vec<Sphere> {
+    let n = rng.random_range(4..60);
+    let largest = [0.2, 0.4, 0.7][rng.random_range(0..3usize)];
+    let mut x = || rng.random_range(-1.0..1.0);
+    let balls = (0..n).map(|_| Sphere::new(Vec3::new(x(), x(), x()), 0.02 + largest * x().abs()));
+    balls.collect()
+}
+
+/// A strip or disc, folded so that pieces of a surface are common in the corpus.
+fn random_sheets(rng: &mut Pcg64) -> MedialMesh {
+    let (w, h) = (rng.random_range(2..6u32), rng.random_range(2..4u32));
+    let mut faces = grid(0, w, h);
     // Glue some vertices to others.
     let mut to: Vec<u32> = (0..w * h).collect();
     for _ in 0..rng.random_range(0..5) {
@@ -183,12 +193,7 @@ fn merging_duplicate_vertices_keeps_the_topology() {
     let mut rng = Pcg64::seed_from_u64(74);
     let mut gone = 0;
     for _ in 0..150 {
-        let n = rng.random_range(4..60);
-        let largest = [0.2, 0.4, 0.7][rng.random_range(0..3usize)];
-        let mut x = || rng.random_range(-1.0..1.0);
-        let balls: Vec<Sphere> = (0..n)
-            .map(|_| Sphere::new(Vec3::new(x(), x(), x()), 0.02 + largest * x().abs()))
-            .collect();
+        let balls = random_balls(&mut rng);
         let whole = UnionAxis::of_balls(&balls).expect("balls").mesh();
         for merge in [0.0, 0.03, 0.1, 0.5] {
             let (mesh, into) = merged(&whole, merge, &RunContext::default()).expect("run");
@@ -246,12 +251,7 @@ fn checked_removal_in_any_order_keeps_the_topology_of_unions() {
     let mut rng = Pcg64::seed_from_u64(73);
     let mut removed = 0;
     for _ in 0..150 {
-        let n = rng.random_range(4..60);
-        let largest = [0.2, 0.4, 0.7][rng.random_range(0..3usize)];
-        let mut x = || rng.random_range(-1.0..1.0);
-        let balls: Vec<Sphere> = (0..n)
-            .map(|_| Sphere::new(Vec3::new(x(), x(), x()), 0.02 + largest * x().abs()))
-            .collect();
+        let balls = random_balls(&mut rng);
         let axis = Axis::of_mesh(UnionAxis::of_balls(&balls).expect("balls").mesh());
         let whole = betti(&axis.mesh);
         let mut remaining = Remaining::all(&axis);
@@ -271,18 +271,6 @@ fn checked_removal_in_any_order_keeps_the_topology_of_unions() {
         }
     }
     assert!(removed > 1_000, "{removed}");
-}
-
-/// A regular grid of `w` times `h` vertices from `first`, two triangles to a cell.
-fn grid(first: u32, w: u32, h: u32) -> Vec<[u32; 3]> {
-    let mut faces = Vec::new();
-    for i in 0..w - 1 {
-        for j in 0..h - 1 {
-            let v = |di: u32, dj: u32| first + (j + dj) * w + i + di;
-            faces.extend([[v(0, 0), v(1, 0), v(1, 1)], [v(0, 0), v(1, 1), v(0, 1)]]);
-        }
-    }
-    faces
 }
 
 #[test]

@@ -153,6 +153,7 @@ pub(super) fn joined(mesh: &mut MedialMesh, shape: &Shape, parts: u64) -> usize 
         let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         (0..mesh.spheres.len() as u32)
             .for_each(|v| members.entry(sets.find(v)).or_default().push(v));
+        // One whose shortest bridge leaves the solid is passed over, or the loop would not end.
         let left = members.iter().filter(|(set, _)| !stuck.contains(*set));
         let Some((&set, own)) = left.min_by_key(|(_, own)| own.len()) else { break };
         match bridge(mesh, shape, own) {
@@ -166,6 +167,7 @@ pub(super) fn joined(mesh: &mut MedialMesh, shape: &Shape, parts: u64) -> usize 
             }
         }
     }
+    // Edges of a medial mesh ascend.
     mesh.edges.sort_unstable();
     joined
 }

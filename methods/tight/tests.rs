@@ -1,6 +1,6 @@
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
-use medial::complex::{MedialMesh, Primitive, Sphere, betti, crossing_faces};
+use medial::complex::{MedialMesh, Sphere, betti, crossing_faces};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Params, RunContext, SimplifyError};
 use rand::{RngExt, SeedableRng};
@@ -83,6 +83,11 @@ fn residuals_have_the_derivatives_that_differences_tell() {
     points.interior.truncate(200);
     let at = |mesh: &MedialMesh| Descent::new(&goal, points.clone(), mesh.clone()).unwrap();
     let base = at(&mesh);
+    for row in &base.residuals.rows {
+        // Nothing limits a residual here, so every row has a primitive.
+        let sum: f64 = row.weights.iter().sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{row:?}");
+    }
     let step = 1e-6;
     let mut compared = 0;
     for v in [0_u32, 7, 19] {
@@ -253,21 +258,6 @@ fn a_ball_in_a_box_touches_its_nearest_sides() {
     let ball = goal.ball_at(middle_of_side);
     assert!((ball.radius - half).abs() < 2e-3 * half, "{ball:?}, {half}");
     assert!(ball.centre.distance(centre) < 2e-3 * half, "{ball:?}");
-}
-
-#[test]
-fn what_serves_a_sample_is_among_its_primitives() {
-    let shape = shape("capsule", 12);
-    let goal = Goal::new(&shape, 0).unwrap();
-    let mesh = start(&shape, 6);
-    let descent = Descent::new(&goal, goal.points(6), mesh).unwrap();
-    for row in &descent.residuals.rows {
-        let sum: f64 = row.weights.iter().sum();
-        assert!((sum - 1.0).abs() < 1e-9, "{row:?}");
-        if let Primitive::Sphere(v) = row.primitive {
-            assert!((v as usize) < descent.mesh.spheres.len());
-        }
-    }
 }
 
 /// Two triangles in parallel planes, and a step that pushes a corner of one through the other.

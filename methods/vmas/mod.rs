@@ -170,6 +170,7 @@ impl Simplification for Prepared<'_> {
             }
         };
         let points = self.points(asked)?;
+        // Each sphere needs points of its own.
         let target = asked.min(self.most_spheres(&points));
         let mut sampling = VariationalSampling::new(&points, &self.solid, self.params);
         let ended = sampling.run(target, &self.run)?;

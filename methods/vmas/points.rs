@@ -113,6 +113,7 @@ impl SurfacePoints {
             (0..mesh.faces.len()).map(|face| area_vector(mesh, face)).collect();
         let mut around = vec![Vec::new(); mesh.vertices.len()];
         for (face, corners) in mesh.faces.iter().enumerate() {
+            // A face without area has no normal, and its plane would be undefined.
             for &corner in corners.iter().filter(|_| vectors[face] != Vec3::ZERO) {
                 around[corner as usize].push(vectors[face]);
             }
@@ -120,6 +121,7 @@ impl SurfacePoints {
         let (mut unplaced, mut planes) = (Vec::new(), Vec::new());
         for (&position, vectors) in mesh.vertices.iter().zip(&around) {
             let area: f64 = vectors.iter().map(|v| v.length()).sum();
+            // Weighted by area, as the vectors are as long as their faces are large.
             let normal = vectors.iter().sum::<Vec3>().normalize_or_zero();
             let before = planes.len();
             planes.extend(vectors.iter().map(|vector| Plane {
@@ -136,6 +138,7 @@ impl SurfacePoints {
         let (mut points, place_of) = Self::placed(&unplaced, &planes);
         let mut faces: Vec<[u32; 3]> =
             mesh.faces.iter().map(|face| face.map(|v| place_of[v as usize])).collect();
+        // Faces whose corner is left out join no points.
         faces.retain(|face| !face.contains(&u32::MAX));
         points.links = sides_of(&faces);
         points.local = Locality::Faces(faces);
@@ -346,12 +349,14 @@ pub(super) fn nearest(points: &[Vec3], area: f64, count: usize) -> Vec<u32> {
     let ids = points.par_iter().flat_map_iter(|&p| {
         let mut squared = guess.max(f64::MIN_POSITIVE);
         let mut near = tree.within(p, squared);
+        // Ends, since there are at least `count` points.
         while near.len() < count {
             squared *= 2.0;
             near = tree.within(p, squared);
         }
         let mut near: Vec<(f64, u32)> =
             near.into_iter().map(|id| (points[id as usize].distance_squared(p), id)).collect();
+        // Ties by id, so that the list does not depend on the order of the tree.
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         near.truncate(count);
         near.into_iter().map(|(_, id)| id)

@@ -98,6 +98,7 @@ impl ClusterSum {
         let mut squares = 0.0;
         let factor = residuals.euclidean();
         for &v in cluster {
+            // The quadric is relative to `origin`, at the radius 0.
             residuals.each_plane(points, v as usize, |PlaneSum { normal, ties, level }, weight| {
                 planes.add(normal, ties, level - normal.dot(origin), weight);
             });
@@ -202,6 +203,7 @@ impl System {
         for j in 0..4 {
             let before: f64 = (0..j).map(|k| factor[j][k] * factor[j][k] * pivots[k]).sum();
             pivots[j] = self.matrix[j][j] - before;
+            // Written so that a pivot that is not a number fails too.
             let is_positive = pivots[j] > FLAT * largest;
             if !is_positive {
                 return None;
@@ -274,6 +276,7 @@ impl Residuals {
             match &points.local {
                 Locality::Faces(_) => sum.add_planes(points, v, 1.0),
                 Locality::Nearest { count, ids } => {
+                    // The point itself is in its list, and counts twice, as in CGAL.
                     let factor = 1.0 / (count + 1) as f64;
                     sum.add_planes(points, v, factor);
                     for &near in &ids[v * count..(v + 1) * count] {

@@ -187,6 +187,7 @@ impl Tally {
 fn largest_ball(points: &SurfacePoints, solid: &Solid<'_>) -> Option<Ball> {
     let balls: Vec<Option<Ball>> =
         (0..points.len()).into_par_iter().map(|v| solid.ball_at(points, v)).collect();
+    // `max_by` takes the last of equals: backwards that is the smallest id.
     let balls = balls.into_iter().flatten().rev();
     balls.max_by(|a, b| a.sphere.radius.total_cmp(&b.sphere.radius))
 }
@@ -293,6 +294,7 @@ impl Clusters {
 /// largest cluster stays whatever its size. Returns the clusters that are left.
 pub(super) fn drop_small(spheres: &mut Vec<Sphere>, labels: &mut [u32], least: usize) -> Clusters {
     let clusters = Clusters::of_labels(labels, spheres.len());
+    // Backwards, so that of equal clusters the first counts as the largest.
     let largest = (0..spheres.len()).rev().max_by_key(|&s| clusters.of(s).len());
     let mut kept: Vec<usize> = (0..spheres.len()).collect();
     kept.retain(|&s| clusters.of(s).len() >= least || Some(s) == largest);
@@ -360,6 +362,7 @@ pub(super) fn to_split(misfits: &[Misfit], edges: &[[u32; 2]], missing: usize) -
         neighbours[b as usize].push(a);
     }
     let mut order: Vec<u32> = (0..spheres as u32).collect();
+    // Ties by id: an unstable sort alone would leave their order open.
     order.sort_unstable_by(|&a, &b| {
         misfits[b as usize].mean.total_cmp(&misfits[a as usize].mean).then(a.cmp(&b))
     });

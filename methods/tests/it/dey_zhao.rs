@@ -6,9 +6,11 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_8};
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::{Sampling, Side, TriMesh};
+use medial::surface::{Side, TriMesh};
 use medial::{Vec3, surface};
 use medial_methods::dey_zhao;
+
+use crate::common;
 
 fn shape_of(mesh: &TriMesh, sampling: &str) -> Shape {
     let report = surface::validate(mesh).expect("a solid");
@@ -22,19 +24,14 @@ fn built_in(id: &str, resolution: u32) -> TriMesh {
 }
 
 fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
-    let mut all = Params::none();
-    for (key, value) in params {
-        all.set(key, value);
-    }
-    let mut prepared =
-        dey_zhao::method().prepare(shape, &all, &RunContext::default()).expect("ready");
-    prepared.at(level).expect("a level")
+    let params = common::params(params);
+    let prepared = dey_zhao::method().prepare(shape, &params, &RunContext::default());
+    prepared.expect("ready").at(level).expect("a level")
 }
 
 fn area(mesh: &MedialMesh) -> f64 {
-    let corner = |v: u32| mesh.spheres[v as usize].centre;
     let areas = mesh.faces.iter().map(|f| {
-        let [a, b, c] = f.map(corner);
+        let [a, b, c] = f.map(|v| mesh.spheres[v as usize].centre);
         (b - a).cross(c - a).length() / 2.0
     });
     areas.sum()
@@ -110,6 +107,13 @@ fn a_larger_strength_keeps_less_and_a_given_mesh_is_no_voronoi_diagram() {
 }
 
 #[test]
+fn more_samples_than_there_are_points_are_not_tried() {
+    let shape = shape_of(&built_in("capsule", 36), "vertices");
+    let many = at(&shape, &[], Level::Spheres(1_000_000_000));
+    assert!(many.diagnostics.warnings.iter().any(|w| w.contains("are not tried")));
+}
+
+#[test]
 fn a_number_of_spheres_is_the_published_result_of_fewer_samples() {
     let mesh = built_in("blob", 60);
     for sampling in ["vertices", "uniform:4000:7"] {
@@ -128,20 +132,6 @@ fn a_number_of_spheres_is_the_published_result_of_fewer_samples() {
             assert_eq!(found.mesh, at(&shape_of(&mesh, &again), &[], Level::Published).mesh);
         }
     }
-}
-
-#[test]
-fn a_level_does_not_depend_on_earlier_ones() {
-    let shape = shape_of(&built_in("capsule", 36), "vertices");
-    let run = RunContext::default();
-    let mut prepared = dey_zhao::method().prepare(&shape, &Params::none(), &run).expect("ready");
-    let levels = [Level::Spheres(400), Level::Published, Level::Spheres(100), Level::Spheres(400)];
-    for level in levels {
-        let found = prepared.at(level).expect("a level");
-        assert_eq!(found.mesh, at(&shape, &[], level).mesh, "{level}");
-    }
-    let many = prepared.at(Level::Spheres(1_000_000_000)).expect("as many as there are");
-    assert!(many.diagnostics.warnings.iter().any(|w| w.contains("are not tried")));
 }
 
 // ----------------------------------------------------------------------------
@@ -359,18 +349,11 @@ fn few_random_samples_keep_the_facets_that_the_definitions_keep() {
         let built_in = medial_datasets::find(id).expect("in the catalogue");
         let mesh = built_in.mesh(built_in.default_resolution);
         for seed in 1..=4 {
-            let sampling = Sampling::AreaUniform { count: SAMPLES, seed };
-            let report = surface::validate(&mesh).expect("a solid");
-            let options = ShapeOptions { sampling, ..ShapeOptions::default() };
-            let shape = Shape::new(id, &mesh, report, options).expect("an extent");
+            let shape = shape_of(&mesh, &format!("uniform:{SAMPLES}:{seed}"));
             all += shape.voronoi().expect("spheres").spheres.len();
             let expected = expected(&shape, &rules.clone().map(|(_, rule)| rule));
             for (k, ((set, _), (centres, faces))) in rules.iter().zip(expected).enumerate() {
-                let mut params = Params::none();
-                set.iter().for_each(|(key, value)| params.set(key, value));
-                let run = RunContext::default();
-                let mut method = dey_zhao::method().prepare(&shape, &params, &run).expect("ready");
-                let found = method.at(Level::Published).expect("a level").mesh;
+                let found = at(&shape, set, Level::Published).mesh;
                 let name = format!("{id}, seed {seed}, {set:?}");
                 let sizes = (found.spheres.len(), found.faces.len());
                 assert_eq!(sizes, (centres.len(), faces), "{name}");

@@ -5,18 +5,16 @@ use std::sync::Arc;
 use medial::complex::betti;
 use medial::complex::collapse::{Collapse, CollapseComplex};
 use medial::complex::collapse::{Hierarchy, Step, replay};
-use medial::shape::{Shape, ShapeOptions};
+use medial::shape::Shape;
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError,
 };
-use medial::surface;
 use medial_methods::pmat;
 
+use crate::common::shape_of;
+
 fn shape(id: &str, resolution: u32) -> Shape {
-    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
-    let mesh = built_in.mesh(resolution);
-    let report = surface::validate(&mesh).expect("built-in shapes are solids");
-    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
+    shape_of(&medial_datasets::find(id).expect("in the catalogue").mesh(resolution))
 }
 
 fn prepare(shape: &Shape) -> Box<dyn Simplification + '_> {
@@ -105,13 +103,4 @@ fn one_thread_and_two_build_the_same_hierarchy() {
         pool.install(|| hierarchy(&shape("bracket", 8)))
     });
     assert_eq!(built[0], built[1]);
-}
-
-#[test]
-fn a_cancelled_run_ends_as_cancelled() {
-    let shape = shape("capsule", 24);
-    let run = RunContext::default();
-    run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-    let cancelled = pmat::method().prepare(&shape, &Params::none(), &run);
-    assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));
 }

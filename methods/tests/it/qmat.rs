@@ -1,26 +1,20 @@
 //! Q-MAT on the medial meshes of sampled solids.
 
 use medial::complex::betti;
-use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{
-    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError,
-};
+use medial::shape::Shape;
+use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplification, Simplified};
 use medial::surface;
 use medial_methods::qmat;
 
+use crate::common::{self, shape_of};
+
 fn shape(id: &str, resolution: u32) -> Shape {
-    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
-    let mesh = built_in.mesh(resolution);
-    let report = surface::validate(&mesh).expect("built-in shapes are solids");
-    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
+    shape_of(&medial_datasets::find(id).expect("in the catalogue").mesh(resolution))
 }
 
 fn prepare<'s>(shape: &'s Shape, params: &[(&str, &str)]) -> Box<dyn Simplification + 's> {
-    let mut all = Params::none();
-    for (key, value) in params {
-        all.set(key, value);
-    }
-    qmat::method().prepare(shape, &all, &RunContext::default()).expect("prepared")
+    let params = common::params(params);
+    qmat::method().prepare(shape, &params, &RunContext::default()).expect("prepared")
 }
 
 fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified {
@@ -101,9 +95,7 @@ fn the_published_level_checks_from_200_spheres_on() {
 #[test]
 fn topology_is_kept_at_every_level_of_real_meshes() {
     for path in medial_test_support::surfaces() {
-        let loaded = surface::read(&path).expect("a solid");
-        let shape = Shape::new("mesh", &loaded.mesh, loaded.report, ShapeOptions::default());
-        let shape = shape.expect("an extent");
+        let shape = shape_of(&surface::read(&path).expect("a solid").mesh);
         let initial = shape.initial().expect("an initial medial mesh");
         // Not that of the solid where the samples are too coarse for it.
         let expected = betti(&initial);
@@ -118,14 +110,12 @@ fn topology_is_kept_at_every_level_of_real_meshes() {
 }
 
 #[test]
-fn levels_continue_start_anew_and_say_what_they_cannot_do() {
+fn all_spheres_and_more_are_the_initial_mesh() {
     let shape = shape("capsule", 24);
     let initial = shape.initial().expect("an initial medial mesh");
     let mut simplification = prepare(&shape, &[]);
     for count in [200, 80, 80, 120] {
-        let result = spheres(simplification.as_mut(), count);
-        assert_eq!(result.mesh, spheres(prepare(&shape, &[]).as_mut(), count).mesh);
-        assert_eq!(result.mesh.spheres.len(), count);
+        assert_eq!(spheres(simplification.as_mut(), count).mesh.spheres.len(), count);
     }
     let all = spheres(simplification.as_mut(), initial.spheres.len());
     assert_eq!((&all.mesh, all.diagnostics.warnings.len()), (&*initial, 0));
@@ -133,17 +123,4 @@ fn levels_continue_start_anew_and_say_what_they_cannot_do() {
     assert_eq!((&more.mesh, more.diagnostics.warnings.len()), (&*initial, 1));
     let published = simplification.at(Level::Published).expect("the count of Table II");
     assert_eq!(published.mesh.spheres.len(), 100);
-    let native = simplification.at(Level::Native(0.5));
-    assert!(matches!(native, Err(SimplifyError::Unsupported { .. })));
-}
-
-#[test]
-fn a_cancelled_run_ends_as_cancelled() {
-    let shape = shape("capsule", 24);
-    let run = RunContext::default();
-    let mut simplification =
-        qmat::method().prepare(&shape, &Params::none(), &run).expect("prepared");
-    run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-    let cancelled = simplification.at(Level::Spheres(10));
-    assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));
 }

@@ -4,19 +4,15 @@ use std::collections::BTreeSet;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
-use medial::shape::{Shape, ShapeOptions};
+use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
 use medial_methods::tam_heidrich::{self, OuterPoles, PartInfo, RemainingPoles, parts_of_faces};
 
-fn shape_of(name: &str, mesh: &TriMesh) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    Shape::new(name, mesh, report, ShapeOptions::default()).expect("an extent")
-}
+use crate::common::{self, shape_of};
 
 fn built_in(id: &str) -> Shape {
-    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
-    shape_of(id, &built_in.mesh(built_in.default_resolution))
+    shape_of(&common::built_in(id))
 }
 
 fn try_at(
@@ -24,11 +20,8 @@ fn try_at(
     params: &[(&str, &str)],
     level: Level,
 ) -> Result<Simplified, SimplifyError> {
-    let mut all = Params::none();
-    for (key, value) in params {
-        all.set(key, value);
-    }
-    tam_heidrich::method().prepare(shape, &all, &RunContext::default())?.at(level)
+    let params = common::params(params);
+    tam_heidrich::method().prepare(shape, &params, &RunContext::default())?.at(level)
 }
 
 fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
@@ -110,9 +103,7 @@ fn the_largest_parts_of_a_sampled_box_are_its_sheets() {
     for (rounds, seed) in [("1", 0), ("2", 0), ("3", 0), ("3", 1), ("3", 2), ("3", 3)] {
         let mut run = RunContext::default();
         run.seed = seed;
-        let mut params = Params::none();
-        params.set("t_v", "");
-        params.set("t_t_rounds", rounds);
+        let params = common::params(&[("t_v", ""), ("t_t_rounds", rounds)]);
         let mut prepared = tam_heidrich::method().prepare(&shape, &params, &run).expect("an axis");
         let result = prepared.at(Level::Published).expect("an answer");
         result.mesh.check().expect("a valid complex");
@@ -317,7 +308,7 @@ fn senseless_levels_are_refused() {
 fn for_threads(name: &str, mesh: &TriMesh, level: Level) -> Simplified {
     let results = [1, 2].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.expect("a pool").install(|| at(&shape_of(name, mesh), &[], level))
+        pool.expect("a pool").install(|| at(&shape_of(mesh), &[], level))
     });
     let [one, two] = results;
     assert_eq!(one.mesh, two.mesh, "{name}");

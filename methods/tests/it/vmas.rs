@@ -1,38 +1,21 @@
 //! VMAS on whole shapes: exact answers, what the authors' program gives, and what must change nothing.
 
 use std::f64::consts::TAU;
-use std::sync::atomic::Ordering;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti, euler};
 use medial::metrics::JudgeOptions;
-use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
+use medial::shape::Shape;
+use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified};
 use medial::surface::{self, TriMesh};
 use medial_methods::vmas;
 
-fn shape_of(name: &str, mesh: &TriMesh) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    Shape::new(name, mesh, report, ShapeOptions::default()).expect("an extent")
-}
-
-fn built_in(id: &str) -> TriMesh {
-    let built_in = medial_datasets::find(id).unwrap_or_else(|| panic!("{id} is in the catalogue"));
-    built_in.mesh(built_in.default_resolution)
-}
-
-fn params(text: &str) -> Params {
-    let mut params = Params::none();
-    for pair in text.split(':').filter(|pair| !pair.is_empty()) {
-        let (key, value) = pair.split_once('=').expect("key=value");
-        params.set(key, value);
-    }
-    params
-}
+use crate::common::{built_in, params, shape_of};
 
 fn at(shape: &Shape, text: &str, level: Level) -> Simplified {
     let vmas = vmas::method();
-    let prepared = vmas.prepare(shape, &params(text), &RunContext::default());
+    let set: Vec<(&str, &str)> = text.split(':').filter_map(|pair| pair.split_once('=')).collect();
+    let prepared = vmas.prepare(shape, &params(&set), &RunContext::default());
     prepared.expect("prepared").at(level).expect("spheres")
 }
 
@@ -60,7 +43,7 @@ fn torus(large: f64, small: f64, around: u32, across: u32) -> TriMesh {
 
 #[test]
 fn sixteen_spheres_of_a_torus_are_a_ring() {
-    let shape = shape_of("torus", &torus(1.0, 0.3, 240, 80));
+    let shape = shape_of(&torus(1.0, 0.3, 240, 80));
     let diagonal = shape.normalisation().diagonal;
     for text in ["", "refit=published", "contact=mesh", "points=vertices"] {
         let Simplified { mesh, diagnostics, .. } = spheres(&shape, text, 16);
@@ -79,7 +62,7 @@ fn sixteen_spheres_of_a_torus_are_a_ring() {
 
 #[test]
 fn one_sphere_of_a_ball_is_the_ball() {
-    let shape = shape_of("sphere", &built_in("sphere"));
+    let shape = shape_of(&built_in("sphere"));
     for text in ["", "points=vertices", "refit=published", "points=vertices:refit=published"] {
         let mesh = spheres(&shape, text, 1).mesh;
         let [ball] = mesh.spheres[..] else { panic!("one sphere") };
@@ -97,8 +80,7 @@ fn one_sphere_of_a_ball_is_the_ball() {
 fn mean_errors_are_those_of_the_authors_program() {
     for (name, mean) in [("fertility.off", 0.234), ("threeholes.off", 0.257)] {
         let Some(path) = medial_test_support::mesh(name) else { continue };
-        let surface::Loaded { mesh, report } = surface::read(&path).expect("a solid");
-        let shape = Shape::new(name, &mesh, report, ShapeOptions::default()).expect("an extent");
+        let shape = shape_of(&surface::read(&path).expect("a solid").mesh);
         let result = spheres(&shape, "points=vertices:refit=published", 100);
         assert_eq!(result.mesh.spheres.len(), 100);
         let options = JudgeOptions { samples: 20_000, ..JudgeOptions::default() };
@@ -114,7 +96,7 @@ fn one_thread_and_two_give_the_same_bytes() {
     for text in ["", "points=vertices:refit=published:connect=faces", "contact=mesh"] {
         let results = [1, 2].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("a pool").install(|| spheres(&shape_of("bracket", &mesh), text, 60))
+            pool.expect("a pool").install(|| spheres(&shape_of(&mesh), text, 60))
         });
         assert_eq!(results[0].mesh, results[1].mesh, "{text}");
         assert_eq!(results[0].diagnostics, results[1].diagnostics, "{text}");
@@ -139,7 +121,7 @@ fn sorted(shape: &Shape, mesh: &MedialMesh, back: impl Fn(Vec3) -> Vec3) -> Vec<
 #[test]
 fn scale_and_rotation_change_nothing_but_scale_and_rotation() {
     let mesh = built_in("blob");
-    let plain = shape_of("blob", &mesh);
+    let plain = shape_of(&mesh);
     // A quarter turn keeps the bounding box, by whose side lengths are measured.
     let there = |p: Vec3| 3.7 * Vec3::new(-p.y, p.x, p.z) + Vec3::new(5.0, 1.0, -2.0);
     let back = |p: Vec3| {
@@ -147,7 +129,7 @@ fn scale_and_rotation_change_nothing_but_scale_and_rotation() {
         Vec3::new(p.y, -p.x, p.z)
     };
     let vertices = mesh.vertices.iter().map(|&v| there(v)).collect();
-    let turned = shape_of("blob", &TriMesh { vertices, faces: mesh.faces.clone() });
+    let turned = shape_of(&TriMesh { vertices, faces: mesh.faces.clone() });
     for text in ["", "points=vertices"] {
         let [a, b] = [&plain, &turned].map(|shape| spheres(shape, text, 12).mesh);
         assert_eq!((a.edges.len(), a.faces.len()), (b.edges.len(), b.faces.len()), "{text}");
@@ -155,22 +137,6 @@ fn scale_and_rotation_change_nothing_but_scale_and_rotation() {
         a.iter_mut().for_each(|s| s[3] *= 3.7);
         for (a, b) in a.iter().zip(&b) {
             assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-7), "{text}: {a:?} {b:?}");
-        }
-    }
-}
-
-#[test]
-fn an_answer_does_not_depend_on_earlier_requests() {
-    let shape = shape_of("capsule", &built_in("capsule"));
-    for text in ["", "points=vertices"] {
-        let vmas = vmas::method();
-        let run = RunContext::default();
-        let mut prepared = vmas.prepare(&shape, &params(text), &run).expect("prepared");
-        for level in [Level::Spheres(40), Level::Spheres(5), Level::Published, Level::Spheres(40)] {
-            let asked = prepared.at(level).expect("spheres");
-            let alone = at(&shape, text, level);
-            assert_eq!((&asked.mesh, &asked.diagnostics), (&alone.mesh, &alone.diagnostics));
-            assert_eq!(asked.asked, level);
         }
     }
 }
@@ -192,42 +158,11 @@ fn fewer_spheres_than_asked_are_said() {
         ("points=vertices:iterations=1", 4, "iterations"),
     ] {
         for (name, mesh) in [("cube", &cube), ("tetrahedron", &tetrahedron)] {
-            let Simplified { mesh, diagnostics, .. } = spheres(&shape_of(name, mesh), text, asked);
+            let Simplified { mesh, diagnostics, .. } = spheres(&shape_of(mesh), text, asked);
             mesh.check().expect("a valid complex");
             assert!((1..asked).contains(&mesh.spheres.len()), "{name} {text}");
             let said = diagnostics.warnings.iter().any(|warning| warning.contains(why));
             assert!(said, "{name} {text}: {:?}", diagnostics.warnings);
         }
     }
-}
-
-#[test]
-fn levels_that_it_has_not_are_refused() {
-    let shape = shape_of("capsule", &built_in("capsule"));
-    let vmas = vmas::method();
-    let mut prepared =
-        vmas.prepare(&shape, &Params::none(), &RunContext::default()).expect("prepared");
-    assert!(matches!(prepared.at(Level::Spheres(0)), Err(SimplifyError::Level(_))));
-    let native = prepared.at(Level::Native(1.0));
-    assert!(matches!(native, Err(SimplifyError::Unsupported { .. })));
-    assert_eq!(prepared.at(Level::Published).expect("spheres").mesh.spheres.len(), 100);
-}
-
-#[test]
-fn a_cancelled_run_ends_as_cancelled() {
-    let shape = shape_of("capsule", &built_in("capsule"));
-    let run = RunContext::default();
-    run.cancel_flag().store(true, Ordering::Relaxed);
-    let before = vmas::method().prepare(&shape, &Params::none(), &run);
-    assert!(matches!(before, Err(SimplifyError::Cancelled)));
-    let run = RunContext::default();
-    let flag = run.cancel_flag();
-    let run = run.on_progress(move |progress| {
-        if progress.done > 3 {
-            flag.store(true, Ordering::Relaxed);
-        }
-    });
-    let vmas = vmas::method();
-    let mut prepared = vmas.prepare(&shape, &Params::none(), &run).expect("prepared");
-    assert!(matches!(prepared.at(Level::Spheres(50)), Err(SimplifyError::Cancelled)));
 }
