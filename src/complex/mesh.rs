@@ -106,15 +106,8 @@ impl MedialMesh {
         check_spheres(&spheres)?;
         let count = spheres.len();
         edges.iter_mut().for_each(|edge| *edge = ascending_edge(*edge));
-        let spans = |&[a, b]: &[u32; 2]| a < b && (b as usize) < count;
-        if let Some(edge) = edges.iter().position(|edge| !spans(edge)) {
-            return Err(ComplexError::Edge { edge, ends: edges[edge], spheres: count });
-        }
         faces.iter_mut().for_each(|face| *face = ascending_face(*face));
-        let spans = |&[a, b, c]: &[u32; 3]| a < b && b < c && (c as usize) < count;
-        if let Some(face) = faces.iter().position(|face| !spans(face)) {
-            return Err(ComplexError::Face { face, corners: faces[face], spheres: count });
-        }
+        check_indices(&edges, &faces, count)?;
         let (edges, faces) = closure(&edges, &faces, count);
         Ok(Self { spheres, edges, faces, contacts: None })
     }
@@ -132,27 +125,14 @@ impl MedialMesh {
     pub fn check(&self) -> Result<(), ComplexError> {
         let spheres = self.spheres.len();
         check_spheres(&self.spheres)?;
-        for (edge, &ends) in self.edges.iter().enumerate() {
-            if ends[0] >= ends[1] || ends[1] as usize >= spheres {
-                return Err(ComplexError::Edge { edge, ends, spheres });
-            }
-        }
-        for (face, &corners) in self.faces.iter().enumerate() {
-            let ascending = corners[0] < corners[1] && corners[1] < corners[2];
-            if !ascending || corners[2] as usize >= spheres {
-                return Err(ComplexError::Face { face, corners, spheres });
-            }
-        }
+        check_indices(&self.edges, &self.faces, spheres)?;
         check_order("edge", &self.edges)?;
         check_order("face", &self.faces)?;
         // Edges are sorted by now, so those of a sphere are a short run.
         let first = run_starts(&self.edges, spheres);
-        let is_missing = |&[a, b]: &[u32; 2]| {
-            let run = &self.edges[first[a as usize] as usize..first[a as usize + 1] as usize];
-            run.binary_search_by_key(&b, |edge| edge[1]).is_err()
-        };
         let missing = self.faces.par_iter().enumerate().find_map_first(|(face, corners)| {
-            let side = sides(corners).into_iter().find(is_missing)?;
+            let mut sides = sides(corners).into_iter();
+            let side = sides.find(|&side| edge_id(&self.edges, &first, side).is_none())?;
             Some(ComplexError::MissingEdge { face, side })
         });
         if let Some(missing) = missing {
@@ -173,15 +153,13 @@ impl MedialMesh {
             )));
         }
         let samples = contacts.samples.len();
-        let stray =
-            contacts.of_sphere.iter().position(|ids| ids.iter().any(|&id| id as usize >= samples));
-        match stray {
-            Some(sphere) => Err(ComplexError::Contacts(format!(
-                "sphere {sphere} touches {:?} of {samples} samples",
-                contacts.of_sphere[sphere]
-            ))),
-            None => Ok(()),
+        for (sphere, ids) in contacts.of_sphere.iter().enumerate() {
+            if ids.iter().any(|&id| id as usize >= samples) {
+                let why = format!("sphere {sphere} touches {ids:?} of {samples} samples");
+                return Err(ComplexError::Contacts(why));
+            }
         }
+        Ok(())
     }
 
     /// The subcomplex induced by the spheres with `keep[i]`: they, and the edges and faces all of
@@ -280,15 +258,41 @@ fn run_starts<const N: usize>(simplices: &[[u32; N]], spheres: usize) -> Vec<u32
     start
 }
 
+/// The place of an ascending pair in sorted edges, whose runs begin at `first` ([`run_starts`]).
+#[inline]
+fn edge_id(edges: &[[u32; 2]], first: &[u32], [a, b]: [u32; 2]) -> Option<u32> {
+    let (from, to) = (first[a as usize], first[a as usize + 1]);
+    let run = &edges[from as usize..to as usize];
+    let place = run.binary_search_by_key(&b, |edge| edge[1]).ok()?;
+    Some(from + place as u32)
+}
+
 fn check_spheres(spheres: &[Sphere]) -> Result<(), ComplexError> {
-    let is_valid = |s: &Sphere| s.centre.is_finite() && s.radius.is_finite() && s.radius >= 0.0;
-    match spheres.iter().position(|s| !is_valid(s)) {
-        Some(sphere) => {
-            let Sphere { centre, radius } = spheres[sphere];
-            Err(ComplexError::Sphere { sphere, centre, radius })
+    for (sphere, &Sphere { centre, radius }) in spheres.iter().enumerate() {
+        if !(centre.is_finite() && radius.is_finite() && radius >= 0.0) {
+            return Err(ComplexError::Sphere { sphere, centre, radius });
         }
-        None => Ok(()),
     }
+    Ok(())
+}
+
+fn check_indices(
+    edges: &[[u32; 2]],
+    faces: &[[u32; 3]],
+    spheres: usize,
+) -> Result<(), ComplexError> {
+    for (edge, &ends) in edges.iter().enumerate() {
+        if ends[0] >= ends[1] || ends[1] as usize >= spheres {
+            return Err(ComplexError::Edge { edge, ends, spheres });
+        }
+    }
+    for (face, &corners) in faces.iter().enumerate() {
+        let ascending = corners[0] < corners[1] && corners[1] < corners[2];
+        if !ascending || corners[2] as usize >= spheres {
+            return Err(ComplexError::Face { face, corners, spheres });
+        }
+    }
+    Ok(())
 }
 
 fn check_order<T: Ord>(what: &'static str, simplices: &[T]) -> Result<(), ComplexError> {
@@ -314,17 +318,16 @@ impl Incidence {
     /// # Panics
     /// If a side of a face is not listed as an edge; see [`MedialMesh::check`].
     pub fn of(mesh: &MedialMesh) -> Self {
-        let first = first_edges(mesh);
-        let edge_id = |a: u32, b: u32| {
-            let (from, to) = (first[a as usize], first[a as usize + 1]);
-            let found = mesh.edges[from..to].binary_search_by_key(&b, |edge| edge[1]);
-            let place = found.expect("every side of a face is an edge in canonical form");
-            (from + place) as u32
-        };
+        let first = run_starts(&mesh.edges, mesh.spheres.len());
         let face_edges: Vec<[u32; 3]> = mesh
             .faces
             .iter()
-            .map(|&[a, b, c]| [edge_id(a, b), edge_id(a, c), edge_id(b, c)])
+            .map(|face| {
+                sides(face).map(|side| {
+                    edge_id(&mesh.edges, &first, side)
+                        .expect("every side of a face is an edge in canonical form")
+                })
+            })
             .collect();
         let mut faces_at = vec![0; mesh.edges.len()];
         for &edge in face_edges.iter().flatten() {
@@ -342,19 +345,6 @@ impl Incidence {
     pub fn faces_at(&self) -> &[u32] {
         &self.faces_at
     }
-}
-
-/// For each sphere the position of the first edge that starts at it or later: the edges are
-/// sorted, so those that start at sphere `a` are `first[a]..first[a + 1]`.
-fn first_edges(mesh: &MedialMesh) -> Vec<usize> {
-    let mut first = vec![0; mesh.spheres.len() + 1];
-    for &[a, _] in &mesh.edges {
-        first[a as usize + 1] += 1;
-    }
-    for sphere in 0..mesh.spheres.len() {
-        first[sphere + 1] += first[sphere];
-    }
-    first
 }
 
 // The canonical lists of a complex from simplices in any order.
@@ -494,8 +484,10 @@ impl<T: Copy + Default> Runs<T> {
 /// # Panics
 /// If a face is out of range; see [`MedialMesh::check`].
 pub fn crossing_faces(mesh: &MedialMesh) -> Vec<[u32; 2]> {
-    let corners = |face: u32| mesh.faces[face as usize].map(|v| mesh.spheres[v as usize].centre);
-    Crossings::new(mesh.faces.clone(), corners).pairs()
+    Crossings::new(mesh.faces.clone(), |face| {
+        mesh.faces[face as usize].map(|v| mesh.spheres[v as usize].centre)
+    })
+    .pairs()
 }
 
 /// Faces in a tree, for the pairs that cross.
@@ -524,19 +516,18 @@ impl Crossings {
 
     /// The pairs that cross and have a face for which `is_asked`, ascending.
     pub fn pairs_with(&self, is_asked: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
-        let of = |place: usize| {
-            let (face, corners) = self.tree.at(place);
-            let others = if is_asked(face) {
-                // Each pair once, and no face with itself.
-                let is_later = |other: u32| other > face || (other < face && !is_asked(other));
-                self.among(self.faces[face as usize], corners, is_later)
-            } else {
-                vec![]
-            };
-            others.into_iter().map(move |other| [face.min(other), face.max(other)])
-        };
-        let mut pairs: Vec<[u32; 2]> =
-            (0..self.tree.len()).into_par_iter().flat_map_iter(of).collect();
+        let mut pairs: Vec<[u32; 2]> = (0..self.tree.len())
+            .into_par_iter()
+            .map(|place| self.tree.at(place))
+            .filter(|&(face, _)| is_asked(face))
+            .flat_map_iter(|(face, corners)| {
+                // Each pair once, and no face with itself: of two requested faces the smaller finds it.
+                let others = self.among(self.faces[face as usize], corners, |other| {
+                    other > face || (other < face && !is_asked(other))
+                });
+                others.into_iter().map(move |other| ascending_edge([face, other]))
+            })
+            .collect();
         pairs.sort_unstable();
         pairs
     }
