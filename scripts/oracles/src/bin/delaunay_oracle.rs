@@ -17,7 +17,7 @@ use std::time::Instant;
 use medial::Vec3;
 use medial::geometry::delaunay::Delaunay;
 use medial::geometry::regular::Regular;
-use medial::geometry::triangulation::Triangulation;
+use medial_oracles::{bytes, cpu_seconds, numbers};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -26,8 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     match args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["make", name, file] => {
             let points = make(name).ok_or_else(|| format!("unknown point set {name}"))?;
-            let bytes: Vec<u8> = points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-            std::fs::write(file, bytes)?;
+            std::fs::write(file, bytes(points.into_iter().flatten()))?;
         }
         ["run", file] => run(file, false)?,
         ["run", file, "weighted"] => run(file, true)?,
@@ -37,39 +36,26 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn run(file: &str, weighted: bool) -> Result<(), Box<dyn std::error::Error>> {
-    let (points, weights) = read(file)?;
+    let rows = numbers(&std::fs::read(file)?);
+    let (points, weights): (Vec<Vec3>, Vec<f64>) =
+        rows.chunks_exact(4).map(|c| (Vec3::new(c[0], c[1], c[2]), c[3])).unzip();
     let before = peak_kib();
     let (start, clock) = (cpu_seconds(), Instant::now());
-    let report = |t: &Triangulation| {
-        let one = rayon::current_num_threads() == 1;
-        let seconds = if one { cpu_seconds() - start } else { clock.elapsed().as_secs_f64() };
-        let peak = peak_kib() - before;
-        let set = t.finite_cells().fold(0u64, |sum, c| {
-            let mut v = t.vertices(c).map(|v| hash_point(points[v.index()]));
-            v.sort_unstable();
-            sum.wrapping_add(v.into_iter().fold(0, |h, x| mix(h ^ x)))
-        });
-        println!("{} {set:016x} {seconds:.4} {peak}", t.finite_cell_count());
+    let triangulation = match weighted {
+        true => Regular::new(&points, &weights)?.into_triangulation(),
+        false => Delaunay::new(&points)?.into_triangulation(),
     };
-    if weighted {
-        report(Regular::new(&points, &weights)?.triangulation());
-    } else {
-        report(Delaunay::new(&points)?.triangulation());
-    }
+    let one = rayon::current_num_threads() == 1;
+    let seconds = if one { cpu_seconds() - start } else { clock.elapsed().as_secs_f64() };
+    let peak = peak_kib() - before;
+    // A sum, since the two sides list cells in different orders.
+    let set = triangulation.finite_cells().fold(0u64, |sum, c| {
+        let mut v = triangulation.vertices(c).map(|v| hash_point(points[v.index()]));
+        v.sort_unstable();
+        sum.wrapping_add(v.into_iter().fold(0, |h, x| mix(h ^ x)))
+    });
+    println!("{} {set:016x} {seconds:.4} {peak}", triangulation.finite_cell_count());
     Ok(())
-}
-
-fn read(file: &str) -> std::io::Result<(Vec<Vec3>, Vec<f64>)> {
-    let record = |c: &[u8]| {
-        let x = |k: usize| f64::from_le_bytes(c[8 * k..8 * k + 8].try_into().unwrap_or([0; 8]));
-        (Vec3::new(x(0), x(1), x(2)), x(3))
-    };
-    Ok(std::fs::read(file)?.chunks_exact(32).map(record).unzip())
-}
-
-/// CPU seconds of all threads.
-fn cpu_seconds() -> f64 {
-    cpu_time::ProcessTime::try_now().map_or(0.0, |t| t.as_duration().as_secs_f64())
 }
 
 fn peak_kib() -> u64 {
@@ -169,9 +155,8 @@ fn lattice(n: u32, coordinate: impl Fn(u32) -> f64) -> Vec<Vec3> {
 
 /// The surface of the unit cube in steps of `1 / n`.
 fn box_grid(n: u32) -> Vec<Vec3> {
-    let extreme = |x: f64| x == 0.0 || x == 1.0;
     let all = lattice(n + 1, |x| f64::from(x) / f64::from(n));
-    all.into_iter().filter(|p| p.to_array().into_iter().any(extreme)).collect()
+    all.into_iter().filter(|p| p.to_array().into_iter().any(|x| x == 0.0 || x == 1.0)).collect()
 }
 
 /// An icosahedron, subdivided `n` times, on the unit sphere.
@@ -186,12 +171,15 @@ fn icosphere(n: u32) -> Vec<Vec3> {
             points.push(Vec3::from(p).normalize());
         }
     }
-    let near = |a: usize, b: usize, p: &[Vec3]| p[a].distance(p[b]) < 1.2;
     let mut faces = Vec::new();
     for a in 0..12 {
         for b in 0..a {
             for c in 0..b {
-                if near(a, b, &points) && near(b, c, &points) && near(a, c, &points) {
+                // Corners that share an edge are 1.05 apart, others 1.7 or more.
+                if [(a, b), (b, c), (a, c)]
+                    .iter()
+                    .all(|&(i, j)| points[i].distance(points[j]) < 1.2)
+                {
                     faces.push([a, b, c]);
                 }
             }

@@ -14,8 +14,7 @@
 //! ```
 //!
 //! Modes: `closest` (points inside), `inside` (points of the box), `inside-hard` (degenerate
-//! ones), and without a counterpart `signed` (points of the box). `FILE` holds little-endian numbers: the counts of vertices, faces and queries of one kind
-//! (u64), vertices (3 f64), faces (3 u32), the three kinds of queries (3 f64). Answers are x, y, z
+//! ones), and without a counterpart `signed` (points of the box). `FILE` is a [`Task`]. Answers are x, y, z
 //! and distance of the closest point, or one of 1, 0, -1 for inside, on, outside.
 #![allow(clippy::print_stdout)]
 
@@ -23,10 +22,10 @@
 mod bumpy_torus;
 
 use std::error::Error;
-use std::io::Write as _;
 
 use medial::Vec3;
 use medial::surface::{self, InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
+use medial_oracles::{Task, bytes, cpu_seconds, numbers};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -40,35 +39,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// A mesh and the points to ask about.
-struct Task {
-    mesh: TriMesh,
-    inside: Vec<Vec3>,
-    around: Vec<Vec3>,
-    hard: Vec<Vec3>,
-}
-
 fn make(name: &str, count: usize, file: &str) -> Result<(), Box<dyn Error>> {
     let mesh =
         if name == "torus" { bumpy_torus::mesh(224, 224) } else { surface::read(name)?.mesh };
     let (lo, hi) = mesh.bounding_box().ok_or("the mesh has no vertices")?;
     let mut rng = Pcg64::seed_from_u64(1);
-    let mut random = |count: usize| -> Vec<Vec3> {
-        let mut point = || lo + (hi - lo) * Vec3::new(rng.random(), rng.random(), rng.random());
-        (0..count).map(|_| point()).collect()
-    };
-    let around = random(count);
+    let around = random(&mut rng, lo, hi, count);
     let test = InsideTest::new(&mesh);
     let mut inside = Vec::new();
     while inside.len() < count {
-        let drawn = random(count);
+        let drawn = random(&mut rng, lo, hi, count);
         let sides = test.sides(&drawn);
         inside.extend(drawn.iter().zip(sides).filter(|(_, s)| *s == Side::Inside).map(|(&p, _)| p));
     }
     inside.truncate(count);
     let hard = degenerate(&mesh, count);
-    Task { mesh, inside, around, hard }.write(file)?;
-    Ok(())
+    Ok(Task { mesh, queries: [inside, around, hard] }.write(file)?)
+}
+
+/// Uniform in a box.
+fn random(rng: &mut Pcg64, lo: Vec3, hi: Vec3, count: usize) -> Vec<Vec3> {
+    (0..count)
+        .map(|_| lo + (hi - lo) * Vec3::new(rng.random(), rng.random(), rng.random()))
+        .collect()
 }
 
 /// Points on the surface, and points that share coordinates with it.
@@ -89,71 +82,17 @@ fn degenerate(mesh: &TriMesh, count: usize) -> Vec<Vec3> {
         .collect()
 }
 
-impl Task {
-    fn write(&self, file: &str) -> std::io::Result<()> {
-        let mut out = std::io::BufWriter::new(std::fs::File::create(file)?);
-        for count in [self.mesh.vertices.len(), self.mesh.faces.len(), self.inside.len()] {
-            out.write_all(&(count as u64).to_le_bytes())?;
-        }
-        let points = |points: &[Vec3], out: &mut dyn std::io::Write| {
-            points
-                .iter()
-                .flat_map(|p| p.to_array())
-                .try_for_each(|x| out.write_all(&x.to_le_bytes()))
-        };
-        points(&self.mesh.vertices, &mut out)?;
-        for v in self.mesh.faces.iter().flatten() {
-            out.write_all(&v.to_le_bytes())?;
-        }
-        for queries in [&self.inside, &self.around, &self.hard] {
-            points(queries, &mut out)?;
-        }
-        out.flush()
+fn queries<'a>(task: &'a Task, mode: &str) -> &'a [Vec3] {
+    let [inside, around, hard] = &task.queries;
+    match mode {
+        "closest" => inside,
+        "inside-hard" => hard,
+        _ => around,
     }
-
-    fn read(file: &str) -> Result<Self, Box<dyn Error>> {
-        let bytes = std::fs::read(file)?;
-        let mut rest = bytes.as_slice();
-        let mut take = |count: usize| {
-            let (head, tail) = rest.split_at_checked(count)?;
-            rest = tail;
-            Some(head)
-        };
-        let short = || format!("{file} is too short");
-        let mut counts = [0; 3];
-        for count in &mut counts {
-            let word = take(8).ok_or_else(short)?;
-            *count = u64::from_le_bytes(word.try_into()?) as usize;
-        }
-        let vertices = points(take(24 * counts[0]).ok_or_else(short)?);
-        let id = |c: &[u8]| u32::from_le_bytes([c[0], c[1], c[2], c[3]]);
-        let faces = take(12 * counts[1]).ok_or_else(short)?;
-        let faces = faces.chunks_exact(12).map(|c| [id(c), id(&c[4..]), id(&c[8..])]).collect();
-        let mut queries = || Ok::<_, String>(points(take(24 * counts[2]).ok_or_else(short)?));
-        let (inside, around, hard) = (queries()?, queries()?, queries()?);
-        Ok(Self { mesh: TriMesh { vertices, faces }, inside, around, hard })
-    }
-
-    fn queries(&self, mode: &str) -> &[Vec3] {
-        match mode {
-            "closest" => &self.inside,
-            "inside-hard" => &self.hard,
-            _ => &self.around,
-        }
-    }
-}
-
-fn numbers(bytes: &[u8]) -> Vec<f64> {
-    let number = |c: &[u8]| f64::from_le_bytes(c.try_into().unwrap_or_default());
-    bytes.chunks_exact(8).map(number).collect()
-}
-
-fn points(bytes: &[u8]) -> Vec<Vec3> {
-    numbers(bytes).chunks_exact(3).map(|c| Vec3::new(c[0], c[1], c[2])).collect()
 }
 
 fn run(task: &Task, mode: &str, answers: &str) -> Result<(), Box<dyn Error>> {
-    let queries = task.queries(mode);
+    let queries = queries(task, mode);
     let start = cpu_seconds();
     let built;
     let found: Vec<f64> = match mode {
@@ -161,19 +100,19 @@ fn run(task: &Task, mode: &str, answers: &str) -> Result<(), Box<dyn Error>> {
             let bvh = TriangleBvh::new(&task.mesh)?;
             built = cpu_seconds();
             let closest = bvh.closest_batch(queries);
-            let row = |c: &medial::surface::Closest| [c.point.x, c.point.y, c.point.z, c.distance];
-            closest.iter().flat_map(row).collect()
+            closest.iter().flat_map(|c| [c.point.x, c.point.y, c.point.z, c.distance]).collect()
         }
         "inside" | "inside-hard" => {
             let test = InsideTest::new(&task.mesh);
             built = cpu_seconds();
-            let sides = test.sides(queries);
-            let value = |side: &Side| match side {
-                Side::Inside => 1.0,
-                Side::On => 0.0,
-                Side::Outside => -1.0,
-            };
-            sides.iter().map(value).collect()
+            let sides = test.sides(queries).into_iter();
+            sides
+                .map(|side| match side {
+                    Side::Inside => 1.0,
+                    Side::On => 0.0,
+                    Side::Outside => -1.0,
+                })
+                .collect()
         }
         "signed" => {
             let (tree, inside) = (TriangleBvh::new(&task.mesh)?, InsideTest::new(&task.mesh));
@@ -183,8 +122,7 @@ fn run(task: &Task, mode: &str, answers: &str) -> Result<(), Box<dyn Error>> {
         _ => return Err(format!("unknown mode {mode}").into()),
     };
     println!("{:.4} {:.4}", cpu_seconds() - built, built - start);
-    std::fs::write(answers, found.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>())?;
-    Ok(())
+    Ok(std::fs::write(answers, bytes(found))?)
 }
 
 fn compare(task: &Task, mode: &str, ours: &str, theirs: &str) -> Result<(), Box<dyn Error>> {
@@ -201,7 +139,7 @@ fn compare(task: &Task, mode: &str, ours: &str, theirs: &str) -> Result<(), Box<
     let (lo, hi) = task.mesh.bounding_box().ok_or("the mesh has no vertices")?;
     let diagonal = lo.distance(hi);
     let (mut relative, mut absolute, mut apart, mut ties) = (0.0, 0.0, 0, 0);
-    for (&p, (a, b)) in task.inside.iter().zip(ours.chunks(4).zip(theirs.chunks(4))) {
+    for (&p, (a, b)) in task.queries[0].iter().zip(ours.chunks(4).zip(theirs.chunks(4))) {
         let [q, r] = [a, b].map(|c| Vec3::new(c[0], c[1], c[2]));
         // Their point, measured by us: the comparison is not about their square root.
         let off = (a[3] - p.distance(r)).abs();
@@ -219,9 +157,4 @@ fn compare(task: &Task, mode: &str, ours: &str, theirs: &str) -> Result<(), Box<
     );
     let agree = relative <= 1e-12 && apart == 0;
     if agree { Ok(()) } else { Err("closest points differ".into()) }
-}
-
-/// CPU seconds of all threads.
-fn cpu_seconds() -> f64 {
-    cpu_time::ProcessTime::try_now().map_or(0.0, |t| t.as_duration().as_secs_f64())
 }

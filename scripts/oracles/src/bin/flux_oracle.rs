@@ -4,7 +4,7 @@
 //! ```text
 //! flux_oracle make NAME RESOLUTION COUNT FILE
 //!     writes COUNT evenly spaced voxels of the start set of a built-in shape or mesh file, with the
-//!     samples of their spheres: FILE as in distance_oracle.rs, and
+//!     samples of their spheres: FILE is a [`Task`], and
 //!     FILE.voxels: number of voxels and samples, sigma, centres (f64)
 //! flux_oracle run FILE ANSWERS
 //!     writes closest points of the samples (x, y, z, distance) to ANSWERS, fluxes to ANSWERS.flux
@@ -23,6 +23,7 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::RunContext;
 use medial::surface::{self, TriMesh, TriangleBvh};
 use medial_methods::aof::{AofParams, Solid, Sphere, Spiral, Surface, Variant, Wanted};
+use medial_oracles::{Task, bytes, numbers};
 
 /// Samples of the finest level.
 const SAMPLES: usize = 50;
@@ -81,52 +82,23 @@ fn make(name: &str, resolution: u32, count: usize, file: &str) -> Outcome {
         .iter()
         .flat_map(|&c| sphere.directions.iter().map(move |&n| c + n * sphere.radius))
         .collect();
-    let mesh = shape.mesh();
-    let mut task = Vec::new();
-    for number in [mesh.vertices.len(), mesh.faces.len(), samples.len()] {
-        task.extend((number as u64).to_le_bytes());
-    }
-    task.extend(bytes(mesh.vertices.iter().flat_map(|v| v.to_array())));
-    task.extend(mesh.faces.iter().flatten().flat_map(|v| v.to_le_bytes()));
-    for _ in 0..3 {
-        task.extend(bytes(samples.iter().flat_map(|p| p.to_array())));
-    }
-    std::fs::write(file, task)?;
+    let mesh = shape.mesh().clone();
+    Task { mesh, queries: [samples.clone(), samples.clone(), samples] }.write(file)?;
     let head = [centres.len() as f64, SAMPLES as f64, grid.side];
     let voxels = head.into_iter().chain(centres.iter().flat_map(|c| c.to_array()));
     std::fs::write(format!("{file}.voxels"), bytes(voxels))?;
     Ok(())
 }
 
-fn bytes(numbers: impl Iterator<Item = f64>) -> Vec<u8> {
-    numbers.flat_map(f64::to_le_bytes).collect()
-}
-
-fn numbers(bytes: &[u8]) -> Vec<f64> {
-    bytes.chunks_exact(8).map(|c| f64::from_le_bytes(c.try_into().unwrap_or_default())).collect()
-}
-
 fn run(file: &str, answers: &str) -> Outcome {
-    let task = std::fs::read(file)?;
-    let count = |k: usize| {
-        u64::from_le_bytes(task[8 * k..8 * k + 8].try_into().unwrap_or_default()) as usize
-    };
-    let (vertices, faces) = (count(0), count(1));
-    let vector = |c: &[f64]| Vec3::new(c[0], c[1], c[2]);
-    let points = numbers(&task[24..24 + 24 * vertices]);
-    let ids = &task[24 + 24 * vertices..24 + 24 * vertices + 12 * faces];
-    let id = |c: &[u8]| u32::from_le_bytes([c[0], c[1], c[2], c[3]]);
-    let mesh = TriMesh {
-        vertices: points.chunks_exact(3).map(vector).collect(),
-        faces: ids.chunks_exact(12).map(|c| [id(c), id(&c[4..]), id(&c[8..])]).collect(),
-    };
+    let Task { mesh, .. } = Task::read(file)?;
     let voxels = numbers(&std::fs::read(format!("{file}.voxels"))?);
     let sphere = Sphere::new(Spiral::EqualArea, voxels[1] as usize, voxels[2]);
     // The mesh has a diagonal of 1 already. The shape rounds it once more, which the compared points must not have.
     let shape = shape(&mesh)?;
     let (tree, surface) = (TriangleBvh::new(&mesh)?, Surface::of(&shape)?);
     let (mut closest, mut fluxes) = (Vec::new(), Vec::new());
-    for centre in voxels[3..].chunks_exact(3).map(vector) {
+    for centre in medial_oracles::points(&voxels[3..]) {
         let start = tree.closest_from(centre, None).face;
         fluxes.push(surface.flux(&sphere, shape.normalisation().forward(centre), start));
         for &n in &sphere.directions {
@@ -134,8 +106,8 @@ fn run(file: &str, answers: &str) -> Outcome {
             closest.extend([near.point.x, near.point.y, near.point.z, near.distance]);
         }
     }
-    std::fs::write(answers, bytes(closest.into_iter()))?;
-    std::fs::write(format!("{answers}.flux"), bytes(fluxes.into_iter()))?;
+    std::fs::write(answers, bytes(closest))?;
+    std::fs::write(format!("{answers}.flux"), bytes(fluxes))?;
     Ok(())
 }
 
@@ -153,8 +125,8 @@ fn points(name: &str, sigma: f64, numbers: &[f64]) -> Outcome {
     let shape = shape(&mesh(name)?)?;
     let (surface, units) = (Surface::of(&shape)?, shape.normalisation());
     let sphere = Sphere::new(Spiral::EqualArea, SAMPLES, sigma / units.diagonal);
-    for c in numbers.chunks_exact(3) {
-        let centre = units.forward(Vec3::new(c[0], c[1], c[2]));
+    for point in medial_oracles::points(numbers) {
+        let centre = units.forward(point);
         let near = surface.closest(centre, None);
         let flux = surface.flux(&sphere, centre, near.face);
         println!("{} {} {flux}", near.distance * units.diagonal, units.backward(near.point));
