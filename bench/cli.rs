@@ -118,8 +118,9 @@ fn run_with(
 
 /// The command line: as derived, but lists of defaults are shown as they would be written.
 pub fn command() -> Command {
-    let with_commas = |verb: Command| verb.mut_args(defaults_with_commas);
-    with_commas(Cli::command()).mut_subcommands(with_commas)
+    Cli::command()
+        .mut_args(defaults_with_commas)
+        .mut_subcommands(|verb| verb.mut_args(defaults_with_commas))
 }
 
 fn defaults_with_commas(argument: Arg) -> Arg {
@@ -129,10 +130,8 @@ fn defaults_with_commas(argument: Arg) -> Arg {
     };
     let words: Vec<_> = defaults.iter().map(|word| word.to_string_lossy()).collect();
     let list = words.join(&delimiter.to_string());
-    let with_list = |help: Option<&clap::builder::StyledStr>| {
-        help.map(|help| format!("{help} [default: {list}]"))
-    };
-    let (short, long) = (with_list(argument.get_help()), with_list(argument.get_long_help()));
+    let [short, long] = [argument.get_help(), argument.get_long_help()]
+        .map(|help| help.map(|help| format!("{help} [default: {list}]")));
     let argument = argument.hide_default_value(true);
     let argument = match short {
         Some(help) => argument.help(help),

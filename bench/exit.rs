@@ -1,5 +1,7 @@
 //! How a verb ends: its exit code, and the sentence that says what went wrong.
 
+use std::fmt::Display;
+use std::path::Path;
 use std::process::ExitCode;
 
 use crate::exec::RunError;
@@ -52,6 +54,11 @@ impl Failure {
     /// The command line is wrong.
     pub fn usage(message: impl ToString) -> Self {
         Self { code: Exit::Usage, message: message.to_string() }
+    }
+
+    /// The file or folder at `path` is wrong.
+    pub fn at(path: &Path, message: impl Display) -> Self {
+        Self::input(format!("{}: {message}", path.display()))
     }
 
     /// The user's input is wrong, and the message does not name it by itself.

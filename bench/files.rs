@@ -50,10 +50,10 @@ pub fn is_medial(path: &Path) -> Result<bool, Failure> {
 
 /// What the first line says that says anything.
 fn any_line(path: &Path, says: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool, Failure> {
-    let fail = |error| Failure::input(format!("{}: {error}", path.display()));
-    let mut reader = BufReader::new(File::open(path).map_err(fail)?).take(HEADER_LIMIT);
+    let file = File::open(path).map_err(|error| Failure::at(path, error))?;
+    let mut reader = BufReader::new(file).take(HEADER_LIMIT);
     let mut line = Vec::new();
-    while reader.read_until(b'\n', &mut line).map_err(fail)? > 0 {
+    while reader.read_until(b'\n', &mut line).map_err(|error| Failure::at(path, error))? > 0 {
         let words: Vec<&[u8]> =
             line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
         if let Some(said) = says(&words) {
@@ -118,7 +118,7 @@ pub fn check_folder(path: &Path) -> Result<(), Failure> {
 /// When it cannot be written; the message names it.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     medial::write_atomically(path, |out| out.write_all(bytes))
-        .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+        .map_err(|error| Failure::at(path, error))
 }
 
 /// Lower-case extension of a path, or nothing.

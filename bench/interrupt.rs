@@ -13,15 +13,14 @@ static LISTENING: AtomicBool = AtomicBool::new(false);
 /// Takes over interrupts (SIGINT, SIGTERM, SIGHUP) for the rest of the process. A second one always ends
 /// it at once.
 pub fn install() {
-    let handle = || {
+    // Without a handler the system's own way of ending is as good.
+    let _ = ctrlc::set_handler(|| {
         let again = INTERRUPTED.swap(true, Ordering::Relaxed);
         if again || !LISTENING.load(Ordering::Relaxed) {
             medial::remove_temporaries();
             std::process::exit(Exit::Interrupted as i32);
         }
-    };
-    // Without a handler the system's own way of ending is as good.
-    let _ = ctrlc::set_handler(handle);
+    });
 }
 
 /// From now on an interrupt only sets the flag, which is given.

@@ -120,15 +120,17 @@ impl Tree {
 
     /// All members but the root.
     fn members(&self) -> Vec<Stat> {
-        let all = processes();
-        let is_member = |stat: &&Stat| {
-            stat.group == self.root
-                || stat.session == self.root
-                || self.seen.get(&stat.pid) == Some(&stat.born)
-        };
-        let ids: BTreeSet<u32> = all.iter().filter(is_member).map(|stat| stat.pid).collect();
+        let mut members = processes();
+        let ids: BTreeSet<u32> = (members.iter())
+            .filter(|stat| {
+                stat.group == self.root
+                    || stat.session == self.root
+                    // The system gives numbers again: the time of birth tells two processes apart.
+                    || self.seen.get(&stat.pid) == Some(&stat.born)
+            })
+            .map(|stat| stat.pid)
+            .collect();
         let below: BTreeSet<u32> = ids.iter().flat_map(|&pid| descendants(pid)).collect();
-        let mut members = all;
         members.retain(|s| s.pid != self.root && (ids.contains(&s.pid) || below.contains(&s.pid)));
         members
     }

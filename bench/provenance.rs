@@ -53,11 +53,10 @@ pub fn peak_bytes() -> Option<u64> {
 
 fn proc_field(path: &str, key: &str) -> Option<String> {
     let text = fs::read_to_string(path).ok()?;
-    let value = |line: &str| {
+    text.lines().find_map(|line| {
         let (name, value) = line.split_once(':')?;
         (name.trim() == key).then(|| value.trim().to_owned())
-    };
-    text.lines().find_map(value)
+    })
 }
 
 fn kibibytes(value: &str) -> Option<u64> {
@@ -74,9 +73,10 @@ fn command_line() -> String {
 
 /// Words as a shell command line, quoted where necessary.
 pub fn shell_line(words: &[String]) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
     let quoted = words.iter().map(|word| {
-        if !word.is_empty() && word.chars().all(plain) {
+        // No shell gives these characters a meaning.
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
+        if !word.is_empty() && word.chars().all(is_plain) {
             word.clone()
         } else {
             format!("'{}'", word.replace('\'', r"'\''"))

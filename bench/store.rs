@@ -152,11 +152,11 @@ impl Store {
     /// # Errors
     /// When a file cannot be removed.
     pub fn clear(&mut self, journal: &str) -> Result<(), StoreError> {
-        let failed = |path: &Path, source| StoreError::Io { path: path.to_owned(), source };
         self.withdraw_page()?;
         remove_artifacts(&self.dir, &self.dir.join(journal));
         for name in [journal, "header.json", "study.toml", "results.csv"] {
-            remove(&self.dir.join(name)).map_err(|error| failed(&self.dir.join(name), error))?;
+            let path = self.dir.join(name);
+            remove(&path).map_err(|source| StoreError::Io { path, source })?;
         }
         self.known.clear();
         self.journal = Journal::open(self.dir.join(journal))?;
@@ -171,13 +171,13 @@ impl Store {
     /// The levels of an item that have to be run: levels without a record, levels that were ended by a
     /// limit that is larger now, and failed levels if failures are to be retried.
     pub fn missing(&self, item: &Item, failures: Failures) -> Vec<Target> {
-        let missing = |key: &String| match self.known.get(key) {
-            None => true,
-            Some(known) => known.is_incomplete(item, failures),
-        };
-        let keys = item.keys();
-        let levels = item.levels.iter().zip(&keys);
-        levels.filter(|(_, key)| missing(key)).map(|(&level, _)| level).collect()
+        (item.levels.iter().zip(item.keys()))
+            .filter(|(_, key)| {
+                let known = self.known.get(key);
+                known.is_none_or(|known| known.is_incomplete(item, failures))
+            })
+            .map(|(&level, _)| level)
+            .collect()
     }
 
     /// Adds lines: records, or what holds a record with what belongs beside it.
@@ -185,6 +185,7 @@ impl Store {
     /// # Errors
     /// When they cannot be written.
     pub fn keep(&mut self, lines: &[impl Serialize]) -> Result<(), StoreError> {
+        // Before the first line: a page next to more records than it shows would be wrong, however the run ends.
         self.withdraw_page()?;
         Ok(self.journal.append_lines(lines)?)
     }

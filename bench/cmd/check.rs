@@ -16,7 +16,7 @@ use crate::output::{counted, print_json, print_line};
 use crate::provenance::{Provenance, shell_line};
 use crate::study::item::MethodSpec;
 use crate::study::registry::{Entry, Registry};
-use crate::study::{Here, Study, no_such_method};
+use crate::study::{Here, Study};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -87,26 +87,22 @@ impl Arguments {
         if self.ids.is_empty() {
             return Ok(registry.usual().collect());
         }
-        let known = || registry.entries().iter().map(|entry| entry.id().to_owned()).collect();
-        let entry = |id: &String| {
-            let found = registry.entry(id);
-            found.ok_or_else(|| Failure::usage(no_such_method(id, &known() as &Vec<String>)))
-        };
-        self.ids.iter().map(entry).collect()
+        self.ids.iter().map(|id| args::method(registry, id)).collect()
     }
 
     fn cases(&self) -> Result<Vec<&'static Case>, Failure> {
         if self.cases.is_empty() {
             return Ok(cases().iter().collect());
         }
-        let case = |name: &String| {
-            find(name).ok_or_else(|| {
+        let mut chosen = Vec::new();
+        for name in &self.cases {
+            chosen.push(find(name).ok_or_else(|| {
                 let known: Vec<&str> = cases().iter().map(|case| case.name).collect();
                 let known = known.join(", ");
                 Failure::usage(format!("no case is called `{name}`; there are: {known}"))
-            })
-        };
-        self.cases.iter().map(case).collect()
+            })?);
+        }
+        Ok(chosen)
     }
 
     /// Every case on every method.
@@ -154,13 +150,15 @@ impl Arguments {
     /// The command that repeats one case on one method.
     fn command(&self, item: &CheckItem, global: &Global) -> String {
         let mut words = vec![program(), "check".into(), item.method.id.clone()];
-        let mut option = |name: &str, value: String| words.extend([format!("--{name}"), value]);
-        option("case", item.case.clone());
-        self.set.iter().for_each(|set| option("set", set.clone()));
-        self.timeout.iter().for_each(|seconds| option("timeout", seconds.to_string()));
-        self.memory.iter().for_each(|megabytes| option("memory", megabytes.to_string()));
-        global.threads.iter().for_each(|threads| option("threads", threads.to_string()));
-        global.plugins.iter().for_each(|file| option("plugins", file.display().to_string()));
+        let mut options = vec![("--case", item.case.clone())];
+        options.extend(self.set.iter().map(|set| ("--set", set.clone())));
+        options.extend(self.timeout.map(|seconds| ("--timeout", seconds.to_string())));
+        options.extend(self.memory.map(|megabytes| ("--memory", megabytes.to_string())));
+        options.extend(global.threads.map(|threads| ("--threads", threads.to_string())));
+        let plugins = global.plugins.iter().map(|file| ("--plugins", file.display().to_string()));
+        for (option, value) in options.into_iter().chain(plugins) {
+            words.extend([option.to_owned(), value]);
+        }
         shell_line(&words)
     }
 }

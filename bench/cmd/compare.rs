@@ -132,6 +132,7 @@ pub fn run(
         true => (items.clone(), Tally::default()),
         false => missing(&items, &store, arguments.retry_failed.into()),
     };
+    // Before anything is cleared: a misspelt parameter must not cost earlier results.
     if let Some(why) = refused_params(&left, &mut supervisor)? {
         return Err(Failure::usage(why));
     }
@@ -164,11 +165,6 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     let mut study = match &arguments.study {
         Some(path) => Study::read(path)?,
         None => Study::default(),
-    };
-    let absolute = |path: &PathBuf| match Source::is_name(path) {
-        true => path.clone(),
-        // Relative paths of the command line start at the working folder.
-        false => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
     };
     if !arguments.meshes.is_empty() {
         study.meshes = arguments.meshes.iter().map(absolute).collect();
@@ -208,6 +204,14 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     arguments.substrate.apply(&mut study)?;
     arguments.measure.apply(&mut study)?;
     Ok(study)
+}
+
+/// A path of the command line: it starts at the working folder, paths of a study file at that of the file.
+fn absolute(path: &PathBuf) -> PathBuf {
+    match Source::is_name(path) {
+        true => path.clone(),
+        false => std::path::absolute(path).unwrap_or_else(|_| path.clone()),
+    }
 }
 
 impl Arguments {

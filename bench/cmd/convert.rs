@@ -109,15 +109,13 @@ impl LookArguments {
     /// # Errors
     /// When it is so.
     fn check(&self, to: &Path) -> Result<(), Failure> {
-        let refuse = |option: &str, known: &[&str]| {
-            check_extension(to, known)
-                .map_err(|Failure { message, .. }| Failure::usage(format!("{option}: {message}")))
-        };
-        if self.color.is_some() {
-            refuse("--color", &["vtp", "glb"])?;
-        }
-        if self.spheres {
-            refuse("--spheres", &["glb"])?;
+        for (is_set, option, extensions) in [
+            (self.color.is_some(), "--color", &["vtp", "glb"][..]),
+            (self.spheres, "--spheres", &["glb"]),
+        ] {
+            if is_set && let Err(Failure { message, .. }) = check_extension(to, extensions) {
+                return Err(Failure::usage(format!("{option}: {message}")));
+            }
         }
         match (self.color, &self.mesh) {
             (Some(Colour::Error), None) => {
@@ -161,9 +159,10 @@ fn errors(mesh: &MedialMesh, shape: &Shape) -> Result<Vec<f64>, Failure> {
     let tree = shape.surface_tree().map_err(Failure::input)?;
     let inside = shape.inside_test();
     let heights = SignedDistance::closed(&tree, &inside).batch(&centres);
-    let of =
-        |(sphere, height): (&complex::Sphere, f64)| sphere.radius + height * to_normal.diagonal;
-    Ok(mesh.spheres.iter().zip(heights).map(of).collect())
+    // Heights are negative inside, and fractions of the diagonal.
+    Ok((mesh.spheres.iter().zip(heights))
+        .map(|(sphere, height)| sphere.radius + height * to_normal.diagonal)
+        .collect())
 }
 
 /// Diagonal of the box of all balls; 1 where there is none.

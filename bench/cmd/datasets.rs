@@ -133,6 +133,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
         return Err(Failure::usage(message));
     }
     let failed = |error: std::io::Error| Failure::input(format!("fetch_meshes.py: {error}"));
+    // The script is a part of this program: nothing has to be installed next to it.
     let scratch = tempfile::tempdir().map_err(failed)?;
     let script = scratch.path().join("fetch_meshes.py");
     fs::write(&script, SCRIPT).map_err(failed)?;

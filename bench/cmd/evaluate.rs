@@ -187,17 +187,16 @@ fn print_table(
             evaluations.push(&row.evaluation);
         }
     }
-    let row = |title: &str, cell: &dyn Fn(&Evaluation) -> String| -> Vec<String> {
-        let cells = evaluations.iter().map(|evaluation| cell(evaluation));
-        std::iter::once(title.to_owned()).chain(cells).collect()
-    };
-    let mut table = vec![
-        heads,
-        row("spheres", &|e| e.counts.spheres.to_string()),
-        row("edges", &|e| e.counts.edges.to_string()),
-        row("faces", &|e| e.counts.faces.to_string()),
-        row("Betti numbers", &|e| format!("{:?}", e.betti)),
-    ];
+    let mut table = vec![heads];
+    table
+        .extend(["spheres", "edges", "faces", "Betti numbers"].map(|title| vec![title.to_owned()]));
+    for evaluation in &evaluations {
+        let counts = &evaluation.counts;
+        table[1].push(counts.spheres.to_string());
+        table[2].push(counts.edges.to_string());
+        table[3].push(counts.faces.to_string());
+        table[4].push(format!("{:?}", evaluation.betti));
+    }
     table.extend(measured_rows(&evaluations).into_iter().map(|(metric, mut values)| {
         values.insert(0, metric);
         values

@@ -338,10 +338,9 @@ fn power_crust_of(
     let (Some(shape), Some(mesh)) = (shape, &arguments.mesh) else {
         return Err(no_mesh());
     };
-    let of_mesh = |message: String| Failure::input(format!("{}: {message}", mesh.display()));
     let (balls, lap) = Cost::of(|| shape.polar_balls());
     stages.add("poles", lap);
-    let balls = balls.map_err(|error| of_mesh(error.to_string()))?;
+    let balls = balls.map_err(|error| Failure::at(mesh, error))?;
     let to_normal = shape.normalisation();
     let inner = match axis {
         Some(axis) => axis.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)).spheres,
@@ -349,18 +348,17 @@ fn power_crust_of(
     };
     let (counts, named) =
         ([inner.len(), balls.outer.len()], arguments.axis.as_ref().unwrap_or(mesh));
-    let of_named = |message: String| Failure::input(format!("{}: {message}", named.display()));
     let (crust, lap) = Cost::of(|| {
         let crust = PowerCrust::new(&inner, &balls.outer)?;
         Ok((crust.facet_count(), surface::crust_surface(&crust, COINCIDENT)))
     });
     stages.add("reconstruct", lap);
     let (facets, mut crust) =
-        crust.map_err(|error: medial::geometry::TriangulationError| of_named(error.to_string()))?;
+        crust.map_err(|error: medial::geometry::TriangulationError| Failure::at(named, error))?;
     if crust.mesh.faces.is_empty() {
-        return Err(of_named(
-            "no inner ball has a power cell: is the medial mesh of this surface, and in its units?"
-                .into(),
+        return Err(Failure::at(
+            named,
+            "no inner ball has a power cell: is the medial mesh of this surface, and in its units?",
         ));
     }
     for vertex in &mut crust.mesh.vertices {
@@ -400,19 +398,19 @@ fn union_surface_of(
     stages: &mut Stages,
 ) -> Result<Made, Failure> {
     let (Some(axis), Some(path)) = (axis, &arguments.axis) else { return Err(no_axis()) };
-    let of_file = |message: String| Failure::input(format!("{}: {message}", path.display()));
-    let union = MedialUnion::new(axis).map_err(|error| of_file(error.to_string()))?;
+    let union = MedialUnion::new(axis).map_err(|error| Failure::at(path, error))?;
     let (lo, hi) = union.bounding_box();
     let corners = TriMesh { vertices: vec![lo, hi], faces: vec![] };
     let diagonal = shape.map(|s| s.normalisation().diagonal);
-    let of_balls = || Normalisation::of(&corners).map(|n| n.diagonal);
-    let diagonal = diagonal
-        .or_else(of_balls)
-        .ok_or_else(|| of_file("its spheres have no extent, or one that is not finite".into()))?;
+    // Without a surface the box of the union gives the unit of the tolerance.
+    let diagonal =
+        diagonal.or_else(|| Normalisation::of(&corners).map(|n| n.diagonal)).ok_or_else(|| {
+            Failure::at(path, "its spheres have no extent, or one that is not finite")
+        })?;
     let (made, lap) = Cost::of(|| fitting_surface(axis, &union, diagonal, arguments.tolerance));
     stages.add("reconstruct", lap);
     let Fitting { made, tolerance, off, betti } =
-        made.map_err(|error| of_file(contour_error(error, diagonal)))?;
+        made.map_err(|error| Failure::at(path, contour_error(error, diagonal)))?;
     let mut warnings = Vec::new();
     if made.lost > 0 {
         warnings.push(format!(

@@ -164,21 +164,19 @@ impl Wanted {
 
 /// What is drawn, as far as there are medial meshes for it.
 fn show(arguments: &Arguments) -> Result<Show, Failure> {
-    let rejected = |show: Show, problem: &str| {
-        let word = show.to_possible_value().map_or_else(String::new, |v| v.get_name().into());
-        Err(Failure::usage(format!("--show {word}{problem}")))
-    };
-    match (arguments.show, arguments.axes.len()) {
-        (None, 0) => Ok(Show::Surface),
-        (None, _) => Ok(Show::Axis),
+    let (show, problem) = match (arguments.show, arguments.axes.len()) {
+        (None, 0) => return Ok(Show::Surface),
+        (None, _) => return Ok(Show::Axis),
         (Some(show), 0) if show != Show::Surface => {
-            rejected(show, ": name a medial mesh after the surface")
+            (show, ": name a medial mesh after the surface")
         }
         (Some(show @ (Show::Surface | Show::Reconstruction)), 2..) => {
-            rejected(show, " with several medial meshes: expected axis or error")
+            (show, " with several medial meshes: expected axis or error")
         }
-        (Some(show), _) => Ok(show),
-    }
+        (Some(show), _) => return Ok(show),
+    };
+    let word = show.to_possible_value().map_or_else(String::new, |v| v.get_name().into());
+    Err(Failure::usage(format!("--show {word}{problem}")))
 }
 
 /// The inputs, in diagonals of the surface.
@@ -214,15 +212,12 @@ fn side_by_side(
     camera: Camera,
     deviations: &[Deviation],
 ) -> Result<Picture, RenderError> {
-    let panel = |(k, axis): (usize, &'_ MedialMesh)| {
+    let mut panels = Vec::new();
+    for (k, axis) in read.axes.iter().enumerate() {
         let name = arguments.axes[k].file_stem().unwrap_or_default().to_string_lossy();
         let caption = format!("{name}, {}", counted(axis.spheres.len() as u64, "sphere"));
-        (caption, deviations.get(k).map(Deviation::errors))
-    };
-    let described: Vec<_> = read.axes.iter().enumerate().map(panel).collect();
-    let panels: Vec<Panel<'_>> = (described.into_iter().zip(&read.axes))
-        .map(|((caption, errors), axis)| Panel { axis, caption, errors })
-        .collect();
+        panels.push(Panel { axis, caption, errors: deviations.get(k).map(Deviation::errors) });
+    }
     let common = Strip {
         surface: read.shape.mesh(),
         diagonal: 1.0,
@@ -253,8 +248,7 @@ fn single(
         (Show::Reconstruction, _, Some(made)) => (vec![Layer::Surface(&made.mesh)], None),
         (Show::Error, _, Some(made)) => {
             let errors = made.errors();
-            let chosen = || Errors::common_scale(&[&errors], 1.0);
-            let end = arguments.max_error.unwrap_or_else(chosen);
+            let end = arguments.max_error.unwrap_or_else(|| Errors::common_scale(&[&errors], 1.0));
             let scale = Scale::errors(end);
             let layer = Layer::Values { mesh: &made.mesh, values: &made.values, scale };
             (vec![layer, Layer::Ghost(surface)], Some(Errors::bar(&[&errors], end, 1.0)))
@@ -373,8 +367,7 @@ fn from_words(text: &str, up: Vec3) -> Result<Camera, Failure> {
 
 /// Numbers between commas, if all are finite.
 fn numbers(text: &str) -> Option<Vec<f64>> {
-    let number = |word: &str| word.trim().parse().ok().filter(|x: &f64| x.is_finite());
-    text.split(',').map(number).collect()
+    text.split(',').map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect()
 }
 
 fn upwards(text: &str) -> Result<Vec3, Failure> {
@@ -408,17 +401,17 @@ fn size(text: &str) -> Result<[usize; 2], Failure> {
 
 /// The background by name or code.
 fn background(text: &str) -> Result<Background, Failure> {
-    let code = |hex: &str, k: usize| u8::from_str_radix(hex.get(2 * k..2 * k + 2)?, 16).ok();
-    let colour = |hex: &str| {
-        // A sign would be taken for a digit's.
-        let is_hex = hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit());
-        is_hex.then(|| Some([code(hex, 0)?, code(hex, 1)?, code(hex, 2)?])).flatten()
-    };
     let found = match text {
         "white" => Some(Background::WHITE),
         "black" => Some(Background::Colour([0; 3])),
         "transparent" => Some(Background::Transparent),
-        _ => text.strip_prefix('#').and_then(colour).map(Background::Colour),
+        _ => text.strip_prefix('#').and_then(|hex| {
+            // The parser alone would take a sign for a digit.
+            let is_hex = hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit());
+            let code = is_hex.then(|| u32::from_str_radix(hex, 16).ok()).flatten()?;
+            let [_, colour @ ..] = code.to_be_bytes();
+            Some(Background::Colour(colour))
+        }),
     };
     found.ok_or_else(|| {
         Failure::usage(format!("--background {text}: write white, black, transparent or #rrggbb"))

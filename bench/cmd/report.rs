@@ -3,7 +3,6 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::io;
 use std::path::{Component, Path, PathBuf};
 use std::time::SystemTime;
 
@@ -73,7 +72,7 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
     for dir in earlier.iter().chain(dirs) {
         let (records, mut bad) = records(dir)?;
         let written = fs::metadata(dir.join(RESULTS)).and_then(|file| file.modified());
-        let written = written.map_err(|error| failed(dir, &error))?;
+        let written = written.map_err(|error| Failure::at(dir, error))?;
         bad.iter_mut().for_each(|line| *line = format!("{}: {line}", dir.display()));
         stores.push((dir, written, records, bad));
     }
@@ -121,8 +120,8 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
             continue;
         };
         let (from, to) = (dir.join(artifact), out.join(artifact));
-        let bytes = fs::read(&from).map_err(|error| failed(&from, &error))?;
-        fs::create_dir_all(to.parent().unwrap_or(out)).map_err(|error| failed(&to, &error))?;
+        let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
+        fs::create_dir_all(to.parent().unwrap_or(out)).map_err(|error| Failure::at(&to, error))?;
         files::write(&to, &bytes)?;
     }
     // The first store's study stands for all; relative paths in it start at the folder it names.
@@ -164,10 +163,6 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
     files::write(&out.join("header.json"), &text)?;
     drop(store);
     Ok(notes)
-}
-
-fn failed(path: &Path, error: &io::Error) -> Failure {
-    Failure::input(format!("{}: {error}", path.display()))
 }
 
 /// Whether two records of one key hold the same result and the same measures.

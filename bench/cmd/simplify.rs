@@ -1,12 +1,10 @@
 //! `medial simplify MESH --method ID -o x.ma`: one method, one mesh.
 
-use std::io;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use medial::complex::MedialMesh;
-use medial::metrics::{JudgeOptions, MetricError, topology_warning};
+use medial::metrics::{JudgeOptions, topology_warning};
 use medial::shape::Shape;
 use medial::simplifier::{
     Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError,
@@ -82,6 +80,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let entry = method(registry, &arguments.method)?;
     let method = entry.method();
     let options = shape_options(&arguments.substrate)?;
+    // All slips that show without the mesh are refused before it is read.
     check_bound(arguments)?;
     arguments.outputs.check(method)?;
     let line = StageLine::new(global.stages());
@@ -145,11 +144,11 @@ fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
 /// The list of parts with their centres as in the input.
 fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde_json::Value> {
     let back = shape.normalisation();
-    let carried = |part: &PartInfo| PartInfo {
-        centre: back.backward(part.centre.into()).to_array(),
-        ..part.clone()
-    };
-    serde_json::to_value(parts.iter().map(carried).collect::<Vec<_>>())
+    let mut parts = parts.to_vec();
+    for part in &mut parts {
+        part.centre = back.backward(part.centre.into()).to_array();
+    }
+    serde_json::to_value(parts)
 }
 
 /// What a method starts from.
@@ -338,13 +337,13 @@ fn search_bound(
     let mut simplification = start.begin(&view, &run).map_err(refused)?;
     let initial = start.spheres().map_err(refused)?;
     let measure = |mesh: &MedialMesh| -> Result<f64, String> {
-        let told = |error: MetricError| error.to_string();
-        let sampled = judge.distances(mesh).map_err(told)?.hausdorff;
-        match arguments.certify && sampled <= bound {
-            // An upper end within the bound needs an interval that is narrow beside it.
-            true => Ok(judge.certify(mesh, CERTIFIED_SHARE * bound).map_err(told)?.upper),
-            false => Ok(sampled),
+        let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
+        if !arguments.certify || sampled > bound {
+            return Ok(sampled);
         }
+        // An upper end within the bound needs an interval that is narrow beside it.
+        let certified = judge.certify(mesh, CERTIFIED_SHARE * bound);
+        Ok(certified.map_err(|error| error.to_string())?.upper)
     };
     let trying = |level: Level| line.at(format!("searching the bound: {level}"));
     let sweep = &start.entry.presentation().sweep;
@@ -391,19 +390,16 @@ impl Outputs {
     /// When an extension is unknown, a folder not there, or the method has no such thing.
     fn check(&self, method: &dyn MedialSimplifier) -> Result<(), Failure> {
         let info = method.info();
-        let needs = |option: &str, extra: &str, what: &str| match info.has_extra(extra) {
-            true => Ok(()),
-            false => Err(Failure::usage(format!("{option}: {} has no {what}", info.id))),
-        };
         check_output(self.output.as_deref())?;
-        if let Some(path) = &self.voxels {
-            needs("--voxels", aof::VOXELS, "voxels")?;
-            check_extension(path, &["csv"])?;
-            check_folder(path)?;
-        }
-        if let Some(path) = &self.power_crust {
-            needs("--power-crust", tam_heidrich::POLES, "poles")?;
-            check_extension(path, &SURFACES)?;
+        for (path, option, extra, what, extensions) in [
+            (&self.voxels, "--voxels", aof::VOXELS, "voxels", &["csv"][..]),
+            (&self.power_crust, "--power-crust", tam_heidrich::POLES, "poles", &SURFACES),
+        ] {
+            let Some(path) = path else { continue };
+            if !info.has_extra(extra) {
+                return Err(Failure::usage(format!("{option}: {} has no {what}", info.id)));
+            }
+            check_extension(path, extensions)?;
             check_folder(path)?;
         }
         Ok(())
@@ -445,11 +441,10 @@ impl Outputs {
             Outer::All => OuterPoles::All,
             Outer::Remaining => OuterPoles::OfRemaining,
         };
-        let of_file = |why: String| Failure::input(format!("{}: {why}", path.display()));
-        let crust = poles.power_crust(shape, outer).map_err(|error| of_file(error.to_string()))?;
+        let crust = poles.power_crust(shape, outer).map_err(|error| Failure::at(path, error))?;
         let mut crust = surface::crust_surface(&crust, COINCIDENT).mesh;
         if crust.faces.is_empty() {
-            return Err(of_file("no pole is left: nothing to make a surface of".into()));
+            return Err(Failure::at(path, "no pole is left: nothing to make a surface of"));
         }
         let back = shape.normalisation();
         crust.vertices.iter_mut().for_each(|vertex| *vertex = back.backward(*vertex));
@@ -474,7 +469,7 @@ impl Outputs {
 /// its indices in the lattice.
 fn write_voxels(path: &Path, voxels: &LatticeVoxels, shape: &Shape) -> Result<(), Failure> {
     let back = shape.normalisation();
-    let write = |out: &mut dyn Write| -> io::Result<()> {
+    medial::write_atomically(path, |out| {
         writeln!(out, "x,y,z,distance,flux,i,j,k")?;
         for voxel in &voxels.voxels {
             let [x, y, z] = back.backward(voxels.centre(voxel)).to_array();
@@ -482,9 +477,8 @@ fn write_voxels(path: &Path, voxels: &LatticeVoxels, shape: &Shape) -> Result<()
             writeln!(out, "{x},{y},{z},{distance},{},{i},{j},{k}", voxel.flux)?;
         }
         Ok(())
-    };
-    medial::write_atomically(path, |out| write(out))
-        .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
+    })
+    .map_err(|error| Failure::at(path, error))
 }
 
 /// The lattice of the voxels, for the JSON of the result.

@@ -123,8 +123,8 @@ impl<'a> Supervisor<'a> {
         while let Some(levels) = groups.pop() {
             let part = Item { levels, ..item.clone() };
             let (attempt, told) = self.attempt(&part)?;
-            let untold = |level: &&Target| told.iter().all(|k| k.simplify.level != **level);
-            let missing: Vec<Target> = part.levels.iter().filter(untold).copied().collect();
+            let mut missing = part.levels.clone();
+            missing.retain(|level| told.iter().all(|kept| kept.simplify.level != *level));
             kept.extend(told);
             let mut fail = |levels: &[Target], fault: &Fault| {
                 kept.extend(levels.iter().map(|&level| self.failed(item, level, fault)));
@@ -159,14 +159,15 @@ impl<'a> Supervisor<'a> {
                 }
                 Attempt::Ended(stage, fault) => {
                     fail(&missing, &fault);
+                    // The scene ended the worker, not the method: every other method on it would end there, too.
                     if stage == Stage::Loading {
                         self.lost = Some((item.scene.clone(), fault));
                     }
                 }
             }
         }
-        let place = |kept: &Record| item.levels.iter().position(|&l| l == kept.simplify.level);
-        kept.sort_by_key(place);
+        // Levels that were run again have come last.
+        kept.sort_by_key(|kept| item.levels.iter().position(|&l| l == kept.simplify.level));
         Ok(kept)
     }
 
@@ -298,12 +299,14 @@ impl<'a> Supervisor<'a> {
                         self.input = item.map(|item| (item.scene.clone(), hash));
                         (stage, since) = (Stage::Preparing, Instant::now());
                     }
+                    // The limit is the method's; measuring has as much again.
                     Event::Measuring => (stage, since) = (Stage::Measuring, Instant::now()),
                     Event::Asked(level) => {
                         let mut levels = item.iter().flat_map(|item| &item.levels);
                         let place = levels.position(|&asked| asked == level);
                         stage = Stage::Asked(place.unwrap_or(0));
                     }
+                    // A search is many runs: each bound has the time limit for itself.
                     Event::Searching(level) => {
                         let mut levels = item.iter().flat_map(|item| &item.levels);
                         let place = levels.position(|&asked| asked == level);
@@ -323,6 +326,7 @@ impl<'a> Supervisor<'a> {
                     let fault = ended(stage, status, &last_words, memory_refused, &limits);
                     return Ok(Attempt::Ended(stage, fault));
                 }
+                // Programs that the worker started are outside of its own limit.
                 Said::Nothing if worker.resident_bytes() > limits.bytes => {
                     worker.end();
                     return Ok(Attempt::Ended(stage, out_of_memory(stage, &limits)));

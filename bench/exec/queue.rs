@@ -140,7 +140,9 @@ fn failures(records: &[&Record]) -> Vec<String> {
     let failed: Vec<&&Record> = records.iter().filter(|r| r.status.is_failure()).collect();
     let alike = failed.len() == records.len()
         && failed.iter().all(|r| r.status == failed[0].status && r.reason == failed[0].reason);
-    let remark = |record: &&&Record| {
+    let shown = if alike { 1 } else { failed.len() };
+    let mut remarks = Vec::new();
+    for record in failed.into_iter().take(shown) {
         let Record { mesh, simplify, status, reason, .. } = record;
         let reason = reason.as_deref().unwrap_or("no reason");
         let level = match records.len() {
@@ -152,9 +154,9 @@ fn failures(records: &[&Record]) -> Vec<String> {
         let status = status.to_string();
         let status =
             if reason.starts_with(&status) { String::new() } else { format!("{status}: ") };
-        format!("{mesh}, {method}, {level}: {status}{reason}")
-    };
-    failed.iter().take(if alike { 1 } else { failed.len() }).map(remark).collect()
+        remarks.push(format!("{mesh}, {method}, {level}: {status}{reason}"));
+    }
+    remarks
 }
 
 /// How many records have a status.
@@ -273,13 +275,14 @@ pub fn run_alternately(
 
 /// The items that either side lacks in its store.
 pub fn missing_in_either(items: &[Item], contenders: &[Contender<'_>; 2]) -> Vec<Item> {
-    let lacks = |item: &&Item| {
+    let mut lacking = items.to_vec();
+    lacking.retain(|item| {
         contenders.iter().any(|contender| {
             let own = contender.build.own(item);
             !contender.store.missing(&own, Failures::Kept).is_empty()
         })
-    };
-    items.iter().filter(lacks).cloned().collect()
+    });
+    lacking
 }
 
 /// One more repetition of all items of a mesh.

@@ -157,15 +157,17 @@ fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Res
         Err(why) => return send(&Event::Refused(why)),
     };
     send(&Event::Preparing(scene.input.hash.clone()))?;
-    let report = |LevelRun { level, outcome, times }: LevelRun| {
-        let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
-        send(&Event::Repeated(level, outcome))
-    };
     let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
     for run in answer_levels(registry, item, scene, &levels) {
-        report(run)?;
+        report_repetition(run)?;
     }
-    answer_bounds(registry, item, scene, &mut |run| report(run))
+    answer_bounds(registry, item, scene, &mut report_repetition)
+}
+
+fn report_repetition(LevelRun { level, outcome, times }: LevelRun) -> io::Result<()> {
+    // The hash alone: the supervisor compares it with that of the first run.
+    let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
+    send(&Event::Repeated(level, outcome))
 }
 
 /// Prepares the method of an item on a very small shape.
@@ -202,12 +204,17 @@ fn answer_levels(
     let unknown = MethodInfo::default();
     let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
     let view = scene.shape().view();
-    let prepare = || match &entry {
-        Ok(entry) => entry.method().prepare(&view, &item.method.params, &context),
-        Err(why) => Err(SimplifyError::Failed(why.clone())),
-    };
-    // The supervisor notices by itself when the pipe is closed.
-    answer(&view, info, prepare, levels, |level| drop(send(&Event::Asked(level.into()))))
+    answer(
+        &view,
+        info,
+        || match &entry {
+            Ok(entry) => entry.method().prepare(&view, &item.method.params, &context),
+            Err(why) => Err(SimplifyError::Failed(why.clone())),
+        },
+        levels,
+        // The supervisor notices by itself when the pipe is closed.
+        |level| drop(send(&Event::Asked(level.into()))),
+    )
 }
 
 /// The results of an item's method for its error bounds, from the loosest to the tightest. Each goes

@@ -80,10 +80,11 @@ impl Worker {
         command.env(SCRATCH, scratch.path());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn()?;
-        let pipe = || io::Error::other("a pipe of the worker is missing");
-        let requests = child.stdin.take().ok_or_else(pipe)?;
-        let output = child.stdout.take().ok_or_else(pipe)?;
-        let errors = child.stderr.take().ok_or_else(pipe)?;
+        let (Some(requests), Some(output), Some(errors)) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            return Err(io::Error::other("a pipe of the worker is missing").into());
+        };
         let (sender, events) = mpsc::channel();
         thread::spawn(move || {
             receive(output, |event| {

@@ -150,19 +150,24 @@ fn of_one_preparation<'s>(
     let mut simplification = match started {
         Ok(simplification) => simplification,
         Err(fault) => {
-            let failed = |&level: &Level| LevelRun {
-                level: level.into(),
-                outcome: Err(fault.clone()),
-                times: clock.times(),
-            };
-            return levels.iter().map(failed).collect();
+            return (levels.iter())
+                .map(|&level| LevelRun {
+                    level: level.into(),
+                    outcome: Err(fault.clone()),
+                    times: clock.times(),
+                })
+                .collect();
         }
     };
     let mut broken: Option<Fault> = None;
-    let ask = |&level: &Level| {
+    let mut runs = Vec::new();
+    for &level in levels {
         let target = level.into();
+        // A simplification that panicked is in an unknown state: it is not called again.
         if let Some(fault) = &broken {
-            return LevelRun { level: target, outcome: Err(fault.clone()), times: clock.times() };
+            let outcome = Err(fault.clone());
+            runs.push(LevelRun { level: target, outcome, times: clock.times() });
+            continue;
         }
         on_level(level);
         let (outcome, lap) = Cost::of(|| guarded(|| simplification.at(level)));
@@ -172,9 +177,9 @@ fn of_one_preparation<'s>(
             let reason = format!("not run: the method panicked at {level}");
             broken = Some(Fault { status: Status::Panicked, reason });
         }
-        LevelRun { level: target, outcome, times: clock.times() }
-    };
-    levels.iter().map(ask).collect()
+        runs.push(LevelRun { level: target, outcome, times: clock.times() });
+    }
+    runs
 }
 
 /// The costs of levels, each as if it had been computed alone.
@@ -191,6 +196,7 @@ impl Clock<'_> {
     fn add(&mut self, lap: Cost) {
         let peak = self.held + lap.usage.peak_bytes;
         self.held += lap.usage.held_bytes;
+        // An incremental method reaches a coarse level through the finer ones: alone it would take them all.
         if self.is_incremental {
             self.so_far.seconds += lap.seconds;
             self.so_far.cpu_seconds += lap.cpu_seconds;

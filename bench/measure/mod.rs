@@ -168,14 +168,17 @@ pub struct Verdict {
 pub fn judge(scene: &Scene, runs: &[LevelRun]) -> Vec<Option<Verdict>> {
     let meshes: Vec<Option<&MedialMesh>> =
         runs.iter().map(|run| run.outcome.as_ref().ok().map(|result| &result.mesh)).collect();
-    // The index of an earlier equal result, if there is one.
-    let first = |index: usize| meshes[..index].iter().position(|&m| m == meshes[index]);
-    let firsts: Vec<usize> = (0..meshes.len()).map(|index| first(index).unwrap_or(index)).collect();
-    let measure = |index: usize| {
-        let mesh = meshes[index].filter(|_| firsts[index] == index)?;
-        Some(judge_one(scene, mesh))
-    };
-    let measured: Vec<Option<Verdict>> = (0..meshes.len()).into_par_iter().map(measure).collect();
+    // The index of the first result that is equal, which can be its own.
+    let firsts: Vec<usize> = (0..meshes.len())
+        .map(|index| meshes.iter().position(|&mesh| mesh == meshes[index]).unwrap_or(index))
+        .collect();
+    let measured: Vec<Option<Verdict>> = (0..meshes.len())
+        .into_par_iter()
+        .map(|index| {
+            let mesh = meshes[index].filter(|_| firsts[index] == index)?;
+            Some(judge_one(scene, mesh))
+        })
+        .collect();
     firsts.into_iter().map(|first| measured[first].clone()).collect()
 }
 

@@ -76,9 +76,9 @@ impl<'a> Search<'a> {
         trying: &'a dyn Fn(Level),
     ) -> Self {
         let ratio = (most as f64 / MIN_SPHERES).powf(1.0 / (COUNTS - 1) as f64).max(RATIO);
-        let count = |step: usize| (most as f64 / ratio.powi(step as i32)).round() as usize;
+        // A geometric series: few probes cover all orders of magnitude from `most` down.
         let counts = (0..COUNTS)
-            .map(count)
+            .map(|step| (most as f64 / ratio.powi(step as i32)).round() as usize)
             .filter(|&count| count >= most.min(MIN_SPHERES as usize))
             .collect();
         let sweep = sweep.iter().copied().map(Level::Native);
@@ -95,6 +95,7 @@ impl<'a> Search<'a> {
         for count in std::mem::take(&mut self.counts) {
             self.probe(Level::Spheres(count))?;
         }
+        // A method may take no counts, or reach lower errors at levels of its own.
         if self.fewest(bound).is_none() {
             for level in std::mem::take(&mut self.own) {
                 self.probe(level)?;

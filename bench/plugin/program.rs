@@ -76,6 +76,7 @@ pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, N
     let mut child = command.spawn()?;
     let mut tree = Tree::of(&child);
     lift_limit(&child);
+    // From the start: a program that fills a pipe that nobody reads would wait for ever.
     let stdout = child.stdout.take().map(Drain::start);
     let stderr = child.stderr.take().map(Drain::start);
     let (status, peak) = match watch(&mut child, &mut tree, context) {
@@ -87,8 +88,9 @@ pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, N
     };
     let strays = tree.end_orphans();
     let deadline = Instant::now() + LONGEST_DRAIN;
-    let text = |drain: Option<Drain>| drain.map_or_else(String::new, |d| d.finish(deadline));
-    Ok(Ended { status, stdout: text(stdout), stderr: text(stderr), peak, strays })
+    let [stdout, stderr] = [stdout, stderr].map(|drain| drain.map(|drain| drain.finish(deadline)));
+    let (stdout, stderr) = (stdout.unwrap_or_default(), stderr.unwrap_or_default());
+    Ok(Ended { status, stdout, stderr, peak, strays })
 }
 
 fn watch(

@@ -66,16 +66,15 @@ impl Given {
     /// # Errors
     /// In words, where there is no name or no file.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let wrong = || {
-            format!("--given {text}: write NAME=FILE.ma, or NAME@MESH=FILE.ma with several meshes")
-        };
-        let (name, file) = text.split_once('=').ok_or_else(wrong)?;
+        let (name, file) = text.split_once('=').unwrap_or_default();
         let (name, mesh) = match name.split_once('@') {
             Some((name, mesh)) => (name, Some(mesh.trim().to_owned())),
             None => (name, None),
         };
         if name.trim().is_empty() || file.is_empty() || mesh.as_deref() == Some("") {
-            return Err(wrong());
+            return Err(format!(
+                "--given {text}: write NAME=FILE.ma, or NAME@MESH=FILE.ma with several meshes"
+            ));
         }
         let (name, file) = (name.trim().to_owned(), PathBuf::from(file));
         let (radii, lenient, block) = (RadiiFrom::File, false, None);
@@ -104,6 +103,10 @@ const CLAIMS: &str = "method.toml";
 const EXTENSIONS: [&str; 5] = ["ma", "ply", "off", "obj", "stl"];
 
 impl Given {
+    fn refused(&self, why: impl Display) -> StudyError {
+        StudyError::Value(format!("given `{}`: {why}", self.name))
+    }
+
     /// The files of a folder with the meshes that they belong to, by name, and the claims; files of no
     /// mesh of the study are passed over.
     ///
@@ -128,13 +131,13 @@ impl Given {
             let file = entry.map_err(failed)?.path();
             let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let of = |mesh: &&String| {
+            let belonging = meshes.iter().filter(|mesh| {
                 stem.strip_prefix(mesh.as_str()).is_some_and(|rest| {
                     rest.is_empty() || rest.strip_prefix('-').is_some_and(is_number)
                 })
-            };
+            });
             // `box-8` is a mesh of its own where the study has one: the longest name wins.
-            let mesh = meshes.iter().filter(of).max_by_key(|mesh| mesh.len());
+            let mesh = belonging.max_by_key(|mesh| mesh.len());
             if let Some(mesh) = mesh.filter(|_| EXTENSIONS.contains(&extension.as_str())) {
                 files.push(Self { file, mesh: Some(mesh.clone()), ..self.clone() });
             }
@@ -275,8 +278,8 @@ impl Study {
         for given in &self.given {
             let folder = self.resolved(&given.file);
             if folder.is_dir() {
-                let wrong = |why| StudyError::Value(format!("given `{}`: {why}", given.name));
-                let (found, claims) = given.in_folder(&folder, meshes).map_err(wrong)?;
+                let (found, claims) =
+                    given.in_folder(&folder, meshes).map_err(|why| given.refused(why))?;
                 all.extend(found.into_iter().map(|given| (given, claims.clone())));
             } else {
                 all.push((given.clone(), Claims::default()));
@@ -287,11 +290,12 @@ impl Study {
             let named = self.methods.iter().filter_map(|method| method.name.as_ref());
             let taken = named.clone().any(|name| *name == given.name);
             let file = self.look_at(given, claims, mesh)?;
-            let same_row = |other: &GivenFile| {
-                (&other.mesh, &other.given.name, other.spheres)
-                    == (&file.mesh, &file.given.name, file.spheres)
-            };
-            if taken || files.iter().any(same_row) {
+            if taken
+                || files.iter().any(|other| {
+                    (&other.mesh, &other.given.name, other.spheres)
+                        == (&file.mesh, &file.given.name, file.spheres)
+                })
+            {
                 let GivenFile { given, mesh, spheres, .. } = &file;
                 let message = format!(
                     "two methods are named `{}` on {mesh} at {spheres} spheres",
@@ -318,13 +322,12 @@ impl Study {
             RadiiFrom::Surface => Radii::NotNeeded,
         };
         let options = ReadOptions { lenient: given.lenient, block: given.block, radii };
-        let wrong = |why: String| StudyError::Value(format!("given `{}`: {why}", given.name));
         // One read: the hash is that of the bytes whose spheres are counted.
-        let bytes = surface::content(&path).map_err(|error| wrong(error.to_string()))?;
-        let loaded = read_external(&path, &bytes, options).map_err(wrong)?;
+        let bytes = surface::content(&path).map_err(|error| given.refused(error))?;
+        let loaded = read_external(&path, &bytes, options).map_err(|why| given.refused(why))?;
         let spheres = loaded.mesh.spheres.len();
         if spheres == 0 {
-            return Err(wrong(format!("{}: no sphere", path.display())));
+            return Err(given.refused(format!("{}: no sphere", path.display())));
         }
         let hash = hex_digest(&bytes);
         Ok(GivenFile { mesh, given, claims, path, hash, spheres, same_as: vec![] })

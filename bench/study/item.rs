@@ -153,11 +153,12 @@ impl Item {
         let scene = (mesh, source, hash, noise, sampling, dual, measure);
         let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.version);
         let common = serde_json::to_string(&rest).expect("plain data");
-        let key = |level: &Target| {
-            let level = serde_json::to_string(level).expect("plain data");
-            hex_digest(format!("{common}\n{level}").as_bytes())
-        };
-        levels.iter().map(key).collect()
+        (levels.iter())
+            .map(|level| {
+                let level = serde_json::to_string(level).expect("plain data");
+                hex_digest(format!("{common}\n{level}").as_bytes())
+            })
+            .collect()
     }
 }
 

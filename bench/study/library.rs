@@ -138,8 +138,9 @@ impl Library {
     /// # Errors
     /// When there is no such folder, or the catalogue named cannot be read.
     pub fn here() -> Result<Self, PublicError> {
-        let set = |name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-        let folder = match set(CACHE) {
+        let [cache, catalogue] = [CACHE, CATALOGUE]
+            .map(|name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from));
+        let folder = match cache {
             Some(folder) => folder,
             None => etcetera::choose_base_strategy()
                 .map(|folders| folders.cache_dir().join("medial"))
@@ -147,7 +148,7 @@ impl Library {
         };
         // Workers and clients have working folders of their own.
         let folder = std::path::absolute(&folder).map_err(io_error(&folder))?;
-        let catalogue = match set(CATALOGUE) {
+        let catalogue = match catalogue {
             Some(path) => Cow::Owned(read_catalogue(&path)?),
             None => Cow::Borrowed(published()),
         };
@@ -188,14 +189,14 @@ impl Library {
     /// # Errors
     /// [`PublicError::Unknown`].
     pub fn wanted(&self, word: &str) -> Result<Vec<&Published>, PublicError> {
-        let meshes = self.catalogue.meshes.iter();
-        let is_wanted = |mesh: &&Published| match Set::ALL.iter().find(|set| set.key() == word) {
-            Some(&set) => mesh.set == set,
+        let set = Set::ALL.into_iter().find(|set| set.key() == word);
+        let mut wanted: Vec<_> = self.catalogue.meshes.iter().collect();
+        wanted.retain(|mesh| match set {
+            Some(set) => mesh.set == set,
             None => mesh.package == word || mesh.name == word,
-        };
-        let wanted: Vec<_> = meshes.filter(is_wanted).collect();
-        let is_word = Set::ALL.iter().any(|set| set.key() == word);
-        if wanted.is_empty() && !is_word { Err(self.unknown(word)) } else { Ok(wanted) }
+        });
+        // A set may be empty, a package or a mesh that is in no catalogue is a slip.
+        if wanted.is_empty() && set.is_none() { Err(self.unknown(word)) } else { Ok(wanted) }
     }
 
     /// The inputs that a word of `--dataset` stands for: `builtin`, a set, `added`, the meshes of a package that are
@@ -209,8 +210,10 @@ impl Library {
         }
         let own = added(self)?;
         if word == ADDED || word == Set::Papers.key() {
-            let in_set = |added: &&Added| word == ADDED || added.set() == word;
-            let mut sources: Vec<_> = own.iter().filter(in_set).map(|a| self.of_added(a)).collect();
+            let mut sources: Vec<_> = (own.iter())
+                .filter(|added| word == ADDED || added.set() == word)
+                .map(|added| self.of_added(added))
+                .collect();
             for mesh in self.catalogue.meshes.iter().filter(|mesh| mesh.set.key() == word) {
                 let is_listed = sources.iter().any(|source: &Source| source.name() == mesh.name);
                 if !is_listed && self.state(mesh)? == State::Here {

@@ -204,35 +204,42 @@ impl Study {
     /// # Errors
     /// [`StudyError::Value`].
     pub fn check(&self) -> Result<(), StudyError> {
-        let wrong = |message: String| Err(StudyError::Value(message));
+        match self.fault() {
+            Some(fault) => Err(StudyError::Value(fault)),
+            None => Ok(()),
+        }
+    }
+
+    /// The first value that makes no sense.
+    fn fault(&self) -> Option<String> {
         if !(1..=MOST_REPEATS).contains(&self.repeat) {
-            return wrong(format!(
+            return Some(format!(
                 "--repeat {}: time each item 1 to {MOST_REPEATS} times",
                 self.repeat
             ));
         }
         if !(self.timeout > 0.0 && self.timeout.is_finite()) {
-            return wrong(format!("--timeout {}: a positive number of seconds", self.timeout));
+            return Some(format!("--timeout {}: a positive number of seconds", self.timeout));
         }
         if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
-            return wrong(format!("--certify {width}: a fraction of the diagonal from 1e-6 on"));
+            return Some(format!("--certify {width}: a fraction of the diagonal from 1e-6 on"));
         }
         if self.memory == Some(0) {
-            return wrong("--memory 0: a positive number of megabytes".into());
+            return Some("--memory 0: a positive number of megabytes".into());
         }
         if let Some(eta) = self.noise.iter().find(|&&eta| !(eta > 0.0 && eta <= 0.1)) {
-            return wrong(format!("noise {eta}: a fraction of the diagonal of at most 0.1"));
+            return Some(format!("noise {eta}: a fraction of the diagonal of at most 0.1"));
         }
         let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
         if counts.chain([&self.spheres]).any(|counts| counts.contains(&0)) {
-            return wrong("--spheres 0: ask for at least one sphere".into());
+            return Some("--spheres 0: ask for at least one sphere".into());
         }
         if let Some(bound) = self.max_error.iter().find(|&&bound| !(bound > 0.0 && bound < 1.0)) {
-            return wrong(format!(
+            return Some(format!(
                 "--max-error {bound}: a fraction of the diagonal between 0 and 1 is meant"
             ));
         }
-        Ok(())
+        None
     }
 }
 
@@ -514,11 +521,13 @@ impl Shard {
     /// # Errors
     /// [`StudyError::Value`] where it is not two numbers, the first from 1 to the second.
     pub fn parse(text: &str) -> Result<Self, StudyError> {
-        let wrong = || StudyError::Value(format!("--shard {text}: write I/N with I from 1 to N"));
-        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
-        let (number, of) = (number.parse().ok(), of.parse().ok());
-        let (number, of) = number.zip(of).ok_or_else(wrong)?;
-        if number == 0 || number > of { Err(wrong()) } else { Ok(Self { number, of }) }
+        text.split_once('/')
+            .and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)))
+            .filter(|(number, of)| (1..=*of).contains(number))
+            .map(|(number, of)| Self { number, of })
+            .ok_or_else(|| {
+                StudyError::Value(format!("--shard {text}: write I/N with I from 1 to N"))
+            })
     }
 
     /// Every Nth item. The place in the whole study decides, not what a store lacks: a shard that is
@@ -545,16 +554,20 @@ pub(crate) fn hash_of(path: &Path) -> Result<String, StudyError> {
     Ok(hex_digest(&bytes))
 }
 
+/// Names that differ in case alone are one file on some systems.
+fn name_key(name: &str) -> String {
+    medial_reports::file_stem(name).to_ascii_lowercase()
+}
+
 /// A name for each source, unlike every other even as the stem of a file: the file's stem, where
 /// that is not enough its name with the extension, then with its folder, then a number.
 pub(crate) fn unique_names(sources: &[Source]) -> Vec<String> {
-    let key = |name: &str| medial_reports::file_stem(name).to_ascii_lowercase();
     let mut names: Vec<String> = sources.iter().map(Source::name).collect();
     for depth in 1..=2 {
         let mut count: HashMap<String, usize> = HashMap::new();
-        names.iter().for_each(|name| *count.entry(key(name)).or_default() += 1);
+        names.iter().for_each(|name| *count.entry(name_key(name)).or_default() += 1);
         for (name, source) in names.iter_mut().zip(sources) {
-            if count[&key(name)] > 1 {
+            if count[&name_key(name)] > 1 {
                 *name = source.long_name(depth);
             }
         }
@@ -563,7 +576,7 @@ pub(crate) fn unique_names(sources: &[Source]) -> Vec<String> {
     for name in &mut names {
         let base = name.clone();
         let mut number = 2;
-        while !taken.insert(key(name)) {
+        while !taken.insert(name_key(name)) {
             *name = format!("{base}-{number}");
             number += 1;
         }

@@ -161,16 +161,16 @@ impl Registry {
         }
         let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
         let new: Vec<Entry> = if plugin::is_script(&file) {
-            let entry =
-                |ScriptMethod { method, fingerprint }| Entry::new(method, Some(fingerprint));
-            let methods = plugin::load_script(&file, self.loader.as_deref(), &taken)?;
-            methods.into_iter().map(entry).collect()
+            (plugin::load_script(&file, self.loader.as_deref(), &taken)?.into_iter())
+                .map(|ScriptMethod { method, fingerprint }| Entry::new(method, Some(fingerprint)))
+                .collect()
         } else {
-            let entry = |external: plugin::External| {
-                let fingerprint = Some(external.fingerprint().to_owned());
-                Entry::new(external.into(), fingerprint)
-            };
-            plugin::load(&file, &taken)?.into_iter().map(entry).collect()
+            (plugin::load(&file, &taken)?.into_iter())
+                .map(|external| {
+                    let fingerprint = Some(external.fingerprint().to_owned());
+                    Entry::new(external.into(), fingerprint)
+                })
+                .collect()
         };
         new.into_iter().for_each(|entry| self.add(entry));
         self.files.push(file);

@@ -265,15 +265,13 @@ fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
     shape.mesh(shape.default_resolution).vertices.len() as f64 * times * times
 }
 
-/// The shape that may have been meant by an id that none has.
 /// Where the name of a file that is not there is that of a built-in shape.
 fn meant_shape(path: &Path) -> String {
-    let is_shape = |id: &&str| medial_datasets::catalogue().iter().any(|shape| shape.id == *id);
-    let name = path.file_name().and_then(|name| name.to_str());
-    let id = name.filter(is_shape);
-    id.map_or(String::new(), |id| format!("; the built-in shape is `builtin:{id}`"))
+    let id = path.file_name().and_then(|name| medial_datasets::find(name.to_str()?));
+    id.map_or(String::new(), |shape| format!("; the built-in shape is `builtin:{}`", shape.id))
 }
 
+/// The shape that may have been meant by an id that none has.
 fn meant(id: &str) -> String {
     let ids: Vec<_> = medial_datasets::catalogue().into_iter().map(|shape| shape.id).collect();
     did_you_mean(id, ids)

@@ -66,14 +66,8 @@ fn results_of_programs_that_stay_open_are_taken_and_fitted() {
     let begun = Instant::now();
     let done = Command::new(MEDIAL)
         .args(["compare", "builtin:capsule", "--plugins", ADAPTERS, "--counts-only", "--published"])
-        .args([
-            "--methods",
-            "mattopo,matstruct,matfp",
-            "--levels",
-            "matstruct=30",
-            "--spheres",
-            "20",
-        ])
+        .args(["--methods", "mattopo,matstruct,matfp", "--levels", "matstruct=30"])
+        .args(["--spheres", "20"])
         .args(["--samples", "500", "--quiet", "--out"])
         .arg(&out)
         .envs([("FTETWILD", &tetrahedra), ("MATTOPO", &mattopo), ("MATSTRUCT", &matstruct)])

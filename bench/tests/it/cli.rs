@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::command::{json, run, text_path};
+use crate::command::{json, run, text_path, words};
 
 /// Seconds and sizes that differ from run to run become `#`.
 fn without_timings(text: &str) -> String {
@@ -51,19 +51,8 @@ fn info_on_a_built_in_shape() {
     assert_eq!(code, 0);
     insta::assert_snapshot!(stdout);
     let (_, object) = json(&["info", "builtin:torus"]);
-    for key in [
-        "vertices",
-        "faces",
-        "components",
-        "genus",
-        "closed",
-        "manifold",
-        "oriented",
-        "self_intersecting",
-        "degenerate_faces",
-        "diagonal",
-        "repairs",
-    ] {
+    for key in "vertices faces components genus closed manifold oriented self_intersecting degenerate_faces diagonal repairs"
+        .split(' ') {
         assert!(!object[key].is_null(), "{key} is missing in {object}");
     }
 }
@@ -90,18 +79,12 @@ fn threads_change_no_byte() {
     for method in ["qmat", "pmat", "hem", "sat-pairwise", "angle", "lambda"] {
         let written = ["1", "2"].map(|threads| {
             let path = dir.path().join(format!("{method}-{threads}.ma"));
-            let (code, ..) = run(&[
-                "simplify",
-                "builtin:blob",
-                "--method",
+            let (code, ..) = run(&words(&format!(
+                "simplify builtin:blob --method {} --spheres 100 --threads {} -o {}",
                 method,
-                "--spheres",
-                "100",
-                "--threads",
                 threads,
-                "-o",
-                text_path(&path),
-            ]);
+                text_path(&path)
+            )));
             assert_eq!(code, 0);
             fs::read(path).expect("written")
         });

@@ -5,24 +5,17 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::command::{json, run, text_path};
+use crate::command::{json, run, text_path, words};
 
 #[test]
 fn compare_leaves_a_row_for_every_run() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("report");
-    let (code, stdout, stderr) = run(&[
-        "compare",
-        "builtin:box",
-        "builtin:capsule",
-        "--spheres",
-        "100,50",
-        "--counts-only",
-        "--samples",
-        "1000",
-        "--out",
-        text_path(&out),
-    ]);
+    let (code, stdout, stderr) = run(&words(&format!(
+        "compare builtin:box builtin:capsule --spheres 100,50 --counts-only \
+             --samples 1000 --out {}",
+        text_path(&out)
+    )));
     assert_eq!(code, 0, "counts that are missed are results: {stderr}");
     insta::assert_snapshot!("compare_summary_heads", heads(&stdout));
     let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
@@ -48,26 +41,11 @@ fn compare_leaves_a_row_for_every_run() {
 fn own_levels_bounds_chains_and_the_start_are_rows() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("report");
-    let (code, object) = json(&[
-        "compare",
-        "builtin:capsule",
-        "--methods",
-        "qmat,angle",
-        "--spheres",
-        "40",
-        "--max-error",
-        "0.05,0.0001",
-        "--after-filters",
-        "qmat",
-        "--levels",
-        "angle=30,60,90",
-        "--certify",
-        "0.01",
-        "--samples",
-        "500",
-        "--out",
-        text_path(&out),
-    ]);
+    let (code, object) = json(&words(&format!(
+        "compare builtin:capsule --methods qmat,angle --spheres 40 --max-error \
+             0.05,0.0001 --after-filters qmat --levels angle=30,60,90 --certify 0.01 --samples 500 --out {}",
+        text_path(&out)
+    )));
     assert_eq!(code, 0, "a bound below the error of the samples is missed: {object}");
     let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
     let records: Vec<Value> =
@@ -119,21 +97,12 @@ fn a_refused_mesh_and_an_unsupported_level_are_rows() {
     let dir = tempfile::tempdir().expect("a folder");
     let (out, bad) = (dir.path().join("report"), dir.path().join("bad.off"));
     fs::write(&bad, "OFF\n1 0 0\n0 0 0\n").expect("written");
-    let (code, object) = json(&[
-        "compare",
+    let (code, object) = json(&words(&format!(
+        "compare {} builtin:sphere --published --counts-only --spheres 20 --samples \
+             500 --out {} --methods sat-pairwise",
         text_path(&bad),
-        "builtin:sphere",
-        "--published",
-        "--counts-only",
-        "--spheres",
-        "20",
-        "--samples",
-        "500",
-        "--out",
-        text_path(&out),
-        "--methods",
-        "sat-pairwise",
-    ]);
+        text_path(&out)
+    )));
     assert_eq!(code, 3);
     assert_eq!(object["status"]["refused"], 2);
     assert_eq!(object["status"]["unsupported"], 1);

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::command::{json, run, text_path};
+use crate::command::{json, run, text_path, words};
 
 #[test]
 fn axis_simplify_evaluate_convert() {
@@ -132,18 +132,11 @@ fn several_files_give_one_table() {
 fn max_error_is_met() {
     let dir = tempfile::tempdir().expect("a folder");
     let path = dir.path().join("x.ma");
-    let (code, object) = json(&[
-        "simplify",
-        "builtin:capsule",
-        "--method",
-        "qmat",
-        "--max-error",
-        "0.02",
-        "--samples",
-        "3000",
-        "-o",
-        text_path(&path),
-    ]);
+    let (code, object) = json(&words(&format!(
+        "simplify builtin:capsule --method qmat --max-error 0.02 --samples 3000 -o \
+             {}",
+        text_path(&path)
+    )));
     assert_eq!(code, 0, "{object}");
     let (_, evaluation) =
         json(&["evaluate", "builtin:capsule", text_path(&path), "--samples", "3000"]);

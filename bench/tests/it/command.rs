@@ -6,6 +6,11 @@ use std::path::Path;
 use assert_cmd::Command;
 use serde_json::Value;
 
+/// The words of a command line without quotes. Temporary folders have no space in their names.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
 /// The command with arguments.
 pub fn medial(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("medial").expect("the binary is built");

@@ -65,19 +65,10 @@ fn two_builds_take_turns() {
     let (study, out) = (folder.path().join("study.toml"), folder.path().join("out"));
     let asked = "meshes = [\"builtin:torus:24\"]\nspheres = [30]\ncounts_only = true\n[[method]]\nid = \"pmat\"\n";
     fs::write(&study, asked).unwrap();
-    let arguments = [
-        "diff",
-        "--run",
-        MEDIAL,
-        MEDIAL,
-        "--study",
-        text(&study),
-        "--out",
-        text(&out),
-        "--repeat",
-        "5",
-        "-q",
-    ];
+    let (study, out_text) = (text(&study), text(&out));
+    let [run, builds] = [["diff", "--run"], [MEDIAL, MEDIAL]];
+    let options = ["--study", study, "--out", out_text, "--repeat", "5", "-q"];
+    let arguments = [&run[..], &builds, &options].concat();
     let (code, first) = medial(&arguments);
     // The machine may be so busy that one is slower: exact quantities are equal all the same.
     assert!(code == 0 || code == 4, "{first}");
@@ -94,7 +85,7 @@ fn two_builds_take_turns() {
     // All is there: nothing is run again.
     assert_eq!(medial(&arguments), (code, first));
 
-    let mut foreign = arguments;
+    let mut foreign = arguments.clone();
     foreign[2] = "/bin/echo";
     let (code, said) = medial(&foreign);
     assert!(code == 1 && said.contains("no build of this program"), "{code} {said}");

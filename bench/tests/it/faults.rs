@@ -76,15 +76,8 @@ fn a_method_that_changes_its_mind_is_called_out() {
     let out = dir.path().join("out");
     let arguments = [
         &["compare", "builtin:box:8", "--methods", "random,qmat", "--spheres", "30", "--repeat"][..],
-        &[
-            "3",
-            "--samples",
-            "100",
-            "--counts-only",
-            "--quiet",
-            "--out",
-            out.to_str().expect("UTF-8"),
-        ],
+        &["3", "--samples", "100", "--counts-only", "--quiet"],
+        &["--out", out.to_str().expect("UTF-8")],
     ];
     assert_eq!(code(&run(example("faulty"), &arguments.concat())), 0);
     for record in records(&out) {

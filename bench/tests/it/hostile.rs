@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::command::{run, text_path};
+use crate::command::{run, text_path, words};
 
 #[test]
 fn deleted_elements_change_no_byte_of_an_evaluation() {
@@ -151,19 +151,10 @@ fn names_reach_neither_a_terminal_nor_a_spreadsheet_as_commands() {
     let escape = dir.path().join("a\u{1b}[2Jb.off");
     fs::copy(&off, &escape).expect("copied");
     let out = dir.path().join("out");
-    let (code, stdout, stderr) = run(&[
-        "compare",
-        text_path(&formula),
-        text_path(&escape),
-        "--methods",
-        "qmat",
-        "--spheres",
-        "20",
-        "--samples",
-        "200",
-        "--out",
-        text_path(&out),
-    ]);
+    // The names have spaces: they are no part of a line that is split.
+    let meshes = ["compare", text_path(&formula), text_path(&escape)];
+    let options = words("--methods qmat --spheres 20 --samples 200 --out");
+    let (code, stdout, stderr) = run(&[&meshes[..], &options, &[text_path(&out)]].concat());
     assert_eq!(code, 0, "{stderr}");
     let table = fs::read_to_string(out.join("results.csv")).expect("a table");
     assert!(table.contains("\n'=cmd|' !A0,"), "{table}");

@@ -1,7 +1,7 @@
 //! Results accumulate: nothing is run twice, nothing is lost, whatever ends a run.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -70,25 +70,23 @@ fn failures_are_run_again_when_asked_or_when_a_limit_is_wider() {
     let out = dir.path().join("out");
     let faulty = |more: &[&str]| {
         let arguments = [
-            &["compare", "builtin:box:8", "--methods", "loops,panics", "--spheres", "20"][..],
+            &["compare", "builtin:box:8", "--methods", "allocates,panics", "--spheres", "20"][..],
             &["--samples", "100", "--counts-only", "--quiet", "--json", "--out", text(&out)],
             more,
         ];
         let output = run(example("faulty"), &arguments.concat());
         run_and_found(&serde_json::from_slice(&output.stdout).expect("JSON"))
     };
-    // A method that reads from a pipe nobody writes to reaches any limit on any machine.
-    assert_eq!(faulty(&["--timeout", "10"]), (2, 0));
-    assert_eq!(faulty(&["--timeout", "10"]), (0, 2));
-    assert_eq!(faulty(&["--timeout", "11"]), (1, 1), "the one that had too little time");
-    assert_eq!(faulty(&["--timeout", "11", "--retry-failed"]), (2, 0));
+    assert_eq!(faulty(&["--memory", "1500"]), (2, 0));
+    assert_eq!(faulty(&["--memory", "1500"]), (0, 2));
+    assert_eq!(faulty(&["--memory", "1501"]), (1, 1), "the one that had too little memory");
+    assert_eq!(faulty(&["--memory", "1501", "--retry-failed"]), (2, 0));
 }
 
 #[test]
 fn two_runs_into_one_folder_lose_nothing() {
     let dir = tempfile::tempdir().expect("a folder");
-    let (out, gate) = (dir.path().join("out"), dir.path().join("gate"));
-    assert!(Command::new("mkfifo").arg(&gate).status().expect("mkfifo runs").success());
+    let (out, gate) = (dir.path().join("out"), gate(dir.path()));
     let arguments = |method: &'static str| {
         let words = ["compare", "builtin:box:8", "--methods", method, "--spheres", "40,30,20"];
         let more = ["--samples", "100", "--counts-only", "--quiet", "--out"];
@@ -110,75 +108,72 @@ fn two_runs_into_one_folder_lose_nothing() {
     assert_eq!(records(&out).len(), 3);
 }
 
-/// Starts a comparison, kills it after a while, and says whether it was still running. Its workers
-/// must notice by themselves, and end.
-fn killed_after(arguments: &[&str], delay: Duration) -> bool {
-    let mut run = Command::new(MEDIAL);
-    run.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
-    let mut child = run.spawn().expect("the command starts");
-    thread::sleep(delay);
-    let running = child.try_wait().expect("it can be asked").is_none();
-    let workers = process_tree::descendants(child.id());
-    child.kill().expect("it can be killed");
-    child.wait().expect("it ends");
-    let deadline = Instant::now() + Duration::from_secs(10);
-    let alive = |&pid: &u32| {
-        let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-        String::from_utf8_lossy(&line).contains("worker")
-    };
-    while workers.iter().any(alive) {
-        assert!(Instant::now() < deadline, "a worker is left: {workers:?}");
-        thread::sleep(Duration::from_millis(20));
-    }
-    running
-}
-
 #[test]
 fn a_killed_run_is_continued() {
     let dir = tempfile::tempdir().expect("a folder");
     let (whole, killed) = (dir.path().join("whole"), dir.path().join("killed"));
-    let words = [
-        "builtin:box:8",
-        "builtin:torus:16",
-        "--methods",
-        "qmat,hem,aof,pmat",
-        "--spheres",
-        "60,30",
-    ];
-    let begun = Instant::now();
-    compare(&words, &whole);
-    let length = begun.elapsed();
-    let common = ["--samples", "200", "--counts-only", "--quiet", "--out", text(&killed)];
-    let arguments = [&["compare"], &words[..], &common].concat();
-    let mut running = 0;
-    for share in [0.2, 0.4, 0.5] {
-        running += usize::from(killed_after(&arguments, length.mul_f64(share)));
-        // What is there is whole, but for a last line that may be torn.
-        let text = fs::read_to_string(killed.join("results.jsonl")).unwrap_or_default();
+    let gate = gate(dir.path());
+    let start = |out: &Path| {
+        let mut run = Command::new(example("faulty"));
+        run.args(["compare", "builtin:box:8", "builtin:torus:16", "--methods", "qmat,waits,pmat"])
+            .args(["--spheres", "60,30", "--samples", "200", "--counts-only", "--quiet", "--out"])
+            .arg(out)
+            .stdout(Stdio::null());
+        run
+    };
+    assert!(start(&whole).status().expect("it starts").success());
+    // Killed at the first item that waits, then at the second one.
+    for passed in 0..2 {
+        let mut run = start(&killed).env("FAULTY_GATE", &gate).spawn().expect("it starts");
+        for _ in 0..passed {
+            drop(fs::OpenOptions::new().write(true).open(&gate).expect("an item waits"));
+        }
+        let pipe = fs::OpenOptions::new().write(true).open(&gate).expect("an item waits");
+        let workers = process_tree::descendants(run.id());
+        run.kill().expect("it can be killed");
+        run.wait().expect("it ends");
+        drop(pipe);
+        // The workers must notice by themselves, and end.
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while workers.iter().any(|&pid| is_worker(pid)) {
+            assert!(Instant::now() < deadline, "a worker is left: {workers:?}");
+            thread::sleep(Duration::from_millis(20));
+        }
+        // All lines are whole, but for a last line that may be torn.
+        let text = fs::read_to_string(killed.join("results.jsonl")).expect("records");
         let complete = text.rfind('\n').map_or(0, |end| end + 1);
         for line in text[..complete].lines() {
             serde_json::from_str::<Value>(line).expect("a whole record");
         }
     }
-    assert!(running > 0, "the runs were over before they were killed");
-    let (code, object) = compare(&words, &killed);
-    assert!(code == 0 || code == 3, "{object}");
+    assert!(start(&killed).status().expect("it starts").success());
     assert_eq!(without_timings(records(&killed)), without_timings(records(&whole)));
-    let files = |out: &Path| {
-        let mut files = vec![];
-        let mut folders = vec![out.join("axes")];
-        while let Some(folder) = folders.pop() {
-            for entry in fs::read_dir(folder).expect("a folder").flatten() {
-                match entry.path() {
-                    path if path.is_dir() => folders.push(path),
-                    path => files.push((entry.file_name(), fs::read(path).expect("read"))),
-                }
-            }
+    assert_eq!(axes(&killed), axes(&whole), "the same results, and no other files");
+}
+
+/// A named pipe at which the method `waits` waits.
+fn gate(dir: &Path) -> PathBuf {
+    let gate = dir.join("gate");
+    assert!(Command::new("mkfifo").arg(&gate).status().expect("mkfifo runs").success());
+    gate
+}
+
+fn is_worker(pid: u32) -> bool {
+    let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+    String::from_utf8_lossy(&line).contains("worker")
+}
+
+/// Names and contents of the medial meshes of a store.
+fn axes(out: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = vec![];
+    for folder in fs::read_dir(out.join("axes")).expect("a folder").flatten() {
+        for file in fs::read_dir(folder.path()).expect("a folder").flatten() {
+            let name = Path::new(&folder.file_name()).join(file.file_name());
+            files.push((name, fs::read(file.path()).expect("read")));
         }
-        files.sort();
-        files
-    };
-    assert_eq!(files(&killed), files(&whole), "the same results, and nothing beside them");
+    }
+    files.sort();
+    files
 }
 
 #[test]
@@ -268,26 +263,22 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
 fn an_interrupted_run_says_how_to_go_on() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
-    let words = ["compare", "builtin:box:8", "--methods", "qmat,loops", "--spheres", "20"];
+    let words = ["compare", "builtin:box:8", "--methods", "qmat,waits", "--spheres", "20"];
+    let gate = gate(dir.path());
     let more = ["--samples", "100", "--counts-only", "--out", text(&out)];
     let earlier = ["compare", "builtin:box:8", "--methods", "pmat", "--spheres", "20", "--quiet"];
     assert_eq!(code(&run(example("faulty"), &[&earlier[..], &more].concat())), 0);
     assert!(out.join("index.html").exists());
     let mut run = Command::new(example("faulty"));
-    run.args(words).args(more).stdout(Stdio::null()).stderr(Stdio::piped());
-    let child = run.spawn().expect("it starts");
-    let deadline = Instant::now() + Duration::from_secs(20);
-    // The first item is done, the second one loops.
-    let lines =
-        || fs::read_to_string(out.join("results.jsonl")).unwrap_or_default().matches('\n').count();
-    while lines() < 2 {
-        assert!(Instant::now() < deadline, "nothing was recorded");
-        thread::sleep(Duration::from_millis(10));
-    }
+    run.args(words).args(more).env("FAULTY_GATE", &gate);
+    let child = run.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts");
+    // Opening blocks until the second item waits: the first one is recorded by then.
+    let pipe = fs::OpenOptions::new().write(true).open(&gate).expect("the second item waits");
     let workers = process_tree::descendants(child.id());
     let pid = child.id().to_string();
     assert!(Command::new("kill").args(["-INT", &pid]).status().expect("kill runs").success());
     let output = child.wait_with_output().expect("it ends");
+    drop(pipe);
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
     assert!(stderr(&output).contains("the same command goes on"), "{}", stderr(&output));
     assert_eq!(records(&out).len(), 2);
@@ -296,10 +287,8 @@ fn an_interrupted_run_says_how_to_go_on() {
     let report = Command::new(example("faulty")).arg("report").arg(&out).output().expect("it runs");
     assert_eq!(code(&report), 0, "{}", stderr(&report));
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
-    assert!(page.contains("--methods pmat") && page.contains("--methods qmat,loops"));
-    let alive =
-        |pid: &u32| fs::read(format!("/proc/{pid}/cmdline")).is_ok_and(|line| !line.is_empty());
-    assert!(!workers.iter().any(alive), "a worker is left");
+    assert!(page.contains("--methods pmat") && page.contains("--methods qmat,waits"));
+    assert!(!workers.iter().any(|&pid| is_worker(pid)), "a worker is left");
 }
 
 #[test]

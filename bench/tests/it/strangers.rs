@@ -2,15 +2,10 @@
 //! beside the built-in ones. (The third way in, a crate of one's own, has its test in `examples/plugin-crate`.)
 
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use crate::common::{code, records, run, stderr};
 
 const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
 
 /// Compares methods on a box, and asks that each has results, a line in the CSV, a curve in a plot,
 /// and its title on the page.
@@ -47,22 +42,13 @@ fn compares(plugins: &[&str], methods: &[(&str, &str)]) {
 
 #[test]
 #[cfg(unix)]
-fn a_program() {
-    let file = root().join("examples/plugins/largest.toml");
-    let file = file.to_str().expect("UTF-8");
-    let method = ("largest-awk", "Largest balls first (POSIX shell and awk)");
-    compares(&["--plugins", file], &[method]);
-}
-
-#[test]
-fn a_python_script() {
-    if !medial_test_support::has_numpy() {
-        return;
+fn programs() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/plugins/largest.toml");
+    let mut methods = vec![("largest-awk", "Largest balls first (POSIX shell and awk)")];
+    if medial_test_support::has_numpy() {
+        methods.push(("largest", "Largest balls first (Python)"));
     }
-    let file = root().join("examples/plugins/largest.toml");
-    let file = file.to_str().expect("UTF-8");
-    let method = ("largest", "Largest balls first (Python)");
-    compares(&["--plugins", file], &[method]);
+    compares(&["--plugins", file], &methods);
 }
 
 #[test]
