@@ -85,16 +85,17 @@ impl MethodNote {
 
 impl Header {
     /// Name and unit of a method's own level, as the runner passed them in.
-    pub(crate) fn native_axis(&self, method: &str) -> Option<String> {
-        self.methods.iter().find(|note| note.id == method)?.native.clone()
+    pub(crate) fn native_axis(&self, method: &str) -> Option<&str> {
+        self.methods.iter().find(|note| note.id == method)?.native.as_deref()
     }
 
     /// BibTeX of the methods with these ids and of the program, each entry once.
     pub(crate) fn bibtex(&self, methods: &[&str]) -> String {
-        let notes = self.methods.iter().filter(|note| methods.contains(&note.id.as_str()));
         let mut entries: Vec<String> = Vec::new();
-        for entry in notes.map(|note| note.bibtex.trim()).filter(|entry| !entry.is_empty()) {
-            if !entries.iter().any(|known| known == entry) {
+        for note in self.methods.iter().filter(|note| methods.contains(&note.id.as_str())) {
+            // Variants of a method share its publication, and BibTeX stops at a key that stands twice.
+            let entry = note.bibtex.trim();
+            if !entry.is_empty() && !entries.iter().any(|known| known == entry) {
                 entries.push(entry.to_owned());
             }
         }

@@ -23,7 +23,6 @@
 mod answers;
 mod comparison;
 pub mod diff;
-mod error;
 mod header;
 pub mod history;
 mod journal;
@@ -41,7 +40,6 @@ mod text;
 mod view3d;
 mod write;
 
-pub use error::ReportError;
 pub use header::{Header, MethodNote, RunNote};
 pub use journal::{
     BadLine, Journal, JournalError, Journaled, parse_records, read_records, write_records,
@@ -54,7 +52,7 @@ pub use record::{
 pub use terminal::summary_text;
 pub use text::{file_stem, printable};
 pub use view3d::View3d;
-pub use write::{read_header, write_report};
+pub use write::{ReportError, read_header, write_report};
 
 #[cfg(doctest)]
 #[doc = include_str!("README.md")]

@@ -4,6 +4,7 @@
 use crate::answers::usual_level;
 use crate::comparison::{Comparison, Entry};
 use crate::plots::{Curve, Figure, Point, Scale};
+use crate::record::Record;
 use crate::tables::{Cell, Column, Row, Table};
 use crate::text::{counted, grouped, significant};
 
@@ -57,35 +58,29 @@ impl PowerLaw {
 /// method.
 pub(crate) fn scaling(comparison: &Comparison<'_>) -> Option<Scaling> {
     let (level, spheres) = usual_level(comparison)?;
-    let of_series = |series: usize| {
-        let own = comparison.entries.iter().filter(|e| e.series == series && e.level == level);
-        growth(series, &own.collect::<Vec<_>>())
-    };
-    let has_points = |growth: &Growth| !growth.seconds.is_empty() || !growth.megabytes.is_empty();
-    let rows: Vec<Growth> =
-        (0..comparison.series.len()).map(of_series).filter(has_points).collect();
+    let mut rows: Vec<Growth> = (0..comparison.series.len())
+        .map(|series| growth(series, &comparison.at(series, level)))
+        .collect();
+    rows.retain(|row| !row.seconds.is_empty() || !row.megabytes.is_empty());
     let most = rows.iter().map(|row| row.seconds.len().max(row.megabytes.len())).max()?;
     (most >= 2).then_some(Scaling { spheres, rows })
 }
 
 fn growth(series: usize, entries: &[&Entry<'_>]) -> Growth {
-    let points = |cost: &dyn Fn(&Entry<'_>) -> Option<f64>| {
-        let point = |entry: &&&Entry<'_>| {
-            let size = entry.record.initial?.spheres as f64;
-            let cost = cost(entry)?;
-            (size > 0.0 && cost > 0.0 && cost.is_finite()).then_some((size, cost))
-        };
-        let reached = entries.iter().filter(|entry| entry.comparable());
-        let mut points: Vec<(f64, f64)> = reached.filter_map(|entry| point(&entry)).collect();
+    let costs: [fn(&Record) -> Option<f64>; 2] = [
+        |record| Some(record.simplify.cpu_seconds?.total),
+        |record| Some(record.simplify.peak_bytes? as f64 / 1e6),
+    ];
+    let [seconds, megabytes] = costs.map(|cost| {
+        let mut points: Vec<(f64, f64)> = (entries.iter().filter(|entry| entry.comparable()))
+            .filter_map(|entry| Some((entry.record.initial?.spheres as f64, cost(entry.record)?)))
+            // Both are drawn and fitted as logarithms.
+            .filter(|&(size, cost)| size > 0.0 && cost > 0.0 && cost.is_finite())
+            .collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         points
-    };
-    Growth {
-        series,
-        asked: entries.len(),
-        seconds: points(&|entry| Some(entry.record.simplify.cpu_seconds?.total)),
-        megabytes: points(&|entry| Some(entry.record.simplify.peak_bytes? as f64 / 1e6)),
-    }
+    });
+    Growth { series, asked: entries.len(), seconds, megabytes }
 }
 
 /// The least-squares line through the logarithms of both coordinates, all of which are positive.
@@ -104,11 +99,12 @@ pub(crate) fn power_law(points: &[(f64, f64)]) -> Result<PowerLaw, String> {
     let n = points.len() as f64;
     let logs: Vec<(f64, f64)> =
         points.iter().map(|(x, y)| ((x / REFERENCE_SIZE).ln(), y.ln())).collect();
-    let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / n;
-    let (x, y) = (mean(|log| log.0), mean(|log| log.1));
+    let x = logs.iter().map(|log| log.0).sum::<f64>() / n;
+    let y = logs.iter().map(|log| log.1).sum::<f64>() / n;
     let spread: f64 = logs.iter().map(|log| (log.0 - x).powi(2)).sum();
     let exponent = logs.iter().map(|log| (log.0 - x) * (log.1 - y)).sum::<f64>() / spread;
     let rest: f64 = logs.iter().map(|log| (log.1 - y - exponent * (log.0 - x)).powi(2)).sum();
+    // Two numbers were fitted, so two degrees of freedom are gone.
     let error = (rest / (n - 2.0) / spread).sqrt();
     Ok(PowerLaw { exponent, error, factor: (y - exponent * x).exp() })
 }
@@ -148,17 +144,15 @@ pub(crate) fn scaling_table(comparison: &Comparison<'_>, scaling: &Scaling, how:
 }
 
 fn row(comparison: &Comparison<'_>, growth: &Growth) -> Row {
-    let points = match growth.seconds.is_empty() {
-        true => &growth.megabytes,
-        false => &growth.seconds,
-    };
+    // Every row has points of at least one cost.
+    let points = if growth.seconds.is_empty() { &growth.megabytes } else { &growth.seconds };
     let sizes = points
         .first()
         .zip(points.last())
         .map(|(first, last)| format!("{} to {}", grouped(first.0 as u64), grouped(last.0 as u64)));
     let mut cells = vec![
         Cell::new(comparison.series[growth.series].as_str()),
-        Cell::new(format!("{} of {}", points.len(), growth.asked)),
+        Cell::share((points.len(), growth.asked)),
         Cell::optional(sizes),
     ];
     for points in [&growth.seconds, &growth.megabytes] {
@@ -181,7 +175,9 @@ pub(crate) fn scaling_figures(comparison: &Comparison<'_>, scaling: &Scaling) ->
         ("overview-scaling", "CPU time", "CPU time (s)", |growth| &growth.seconds),
         ("overview-scaling-memory", "Peak memory", "peak memory (MB)", |growth| &growth.megabytes),
     ];
-    let figure = |(stem, what, axis, cost): (&str, &str, &str, Cost)| {
+    let to = counted(scaling.spheres, "sphere", "spheres");
+    let mut figures = vec![];
+    for (stem, what, axis, cost) in kinds {
         let curve = |growth: &Growth| {
             let points = cost(growth);
             let name = comparison.series[growth.series].clone();
@@ -191,22 +187,18 @@ pub(crate) fn scaling_figures(comparison: &Comparison<'_>, scaling: &Scaling) ->
             let line = law.zip(ends).map(|(law, (first, last))| {
                 [first.0, last.0].map(|size| (size, law.at(size))).to_vec()
             });
-            let point = |&(x, y): &(f64, f64)| Point {
-                spheres: Some(scaling.spheres as f64),
-                ..Point::at(x, y)
-            };
+            let spheres = Some(scaling.spheres as f64);
             Curve {
                 series: growth.series,
                 label: format!("{name}{exponent}, n={}", points.len()),
                 name,
                 of: "one mesh".to_owned(),
-                points: points.iter().map(point).collect(),
+                points: points.iter().map(|&(x, y)| Point { spheres, ..Point::at(x, y) }).collect(),
                 // Points alone where no law holds.
                 line: Some(line.unwrap_or_default()),
                 dashed: false,
             }
         };
-        let to = counted(scaling.spheres, "sphere", "spheres");
         let figure = Figure {
             stem: stem.to_owned(),
             title: format!("{what} against input size, to {to}; one point a mesh"),
@@ -216,9 +208,9 @@ pub(crate) fn scaling_figures(comparison: &Comparison<'_>, scaling: &Scaling) ->
             front: false,
             leading: false,
         };
-        figure.with_points()
-    };
-    kinds.into_iter().filter_map(figure).collect()
+        figures.extend(figure.with_points());
+    }
+    figures
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
+use crate::header::Header;
 use crate::metric::{COMPARED, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::plots::{Curve, Figure, Scale, native_points};
 use crate::record::{Record, Status, Target};
@@ -347,14 +348,14 @@ fn mean_of(entries: &[&Entry<'_>], value: fn(&Record) -> Option<f64>) -> Option<
 pub(crate) fn native_table(
     comparison: &Comparison<'_>,
     curves: &[NativeCurve],
-    axis: &dyn Fn(&str) -> Option<String>,
+    header: &Header,
     how: &str,
 ) -> Table {
     let mut rows = vec![];
     for curve in curves {
-        let axis = axis(comparison.methods[curve.series]);
+        let axis = header.native_axis(comparison.methods[curve.series]);
         for (index, point) in curve.points.iter().enumerate() {
-            let level = match (point.level, &axis) {
+            let level = match (point.level, axis) {
                 (Target::Native(value), Some(axis)) => format!("{value} {axis}"),
                 (level, _) => level_label(level),
             };
@@ -399,7 +400,7 @@ pub(crate) fn native_table(
 pub(crate) fn native_figures(
     comparison: &Comparison<'_>,
     natives: &[NativeCurve],
-    axis: &dyn Fn(&str) -> Option<String>,
+    header: &Header,
 ) -> Vec<Figure> {
     let stems = file_stems(comparison.series.iter().map(String::as_str));
     let mut figures = vec![];
@@ -428,12 +429,12 @@ pub(crate) fn native_figures(
             }
         }
         let name = comparison.series[native.series].clone();
-        let native_axis = axis(comparison.methods[native.series]);
+        let native_axis = header.native_axis(comparison.methods[native.series]);
         figures.push(Figure {
             stem: format!("overview-level-{}", stems[native.series]),
             title: format!("{name}: Hausdorff error against its native level"),
             x: (
-                native_axis.unwrap_or_else(|| "native level".to_owned()),
+                native_axis.unwrap_or("native level").to_owned(),
                 if is_log { Scale::Log } else { Scale::Linear },
             ),
             y: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),

@@ -17,6 +17,14 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
+/// The least of 1, 2 and 5 times a power of ten that is not below a positive number.
+pub(crate) fn round_up(value: f64) -> f64 {
+    let power = 10.0_f64.powf(value.log10().floor());
+    // Divisions round: a step of 0.1 that comes out a hair larger must not become 0.2.
+    let found = [1.0, 2.0, 5.0].into_iter().find(|m| m * power >= value * (1.0 - 1e-9));
+    found.unwrap_or(10.0) * power
+}
+
 /// A count with commas between the thousands: `34,702`.
 pub(crate) fn grouped(count: u64) -> String {
     let digits = count.to_string();
@@ -82,12 +90,13 @@ pub(crate) fn file_stems<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<St
             .collect();
         let base = base.trim_start_matches('.').trim_end_matches('.');
         let base = if base.is_empty() { "unnamed" } else { base };
-        let taken =
-            |stem: &str| stems.iter().any(|other: &String| other.eq_ignore_ascii_case(stem));
-        let stem = std::iter::once(base.to_owned())
-            .chain((2..).map(|number| format!("{base}-{number}")))
-            .find(|stem| !taken(stem))
-            .unwrap_or_else(|| base.to_owned());
+        let mut stem = base.to_owned();
+        let mut number = 2;
+        // Case-insensitive file systems would overwrite `bear` with `Bear`.
+        while stems.iter().any(|other| other.eq_ignore_ascii_case(&stem)) {
+            stem = format!("{base}-{number}");
+            number += 1;
+        }
         stems.push(stem);
     }
     stems

@@ -83,12 +83,13 @@ impl<'a> View3d<'a> {
             0..MOST => refined(surface),
             _ => coarsened(surface),
         };
-        let beyond = |(label, axis): &(String, &MedialMesh)| {
+        let mut errors = vec![];
+        for (label, axis) in &results {
             let union = MedialUnion::new(axis).map_err(|error| format!("{label}: {error}"))?;
+            // The union's distances are positive outside of it: a vertex inside is one that it reaches beyond.
             let signed = union.signed_batch(&surface.vertices);
-            Ok(signed.into_iter().map(|signed| -signed).collect())
-        };
-        let errors = results.iter().map(beyond).collect::<Result<_, String>>()?;
+            errors.push(signed.into_iter().map(|signed| -signed).collect());
+        }
         Ok(Self { camera, surface, results, errors })
     }
 
@@ -111,10 +112,6 @@ impl<'a> View3d<'a> {
         let step = (high - low).max_element() / f64::from(u16::MAX);
         let end = Errors::common_scale(&self.errors().iter().collect::<Vec<_>>(), diagonal);
         let radii = Scale::radii(self.results.iter().map(|(_, axis)| *axis));
-        let table = |map: ColourMap| {
-            let place = |k: usize| k as f64 / (COLOURS - 1) as f64;
-            (0..COLOURS).map(|k| map.at(place(k))).collect()
-        };
         let head = Head {
             direction: camera.direction.to_array(),
             up: camera.up.to_array(),
@@ -124,16 +121,25 @@ impl<'a> View3d<'a> {
             diagonal,
             largest_error: 100.0 * end / diagonal,
             radii: [radii.lo, radii.hi],
-            colours: [table(ColourMap::Viridis), table(ColourMap::Diverging)],
-            results: self.results.iter().map(|(label, axis)| result_head(label, axis)).collect(),
+            colours: [ColourMap::Viridis, ColourMap::Diverging]
+                .map(|map| (0..COLOURS).map(|k| map.at(k as f64 / (COLOURS - 1) as f64)).collect()),
+            results: (self.results.iter())
+                .map(|(label, axis)| ResultHead {
+                    label: label.clone(),
+                    counts: [axis.spheres.len(), axis.edges.len(), axis.faces.len()],
+                })
+                .collect(),
         };
-        let head = serde_json::to_vec(&head).map_err(|error| error.to_string())?;
-        let mut bytes = framed(head);
+        let mut head = serde_json::to_vec(&head).map_err(|error| error.to_string())?;
+        // The browser reads the arrays in place, which must begin at a multiple of four.
+        head.resize(head.len().next_multiple_of(4), b' ');
+        let mut bytes = (head.len() as u32).to_le_bytes().to_vec();
+        bytes.append(&mut head);
         self.arrays(surface, (low, step), &mut bytes);
         for values in errors {
             bytes.extend(values.iter().map(|error| byte_of(error / end)));
         }
-        Ok(script(name, &bytes))
+        Ok(format!("{START}{}{MIDDLE}{}{END}", serde_json::Value::from(name), pack(&bytes)))
     }
 
     /// Everything but the errors.
@@ -160,26 +166,9 @@ impl<'a> View3d<'a> {
     }
 }
 
-fn result_head(label: &str, axis: &MedialMesh) -> ResultHead {
-    let counts = [axis.spheres.len(), axis.edges.len(), axis.faces.len()];
-    ResultHead { label: label.to_owned(), counts }
-}
-
-/// A head with its length, such that what follows begins at a multiple of four.
-fn framed(mut head: Vec<u8>) -> Vec<u8> {
-    head.resize(head.len().next_multiple_of(4), b' ');
-    let mut bytes = (head.len() as u32).to_le_bytes().to_vec();
-    bytes.append(&mut head);
-    bytes
-}
-
 /// An error as a byte: 128 for none, 1 and 255 for the ends and all beyond.
 fn byte_of(share: f64) -> u8 {
     (128.0 + 127.0 * share.clamp(-1.0, 1.0)).round() as u8
-}
-
-fn script(name: &str, bytes: &[u8]) -> String {
-    format!("{START}{}{MIDDLE}{}{END}", serde_json::Value::from(name), pack(bytes))
 }
 
 const START: &str = "medialView(";
@@ -191,8 +180,7 @@ const END: &str = "\");\n";
 pub(crate) fn text_of(script: &str) -> Option<&str> {
     let inner = script.strip_prefix(START)?.strip_suffix(END)?;
     let text = inner.rsplit_once(MIDDLE)?.1;
-    let is_base64 = |byte: u8| byte.is_ascii_alphanumeric() || b"+/=".contains(&byte);
-    text.bytes().all(is_base64).then_some(text)
+    text.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"+/=".contains(&byte)).then_some(text)
 }
 
 /// The same surface with shorter edges: long ones are halved as long as there is room.
@@ -201,11 +189,11 @@ fn refined(mesh: &TriMesh) -> TriMesh {
     let longest = EDGE * low.distance(high);
     let mut mesh = mesh.clone();
     while mesh.vertices.len() < REFINED {
-        let before = mesh.vertices.len();
-        mesh = halved(&mesh, longest);
-        if mesh.vertices.len() == before {
+        let finer = halved(&mesh, longest);
+        if finer.vertices.len() == mesh.vertices.len() {
             break;
         }
+        mesh = finer;
     }
     mesh
 }
@@ -226,6 +214,7 @@ fn halved(mesh: &TriMesh, longest: f64) -> TriMesh {
     };
     let mut faces = Vec::with_capacity(mesh.faces.len());
     for &[a, b, c] in &mesh.faces {
+        // Every case keeps the orientation; two halved sides leave a corner and a quadrangle of two faces.
         match [middle(a, b), middle(b, c), middle(c, a)] {
             [None, None, None] => faces.push([a, b, c]),
             [Some(x), None, None] => faces.extend([[a, x, c], [x, b, c]]),

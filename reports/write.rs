@@ -1,5 +1,6 @@
 //! Writing a report: tables, plots and the page into one folder.
 
+use std::fmt::Display;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,7 +10,6 @@ use base64::prelude::BASE64_STANDARD;
 
 use crate::answers::{by_bound, equal_error_figure, equal_error_table, purpose_table, wins_table};
 use crate::comparison::Comparison;
-use crate::error::ReportError;
 use crate::header::Header;
 use crate::journal::replace_file;
 use crate::page::{MeshPart, MeshView, Page};
@@ -46,16 +46,16 @@ pub fn write_report(
     let (summaries, bounds) = (by_count(&comparison), by_bound(&comparison));
     let (natives, scaling) = (native_curves(&comparison), scaling(&comparison));
     let how = header.how();
-    let axis = |method: &str| header.native_axis(method);
     let mut files = Files { dir, written: Vec::new() };
-    files.write("results.csv", &to_csv(&comparison).map_err(|error| ReportError::csv(&error))?)?;
+    let csv = to_csv(&comparison).map_err(|error| ReportError::content("results.csv", error))?;
+    files.write("results.csv", &csv)?;
 
     let answers = purpose_table(&comparison, &how);
     let wins = wins_table(&comparison, &how).filter(|_| !is_one);
     let equal_error = equal_error_table(&comparison, &bounds, &how);
     let mut means = vec![means_table(&comparison, &summaries, &how)];
     if !natives.is_empty() {
-        means.push(native_table(&comparison, &natives, &axis, &how));
+        means.push(native_table(&comparison, &natives, header, &how));
     }
     means.retain(|table| !table.rows.is_empty());
     let growth = scaling.as_ref().map(|scaling| scaling_table(&comparison, scaling, &how));
@@ -75,7 +75,7 @@ pub fn write_report(
     let mut figures = mean_figures(&comparison, &summaries, &natives);
     figures.extend(equal_error_figure(&comparison, &bounds));
     figures.extend(scaling.iter().flat_map(|scaling| scaling_figures(&comparison, scaling)));
-    figures.extend(native_figures(&comparison, &natives, &axis));
+    figures.extend(native_figures(&comparison, &natives, header));
     files.write_plots(&figures)?;
 
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
@@ -100,12 +100,11 @@ pub fn write_report(
     if !comparison.entries.is_empty() {
         files.write(BIBTEX, bibtex.as_bytes())?;
     }
-    let header_json =
-        serde_json::to_vec_pretty(header).map_err(|error| ReportError::header(&error))?;
+    let header_json = serde_json::to_vec_pretty(header)
+        .map_err(|error| ReportError::content("header.json", error))?;
     files.write("header.json", &header_json)?;
     let shown = pictures.values().flat_map(|strip| [strip.file.clone(), strip.view_file()]);
-    let shown = shown.map(|file| dir.join(file)).collect();
-    files.remove_stale(shown)?;
+    files.remove_stale(&shown.map(|file| dir.join(file)).collect::<Vec<_>>())?;
     let mut equal_error: Vec<Table> = equal_error.into_iter().collect();
     if is_one {
         // Means over one mesh are its results, and counts of meshes are ones.
@@ -183,8 +182,35 @@ fn view(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<Me
 /// [`ReportError::Io`] when the file is missing or is no header.
 pub fn read_header(dir: &Path) -> Result<Header, ReportError> {
     let path = dir.join("header.json");
-    let read = || serde_json::from_slice(&fs::read(&path)?).map_err(io::Error::from);
-    read().map_err(|source| ReportError::Io { path: path.clone(), source })
+    (fs::read(&path).and_then(|bytes| serde_json::from_slice(&bytes).map_err(io::Error::from)))
+        .map_err(|source| ReportError::Io { path, source })
+}
+
+/// Why a report could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A file could not be made from the records.
+    #[error("{what} could not be made: {message}")]
+    Content {
+        /// The file.
+        what: &'static str,
+        /// What went wrong.
+        message: String,
+    },
+}
+
+impl ReportError {
+    pub(crate) fn content(what: &'static str, error: impl Display) -> Self {
+        Self::Content { what, message: error.to_string() }
+    }
 }
 
 /// The folder of the report and what was written there.
@@ -196,13 +222,10 @@ struct Files<'a> {
 impl Files<'_> {
     fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), ReportError> {
         let path = self.dir.join(name);
-        match replace_file(&path, bytes) {
-            Ok(()) => {
-                self.written.push(path);
-                Ok(())
-            }
-            Err(source) => Err(ReportError::Io { path, source }),
-        }
+        replace_file(&path, bytes)
+            .map_err(|source| ReportError::Io { path: path.clone(), source })?;
+        self.written.push(path);
+        Ok(())
     }
 
     fn write_plots(&mut self, figures: &[Figure]) -> Result<(), ReportError> {
@@ -238,7 +261,7 @@ impl Files<'_> {
 
     /// Removes what an earlier report left under the names that only a report gives.
     /// The pictures and views that are `shown` stay.
-    fn remove_stale(&self, shown: Vec<PathBuf>) -> Result<(), ReportError> {
+    fn remove_stale(&self, shown: &[PathBuf]) -> Result<(), ReportError> {
         let ours: [(&str, &[&str]); 4] =
             [("tables", &["md", "tex"]), ("plots", &["svg"]), (FOLDER, &["png"]), (VIEWS, &["js"])];
         for (folder, extensions) in ours {
@@ -250,11 +273,10 @@ impl Files<'_> {
             };
             for entry in entries {
                 let path = entry.map_err(failed)?.path();
+                // Files of the user, whose names begin otherwise, stay.
                 let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
                 let ours = (name.starts_with("mesh-") || name.starts_with("overview-"))
-                    && path
-                        .extension()
-                        .is_some_and(|extension| extensions.iter().any(|&ours| extension == ours));
+                    && name.rsplit_once('.').is_some_and(|(_, end)| extensions.contains(&end));
                 if ours && !self.written.contains(&path) && !shown.contains(&path) {
                     fs::remove_file(&path).map_err(failed)?;
                 }

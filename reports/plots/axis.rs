@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-use crate::text::{grouped, significant};
+use crate::text::{grouped, round_up, significant};
 
 /// Width of a letter beneath an axis, with its share of the gap to the next label; of the axis' length.
 const WIDTH_OF_LETTER: f64 = 0.018;
@@ -41,10 +41,9 @@ pub(crate) struct Axis {
 impl Axis {
     /// An axis that holds all values with a margin; `None` where there is no finite value.
     pub(crate) fn fit(scale: Scale, values: impl IntoIterator<Item = f64>) -> Option<Self> {
-        let usable = |value: &f64| value.is_finite() && (scale != Scale::Log || *value > 0.0);
         let (mut low, mut high) = values
             .into_iter()
-            .filter(usable)
+            .filter(|value| value.is_finite() && (scale != Scale::Log || *value > 0.0))
             .map(|value| (value, value))
             .reduce(|(low, high), (a, b)| (low.min(a), high.max(b)))?;
         match scale {
@@ -117,7 +116,7 @@ fn lay_out(scale: Scale, value: f64) -> f64 {
 /// that stays readable on a logarithmic one.
 fn round_numbers(scale: Scale, low: f64, high: f64) -> Vec<f64> {
     if scale == Scale::Linear {
-        let step = round_step((high - low) / 5.0);
+        let step = round_up((high - low) / 5.0);
         let first = (low / step).ceil() as i64;
         return (first..).map(|k| k as f64 * step).take_while(|&value| value <= high).collect();
     }
@@ -140,16 +139,6 @@ fn round_numbers(scale: Scale, low: f64, high: f64) -> Vec<f64> {
     // More than eight decades: every second or third of them.
     let stride = sparsest.len().div_ceil(8);
     sparsest.into_iter().step_by(stride).collect()
-}
-
-/// The smallest of 1, 2, 5 times a power of ten that is at least `least`.
-fn round_step(least: f64) -> f64 {
-    let power = 10f64.powf(least.log10().floor());
-    [1.0, 2.0, 5.0]
-        .map(|digit| digit * power)
-        .into_iter()
-        .find(|&s| s >= least)
-        .unwrap_or(10.0 * power)
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use crate::summary::{CountSummary, NativeCurve};
 use crate::text::{grouped, significant};
 
 pub(crate) use self::axis::Scale;
-pub(crate) use self::svg::{FONTS, PlotError, symbol};
+pub(crate) use self::svg::{FONTS, symbol};
 
 /// A figure before it is drawn.
 pub(crate) struct Figure {
@@ -77,7 +77,6 @@ impl Figure {
 
     /// The figure for the script of the page: numbers with five digits.
     pub(crate) fn to_json(&self) -> Value {
-        let rounded = |value: f64| -> f64 { significant(value, 5).parse().unwrap_or(value) };
         let front = self.front();
         let curves = self.curves.iter().enumerate().map(|(index, curve)| {
             let points = curve.points.iter().enumerate().map(|(k, point)| {
@@ -85,20 +84,21 @@ impl Figure {
                 let spheres = point.spheres.map(rounded);
                 json!([rounded(point.x), rounded(point.y), point.n, spheres, is_front])
             });
+            // By index, since few points have a tag.
             let tags = curve.points.iter().enumerate();
             let tags = tags.filter_map(|(k, point)| Some(json!([k, point.tag.as_ref()?])));
-            let line = curve.line.as_ref().map(|line| {
-                line.iter().map(|&(x, y)| [rounded(x), rounded(y)]).collect::<Vec<_>>()
-            });
+            let line: Option<Vec<[f64; 2]>> = (curve.line.as_ref())
+                .map(|line| line.iter().map(|&(x, y)| [rounded(x), rounded(y)]).collect());
             json!({
                 "series": curve.series, "label": curve.label, "name": curve.name, "of": curve.of,
                 "dashed": curve.dashed, "line": line,
                 "points": points.collect::<Vec<_>>(), "tags": tags.collect::<Vec<_>>(),
             })
         });
-        let axis = |(title, scale): &(String, Scale)| json!({"title": title, "scale": scale.key()});
+        let [x, y] =
+            [&self.x, &self.y].map(|(title, scale)| json!({"title": title, "scale": scale.key()}));
         json!({
-            "title": self.title, "leading": self.leading, "x": axis(&self.x), "y": axis(&self.y),
+            "title": self.title, "leading": self.leading, "x": x, "y": y,
             "curves": curves.collect::<Vec<_>>(),
         })
     }
@@ -106,16 +106,19 @@ impl Figure {
     /// The non-dominated points, by curve and index, from left to right: no other point is at most
     /// as large in both coordinates. Empty where fewer than two series compare.
     fn front(&self) -> Vec<(usize, usize)> {
-        let candidates = self.curves.iter().enumerate().flat_map(|(index, curve)| {
-            let points = curve.points.iter().enumerate();
-            let compared = points.filter(|(_, p)| p.compared && p.x > 0.0 && p.y.is_finite());
-            compared.map(move |(k, point)| (point.x, point.y, index, k))
-        });
-        let mut all: Vec<(f64, f64, usize, usize)> = candidates.filter(|_| self.front).collect();
+        let mut all = vec![];
+        for (index, curve) in self.curves.iter().enumerate().filter(|_| self.front) {
+            for (k, p) in curve.points.iter().enumerate() {
+                if p.compared && p.x > 0.0 && p.y.is_finite() {
+                    all.push((p.x, p.y, index, k));
+                }
+            }
+        }
         let first = all.first().map(|point| self.curves[point.2].series);
         if all.iter().all(|point| Some(self.curves[point.2].series) == first) {
             return Vec::new();
         }
+        // From left to right a point is dominated unless it is lower than all before it.
         all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut lowest = f64::INFINITY;
         all.retain(|&(_, y, _, _)| {
@@ -125,6 +128,10 @@ impl Figure {
         });
         all.into_iter().map(|(_, _, curve, point)| (curve, point)).collect()
     }
+}
+
+fn rounded(value: f64) -> f64 {
+    significant(value, 5).parse().unwrap_or(value)
 }
 
 /// A family of figures: one for each mesh, and one of the means over all.
@@ -211,18 +218,20 @@ impl Kind {
 
 /// The figures of one mesh.
 pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str) -> Vec<Figure> {
-    let figure = |kind: &Kind| {
-        let series = 0..comparison.series.len();
-        let curves = series.flat_map(|series| mesh_curves(comparison, mesh, series, kind));
-        kind.figure(&format!("mesh-{stem}"), &comparison.meshes[mesh], curves.collect())
-    };
-    KINDS.iter().filter_map(figure).collect()
+    (KINDS.iter())
+        .filter_map(|kind| {
+            let series = 0..comparison.series.len();
+            let curves = series.flat_map(|series| mesh_curves(comparison, mesh, series, kind));
+            kind.figure(&format!("mesh-{stem}"), &comparison.meshes[mesh], curves.collect())
+        })
+        .collect()
 }
 
 /// Every measured result of one method on one mesh, from many spheres to few: those at counts and
 /// error bounds as a line, those at native levels as dashes.
 fn mesh_curves(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &Kind) -> Vec<Curve> {
-    let of_level = |dashed: bool| {
+    let mut curves = vec![];
+    for dashed in [false, true] {
         let mut entries: Vec<&Entry<'_>> = comparison
             .of_mesh(mesh)
             .filter(|entry| entry.series == series && entry.measured())
@@ -232,14 +241,14 @@ fn mesh_curves(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &K
             })
             .collect();
         entries.sort_by_key(|entry| std::cmp::Reverse(reached(entry.record)));
-        let point = |entry: &&Entry<'_>| {
-            let spheres = reached(entry.record)? as f64;
-            kind.point(spheres, TOTAL_SECONDS.of(entry.record), kind.y.of(entry.record))
-        };
-        let mut points: Vec<Point> = entries.iter().filter_map(point).collect();
-        points.iter_mut().for_each(|point| point.n = Some(1));
+        let mut points = vec![];
+        for record in entries.into_iter().map(|entry| entry.record) {
+            let Some(spheres) = reached(record) else { continue };
+            let point = kind.point(spheres as f64, TOTAL_SECONDS.of(record), kind.y.of(record));
+            points.extend(point.map(|point| Point { n: Some(1), ..point }));
+        }
         kind.tag_ends(&mut points);
-        Curve {
+        curves.push(Curve {
             series,
             label: comparison.series[series].clone(),
             name: comparison.series[series].clone(),
@@ -247,9 +256,8 @@ fn mesh_curves(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &K
             points,
             line: None,
             dashed,
-        }
-    };
-    let mut curves = [false, true].map(of_level).to_vec();
+        });
+    }
     // One row in the legend for both.
     if !curves[0].points.is_empty() {
         curves[1].label.clear();
@@ -263,7 +271,8 @@ pub(crate) fn mean_figures(
     summaries: &[CountSummary],
     natives: &[NativeCurve],
 ) -> Vec<Figure> {
-    let figure = |kind: &Kind| {
+    let mut figures = vec![];
+    for kind in &KINDS {
         let mut curves: Vec<Curve> = (0..comparison.series.len())
             .map(|series| mean_curve(comparison, summaries, series, kind))
             .collect();
@@ -273,6 +282,7 @@ pub(crate) fn mean_figures(
                 "mean" => Some((point.spheres, point.mean)),
                 _ => None,
             });
+            // The axis shows the spheres.
             points.iter_mut().for_each(|point| point.spheres = None);
             let series = native.series;
             let is_named = !curves[series].points.is_empty();
@@ -288,9 +298,9 @@ pub(crate) fn mean_figures(
             });
         }
         let of = format!("All meshes, {} means", kind.y.mean.word());
-        kind.figure("overview", &of, curves)
-    };
-    KINDS.iter().filter_map(figure).collect()
+        figures.extend(kind.figure("overview", &of, curves));
+    }
+    figures
 }
 
 fn mean_curve(
@@ -324,16 +334,17 @@ pub(crate) fn native_points(
     native: &NativeCurve,
     place: impl Fn(&crate::summary::NativePoint) -> Option<(f64, f64)>,
 ) -> Vec<Point> {
-    let point = |point| {
-        let (x, y) = place(point)?;
-        Some(Point {
-            n: Some(native.over),
-            spheres: Some(point.spheres),
-            compared: native.over == comparison.meshes.len(),
-            ..Point::at(x, y)
+    (native.points.iter())
+        .filter_map(|point| {
+            let (x, y) = place(point)?;
+            Some(Point {
+                n: Some(native.over),
+                spheres: Some(point.spheres),
+                compared: native.over == comparison.meshes.len(),
+                ..Point::at(x, y)
+            })
         })
-    };
-    native.points.iter().filter_map(point).collect()
+        .collect()
 }
 
 #[cfg(test)]

@@ -13,8 +13,9 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::Axis;
-use super::{Curve, Figure};
+use super::{Curve, Figure, Point};
 use crate::text::{printable, shortened};
+use crate::write::ReportError;
 
 /// The backend draws at whole pixels: a large drawing keeps circles and slopes smooth at any size.
 const WIDTH: i32 = 1280;
@@ -39,7 +40,6 @@ const COLOURS: [RGBColor; 12] = [
     RGBColor(0xA6, 0x56, 0x28),
 ];
 
-/// Name, whether it is hollow, and its outline in pixels.
 type Marker = (&'static str, bool, &'static [(i32, i32)]);
 
 /// Markers: name of the page's symbol, whether it is hollow, and its outline in pixels.
@@ -87,15 +87,8 @@ pub(crate) const FONTS: &str = "Helvetica, Arial, sans-serif";
 
 const FRONT: &str = "not dominated";
 
-/// Why a plot could not be drawn.
-#[derive(Debug, thiserror::Error)]
-#[error("plot: {0}")]
-pub(crate) struct PlotError(String);
-
-impl PlotError {
-    fn new(error: impl Display) -> Self {
-        Self(error.to_string())
-    }
+fn failed(error: impl Display) -> ReportError {
+    ReportError::content("a plot", format!("plot: {error}"))
 }
 
 fn font(size: i32, at: HPos) -> TextStyle<'static> {
@@ -108,10 +101,10 @@ type Chart<'a, 'b, B> = ChartContext<'a, B, Cartesian2d<Axis, Axis>>;
 
 impl Figure {
     /// The figure as SVG; `None` where there is no point to draw.
-    pub(crate) fn to_svg(&self) -> Result<Option<String>, PlotError> {
-        let points = || self.curves.iter().flat_map(|curve| &curve.points);
-        let x = Axis::fit(self.x.1, points().map(|point| point.x));
-        let y = Axis::fit(self.y.1, points().map(|point| point.y));
+    pub(crate) fn to_svg(&self) -> Result<Option<String>, ReportError> {
+        let points: Vec<&Point> = self.curves.iter().flat_map(|curve| &curve.points).collect();
+        let x = Axis::fit(self.x.1, points.iter().map(|point| point.x));
+        let y = Axis::fit(self.y.1, points.iter().map(|point| point.y));
         let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
         let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 1;
         let size = (WIDTH as u32, HEIGHT.max(rows as i32 * LEGEND_ROW + 120) as u32);
@@ -125,10 +118,10 @@ impl Figure {
         x: Axis,
         y: Axis,
         area: &DrawingArea<B, Shift>,
-    ) -> Result<(), PlotError> {
-        area.fill(&WHITE).map_err(PlotError::new)?;
+    ) -> Result<(), ReportError> {
+        area.fill(&WHITE).map_err(failed)?;
         let title = printable(&shortened(&self.title, 76));
-        area.draw(&Text::new(title, (28, 40), font(30, HPos::Left))).map_err(PlotError::new)?;
+        area.draw(&Text::new(title, (28, 40), font(30, HPos::Left))).map_err(failed)?;
         let (_, below) = area.split_vertically(68);
         let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
         let legend_width = (88 + 14 * longest.unwrap_or(0).max(FRONT.len()) as i32).min(460);
@@ -142,7 +135,7 @@ impl Figure {
             .x_label_area_size(88)
             .y_label_area_size(116)
             .build_cartesian_2d(x, y)
-            .map_err(PlotError::new)?;
+            .map_err(failed)?;
         chart
             .configure_mesh()
             .bold_line_style(GRID.stroke_width(2))
@@ -156,50 +149,49 @@ impl Figure {
             .x_desc(&self.x.0)
             .y_desc(&self.y.0)
             .draw()
-            .map_err(PlotError::new)?;
+            .map_err(failed)?;
         let mut taken = Vec::new();
         for curve in &self.curves {
             draw_curve(&mut chart, curve, &mut taken)?;
         }
-        let front = self.front().into_iter().map(|(curve, point)| {
-            let point = &self.curves[curve].points[point];
-            (point.x, point.y)
-        });
-        let front: Vec<(f64, f64)> = front.collect();
+        let front: Vec<(f64, f64)> = (self.front().into_iter())
+            .map(|(curve, point)| &self.curves[curve].points[point])
+            .map(|point| (point.x, point.y))
+            .collect();
+        // A single point dominates all others, which no line shows.
         let has_front = front.len() > 1;
         if has_front {
             let line = LineSeries::new(front, INK.stroke_width(2));
-            chart.draw_series(line).map_err(PlotError::new)?;
+            chart.draw_series(line).map_err(failed)?;
         }
         self.draw_legend(&legend, has_front)?;
-        area.present().map_err(PlotError::new)
+        area.present().map_err(failed)
     }
 
     fn draw_legend<B: DrawingBackend>(
         &self,
         area: &DrawingArea<B, Shift>,
         has_front: bool,
-    ) -> Result<(), PlotError> {
+    ) -> Result<(), ReportError> {
         let mut y = 36;
         for curve in self.curves.iter().filter(|curve| !curve.label.is_empty()) {
             let stroke = COLOURS[curve.series % COLOURS.len()].stroke_width(4);
-            let dashes: &[(i32, i32)] =
-                if curve.dashed { &[(0, 10), (38, 48)] } else { &[(0, 48)] };
-            for &(from, to) in dashes {
-                area.draw(&PathElement::new(vec![(from, y), (to, y)], stroke))
-                    .map_err(PlotError::new)?;
+            // A dash on either side of the marker.
+            let dashes = if curve.dashed { vec![(0, 10), (38, 48)] } else { vec![(0, 48)] };
+            for (from, to) in dashes {
+                area.draw(&PathElement::new(vec![(from, y), (to, y)], stroke)).map_err(failed)?;
             }
             for shape in marker::<B>(curve.series, (24, y)) {
-                area.draw(&shape).map_err(PlotError::new)?;
+                area.draw(&shape).map_err(failed)?;
             }
             area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))
-                .map_err(PlotError::new)?;
+                .map_err(failed)?;
             y += LEGEND_ROW;
         }
         if has_front {
             area.draw(&PathElement::new(vec![(0, y), (48, y)], INK.stroke_width(2)))
-                .map_err(PlotError::new)?;
-            area.draw(&Text::new(FRONT, (62, y), font(24, HPos::Left))).map_err(PlotError::new)?;
+                .map_err(failed)?;
+            area.draw(&Text::new(FRONT, (62, y), font(24, HPos::Left))).map_err(failed)?;
         }
         Ok(())
     }
@@ -213,15 +205,17 @@ fn draw_curve<B: DrawingBackend>(
     chart: &mut Chart<'_, '_, B>,
     curve: &Curve,
     taken: &mut Vec<[i32; 4]>,
-) -> Result<(), PlotError> {
+) -> Result<(), ReportError> {
     let stroke = COLOURS[curve.series % COLOURS.len()].stroke_width(4);
-    let through = || curve.points.iter().map(|point| (point.x, point.y)).collect();
-    let line: Vec<(f64, f64)> = curve.line.clone().unwrap_or_else(through);
+    let line = match &curve.line {
+        Some(line) => line.clone(),
+        None => curve.points.iter().map(|point| (point.x, point.y)).collect(),
+    };
     if curve.dashed {
         let dashes = DashedLineSeries::new(line, 14, 10, stroke);
-        chart.draw_series(dashes).map_err(PlotError::new)?;
+        chart.draw_series(dashes).map_err(failed)?;
     } else {
-        chart.draw_series(LineSeries::new(line, stroke)).map_err(PlotError::new)?;
+        chart.draw_series(LineSeries::new(line, stroke)).map_err(failed)?;
     }
     let area = chart.plotting_area().strip_coord_spec();
     let origin = area.get_base_pixel();
@@ -229,11 +223,11 @@ fn draw_curve<B: DrawingBackend>(
         let (x, y) = chart.backend_coord(&(point.x, point.y));
         let at = (x - origin.0, y - origin.1);
         for shape in marker::<B>(curve.series, at) {
-            area.draw(&shape).map_err(PlotError::new)?;
+            area.draw(&shape).map_err(failed)?;
         }
         let Some(tag) = &point.tag else { continue };
         let Some(at) = free_place(at, tag, taken) else { continue };
-        area.draw(&Text::new(tag.clone(), at, font(20, HPos::Left))).map_err(PlotError::new)?;
+        area.draw(&Text::new(tag.clone(), at, font(20, HPos::Left))).map_err(failed)?;
     }
     Ok(())
 }

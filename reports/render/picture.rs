@@ -7,6 +7,7 @@ use png::{BitDepth, ColorType, Compression, Encoder};
 
 use super::RenderError;
 use super::scene::Scale;
+use crate::text::round_up;
 
 /// What is behind everything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -311,13 +312,6 @@ fn ticks(lo: f64, hi: f64) -> Vec<(f64, String)> {
         // A minus sign: a hyphen is shorter and hard to see.
         .map(|value| (value, format!("{value:.decimals$}").replace('-', "−")))
         .collect()
-}
-
-/// The least of 1, 2 and 5 times a power of ten that is not below a positive number.
-pub(super) fn round_up(value: f64) -> f64 {
-    let power = 10.0_f64.powf(value.log10().floor());
-    let found = [1.0, 2.0, 5.0].into_iter().find(|m| m * power >= value * (1.0 - 1e-9));
-    found.unwrap_or(10.0) * power
 }
 
 #[cfg(test)]

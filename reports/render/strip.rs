@@ -4,9 +4,10 @@ use medial::complex::MedialMesh;
 use medial::surface::TriMesh;
 
 use super::camera::{Camera, Frame};
-use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, round_up, text_width};
+use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, text_width};
 use super::scene::{AxisColour, Layer, Scale, Scene};
 use super::{RenderError, check_size};
+use crate::text::{round_up, significant};
 
 /// What medial meshes are coloured by, before the scale is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,7 +75,7 @@ impl Errors<'_> {
     /// The bar of errors up to `end`, with the largest error where it is beyond.
     pub fn bar(all: &[&Self], end: f64, diagonal: f64) -> Bar {
         let largest = all.iter().map(|errors| errors.largest()).fold(0.0, f64::max);
-        let beyond = crate::text::significant(100.0 * largest / diagonal, 3);
+        let beyond = significant(100.0 * largest / diagonal, 3);
         Bar {
             scale: Scale::errors(end),
             times: 100.0 / diagonal,
