@@ -28,19 +28,7 @@ impl Journal {
     /// [`JournalError::Io`] when the file cannot be opened, read or written.
     pub fn open(path: impl Into<PathBuf>) -> Result<Self, JournalError> {
         let path = path.into();
-        let open = || -> io::Result<File> {
-            let mut file = OpenOptions::new().read(true).append(true).create(true).open(&path)?;
-            if file.metadata()?.len() > 0 {
-                let mut last = [0];
-                file.seek(SeekFrom::End(-1))?;
-                file.read_exact(&mut last)?;
-                if last != *b"\n" {
-                    file.write_all(b"\n")?;
-                }
-            }
-            Ok(file)
-        };
-        match open() {
+        match open_for_lines(&path) {
             Ok(file) => Ok(Self { file, path }),
             Err(source) => Err(JournalError::Io { path, source }),
         }
@@ -52,14 +40,23 @@ impl Journal {
     /// # Errors
     /// [`JournalError::Io`] when writing fails.
     pub fn append_lines(&mut self, lines: &[impl Serialize]) -> Result<(), JournalError> {
-        let failed = |source| JournalError::Io { path: self.path.clone(), source };
         let mut bytes = Vec::new();
         for line in lines {
-            serde_json::to_writer(&mut bytes, line).map_err(|error| failed(error.into()))?;
+            serde_json::to_writer(&mut bytes, line).map_err(|error| JournalError::Io {
+                path: self.path.clone(),
+                source: error.into(),
+            })?;
             bytes.push(b'\n');
         }
-        let mut file = &self.file;
-        file.write_all(&bytes).and_then(|()| file.sync_data()).map_err(failed)
+        self.write(&bytes)
+    }
+
+    /// Writes by one call, so that lines of two processes do not mix, and waits for the disk.
+    fn write(&mut self, bytes: &[u8]) -> Result<(), JournalError> {
+        self.file
+            .write_all(bytes)
+            .and_then(|()| self.file.sync_data())
+            .map_err(|source| JournalError::Io { path: self.path.clone(), source })
     }
 
     /// Adds one record and waits until it is on the disk.
@@ -68,12 +65,22 @@ impl Journal {
     /// [`JournalError::Unreadable`] when the record holds a number that JSON cannot carry (not
     /// finite); nothing is written then. [`JournalError::Io`] when writing fails.
     pub fn append(&mut self, record: &Record) -> Result<(), JournalError> {
-        let line = to_line(record)?;
-        self.file
-            .write_all(line.as_bytes())
-            .and_then(|()| self.file.sync_data())
-            .map_err(|source| JournalError::Io { path: self.path.clone(), source })
+        self.write(to_line(record)?.as_bytes())
     }
+}
+
+fn open_for_lines(path: &Path) -> io::Result<File> {
+    let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
+    if file.metadata()?.len() > 0 {
+        let mut last = [0];
+        file.seek(SeekFrom::End(-1))?;
+        file.read_exact(&mut last)?;
+        // Without the break the next record would be joined with a torn one, and both be lost.
+        if last != *b"\n" {
+            file.write_all(b"\n")?;
+        }
+    }
+    Ok(file)
 }
 
 /// What a `results.jsonl` holds.
@@ -157,19 +164,17 @@ pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// One line with its line break. JSON has no infinity and no NaN and serde writes `null` for
 /// them, which would spoil the record for every reader: such a record is refused here.
 fn to_line(record: &Record) -> Result<String, JournalError> {
-    let unreadable = |message: String| JournalError::Unreadable {
-        mesh: record.mesh.clone(),
-        method: record.simplify.method.clone(),
-        message,
+    let written = serde_json::to_string(record).and_then(|line| {
+        let back: Record = serde_json::from_str(&line)?;
+        Ok((line, back == *record))
+    });
+    let message = match written {
+        Ok((line, true)) => return Ok(line + "\n"),
+        Ok((_, false)) => "a number is not finite".to_owned(),
+        Err(error) => error.to_string(),
     };
-    let mut line = serde_json::to_string(record).map_err(|error| unreadable(error.to_string()))?;
-    let back: Record =
-        serde_json::from_str(&line).map_err(|error| unreadable(error.to_string()))?;
-    if &back != record {
-        return Err(unreadable("a number is not finite".to_owned()));
-    }
-    line.push('\n');
-    Ok(line)
+    let (mesh, method) = (record.mesh.clone(), record.simplify.method.clone());
+    Err(JournalError::Unreadable { mesh, method, message })
 }
 
 /// Why a `results.jsonl` could not be read or written.

@@ -157,13 +157,16 @@ impl Metric {
 
     /// Name, unit and arrow: `Hausdorff (%) ↓`.
     pub(crate) fn heading(&self) -> String {
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
         let arrow = match self.better {
             Better::Lower => " ↓",
             Better::Higher => " ↑",
             Better::Neither => "",
         };
-        format!("{}{unit}{arrow}", self.title)
+        format!("{}{}{arrow}", self.title, self.unit_suffix())
+    }
+
+    fn unit_suffix(&self) -> String {
+        if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) }
     }
 
     /// Name and unit for a plot's axis.
@@ -179,6 +182,7 @@ impl Metric {
         (better, digits, mean): (Better, Digits, Mean),
         value: Value,
     ) -> Self {
+        // The JSON holds fractions, whose unit is 1.
         let times = if unit.is_empty() || unit.as_bytes()[0] != b'%' { 1.0 } else { 100.0 };
         Self {
             key,
@@ -359,6 +363,7 @@ pub const METRICS: &[Metric] = &[
 
 /// The metric with a key, at compile time: a key that no metric has stops the build.
 const fn named(key: &str) -> Metric {
+    // Loops and comparisons by hand: iterators and `==` of texts are not constant.
     let mut index = 0;
     while index < METRICS.len() {
         let (a, b) = (METRICS[index].key.as_bytes(), key.as_bytes());
@@ -410,19 +415,19 @@ pub(crate) static COMPARED: [&Metric; COMPARED_METRICS] = {
 /// Every metric that was measured on at least one of some medial meshes: a row with its name and unit, and a cell for
 /// each mesh, `-` where it was not measured there.
 pub fn measured_rows(evaluations: &[&Evaluation]) -> Vec<(String, Vec<String>)> {
-    let row = |metric: &Metric| {
-        let Value::Evaluation(value) = metric.value else { return None };
+    let mut rows = vec![];
+    for metric in METRICS {
+        let Value::Evaluation(value) = metric.value else { continue };
         let found: Vec<Option<f64>> = evaluations.iter().map(|e| value(e)).collect();
-        let cell = |value: &Option<f64>| {
-            value.map_or_else(|| "-".to_owned(), |v| metric.format(metric.times * v))
-        };
-        found.iter().any(Option::is_some).then(|| {
-            let unit =
-                if metric.unit.is_empty() { String::new() } else { format!(" ({})", metric.unit) };
-            (format!("{}{unit}", metric.title), found.iter().map(cell).collect())
-        })
-    };
-    METRICS.iter().filter_map(row).collect()
+        if found.iter().any(Option::is_some) {
+            let cells = (found.into_iter())
+                .map(|value| value.map(|value| metric.format(metric.times * value)))
+                .map(|text| text.unwrap_or_else(|| "-".to_owned()))
+                .collect();
+            rows.push((format!("{}{}", metric.title, metric.unit_suffix()), cells));
+        }
+    }
+    rows
 }
 
 #[cfg(test)]

@@ -74,15 +74,16 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
         if let Some(error) = HAUSDORFF.of(record) {
             caption.push_str(&format!(", {} %", significant(error, 2)));
         }
-        let strip = || PictureStrip {
+        let strip = strips.entry(entry.mesh).or_insert_with(|| PictureStrip {
             mesh: comparison.meshes[entry.mesh].clone(),
             mesh_hash: record.mesh_hash.clone(),
             file: String::new(),
             view: String::new(),
             panels: vec![],
-        };
-        strips.entry(entry.mesh).or_insert_with(strip).panels.push((artifact, caption));
+        });
+        strip.panels.push((artifact, caption));
     }
+    // A name depends on all panels of the strip.
     for (&mesh, strip) in &mut strips {
         strip.name(&stems[mesh]);
     }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::answers::{BoundSummary, by_bound};
 use crate::comparison::Comparison;
-use crate::metric::{HAUSDORFF, MEAN_ERROR, Metric, TOTAL_SECONDS};
+use crate::metric::{HAUSDORFF, MEAN_ERROR, TOTAL_SECONDS};
 use crate::record::Record;
 use crate::summary::{CountSummary, SeriesSummary, by_count, native_curves};
 use crate::text::printable;
@@ -90,16 +90,16 @@ fn write_count(
 }
 
 fn write_row(text: &mut String, row: &SeriesSummary, label: &str, width: usize) {
-    let number = |metric: &Metric| {
+    let [hausdorff, mean, seconds] = [&HAUSDORFF, &MEAN_ERROR, &TOTAL_SECONDS].map(|metric| {
         row.mean(metric).map_or_else(|| "-".to_owned(), |value| metric.format_mean(value))
-    };
+    });
     let (right, known) = row.topology;
     let cells = [
-        number(&HAUSDORFF),
+        hausdorff,
         format!("{}/{}", row.over, row.asked),
-        number(&MEAN_ERROR),
+        mean,
         format!("{right}/{known}"),
-        number(&TOTAL_SECONDS),
+        seconds,
         format!("{}/{}", row.reached, row.asked),
         row.missed.to_string(),
         row.failed.to_string(),

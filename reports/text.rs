@@ -48,6 +48,11 @@ pub(crate) fn betti(numbers: [u64; 3]) -> String {
     format!("{}, {}, {}", numbers[0], numbers[1], numbers[2])
 }
 
+/// The same where they were computed.
+pub(crate) fn known_betti(numbers: Option<[u64; 3]>) -> String {
+    numbers.map_or("unknown".to_owned(), betti)
+}
+
 /// Memory in MB of a million bytes.
 pub(crate) fn megabytes(bytes: u64) -> String {
     grouped((bytes as f64 / 1e6).round() as u64)

@@ -21,7 +21,7 @@ use crate::metric::{BELOW_30, COMPARED, EPSILON, SPHERES_ONLY};
 use crate::plots::{FONTS, Figure, symbol};
 use crate::record::{Machine, Status};
 use crate::tables::{Cell, Column, Row, Table, warnings};
-use crate::text::{betti, counted, escape_html, grouped, printable};
+use crate::text::{counted, escape_html, grouped, known_betti, printable};
 use crate::write::BIBTEX;
 
 /// Everything that the page is made of.
@@ -132,6 +132,7 @@ impl Page<'_> {
     /// The large document: the records as columns, and the plots of each mesh.
     fn bulk(&self) -> Value {
         let count = self.comparison.entries.len();
+        // More rows than that are in the CSV alone.
         let is_shown = count > 0 && count <= records::MOST;
         let figures = self.meshes.iter().map(|mesh| figures(&mesh.figures));
         json!({
@@ -150,6 +151,7 @@ impl Page<'_> {
             json!({"name": name, "colour": colour, "symbol": symbol, "hollow": hollow})
         });
         let metrics = COMPARED.iter().map(|metric| {
+            // Hidden at first, so that the table fits a screen.
             let rare = [&EPSILON, &SPHERES_ONLY, &BELOW_30].iter().any(|rare| rare.key == metric.key);
             json!({"key": metric.key, "title": metric.heading(), "digits": metric.digits(), "shown": !rare})
         });
@@ -226,8 +228,9 @@ impl Page<'_> {
         facts.extend(
             run.filter(|run| !run.version.is_empty()).map(|run| format!("medial {}", run.version)),
         );
-        let recorded = || comparison.entries.first().map(|entry| &entry.record.machine);
-        let machine = run.and_then(|run| run.machine.as_ref()).or_else(recorded);
+        // A header may name no machine; each record does.
+        let recorded = comparison.entries.first().map(|entry| &entry.record.machine);
+        let machine = run.and_then(|run| run.machine.as_ref()).or(recorded);
         facts.extend(machine.map(Machine::to_string).filter(|text| !text.is_empty()));
         facts
     }
@@ -254,7 +257,6 @@ impl Page<'_> {
         }
         let initial = entries().find_map(|entry| entry.record.initial);
         let initial = initial.map_or(vec![], |initial| {
-            let known = |numbers: Option<[u64; 3]>| numbers.map_or("unknown".to_owned(), betti);
             let [spheres, edges, faces] =
                 [initial.spheres, initial.edges, initial.faces].map(grouped);
             let wrong = initial.betti.zip(initial.expected_betti).filter(|(a, b)| a != b).is_some();
@@ -263,8 +265,8 @@ impl Page<'_> {
                     "initial medial mesh",
                     format!("{spheres} spheres, {edges} edges, {faces} faces")
                 ]),
-                json!(["its Betti numbers", known(initial.betti)]),
-                json!(["Betti numbers of the solid", known(initial.expected_betti)]),
+                json!(["its Betti numbers", known_betti(initial.betti)]),
+                json!(["Betti numbers of the solid", known_betti(initial.expected_betti)]),
             ];
             if wrong {
                 let verdict = "wrong before any simplification: methods that start here inherit it";
@@ -300,17 +302,17 @@ impl Page<'_> {
             places.push(format!("{} ({level})", self.comparison.meshes[entry.mesh]));
         }
         let runs: usize = groups.values().map(Vec::len).sum();
-        let row =
-            |((series, status, reason), places): (&(usize, Status, &str), &Vec<String>)| Row {
-                cells: vec![
-                    Cell::new(self.comparison.series[*series].as_str()),
-                    Cell::new(status.to_string()),
-                    Cell::new(*reason),
-                    Cell::new(places.len().to_string()),
-                    Cell::new(abridged(places)),
-                ],
-                starts_group: false,
-            };
+        let mut rows = vec![];
+        for ((series, status, reason), places) in &groups {
+            let cells = vec![
+                Cell::new(self.comparison.series[*series].as_str()),
+                Cell::new(status.to_string()),
+                Cell::new(*reason),
+                Cell::new(places.len().to_string()),
+                Cell::new(abridged(places)),
+            ];
+            rows.push(Row { cells, starts_group: false });
+        }
         (runs > 0).then(|| Table {
             caption: format!(
                 "{} of {} without the requested result",
@@ -325,7 +327,7 @@ impl Page<'_> {
                 Column::number("runs"),
                 Column::text("meshes (requested)"),
             ],
-            rows: groups.iter().map(row).collect(),
+            rows,
         })
     }
 
@@ -340,6 +342,7 @@ impl Page<'_> {
                     self.comparison.meshes[entry.mesh],
                     level_label(entry.record.simplify.level)
                 );
+                // In the order of their first appearance, which no map keeps.
                 match groups.iter_mut().find(|(known, _)| *known == warning) {
                     Some((_, places)) => places.push(place),
                     None => groups.push((warning, vec![place])),

@@ -152,37 +152,35 @@ const LIBRARY: [&str; 5] = ["public", "defective", "small", "papers", "added"];
 
 /// The mesh as the command line of the run names it, or else its name.
 fn mesh_argument(record: &Record) -> String {
-    let is_named = |word: &str| {
-        let name = match (word.strip_prefix("builtin:"), word.strip_prefix("dataset:")) {
-            (Some(spec), _) => spec.replacen(':', "-", 1),
-            (None, Some(name)) => name.to_owned(),
-            (None, None) => {
-                let file = word.rsplit('/').next().unwrap_or(word);
-                // A bare word may be a method's name: files have an extension.
-                match file.rsplit_once('.') {
-                    Some((stem, _)) if !stem.is_empty() => stem.to_owned(),
-                    _ => return false,
-                }
-            }
-        };
-        name == record.mesh
-    };
-    let word = record.command.split_whitespace().find(|word| is_named(word));
-    match word {
-        Some(word) => word.to_owned(),
-        None => match record.dataset.as_deref() {
-            Some("builtin") => format!("builtin:{}", record.mesh),
-            Some(set) if LIBRARY.contains(&set) => format!("dataset:{}", record.mesh),
-            // A foreign set: its meshes have no name here.
-            _ => record.mesh.clone(),
-        },
+    let mut words = record.command.split_whitespace();
+    let named = words.find(|word| mesh_name(word).is_some_and(|name| name == record.mesh));
+    match (named, record.dataset.as_deref()) {
+        (Some(word), _) => word.to_owned(),
+        (None, Some("builtin")) => format!("builtin:{}", record.mesh),
+        (None, Some(set)) if LIBRARY.contains(&set) => format!("dataset:{}", record.mesh),
+        // A foreign set: its meshes have no name here.
+        _ => record.mesh.clone(),
     }
+}
+
+/// The name of the mesh that a word of a command line stands for.
+fn mesh_name(word: &str) -> Option<String> {
+    if let Some(spec) = word.strip_prefix("builtin:") {
+        return Some(spec.replacen(':', "-", 1));
+    }
+    if let Some(name) = word.strip_prefix("dataset:") {
+        return Some(name.to_owned());
+    }
+    // A bare word may be a method's name: files have an extension.
+    let (stem, _) = word.rsplit('/').next()?.rsplit_once('.')?;
+    (!stem.is_empty()).then(|| stem.to_owned())
 }
 
 /// A word as a shell takes it.
 fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
+    // What no shell interprets; everything else stands in single quotes.
+    let is_plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c));
+    if is_plain && !word.is_empty() {
         word.to_owned()
     } else {
         format!("'{}'", word.replace('\'', r"'\''"))

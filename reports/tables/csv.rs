@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry};
 use crate::metric::{METRICS, Value as Place};
@@ -106,7 +106,6 @@ pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error>
 fn row(entry: &Entry<'_>) -> BTreeMap<String, String> {
     let record = entry.record;
     let simplify = &record.simplify;
-    let json = |value: Result<String, serde_json::Error>| value.unwrap_or_default();
     let (level, asked) = match simplify.level {
         Target::Published => ("published", String::new()),
         Target::Spheres(count) => ("spheres", count.to_string()),
@@ -117,9 +116,9 @@ fn row(entry: &Entry<'_>) -> BTreeMap<String, String> {
         ("level", level.to_owned()),
         ("asked", asked),
         ("comparable", entry.comparable().to_string()),
-        ("params", json(serde_json::to_string(&simplify.params))),
-        ("diagnostics", json(serde_json::to_string(&simplify.diagnostics))),
-        ("seeds", json(serde_json::to_string(&record.seeds))),
+        ("params", json!(simplify.params).to_string()),
+        ("diagnostics", json!(simplify.diagnostics).to_string()),
+        ("seeds", json!(record.seeds).to_string()),
         ("warnings", warnings(record).join("; ")),
     ]
     .map(|(name, text)| (name.to_owned(), inert(text)))

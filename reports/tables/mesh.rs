@@ -4,36 +4,35 @@ use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::{COMPARED, Metric};
 use crate::summary::pick;
 use crate::tables::{Cell, Column, Row, Table};
-use crate::text::{betti, grouped, printable};
+use crate::text::{betti, grouped, known_betti, printable};
 
-/// What the bold numbers of one level have to equal.
-pub(crate) struct Best(Vec<(usize, [Option<f64>; COMPARED.len()])>);
+/// The values that the bold numbers equal, for each level by [`COMPARED`].
+pub(crate) struct Best(Vec<[Option<f64>; COMPARED.len()]>);
 
 impl Best {
     /// The best values of one mesh, for each level at which at least two results compare.
     pub(crate) fn of_mesh(comparison: &Comparison<'_>, mesh: usize) -> Self {
-        let best_at = |level: usize| {
+        let mut levels = vec![];
+        for level in 0..comparison.levels.len() {
             let here: Vec<&Entry<'_>> = comparison
                 .of_mesh(mesh)
                 .filter(|entry| entry.level == level && entry.comparable())
                 .collect();
-            COMPARED.map(|metric| {
+            levels.push(COMPARED.map(|metric| {
                 let values: Vec<f64> =
                     here.iter().filter_map(|entry| metric.of(entry.record)).collect();
-                if values.len() < 2 {
-                    return None;
-                }
-                values.into_iter().reduce(|a, b| pick(metric, a, b))
-            })
-        };
-        Self((0..comparison.levels.len()).map(|level| (level, best_at(level))).collect())
+                // A single result is no best.
+                let best = values.iter().copied().reduce(|a, b| pick(metric, a, b));
+                best.filter(|_| values.len() > 1)
+            }));
+        }
+        Self(levels)
     }
 
     /// Whether a value of an entry is the best of its level, as far as it is written.
     pub(crate) fn is_best(&self, entry: &Entry<'_>, metric: &Metric, value: f64) -> bool {
         let column = COMPARED.iter().position(|other| other.key == metric.key);
-        let best = self.0.iter().find(|(level, _)| *level == entry.level).zip(column);
-        let best = best.and_then(|((_, values), column)| values[column]);
+        let best = column.and_then(|column| self.0[entry.level][column]);
         // Two numbers that read the same are equally good.
         entry.comparable() && best.is_some_and(|best| metric.format(best) == metric.format(value))
     }
@@ -111,14 +110,13 @@ fn cells(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<Cel
 fn notes(comparison: &Comparison<'_>, mesh: usize, how: &str) -> Vec<String> {
     let mut notes = vec![how.to_owned()];
     if let Some(initial) = comparison.of_mesh(mesh).find_map(|entry| entry.record.initial) {
-        let known = |numbers: Option<[u64; 3]>| numbers.map_or("unknown".to_owned(), betti);
         notes.push(format!(
             "Initial medial mesh: {} spheres, {} edges, {} faces; Betti numbers {}; the solid's: {}.",
             grouped(initial.spheres),
             grouped(initial.edges),
             grouped(initial.faces),
-            known(initial.betti),
-            known(initial.expected_betti),
+            known_betti(initial.betti),
+            known_betti(initial.expected_betti),
         ));
     }
     notes.push(UNITS.to_owned());

@@ -26,13 +26,12 @@ pub(crate) struct Table {
 impl Table {
     /// The table without some columns, by their titles.
     pub(crate) fn without(mut self, titles: &[&str]) -> Self {
-        let keep: Vec<bool> =
-            self.columns.iter().map(|column| !titles.contains(&column.title.as_str())).collect();
-        let mut kept = keep.iter();
-        self.columns.retain(|_| *kept.next().unwrap_or(&true));
-        for row in &mut self.rows {
-            let mut kept = keep.iter();
-            row.cells.retain(|_| *kept.next().unwrap_or(&true));
+        // From the right, so that places to the left stay valid.
+        for column in (0..self.columns.len()).rev() {
+            if titles.contains(&self.columns[column].title.as_str()) {
+                self.columns.remove(column);
+                self.rows.iter_mut().for_each(|row| drop(row.cells.remove(column)));
+            }
         }
         self
     }
@@ -59,6 +58,10 @@ impl Column {
 
     pub(crate) fn number(title: impl Into<String>) -> Self {
         Self { title: title.into(), number: true }
+    }
+
+    fn class(&self) -> &'static str {
+        if self.number { " class=\"num\"" } else { "" }
     }
 }
 
@@ -127,10 +130,9 @@ pub(crate) fn to_markdown(table: &Table) -> String {
 
 /// The table as HTML, in a box that scrolls sideways where the page is narrow.
 pub(crate) fn to_html(table: &Table) -> String {
-    let class = |column: &Column| if column.number { " class=\"num\"" } else { "" };
     let mut html = String::from("<div class=\"scroll\"><table>\n<thead><tr>");
     for column in &table.columns {
-        html.push_str(&format!("<th{}>{}</th>", class(column), escape_html(&column.title)));
+        html.push_str(&format!("<th{}>{}</th>", column.class(), escape_html(&column.title)));
     }
     html.push_str("</tr></thead>\n<tbody>\n");
     for row in &table.rows {
@@ -138,7 +140,7 @@ pub(crate) fn to_html(table: &Table) -> String {
         for (cell, column) in row.cells.iter().zip(&table.columns) {
             let text = escape_html(&cell.text);
             let text = if cell.best { format!("<strong>{text}</strong>") } else { text };
-            html.push_str(&format!("<td{}>{text}</td>", class(column)));
+            html.push_str(&format!("<td{}>{text}</td>", column.class()));
         }
         html.push_str("</tr>\n");
     }
@@ -193,6 +195,7 @@ pub(crate) fn to_latex(table: &Table, label: &str) -> String {
     let titles: Vec<String> = table.columns.iter().map(|c| escape_latex(&c.title)).collect();
     text.push_str(&format!("{} \\\\\n", titles.join(" & ")));
     for (index, row) in table.rows.iter().enumerate() {
+        // The first rule separates the head, whether or not a group starts.
         if index == 0 || row.starts_group {
             text.push_str("\\midrule\n");
         }
