@@ -275,49 +275,56 @@ fn tetrahedra(regular: &Regular) -> Vec<bool> {
         .collect()
 }
 
+/// Whether a cell is in the complex; infinite cells are not, and come after the finite ones.
+#[inline]
+fn is_member(cells: &[bool], cell: CellId) -> bool {
+    cells.get(cell.index()).is_some_and(|&is_in| is_in)
+}
+
 /// Step 2: two bits for each facet of each cell, the same from both sides.
 fn triangles(regular: &Regular, cells: &[bool]) -> Vec<u8> {
-    let is_in = |c: CellId| cells.get(c.index()).is_some_and(|&c| c);
     // Computed once, at the cell with the smaller id, then copied to the other.
-    let ids = || (0..regular.cell_count() as u32).into_par_iter().with_min_len(GRAIN);
-    let first = |c| {
-        let cell = CellId(c);
-        let facets = (0..4).map(|opposite| Facet { cell, opposite });
-        facets.fold(0, |bits, facet| {
-            let mirror = regular.mirror(facet);
-            if mirror.cell < cell || regular.is_infinite(cell) {
-                return bits;
-            }
-            let class = match (is_in(cell), is_in(mirror.cell)) {
-                (true, true) => Class::Interior as u8,
-                (false, false) => u8::from(is_singular_triangle(regular, facet, mirror)),
-                _ => Class::Regular as u8,
-            };
-            bits | class << (2 * facet.opposite)
-        })
-    };
-    let own: Vec<u8> = ids().map(first).collect();
-    ids()
+    let ids = (0..regular.cell_count() as u32).into_par_iter().with_min_len(GRAIN);
+    let own: Vec<u8> = ids
+        .clone()
         .map(|c: u32| {
             let cell = CellId(c);
             let facets = (0..4).map(|opposite| Facet { cell, opposite });
-            facets.fold(own[cell.index()], |bits, facet| {
+            facets.fold(0, |bits, facet| {
                 let mirror = regular.mirror(facet);
-                let seen = own[mirror.cell.index()] >> (2 * mirror.opposite) & 3;
-                bits | seen << (2 * facet.opposite)
+                if mirror.cell < cell || regular.is_infinite(cell) {
+                    return bits;
+                }
+                let class = match (is_member(cells, cell), is_member(cells, mirror.cell)) {
+                    (true, true) => Class::Interior as u8,
+                    (false, false) => u8::from(is_singular_triangle(regular, facet, mirror)),
+                    _ => Class::Regular as u8,
+                };
+                bits | class << (2 * facet.opposite)
             })
         })
-        .collect()
+        .collect();
+    ids.map(|c: u32| {
+        let cell = CellId(c);
+        let facets = (0..4).map(|opposite| Facet { cell, opposite });
+        facets.fold(own[cell.index()], |bits, facet| {
+            let mirror = regular.mirror(facet);
+            let seen = own[mirror.cell.index()] >> (2 * mirror.opposite) & 3;
+            bits | seen << (2 * facet.opposite)
+        })
+    })
+    .collect()
 }
 
 /// Whether a triangle without cofaces in the complex is in it.
 fn is_singular_triangle(regular: &Regular, facet: Facet, mirror: Facet) -> bool {
     let triangle = sites(regular, regular.facet_vertices(facet));
-    let is_clear = |f: Facet| {
-        let v = regular.vertices(f.cell)[f.opposite];
-        v == VertexId::INFINITE || triangle_clearance(triangle, regular.site(v)) != Sign::Negative
-    };
-    triangle_size(triangle) != Sign::Positive && is_clear(facet) && is_clear(mirror)
+    triangle_size(triangle) != Sign::Positive
+        && [facet, mirror].into_iter().all(|f| {
+            let v = regular.vertices(f.cell)[f.opposite];
+            v == VertexId::INFINITE
+                || triangle_clearance(triangle, regular.site(v)) != Sign::Negative
+        })
 }
 
 /// Indexed by the set of vertices across whose opposite facets lie later cells: the pairs, as bits,
@@ -342,7 +349,7 @@ const FIRST_AT: [u8; 16] = {
 /// Step 3 for edges: two bits for each edge of each finite cell that is its first.
 fn edges(regular: &Regular, cells: &[bool], facets: &[u8]) -> Vec<u16> {
     let ids = (0..regular.finite_cell_count() as u32).into_par_iter().with_min_len(GRAIN);
-    let of_cell = |ring: &mut Vec<CellId>, c| {
+    ids.map_init(Vec::new, |ring: &mut Vec<CellId>, c: u32| {
         let cell = CellId(c);
         let v = regular.vertices(cell);
         // Two neighbours of the cell are at the edge. They are in the cell's own record and show, for
@@ -366,8 +373,8 @@ fn edges(regular: &Regular, cells: &[bool], facets: &[u8]) -> Vec<u16> {
             }
         }
         bits
-    };
-    ids.map_init(Vec::new, of_cell).collect()
+    })
+    .collect()
 }
 
 /// The class of the edge with these cells around it, zero if it is not in the complex.
@@ -378,7 +385,7 @@ fn edge_class(
     ends: [VertexId; 2],
     ring: &[CellId],
 ) -> u8 {
-    let members = ring.iter().filter(|c| cells.get(c.index()).is_some_and(|&c| c)).count();
+    let members = ring.iter().filter(|c| is_member(cells, **c)).count();
     if members == ring.len() {
         return Class::Interior as u8;
     }
@@ -416,7 +423,7 @@ fn vertices(regular: &Regular, cells: &[bool], edges: &[u16]) -> Vec<u8> {
             }
         }
     }
-    for cell in regular.cells().filter(|c| !cells.get(c.index()).is_some_and(|&c| c)) {
+    for cell in regular.cells().filter(|c| !is_member(cells, *c)) {
         for v in regular.vertices(cell).into_iter().filter(|&v| v != VertexId::INFINITE) {
             let class = &mut class[v.index()];
             *class = (*class).min(Class::Regular as u8);
@@ -494,12 +501,12 @@ fn anchors(centres: &[Vec3]) -> ([Vec3; 4], f64) {
     let least = (origin.abs().max_element() * 1e-13).max(1e-30);
     let length = (extent / 2.0).clamp(least, MAX_COORDINATE);
     let step = f64::powi(2.0, length.log2().floor() as i32);
-    let along = |k: usize| {
-        let mut anchor = origin.to_array();
+    let [x, y, z] = [0, 1, 2].map(|k| {
+        let mut anchor = origin;
         anchor[k] -= if anchor[k] < 0.0 { -step } else { step };
-        Vec3::from_array(anchor)
-    };
-    ([origin, along(0), along(1), along(2)], -step * step)
+        anchor
+    });
+    ([origin, x, y, z], -step * step)
 }
 
 // The topology of the dual complex: simplices, Euler number, Betti numbers.

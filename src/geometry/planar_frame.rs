@@ -48,10 +48,10 @@ pub enum Part {
 impl PlanarFrame {
     /// The frame of a triangle, and the index of the corner that became `a`.
     pub fn new(corners: [Vec3; 3]) -> (Self, usize) {
-        let side = |k: usize| (corners[(k + 1) % 3] - corners[k]).length_squared();
+        let sides = [0, 1, 2].map(|k| corners[(k + 1) % 3].distance_squared(corners[k]));
         let mut first = 0;
         for k in 1..3 {
-            if side(k) > side(first) {
+            if sides[k] > sides[first] {
                 first = k;
             }
         }

@@ -268,14 +268,14 @@ impl PowerCrust {
     /// # Errors
     /// A centre or radius that is not finite, a radius that is negative, as in [`Regular::new`].
     pub fn new(inner: &[Sphere], outer: &[Sphere]) -> Result<Self, TriangulationError> {
-        let balls = || inner.iter().chain(outer);
-        for (index, ball) in balls().enumerate() {
+        let balls = inner.iter().chain(outer);
+        for (index, ball) in balls.clone().enumerate() {
             if ball.radius < 0.0 || !ball.radius.is_finite() {
                 return Err(TriangulationError::Radius { index, radius: ball.radius });
             }
         }
-        let mut points: Vec<Vec3> = balls().map(|b| b.centre).collect();
-        let mut weights: Vec<f64> = balls().map(|b| b.radius * b.radius).collect();
+        let mut points: Vec<Vec3> = balls.clone().map(|b| b.centre).collect();
+        let mut weights: Vec<f64> = balls.map(|b| b.radius * b.radius).collect();
         points.extend(box_around(&points));
         weights.resize(points.len(), 0.0);
         let regular = Regular::new(&points, &weights)?;
@@ -284,19 +284,21 @@ impl PowerCrust {
 
     /// Step 2: the facets between balls below the index `first_outer` and the others.
     fn between(regular: &Regular, first_outer: u32) -> Self {
-        let is_inner = |v: VertexId| v.0 < first_outer;
-        let facets_of = |cell: CellId| {
-            let v = regular.vertices(cell);
-            let pairs = (0..4).flat_map(move |i| (0..4).map(move |j| (i, j)));
-            let separating = pairs.filter(move |&(i, j)| is_inner(v[i]) && !is_inner(v[j]));
-            separating.filter_map(move |(i, j)| {
-                let ring: Vec<CellId> = regular.edge_ring(cell, i, j).collect();
-                // Each facet once, from the first of its cells.
-                (ring.iter().min() == Some(&cell)).then_some(([v[i].0, v[j].0], ring))
-            })
-        };
         let finite = (0..regular.finite_cell_count() as u32).into_par_iter().with_min_len(1 << 12);
-        let facets: Vec<_> = finite.flat_map_iter(|cell| facets_of(CellId(cell))).collect();
+        let facets: Vec<_> = finite
+            .flat_map_iter(|cell| {
+                let cell = CellId(cell);
+                let v = regular.vertices(cell).map(|v| v.0);
+                let pairs = (0..4).flat_map(move |i| (0..4).map(move |j| (i, j)));
+                let separating =
+                    pairs.filter(move |&(i, j)| v[i] < first_outer && v[j] >= first_outer);
+                separating.filter_map(move |(i, j)| {
+                    let ring: Vec<CellId> = regular.edge_ring(cell, i, j).collect();
+                    // Each facet once, from the first of its cells.
+                    (ring.iter().min() == Some(&cell)).then_some(([v[i], v[j]], ring))
+                })
+            })
+            .collect();
         let mut corner_of = vec![u32::MAX; regular.cell_count()];
         let mut cells = Vec::new();
         let (mut start, mut rings) = (vec![0], Vec::new());
@@ -367,7 +369,7 @@ fn box_around(points: &[Vec3]) -> [Vec3; 8] {
     let margin = Vec3::splat(if extent > 0.0 { MARGIN * extent } else { 1.0 });
     let (lo, hi) = (lo - margin, hi + margin);
     [0, 1, 2, 3, 4, 5, 6, 7].map(|k: u32| {
-        let pick = |bit: u32, lo: f64, hi: f64| if k >> bit & 1 == 0 { lo } else { hi };
-        Vec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z))
+        let is_low = glam::BVec3::new(k & 1 == 0, k & 2 == 0, k & 4 == 0);
+        Vec3::select(is_low, lo, hi)
     })
 }

@@ -317,11 +317,14 @@ impl Slab {
         if let Some((sphere, weights)) = self.face.as_ref().and_then(|face| face.best_sphere(p)) {
             return HullFoot::towards(sphere, weights, p, || self.free_direction(sphere));
         }
-        let feet = [0, 1, 2].map(|k| (k, self.cones[k].foot(p)));
-        let nearer = |a: (usize, HullFoot<2>), b: (usize, HullFoot<2>)| {
-            if b.1.signed_distance < a.1.signed_distance { b } else { a }
-        };
-        let (side, foot) = nearer(nearer(feet[0], feet[1]), feet[2]);
+        let feet = self.cones.map(|cone| cone.foot(p));
+        let mut side = 0;
+        for k in 1..3 {
+            if feet[k].signed_distance < feet[side].signed_distance {
+                side = k;
+            }
+        }
+        let foot = feet[side];
         let mut weights = [0.0; 3];
         weights[side] = foot.weights[0];
         weights[(side + 1) % 3] = foot.weights[1];
@@ -343,12 +346,11 @@ impl Slab {
                 None => candidates.push(away.try_normalize().unwrap_or(Vec3::X)),
             }
         }
-        let overstep = |n: Vec3| {
+        let oversteps = candidates.into_iter().map(|n| {
             let reach = self.spheres.iter().map(|m| n.dot(m.centre - sphere.centre) + m.radius);
-            reach.fold(f64::NEG_INFINITY, f64::max)
-        };
-        let best = candidates.iter().copied().min_by(|&a, &b| overstep(a).total_cmp(&overstep(b)));
-        best.unwrap_or(Vec3::X)
+            (reach.fold(f64::NEG_INFINITY, f64::max), n)
+        });
+        oversteps.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Vec3::X, |best| best.1)
     }
 
     /// The two planes tangent to all three balls from outside, or `None` when there are none:

@@ -84,8 +84,7 @@ impl TriangleTree {
 /// Whether two triangles of positive area share more than corners and edges: `f` and `g` are the indices of
 /// their corners, `s` and `t` the places.
 pub fn triangles_meet(f: [u32; 3], s: [Vec3; 3], g: [u32; 3], t: [Vec3; 3]) -> bool {
-    let shared = |i: usize| g.iter().position(|&v| v == f[i]);
-    let mut common = (0..3).filter_map(|i| shared(i).map(|j| (i, j)));
+    let mut common = (0..3).filter_map(|i| Some((i, g.iter().position(|&v| v == f[i])?)));
     match (common.next(), common.next(), common.next()) {
         (None, ..) => apart_triangles_meet(s, t),
         (Some((i, j)), None, _) => {
@@ -111,14 +110,17 @@ fn folded(a: Vec3, b: Vec3, p: Vec3, q: Vec3) -> bool {
 }
 
 fn apart_triangles_meet(s: [Vec3; 3], t: [Vec3; 3]) -> bool {
-    let apart = |plane: [Vec3; 3], other: [Vec3; 3]| {
-        let [x, y, z] = other.map(|p| orient3d(plane[0], plane[1], plane[2], p));
-        !x.is_zero() && x == y && y == z
-    };
-    if apart(t, s) || apart(s, t) {
+    if is_beside(t, s) || is_beside(s, t) {
         return false;
     }
     (0..3).any(|i| segment_meets(opposite(s, i), t) || segment_meets(opposite(t, i), s))
+}
+
+/// Whether a triangle lies strictly on one side of the plane of another.
+#[inline]
+fn is_beside([a, b, c]: [Vec3; 3], triangle: [Vec3; 3]) -> bool {
+    let [x, y, z] = triangle.map(|p| orient3d(a, b, c, p));
+    !x.is_zero() && x == y && y == z
 }
 
 /// Whether a segment and a triangle of positive area meet, both with their ends.
@@ -141,9 +143,10 @@ fn meets_in_plane([p, q]: [Vec3; 2], triangle: [Vec3; 3]) -> bool {
     let Some((axis, turn)) = projection_axis(triangle) else { return false };
     let flat = triangle.map(|v| project(v, axis));
     let [p, q] = [p, q].map(|v| project(v, axis));
-    let contains =
-        |x: Point2| (0..3).all(|i| !orient2d(flat[i], flat[(i + 1) % 3], x).opposes(turn));
-    contains(p) || contains(q) || (0..3).any(|i| segments_meet(p, q, flat[i], flat[(i + 1) % 3]))
+    let sides = [0, 1, 2].map(|i| [flat[i], flat[(i + 1) % 3]]);
+    // An end within the triangle, or else a side that the segment crosses.
+    [p, q].iter().any(|&x| sides.iter().all(|&[a, b]| !orient2d(a, b, x).opposes(turn)))
+        || sides.iter().any(|&[a, b]| segments_meet(p, q, a, b))
 }
 
 fn segments_meet(p: Point2, q: Point2, a: Point2, b: Point2) -> bool {

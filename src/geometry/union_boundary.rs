@@ -151,8 +151,8 @@ impl Meeting {
         let (a, b) = (p - o, q - o);
         let n = a.cross(b);
         let nu = n.length_squared();
-        let lift = |d: Vec3, s: &Site| d.length_squared() + (sites[0].w - s.w);
-        let (l, m) = (lift(a, sites[1]), lift(b, sites[2]));
+        let l = a.length_squared() + (sites[0].w - sites[1].w);
+        let m = b.length_squared() + (sites[0].w - sites[2].w);
         let z = (l * b.cross(n) + m * n.cross(a)) / (2.0 * nu);
         Self {
             foot: o + z,
@@ -244,9 +244,9 @@ fn is_point(complex: &DualComplex<'_>, start: Facet, end: Facet) -> bool {
     let regular = complex.regular();
     // Counter-clockwise as seen from the gap.
     let [f, g] = [start, end].map(|side| regular.facet_vertices(regular.mirror(side)));
-    let apex =
-        |of: [VertexId; 3], other: [VertexId; 3]| of.into_iter().find(|v| !other.contains(v));
-    let (Some(c), Some(d)) = (apex(f, g), apex(g, f)) else { return false };
+    let c = f.into_iter().find(|v| !g.contains(v));
+    let d = g.into_iter().find(|v| !f.contains(v));
+    let (Some(c), Some(d)) = (c, d) else { return false };
     let sites = |t: [VertexId; 3]| t.map(|v| regular.site(v));
     let [s, t, u] = sites(f);
     // For coplanar centres this is zero if and only if the four balls have a point of equal powers,

@@ -1,7 +1,5 @@
 //! Closest point on a triangle mesh.
 
-use std::ops::Range;
-
 use crate::Vec3;
 use crate::geometry::planar_frame::{Part, PlanarFrame};
 use crate::geometry::trees::{Bounds, Frame, Lanes, Plan, Query, Tree, WideTree, in_morton_order};
@@ -88,10 +86,10 @@ pub(super) fn check_corners(triangles: &[[Vec3; 3]]) -> Result<(), BvhError> {
         return Err(BvhError::Empty);
     }
     for (face, corners) in triangles.iter().enumerate() {
-        let fits =
-            |corner: &&Vec3| corner.abs().max_element() <= MAX_COORDINATE && !corner.is_nan();
-        if let Some(&corner) = corners.iter().find(|c| !fits(c)) {
-            return Err(BvhError::Corner { face, corner });
+        for &corner in corners {
+            if corner.is_nan() || corner.abs().max_element() > MAX_COORDINATE {
+                return Err(BvhError::Corner { face, corner });
+            }
         }
     }
     Ok(())
@@ -128,9 +126,11 @@ impl TriangleBvh {
         let framed = corners.iter().map(|&t| PlanarFrame::new(t));
         let (frames, firsts): (Vec<_>, Vec<_>) = framed.map(|(t, k)| (t, k as u8)).unzip();
         let wide = WideTree::new(&tree);
-        let block =
-            |l: &Range<u32>| Block::new(&frames[l.start as usize..l.end as usize], wide.frame());
-        let blocks = wide.leaves().iter().map(block).collect();
+        let blocks = wide
+            .leaves()
+            .iter()
+            .map(|leaf| Block::new(&frames[leaf.start as usize..leaf.end as usize], wide.frame()))
+            .collect();
         Ok(Self { tree, wide, blocks, frames, corners, firsts, places, slack })
     }
 
@@ -347,26 +347,41 @@ pub(super) struct Block {
 /// measured from its start, which differs by less than rounding.
 const NEGLIGIBLE: f64 = 1e-30;
 
+/// The values of four triangles.
+fn lanes(frames: &[PlanarFrame], value: impl Fn(&PlanarFrame) -> f64) -> Lanes {
+    Lanes::from([0, 1, 2, 3].map(|k| value(frames.get(k).unwrap_or(&frames[0])) as f32))
+}
+
+#[inline]
+fn dot(u: &[Lanes; 3], v: &[Lanes; 3]) -> Lanes {
+    u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+}
+
+/// Squared distance in the plane from a point, relative to the start of a side, to the side.
+#[inline]
+fn to_side([x, y]: [Lanes; 2], [run, rise]: [Lanes; 2], reciprocal: Lanes) -> Lanes {
+    let t = ((x * run + y * rise) * reciprocal).fast_max(Lanes::ZERO).fast_min(Lanes::ONE);
+    let (dx, dy) = (x - t * run, y - t * rise);
+    dx * dx + dy * dy
+}
+
 impl Block {
     pub fn new(frames: &[PlanarFrame], frame: &Frame) -> Self {
-        let lanes = |value: &dyn Fn(&PlanarFrame) -> f64| {
-            Lanes::from([0, 1, 2, 3].map(|k| value(frames.get(k).unwrap_or(&frames[0])) as f32))
-        };
         let s = frame.scale;
-        let reciprocal = |run: &dyn Fn(&PlanarFrame) -> f64| {
-            lanes(&|t| {
-                let squared = (run(t) * s).powi(2) + (t.apex[1] * s).powi(2);
-                if squared > NEGLIGIBLE { 1.0 / squared } else { 0.0 }
-            })
-        };
         Self {
-            origin: [0, 1, 2].map(|k| lanes(&|t| frame.forward(t.origin)[k])),
-            x: [0, 1, 2].map(|k| lanes(&|t| t.x[k])),
-            y: [0, 1, 2].map(|k| lanes(&|t| t.y[k])),
-            normal: [0, 1, 2].map(|k| lanes(&|t| t.normal[k])),
-            length: lanes(&|t| t.length * s),
-            apex: [0, 1].map(|k| lanes(&|t| t.apex[k] * s)),
-            reciprocal: [reciprocal(&|t| t.apex[0]), reciprocal(&|t| t.length - t.apex[0])],
+            origin: [0, 1, 2].map(|k| lanes(frames, |t| frame.forward(t.origin)[k])),
+            x: [0, 1, 2].map(|k| lanes(frames, |t| t.x[k])),
+            y: [0, 1, 2].map(|k| lanes(frames, |t| t.y[k])),
+            normal: [0, 1, 2].map(|k| lanes(frames, |t| t.normal[k])),
+            length: lanes(frames, |t| t.length * s),
+            apex: [0, 1].map(|k| lanes(frames, |t| t.apex[k] * s)),
+            reciprocal: [0, 1].map(|side| {
+                lanes(frames, |t| {
+                    let run = if side == 0 { t.apex[0] } else { t.length - t.apex[0] };
+                    let squared = (run * s).powi(2) + (t.apex[1] * s).powi(2);
+                    if squared > NEGLIGIBLE { 1.0 / squared } else { 0.0 }
+                })
+            }),
         }
     }
 
@@ -374,10 +389,9 @@ impl Block {
     #[inline]
     pub fn within(&self, query: &Query, limit: f32) -> u32 {
         let w = [0, 1, 2].map(|k| query.p[k] - self.origin[k]);
-        let dot = |axis: &[Lanes; 3]| w[0] * axis[0] + w[1] * axis[1] + w[2] * axis[2];
-        let (x, y, height) = (dot(&self.x), dot(&self.y), dot(&self.normal));
+        let (x, y, height) = (dot(&w, &self.x), dot(&w, &self.y), dot(&w, &self.normal));
         let [cx, cy] = self.apex;
-        let (zero, one) = (Lanes::ZERO, Lanes::ONE);
+        let zero = Lanes::ZERO;
         let beyond = self.length - x;
         let across = cx - self.length;
         let left = cy * x - cx * y;
@@ -385,13 +399,8 @@ impl Block {
         let inside = y.simd_ge(zero) & left.simd_ge(zero) & right.simd_ge(zero);
         let past = x - x.fast_max(zero).fast_min(self.length);
         let base = past * past + y * y;
-        let along = |start: Lanes, run: Lanes, reciprocal: Lanes| {
-            let t = ((start * run + y * cy) * reciprocal).fast_max(zero).fast_min(one);
-            let (dx, dy) = (start - t * run, y - t * cy);
-            dx * dx + dy * dy
-        };
-        let sides = along(x, cx, self.reciprocal[0])
-            .fast_min(along(-beyond, across, self.reciprocal[1]))
+        let sides = to_side([x, y], [cx, cy], self.reciprocal[0])
+            .fast_min(to_side([-beyond, y], [across, cy], self.reciprocal[1]))
             .fast_min(base);
         let squared = height * height + inside.bitselect(zero, sides);
         squared.simd_le(Lanes::splat(limit)).to_bitmask()

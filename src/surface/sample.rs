@@ -269,13 +269,12 @@ pub(super) fn eliminate(points: &[Vec3], normals: &[Vec3], area: f64, count: usi
         return Vec::new();
     }
     let radius = (area / (2.0 * 3.0_f64.sqrt() * count as f64)).sqrt();
-    let neighbours = Neighbours::within(points, normals, 2.0 * radius);
+    let reach = 2.0 * radius;
+    let neighbours = Neighbours::within(points, normals, reach);
     let share = count as f64 / points.len() as f64;
     let least = 2.0 * radius * (1.0 - share.powf(GAMMA)) * BETA;
-    let weight = |distance: f64| (1.0 - distance.max(least) / (2.0 * radius)).max(0.0).powi(ALPHA);
-
     let mut weights: Vec<f64> = (0..points.len())
-        .map(|i| neighbours.of(i).iter().map(|&(_, d)| weight(f64::from(d))).sum())
+        .map(|i| neighbours.of(i).iter().map(|&(_, d)| weight(d, least, reach)).sum())
         .collect();
     let mut heap: BinaryHeap<Heaviest> =
         (0..).zip(&weights).map(|(sample, &weight)| Heaviest { weight, sample }).collect();
@@ -292,10 +291,15 @@ pub(super) fn eliminate(points: &[Vec3], normals: &[Vec3], area: f64, count: usi
         kept[sample as usize] = false;
         left -= 1;
         for &(other, distance) in neighbours.of(sample as usize) {
-            weights[other as usize] -= weight(f64::from(distance));
+            weights[other as usize] -= weight(distance, least, reach);
         }
     }
     (0..points.len() as u32).filter(|&i| kept[i as usize]).collect()
+}
+
+/// Step 2: the part of a sample's weight from another one at this distance.
+fn weight(distance: f32, least: f64, reach: f64) -> f64 {
+    (1.0 - f64::from(distance).max(least) / reach).max(0.0).powi(ALPHA)
 }
 
 /// An entry of the heap: largest weight first, then smallest index.
@@ -333,6 +337,11 @@ struct Neighbours {
 /// Cells along one axis; three indices fit 64 bits.
 const CELLS: f64 = (1 << 20) as f64;
 
+/// The key of a cell. Cells along `z` have consecutive keys.
+fn key([x, y, z]: [u64; 3]) -> u64 {
+    (x << 42) | (y << 21) | z
+}
+
 impl Neighbours {
     /// All pairs closer than `reach` on faces that do not look in opposite directions.
     fn within(points: &[Vec3], normals: &[Vec3], reach: f64) -> Self {
@@ -341,28 +350,29 @@ impl Neighbours {
         let size = reach.max((hi - lo).max_element() / CELLS);
         // One cell of margin, so that the cells beside a cell always have a valid number.
         let cell = |p: Vec3| ((p - lo) / size).to_array().map(|x| x as u64 + 1);
-        let key = |[x, y, z]: [u64; 3]| (x << 42) | (y << 21) | z;
         let mut order: Vec<(u64, u32)> =
             (0..).zip(points).map(|(i, &p)| (key(cell(p)), i)).collect();
         order.sort_unstable();
-        let near_of = |i: usize| {
-            let [x, y, z] = cell(points[i]);
-            let mut near = Vec::new();
-            for (x, y) in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (x, y))) {
-                // Keys of three cells along z are consecutive: one search instead of three.
-                let (first, last) = (key([x, y, z - 1]), key([x, y, z + 1]));
-                let from = order.partition_point(|&(k, _)| k < first);
-                for &(_, j) in order[from..].iter().take_while(|&&(k, _)| k <= last) {
-                    let distance = points[i].distance(points[j as usize]);
-                    let faces_away = normals[i].dot(normals[j as usize]) < 0.0;
-                    if j as usize != i && distance < reach && !faces_away {
-                        near.push((j, distance as f32));
+        let lists: Vec<Vec<(u32, f32)>> = (0..points.len())
+            .into_par_iter()
+            .map(|i: usize| {
+                let [x, y, z] = cell(points[i]);
+                let mut near = Vec::new();
+                for (x, y) in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (x, y))) {
+                    // Keys of three cells along z are consecutive: one search instead of three.
+                    let (first, last) = (key([x, y, z - 1]), key([x, y, z + 1]));
+                    let from = order.partition_point(|&(k, _)| k < first);
+                    for &(_, j) in order[from..].iter().take_while(|&&(k, _)| k <= last) {
+                        let distance = points[i].distance(points[j as usize]);
+                        let faces_away = normals[i].dot(normals[j as usize]) < 0.0;
+                        if j as usize != i && distance < reach && !faces_away {
+                            near.push((j, distance as f32));
+                        }
                     }
                 }
-            }
-            near
-        };
-        let lists: Vec<Vec<(u32, f32)>> = (0..points.len()).into_par_iter().map(near_of).collect();
+                near
+            })
+            .collect();
         let mut start = vec![0];
         for list in &lists {
             start.push(start[start.len() - 1] + list.len());

@@ -30,6 +30,11 @@ pub(super) fn minor<const D: usize, const D2: usize>(
 }
 
 #[inline]
+pub(super) fn dot<const D: usize, const D2: usize>(a: &[Wide<D>; 3], b: &[Wide<D>; 3]) -> Wide<D2> {
+    a[0].mul::<D, D2>(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
+}
+
+#[inline]
 fn det3<const D: usize, const D2: usize, const D3: usize>(
     [a, b, c]: &[[Wide<D>; 3]; 3],
 ) -> Wide<D3> {
@@ -68,7 +73,7 @@ pub(crate) fn collinear(a: &[f64; 3], b: &[f64; 3], c: &[f64; 3]) -> bool {
         })
     }
     match differences([b, c], a, i32::MAX).0 {
-        Differences::One(d) => parallel::<1, 2>(d.map(|p| p.map(|x| Wide::from_i128(x.into())))),
+        Differences::One(d) => parallel::<1, 2>(widen(&d)),
         Differences::Two(d) => parallel::<2, 4>(widen(&d)),
         Differences::Any(d) => parallel::<20, 40>(d),
     }
@@ -79,11 +84,10 @@ fn in_sphere_det<const D: usize, const D2: usize, const D3: usize, const D5: usi
     points: &[[Wide<D>; 3]; 4],
     offset: &[Wide<D2>; 4],
 ) -> Sign {
-    let lift = |i: usize| -> Wide<D2> {
-        let p = &points[i];
-        p[0].mul::<D, D2>(p[0]).add(p[1].mul(p[1])).add(p[2].mul(p[2])).add(offset[i])
-    };
-    lifted_det::<D, D2, D3, D2, D5>(points, &[lift(0), lift(1), lift(2), lift(3)])
+    let [a, b, c, d] = points;
+    let lifts: [Wide<D2>; 4] = [a, b, c, d].map(|p| dot(p, p));
+    let lifts = [0, 1, 2, 3].map(|i| lifts[i].add(offset[i]));
+    lifted_det::<D, D2, D3, D2, D5>(points, &lifts)
 }
 
 /// The sign of the determinant of four differences with their lifts; `R = D3 + L`.
@@ -128,38 +132,55 @@ pub(super) fn in_sphere(p: [&[f64; 3]; 4], e: &[f64; 3], grid: Option<Grid>) -> 
 /// `|p|^2 - w` taken exactly.
 pub(super) fn power_test(p: [(&[f64; 3], f64); 4], e: (&[f64; 3], f64)) -> Sign {
     let weights = p.map(|q| q.1);
-    // Weights must be integers in units of the squared quantum, so they bound the quantum by half
-    // their lowest exponent.
-    let mut cap = i32::MAX;
-    let mut top = i32::MIN;
-    for w in weights.iter().chain([&e.1]) {
-        cap = cap.min(lowest_bit(*w));
-        top = top.max(highest_bit(*w));
-    }
-    let cap = if cap == i32::MAX { cap } else { cap.div_euclid(2) };
-    let (d, quantum) = differences(p.map(|q| q.0), e.0, cap);
+    let range = WeightRange::of(&weights).with(e.1);
+    let (d, quantum) = differences(p.map(|q| q.0), e.0, range.quantum_cap());
     let unit = 2 * quantum;
-    let below = |limit: i32| top == i32::MIN || top - unit <= limit;
-    let offset4 = |w: f64| to_wide::<4>(e.1, unit).sub(to_wide(w, unit));
-    let offset40 = |w: f64| to_wide::<40>(e.1, unit).sub(to_wide(w, unit));
     // The limits leave room in a lift for three squares, a difference of weights and the sign.
     match d {
-        Differences::One(d) if below(122) => {
+        Differences::One(d) if range.fits(122, unit) => {
             integers::lifted_sign(&d, &weights.map(|w: f64| to_i128(e.1, unit) - to_i128(w, unit)))
         }
-        Differences::One(d) if below(250) => {
-            let d = d.map(|p| p.map(|x| Wide::from_i128(x.into())));
-            in_sphere_det::<2, 4, 6, 10>(&d, &weights.map(offset4))
+        Differences::One(d) if range.fits(250, unit) => {
+            in_sphere_det::<2, 4, 6, 10>(&widen(&d), &offsets(e.1, weights, unit))
         }
-        Differences::Two(d) if below(250) => {
-            in_sphere_det::<2, 4, 6, 10>(&widen(&d), &weights.map(offset4))
+        Differences::Two(d) if range.fits(250, unit) => {
+            in_sphere_det::<2, 4, 6, 10>(&widen(&d), &offsets(e.1, weights, unit))
         }
-        Differences::One(d) => {
-            let d = d.map(|p| p.map(|x| Wide::from_i128(x.into())));
-            in_sphere_det::<20, 40, 60, 100>(&d, &weights.map(offset40))
-        }
-        Differences::Two(d) => in_sphere_det::<20, 40, 60, 100>(&widen(&d), &weights.map(offset40)),
-        Differences::Any(d) => in_sphere_det::<20, 40, 60, 100>(&d, &weights.map(offset40)),
+        d => in_sphere_det::<20, 40, 60, 100>(&d.into_wide(), &offsets(e.1, weights, unit)),
+    }
+}
+
+/// The differences of a weight to others, in units of `2^unit`.
+fn offsets<const N: usize, const K: usize>(w: f64, others: [f64; K], unit: i32) -> [Wide<N>; K] {
+    others.map(|other| to_wide::<N>(w, unit).sub(to_wide(other, unit)))
+}
+
+/// The bits that weights span: the exponent of the lowest one, and one more than that of the highest.
+#[derive(Clone, Copy)]
+pub(super) struct WeightRange {
+    lowest: i32,
+    top: i32,
+}
+
+impl WeightRange {
+    pub(super) fn of(weights: &[f64]) -> Self {
+        weights.iter().fold(Self { lowest: i32::MAX, top: i32::MIN }, |range, &w| range.with(w))
+    }
+
+    pub(super) fn with(self, w: f64) -> Self {
+        Self { lowest: self.lowest.min(lowest_bit(w)), top: self.top.max(highest_bit(w)) }
+    }
+
+    /// Weights must be integers in units of the squared quantum, so they bound the quantum by half
+    /// their lowest exponent.
+    pub(super) fn quantum_cap(self) -> i32 {
+        if self.lowest == i32::MAX { i32::MAX } else { self.lowest.div_euclid(2) }
+    }
+
+    /// Whether weights in units of `2^unit` have at most this many bits.
+    pub(super) fn fits(self, bits: i32, unit: i32) -> bool {
+        // All weights are zero where there is no highest bit.
+        self.top == i32::MIN || self.top - unit <= bits
     }
 }
 
@@ -167,18 +188,12 @@ pub(super) fn power_test(p: [(&[f64; 3], f64); 4], e: (&[f64; 3], f64)) -> Sign 
 /// in the last place; `None` if the points are coplanar.
 pub(super) fn orthocentre(p: [(&[f64; 3], f64); 4]) -> Option<[f64; 3]> {
     let weights = p.map(|q| q.1);
-    let cap = weights.iter().map(|&w| lowest_bit(w)).min().unwrap_or(i32::MAX);
-    let cap = if cap == i32::MAX { cap } else { cap.div_euclid(2) };
+    let cap = WeightRange::of(&weights).quantum_cap();
     let (d, quantum) = differences([p[1].0, p[2].0, p[3].0], p[0].0, cap);
-    let unit = 2 * quantum;
-    let d: [[Wide<20>; 3]; 3] = match d {
-        Differences::One(d) => d.map(|p| p.map(|x| Wide::from_i128(x.into()))),
-        Differences::Two(d) => widen(&d),
-        Differences::Any(d) => d,
-    };
-    let offset = [1, 2, 3].map(|i| to_wide::<40>(weights[0], unit).sub(to_wide(weights[i], unit)));
+    let [first, others @ ..] = weights;
+    let offset = offsets(first, others, 2 * quantum);
     // Always the widest tier: this runs only where double precision is not trusted.
-    orthocentre_wide::<20, 40, 60, 80>(&d, &offset, quantum)
+    orthocentre_wide::<20, 40, 60, 80>(&d.into_wide(), &offset, quantum)
 }
 
 /// Cramer's rule for `2 d_i . c = |d_i|^2 + offset_i` with exact numerators and denominator.
@@ -192,10 +207,7 @@ fn orthocentre_wide<const D: usize, const D2: usize, const D3: usize, const D4: 
         return None;
     }
     let (den, den_exp) = denominator.to_scaled_f64();
-    let lifts = [0, 1, 2].map(|i| {
-        let p = &d[i];
-        p[0].mul::<D, D2>(p[0]).add(p[1].mul(p[1])).add(p[2].mul(p[2])).add(offset[i])
-    });
+    let lifts: [Wide<D2>; 3] = [0, 1, 2].map(|i| dot(&d[i], &d[i]).add(offset[i]));
     Some([0, 1, 2].map(|k| {
         let (x, y) = ((k + 1) % 3, (k + 2) % 3);
         let mut numerator: Wide<D4> = Wide::ZERO;
@@ -292,6 +304,17 @@ pub(super) enum Differences<const K: usize> {
     One([[i64; 3]; K]),
     Two([[i128; 3]; K]),
     Any([[Wide<20>; 3]; K]),
+}
+
+impl<const K: usize> Differences<K> {
+    /// The same in the widest tier.
+    pub(super) fn into_wide(self) -> [[Wide<20>; 3]; K] {
+        match self {
+            Self::One(d) => widen(&d),
+            Self::Two(d) => widen(&d),
+            Self::Any(d) => d,
+        }
+    }
 }
 
 /// A grid on which differences fit one word: coordinates are multiples of `1 / scale`, a power of
@@ -420,8 +443,10 @@ pub(super) fn differences<const K: usize>(
 }
 
 #[inline]
-pub(super) fn widen<const K: usize, const N: usize>(d: &[[i128; 3]; K]) -> [[Wide<N>; 3]; K] {
-    d.map(|p| p.map(Wide::from_i128))
+pub(super) fn widen<T: Copy + Into<i128>, const K: usize, const N: usize>(
+    d: &[[T; 3]; K],
+) -> [[Wide<N>; 3]; K] {
+    d.map(|p| p.map(|x| Wide::from_i128(x.into())))
 }
 
 // The exact stage for axes of very different extents, such as a solid flattened to `1e-100`.
@@ -453,9 +478,9 @@ struct Scaled<const K: usize> {
 fn scaled<const K: usize>(points: [&[f64; 3]; K], origin: &[f64; 3]) -> Option<Scaled<K>> {
     let (mut factors, mut exponents) = ([1.0; 3], [0; 3]);
     for k in 0..3 {
-        let on_axis = || points.iter().chain([&origin]).map(|p| p[k]);
-        let top = on_axis().map(highest_bit).max().unwrap_or(i32::MIN);
-        let low = on_axis().map(lowest_bit).min().unwrap_or(i32::MAX);
+        let on_axis = points.iter().chain([&origin]).map(|p| p[k]);
+        let top = on_axis.clone().map(highest_bit).max().unwrap_or(i32::MIN);
+        let low = on_axis.map(lowest_bit).min().unwrap_or(i32::MAX);
         if top == i32::MIN {
             continue;
         }
@@ -466,8 +491,8 @@ fn scaled<const K: usize>(points: [&[f64; 3]; K], origin: &[f64; 3]) -> Option<S
         }
         factors[k] = f64::from_bits(((1023 - exponents[k]) as u64) << 52);
     }
-    let scale = |p: &[f64; 3]| [0, 1, 2].map(|k| p[k] * factors[k]);
-    let (points, origin) = (points.map(scale), scale(origin));
+    let points = points.map(|p| [0, 1, 2].map(|k| p[k] * factors[k]));
+    let origin = [0, 1, 2].map(|k| origin[k] * factors[k]);
     let differences = differences(points.each_ref(), &origin, i32::MAX).0;
     Some(Scaled { differences, exponents })
 }
@@ -487,13 +512,12 @@ fn in_sphere_scaled(p: [&[f64; 3]; 4], e: &[f64; 3]) -> Option<Sign> {
     let least = exponents.into_iter().min().unwrap_or(0);
     let shifts = exponents.map(|exponent| 2 * (exponent - least));
     let longest = shifts.into_iter().max().unwrap_or(0);
-    let one = |d: &[[i64; 3]; 4]| d.map(|p| p.map(|x| Wide::<1>::from_i128(x.into())));
     match differences {
         Differences::One(d) if longest <= SHORT_SHIFT => {
-            Some(lifted_det_scaled::<1, 2, 3, 14, 17>(&one(&d), shifts))
+            Some(lifted_det_scaled::<1, 2, 3, 14, 17>(&widen(&d), shifts))
         }
         Differences::One(d) if longest <= LONG_SHIFT => {
-            Some(lifted_det_scaled::<1, 2, 3, 44, 47>(&one(&d), shifts))
+            Some(lifted_det_scaled::<1, 2, 3, 44, 47>(&widen(&d), shifts))
         }
         Differences::Two(d) if longest <= SHORT_SHIFT => {
             Some(lifted_det_scaled::<2, 4, 6, 14, 20>(&widen(&d), shifts))

@@ -114,10 +114,9 @@ impl Filter {
         if !(-180..=180).contains(&quantum) {
             return Self::ANY;
         }
-        let largest = |degree: i32| f64::powi(2.0, 52 + degree * quantum);
         Self {
-            exact_orientation: ORIENTATION_BOUND * largest(3),
-            exact_power: IN_SPHERE_BOUND / 12.0 * largest(5),
+            exact_orientation: ORIENTATION_BOUND * f64::powi(2.0, 52 + 3 * quantum),
+            exact_power: IN_SPHERE_BOUND / 12.0 * f64::powi(2.0, 52 + 5 * quantum),
             grid: Grid::new(quantum, top),
         }
     }
@@ -189,6 +188,16 @@ impl Filter {
     }
 }
 
+#[inline(always)]
+fn difference<R: Real>(p: [R; 3], q: [R; 3]) -> [R; 3] {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+#[inline(always)]
+fn norm2<R: Real>(p: [R; 3]) -> R {
+    p[0] * p[0] + p[1] * p[1] + p[2] * p[2]
+}
+
 /// The lifted determinant of four weighted points relative to a fifth, and its error bound, for
 /// one cell or in lanes.
 #[inline(always)]
@@ -196,8 +205,8 @@ fn lifted_determinant<R: Real, M: Metric>(
     [a, b, c, d]: [([R; 3], R); 4],
     e: ([R; 3], R),
 ) -> (R, R) {
-    let relative = |p: [R; 3]| [p[0] - e.0[0], p[1] - e.0[1], p[2] - e.0[2]];
-    let (ap, bp, cp, dp) = (relative(a.0), relative(b.0), relative(c.0), relative(d.0));
+    let (ap, bp) = (difference(a.0, e.0), difference(b.0, e.0));
+    let (cp, dp) = (difference(c.0, e.0), difference(d.0, e.0));
     // The four 3 x 3 minors share six 2 x 2 minors.
     let ab = ap[0] * bp[1] - bp[0] * ap[1];
     let bc = bp[0] * cp[1] - cp[0] * bp[1];
@@ -209,7 +218,6 @@ fn lifted_determinant<R: Real, M: Metric>(
     let bcd = bp[2] * cd - cp[2] * bd + dp[2] * bc;
     let cda = cp[2] * da + dp[2] * ac + ap[2] * cd;
     let dab = dp[2] * ab + ap[2] * bd + bp[2] * da;
-    let norm2 = |p: [R; 3]| p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
     let (mut al, mut bl, mut cl, mut dl) = (norm2(ap), norm2(bp), norm2(cp), norm2(dp));
     let reach2 = al.max(bl).max(cl.max(dl));
     let mut lift = reach2;

@@ -251,11 +251,15 @@ impl Columns {
     }
 }
 
+#[inline(always)]
+fn lift(p: &[i64; 3]) -> i128 {
+    product(p[0], p[0]) + product(p[1], p[1]) + product(p[2], p[2])
+}
+
 /// The sign of the lifted determinant of four differences. Each lift is increased by its `offset`,
 /// which is below `2^123` in absolute value.
 #[inline]
 pub(super) fn lifted_sign([a, b, c, d]: &[[i64; 3]; 4], offset: &[i128; 4]) -> Sign {
-    let lift = |p: &[i64; 3]| product(p[0], p[0]) + product(p[1], p[1]) + product(p[2], p[2]);
     let (ab, bc, cd, da) =
         (minor_narrow(a, b), minor_narrow(b, c), minor_narrow(c, d), minor_narrow(d, a));
     let (ac, bd) = (minor_narrow(a, c), minor_narrow(b, d));

@@ -29,8 +29,8 @@ const FILTER_2D: f64 = 3.330_669_073_875_472e-16;
 
 #[cold]
 fn orient2d_exact(a: Point2, b: Point2, c: Point2) -> Sign {
-    let coord = |p: Point2| robust::Coord { x: p[0], y: p[1] };
-    Sign::of(robust::orient2d(coord(a), coord(b), coord(c)))
+    let [a, b, c] = [a, b, c].map(|[x, y]| robust::Coord { x, y });
+    Sign::of(robust::orient2d(a, b, c))
 }
 
 /// The point without its coordinate `axis`. The order of the other two is such that a triangle whose

@@ -29,11 +29,9 @@
 //! by their *reach* `|d|^2 + |w_0 - w|`. The filter never decides when a difference is so short that
 //! products may underflow, or when a product overflows.
 
-use crate::predicates::exact::{
-    Differences, differences, highest_bit, lowest_bit, minor, to_wide, widen,
-};
+use crate::predicates::exact::{Differences, WeightRange, differences, minor, to_wide, widen};
 use crate::predicates::integers::Wide;
-use crate::predicates::{Sign, Site};
+use crate::predicates::{Sign, Site, exact};
 
 const U: f64 = f64::EPSILON / 2.0;
 
@@ -185,35 +183,22 @@ trait Form<const K: usize> {
 #[inline(never)]
 fn exact_sign<F: Form<K>, const K: usize>(origin: &Site, others: [&Site; K]) -> Sign {
     let weights = others.map(|s| s.w);
-    let (mut cap, mut top) = (lowest_bit(origin.w), highest_bit(origin.w));
-    for w in weights {
-        cap = cap.min(lowest_bit(w));
-        top = top.max(highest_bit(w));
-    }
-    // Weights are integers in units of the squared quantum.
-    let cap = if cap == i32::MAX { cap } else { cap.div_euclid(2) };
-    let (d, quantum) = differences(others.map(|s| &s.p), &origin.p, cap);
+    let range = WeightRange::of(&weights).with(origin.w);
+    let (d, quantum) = differences(others.map(|s| &s.p), &origin.p, range.quantum_cap());
     let unit = 2 * quantum;
-    let below = |limit: i32| top == i32::MIN || top - unit <= limit;
     let w = (origin.w, weights);
     match d {
-        Differences::One(d) if below(122) => {
-            evaluate::<F, K, 1, 2, 3, 4, 6, 8>(&lengthen(&d), w, unit)
+        Differences::One(d) if range.fits(122, unit) => {
+            evaluate::<F, K, 1, 2, 3, 4, 6, 8>(&widen(&d), w, unit)
         }
-        Differences::One(d) if below(250) => {
-            evaluate::<F, K, 2, 4, 6, 8, 12, 16>(&lengthen(&d), w, unit)
-        }
-        Differences::Two(d) if below(250) => {
+        Differences::One(d) if range.fits(250, unit) => {
             evaluate::<F, K, 2, 4, 6, 8, 12, 16>(&widen(&d), w, unit)
         }
-        Differences::One(d) => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&lengthen(&d), w, unit),
-        Differences::Two(d) => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&widen(&d), w, unit),
-        Differences::Any(d) => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&d, w, unit),
+        Differences::Two(d) if range.fits(250, unit) => {
+            evaluate::<F, K, 2, 4, 6, 8, 12, 16>(&widen(&d), w, unit)
+        }
+        d => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&d.into_wide(), w, unit),
     }
-}
-
-fn lengthen<const K: usize, const N: usize>(d: &[[i64; 3]; K]) -> [[Wide<N>; 3]; K] {
-    d.map(|p| p.map(|x| Wide::from_i128(x.into())))
 }
 
 fn evaluate<
@@ -233,14 +218,9 @@ fn evaluate<
     let w: Wide<D2> = to_wide(w, unit);
     let mut l = [w; K];
     for i in 0..K {
-        l[i] = dot_wide::<D, D2>(&d[i], &d[i]).add(w).sub(to_wide(weights[i], unit));
+        l[i] = exact::dot::<D, D2>(&d[i], &d[i]).add(w).sub(to_wide(weights[i], unit));
     }
     F::sign::<D, D2, D3, D4, D6, D8>(d, &l, w)
-}
-
-#[inline]
-fn dot_wide<const D: usize, const D2: usize>(a: &[Wide<D>; 3], b: &[Wide<D>; 3]) -> Wide<D2> {
-    a[0].mul::<D, D2>(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
 }
 
 #[inline]
@@ -256,142 +236,72 @@ fn twice<const N: usize>(a: Wide<N>) -> Wide<N> {
     a.add(a)
 }
 
-struct TetrahedronSize;
+/// A form by its polynomial, in which the widths of integers are in scope by degree.
+macro_rules! form {
+    ($name:ident, $k:literal, |$d:pat_param, $l:pat_param, $w:pat_param| $value:expr) => {
+        struct $name;
 
-impl Form<3> for TetrahedronSize {
-    fn sign<
-        const D: usize,
-        const D2: usize,
-        const D3: usize,
-        const D4: usize,
-        const D6: usize,
-        const D8: usize,
-    >(
-        [a, b, c]: &[[Wide<D>; 3]; 3],
-        l: &[Wide<D2>; 3],
-        w: Wide<D2>,
-    ) -> Sign {
-        let normals: [[Wide<D2>; 3]; 3] = [cross_wide(b, c), cross_wide(c, a), cross_wide(a, b)];
-        let n: [Wide<D4>; 3] = [0, 1, 2].map(|k| {
-            let term = |i: usize| normals[i][k].mul::<D2, D4>(l[i]);
-            term(0).add(term(1)).add(term(2))
-        });
-        let n2: Wide<D8> = dot_wide(&n, &n);
-        let row = |k: usize| normals[0][k].mul::<D, D3>(a[k]);
-        let det = row(0).add(row(1)).add(row(2));
-        let det2: Wide<D6> = det.mul(det);
-        n2.sub(det2.mul(twice(twice(w)))).sign()
-    }
+        impl Form<$k> for $name {
+            fn sign<
+                const D: usize,
+                const D2: usize,
+                const D3: usize,
+                const D4: usize,
+                const D6: usize,
+                const D8: usize,
+            >(
+                $d: &[[Wide<D>; 3]; $k],
+                $l: &[Wide<D2>; $k],
+                $w: Wide<D2>,
+            ) -> Sign {
+                $value.sign()
+            }
+        }
+    };
 }
 
-struct TriangleSize;
+form!(TetrahedronSize, 3, |[a, b, c], l, w| {
+    let normals: [[Wide<D2>; 3]; 3] = [cross_wide(b, c), cross_wide(c, a), cross_wide(a, b)];
+    let n: [Wide<D4>; 3] =
+        [0, 1, 2].map(|k| exact::dot(&[normals[0][k], normals[1][k], normals[2][k]], l));
+    let n2: Wide<D8> = exact::dot(&n, &n);
+    let [x, y, z] = [0, 1, 2].map(|k| normals[0][k].mul::<D, D3>(a[k]));
+    let det = x.add(y).add(z);
+    let det2: Wide<D6> = det.mul(det);
+    n2.sub(det2.mul(twice(twice(w))))
+});
 
-impl Form<2> for TriangleSize {
-    fn sign<
-        const D: usize,
-        const D2: usize,
-        const D3: usize,
-        const D4: usize,
-        const D6: usize,
-        const D8: usize,
-    >(
-        [a, b]: &[[Wide<D>; 3]; 2],
-        [l, m]: &[Wide<D2>; 2],
-        w: Wide<D2>,
-    ) -> Sign {
-        let (aa, bb, ab): (Wide<D2>, Wide<D2>, Wide<D2>) =
-            (dot_wide(a, a), dot_wide(b, b), dot_wide(a, b));
-        let nu: Wide<D4> = aa.mul::<D2, D4>(bb).sub(ab.mul(ab));
-        let squares: Wide<D6> =
-            l.mul::<D2, D4>(*l).mul::<D2, D6>(bb).add(m.mul::<D2, D4>(*m).mul(aa));
-        let mixed: Wide<D6> = l.mul::<D2, D4>(*m).mul(ab);
-        squares.sub(twice(mixed)).sub(nu.mul(twice(twice(w)))).sign()
-    }
-}
+form!(TriangleSize, 2, |[a, b], [l, m], w| {
+    let (aa, bb, ab): (Wide<D2>, Wide<D2>, Wide<D2>) =
+        (exact::dot(a, a), exact::dot(b, b), exact::dot(a, b));
+    let nu: Wide<D4> = aa.mul::<D2, D4>(bb).sub(ab.mul(ab));
+    let squares: Wide<D6> = l.mul::<D2, D4>(*l).mul::<D2, D6>(bb).add(m.mul::<D2, D4>(*m).mul(aa));
+    let mixed: Wide<D6> = l.mul::<D2, D4>(*m).mul(ab);
+    let size: Wide<D6> = squares.sub(twice(mixed)).sub(nu.mul(twice(twice(w))));
+    size
+});
 
-struct EdgeSize;
+form!(EdgeSize, 1, |[a], [l], w| {
+    let aa: Wide<D2> = exact::dot(a, a);
+    l.mul::<D2, D4>(*l).sub(aa.mul(twice(twice(w))))
+});
 
-impl Form<1> for EdgeSize {
-    fn sign<
-        const D: usize,
-        const D2: usize,
-        const D3: usize,
-        const D4: usize,
-        const D6: usize,
-        const D8: usize,
-    >(
-        [a]: &[[Wide<D>; 3]; 1],
-        [l]: &[Wide<D2>; 1],
-        w: Wide<D2>,
-    ) -> Sign {
-        let aa: Wide<D2> = dot_wide(a, a);
-        l.mul::<D2, D4>(*l).sub(aa.mul(twice(twice(w)))).sign()
-    }
-}
+form!(TriangleClearance, 3, |[a, b, v], [l, m, lv], _| {
+    let (aa, bb, ab): (Wide<D2>, Wide<D2>, Wide<D2>) =
+        (exact::dot(a, a), exact::dot(b, b), exact::dot(a, b));
+    let (av, bv): (Wide<D2>, Wide<D2>) = (exact::dot(a, v), exact::dot(b, v));
+    let nu: Wide<D4> = aa.mul::<D2, D4>(bb).sub(ab.mul(ab));
+    let along_a: Wide<D4> = l.mul::<D2, D4>(bb).sub(m.mul(ab));
+    let along_b: Wide<D4> = m.mul::<D2, D4>(aa).sub(l.mul(ab));
+    nu.mul::<D2, D6>(*lv).sub(along_a.mul(av)).sub(along_b.mul(bv))
+});
 
-struct TriangleClearance;
+form!(EdgeClearance, 2, |[a, v], [l, lv], _| {
+    let (aa, av): (Wide<D2>, Wide<D2>) = (exact::dot(a, a), exact::dot(a, v));
+    lv.mul::<D2, D4>(aa).sub(l.mul(av))
+});
 
-impl Form<3> for TriangleClearance {
-    fn sign<
-        const D: usize,
-        const D2: usize,
-        const D3: usize,
-        const D4: usize,
-        const D6: usize,
-        const D8: usize,
-    >(
-        [a, b, v]: &[[Wide<D>; 3]; 3],
-        [l, m, lv]: &[Wide<D2>; 3],
-        _: Wide<D2>,
-    ) -> Sign {
-        let (aa, bb, ab): (Wide<D2>, Wide<D2>, Wide<D2>) =
-            (dot_wide(a, a), dot_wide(b, b), dot_wide(a, b));
-        let (av, bv): (Wide<D2>, Wide<D2>) = (dot_wide(a, v), dot_wide(b, v));
-        let nu: Wide<D4> = aa.mul::<D2, D4>(bb).sub(ab.mul(ab));
-        let along_a: Wide<D4> = l.mul::<D2, D4>(bb).sub(m.mul(ab));
-        let along_b: Wide<D4> = m.mul::<D2, D4>(aa).sub(l.mul(ab));
-        nu.mul::<D2, D6>(*lv).sub(along_a.mul(av)).sub(along_b.mul(bv)).sign()
-    }
-}
-
-struct EdgeClearance;
-
-impl Form<2> for EdgeClearance {
-    fn sign<
-        const D: usize,
-        const D2: usize,
-        const D3: usize,
-        const D4: usize,
-        const D6: usize,
-        const D8: usize,
-    >(
-        [a, v]: &[[Wide<D>; 3]; 2],
-        [l, lv]: &[Wide<D2>; 2],
-        _: Wide<D2>,
-    ) -> Sign {
-        let (aa, av): (Wide<D2>, Wide<D2>) = (dot_wide(a, a), dot_wide(a, v));
-        lv.mul::<D2, D4>(aa).sub(l.mul(av)).sign()
-    }
-}
-
-struct VertexClearance;
-
-impl Form<1> for VertexClearance {
-    fn sign<
-        const D: usize,
-        const D2: usize,
-        const D3: usize,
-        const D4: usize,
-        const D6: usize,
-        const D8: usize,
-    >(
-        _: &[[Wide<D>; 3]; 1],
-        [lv]: &[Wide<D2>; 1],
-        _: Wide<D2>,
-    ) -> Sign {
-        lv.sign()
-    }
-}
+form!(VertexClearance, 1, |_, [lv], _| lv);
 
 #[cfg(test)]
 mod tests {

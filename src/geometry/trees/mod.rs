@@ -463,10 +463,11 @@ where
 pub fn morton_order(points: &[Vec3]) -> Vec<(u64, u32)> {
     let Bounds { lo, hi } = Bounds::of_points(points.iter().copied());
     let scale = (hi - lo).map(|extent| if extent > 0.0 { (1 << 21) as f64 / extent } else { 0.0 });
-    let code = |p: Vec3| morton_code((p - lo) * scale);
     // The index breaks ties, so that an unstable parallel sort has one result.
-    let mut order: Vec<(u64, u32)> =
-        (0..points.len()).into_par_iter().map(|i| (code(points[i]), i as u32)).collect();
+    let mut order: Vec<(u64, u32)> = (0..points.len())
+        .into_par_iter()
+        .map(|i| (morton_code((points[i] - lo) * scale), i as u32))
+        .collect();
     order.par_sort_unstable();
     order
 }

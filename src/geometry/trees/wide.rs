@@ -112,8 +112,8 @@ impl WideTree {
     }
 
     /// Collapses a tree in the frame of a box around its own. Boxes no larger than `least` half
-    /// sides of the frame are leaves, whatever they hold. `each` is told the children of every node,
-    /// up to four, in the order of the nodes.
+    /// sides of the frame are leaves, whatever they hold. `each` gets the children of every node, up to
+    /// four, in the order of the nodes.
     pub(super) fn within(
         tree: &Tree,
         frame: Bounds,
@@ -315,21 +315,19 @@ impl Node {
 
 /// Up to four descendants of an inner node, from left to right.
 fn descendants(tree: &Tree, index: usize) -> Vec<usize> {
-    let pair = |index: usize| {
-        let first = tree.nodes[index].first as usize;
-        [first, first + 1]
-    };
-    let mut children = pair(index).to_vec();
+    let first = tree.nodes[index].first as usize;
+    let mut children = vec![first, first + 1];
     while children.len() < 4 {
-        let area = |&child: &usize| tree.nodes[child].bounds.half_area(0.0);
-        let inner = |child: &usize| tree.nodes[*child].count == 0;
+        // The largest box is the likeliest to be entered, so its children spare the most steps.
         let largest = (0..children.len())
-            .filter(|&k| inner(&children[k]))
-            .max_by(|&a, &b| area(&children[a]).total_cmp(&area(&children[b])));
-        let Some(largest) = largest else {
+            .map(|k| (k, &tree.nodes[children[k]]))
+            .filter(|(_, child)| child.count == 0)
+            .map(|(k, child)| (k, child.first as usize, child.bounds.half_area(0.0)))
+            .max_by(|a, b| a.2.total_cmp(&b.2));
+        let Some((k, first, _)) = largest else {
             break;
         };
-        children.splice(largest..=largest, pair(children[largest]));
+        children.splice(k..=k, [first, first + 1]);
     }
     children
 }
@@ -373,19 +371,19 @@ impl ReachTree {
     /// Collapses a tree over boxes of centres whose reaches are radii. All balls are within `frame`.
     pub fn new(tree: &Tree, frame: Bounds) -> Self {
         let mut radii = Vec::new();
-        let mut each = |children: &[&super::Node]| {
-            radii.push([0, 1].map(|k| {
-                let mut of = [0.0; 4];
-                for (radius, child) in of.iter_mut().zip(children) {
-                    *radius = if k == 0 { child.reach } else { child.least_reach };
-                }
-                of
-            }));
-        };
-        let wide = WideTree::within(tree, frame, CLUSTER, &mut each);
+        let wide = WideTree::within(tree, frame, CLUSTER, |children: &[&super::Node]| {
+            // Lanes without a child have an empty box, so any radius will do.
+            let mut of = [[0.0; 4]; 2];
+            for (lane, child) in children.iter().enumerate() {
+                (of[0][lane], of[1][lane]) = (child.reach, child.least_reach);
+            }
+            radii.push(of);
+        });
         let scale = wide.frame().scale;
-        let scaled = |of: [f64; 4]| Lanes::from(of.map(|radius| (radius * scale) as f32));
-        Self { wide, radii: radii.into_iter().map(|pair| pair.map(scaled)).collect() }
+        let scaled = radii
+            .into_iter()
+            .map(|pair| pair.map(|of| Lanes::from(of.map(|radius| (radius * scale) as f32))));
+        Self { wide, radii: scaled.collect() }
     }
 
     /// The tree over the boxes alone.
@@ -412,18 +410,19 @@ impl ReachTree {
         limit: f32,
         visit: impl FnMut(usize, f32) -> f32,
     ) {
-        let bounds = |place: usize| {
-            let (node, [largest, smallest]) = (self.wide.node(place), &self.radii[place]);
-            let outside = node.distance_squared(query).sqrt() - *largest;
-            match measure {
-                Measure::Signed => outside,
-                // Each hull holds its largest ball, whose centre is in the box.
-                Measure::Unsigned => {
-                    outside.fast_max(*smallest - node.farthest_squared(query).sqrt())
-                }
-            }
-        };
-        self.wide.search(limit, bounds, visit);
+        self.wide.search(limit, |place| self.bounds(place, query, measure), visit);
+    }
+
+    /// Lower bounds of the distances to the hulls below the children of a node.
+    #[inline]
+    fn bounds(&self, place: usize, query: &Query, measure: Measure) -> Lanes {
+        let (node, [largest, smallest]) = (self.wide.node(place), &self.radii[place]);
+        let outside = node.distance_squared(query).sqrt() - *largest;
+        match measure {
+            Measure::Signed => outside,
+            // Each hull holds its largest ball, whose centre is in the box.
+            Measure::Unsigned => outside.fast_max(*smallest - node.farthest_squared(query).sqrt()),
+        }
     }
 }
 

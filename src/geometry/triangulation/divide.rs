@@ -204,9 +204,11 @@ impl<'s, M: Metric> Builder<'s, M> {
     fn divide(&mut self, cut: Cut, range: &Range<u32>) -> ([Part<'s, M>; 2], Vec<Place>) {
         let (places, counts) = self.places(cut);
         let parts = [0, 1].map(|part| {
-            let position = |v: u32| Vec3::from_array(self.sites[v as usize].p);
-            let sites: Vec<u32> =
-                range.clone().filter(|v: &u32| cut.is_below(position(*v)) == (part == 0)).collect();
+            let sites = range.clone().filter(|&v| {
+                let position = Vec3::from_array(self.sites[v as usize].p);
+                cut.is_below(position) == (part == 0)
+            });
+            let sites: Vec<u32> = sites.collect();
             let mut builder = Self::new(self.sites, self.filter, 0);
             let hints = self.hints(part, &sites, &places);
             builder.last = counts[part].min(1);
@@ -390,8 +392,9 @@ fn decisive(cells: &[Cell], cell: u32) -> &Cell {
 fn approximate_orthocentre(s: [&Site; 4]) -> Vec3 {
     let [a, b, c, d] = s.map(|s| Vec3::from_array(s.p));
     let [u, v, w] = [b - a, c - a, d - a];
-    let lift = |e: Vec3, site: &Site| e.length_squared() + (s[0].w - site.w);
+    let [l, m, n] = [(u, s[1]), (v, s[2]), (w, s[3])]
+        .map(|(edge, site)| edge.length_squared() + (s[0].w - site.w));
     let (vw, wu, uv) = (v.cross(w), w.cross(u), u.cross(v));
-    let scaled = lift(u, s[1]) * vw + lift(v, s[2]) * wu + lift(w, s[3]) * uv;
+    let scaled = l * vw + m * wu + n * uv;
     a + scaled / (2.0 * u.dot(vw))
 }

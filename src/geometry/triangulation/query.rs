@@ -228,11 +228,10 @@ impl Triangulation {
         let vertices = self.vertices(cell);
         let distinct = (0..4).all(|i| (0..i).all(|j| vertices[i] != vertices[j]));
         let last = vertices[3] == VertexId::INFINITE;
-        let known = |v: VertexId| self.is_vertex(v);
         if distinct
             && last == self.is_infinite(cell)
-            && vertices[..3].iter().all(|&v| known(v))
-            && (last || known(vertices[3]))
+            && vertices[..3].iter().all(|&v| self.is_vertex(v))
+            && (last || self.is_vertex(vertices[3]))
         {
             Ok(())
         } else {
@@ -280,9 +279,8 @@ impl Triangulation {
         sites: &[Site],
         filter: Filter,
     ) -> Result<(), Violation> {
-        let site = |v: VertexId| &sites[v.index()];
         for cell in self.finite_cells() {
-            let [a, b, c, d] = self.vertices(cell).map(|v| &site(v).p);
+            let [a, b, c, d] = self.vertices(cell).map(|v| &sites[v.index()].p);
             let sign = filter.orient3d(a, b, c, d);
             if sign != Sign::Positive {
                 return Err(Violation::Orientation { cell, sign });
@@ -294,7 +292,7 @@ impl Triangulation {
                 let mirror = self.mirror(facet);
                 let across = self.vertices(mirror.cell)[mirror.opposite];
                 if across != VertexId::INFINITE
-                    && self.conflicts::<M>(sites, filter, cell, site(across))
+                    && self.conflicts::<M>(sites, filter, cell, &sites[across.index()])
                 {
                     return Err(Violation::Regularity { facet });
                 }
