@@ -165,16 +165,23 @@ pub fn union_surface_while(
     let mut grid = cube_around(&union, longest);
     let sizes: Vec<f64> = (0..=MAX_BISECTIONS).map(|g| grid.longest_edge(g)).collect();
     let goal = sizes.iter().position(|&s| s <= longest).unwrap_or(sizes.len() - 1) as u8;
-    let wanted = |leaf: &Leaf, values: [Value; 4]| {
-        let size = sizes[usize::from(leaf.generation)];
-        let radius = values.iter().map(|v| v.radius).fold(f64::INFINITY, f64::min);
-        size > longest.min(radius.max(smallest)) && values.iter().all(|v| v.signed.abs() <= size)
-    };
-    let values = |points: &[Vec3]| {
-        let found = union.deepest_ball_batch(points).into_iter();
-        found.map(|(signed, radius)| Value { signed, radius }).collect()
-    };
-    grid.refine(goal, most, values, wanted, &mut go_on).map_err(|unfinished| match unfinished {
+    let refined = grid.refine(
+        goal,
+        most,
+        |points: &[Vec3]| {
+            let found = union.deepest_ball_batch(points).into_iter();
+            found.map(|(signed, radius)| Value { signed, radius }).collect()
+        },
+        |leaf: &Leaf, values: [Value; 4]| {
+            let size = sizes[usize::from(leaf.generation)];
+            let radius = values.iter().map(|v| v.radius).fold(f64::INFINITY, f64::min);
+            // A vertex farther from the boundary than the longest edge: the boundary is not in the leaf.
+            size > longest.min(radius.max(smallest))
+                && values.iter().all(|v| v.signed.abs() <= size)
+        },
+        &mut go_on,
+    );
+    refined.map_err(|unfinished| match unfinished {
         Unfinished::TooMany { generation, leaves } => {
             // Feasible even if everything is thin and refined as far as possible.
             let size = sizes[usize::from(generation)] / MIN_SHARE_OF_CELL;
@@ -238,46 +245,60 @@ const MAX_STEPS: usize = 60;
 
 /// The surface, and for each of its vertices the length of the edge that it is on.
 fn march(grid: &Bisection, union: &MedialUnion) -> (TriMesh, Vec<f64>) {
-    let inside = |v: u32| grid.values[v as usize].signed < 0.0;
-    let is_mixed = |leaf: &&Leaf| {
-        let count = leaf.vertices.iter().filter(|&&v| inside(v)).count();
-        count != 0 && count != 4
-    };
-    let mixed: Vec<&Leaf> = grid.leaves.iter().filter(is_mixed).collect();
-    let crossings = |leaf: &&Leaf| {
-        let v = leaf.vertices;
-        let pairs = PAIRS.map(|[i, j, ..]| (v[i], v[j]));
-        pairs.into_iter().filter(|&(a, b)| inside(a) != inside(b)).map(|(a, b)| edge_key(a, b))
-    };
-    let mut edges: Vec<u64> = mixed.par_iter().flat_map_iter(crossings).collect();
+    let mixed: Vec<&Leaf> = grid
+        .leaves
+        .iter()
+        .filter(|leaf| {
+            let count = leaf.vertices.iter().filter(|&&v| grid.is_inside(v)).count();
+            count != 0 && count != 4
+        })
+        .collect();
+    let mut edges: Vec<u64> = mixed
+        .par_iter()
+        .flat_map_iter(|leaf| {
+            let v = leaf.vertices;
+            let pairs = PAIRS.map(|[i, j, ..]| (v[i], v[j])).into_iter();
+            pairs
+                .filter(|&(a, b)| grid.is_inside(a) != grid.is_inside(b))
+                .map(|(a, b)| edge_key(a, b))
+        })
+        .collect();
+    // Sorted keys number the vertices: the same numbers for any number of threads.
     edges.par_sort_unstable();
     edges.dedup();
-    let meet = |near: &mut usize, &key: &u64| {
-        let ends = [(key >> 32) as u32, key as u32];
-        let [a, b] = ends.map(|v| grid.position(v));
-        let values = ends.map(|v| grid.values[v as usize].signed);
-        (crossing(union, near, [a, b], values), a.distance(b))
-    };
     let chunks = edges.par_iter().with_min_len(1 << 8);
-    let found: Vec<(Vec3, f64)> = chunks.map_init(|| 0, meet).collect();
+    let found: Vec<(Vec3, f64)> = chunks
+        .map_init(
+            || 0,
+            |near: &mut usize, &key: &u64| {
+                let ends = [(key >> 32) as u32, key as u32];
+                let [a, b] = ends.map(|v| grid.position(v));
+                let values = ends.map(|v| grid.values[v as usize].signed);
+                (crossing(union, near, [a, b], values), a.distance(b))
+            },
+        )
+        .collect();
     let vertices: Vec<Vec3> = found.iter().map(|f| f.0).collect();
-    let vertex = |a: u32, b: u32| {
-        edges.binary_search(&edge_key(a, b)).expect("listed, its ends are on different sides")
-            as u32
-    };
-    let triangles = |leaf: &&Leaf| {
-        let x = leaf.vertices;
-        let (polygon, corners) = polygon(x.map(inside));
-        let mut ring =
-            polygon.map(|(i, j)| if corners == 3 && i == j { 0 } else { vertex(x[i], x[j]) });
-        let ring = &mut ring[..corners];
-        let [a, b, c, d] = x.map(|v| grid.position(v));
-        if (b - a).cross(c - a).dot(d - a) < 0.0 {
-            ring.reverse();
-        }
-        cut(ring, &vertices)
-    };
-    let faces = mixed.par_iter().with_min_len(1 << 10).flat_map_iter(triangles).collect();
+    let faces = mixed
+        .par_iter()
+        .with_min_len(1 << 10)
+        .flat_map_iter(|leaf| {
+            let x = leaf.vertices;
+            let (polygon, corners) = polygon(x.map(|v| grid.is_inside(v)));
+            let mut ring = [0; 4];
+            for (vertex, (i, j)) in ring.iter_mut().zip(polygon).take(corners) {
+                let place = edges.binary_search(&edge_key(x[i], x[j]));
+                *vertex = place.expect("listed, its ends are on different sides") as u32;
+            }
+            let ring = &mut ring[..corners];
+            // `polygon` assumes a positive tetrahedron; bisection makes both orientations.
+            let [a, b, c, d] = x.map(|v| grid.position(v));
+            if (b - a).cross(c - a).dot(d - a) < 0.0 {
+                ring.reverse();
+            }
+            cut(ring, &vertices)
+        })
+        .collect();
     (TriMesh { vertices, faces }, found.iter().map(|f| f.1).collect())
 }
 
@@ -307,8 +328,8 @@ fn cut(ring: &[u32], vertices: &[Vec3]) -> Vec<[u32; 3]> {
         return vec![[a, b, c]];
     }
     let [a, b, c, d] = [ring[0], ring[1], ring[2], ring[3]];
-    let length = |a: u32, b: u32| vertices[a as usize].distance_squared(vertices[b as usize]);
-    if length(a, c) <= length(b, d) {
+    let [p, q, r, s] = [a, b, c, d].map(|v| vertices[v as usize]);
+    if p.distance_squared(r) <= q.distance_squared(s) {
         vec![[a, b, c], [a, c, d]]
     } else {
         vec![[a, b, d], [b, c, d]]
@@ -487,13 +508,15 @@ impl Bisection {
                 }
                 self.values.extend(values(chunk));
             }
-            let is_split = |leaf: &Leaf| {
-                let may = leaf.generation < MAX_BISECTIONS;
-                let wanted = !leaf.settled && may && wanted(leaf, self.values_of(leaf));
-                (wanted || self.has_hanging_vertex(leaf), wanted)
-            };
             let chunks = self.leaves.par_iter().with_min_len(1 << 12);
-            let split: Vec<(bool, bool)> = chunks.map(is_split).collect();
+            let split: Vec<(bool, bool)> = chunks
+                .map(|leaf| {
+                    let wanted = !leaf.settled
+                        && leaf.generation < MAX_BISECTIONS
+                        && wanted(leaf, leaf.vertices.map(|v| self.values[v as usize]));
+                    (wanted || self.has_hanging_vertex(leaf), wanted)
+                })
+                .collect();
             let more = split.iter().filter(|s| s.0).count();
             if more == 0 {
                 return Ok(());
@@ -546,8 +569,7 @@ impl Bisection {
         pairs.iter().any(|&(i, j)| {
             let (a, b) = (leaf.vertices[i], leaf.vertices[j]);
             // An edge tested before can have got a middle vertex only in the last round.
-            let is_new = |v: u32| self.bisected_in[v as usize] == self.round;
-            if !(leaf.fresh || is_new(a) && is_new(b)) {
+            if !leaf.fresh && [a, b].iter().any(|&v| self.bisected_in[v as usize] != self.round) {
                 return false;
             }
             // Ends one step apart have no grid point between them.
@@ -572,9 +594,8 @@ impl Bisection {
         vertex
     }
 
-    /// The values at the vertices of a tetrahedron.
-    fn values_of(&self, leaf: &Leaf) -> [Value; 4] {
-        leaf.vertices.map(|v| self.values[v as usize])
+    fn is_inside(&self, vertex: u32) -> bool {
+        self.values[vertex as usize].signed < 0.0
     }
 }
 

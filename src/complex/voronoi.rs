@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
+use super::mesh::ascending_edge;
 use super::{Contacts, MedialMesh, Sphere};
 use crate::Vec3;
 use crate::geometry::trees::morton_order;
@@ -65,11 +66,14 @@ impl CellSpheres {
             .zip(&sides)
             .map(|(&c, &side)| side == Side::Inside && surface.any_within(c, GUARD_BAND))
             .collect();
+        // Only cells with a circumsphere have a side: the two lists advance at different rates.
         let mut verdicts = sides.iter().zip(&near);
-        let inside = |(&side, &near): (&Side, &bool)| side == Side::Inside && !near;
         let is_inside: Vec<bool> = circumspheres
             .iter()
-            .map(|sphere| sphere.is_some() && verdicts.next().is_some_and(inside))
+            .map(|sphere| {
+                sphere.is_some()
+                    && verdicts.next().is_some_and(|(&side, &near)| side == Side::Inside && !near)
+            })
             .collect();
         let in_guard_band = near.iter().filter(|&&near| near).count();
         let cells = delaunay.triangulation().finite_cells().zip(&circumspheres);
@@ -121,15 +125,13 @@ pub fn voronoi_medial_mesh(
 ) -> MedialMesh {
     let triangulation = delaunay.triangulation();
     let kept = &cells.kept;
-    let sphere_of_cell = cells.sphere_ids(triangulation.cell_count());
+    let sphere_of_cell = &cells.sphere_ids(triangulation.cell_count());
     let spheres: Vec<Sphere> = cells.inner_spheres().collect();
-    let sphere = |cell: CellId| sphere_of_cell[cell.index()];
-
     let edges = kept.par_iter().flat_map_iter(|&cell| {
         let neighbours = triangulation.neighbours(cell).into_iter();
         neighbours
             .filter(move |&other| other > cell && cells.is_inside(other))
-            .map(move |other| [sphere(cell), sphere(other)])
+            .map(move |other| [cell, other].map(|cell| sphere_of_cell[cell.index()]))
     });
     let all: Vec<u32> = (0..facets.len() as u32).collect();
     let faces = facets.triangles(&all, &spheres, dual);
@@ -192,15 +194,15 @@ fn planar_delaunay(polygon: &[u32], spheres: &[Sphere]) -> Option<Vec<[u32; 3]>>
 
 /// Whether the sides of a polygon are just the edges that have a single triangle.
 fn bounded_by(triangles: &[[u32; 3]], polygon: &[u32]) -> bool {
-    let ordered = |a: u32, b: u32| [a.min(b), a.max(b)];
     let mut edges: Vec<[u32; 2]> = triangles
         .iter()
-        .flat_map(|&[a, b, c]| [ordered(a, b), ordered(b, c), ordered(a, c)])
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [a, c]].map(ascending_edge))
         .collect();
     edges.sort_unstable();
     let single = edges.chunk_by(|a, b| a == b).filter(|run| run.len() == 1).map(|run| run[0]);
-    let mut sides: Vec<[u32; 2]> =
-        (0..polygon.len()).map(|k| ordered(polygon[k], polygon[(k + 1) % polygon.len()])).collect();
+    let mut sides: Vec<[u32; 2]> = (0..polygon.len())
+        .map(|k| ascending_edge([polygon[k], polygon[(k + 1) % polygon.len()]]))
+        .collect();
     sides.sort_unstable();
     single.eq(sides)
 }

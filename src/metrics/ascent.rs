@@ -149,10 +149,12 @@ impl Start<'_> {
     /// the order of the pose's curve, which depends neither on numbering nor on orientation.
     fn pick(&self) -> Vec<Summit> {
         let grain = GAIN * self.pose.diameter();
-        let rank =
-            |k: usize| ((-self.values[k] / grain).round(), self.pose.place_of(self.points[k]));
-        let mut ranked: Vec<_> =
-            self.largest().into_iter().map(|k| (rank(k), self.peak(k))).collect();
+        let mut ranked: Vec<_> = self
+            .largest()
+            .into_iter()
+            .map(|k| Summit { point: self.points[k], value: self.values[k] })
+            .map(|peak| (((-peak.value / grain).round(), self.pose.place_of(peak.point)), peak))
+            .collect();
         ranked.sort_by(|((a, at), _), ((b, other), _)| a.total_cmp(b).then_with(|| at.cmp(other)));
         let mut seeds: Vec<Summit> = Vec::with_capacity(self.seeds);
         for (_, peak) in ranked {
@@ -179,10 +181,6 @@ impl Start<'_> {
             order.retain(|&k| values[k] >= least);
         }
         order
-    }
-
-    fn peak(&self, k: usize) -> Summit {
-        Summit { point: self.points[k], value: self.values[k] }
     }
 }
 
@@ -270,8 +268,10 @@ impl<'a> PeakSearch<'a> {
         let pose = &samples.pose;
         let mut sigma = union.signed_batch(&samples.points);
         sigma.iter_mut().for_each(|value| *value = value.abs());
-        let value = |p, near: &mut usize| union.signed_from(p, near).abs();
-        let forward = ascend(&OnMesh { mesh: tree, value }, &samples.start(&sigma));
+        let forward = ascend(
+            &OnMesh { mesh: tree, value: |p, near: &mut usize| union.signed_from(p, near).abs() },
+            &samples.start(&sigma),
+        );
         let envelope = EnvelopeOptions {
             samples: options.envelope_samples,
             burial: BURIAL * pose.diameter(),

@@ -150,7 +150,6 @@ impl AxisParts {
         if mesh.spheres.is_empty() {
             return Err(UnionError::Empty.into());
         }
-        let point = |v: u32| lifted(&mesh.spheres[v as usize]);
         let mut with_face = vec![false; mesh.edges.len()];
         for &[a, b, c] in &mesh.faces {
             for side in [[a, b], [a, c], [b, c]] {
@@ -165,13 +164,15 @@ impl AxisParts {
         }
         let lone = mesh.edges.iter().zip(with_face).filter(|&(_, with)| !with);
         Ok(Self {
-            triangles: mesh.faces.iter().map(|f| f.map(point)).collect(),
-            segments: lone.map(|(e, _)| e.map(point)).collect(),
-            spheres: mesh.spheres.iter().map(lifted).collect(),
-            isolated: (0..)
+            triangles: mesh.faces.iter().map(|&f| mesh.spheres_of(f).map(lifted)).collect(),
+            segments: lone.map(|(&e, _)| mesh.spheres_of(e).map(lifted)).collect(),
+            spheres: mesh.spheres.iter().copied().map(lifted).collect(),
+            isolated: mesh
+                .spheres
+                .iter()
                 .zip(&with_edge)
                 .filter(|&(_, &with)| !with)
-                .map(|(v, _)| point(v))
+                .map(|(&sphere, _)| lifted(sphere))
                 .collect(),
         })
     }
@@ -285,7 +286,7 @@ fn length([a, b]: &[DVec4; 2]) -> f64 {
 const MIN_SINE_SQUARED: f64 = 1e-24;
 
 /// The sphere as a point.
-pub(super) fn lifted(sphere: &Sphere) -> DVec4 {
+fn lifted(sphere: Sphere) -> DVec4 {
     sphere.centre.extend(sphere.radius)
 }
 

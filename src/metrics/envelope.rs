@@ -229,8 +229,8 @@ fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
     let [x, y, _] = axes;
     // Below one half, so that one of two orthogonal axes always qualifies; not a simple fraction, so
     // that rounding does not decide for symmetric shapes.
-    let is_across = |axis: Vec3| axis.reject_from_normalized(frame.u).length_squared() > 0.2137;
-    frame.across(if is_across(x) { x } else { y }).unwrap_or(frame.v)
+    let is_across = x.reject_from_normalized(frame.u).length_squared() > 0.2137;
+    frame.across(if is_across { x } else { y }).unwrap_or(frame.v)
 }
 
 /// Uniform over all rotations (Shoemake 1992, "Uniform random rotations", Graphics Gems III).

@@ -240,15 +240,15 @@ impl Summary {
         let count = values.len().max(1) as f64;
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
-        let rank = |share: f64| {
+        let [p95, p99] = [0.95, 0.99].map(|share: f64| {
             let rank = ((share * count).ceil() as usize).clamp(1, values.len().max(1));
             sorted.get(rank - 1).copied().unwrap_or(0.0)
-        };
+        });
         Self {
             mean: values.iter().sum::<f64>() / count,
             rms: (values.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
-            p95: rank(0.95),
-            p99: rank(0.99),
+            p95,
+            p99,
         }
     }
 }
@@ -338,17 +338,14 @@ pub(super) fn surface_distances_from(
         highest(tree, &on_surface.start(&there), |p, near| distance_from(&other_tree, p, near));
     let reverse =
         highest(&other_tree, &on_other.start(&back), |p, near| distance_from(tree, p, near));
-    let mean = |values: &[f64], power: i32| {
-        values.iter().map(|v| v.powi(power)).sum::<f64>() / values.len().max(1) as f64
-    };
-    let uniform = &there[..on_surface.uniform];
+    let uniform = Summary::new(&there[..on_surface.uniform]);
     Ok(SurfaceDistances {
         forward,
         reverse,
         hausdorff: forward.max(reverse),
-        mean: mean(uniform, 1),
-        rms: mean(uniform, 2).sqrt(),
-        reverse_mean: mean(&back[..on_other.uniform], 1),
+        mean: uniform.mean,
+        rms: uniform.rms,
+        reverse_mean: Summary::new(&back[..on_other.uniform]).mean,
         samples: there.len(),
         reverse_samples: back.len(),
     })

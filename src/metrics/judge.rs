@@ -527,11 +527,10 @@ pub fn triangle_quality(mesh: &MedialMesh) -> TriangleQuality {
     let angles: Vec<[f64; 2]> =
         mesh.faces.iter().filter_map(|face| extreme_angles(corners(mesh, face))).collect();
     let share = |n: f64| (!angles.is_empty()).then(|| n / angles.len() as f64);
-    let mean = |which: usize| share(angles.iter().map(|extremes| extremes[which]).sum());
     let below = |limit: f64| share(angles.iter().filter(|[min, _]| *min < limit).count() as f64);
     TriangleQuality {
-        min_angle_mean: mean(0),
-        max_angle_mean: mean(1),
+        min_angle_mean: share(angles.iter().map(|[min, _]| min).sum()),
+        max_angle_mean: share(angles.iter().map(|[_, max]| max).sum()),
         below_30: below(30.0),
         below_10: below(10.0),
         below_1: below(1.0),

@@ -17,16 +17,11 @@ pub use ascent::{Peak, PeakSearch, Peaks};
 pub use axis_distance::{AxisOptions, COVERED, axis_distance};
 pub use certificate::{Certificate, FINEST, ROUNDING, Witness, WitnessSide, certify};
 pub use envelope::{EnvelopeOptions, sample_envelope};
-pub use hausdorff::{DistanceOptions, MetricError, distances};
-pub use hausdorff::{SurfaceDistances, surface_distances};
-pub use judge::counts;
-pub use judge::triangle_quality;
+pub use hausdorff::{DistanceOptions, MetricError, SurfaceDistances, distances, surface_distances};
 pub use judge::{
-    AxisDistances, AxisSpan, Counts, Distances, Evaluation, RatioSpikes, SheetCoverage, Spikes,
-    TriangleQuality,
+    AxisDistances, AxisSpan, Counts, Distances, Evaluation, Judge, JudgeOptions, RatioSpikes,
+    SheetCoverage, Spikes, TriangleQuality, Truth, counts, triangle_quality,
 };
-pub use judge::{Judge, JudgeOptions, Truth};
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
-pub use union_topology::topology_warning;
-pub use union_topology::{cover_betti, union_betti};
+pub use union_topology::{topology_warning, union_betti};
 pub use volume::{VolumeOptions, enclosed_volume, volume_error};

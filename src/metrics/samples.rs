@@ -325,25 +325,29 @@ impl Corners {
                 *around[v as usize].get_or_insert(0.0) += area;
             }
         }
-        let used = || surface.vertices.iter().zip(&around).filter_map(|(&p, a)| Some((p, (*a)?)));
-        let count = used().count().max(1) as f64;
-        let mean = used().map(|(_, area)| area).sum::<f64>() / count;
-        let weight = |area: f64| if mean > 0.0 { 1.0 + 0.1 * area / (area + mean) } else { 1.0 };
-        Self {
-            points: used().map(|(p, _)| p).collect(),
-            weights: used().map(|(_, area)| weight(area)).collect(),
+        let (points, areas): (Vec<Vec3>, Vec<f64>) = surface
+            .vertices
+            .iter()
+            .zip(&around)
+            .filter_map(|(&p, area)| Some((p, (*area)?)))
+            .unzip();
+        let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
+        let mut weights = areas;
+        for weight in &mut weights {
+            *weight = if mean > 0.0 { 1.0 + 0.1 * *weight / (*weight + mean) } else { 1.0 };
         }
+        Self { points, weights }
     }
 
     /// The points at the largest weighted distance, by coordinates.
     fn farthest(&self, distance: impl Fn(Vec3) -> f64 + Sync) -> Vec<Vec3> {
-        let far = |(&p, w): (&Vec3, &f64)| distance(p) * w;
-        let each = || self.points.iter().zip(&self.weights);
-        let most = each().map(far).fold(0.0, f64::max);
-        let mut farthest: Vec<Vec3> = each()
-            .filter(|&pair| most > 0.0 && far(pair) >= most * (1.0 - EQUAL))
-            .map(|(&p, _)| p)
-            .collect();
+        let weighted = self.points.iter().zip(&self.weights);
+        let far: Vec<f64> = weighted.map(|(&p, w)| distance(p) * w).collect();
+        let most = far.iter().copied().fold(0.0, f64::max);
+        let mut farthest = self.points.clone();
+        let mut far = far.into_iter();
+        farthest
+            .retain(|_| most > 0.0 && far.next().is_some_and(|far| far >= most * (1.0 - EQUAL)));
         farthest.sort_unstable_by(by_coordinates);
         farthest.dedup();
         farthest
@@ -393,14 +397,17 @@ impl Corners {
                 1.732 * along + 2.236 * (d.length_squared() - along * along)
             },
         );
-        let frames = |&x: &Vec3| {
-            let across = move |v: Vec3| (v - origin).reject_from_normalized(x);
-            let second = self.farthest(|v| across(v).length());
-            let frame = move |v: Vec3| across(v).try_normalize().map(|y| [x, y, x.cross(y)]);
-            second.into_iter().take(MAX_SECOND_AXES).filter_map(frame).collect::<Vec<_>>()
-        };
         let most = (MAX_COMPARISONS / self.points.len()).max(1);
-        let frames = first[..first.len().min(most)].par_iter().flat_map_iter(frames).collect();
+        let frames = first[..first.len().min(most)]
+            .par_iter()
+            .flat_map_iter(|&x| {
+                let second = self.farthest(|v| (v - origin).reject_from_normalized(x).length());
+                second.into_iter().take(MAX_SECOND_AXES).filter_map(move |v| {
+                    let y = (v - origin).reject_from_normalized(x).try_normalize()?;
+                    Some([x, y, x.cross(y)])
+                })
+            })
+            .collect();
         let frames = least(
             frames,
             || &*marks,

@@ -71,7 +71,7 @@ struct EdgeFacts {
 
 impl EdgeFacts {
     fn of(mesh: &MedialMesh, incidence: &Incidence) -> Self {
-        let ends = || mesh.edges.iter().map(|&edge| mesh.spheres_of(edge));
+        let ends: Vec<[Sphere; 2]> = mesh.edges.iter().map(|&edge| mesh.spheres_of(edge)).collect();
         let degrees = degrees(mesh);
         let faces_at = incidence.faces_at();
         let mut boundary_spheres = vec![false; mesh.spheres.len()];
@@ -79,7 +79,8 @@ impl EdgeFacts {
             edge.iter().for_each(|&sphere| boundary_spheres[sphere as usize] = true);
         }
         // Shorter edges count as points: their direction and ratio are rounding.
-        let lengths: Vec<f64> = ends()
+        let lengths: Vec<f64> = ends
+            .iter()
             .map(|[a, b]| a.centre.distance(b.centre))
             .map(|length| if length < ZERO_LENGTH { 0.0 } else { length })
             .collect();
@@ -89,7 +90,7 @@ impl EdgeFacts {
             dangling[edge] = lengths[edge] > 0.0 && faces_at[edge] == 0 && is_loose;
         }
         Self {
-            ratios: ends().map(|[a, b]| stability_ratio(a, b)).collect(),
+            ratios: ends.into_iter().map(|[a, b]| stability_ratio(a, b)).collect(),
             dangling,
             lengths,
             boundary_spheres,
@@ -97,25 +98,29 @@ impl EdgeFacts {
     }
 
     fn by_ratio(&self, mesh: &MedialMesh, threshold: f64) -> RatioSpikes {
-        let proper = || (0..self.lengths.len()).filter(|&edge| self.lengths[edge] > 0.0);
-        let weak = || proper().filter(|&edge| self.ratios[edge] < threshold);
+        let mut proper: Vec<usize> = (0..self.lengths.len()).collect();
+        proper.retain(|&edge| self.lengths[edge] > 0.0);
+        let mut weak = proper.clone();
+        weak.retain(|&edge| self.ratios[edge] < threshold);
         // Folds from zero, since the sum of nothing is minus zero.
-        let weak_length = weak().fold(0.0, |sum, edge| sum + self.lengths[edge]);
-        let length = proper().fold(0.0, |sum, edge| sum + self.lengths[edge]);
+        let weak_length = weak.iter().fold(0.0, |sum, &edge| sum + self.lengths[edge]);
+        let length = proper.iter().fold(0.0, |sum, &edge| sum + self.lengths[edge]);
         RatioSpikes {
             threshold,
-            edge_share: share(weak().count() as f64, proper().count() as f64),
+            edge_share: share(weak.len() as f64, proper.len() as f64),
             length_share: share(weak_length, length),
             spikes: self.spikes_on_the_boundary(mesh, threshold),
-            dangling_edges: weak().filter(|&edge| self.dangling[edge]).count() as u64,
+            dangling_edges: weak.iter().filter(|&&edge| self.dangling[edge]).count() as u64,
         }
     }
 
     /// Measure 2. Edges without length extend a component, but alone they are none.
     fn spikes_on_the_boundary(&self, mesh: &MedialMesh, threshold: f64) -> u64 {
-        let weak = || (0..self.ratios.len()).filter(|&edge| self.ratios[edge] < threshold);
+        let mut weak: Vec<usize> = (0..self.ratios.len()).collect();
+        weak.retain(|&edge| self.ratios[edge] < threshold);
         let mut components = DisjointSets::singletons(mesh.spheres.len());
-        for [a, b] in weak().map(|edge| mesh.edges[edge]) {
+        for &edge in &weak {
+            let [a, b] = mesh.edges[edge];
             components.join(a, b);
         }
         let mut on_boundary = vec![false; mesh.spheres.len()];
@@ -123,7 +128,7 @@ impl EdgeFacts {
             on_boundary[components.find(sphere as u32) as usize] = true;
         }
         let mut counted = vec![false; mesh.spheres.len()];
-        for edge in weak().filter(|&edge| self.lengths[edge] > 0.0) {
+        for edge in weak.into_iter().filter(|&edge| self.lengths[edge] > 0.0) {
             let component = components.find(mesh.edges[edge][0]) as usize;
             counted[component] = on_boundary[component];
         }

@@ -8,11 +8,6 @@
 //! lies below that of a cone of radius `r` by up to about `spacing^2 / (8 r)`, of a slab by twice
 //! that. So contacts shallower than this are missed, but a gap never counts as a contact. Where a primitive
 //! is thinner than the balls are apart, they do not even touch: [`union_betti`] counts each then.
-//!
-//! [`cover_betti`] makes the balls so much larger that they hold the union: with `d` from a point of a primitive
-//! to the nearest ball's centre, `r^2 + d^2` in place of `r^2` is enough, since the power of a point of the
-//! union's boundary with the ball at that centre is at most `d^2`. So nothing falls apart, and gaps narrower than
-//! that are closed.
 
 use super::MetricError;
 use crate::complex::{MedialMesh, UnionError};
@@ -29,27 +24,6 @@ const MAX_BALLS: usize = 5_000_000;
 /// # Errors
 /// When the mesh is empty or not valid, the spacing is not positive, or the balls are too many.
 pub fn union_betti(mesh: &MedialMesh, spacing: f64) -> Result<[u64; 3], MetricError> {
-    Ok(DualComplex::of_balls(&checked_balls(mesh, spacing)?)?.betti())
-}
-
-/// The Betti numbers `[b0, b1, b2]` of balls that hold the union, and go beyond it by at most
-/// `sqrt(r^2 + spacing^2 / 3) - r` where its radius is `r`.
-///
-/// What is narrower than that, such as a slit between two faces, does not count. Cost as
-/// [`union_betti`].
-///
-/// # Errors
-/// When the mesh is empty or not valid, the spacing is not positive, or the balls are too many.
-pub fn cover_betti(mesh: &MedialMesh, spacing: f64) -> Result<[u64; 3], MetricError> {
-    let mut balls = checked_balls(mesh, spacing)?;
-    for ball in &mut balls {
-        // No point of a triangle with sides of at most `spacing` is farther from its nearest corner.
-        ball.radius = ball.radius.hypot(spacing / 3.0_f64.sqrt());
-    }
-    Ok(DualComplex::of_balls(&balls)?.betti())
-}
-
-fn checked_balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
     mesh.check().map_err(UnionError::from)?;
     if mesh.spheres.is_empty() {
         return Err(UnionError::Empty.into());
@@ -57,18 +31,14 @@ fn checked_balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricE
     if spacing.is_nan() || spacing <= 0.0 {
         return Err(MetricError::Spacing(spacing));
     }
-    balls(mesh, spacing)
+    Ok(DualComplex::of_balls(&balls(mesh, spacing)?)?.betti())
 }
 
 /// The spheres, then those between the ends of each edge, then those within each face.
 fn balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
-    let parts = |[a, b]: [Sphere; 2]| (a.centre.distance(b.centre) / spacing).ceil().max(1.0);
-    let sides = |&f: &[u32; 3]| {
-        let [a, b, c] = mesh.spheres_of(f);
-        parts([a, b]).max(parts([b, c])).max(parts([c, a]))
-    };
-    let on_edges: f64 = mesh.edges.iter().map(|e| parts(mesh.spheres_of(*e))).sum();
-    let in_faces: f64 = mesh.faces.iter().map(|f| sides(f) * sides(f) / 2.0).sum();
+    let on_edges: f64 = mesh.edges.iter().map(|&e| parts(&mesh.spheres_of(e), spacing)).sum();
+    let in_faces: f64 =
+        mesh.faces.iter().map(|&f| parts(&mesh.spheres_of(f), spacing).powi(2) / 2.0).sum();
     let count = mesh.spheres.len() as f64 + on_edges + in_faces;
     if count > MAX_BALLS as f64 {
         return Err(MetricError::TooManyBalls { count, most: MAX_BALLS });
@@ -76,12 +46,12 @@ fn balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
     let mut balls = mesh.spheres.clone();
     for edge in &mesh.edges {
         let [a, b] = mesh.spheres_of(*edge);
-        let n = parts([a, b]);
+        let n = parts(&[a, b], spacing);
         balls.extend((1..n as u32).map(|k| a.lerp(b, f64::from(k) / n)));
     }
     for face in &mesh.faces {
         let [a, b, c] = mesh.spheres_of(*face);
-        let n = sides(face);
+        let n = parts(&[a, b, c], spacing);
         for i in 1..n as u32 {
             // A row from side ab to side ac, parallel to bc, without its ends.
             let t = f64::from(i) / n;
@@ -90,6 +60,12 @@ fn balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
         }
     }
     Ok(balls)
+}
+
+/// Parts that are no longer than `spacing`, of the longest side of an edge or a triangle.
+fn parts(corners: &[Sphere], spacing: f64) -> f64 {
+    let ends = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
+    ends.map(|[a, b]| (a.centre.distance(b.centre) / spacing).ceil()).fold(1.0, f64::max)
 }
 
 // The warning about Betti numbers that differ from the solid's.
@@ -105,18 +81,15 @@ fn balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
 /// ```
 pub fn topology_warning(found: [u64; 3], expected: Option<[u64; 3]>) -> Option<String> {
     let expected = expected.filter(|&expected| expected != found)?;
-    let of = |k: usize, one: &str, many: &str| {
-        let (more, less) =
-            (found[k].saturating_sub(expected[k]), expected[k].saturating_sub(found[k]));
-        let (number, what) = if more > 0 { (more, "too many") } else { (less, "missing") };
-        (number > 0).then(|| format!("{number} {} {what}", if number == 1 { one } else { many }))
-    };
-    let parts = [
-        of(0, "component", "components"),
-        of(1, "tunnel", "tunnels"),
-        of(2, "closed pocket", "closed pockets"),
-    ];
-    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    let mut parts = Vec::new();
+    for (k, one) in ["component", "tunnel", "closed pocket"].into_iter().enumerate() {
+        let number = found[k].abs_diff(expected[k]);
+        let plural = if number == 1 { "" } else { "s" };
+        let what = if found[k] > expected[k] { "too many" } else { "missing" };
+        if number > 0 {
+            parts.push(format!("{number} {one}{plural} {what}"));
+        }
+    }
     Some(format!("the Betti numbers are {found:?}, the solid's {expected:?}: {}", parts.join(", ")))
 }
 
@@ -138,6 +111,8 @@ mod tests {
         assert_eq!(union_betti(&chain(&horseshoe, 0.4), 0.02).unwrap(), [1, 1, 0]);
         let apart = MedialMesh::from_simplices(chain(&horseshoe, 0.3).spheres, vec![], vec![]);
         assert_eq!(union_betti(&apart.unwrap(), 0.02).unwrap(), [5, 0, 0]);
+        // Thinner than the balls are apart.
+        assert!(union_betti(&chain(&horseshoe, 1e-6), 0.02).unwrap()[0] > 100);
     }
 
     #[test]
@@ -150,18 +125,6 @@ mod tests {
         let open =
             MedialMesh::from_simplices(corners.to_vec(), vec![], faces[..3].to_vec()).unwrap();
         assert_eq!(union_betti(&open, 0.1).unwrap(), [1, 0, 0]);
-    }
-
-    #[test]
-    fn a_cover_holds_thin_primitives_together_and_keeps_wide_gaps() {
-        let horseshoe = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [0.0, 0.7]];
-        let thin = chain(&horseshoe, 1e-6);
-        assert!(union_betti(&thin, 0.02).unwrap()[0] > 100);
-        assert_eq!(cover_betti(&thin, 0.02).unwrap(), [1, 0, 0]);
-        // A gap of 0.1, and one of 0.01.
-        assert_eq!(cover_betti(&chain(&horseshoe, 0.3), 0.02).unwrap(), [1, 0, 0]);
-        assert_eq!(cover_betti(&chain(&horseshoe, 0.345), 0.02).unwrap(), [1, 0, 0]);
-        assert_eq!(cover_betti(&chain(&horseshoe, 0.35), 0.02).unwrap(), [1, 1, 0]);
     }
 
     #[test]

@@ -195,10 +195,10 @@ impl CollapseComplex {
 
     /// Whether `{a, b, c}` is a face. Cost: the shortest of the three links.
     pub fn has_face(&self, a: u32, b: u32, c: u32) -> bool {
-        let faces_of = |v: u32| self.sides[v as usize].len();
-        let [v, p, q] = if faces_of(a) <= faces_of(b) && faces_of(a) <= faces_of(c) {
+        let [of_a, of_b, of_c] = [a, b, c].map(|v| self.sides[v as usize].len());
+        let [v, p, q] = if of_a <= of_b && of_a <= of_c {
             [a, b, c]
-        } else if faces_of(b) <= faces_of(c) {
+        } else if of_b <= of_c {
             [b, a, c]
         } else {
             [c, a, b]
@@ -473,14 +473,13 @@ impl CollapseComplex {
     /// The answer stays valid until one of `a`, `b`, `p`, `q` is part of a collapse.
     /// Cost: the faces of both ends.
     pub fn folded_face(&self, a: u32, b: u32, centre: Vec3) -> Option<[u32; 3]> {
-        let folded_at = |moved: u32, other: u32| {
+        [[a, b], [b, a]].into_iter().find_map(|[moved, other]| {
             let sides = self.opposite_sides(moved).iter();
             // Faces with both ends vanish, so they cannot fold.
             let mut faces = sides.filter(|&&[p, q]| p != other && q != other);
             let folded = faces.find(|&&[p, q]| self.folds([moved, p, q], centre));
             folded.map(|&[p, q]| [moved, p, q])
-        };
-        folded_at(a, b).or_else(|| folded_at(b, a))
+        })
     }
 
     /// Whether a face `[v, p, q]` folds over when `v` moves to `centre`: the dot product of its

@@ -26,8 +26,8 @@ impl Candidate {
     pub fn new(complex: &CollapseComplex, [a, b]: [u32; 2], cost: f64, tie: f64) -> Self {
         let stamp = complex.stamp(a, b).expect("both ends are left");
         // `is_before` compares with `<`, which is a total order only without not-a-number.
-        let ordered = |key: f64| if key.is_nan() { f64::INFINITY } else { key };
-        Self { cost: ordered(cost), tie: ordered(tie), ends: [a.min(b), a.max(b)], stamp }
+        let [cost, tie] = [cost, tie].map(|key| if key.is_nan() { f64::INFINITY } else { key });
+        Self { cost, tie, ends: [a.min(b), a.max(b)], stamp }
     }
 
     /// The cost.

@@ -266,15 +266,6 @@ impl MedialUnion {
         })
     }
 
-    /// [`deepest`](Self::deepest) for many points, in their order, in parallel.
-    pub fn deepest_batch(&self, points: &[Vec3]) -> Vec<NearestPrimitive> {
-        in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.parts.nearest::<Signed>(p, *last);
-            *last = place;
-            nearest
-        })
-    }
-
     /// [`deepest`](Self::deepest) for many points, in their order, in parallel. Each search begins with the
     /// primitive that `near` names for the point, or, where it names none, with the one that was found last:
     /// fast if these are near. Where `enough` has a distance for the point, any primitive that is no farther
@@ -312,15 +303,6 @@ impl MedialUnion {
         })
     }
 
-    /// [`nearest_surface`](Self::nearest_surface) for many points, in their order, in parallel.
-    pub fn nearest_surface_batch(&self, points: &[Vec3]) -> Vec<NearestPrimitive> {
-        in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.parts.nearest::<Unsigned>(p, *last);
-            *last = place;
-            nearest
-        })
-    }
-
     /// Whether some primitive holds `p` more than `depth` below its surface; with a negative depth,
     /// whether one is nearer than that. Ends at the first that is found.
     pub fn buries(&self, p: Vec3, depth: f64) -> bool {
@@ -333,10 +315,9 @@ impl MedialUnion {
         // Primitives that buried a point are tried first, the most recent one before the others.
         let mut recent = [None; RECENT];
         points.retain(|&p| {
-            let holds = |place: &Option<usize>| {
+            let again = recent.iter().position(|place: &Option<usize>| {
                 place.is_some_and(|place| self.parts.shape(place).signed(p) < -depth)
-            };
-            let again = recent.iter().position(holds);
+            });
             let burier = match again {
                 Some(turn) => recent[turn],
                 None => self.burier(p, depth),
@@ -374,8 +355,9 @@ const RUN: usize = 512;
 const RECENT: usize = 4;
 
 fn ball_box(balls: &[Sphere]) -> Bounds {
-    let corners = |m: &Sphere| [-m.radius, m.radius].map(|r| m.centre + Vec3::splat(r));
-    Bounds::of_points(balls.iter().flat_map(corners))
+    Bounds::of_points(
+        balls.iter().flat_map(|m| [-m.radius, m.radius].map(|r| m.centre + Vec3::splat(r))),
+    )
 }
 
 // Spheres that differ by no more than rounding.
@@ -407,24 +389,21 @@ impl Distinct {
     /// the same place along one direction.
     pub fn new(mesh: &MedialMesh) -> Self {
         let spheres = &mesh.spheres;
-        let along = |m: &Sphere| {
-            let [x, y, z, r] = GENERIC;
-            x * m.centre.x + y * m.centre.y + z * m.centre.z + r * m.radius
-        };
-        let mut order: Vec<(f64, u32)> = (0..).zip(spheres).map(|(v, m)| (along(m), v)).collect();
+        let [x, y, z, r] = GENERIC;
+        let along =
+            spheres.iter().map(|m| x * m.centre.x + y * m.centre.y + z * m.centre.z + r * m.radius);
+        let mut order: Vec<(f64, u32)> = along.zip(0..).collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        // Rounding of the place itself is a share of the coordinates.
-        let reach = |m: &Sphere| {
-            let largest = m.centre.abs().max_element().max(m.radius);
-            3.0 * EQUAL * m.radius + 16.0 * f64::EPSILON * largest
-        };
         let mut group: Vec<u32> = (0..spheres.len() as u32).collect();
         let mut any = false;
         // Of each group the first sphere along the direction.
         let mut firsts: Vec<(f64, u32)> = Vec::new();
         for (place, v) in order {
             let m = &spheres[v as usize];
-            let near = firsts.iter().rev().take_while(|first| first.0 >= place - reach(m));
+            // Rounding of the place itself is a share of the coordinates.
+            let largest = m.centre.abs().max_element().max(m.radius);
+            let reach = 3.0 * EQUAL * m.radius + 16.0 * f64::EPSILON * largest;
+            let near = firsts.iter().rev().take_while(|first| first.0 >= place - reach);
             match near.map(|&(_, w)| w).find(|&w| is_equal(&spheres[w as usize], m)) {
                 Some(w) => (group[v as usize], any) = (w, true),
                 None => firsts.push((place, v)),

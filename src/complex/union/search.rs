@@ -236,8 +236,10 @@ impl<R: Reading> UnionSearch for Nearest<'_, R> {
     fn look(&mut self, place: usize) {
         let signed = self.parts.shape(place).signed(self.p);
         let value = R::value(signed);
-        let smaller = || self.parts.primitive(place) < self.parts.primitive(self.place);
-        if value < self.value || (value == self.value && smaller()) {
+        if value < self.value
+            || (value == self.value
+                && self.parts.primitive(place) < self.parts.primitive(self.place))
+        {
             (self.place, self.signed, self.value) = (place, signed, value);
             self.tighten();
         }
@@ -356,8 +358,8 @@ impl Shape {
 
     /// Radius of the interpolated sphere that attains the signed distance.
     pub fn radius_towards(&self, p: Vec3) -> f64 {
-        let radius = |(signed, centre): (f64, Vec3)| (p.distance(centre) - signed).max(0.0);
-        self.nearest_centre(p).map_or(f64::INFINITY, radius)
+        self.nearest_centre(p)
+            .map_or(f64::INFINITY, |(signed, centre)| (p.distance(centre) - signed).max(0.0))
     }
 }
 
@@ -437,8 +439,8 @@ impl Parts {
         let padding = sides.sum::<f64>() / boxes.len() as f64;
         let tree = Tree::build(&boxes, Plan { max_leaf: LEAF, group: LANES, padding });
         let quick = ReachTree::new(&tree, balls);
-        let extent = |(b, radius): &(Bounds, f64)| (b.hi - b.lo).length() + radius;
-        let slack = ROUNDING * boxes.iter().map(extent).fold(0.0, f64::max);
+        let extents = boxes.iter().map(|(b, radius)| (b.hi - b.lo).length() + radius);
+        let slack = ROUNDING * extents.fold(0.0, f64::max);
         let mut order = tree.order().to_vec();
         let mut this = Self {
             leaves: Vec::with_capacity(quick.wide().leaves().len() + 1),

@@ -123,10 +123,11 @@ fn what_was_near_does_not_change_the_answers() {
     for kind in ["scattered", "clusters", "nested", "far apart"] {
         let mut mesh = mesh(kind, 60, &mut rng);
         let points: Vec<Vec3> = (0..700).map(|_| vector(&mut rng)).collect();
-        let before = MedialUnion::new(&mesh).unwrap().deepest_batch(&points);
+        let union = MedialUnion::new(&mesh).unwrap();
+        let before: Vec<_> = points.iter().map(|&p| union.deepest(p)).collect();
         mesh.spheres.iter_mut().for_each(|m| m.centre += 0.01 * vector(&mut rng));
         let union = MedialUnion::new(&mesh).unwrap();
-        let fresh = union.deepest_batch(&points);
+        let fresh: Vec<_> = points.iter().map(|&p| union.deepest(p)).collect();
         let all = |_| None;
         assert_eq!(union.deepest_batch_near(&points, &before, all), fresh, "{kind}");
         assert_eq!(union.deepest_batch_near(&points, &[], all), fresh, "{kind}");

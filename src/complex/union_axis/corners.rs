@@ -241,14 +241,13 @@ impl Voronoi {
         corners: &'a Corners,
         balls: u32,
     ) -> impl Iterator<Item = [u32; 2]> + 'a {
-        let sides = move |cell: CellId| {
+        self.inside().flat_map(move |cell| {
             let delaunay = corners.delaunay().expect("a cell");
             (0..4).map(move |opposite| match self.station(Facet { cell, opposite }) {
                 NONE => [balls + cell.0, balls + delaunay.neighbours(cell)[opposite].0],
                 ball => [balls + cell.0, ball],
             })
-        };
-        self.inside().flat_map(sides)
+        })
     }
 }
 
@@ -276,14 +275,18 @@ pub(super) fn classify_sides(
         all.inside += votes.inside;
         all.outside += votes.outside;
     }
-    let mut verdict = |c: usize| {
+    let mut inside = vec![false; free.len()];
+    for c in (0..free.len()).filter(|&c| free[c]) {
         let group = groups.find(c as u32);
-        let Votes { inside, outside: out } = of_group[group as usize];
-        let unanimous = if group == outside { inside == 0 } else { (inside == 0) != (out == 0) };
-        tally.doubtful += usize::from(free[c] && group == c as u32 && !unanimous);
-        free[c] && group != outside && inside > out
-    };
-    let inside: Vec<bool> = (0..free.len()).map(&mut verdict).collect();
+        let votes = of_group[group as usize];
+        let is_doubtful = match group == outside {
+            true => votes.inside > 0,
+            false => (votes.inside == 0) == (votes.outside == 0),
+        };
+        // Each group counts once, at its representative.
+        tally.doubtful += usize::from(is_doubtful && group == c as u32);
+        inside[c] = group != outside && votes.inside > votes.outside;
+    }
     tally.inside = inside.iter().filter(|&&i| i).count();
     Voronoi { stations, inside }
 }
@@ -412,11 +415,11 @@ impl Sectors {
 pub(super) fn sectors_of(complex: &DualComplex<'_>, corners: &Corners) -> Sectors {
     let edges: Vec<CellEdge> =
         complex.edges().filter(|e| e.1 == Class::Regular).map(|e| e.0).collect();
-    let at_edge = |walls: &mut Vec<[Facet; 2]>, &edge: &CellEdge| {
+    let chunks = edges.par_iter().with_min_len(1 << 10);
+    let found = chunks.map_init(Vec::new, |walls, &edge| {
         find_walls(complex, edge, walls);
         sectors_at(complex, corners, edge, walls)
-    };
-    let found = edges.par_iter().with_min_len(1 << 10).map_init(Vec::new, at_edge);
+    });
     let mut sectors: Vec<Sector> = found.flatten_iter().collect();
     sectors.par_sort_unstable();
     let mut start = vec![0; corners.points().len() + 1];
@@ -458,9 +461,8 @@ fn sectors_at(
     walls: &[[Facet; 2]],
 ) -> Vec<Sector> {
     let [from, to] = complex.edge_vertices(edge).map(|v| v.0);
-    let is_gap = |k: &usize| !complex.contains(walls[*k][1].cell);
     let gaps: Vec<[u32; 2]> = (0..walls.len())
-        .filter(is_gap)
+        .filter(|&k| !complex.contains(walls[k][1].cell))
         .map(|k| [walls[k][1], walls[(k + 1) % walls.len()][0]].map(|side| corners.at(side)))
         .collect();
     let mut sectors = Vec::with_capacity(2 * gaps.len());

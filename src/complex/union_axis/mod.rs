@@ -183,9 +183,8 @@ impl UnionAxis {
             polygon.corners = polygon.between.map(|c| corners.point(c));
         }
         // The other sides are Voronoi edges.
-        let is_ball = |v: u32| (v as usize) < of_ball.len();
-        let along_balls = polygons.iter().flat_map(Polygon::edges);
-        edges.extend(along_balls.filter(|&[a, b]| is_ball(a) && is_ball(b)));
+        let sides = polygons.iter().flat_map(Polygon::edges);
+        edges.extend(sides.filter(|ends| ends.iter().all(|&v| (v as usize) < of_ball.len())));
         for edge in &mut edges {
             edge.sort_unstable();
         }

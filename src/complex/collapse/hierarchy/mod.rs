@@ -126,11 +126,11 @@ impl Hierarchy {
         }
         // The link condition in counts. T1: each common neighbour (two edges that merge) has a face
         // with the edge (which vanishes). T2: no two faces merge.
-        let violates = |step: &u32| {
-            let [edges, faces] = [&moved_edges, &moved_faces].map(|moved| moved[*step as usize]);
-            edges.merged != faces.vanished || faces.merged > 0
-        };
-        let against_link = (0..steps.len() as u32).filter(violates).collect();
+        let against_link = (0..)
+            .zip(moved_edges.iter().zip(&moved_faces))
+            .filter(|(_, (edges, faces))| edges.merged != faces.vanished || faces.merged > 0)
+            .map(|(step, _)| step)
+            .collect();
         Ok(Self { initial, steps, ranks, by_rank, edges, faces, against_link })
     }
 
