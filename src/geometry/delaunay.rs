@@ -166,6 +166,7 @@ impl Delaunay {
         self.check_regularity::<Unweighted>(&self.sites, self.filter)?;
         for point in 0..self.sites.len() {
             let id = VertexId(point as u32);
+            // A duplicate must repeat the position of a vertex; any other point is its own representative.
             let kept = self.representative(id);
             let same = lexicographic(&self.sites[point].p, &self.sites[kept.index()].p).is_eq();
             if !same || !self.is_vertex(kept) || (kept != id && self.is_vertex(id)) {

@@ -426,6 +426,7 @@ fn vertices(regular: &Regular, cells: &[bool], edges: &[u16]) -> Vec<u8> {
     for cell in regular.cells().filter(|c| !is_member(cells, *c)) {
         for v in regular.vertices(cell).into_iter().filter(|&v| v != VertexId::INFINITE) {
             let class = &mut class[v.index()];
+            // The minimum keeps 0, for points outside of the complex.
             *class = (*class).min(Class::Regular as u8);
         }
     }
@@ -579,6 +580,7 @@ impl DualComplex<'_> {
         if vertices == 0 {
             return [0; 3];
         }
+        // Edges suffice: triangles and tetrahedra join no more than their edges do.
         let mut components = DisjointSets::singletons(self.vertices.len());
         for (edge, _) in self.edges() {
             let [a, b] = self.edge_vertices(edge);

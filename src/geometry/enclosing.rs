@@ -36,6 +36,7 @@ pub fn enclosing_ball(points: &[Vec3]) -> (Vec3, f64) {
         if ball.contains(&[far]) {
             return (ball.centre, ball.radius);
         }
+        // At most four points determine a ball, and the farthest joins them.
         let mut determining = [far; 5];
         determining[..ball.size].copy_from_slice(&ball.support[..ball.size]);
         let grown = by_enumeration(&determining[..=ball.size]);
@@ -113,6 +114,7 @@ fn by_enumeration(points: &[Vec3]) -> Ball {
 }
 
 fn contains_all((centre, radius): (Vec3, f64), points: &[Vec3]) -> bool {
+    // Points that determine the ball are on it up to rounding only.
     let limit = radius * (1.0 + SLACK);
     points.iter().all(|p| p.distance_squared(centre) <= limit * limit)
 }

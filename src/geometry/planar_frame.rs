@@ -67,6 +67,7 @@ impl PlanarFrame {
         let scale = power_of_two_below(1.0 / length);
         let across = accurate_cross(base * scale, slant * scale);
         let (doubled_area, scaled_length) = (across.length(), length * scale);
+        // Below this, the cross product is rounding and gives no direction.
         let flat = doubled_area <= FLAT * scaled_length * scaled_length;
         let normal = if flat { x.any_orthonormal_vector() } else { across / doubled_area };
         let height = if flat { 0.0 } else { doubled_area / scaled_length / scale };
@@ -130,6 +131,7 @@ impl PlanarFrame {
         let [left, right] = self.sides(x, y);
         let flat = self.is_flat();
         if y >= 0.0 && left >= 0.0 && right >= 0.0 && !flat {
+            // `signum` of zero is one: a point on the triangle has no direction.
             let sign = if height == 0.0 { 0.0 } else { height.signum() };
             return (height.abs(), self.normal * sign);
         }

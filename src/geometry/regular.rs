@@ -203,6 +203,7 @@ impl Regular {
         for &point in &self.hidden {
             let site = &self.sites[point.index()];
             near = self.walk(&self.sites, near, &site.p);
+            // A point at the position of a vertex is hidden by the weights alone, without a sphere test.
             let same = self
                 .vertices(near)
                 .into_iter()

@@ -110,6 +110,7 @@ fn folded(a: Vec3, b: Vec3, p: Vec3, q: Vec3) -> bool {
 }
 
 fn apart_triangles_meet(s: [Vec3; 3], t: [Vec3; 3]) -> bool {
+    // Six orientations decide most pairs; the test of edges takes up to thirty more.
     if is_beside(t, s) || is_beside(s, t) {
         return false;
     }

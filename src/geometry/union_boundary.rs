@@ -224,6 +224,7 @@ fn find_walls(complex: &DualComplex<'_>, (cell, i, j): CellEdge, walls: &mut Vec
     let regular = complex.regular();
     let ends = complex.edge_vertices((cell, i, j));
     let ring: Vec<CellId> = regular.edge_ring(cell, i, j).collect();
+    // A wall stands between two consecutive cells of the ring, the last and the first included.
     for (k, &cell) in ring.iter().enumerate() {
         let next = ring[(k + 1) % ring.len()];
         let v = regular.vertices(cell);
@@ -313,6 +314,7 @@ impl UnionBoundary {
         let mut keyed: Vec<(u32, u32)> =
             keyed.filter_map(|(i, v)| Some((key(v)?, i as u32))).collect();
         keyed.sort_unstable();
+        // Neighbours are enough: joining is transitive.
         for pair in keyed.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
             groups.join(pair[0].1, pair[1].1);
         }

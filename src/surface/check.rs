@@ -26,6 +26,7 @@ pub(super) fn orient_and_examine(repaired: Repaired) -> Examined {
         repaired;
     let mut mesh = TriMesh { vertices, faces };
     let turns = topology.turns(&mesh.faces);
+    // A one-sided surface has no turns: its faces stay as they are, and the fault comes below.
     let turned = turns.clone().unwrap_or_default();
     topology::turn_over(&mut mesh.faces, turned.iter().copied());
 
@@ -44,6 +45,7 @@ pub(super) fn orient_and_examine(repaired: Repaired) -> Examined {
             Err(too_many) => fault = Some(too_many),
         }
     }
+    // Last of all: the volume of a shell means something only for a closed manifold.
     fault = fault.or_else(|| evidence.flat_shell(&shells));
     if fault.is_none() {
         evidence.add_solid(&mut report, &shells);
@@ -244,6 +246,7 @@ impl Evidence<'_> {
 
     /// Adds the figures that are defined only for a closed two-sided manifold.
     fn add_solid(&self, report: &mut SurfaceReport, shells: &[Shell]) {
+        // Each closed shell has the Euler number 2 - 2 g; the sum over all shells gives the total genus.
         let genus = report.components as i64 - report.euler / 2;
         let cavities = shells.iter().filter(|s| s.is_cavity()).count();
         report.genus = usize::try_from(genus).ok();
@@ -320,7 +323,9 @@ pub(super) fn intersections(
         first_degenerate: flat.iter().position(|&f| f).map(|f| f as u32),
         ..Intersections::default()
     };
+    // The budget counts tests, not seconds: the result is the same on every machine.
     let mut budget = 5_000_000 + 200 * faces.len();
+    // In blocks: a budget shared by running threads would make the result depend on them.
     for block in (0..tree.len()).step_by(BLOCK) {
         let end = (block + BLOCK).min(tree.len());
         let partial: Vec<Partial> =
@@ -332,6 +337,7 @@ pub(super) fn intersections(
             found.first = found.first.into_iter().chain(part.first).min();
             found.components.extend(part.components);
         }
+        // Now, not after the last block: the list would grow with the pairs of faces.
         found.components.sort_unstable();
         found.components.dedup();
         if budget == 0 && end < tree.len() {

@@ -122,6 +122,7 @@ impl TriangleBvh {
             places[face as usize] = place;
         }
         let Bounds { lo, hi } = tree.bounds();
+        // Relative to the largest coordinate: differences of coordinates lose that many digits.
         let slack = 64.0 * f64::EPSILON * lo.abs().max(hi.abs()).max_element();
         let framed = corners.iter().map(|&t| PlanarFrame::new(t));
         let (frames, firsts): (Vec<_>, Vec<_>) = framed.map(|(t, k)| (t, k as u8)).unzip();
@@ -314,6 +315,7 @@ impl<'a> Nearest<'a> {
         }
         // Of equally near faces the smallest, so that the answer does not depend on the search.
         let order = self.bvh.tree.order();
+        // In a bounded search there may be no place yet: a face exactly at the bound counts.
         let first = self.place == NONE || order[place] < order[self.place];
         if squared < self.squared || first {
             self.place = place;

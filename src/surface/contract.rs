@@ -76,6 +76,7 @@ pub fn contract_short_edges(
     let mut queue: BinaryHeap<_> = surface.short_edges().collect();
     let mut contracted = 0;
     loop {
+        // Collected for the next round: a contraction nearby may make the link condition hold.
         let mut refused = Vec::new();
         let (before, mut popped) = (contracted, 0);
         while let Some(Reverse(edge)) = queue.pop() {
@@ -187,6 +188,7 @@ impl<'a> Shrinking<'a> {
         }
         let length = self.point(a).distance(self.point(b));
         let [reach_a, reach_b] = [a, b].map(|v| self.reach[v as usize]);
+        // The bound covers all vertices contracted into the other end, now one edge farther away.
         let (into_a, into_b) = (reach_a.max(reach_b + length), reach_b.max(reach_a + length));
         let mut ways = [(into_a, b, a), (into_b, a, b)];
         if into_b < into_a || (into_b == into_a && b < a) {
@@ -262,6 +264,7 @@ impl<'a> Shrinking<'a> {
             debug_assert!(star.len() > 2, "a closed manifold");
         }
         let faces = (0..).zip(&self.faces);
+        // A face that is gone has left the stars of all its corners.
         let alive = faces.filter(|(f, face)| self.stars[face[0] as usize].contains(f));
         let faces = alive.map(|(_, face)| face.map(|v| name[v as usize])).collect();
         TriMesh { vertices, faces }

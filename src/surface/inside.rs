@@ -219,6 +219,7 @@ fn contains(triangle: [Vec3; 3], p: Vec3) -> bool {
         None => {
             let Bounds { lo, hi } = Bounds::of_points(triangle);
             let mut ends = triangle;
+            // Of collinear corners the lexicographic extremes are the ends of the segment.
             ends.sort_by(|p, q| {
                 p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z))
             });

@@ -117,6 +117,7 @@ fn keep_largest(mesh: &mut TriMesh) -> Option<Repair> {
     }
     let largest = (0..components).max_by(|&a, &b| areas[a].total_cmp(&areas[b]).then(b.cmp(&a)))?;
     let all = mesh.faces.len();
+    // `retain` visits faces in order, so the iterator keeps pace with it.
     let mut of_face = component.iter();
     mesh.faces.retain(|_| of_face.next() == Some(&(largest as u32)));
     let dropped =
@@ -156,9 +157,11 @@ const MAX_EDGES: usize = 500;
 /// When a loop is too long, meets itself, or has no triangulation with new edges alone. Then nothing
 /// is changed.
 pub(super) fn fill(vertices: &[Vec3], faces: &mut Vec<[u32; 3]>) -> Result<Vec<Repair>, Fault> {
+    // Found before any hole is filled: new triangles must not change the loops of other holes.
     let rim = Rim::new(faces);
     let mut repairs = Vec::new();
     let mut added: Vec<[u32; 3]> = Vec::new();
+    // Grows with each patch, so that two patches never share a chord.
     let mut edges = rim.edges;
     for corners in loops(vertices, &rim.next)? {
         let first = named(vertices, corners[0]);
@@ -283,6 +286,7 @@ impl<'a> Patch<'a> {
     ) -> Self {
         let n = corners.len();
         let origin = vertices[corners[0] as usize];
+        // The weight compares areas, which would overflow in large units and vanish in small ones.
         let reach = corners.iter().map(|&v| (vertices[v as usize] - origin).abs().max_element());
         let reach = reach.fold(0.0, f64::max);
         let scaled = |v: u32| (vertices[v as usize] - origin) / reach;

@@ -139,6 +139,7 @@ const TWO_POW_64: f64 = 18_446_744_073_709_551_616.0;
 #[inline]
 fn times_power(mut value: f64, mut power: i32) -> f64 {
     while power != 0 {
+        // 2^1000 is a normal number; 2^2000 is none.
         let step = power.clamp(-1000, 1000);
         value *= f64::from_bits(((1023 + step) as u64) << 52);
         power -= step;

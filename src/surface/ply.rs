@@ -96,6 +96,7 @@ pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
         }
     }
     let (head, rows) = bytes.split_at(length);
+    // Comments may be in any encoding; bytes replaced there harm nothing.
     let mut head = String::from_utf8_lossy(head).into_owned();
     if is_cr {
         head = head.replace('\r', "\n");
@@ -118,6 +119,7 @@ pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
                 ScalarType::Double => 8,
             },
         });
+        // At least 1: elements without properties could otherwise be announced in any number.
         let least = sizes.sum::<usize>().max(1);
         if element.count.checked_mul(least).is_none_or(|size| size > rows.len() + 1) {
             let what = match element.name.as_str() {
@@ -154,6 +156,7 @@ impl Ply<'_> {
         mut take: impl FnMut(&str, usize, &Place, Row) -> Result<(), E>,
     ) -> Result<(), E> {
         let parser = Parser::<Row>::new();
+        // The binary reader advances this slice, so each row starts where the last one ended.
         let mut rest = self.rows;
         let mut cursor = Cursor::at_line(self.rows, self.line);
         for element in &self.elements {

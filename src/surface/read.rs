@@ -462,6 +462,7 @@ fn parse_off_header(cursor: &mut Cursor<'_>) -> Result<OffHeader, Fault> {
             return Err(Fault::Count { what, announced: announced as u64, holds });
         }
     }
+    // The prefix is made of ST, C and N alone, so no letter is ambiguous.
     let (normals, colours) = (prefix.contains(&b'N'), prefix.contains(&b'C'));
     let texture = prefix.starts_with(b"ST");
     Ok(OffHeader { vertices, faces, normals, colours, texture })
@@ -504,6 +505,7 @@ fn parse_vertices(
     }
     // Vertices may begin on the line of the counts, and then surely are not one on each line.
     let fresh_line = cursor.clone().token_on_line().is_none();
+    // No overflow: both were compared with the size of the file.
     let needed = header.vertices + header.faces;
     let by_line = fresh_line && cursor.lines_left(needed) >= needed;
     let extra = 3 * usize::from(header.normals) + 2 * usize::from(header.texture);
@@ -560,6 +562,7 @@ fn parse_faces(
     soup: &mut PolygonSoup,
 ) -> Result<(), Fault> {
     let by_line = cursor.lines_left(header.faces) >= header.faces;
+    // Bounded by the size of the file, see `parse_off_header`; corners grow as they come.
     soup.ends.reserve_exact(header.faces);
     soup.lines.reserve_exact(header.faces);
     for face in 0..header.faces {
@@ -633,6 +636,7 @@ fn parse_obj(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
                     };
                     match from_one.filter(|&corner| (1..=i64::from(u32::MAX)).contains(&corner)) {
                         Some(corner) => {
+                            // Of equal corners the first face wins, hence the reversed index.
                             largest = largest.max((corner, usize::MAX - face));
                             soup.corners.push((corner - 1) as u32);
                         }

@@ -322,6 +322,7 @@ impl Repair {
 
 impl fmt::Display for Repair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // One table of counts and nouns for both, so that a message cannot disagree with `count`.
         let (count, noun) = self.changed();
         let what = counted(count, noun);
         match *self {

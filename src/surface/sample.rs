@@ -70,6 +70,7 @@ impl FromStr for Sampling {
         if text == "auto" {
             return Ok(Self::Auto);
         }
+        // Only now: the two kinds above have no count.
         let count = parts.next().and_then(|c| c.parse().ok()).ok_or_else(error)?;
         let seed = parts.next().map_or(Ok(0), str::parse).map_err(|_| error())?;
         match kind {
@@ -270,6 +271,7 @@ pub(super) fn eliminate(points: &[Vec3], normals: &[Vec3], area: f64, count: usi
     }
     let radius = (area / (2.0 * 3.0_f64.sqrt() * count as f64)).sqrt();
     let reach = 2.0 * radius;
+    // Found once: eliminations only remove neighbours.
     let neighbours = Neighbours::within(points, normals, reach);
     let share = count as f64 / points.len() as f64;
     let least = 2.0 * radius * (1.0 - share.powf(GAMMA)) * BETA;

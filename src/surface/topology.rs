@@ -70,6 +70,7 @@ impl Topology {
             })
             .collect();
         sides.sort_unstable();
+        // Sorted by edge, so the half-edges of an edge are neighbours, and "first" means the smallest edge.
         for group in sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
             let edge = [group[0].0, group[0].1];
             self.edges += 1;
@@ -261,6 +262,7 @@ pub(super) fn repairs(
             (0, true) if shells[index].is_cavity() => inward += 1,
             (0, true) => outward += 1,
             (_, false) => reoriented += turned,
+            // Turned twice is not turned: only the other faces of the component changed.
             (_, true) => reoriented += all - turned,
         }
     }
@@ -373,6 +375,7 @@ fn count_separate(
         crossed.sort_unstable();
         crossed.dedup();
         for other in crossed.drain(..) {
+            // Taken, so that the counter is zero again for the next ray.
             let around = std::mem::take(&mut winding[other as usize]) != 0;
             let meets = meeting.binary_search(&[own.min(other), own.max(other)]).is_ok();
             if around && other != own && !meets {
@@ -443,6 +446,7 @@ fn count_touching(
     for (&face, &component) in parts.faces.iter().zip(parts.component) {
         faces[component as usize].push(face);
     }
+    // Built on demand: most components touch no other.
     let mut cache: Vec<Option<Part>> = (0..depths.len()).map(|_| None).collect();
     for &[a, b] in meeting {
         for i in [a, b].map(|i| i as usize) {
@@ -457,6 +461,7 @@ fn count_touching(
 }
 
 fn lies_in(inner: &Part, outer: &Part, budget: &mut Budget) -> Result<bool, TooManyNested> {
+    // The boxes decide most pairs without a query.
     if !(inner.lo.cmpge(outer.lo).all() && inner.hi.cmple(outer.hi).all()) {
         return Ok(false);
     }
@@ -467,6 +472,7 @@ fn lies_in(inner: &Part, outer: &Part, budget: &mut Budget) -> Result<bool, TooM
     if strictly > 0 {
         return Ok(true);
     }
+    // All vertices are on the outer surface; rounded centres may be on either side, so the majority decides.
     let (inside, outside) = outer.count(&inner.centres, false, budget)?;
     Ok(inside > outside)
 }

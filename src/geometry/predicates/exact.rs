@@ -202,6 +202,7 @@ fn orthocentre_wide<const D: usize, const D2: usize, const D3: usize, const D4: 
     offset: &[Wide<D2>; 3],
     quantum: i32,
 ) -> Option<[f64; 3]> {
+    // Exact, so that coplanar points are recognised as such.
     let denominator: Wide<D3> = det3::<D, D2, D3>(d);
     if denominator.sign() == Sign::Zero {
         return None;

@@ -26,6 +26,7 @@ impl<const N: usize> Wide<N> {
     pub(super) fn from_shifted(mantissa: u64, shift: u32, negative: bool) -> Self {
         let mut limbs = [0; N];
         let (limb, bit) = ((shift / 64) as usize, shift % 64);
+        // A shift of less than 64 bits spreads the mantissa over two limbs at most.
         let wide = u128::from(mantissa) << bit;
         limbs[limb] = wide as u64;
         if limb + 1 < N {

@@ -215,6 +215,7 @@ fn evaluate<
     (w, weights): (f64, [f64; K]),
     unit: i32,
 ) -> Sign {
+    // One unit for weights and squares, so that lifts are sums of integers.
     let w: Wide<D2> = to_wide(w, unit);
     let mut l = [w; K];
     for i in 0..K {
