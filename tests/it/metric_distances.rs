@@ -1,15 +1,16 @@
-//! Distances, volume error and axis distance against closed forms.
+//! Distances, certified intervals, volume error and axis distance against closed forms.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, UnionError};
-use medial::geometry::Sphere;
+use medial::geometry::{Cone, Slab, Sphere};
 use medial::metrics::{
-    AxisOptions, DistanceOptions, Distances, EnvelopeOptions, Judge, JudgeOptions, MetricError,
-    SurfaceDistances, Truth, VolumeOptions, axis_distance, distances, enclosed_volume,
-    sample_envelope, surface_distances, volume_error,
+    AxisOptions, Certificate, DistanceOptions, Distances, EnvelopeOptions, Judge, JudgeOptions,
+    MetricError, ROUNDING, SurfaceDistances, Truth, VolumeOptions, Witness, WitnessSide,
+    axis_distance, certify, distances, enclosed_volume, sample_envelope, surface_distances,
+    volume_error,
 };
 use medial::surface::{InsideTest, TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
@@ -69,21 +70,11 @@ fn tapered_capsule(length: f64, radii: [f64; 2], steps: u32) -> TriMesh {
 
 /// The box `[0, a] x [0, b] x [0, c]` with `a >= b >= c`, and its exact medial axis: 13 sheets.
 fn cuboid(a: f64, b: f64, c: f64) -> (TriMesh, MedialMesh) {
-    let corner =
-        |k: u32| Vec3::new(f64::from(k & 1) * a, f64::from(k >> 1 & 1) * b, f64::from(k >> 2) * c);
-    let quads =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let faces = quads.iter().flat_map(|&[i, j, k, l]| [[i, j, k], [i, k, l]]).collect();
-    let surface = TriMesh { vertices: (0..8).map(corner).collect(), faces };
-
-    let h = c / 2.0;
-    let mut spheres: Vec<_> = (0..8).map(|k| (corner(k), 0.0)).collect();
-    let inset = |k: u32| {
-        let clamp = |x: f64, side: f64| x.clamp(h, side - h);
-        let p = corner(k);
-        (Vec3::new(clamp(p.x, a), clamp(p.y, b), h), h)
-    };
-    spheres.extend((0..4).map(inset));
+    let size = Vec3::new(a, b, c);
+    let surface = crate::shapes::cuboid(Vec3::ZERO, size);
+    let h = Vec3::splat(c / 2.0);
+    let mut spheres: Vec<_> = surface.vertices.iter().map(|&p| (p, 0.0)).collect();
+    spheres.extend(surface.vertices[..4].iter().map(|p| (p.clamp(h, size - h), c / 2.0)));
     let mut sheets = vec![[8, 9, 11], [8, 11, 10]];
     // One sheet below each edge of the box: triangles at the upright ones, else trapezoids.
     for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3)] {
@@ -307,11 +298,11 @@ fn results_do_not_depend_on_threads() {
         let options = VolumeOptions { depth: 5, seed: 1 };
         pool.install(|| {
             let volume = volume_error(&surface, &bvh, inside, &union, &options).unwrap();
-            (measure(&surface, &blunt), volume)
+            (volume, measure(&surface, &blunt), certified(&surface, &blunt, 0.1))
         })
     };
     let one = run(1);
-    assert!(one.1 > 0.0);
+    assert!(one.0 > 0.0);
     assert_eq!(one, run(3));
 }
 
@@ -452,4 +443,139 @@ fn surfaces_without_area_are_refused() {
     assert!(surface_distances(&solid, &tree, &flat, &DistanceOptions::default()).is_err());
     let none = DistanceOptions { envelope_samples: 0, ..Default::default() };
     assert!(surface_distances(&solid, &tree, &solid, &none).is_err());
+}
+
+// Certified intervals.
+
+fn certified(surface: &TriMesh, mesh: &MedialMesh, tolerance: f64) -> Certificate {
+    let bvh = TriangleBvh::new(surface).unwrap();
+    let certificate = certify(surface, &bvh, mesh, tolerance).unwrap();
+    assert!(certificate.upper - certificate.lower <= tolerance, "{certificate:?}");
+    // The lower end is the distance of the witness, which is where it is said to be.
+    let Witness { point, on } = certificate.witness;
+    let signed = MedialUnion::new(mesh).unwrap().signed(point);
+    let to_surface = bvh.closest(point).distance;
+    let (off, distance) = match on {
+        WitnessSide::Surface => (to_surface, signed.abs()),
+        WitnessSide::Union => (signed.abs(), to_surface),
+    };
+    assert!(off <= ROUNDING, "the witness is {off} off the {on:?}");
+    assert!((distance - certificate.lower).abs() <= 2.0 * ROUNDING, "{certificate:?}: {distance}");
+    certificate
+}
+
+#[track_caller]
+fn holds(surface: &TriMesh, mesh: &MedialMesh, exact: f64) {
+    for tolerance in [1e-2, 1e-3, 1e-4] {
+        let Certificate { lower, upper, .. } = certified(surface, mesh, tolerance);
+        assert!((lower..=upper).contains(&exact), "{exact} is not within {lower} to {upper}");
+    }
+}
+
+#[test]
+fn the_interval_holds_known_distances() {
+    let half = Vec3::new(0.4, 0.3, 0.2);
+    let surface = centred_cuboid(half);
+    // A ball inside: the corners are farthest, or the middle of the ball's surface.
+    let ball = |c, r| complex(&[(c, r)], &[], &[]);
+    holds(&surface, &ball(Vec3::ZERO, 0.15), half.length() - 0.15);
+    // A ball around the box: its poles over the largest faces.
+    holds(&surface, &ball(Vec3::ZERO, 0.9), 0.9 - 0.2);
+    // A point.
+    holds(&surface, &ball(Vec3::ZERO, 0.0), half.length());
+    // A capsule along the longest axis: the corners again.
+    let ends = [(-0.3 * Vec3::X, 0.1), (0.3 * Vec3::X, 0.1)];
+    let capsule = complex(&ends, &[[0, 1]], &[]);
+    holds(&surface, &capsule, Vec3::new(0.1, 0.3, 0.2).length() - 0.1);
+    // A tapered cone that sticks out: its far end.
+    let spike = complex(&[(Vec3::ZERO, 0.15), (Vec3::X, 0.05)], &[[0, 1]], &[]);
+    let corner = Cone::new(Sphere::new(Vec3::ZERO, 0.15), Sphere::new(Vec3::X, 0.05));
+    holds(
+        &surface,
+        &spike,
+        (1.05_f64 - 0.4).max(corner.signed_distance(Vec3::new(-0.4, 0.3, 0.2))),
+    );
+    // A slab far above: its plane is parallel to the box's top.
+    let corners = [Vec3::new(-0.1, -0.1, 0.7), Vec3::new(0.2, -0.1, 0.7), Vec3::new(0.0, 0.2, 0.7)];
+    let slab = complex(&corners.map(|c| (c, 0.05)), &[], &[[0, 1, 2]]);
+    let depth = Slab::new(corners.map(|c| Sphere::new(c, 0.05)));
+    let below = surface.vertices.iter().map(|&v| depth.signed_distance(v)).fold(0.0, f64::max);
+    holds(&surface, &slab, below.max(0.75 - 0.2));
+}
+
+#[test]
+fn the_interval_holds_the_distance_of_balls_and_spheres() {
+    for levels in [0, 2, 3] {
+        let surface = crate::shapes::sphere(levels);
+        // Every face is acute: the foot of the centre lies in it.
+        let plane = |f: usize| {
+            let [a, b, c] = surface.triangle(f);
+            (b - a).cross(c - a).normalize().dot(a)
+        };
+        let inradius = (0..surface.faces.len()).map(plane).fold(1.0, f64::min);
+        let ball = |r| complex(&[(Vec3::ZERO, r)], &[], &[]);
+        // Within: the vertices are farthest. Around: the points over the middles of faces.
+        holds(&surface, &ball(0.3), 1.0 - 0.3);
+        holds(&surface, &ball(1.25), 1.25 - inradius);
+        // Two balls, one of them buried: nothing changes.
+        let two = complex(&[(Vec3::ZERO, 1.25), (0.2 * Vec3::X, 0.9)], &[], &[]);
+        holds(&surface, &two, 1.25 - inradius);
+    }
+}
+
+/// A polyhedron with its vertices on a cone that is thicker by `t` everywhere is `t` away from it.
+#[test]
+fn the_interval_holds_the_distance_of_a_cone() {
+    let (length, radii) = (0.8, [0.1, 0.25]);
+    let surface = tapered_capsule(length, radii, 6);
+    let on = Cone::new(Sphere::new(Vec3::ZERO, radii[0]), Sphere::new(length * Vec3::X, radii[1]));
+    assert!(surface.vertices.iter().all(|&v| on.signed_distance(v).abs() < 1e-14));
+    for t in [0.05, 0.09] {
+        let ends = [(Vec3::ZERO, radii[0] - t), (length * Vec3::X, radii[1] - t)];
+        holds(&surface, &complex(&ends, &[[0, 1]], &[]), t);
+    }
+}
+
+/// The boundary of a ball that another one mostly covers counts only where it is not covered.
+#[test]
+fn buried_parts_do_not_count() {
+    let surface = centred_cuboid(Vec3::splat(0.3));
+    let balls = [(Vec3::ZERO, 0.5), (0.1 * Vec3::X, 0.3)];
+    let alone = certified(&surface, &complex(&balls[..1], &[], &[]), 1e-4);
+    let both = certified(&surface, &complex(&balls, &[], &[]), 1e-4);
+    assert!((alone.lower - both.lower).abs() <= 1e-4 && (alone.upper - both.upper).abs() <= 1e-4);
+}
+
+#[test]
+fn the_interval_agrees_with_samples_on_random_meshes() {
+    let mut rng = Pcg64::seed_from_u64(7);
+    let mut random =
+        |scale: f64| scale * Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
+    let surface = centred_cuboid(Vec3::new(0.35, 0.3, 0.2));
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    for round in 0..12 {
+        let spheres: Vec<_> =
+            (0..8).map(|_| (random(0.3), random(0.2).length() * f64::from(round % 3))).collect();
+        let edges = [[0, 5], [5, 6], [1, 7]];
+        let mesh = complex(&spheres, &edges, &[[0, 1, 2], [1, 2, 3], [2, 3, 4]]);
+        let interval = certified(&surface, &mesh, 1e-3);
+        let options = DistanceOptions { surface_samples: 5_000, envelope_samples: 5_000, seed: 1 };
+        let sampled = distances(&surface, &bvh, &mesh, &options).unwrap().hausdorff;
+        assert!(sampled <= interval.upper, "{sampled} is above {interval:?}");
+        // The largest samples alone fall short by a tenth.
+        assert!(sampled >= 0.99 * interval.lower, "{sampled} is far below {interval:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_certified_is_refused() {
+    let surface = centred_cuboid(Vec3::splat(0.3));
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    let mesh = complex(&[(Vec3::ZERO, 0.2)], &[], &[]);
+    for tolerance in [0.0, -1.0, 1e-9, 2.0, f64::NAN, f64::INFINITY] {
+        let refused = certify(&surface, &bvh, &mesh, tolerance);
+        assert!(matches!(refused, Err(MetricError::Tolerance(_))), "{refused:?}");
+    }
+    let empty = certify(&surface, &bvh, &MedialMesh::default(), 1e-3);
+    assert!(matches!(empty, Err(MetricError::Union(_))));
 }

@@ -223,12 +223,15 @@ fn symmetric() -> Vec<(&'static str, Symmetry, TriMesh, MedialMesh)> {
     ]
 }
 
-fn judged(surface: &TriMesh, mesh: &MedialMesh) -> Evaluation {
+fn judge(surface: &TriMesh, truth: Truth, samples: usize, volume_depth: u32) -> Judge {
     let tree = TriangleBvh::new(surface).unwrap().into();
     let inside = InsideTest::new(surface).into();
-    let truth = Truth { betti: None, axis: None, diagonal: 1.0 };
-    let options = JudgeOptions { samples: 3_000, volume_depth: 5, seed: 4 };
-    Judge::new(surface.clone(), tree, inside, truth, options).evaluate(mesh).unwrap()
+    let options = JudgeOptions { samples, volume_depth, seed: 4 };
+    Judge::new(surface.clone(), tree, inside, truth, options)
+}
+
+fn judged(surface: &TriMesh, mesh: &MedialMesh) -> Evaluation {
+    judge(surface, Truth::default(), 3_000, 5).evaluate(mesh).unwrap()
 }
 
 #[test]
@@ -292,15 +295,14 @@ fn certified_intervals_meet_when_both_are_moved() {
 
 /// The same complex with its spheres in another order.
 fn renumbered(mesh: &MedialMesh, rng: &mut Pcg64) -> MedialMesh {
-    let mut order: Vec<usize> = (0..mesh.spheres.len()).collect();
-    order.shuffle(rng);
-    let mut new = vec![0; order.len()];
-    for (to, &from) in (0..).zip(&order) {
-        new[from] = to;
+    let mut new: Vec<u32> = (0..mesh.spheres.len() as u32).collect();
+    new.shuffle(rng);
+    let mut spheres = mesh.spheres.clone();
+    for (&to, &sphere) in new.iter().zip(&mesh.spheres) {
+        spheres[to as usize] = sphere;
     }
     let edges = mesh.edges.iter().map(|e| e.map(|v| new[v as usize])).collect();
     let faces = mesh.faces.iter().map(|f| f.map(|v| new[v as usize])).collect();
-    let spheres = order.iter().map(|&v| mesh.spheres[v]).collect();
     MedialMesh::from_simplices(spheres, edges, faces).unwrap()
 }
 
@@ -309,10 +311,7 @@ fn renumbering_changes_nothing_at_all() {
     let (surface, mesh) = (solid(), axis(1));
     let judge_of = |surface: &TriMesh| {
         let truth = Truth { betti: Some([1, 0, 0]), axis: Some(axis(2)), diagonal: 1.0 };
-        let options = JudgeOptions { samples: 3_000, volume_depth: 4, seed: 2 };
-        let tree = TriangleBvh::new(surface).unwrap().into();
-        let inside = InsideTest::new(surface).into();
-        Judge::new(surface.clone(), tree, inside, truth, options)
+        judge(surface, truth, 3_000, 4)
     };
     let judge = judge_of(&surface);
     let (before, certified) = (judge.evaluate(&mesh).unwrap(), judge.certify(&mesh, 1e-3).unwrap());
@@ -348,12 +347,6 @@ fn renumbering_changes_nothing_at_all() {
 /// A box of diagonal 1 around the origin, and its exact axis.
 fn cuboid() -> (TriMesh, MedialMesh) {
     let half = Vec3::new(1.5, 1.0, 0.5) / 14f64.sqrt();
-    let sign = |k: u32, bit: u32| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
-    let corner = |k: u32| half * Vec3::new(sign(k, 0), sign(k, 1), sign(k, 2));
-    let quads =
-        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let surface = TriMesh { vertices: (0..8).map(corner).collect(), faces };
     let flat = |i: u32, j: u32, n: u32| {
         let at = |k: u32, side: f64| (2.0 * f64::from(k) / f64::from(n) - 1.0) * (side - half.z);
         Sphere::new(Vec3::new(at(i, half.x), at(j, half.y), 0.0), half.z)
@@ -366,15 +359,12 @@ fn cuboid() -> (TriMesh, MedialMesh) {
         let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
         [[a, b, c], [a, c, d]]
     });
-    (surface, MedialMesh::from_simplices(grid, vec![], sheet.collect()).unwrap())
+    let axis = MedialMesh::from_simplices(grid, vec![], sheet.collect()).unwrap();
+    (shapes::cuboid(-half, half), axis)
 }
 
 fn warnings(mesh: &MedialMesh) -> Vec<String> {
-    let (surface, _) = cuboid();
-    let tree = TriangleBvh::new(&surface).unwrap().into();
-    let inside = InsideTest::new(&surface).into();
-    let options = JudgeOptions { samples: 2_000, volume_depth: 3, seed: 0 };
-    Judge::new(surface, tree, inside, Truth::default(), options).evaluate(mesh).unwrap().warnings
+    judge(&cuboid().0, Truth::default(), 2_000, 3).evaluate(mesh).unwrap().warnings
 }
 
 fn with_radii(of: impl Fn(f64) -> f64) -> MedialMesh {

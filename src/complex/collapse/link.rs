@@ -137,54 +137,10 @@ impl CollapseComplex {
 
 // The invariants of a complex under collapse.
 
-/// The first violation that [`CollapseComplex::check`] found.
+/// The first violation that [`CollapseComplex::check`] found, with the vertex or the count.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CollapseError {
-    /// A vertex names a neighbour that is gone, is the vertex itself, or does not name it back.
-    #[error("vertex {vertex} names {neighbour} as a neighbour, which is gone or does not name it")]
-    Neighbour {
-        /// The vertex.
-        vertex: u32,
-        /// The neighbour.
-        neighbour: u32,
-    },
-    /// A vertex names a neighbour or a side twice.
-    #[error("the link of vertex {vertex} holds a simplex twice")]
-    Repeated {
-        /// The vertex.
-        vertex: u32,
-    },
-    /// A vertex names a side that does not ascend, lacks an edge, or is not named by its ends.
-    #[error("vertex {vertex} names the side {side:?}, which is not a face seen from all three")]
-    Side {
-        /// The vertex.
-        vertex: u32,
-        /// The side opposite the vertex.
-        side: [u32; 2],
-    },
-    /// A retired vertex still has a link.
-    #[error("vertex {vertex} is gone but has a link")]
-    Ghost {
-        /// The vertex.
-        vertex: u32,
-    },
-    /// A sphere is not finite or has a negative radius.
-    #[error("vertex {vertex} has a sphere that is not valid")]
-    Sphere {
-        /// The vertex.
-        vertex: u32,
-    },
-    /// A count that the complex keeps up to date is wrong.
-    #[error("{kept} {what} were kept count of, there are {counted}")]
-    Count {
-        /// `"spheres"`, `"edges"` or `"faces"`.
-        what: &'static str,
-        /// The count that the complex keeps up to date.
-        kept: usize,
-        /// The count of its lists.
-        counted: usize,
-    },
-}
+#[error("{0}")]
+pub struct CollapseError(String);
 
 impl CollapseComplex {
     /// Verifies every invariant: links that agree with each other, no repetition, no trace of
@@ -199,9 +155,9 @@ impl CollapseComplex {
                 if self.neighbours(vertex).is_empty() && self.opposite_sides(vertex).is_empty() {
                     continue;
                 }
-                return Err(CollapseError::Ghost { vertex });
+                return Err(CollapseError(format!("vertex {vertex} is gone but has a link")));
             }
-            self.check_vertex(vertex)?;
+            self.check_vertex(vertex).map_err(CollapseError)?;
             spheres += 1;
             neighbours += self.neighbours(vertex).len();
             sides += self.opposite_sides(vertex).len();
@@ -212,21 +168,25 @@ impl CollapseComplex {
             ("edges", self.edge_count, neighbours / 2),
             ("faces", self.face_count, sides / 3),
         ];
-        match counts.into_iter().find(|&(_, kept, counted)| kept != counted) {
-            Some((what, kept, counted)) => Err(CollapseError::Count { what, kept, counted }),
-            None => Ok(()),
+        for (what, kept, counted) in counts {
+            if kept != counted {
+                let why = format!("{kept} {what} were kept count of, there are {counted}");
+                return Err(CollapseError(why));
+            }
         }
+        Ok(())
     }
 
-    fn check_vertex(&self, vertex: u32) -> Result<(), CollapseError> {
+    fn check_vertex(&self, vertex: u32) -> Result<(), String> {
         let sphere = self.sphere(vertex);
         if !(sphere.centre.is_finite() && sphere.radius.is_finite() && sphere.radius >= 0.0) {
-            return Err(CollapseError::Sphere { vertex });
+            return Err(format!("vertex {vertex} has a sphere that is not valid"));
         }
         for &neighbour in self.neighbours(vertex) {
             let mutual = self.is_alive(neighbour) && self.neighbours(neighbour).contains(&vertex);
             if neighbour == vertex || !mutual {
-                return Err(CollapseError::Neighbour { vertex, neighbour });
+                let names = format!("vertex {vertex} names {neighbour} as a neighbour");
+                return Err(format!("{names}, which is gone or does not name it"));
             }
         }
         for &side in self.opposite_sides(vertex) {
@@ -236,11 +196,12 @@ impl CollapseComplex {
             };
             let edges = [p, q].iter().all(|v| self.neighbours(vertex).contains(v));
             if p >= q || !edges || !names(p, vertex, q) || !names(q, vertex, p) {
-                return Err(CollapseError::Side { vertex, side });
+                let names = format!("vertex {vertex} names the side {side:?}");
+                return Err(format!("{names}, which is not a face seen from all three"));
             }
         }
         if has_repetition(self.neighbours(vertex)) || has_repetition(self.opposite_sides(vertex)) {
-            return Err(CollapseError::Repeated { vertex });
+            return Err(format!("the link of vertex {vertex} holds a simplex twice"));
         }
         Ok(())
     }

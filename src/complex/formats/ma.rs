@@ -88,7 +88,7 @@ pub fn parse_ma_with(
             records.parts = trailer(&line, &mut rest, records.announced)?;
         } else if is_complete && counts(&line).is_some() {
             match options.block {
-                None => return Err(line.error(MaErrorKind::Appended)),
+                None => return Err(line.malformed(APPENDED)),
                 Some(wanted) if wanted == block => break,
                 Some(_) => {
                     block += 1;
@@ -101,7 +101,8 @@ pub fn parse_ma_with(
     }
     match options.block {
         Some(wanted) if wanted != block => {
-            Err(MaError::of(name, MaErrorKind::Block { wanted, blocks: block }))
+            let why = format!("there is no block {wanted}: the file holds {block}, counted from 1");
+            Err(MaError::of(name, MaErrorKind::Malformed(why)))
         }
         _ => records.finish(name),
     }
@@ -149,12 +150,9 @@ impl Line<'_> {
         Words { line: self, rest: self.text.split_ascii_whitespace() }
     }
 
-    fn error(&self, kind: MaErrorKind) -> MaError {
+    fn malformed(&self, why: impl Into<String>) -> MaError {
+        let kind = MaErrorKind::Malformed(why.into());
         MaError { file: self.file.to_owned(), line: Some(self.number), kind }
-    }
-
-    fn malformed(&self, why: String) -> MaError {
-        self.error(MaErrorKind::Malformed(why))
     }
 }
 
@@ -166,12 +164,12 @@ struct Words<'a> {
 
 impl<'a> Words<'a> {
     fn required(&mut self, field: &'static str) -> Result<&'a str, MaError> {
-        self.rest.next().ok_or_else(|| self.line.error(MaErrorKind::Missing { field }))
+        self.rest.next().ok_or_else(|| self.line.malformed(format!("the {field} is missing")))
     }
 
     fn number(&mut self, field: &'static str) -> Result<f64, MaError> {
         let text = self.required(field)?;
-        finite(text, field).map_err(|kind| self.line.error(kind))
+        finite(text, field).map_err(|why| self.line.malformed(why))
     }
 
     fn point(&mut self) -> Result<Vec3, MaError> {
@@ -189,15 +187,15 @@ impl<'a> Words<'a> {
         }
         let radius = self.number("radius")?;
         if radii == Radii::NotNegative && radius < 0.0 {
-            return Err(self.line.error(MaErrorKind::NegativeRadius(radius)));
+            return Err(self.line.malformed(format!("the radius {radius} is negative")));
         }
         Ok(Sphere::new(centre, radius))
     }
 }
 
-fn finite(text: &str, field: &'static str) -> Result<f64, MaErrorKind> {
+fn finite(text: &str, field: &'static str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
-    number.ok_or_else(|| MaErrorKind::Number { field, text: shortened(text) })
+    number.ok_or_else(|| format!("the {field} {:?} is not a finite number", shortened(text)))
 }
 
 /// A word as it may be repeated in a message.
@@ -228,7 +226,7 @@ fn trailer<'a>(
     rest: &mut impl Iterator<Item = Line<'a>>,
     records: [u64; 3],
 ) -> Result<u64, MaError> {
-    let broken = || first.error(MaErrorKind::Trailer);
+    let broken = || first.malformed(TRAILER);
     let parts: u64 = first.text.parse().map_err(|_| broken())?;
     let mut numbers: VecDeque<u64> = VecDeque::new();
     for _ in 0..parts {
@@ -318,7 +316,7 @@ impl Records {
             (_, &[Some(3), Some(n)]) if options.radii == Radii::NotNeeded => {
                 ([n, 0, 0], Layout::Points, false)
             }
-            (_, &[Some(3), Some(_)]) => return Err(line.error(MaErrorKind::NoRadii)),
+            (_, &[Some(3), Some(_)]) => return Err(line.malformed(NO_RADII)),
             _ => {
                 let found = shortened(&line.text);
                 let why = format!("expected three counts `nV nE nF` first, found {found:?}");
@@ -328,7 +326,10 @@ impl Records {
         let room = bytes / SHORTEST_RECORD;
         for (what, &announced) in KINDS.into_iter().zip(&announced) {
             if announced > u64::from(u32::MAX) || (announced > room as u64 && !options.lenient) {
-                return Err(line.error(MaErrorKind::Announced { what, announced, bytes }));
+                let file = format!("but the file is only {bytes} bytes long");
+                return Err(
+                    line.malformed(format!("the header announces {announced} {what}, {file}"))
+                );
             }
         }
         let [spheres, edges, faces] = announced.map(|count| room.min(count as usize));
@@ -372,7 +373,11 @@ impl Records {
                 self.spheres.push(words.sphere(self.options.radii)?);
                 SPHERE
             }
-            _ if is_list => return Err(line.error(MaErrorKind::NoSphere(shortened(letter)))),
+            _ if is_list => {
+                let found = shortened(letter);
+                let why = format!("a list of spheres alone has lines `v x y z r`, found {found:?}");
+                return Err(line.malformed(why));
+            }
             "e" => {
                 let edge = self.indices(&mut words)?;
                 self.edges.push(edge);
@@ -392,18 +397,17 @@ impl Records {
                 self.normals += 1;
                 return Ok(());
             }
-            _ => return Err(line.error(MaErrorKind::Record(shortened(letter)))),
+            _ => return Err(unknown_record(line, 'e', letter)),
         };
         let flags: Vec<&str> = words.rest.take(MAX_WORDS + 1).collect();
-        let deleted = self.mark(kind, &flags).map_err(|kind| line.error(kind))?;
+        let deleted = self.mark(kind, &flags).map_err(|why| line.malformed(why))?;
         self.words[kind][flags.len()] += 1;
         self.deleted[kind].push(deleted);
         let (announced, found) = (self.announced[kind], self.found()[kind] as u64);
         if found > announced && !self.options.lenient && self.layout != Layout::Bare {
             // More spheres than announced would make every index doubtful; of the others a known tool may write more.
             if kind == SPHERE {
-                let what = KINDS[kind];
-                return Err(line.error(MaErrorKind::Count { what, announced, found }));
+                return Err(line.malformed(miscount(kind, announced, found)));
             }
             self.excess[kind].get_or_insert(line.number);
         }
@@ -415,10 +419,9 @@ impl Records {
         let mut indices = [0; N];
         for index in &mut indices {
             let text = words.required("index of a sphere")?;
-            *index = text.parse().map_err(|_| {
-                let (text, spheres) = (shortened(text), self.announced[SPHERE]);
-                words.line.error(MaErrorKind::Index { text, spheres })
-            })?;
+            *index = text
+                .parse()
+                .map_err(|_| words.line.malformed(no_sphere(text, self.announced[SPHERE])))?;
             if self.largest.is_none_or(|(largest, _)| *index > largest) {
                 self.largest = Some((*index, words.line.number));
             }
@@ -427,15 +430,15 @@ impl Records {
     }
 
     /// Whether the words behind the values of a record mark it as deleted.
-    fn mark(&mut self, kind: usize, words: &[&str]) -> Result<bool, MaErrorKind> {
+    fn mark(&mut self, kind: usize, words: &[&str]) -> Result<bool, String> {
         match (kind, words) {
             (_, []) => Ok(false),
             (FACE, ["0"]) => Ok(false),
             (FACE, ["1"]) => Ok(true),
-            (FACE, [word]) => Err(MaErrorKind::Malformed(format!(
+            (FACE, [word]) => Err(format!(
                 "a face has three spheres; the fourth word {:?} is no mark of deletion (0 or 1)",
                 shortened(word)
-            ))),
+            )),
             (FACE, [importance, deleted]) => {
                 finite(importance, "flag")?;
                 Ok(integer(deleted)? != 0.0)
@@ -470,7 +473,7 @@ impl Records {
         self.check_counts(name, &mut notes, &mut warnings)?;
         let spheres = self.spheres.len() as u64;
         if let Some((largest, line)) = self.largest.filter(|&(i, _)| u64::from(i) >= spheres) {
-            let kind = MaErrorKind::Index { text: largest.to_string(), spheres };
+            let kind = MaErrorKind::Malformed(no_sphere(&largest.to_string(), spheres));
             return Err(MaError { line: Some(line), ..MaError::of(name, kind) });
         }
         self.warn_of_doubts(&mut warnings);
@@ -526,7 +529,7 @@ impl Records {
                 // Where the first record too many stands, the message counts up to it.
                 let line = self.excess[kind];
                 let found = if line.is_some() { announced + 1 } else { found };
-                let kind = MaErrorKind::Count { what, announced, found };
+                let kind = MaErrorKind::Malformed(miscount(kind, announced, found));
                 return Err(MaError { line, ..MaError::of(name, kind) });
             }
         }
@@ -614,18 +617,43 @@ fn drop_simplices<const N: usize>(
     note(notes, all - simplices.len(), what, "dropped: on a deleted sphere");
 }
 
-fn integer(word: &str) -> Result<f64, MaErrorKind> {
+fn integer(word: &str) -> Result<f64, String> {
     let value = finite(word, "flag")?;
     if value.fract() != 0.0 || value.abs() > f64::from(i32::MAX) {
-        return Err(MaErrorKind::Malformed(format!("the flag {word} is not a whole number")));
+        return Err(format!("the flag {word} is not a whole number"));
     }
     Ok(value)
 }
 
-fn not_flags(words: &[&str]) -> MaErrorKind {
-    let found = shortened(&words.join(" "));
-    MaErrorKind::Malformed(format!("{found:?} behind the values: flags of no known tool"))
+fn not_flags(words: &[&str]) -> String {
+    format!("{:?} behind the values: flags of no known tool", shortened(&words.join(" ")))
 }
+
+/// The message of counts that differ. `found` stops at the first record too many.
+fn miscount(kind: usize, announced: u64, found: u64) -> String {
+    let bound = if found > announced { "at least" } else { "only" };
+    let what = KINDS[kind];
+    format!("the header announces {announced} {what}, the file holds {bound} {found}")
+}
+
+fn no_sphere(text: &str, spheres: u64) -> String {
+    let text = shortened(text);
+    format!("{text:?} is not one of the {spheres} spheres; indices start at 0")
+}
+
+/// The message of a line that is no `v`, no `f` and no record of `letter`, that of edges.
+fn unknown_record(line: &Line<'_>, letter: char, word: &str) -> MaError {
+    let found = shortened(word);
+    line.malformed(format!("expected a line that starts with v, {letter} or f, found {found:?}"))
+}
+
+const NO_RADII: &str = "points without radii: `--radii surface` takes their distances to a surface";
+
+const APPENDED: &str = "all that the header announces stands above: another medial mesh begins here, \
+                        written behind the first; `--block 1`, `--block 2` ... say which is meant";
+
+const TRAILER: &str = "expected the parts of the structure behind the last record: a number of them, \
+                       and for each `id type m` with m indices";
 
 /// Statements of OBJ that do not concern spheres, edges and faces.
 const IGNORED: [&str; 11] =
@@ -665,7 +693,7 @@ pub fn parse_obj(
                 (4, radii) => words.sphere(radii)?,
                 // Behind the coordinates there may be colours.
                 (_, Radii::NotNeeded) => Sphere::new(words.point()?, 0.0),
-                (3, _) => return Err(line.error(MaErrorKind::NoRadii)),
+                (3, _) => return Err(line.malformed(NO_RADII)),
                 (numbers, _) => {
                     let why = "a vertex has 4 numbers, x y z and a radius";
                     return Err(line.malformed(format!("{why}; found {numbers}")));
@@ -674,7 +702,7 @@ pub fn parse_obj(
             "l" => {
                 let corners = obj_indices(words, spheres.len())?;
                 if corners.len() < 2 {
-                    return Err(line.error(MaErrorKind::Missing { field: "index of a sphere" }));
+                    return Err(line.malformed("the index of a sphere is missing"));
                 }
                 edges.extend(corners.windows(2).map(|pair| [pair[0], pair[1]]));
             }
@@ -687,11 +715,7 @@ pub fn parse_obj(
                 }
             },
             word if IGNORED.contains(&word) => {}
-            word => {
-                let found = shortened(word);
-                let why = format!("expected a line that starts with v, l or f, found {found:?}");
-                return Err(line.malformed(why));
-            }
+            word => return Err(unknown_record(&line, 'l', word)),
         }
     }
     canonical(spheres, edges, faces, options.radii, Vec::new())

@@ -119,100 +119,18 @@ pub enum MaErrorKind {
     /// The operating system refused.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// No such format.
-    #[error("the extension {extension:?} is not one of {known}")]
-    Extension {
-        /// The file's extension, in lower case.
-        extension: String,
-        /// The extensions that would do.
-        known: &'static str,
-    },
     /// The format cannot hold this mesh, or no such values.
     #[error("{0}")]
     Unwritable(String),
     /// The mesh to be written is not in canonical form.
     #[error("the medial mesh is not valid: {0}")]
     Mesh(#[from] ComplexError),
-    /// The header or a line is missing or is not what the format asks for.
+    /// The extension or the text is none of a medial mesh, or not as the options demand.
     #[error("{0}")]
     Malformed(String),
-    /// The header announces more elements than the file has bytes for, or than 32-bit ids reach.
-    #[error("the header announces {announced} {what}, but the file is only {bytes} bytes long")]
-    Announced {
-        /// `"spheres"`, `"edges"` or `"faces"`.
-        what: &'static str,
-        /// The number in the header.
-        announced: u64,
-        /// Size of the file.
-        bytes: usize,
-    },
-    /// The file holds fewer or more elements than its header announces.
-    #[error("the header announces {announced} {what}, the file holds {}{found}",
-        if found > announced { "at least " } else { "only " })]
-    Count {
-        /// `"spheres"`, `"edges"` or `"faces"`.
-        what: &'static str,
-        /// The number in the header.
-        announced: u64,
-        /// The number of lines found.
-        found: u64,
-    },
-    /// A line starts with a word that the format does not have.
-    #[error("expected a line that starts with v, e or f, found {0:?}")]
-    Record(String),
-    /// A line of a list of spheres is none.
-    #[error("a list of spheres alone has lines `v x y z r`, found {0:?}")]
-    NoSphere(String),
-    /// Points without radii.
-    #[error("points without radii: `--radii surface` takes their distances to a surface")]
-    NoRadii,
-    /// A second file was appended.
-    #[error(
-        "all that the header announces stands above: another medial mesh begins here, written behind the first; \
-         `--block 1`, `--block 2` ... say which is meant"
-    )]
-    Appended,
-    /// The file has fewer medial meshes.
-    #[error("there is no block {wanted}: the file holds {blocks}, counted from 1")]
-    Block {
-        /// The requested block.
-        wanted: usize,
-        /// Number of medial meshes in the file.
-        blocks: usize,
-    },
-    /// The lines after the last record are no list of parts.
-    #[error(
-        "expected the parts of the structure behind the last record: a number of them, and for each `id type m` with m indices"
-    )]
-    Trailer,
     /// Every radius is 0.
     #[error("every radius is 0: a surface or a set of points, no medial mesh")]
     Points,
-    /// A line ends too early.
-    #[error("the {field} is missing")]
-    Missing {
-        /// The missing value.
-        field: &'static str,
-    },
-    /// A word is not a finite number.
-    #[error("the {field} {text:?} is not a finite number")]
-    Number {
-        /// The value that the number stands for.
-        field: &'static str,
-        /// The word.
-        text: String,
-    },
-    /// A radius is negative, where none may be.
-    #[error("the radius {0} is negative")]
-    NegativeRadius(f64),
-    /// A word is not the index of a sphere.
-    #[error("{text:?} is not one of the {spheres} spheres; indices start at 0")]
-    Index {
-        /// The word.
-        text: String,
-        /// Number of spheres.
-        spheres: u64,
-    },
 }
 
 /// Reads a medial mesh from a `.ma` file, a list of spheres, a `.ply` file or an `.obj` file with radii, told apart by
@@ -258,8 +176,8 @@ fn parser<'a>(path: &Path) -> Result<Parser<'a>, MaError> {
         "obj" => Ok(parse_obj),
         other => {
             let known = ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj";
-            let extension = other.to_owned();
-            Err(MaError::of(path.display(), MaErrorKind::Extension { extension, known }))
+            let why = format!("the extension {other:?} is not one of {known}");
+            Err(MaError::of(path.display(), MaErrorKind::Malformed(why)))
         }
     }
 }
@@ -312,7 +230,8 @@ fn write_as(
         "ma" | "ply" | "obj" | "vtp" | "glb" => None,
         _ => {
             let known = ".ma, .ply, .obj, .vtp, .glb";
-            return Err(MaErrorKind::Extension { extension: extension.to_owned(), known });
+            let why = format!("the extension {extension:?} is not one of {known}");
+            return Err(MaErrorKind::Unwritable(why));
         }
     };
     if let Some(lacks) = lacks {

@@ -46,9 +46,6 @@ use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 use crate::surface::{TriMesh, TriangleBvh};
 
-#[cfg(test)]
-mod tests;
-
 /// Bound on the rounding error of a distance, in units of the surface's diagonal.
 pub const ROUNDING: f64 = 1e-9;
 
