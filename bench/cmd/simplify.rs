@@ -472,9 +472,10 @@ fn write_voxels(path: &Path, voxels: &LatticeVoxels, shape: &Shape) -> Result<()
     medial::write_atomically(path, |out| {
         writeln!(out, "x,y,z,distance,flux,i,j,k")?;
         for voxel in &voxels.voxels {
-            let [x, y, z] = back.backward(voxels.centre(voxel)).to_array();
-            let ([i, j, k], distance) = (voxel.place, voxel.distance * back.diagonal);
-            writeln!(out, "{x},{y},{z},{distance},{},{i},{j},{k}", voxel.flux)?;
+            let [x, y, z] = back.backward(voxels.grid.centre(voxel.place)).to_array();
+            let [distance, flux] = [voxel.distance, voxel.flux].map(f64::from);
+            let ([i, j, k], distance) = (voxel.place, distance * back.diagonal);
+            writeln!(out, "{x},{y},{z},{distance},{flux},{i},{j},{k}")?;
         }
         Ok(())
     })
@@ -486,9 +487,9 @@ fn describe_voxels(voxels: &LatticeVoxels, shape: &Shape) -> serde_json::Value {
     let back = shape.normalisation();
     json!({
         "count": voxels.voxels.len(),
-        "origin": back.backward(voxels.origin).to_array(),
-        "side": voxels.side * back.diagonal,
-        "size": voxels.size,
+        "origin": back.backward(voxels.grid.origin).to_array(),
+        "side": voxels.grid.side * back.diagonal,
+        "size": voxels.grid.size,
         "betti": voxels.betti(),
     })
 }

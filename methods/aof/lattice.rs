@@ -71,41 +71,44 @@ impl Grid {
     }
 }
 
-/// The voxels of a cubic lattice that the spheres of a result stand for, one for each sphere in the
-/// same order.
+/// The voxels of a lattice that the spheres of a result stand for, one for each sphere in the same
+/// order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatticeVoxels {
-    /// Lower corner of the lattice, in normalised units.
-    pub origin: Vec3,
-    /// Side of a voxel, in normalised units.
-    pub side: f64,
-    /// Voxels of the lattice along each axis.
-    pub size: [u32; 3],
-    /// The voxels, by `z`, then `y`, then `x`.
-    pub voxels: Vec<LatticeVoxel>,
-}
-
-/// A voxel with what was measured there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LatticeVoxel {
-    /// Indices along the axes, from the lower corner.
-    pub place: [u32; 3],
-    /// Distance of its centre to the surface, in normalised units, to single precision.
-    pub distance: f64,
-    /// Average outward flux of the gradient of the distance, `AOF'`; 0 where it was not measured.
-    pub flux: f64,
+    /// The lattice, normalised.
+    pub grid: Grid,
+    /// The voxels by `z`, then `y`, then `x`.
+    pub voxels: Vec<Voxel>,
 }
 
 impl LatticeVoxels {
-    /// Centre of a voxel, in normalised units.
-    pub fn centre(&self, voxel: &LatticeVoxel) -> Vec3 {
-        self.origin + (Vec3::from(voxel.place.map(f64::from)) + 0.5) * self.side
+    /// All voxels of a set.
+    pub(super) fn sorted(grid: Grid, voxels: &Bricks) -> Self {
+        let mut voxels: Vec<Voxel> = voxels.iter().collect();
+        voxels.sort_unstable_by_key(Voxel::key);
+        Self { grid, voxels }
+    }
+
+    /// Centres of the voxels, normalised.
+    pub fn points(&self) -> Vec<Vec3> {
+        self.voxels.iter().map(|voxel| self.grid.centre(voxel.place)).collect()
     }
 
     /// Betti numbers of the union of the closed voxels.
     pub fn betti(&self) -> [u64; 3] {
-        cubical_betti(&self.voxels.iter().map(|voxel| voxel.place).collect::<Vec<_>>())
+        betti(self.voxels.iter().copied())
     }
+
+    pub(super) fn bricks(&self) -> Bricks {
+        let mut bricks = Bricks::new(self.grid.size);
+        self.voxels.iter().for_each(|&voxel| bricks.insert(voxel));
+        bricks
+    }
+}
+
+/// Betti numbers of the union of closed voxels.
+pub(super) fn betti(voxels: impl Iterator<Item = Voxel>) -> [u64; 3] {
+    cubical_betti(&voxels.map(|voxel| voxel.place.map(u32::from)).collect::<Vec<_>>())
 }
 
 /// Voxels along a side of a brick.
@@ -118,12 +121,20 @@ pub type Place = [u16; 3];
 /// A voxel and its values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Voxel {
-    /// Where it is.
+    /// Indices along the axes.
     pub place: Place,
     /// Distance of its centre to the surface, a fraction of the diagonal.
     pub distance: f32,
     /// `AOF'`; 0 if the voxel was dismissed at a coarser level.
     pub flux: f32,
+}
+
+impl Voxel {
+    /// Its rank in a result: by `z`, then `y`, then `x`.
+    pub(super) fn key(&self) -> [u16; 3] {
+        let [x, y, z] = self.place;
+        [z, y, x]
+    }
 }
 
 /// A set of voxels with values.
@@ -138,43 +149,34 @@ pub struct Bricks {
 type Values = [[f32; 2]; (SIDE * SIDE * SIDE) as usize];
 
 impl Bricks {
-    /// An empty set of voxels of a grid with these numbers along the axes.
-    pub fn new(grid: [u32; 3]) -> Self {
-        Self { there: Bits::new(grid), values: Vec::new(), len: 0 }
+    /// An empty set for a lattice with these numbers of voxels along the axes.
+    pub(super) fn new(size: [u32; 3]) -> Self {
+        Self { there: Bits::new(size), values: Vec::new(), len: 0 }
     }
 
-    /// Whether there is no voxel.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Number of voxels.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.len
     }
 
-    /// Puts in a voxel that is not there yet.
-    pub fn insert(&mut self, voxel: Voxel) {
+    /// Inserts a voxel that is not there yet.
+    pub(super) fn insert(&mut self, voxel: Voxel) {
         let brick = self.there.brick_or_new(voxel.place);
         if brick == self.values.len() {
             self.values.push(Box::new([[0.0; 2]; (SIDE * SIDE * SIDE) as usize]));
         }
+        self.there.set(voxel.place);
         let (layer, bit) = inside(voxel.place);
-        let word = &mut self.there.words[brick][layer];
-        debug_assert!(*word >> bit & 1 == 0, "inserted twice");
-        *word |= 1 << bit;
         self.values[brick][64 * layer + bit] = [voxel.distance, voxel.flux];
         self.len += 1;
     }
 
-    /// Takes out a voxel that is there.
-    pub fn remove(&mut self, place: Place) {
-        *self.there.word(place) &= !(1 << inside(place).1);
+    /// Removes a voxel that is there.
+    pub(super) fn remove(&mut self, place: Place) {
+        self.there.clear(place);
         self.len -= 1;
     }
 
-    /// The voxel at a place, if there is one.
-    pub fn get(&self, place: Place) -> Option<Voxel> {
+    pub(super) fn get(&self, place: Place) -> Option<Voxel> {
         let brick = self.there.brick(place)?;
         let (layer, bit) = inside(place);
         let [distance, flux] = self.values[brick][64 * layer + bit];
@@ -182,11 +184,15 @@ impl Bricks {
         is_there.then_some(Voxel { place, distance, flux })
     }
 
-    /// The existing voxels among the 27 around and at a place, as bits
-    /// `dx + 1 + 3 (dy + 1) + 9 (dz + 1)`.
+    /// See [`Bits::neighbourhood`].
     #[inline]
-    pub fn neighbourhood(&self, place: Place) -> u32 {
+    pub(super) fn neighbourhood(&self, place: Place) -> u32 {
         self.there.neighbourhood(place)
+    }
+
+    /// No bit, with room for one at each place of these bricks.
+    pub(super) fn no_marks(&self) -> Bits {
+        Bits { words: vec![[0; 8]; self.there.words.len()], ..self.there.clone() }
     }
 
     /// All voxels, brick by brick.
@@ -207,41 +213,9 @@ impl Bricks {
     }
 }
 
-/// A mark for each place of a set of bricks.
-pub struct Marks(Bits);
-
-impl Marks {
-    /// No mark on any place of these bricks.
-    pub fn of(bricks: &Bricks) -> Self {
-        let mut marks = bricks.there.clone();
-        marks.words.fill([0; 8]);
-        Self(marks)
-    }
-
-    /// Marks a place; whether it had no mark.
-    pub fn set(&mut self, place: Place) -> bool {
-        let bit = 1 << inside(place).1;
-        let word = self.0.word(place);
-        let new = *word & bit == 0;
-        *word |= bit;
-        new
-    }
-
-    /// Takes the mark from a place.
-    pub fn clear(&mut self, place: Place) {
-        *self.0.word(place) &= !(1 << inside(place).1);
-    }
-
-    /// The marked places among the 27 around and at a place, as bits as in [`Bricks::neighbourhood`].
-    #[inline]
-    pub fn neighbourhood(&self, place: Place) -> u32 {
-        self.0.neighbourhood(place)
-    }
-}
-
 /// A bit for each place; only bricks with a bit are allocated.
 #[derive(Clone, Debug)]
-struct Bits {
+pub(super) struct Bits {
     /// Bricks along each axis.
     size: [u32; 3],
     table: Vec<u32>,
@@ -280,15 +254,23 @@ impl Bits {
         self.table[slot] as usize
     }
 
-    /// The word of a place in a brick that is there.
-    #[inline]
-    fn word(&mut self, place: Place) -> &mut u64 {
+    /// Sets the bit of a place in an allocated brick.
+    pub(super) fn set(&mut self, place: Place) {
+        let (layer, bit) = inside(place);
         let brick = self.table[self.slot(place)] as usize;
-        &mut self.words[brick][inside(place).0]
+        self.words[brick][layer] |= 1 << bit;
     }
 
+    /// Clears the bit of a place in an allocated brick.
+    pub(super) fn clear(&mut self, place: Place) {
+        let (layer, bit) = inside(place);
+        let brick = self.table[self.slot(place)] as usize;
+        self.words[brick][layer] &= !(1 << bit);
+    }
+
+    /// The bits of the 27 places around and at a place, as bits `dx + 1 + 3 (dy + 1) + 9 (dz + 1)`.
     #[inline]
-    fn neighbourhood(&self, place: Place) -> u32 {
+    pub(super) fn neighbourhood(&self, place: Place) -> u32 {
         // All neighbours in one brick: three words instead of nine rows. Most voxels are inside.
         if place.iter().all(|v| (1..7).contains(&(v % 8))) {
             let Some(brick) = self.brick(place) else {
@@ -363,8 +345,8 @@ pub struct Tally {
     pub start: u64,
     /// Dismissed at each level above the finest.
     pub dismissed: Vec<u64>,
-    /// Spheres evaluated at each level.
-    pub evaluated: Vec<u64>,
+    /// Spheres evaluated at all levels.
+    pub evaluated: u64,
 }
 
 /// The outcome of a descent.
@@ -373,7 +355,7 @@ pub struct Descent {
     pub grid: Grid,
     /// The voxels.
     pub voxels: Bricks,
-    /// Counts of what happened to them.
+    /// Their numbers.
     pub tally: Tally,
 }
 
@@ -381,78 +363,62 @@ pub struct Descent {
 ///
 /// # Errors
 /// When the run was cancelled.
-pub fn coarse_to_fine(
+pub(super) fn coarse_to_fine(
     surface: &Surface,
     grid: Grid,
     params: &AofParams,
     wanted: Wanted,
     run: &RunContext,
 ) -> Result<Descent, SimplifyError> {
-    let levels = Levels::new(&grid, params)?;
+    let levels = levels(&grid, params)?;
     let blocks = blocks(surface, &grid);
     let done = AtomicUsize::new(0);
+    let none = Tally { dismissed: vec![0; levels.len() - 1], ..Tally::default() };
     let parts: Result<Vec<_>, SimplifyError> = blocks
         .par_iter()
         .map(|block| {
             run.step(done.fetch_add(1, Ordering::Relaxed), blocks.len())?;
-            let (voxels, tally) = (Vec::new(), levels.tally());
-            let mut walk = Walk { surface, grid: &grid, levels: &levels, wanted, voxels, tally };
+            let (levels, start, tally) = (&levels[..], params.start, none.clone());
+            let mut walk =
+                Walk { surface, grid: &grid, levels, start, wanted, voxels: Vec::new(), tally };
             walk.block(block);
             Ok((walk.voxels, walk.tally))
         })
         .collect();
     run.step(blocks.len(), blocks.len())?;
-    let mut descent = Descent { grid, voxels: Bricks::new(grid.size), tally: levels.tally() };
+    let (mut voxels, mut tally) = (Bricks::new(grid.size), none);
     // In the order of the blocks: brick numbers, and with them every later order, are deterministic.
-    for (voxels, tally) in parts? {
-        voxels.into_iter().for_each(|voxel| descent.voxels.insert(voxel));
-        descent.tally.add(&tally);
+    for (of_block, counts) in parts? {
+        of_block.into_iter().for_each(|voxel| voxels.insert(voxel));
+        tally.start += counts.start;
+        tally.evaluated += counts.evaluated;
+        tally.dismissed.iter_mut().zip(counts.dismissed).for_each(|(all, own)| *all += own);
     }
-    Ok(descent)
+    Ok(Descent { grid, voxels, tally })
 }
 
-/// Sizes that depend on the level alone, from coarse to fine.
-struct Levels {
-    spheres: Vec<Sphere>,
+/// One level of resolution.
+struct LatticeLevel {
+    sphere: Sphere,
     /// Finest voxels along a side.
-    sizes: Vec<u32>,
-    /// Flux from which on a voxel of the level is dismissed.
-    dismissed_from: Vec<f64>,
-    d: u32,
-    start: Start,
+    size: u32,
+    /// Flux from which on a voxel is dismissed.
+    dismissed_from: f64,
 }
 
-impl Levels {
-    fn new(grid: &Grid, params: &AofParams) -> Result<Self, SimplifyError> {
-        let (mut spheres, mut sizes, mut dismissed_from) = (Vec::new(), Vec::new(), Vec::new());
-        for (level, count) in (0..params.levels).zip(params.sample_counts()?) {
-            let size = params.d.pow(params.levels - 1 - level);
-            let sphere = Sphere::new(params.spiral, count, grid.side * f64::from(size));
-            dismissed_from.push(match params.dismiss {
-                Dismiss::Zero => 0.0,
-                Dismiss::Bias => -sphere.bias,
-            });
-            spheres.push(sphere);
-            sizes.push(size);
-        }
-        Ok(Self { spheres, sizes, dismissed_from, d: params.d, start: params.start })
-    }
-
-    fn tally(&self) -> Tally {
-        let levels = self.sizes.len();
-        Tally { dismissed: vec![0; levels - 1], evaluated: vec![0; levels], ..Tally::default() }
-    }
-}
-
-impl Tally {
-    fn add(&mut self, other: &Self) {
-        self.start += other.start;
-        let pairs =
-            [(&mut self.dismissed, &other.dismissed), (&mut self.evaluated, &other.evaluated)];
-        for (mine, theirs) in pairs {
-            mine.iter_mut().zip(theirs).for_each(|(a, b)| *a += b);
-        }
-    }
+/// From coarse to fine.
+fn levels(grid: &Grid, params: &AofParams) -> Result<Vec<LatticeLevel>, SimplifyError> {
+    let counts = params.sample_counts()?.into_iter();
+    let levels = counts.zip((0..params.levels).rev()).map(|(count, finer)| {
+        let size = params.d.pow(finer);
+        let sphere = Sphere::new(params.spiral, count, grid.side * f64::from(size));
+        let dismissed_from = match params.dismiss {
+            Dismiss::Zero => 0.0,
+            Dismiss::Bias => -sphere.bias,
+        };
+        LatticeLevel { sphere, size, dismissed_from }
+    });
+    Ok(levels.collect())
 }
 
 /// A box of coarse voxels, and a face near it.
@@ -498,7 +464,8 @@ fn blocks(surface: &Surface, grid: &Grid) -> Vec<Block> {
 struct Walk<'a> {
     surface: &'a Surface,
     grid: &'a Grid,
-    levels: &'a Levels,
+    levels: &'a [LatticeLevel],
+    start: Start,
     wanted: Wanted,
     voxels: Vec<Voxel>,
     tally: Tally,
@@ -516,15 +483,11 @@ struct Known {
 
 impl Walk<'_> {
     fn block(&mut self, block: &Block) {
+        let known = Known { is_inside: false, dismissed: false, face: block.face };
         for z in block.lo[2]..block.hi[2] {
             for y in block.lo[1]..block.hi[1] {
                 for x in block.lo[0]..block.hi[0] {
-                    let base = [x, y, z].map(|i| i * self.grid.split);
-                    self.visit(
-                        0,
-                        base,
-                        Known { is_inside: false, dismissed: false, face: block.face },
-                    );
+                    self.visit(0, [x, y, z].map(|i| i * self.grid.split), known);
                 }
             }
         }
@@ -532,17 +495,16 @@ impl Walk<'_> {
 
     /// Steps 2 to 4 for the voxel of a level whose lowest finest voxel is at `base`.
     fn visit(&mut self, level: usize, base: [u32; 3], mut known: Known) {
-        let size = self.levels.sizes[level];
-        let sigma = self.levels.spheres[level].radius;
+        let LatticeLevel { ref sphere, size, dismissed_from } = self.levels[level];
         let middle = Vec3::from(base.map(|i| f64::from(i) + f64::from(size) * 0.5));
         let centre = self.grid.origin + middle * self.grid.side;
         let Closest { distance, face, .. } = self.surface.closest(centre, Some(known.face));
         known.face = face;
         // Farthest centre of a descendant.
-        let spread = HALF_DIAGONAL * (sigma - self.grid.side);
-        let finest = level + 1 == self.levels.sizes.len();
-        // The sphere does not fit, whatever the side.
-        if finest && distance < sigma {
+        let spread = HALF_DIAGONAL * (sphere.radius - self.grid.side);
+        let finest = level + 1 == self.levels.len();
+        let sphere_fits = distance >= sphere.radius;
+        if !sphere_fits && (finest || level == 0 && self.start == Start::Coarse) {
             return;
         }
         // Farther from the surface than any descendant's centre is away: all have this side.
@@ -552,13 +514,10 @@ impl Walk<'_> {
             }
             known.is_inside = true;
         }
-        if level == 0 && self.levels.start == Start::Coarse && distance < sigma {
-            return;
-        }
-        let evaluate = !known.dismissed && self.wanted != Wanted::Places && distance >= sigma;
+        let evaluate = !known.dismissed && self.wanted != Wanted::Places && sphere_fits;
         let flux = if evaluate {
-            self.tally.evaluated[level] += 1;
-            self.surface.flux(&self.levels.spheres[level], centre, face)
+            self.tally.evaluated += 1;
+            self.surface.flux(sphere, centre, face)
         } else {
             0.0
         };
@@ -566,7 +525,7 @@ impl Walk<'_> {
             self.emit(base, distance, flux);
             return;
         }
-        if evaluate && flux >= self.levels.dismissed_from[level] {
+        if evaluate && flux >= dismissed_from {
             self.tally.dismissed[level] += u64::from(size).pow(3);
             known.dismissed = true;
             if self.wanted == Wanted::Kept {
@@ -576,17 +535,14 @@ impl Walk<'_> {
         }
         // The spheres of all descendants fit, and no values are needed: skip the recursion.
         if self.wanted == Wanted::Places && distance >= spread + self.grid.side {
-            for k in 0..size.pow(3) {
-                let at = [k % size, k / size % size, k / size / size];
+            for at in cube(size) {
                 self.emit([0, 1, 2].map(|axis| base[axis] + at[axis]), distance, 0.0);
             }
             return;
         }
-        let (step, d) = (self.levels.sizes[level + 1], self.levels.d);
-        for k in 0..d.pow(3) {
-            let at = [k % d, k / d % d, k / d / d];
-            let child = [0, 1, 2].map(|axis| base[axis] + at[axis] * step);
-            self.visit(level + 1, child, known);
+        let step = self.levels[level + 1].size;
+        for at in cube(size / step) {
+            self.visit(level + 1, [0, 1, 2].map(|axis| base[axis] + at[axis] * step), known);
         }
     }
 
@@ -595,6 +551,11 @@ impl Walk<'_> {
         let place = place.map(|i| i as u16);
         self.voxels.push(Voxel { place, distance: distance as f32, flux: flux as f32 });
     }
+}
+
+/// The places of a cube of `n` voxels along each side.
+fn cube(n: u32) -> impl Iterator<Item = [u32; 3]> {
+    (0..n.pow(3)).map(move |k| [k % n, k / n % n, k / n / n])
 }
 
 #[cfg(test)]

@@ -77,8 +77,8 @@ use medial::simplifier::{
 use serde::{Deserialize, Serialize};
 
 pub use flux::{Refined, Sphere, Spiral, Surface};
-pub use lattice::{Bricks, Descent, Grid, LatticeVoxel, LatticeVoxels, Place, Voxel, Wanted};
-pub use solid::{Axis, Base, Loss, Solid};
+pub use lattice::{Bricks, Descent, Grid, LatticeVoxels, Place, Voxel, Wanted};
+pub use solid::{Base, Loss, Solid};
 
 /// Name of the extra that holds the [`LatticeVoxels`].
 pub const VOXELS: &str = "voxels";
@@ -162,12 +162,11 @@ fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified, Simpli
     if axis.voxels.is_empty() {
         diagnostics.warn(format!("no voxel passes an object angle of {angle} degrees"));
     }
-    let voxels = axis.lattice_voxels();
-    for (name, number) in ["voxel_b0", "voxel_b1", "voxel_b2"].into_iter().zip(voxels.betti()) {
+    for (name, number) in ["voxel_b0", "voxel_b1", "voxel_b2"].into_iter().zip(axis.betti()) {
         diagnostics.count(name, number as usize);
     }
     let native_level = (!matches!(level, Level::Spheres(_))).then_some(angle);
-    let extras = Extras::with(voxels);
+    let extras = Extras::with(axis);
     Ok(Simplified { native_level, diagnostics, extras, ..Simplified::new(mesh, level) })
 }
 

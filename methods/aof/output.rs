@@ -32,25 +32,15 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
+use std::sync::LazyLock;
 
 use medial::complex::{MedialMesh, Sphere as Ball};
 use medial::simplifier::{RunContext, SimplifyError};
 use rayon::prelude::*;
 
-use super::lattice::{Bricks, Place, Voxel};
-use super::solid::{Axis, BYTES_PER_VOXEL, Base, Solid};
-use super::thinning::{CENTRE, offset, ones};
-
-/// The voxels by `z`, then `y`, then `x`.
-pub fn sorted(voxels: &Bricks) -> Vec<Voxel> {
-    let mut sorted: Vec<Voxel> = voxels.iter().collect();
-    sorted.sort_unstable_by_key(|voxel| key(voxel.place));
-    sorted
-}
-
-fn key([x, y, z]: Place) -> [u16; 3] {
-    [z, y, x]
-}
+use super::lattice::{LatticeVoxels, Voxel};
+use super::solid::{BYTES_PER_VOXEL, Base, Solid};
+use super::thinning::{CENTRE, offset, ones, squared, touch};
 
 /// The medial mesh on balls of sorted voxels.
 ///
@@ -65,23 +55,19 @@ pub fn medial_mesh(
     run: &RunContext,
 ) -> Result<MedialMesh, SimplifyError> {
     assert_eq!(voxels.len(), balls.len(), "one ball for each voxel");
-    let keys: Vec<[u16; 3]> = voxels.iter().map(|voxel| key(voxel.place)).collect();
-    let around: Vec<Around> = (0..keys.len())
-        .into_par_iter()
-        .map(|k| std::array::from_fn(|bit| neighbour(&keys, k, bit as u32)))
-        .collect();
+    let keys: Vec<[u16; 3]> = voxels.iter().map(Voxel::key).collect();
+    let around: Vec<Around> =
+        (0..keys.len()).into_par_iter().map(|k| Around::of(&keys, k)).collect();
     run.step(0, 1)?;
     let (mut edges, mut faces, mut first) = (Vec::new(), Vec::new(), vec![0]);
     let mut lengths = Vec::new();
-    for a in 0..keys.len() as u32 {
+    for (a, near) in (0..).zip(&around) {
         // Voxels are sorted like bits, so the later bits are the later voxels: each simplex once.
-        let after = &around[a as usize][AFTER_CENTRE..];
-        for &b in after.iter().flatten() {
-            edges.push([a, b]);
-            for &c in after.iter().flatten().filter(|&&c| c > b && are_adjacent(&keys, b, c)) {
-                faces.push([a, b, c]);
-                lengths
-                    .push([[a, b], [a, c], [b, c]].map(|pair| squared(&keys, pair)).iter().sum());
+        for b in ones(near.there & AFTER_CENTRE) {
+            edges.push([a, near.ids[b as usize]]);
+            for c in ones(near.there & TOUCHING_AFTER[b as usize]) {
+                faces.push([a, near.ids[b as usize], near.ids[c as usize]]);
+                lengths.push(squared(CENTRE, b) + squared(CENTRE, c) + squared(b, c));
             }
         }
         first.push(faces.len() as u32);
@@ -92,29 +78,38 @@ pub fn medial_mesh(
     Ok(MedialMesh { spheres: balls, edges, faces, contacts: None })
 }
 
-/// The voxel at a bit of the neighbourhood of voxel `k`.
-fn neighbour(keys: &[[u16; 3]], k: usize, bit: u32) -> Option<u32> {
-    let [dx, dy, dz] = offset(bit);
-    let [z, y, x] = keys[k].map(i32::from);
-    let [Ok(z), Ok(y), Ok(x)] = [z + dz, y + dy, x + dx].map(u16::try_from) else { return None };
-    keys.binary_search(&[z, y, x]).ok().map(|found| found as u32)
+/// The voxels around and at a voxel: bits as in `thinning.rs`, in the order of `z`, `y`, `x`.
+struct Around {
+    there: u32,
+    /// Ids of the voxels that are there, ascending.
+    ids: [u32; 27],
 }
 
-fn are_adjacent(keys: &[[u16; 3]], a: u32, b: u32) -> bool {
-    let (a, b) = (keys[a as usize], keys[b as usize]);
-    (0..3).all(|axis| a[axis].abs_diff(b[axis]) <= 1)
+impl Around {
+    fn of(keys: &[[u16; 3]], k: usize) -> Self {
+        let [z, y, x] = keys[k].map(i32::from);
+        let mut around = Self { there: 0, ids: [0; 27] };
+        for bit in 0..27 {
+            let [dx, dy, dz] = offset(bit);
+            let near = [z + dz, y + dy, x + dx];
+            if let Ok(id) = keys.binary_search_by(|key| key.map(i32::from).cmp(&near)) {
+                around.there |= 1 << bit;
+                around.ids[bit as usize] = id as u32;
+            }
+        }
+        around
+    }
 }
 
-fn squared(keys: &[[u16; 3]], [a, b]: [u32; 2]) -> u8 {
-    let (a, b) = (keys[a as usize], keys[b as usize]);
-    (0..3).map(|axis| a[axis].abs_diff(b[axis]).pow(2) as u8).sum()
-}
+/// The bits of voxels that come after the voxel itself.
+const AFTER_CENTRE: u32 = 0x7ff_ffff & !((2 << CENTRE) - 1);
 
-/// The voxels around and at a voxel, ascending: bits as in `thinning.rs`, in the order of `z`, `y`, `x`.
-type Around = [Option<u32>; 27];
-
-/// The first bit of voxels that come after the voxel itself.
-const AFTER_CENTRE: usize = CENTRE as usize + 1;
+/// For each of the 27 bits the later ones whose voxels touch its voxel.
+static TOUCHING_AFTER: LazyLock<[u32; 27]> = LazyLock::new(|| {
+    std::array::from_fn(|a| {
+        (a as u32 + 1..27).filter(|&b| touch(a as u32, b)).fold(0, |bits, b| bits | 1 << b)
+    })
+});
 
 /// Triangles, by their voxels.
 struct Triangles<'a> {
@@ -149,25 +144,10 @@ fn left_out(
     Ok(left_out)
 }
 
-/// Bits of the eight blocks of 2 x 2 x 2 voxels that hold a voxel.
-const BLOCKS: [u32; 8] = blocks();
-
-const fn blocks() -> [u32; 8] {
-    let mut masks = [0; 8];
-    let mut block = 0;
-    while block < 8 {
-        let mut corner = 0;
-        while corner < 8 {
-            let x = (block & 1) + (corner & 1);
-            let y = (block >> 1 & 1) + (corner >> 1 & 1);
-            let z = (block >> 2 & 1) + (corner >> 2 & 1);
-            masks[block as usize] |= 1 << (x + 3 * y + 9 * z);
-            corner += 1;
-        }
-        block += 1;
-    }
-    masks
-}
+/// The block of 2 x 2 x 2 voxels at the lowest corner of a neighbourhood, and how far its bits move
+/// to the other corners.
+const BLOCK: u32 = 0o033_033;
+const CORNERS: [u32; 8] = [0, 1, 3, 4, 9, 10, 12, 13];
 
 /// Step 1: each tetrahedron as its four triangles.
 fn tetrahedra(
@@ -181,17 +161,14 @@ fn tetrahedra(
         if voxel.is_multiple_of(65_536) {
             run.step(voxel as usize, around.len())?;
         }
-        let there = (0..27).fold(0, |bits, bit| bits | u32::from(near[bit].is_some()) << bit);
         own.clear();
-        for block in BLOCKS {
+        for block in CORNERS.map(|corner| BLOCK << corner) {
             // Another voxel of the block comes first; the block is listed there.
-            if there & block & before != 0 {
+            if near.there & block & before != 0 {
                 continue;
             }
-            let others: Vec<u32> = (AFTER_CENTRE..27)
-                .filter(|bit| block >> bit & 1 == 1)
-                .filter_map(|bit| near[bit])
-                .collect();
+            let others: Vec<u32> =
+                ones(near.there & block & AFTER_CENTRE).map(|bit| near.ids[bit as usize]).collect();
             for (i, &a) in others.iter().enumerate() {
                 for (j, &b) in others.iter().enumerate().skip(i + 1) {
                     own.extend(others[j + 1..].iter().map(|&c| [a, b, c]));
@@ -318,7 +295,7 @@ const RESIDENT: f64 = 1.75;
 
 impl Solid<'_> {
     /// Memory for the voxels of a base and for the medial mesh of an axis, in megabytes.
-    pub(super) fn megabytes_with_output(&self, base: &Base, axis: &Axis) -> f64 {
+    pub(super) fn megabytes_with_output(&self, base: &Base, axis: &LatticeVoxels) -> f64 {
         let voxels = axis.bricks();
         let mut numbers = [0_u64; 3];
         for voxel in &axis.voxels {
@@ -334,38 +311,16 @@ impl Solid<'_> {
 
 /// Edges, triangles and tetrahedra of mutually adjacent voxels of which a voxel is the first.
 fn simplices(neighbourhood: u32) -> [u32; 3] {
-    let after = neighbourhood & !((2 << CENTRE) - 1);
+    let after = neighbourhood & AFTER_CENTRE;
     let mut numbers = [after.count_ones(), 0, 0];
     for b in ones(after) {
-        let with_b = after & ADJACENT_AFTER[b as usize];
+        let with_b = after & TOUCHING_AFTER[b as usize];
         numbers[1] += with_b.count_ones();
         for c in ones(with_b) {
-            numbers[2] += (with_b & ADJACENT_AFTER[c as usize]).count_ones();
+            numbers[2] += (with_b & TOUCHING_AFTER[c as usize]).count_ones();
         }
     }
     numbers
-}
-
-/// For each of the 27 places the later ones that touch it.
-const ADJACENT_AFTER: [u32; 27] = adjacent_after();
-
-const fn adjacent_after() -> [u32; 27] {
-    let mut masks = [0; 27];
-    let mut a = 0;
-    while a < 27 {
-        let mut b = a + 1;
-        while b < 27 {
-            let (p, q) = (offset(a), offset(b));
-            let near =
-                (p[0] - q[0]).abs() <= 1 && (p[1] - q[1]).abs() <= 1 && (p[2] - q[2]).abs() <= 1;
-            if near {
-                masks[a as usize] |= 1 << b;
-            }
-            b += 1;
-        }
-        a += 1;
-    }
-    masks
 }
 
 #[cfg(test)]

@@ -4,16 +4,14 @@
 use std::cmp::Reverse;
 
 use medial::Vec3;
-use medial::complex::{MedialMesh, MedialUnion, Sphere as Ball, cubical_betti};
+use medial::complex::{MedialMesh, MedialUnion, Sphere as Ball};
 use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Level, RunContext, SimplifyError};
 use rayon::prelude::*;
 
 use super::flux::{Sphere, Surface};
-use super::lattice::{
-    Bricks, Descent, Grid, LatticeVoxel, LatticeVoxels, Voxel, Wanted, coarse_to_fine,
-};
-use super::output::{medial_mesh, sorted};
+use super::lattice::{Descent, Grid, LatticeVoxels, Voxel, Wanted, betti, coarse_to_fine};
+use super::output::medial_mesh;
 use super::thinning::{FACES, Order, thin};
 use super::{AofParams, AofSettings, MAX_RESOLUTION, Start, Variant};
 
@@ -26,15 +24,6 @@ pub struct Solid<'s> {
     volume: f64,
     /// Area of the surface.
     area: f64,
-}
-
-/// The voxels of an axis.
-#[derive(Clone)]
-pub struct Axis {
-    /// The lattice.
-    pub grid: Grid,
-    /// Voxels by `z`, then `y`, then `x`.
-    pub voxels: Vec<Voxel>,
 }
 
 impl<'s> Solid<'s> {
@@ -84,27 +73,27 @@ impl<'s> Solid<'s> {
     ///
     /// # Errors
     /// When the run was cancelled.
-    pub fn axis(&self, start: &Descent, angle: f64) -> Result<Axis, SimplifyError> {
+    pub fn axis(&self, start: &Descent, angle: f64) -> Result<LatticeVoxels, SimplifyError> {
         let threshold = self.params.threshold(angle);
         let order = match self.params.variant {
             Variant::Plain => {
-                let mut voxels = sorted(&start.voxels);
-                voxels.retain(|voxel| voxel.flux <= threshold);
-                return Ok(Axis { grid: start.grid, voxels });
+                let mut axis = LatticeVoxels::sorted(start.grid, &start.voxels);
+                axis.voxels.retain(|voxel| voxel.flux <= threshold);
+                return Ok(axis);
             }
             Variant::Homotopy => Order::OutermostFirst { threshold },
             Variant::Thinning => Order::ByFlux { threshold },
         };
         let mut voxels = start.voxels.clone();
         thin(&mut voxels, order, &self.run)?;
-        Ok(Axis { grid: start.grid, voxels: sorted(&voxels) })
+        Ok(LatticeVoxels::sorted(start.grid, &voxels))
     }
 
     /// The medial mesh of an axis, with centres on the axis or in the voxels.
     ///
     /// # Errors
     /// When the run was cancelled.
-    pub fn medial_mesh(&self, axis: &Axis) -> Result<MedialMesh, SimplifyError> {
+    pub fn medial_mesh(&self, axis: &LatticeVoxels) -> Result<MedialMesh, SimplifyError> {
         let centres = axis.points();
         let balls = if self.params.refine {
             let counts = self.params.sample_counts()?;
@@ -118,38 +107,6 @@ impl<'s> Solid<'s> {
                 .collect()
         };
         medial_mesh(&axis.voxels, balls, &self.run)
-    }
-}
-
-impl Axis {
-    /// Centres of the voxels, normalised.
-    pub fn points(&self) -> Vec<Vec3> {
-        self.voxels.iter().map(|voxel| self.grid.centre(voxel.place)).collect()
-    }
-
-    /// The voxels as data, normalised.
-    pub fn lattice_voxels(&self) -> LatticeVoxels {
-        LatticeVoxels {
-            origin: self.grid.origin,
-            side: self.grid.side,
-            size: self.grid.size,
-            voxels: self
-                .voxels
-                .iter()
-                .map(|voxel| LatticeVoxel {
-                    place: voxel.place.map(u32::from),
-                    distance: f64::from(voxel.distance),
-                    flux: f64::from(voxel.flux),
-                })
-                .collect(),
-        }
-    }
-
-    /// The voxels as a set.
-    pub(super) fn bricks(&self) -> Bricks {
-        let mut bricks = Bricks::new(self.grid.size);
-        self.voxels.iter().for_each(|&voxel| bricks.insert(voxel));
-        bricks
     }
 }
 
@@ -229,7 +186,7 @@ impl Solid<'_> {
         for (level, &dismissed) in tally.dismissed.iter().enumerate() {
             diagnostics.count(&format!("dismissed_at_level_{}", level + 1), dismissed as usize);
         }
-        diagnostics.count("spheres_evaluated", tally.evaluated.iter().sum::<u64>() as usize);
+        diagnostics.count("spheres_evaluated", tally.evaluated as usize);
         Ok(Base {
             resolution,
             descent,
@@ -242,7 +199,7 @@ impl Solid<'_> {
     fn tried(&self, resolution: u32, start: &Descent) -> TriedStart {
         let betti = match self.params.variant {
             Variant::Plain => [0; 3],
-            Variant::Homotopy | Variant::Thinning => betti_of(&start.voxels),
+            Variant::Homotopy | Variant::Thinning => betti(start.voxels.iter()),
         };
         let loss = self.loss_of_start(start, self.accepted_loss());
         TriedStart { resolution, betti, voxels: start.tally.start, loss }
@@ -302,11 +259,6 @@ impl Solid<'_> {
         }
         Ok(best)
     }
-}
-
-/// Betti numbers of the union of closed voxels.
-fn betti_of(voxels: &Bricks) -> [u64; 3] {
-    cubical_betti(&voxels.iter().map(|voxel| voxel.place.map(u32::from)).collect::<Vec<_>>())
 }
 
 // Losses.
@@ -562,7 +514,7 @@ impl Solid<'_> {
         base: &Base,
         count: usize,
         diagnostics: &mut Diagnostics,
-    ) -> Result<Axis, SimplifyError> {
+    ) -> Result<LatticeVoxels, SimplifyError> {
         let first = self.axis(&base.descent, self.params.angle)?;
         let mut search = Search {
             growth: Growth::of(&first, base.resolution),
@@ -667,10 +619,14 @@ impl Solid<'_> {
     }
 
     /// The axis of a lattice; `None` where the topology or a part of the base is lost.
-    fn faithful_axis(&self, resolution: u32, base: &Base) -> Result<Option<Axis>, SimplifyError> {
+    fn faithful_axis(
+        &self,
+        resolution: u32,
+        base: &Base,
+    ) -> Result<Option<LatticeVoxels>, SimplifyError> {
         let start = self.descend(resolution, self.wanted())?;
         if let Some(topology) = base.topology {
-            let betti = betti_of(&start.voxels);
+            let betti = betti(start.voxels.iter());
             // Another topology than the base's is accepted if it is the solid's: the base may lack it.
             if betti != topology && Some(betti) != self.shape.expected_betti() {
                 return Ok(None);
@@ -684,16 +640,16 @@ impl Solid<'_> {
     }
 
     /// Step 4.
-    fn reduce_to(&self, axis: &mut Axis, count: usize) -> Result<(), SimplifyError> {
+    fn reduce_to(&self, axis: &mut LatticeVoxels, count: usize) -> Result<(), SimplifyError> {
         if self.params.variant == Variant::Plain {
             // Most negative flux first. Stable, so ties go by place; then back to the order of places.
             axis.voxels.sort_by(|a, b| a.flux.total_cmp(&b.flux));
             axis.voxels.truncate(count);
-            axis.voxels.sort_unstable_by_key(|v| [v.place[2], v.place[1], v.place[0]]);
+            axis.voxels.sort_unstable_by_key(Voxel::key);
         } else {
             let mut voxels = axis.bricks();
             thin(&mut voxels, Order::Down { to: count }, &self.run)?;
-            axis.voxels = sorted(&voxels);
+            *axis = LatticeVoxels::sorted(axis.grid, &voxels);
         }
         Ok(())
     }
@@ -703,7 +659,7 @@ impl Solid<'_> {
 struct Search {
     growth: Growth,
     /// The coarsest with the count, or the finest that was tried.
-    best: Axis,
+    best: LatticeVoxels,
     /// Its resolution.
     high: u32,
     /// A coarser resolution that has too few voxels, or not the topology.
@@ -718,7 +674,7 @@ struct Growth {
 }
 
 impl Growth {
-    fn of(axis: &Axis, resolution: u32) -> Self {
+    fn of(axis: &LatticeVoxels, resolution: u32) -> Self {
         let voxels = axis.bricks();
         let sheets = axis
             .voxels

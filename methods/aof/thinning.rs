@@ -36,7 +36,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use medial::simplifier::{RunContext, SimplifyError};
 
-use super::lattice::{Bricks, Marks, Place, Voxel};
+use super::lattice::{Bricks, Place, Voxel};
 
 /// The voxels that are deleted, and their order.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,7 +95,7 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), S
     let least = if let Order::Down { to } = order { to } else { 0 };
     let mut queue = BucketQueue::new(order.keys(voxels));
     // Places in the queue, and end points that must not be queued again.
-    let mut barred = Marks::of(voxels);
+    let mut barred = voxels.no_marks();
     for voxel in voxels.iter() {
         // With all six face neighbours a voxel is not simple; a deletion next to it will queue it.
         let surrounded = voxels.neighbourhood(voxel.place) & FACES == FACES;
@@ -150,41 +150,18 @@ pub fn is_end_point(neighbourhood: u32) -> bool {
     })
 }
 
-fn touch(a: u32, b: u32) -> bool {
-    let (p, q) = (offset(a), offset(b));
-    (0..3).all(|axis| (p[axis] - q[axis]).abs() <= 1)
-}
-
 /// The neighbours in the planes `x = 0`, `y = 0`, `z = 0`, `x = +-y`, `y = +-z`, `z = +-x`.
-const PLANES: [u32; 9] = planes();
-
-const fn planes() -> [u32; 9] {
-    let normals = [
-        [1, 0, 0],
-        [0, 1, 0],
-        [0, 0, 1],
-        [1, -1, 0],
-        [1, 1, 0],
-        [0, 1, -1],
-        [0, 1, 1],
-        [1, 0, -1],
-        [1, 0, 1],
-    ];
-    let mut masks = [0; 9];
-    let mut plane = 0;
-    while plane < 9 {
-        let mut bit = 0;
-        while bit < 27 {
-            let (o, n) = (offset(bit), normals[plane]);
-            if bit != CENTRE && o[0] * n[0] + o[1] * n[1] + o[2] * n[2] == 0 {
-                masks[plane] |= 1 << bit;
-            }
-            bit += 1;
-        }
-        plane += 1;
-    }
-    masks
-}
+const PLANES: [u32; 9] = [
+    0o222_202_222,
+    0o070_050_070,
+    0o000_757_000,
+    0o421_401_421,
+    0o124_104_124,
+    0o700_050_007,
+    0o007_050_700,
+    0o444_202_111,
+    0o111_202_444,
+];
 
 /// Bit of the voxel itself.
 pub(super) const CENTRE: u32 = 13;
@@ -243,8 +220,20 @@ fn grow_6(bits: u32) -> u32 {
 }
 
 /// Offset of a bit of a neighbourhood.
-pub(super) const fn offset(bit: u32) -> [i32; 3] {
+pub(super) fn offset(bit: u32) -> [i32; 3] {
     [bit as i32 % 3 - 1, bit as i32 / 3 % 3 - 1, bit as i32 / 9 - 1]
+}
+
+/// Squared distance of two bits of a neighbourhood, in voxels.
+pub(super) fn squared(a: u32, b: u32) -> u8 {
+    let (p, q) = (offset(a), offset(b));
+    (0..3).map(|axis| (p[axis] - q[axis]).pow(2) as u8).sum()
+}
+
+/// Whether the voxels of two bits are equal or have a common corner.
+pub(super) fn touch(a: u32, b: u32) -> bool {
+    // A difference of two along an axis alone is a squared distance of four.
+    squared(a, b) <= 3
 }
 
 /// The bits that are set, ascending.
@@ -298,34 +287,26 @@ mod tests {
 
     use super::*;
 
+    /// Components of bits that are at most a squared distance apart.
+    fn components(bits: impl Iterator<Item = u32>, reach: u8) -> Vec<Vec<u32>> {
+        bits.fold(Vec::new(), |components, bit| {
+            let (joined, mut apart): (Vec<_>, Vec<Vec<u32>>) = components
+                .into_iter()
+                .partition(|bits: &Vec<u32>| bits.iter().any(|&b| squared(b, bit) <= reach));
+            apart.push([joined.concat(), vec![bit]].concat());
+            apart
+        })
+    }
+
     /// By the definition, one neighbourhood at a time.
     fn is_simple_by_definition(neighbourhood: u32) -> bool {
-        let components =
-            |bits: &[u32], near: &dyn Fn([i32; 3]) -> bool, counts: &dyn Fn(u32) -> bool| {
-                let mut label: Vec<usize> = (0..bits.len()).collect();
-                for _ in 0..bits.len() {
-                    for i in 0..bits.len() {
-                        for j in 0..bits.len() {
-                            let (p, q) = (offset(bits[i]), offset(bits[j]));
-                            if near([0, 1, 2].map(|k| (p[k] - q[k]).abs())) {
-                                label[i] = label[i].min(label[j]);
-                            }
-                        }
-                    }
-                }
-                let mut labels: Vec<usize> =
-                    (0..bits.len()).filter(|&i| counts(bits[i])).map(|i| label[i]).collect();
-                labels.sort_unstable();
-                labels.dedup();
-                labels.len()
-            };
-        let norm = |bit: u32| offset(bit).iter().map(|x| x.abs()).sum::<i32>();
-        let around = || (0..27).filter(|&bit| bit != CENTRE);
-        let object: Vec<u32> = around().filter(|&bit| neighbourhood >> bit & 1 == 1).collect();
-        let rest: Vec<u32> =
-            around().filter(|&bit| neighbourhood >> bit & 1 == 0 && norm(bit) <= 2).collect();
-        components(&object, &|d| d.iter().all(|&x| x <= 1), &|_| true) == 1
-            && components(&rest, &|d| d.iter().sum::<i32>() <= 1, &|bit| norm(bit) == 1) == 1
+        let object = ones(neighbourhood & !(1 << CENTRE));
+        let rest = (0..27).filter(|&bit| {
+            neighbourhood >> bit & 1 == 0 && (1..=2).contains(&squared(bit, CENTRE))
+        });
+        let at_face = |bits: &Vec<u32>| bits.iter().any(|&bit| squared(bit, CENTRE) == 1);
+        components(object, 3).len() == 1
+            && components(rest, 1).iter().filter(|bits| at_face(bits)).count() == 1
     }
 
     #[test]
@@ -351,9 +332,14 @@ mod tests {
                 assert_eq!(NOT_LOW[axis] >> bit & 1 == 1, o[axis] > -1);
                 assert_eq!(NOT_HIGH[axis] >> bit & 1 == 1, o[axis] < 1);
             }
-            let steps = o.iter().map(|x| x.abs()).sum::<i32>();
-            assert_eq!(NEAREST_18 >> bit & 1 == 1, steps == 1 || steps == 2);
-            assert_eq!(FACES >> bit & 1 == 1, steps == 1);
+            let distance = squared(bit, CENTRE);
+            assert_eq!(NEAREST_18 >> bit & 1 == 1, distance == 1 || distance == 2);
+            assert_eq!(FACES >> bit & 1 == 1, distance == 1);
+            let [x, y, z] = o;
+            let normals = [x, y, z, x - y, x + y, y - z, y + z, z - x, z + x];
+            for (plane, along) in PLANES.iter().zip(normals) {
+                assert_eq!(plane >> bit & 1 == 1, along == 0 && bit != CENTRE);
+            }
         }
     }
 

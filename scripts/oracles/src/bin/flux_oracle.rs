@@ -75,7 +75,7 @@ fn make(name: &str, resolution: u32, count: usize, file: &str) -> Outcome {
     let solid = solid(&shape)?;
     let grid = solid.grid(resolution);
     let start = solid.descend(resolution, Wanted::Places)?.voxels;
-    let step = (start.len() / count).max(1);
+    let step = (start.iter().count() / count).max(1);
     let centres: Vec<Vec3> = start.iter().step_by(step).map(|v| grid.centre(v.place)).collect();
     let sphere = Sphere::new(Spiral::EqualArea, SAMPLES, grid.side);
     let samples: Vec<Vec3> = centres
@@ -117,7 +117,7 @@ fn time(name: &str, resolution: u32) -> Outcome {
     let (clock, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
     let tally = solid.descend(resolution, Wanted::Kept)?.tally;
     let (wall, cpu) = (clock.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-    println!("{wall:.4} {cpu:.4} {} {SAMPLES}", tally.evaluated.iter().sum::<u64>());
+    println!("{wall:.4} {cpu:.4} {} {SAMPLES}", tally.evaluated);
     Ok(())
 }
 
