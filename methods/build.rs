@@ -17,8 +17,7 @@ fn main() {
     let compiler = env::var_os("RUSTC").expect("set by cargo");
     let compiler = Command::new(compiler).arg("--version").output().expect("the compiler runs");
     let compiler = String::from_utf8_lossy(&compiler.stdout).trim().to_owned();
-    let setting = |name: &str| env::var(name).unwrap_or_default();
-    let (target, level) = (setting("TARGET"), setting("OPT_LEVEL"));
+    let [target, level] = ["TARGET", "OPT_LEVEL"].map(|name| env::var(name).unwrap_or_default());
     // A package has no lock file of its own: the one of the build is not known there.
     let lock = root.join("../Cargo.lock");
     let lock = if lock.exists() { digest(&root, &[lock]) } else { String::new() };

@@ -28,12 +28,12 @@
 
 use std::sync::Arc;
 
-use medial::complex::{DualTriangulation, MedialMesh, VoronoiFacets};
+use medial::complex::{Contacts, DualTriangulation, MedialMesh, VoronoiFacets};
 use medial::geometry::enclosing_ball;
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -189,18 +189,19 @@ fn rank_cells(shape: &Shape) -> Result<Cells, SimplifyError> {
     let FacetSet { mesh, facets, dual } = FacetSet::of(shape)?;
     let facet_value = facet_values(shape, &facets)?;
     let contacts = mesh.contacts.as_ref().expect("a Voronoi medial mesh has contacts");
-    let of_samples = |ids: &[u32]| {
-        enclosing_ball(&ids.iter().map(|&s| contacts.samples[s as usize]).collect::<Vec<_>>()).1
-    };
-    let of_edge = |&[a, b]: &[u32; 2]| {
-        let [mine, theirs] = [a, b].map(|v| contacts.of_sphere[v as usize]);
-        let shared: Vec<u32> = mine.into_iter().filter(|s| theirs.contains(s)).collect();
-        (shared.len() >= 3).then(|| ([a, b], of_samples(&shared)))
-    };
-    let found: Vec<([u32; 2], f64)> = mesh.edges.par_iter().filter_map(of_edge).collect();
+    let found: Vec<([u32; 2], f64)> = mesh
+        .edges
+        .par_iter()
+        .filter_map(|&ends| {
+            // The ends of a Voronoi edge share its three samples, those of a diagonal only two.
+            let [mine, theirs] = ends.map(|v| contacts.of_sphere[v as usize]);
+            let shared: Vec<u32> = mine.into_iter().filter(|s| theirs.contains(s)).collect();
+            (shared.len() >= 3).then(|| (ends, enclosing_radius(contacts, &shared)))
+        })
+        .collect();
     let (edges, mut edge_value): (Vec<[u32; 2]>, Vec<f64>) = found.into_iter().unzip();
     let mut vertex_value: Vec<f64> =
-        contacts.of_sphere.par_iter().map(|ids| of_samples(ids)).collect();
+        contacts.of_sphere.par_iter().map(|ids| enclosing_radius(contacts, ids)).collect();
     for (facet, &value) in facet_value.iter().enumerate() {
         let v = facets.polygon(facet);
         for k in 0..v.len() {
@@ -231,6 +232,10 @@ fn rank_cells(shape: &Shape) -> Result<Cells, SimplifyError> {
     })
 }
 
+fn enclosing_radius(contacts: &Contacts, ids: &[u32]) -> f64 {
+    enclosing_ball(&ids.iter().map(|&s| contacts.samples[s as usize]).collect::<Vec<_>>()).1
+}
+
 /// The facets alone.
 fn rank_facets(shape: &Shape) -> Result<RankedFacets<'static>, SimplifyError> {
     let set = FacetSet::of(shape)?;
@@ -241,11 +246,8 @@ fn rank_facets(shape: &Shape) -> Result<RankedFacets<'static>, SimplifyError> {
 
 fn facet_values(shape: &Shape, facets: &VoronoiFacets) -> Result<Vec<f64>, SimplifyError> {
     let delaunay = shape.delaunay()?;
-    let half = |facet: usize| {
-        let [p, q] = facets.ends(facet).map(|v| delaunay.point(v));
-        p.distance(q) / 2.0
-    };
-    Ok((0..facets.len()).map(half).collect())
+    let ends = (0..facets.len()).map(|facet| facets.ends(facet).map(|v| delaunay.point(v)));
+    Ok(ends.map(|[p, q]| p.distance(q) / 2.0).collect())
 }
 
 impl Cells {
@@ -261,14 +263,17 @@ impl Cells {
     }
 
     fn kept(&self, lambda: f64) -> MedialMesh {
-        let passing = |values: &[f64]| -> Vec<u32> {
-            (0..).zip(values).filter(|&(_, &value)| value >= lambda).map(|(id, _)| id).collect()
-        };
         let edges: Vec<[u32; 2]> =
-            passing(&self.edge_value).into_iter().map(|e| self.edges[e as usize]).collect();
-        let (facets, vertices) = (passing(&self.facet_value), passing(&self.vertex_value));
+            passing(&self.edge_value, lambda).map(|edge| self.edges[edge as usize]).collect();
+        let facets: Vec<u32> = passing(&self.facet_value, lambda).collect();
+        let vertices: Vec<u32> = passing(&self.vertex_value, lambda).collect();
         self.facets.subcomplex(&self.mesh, self.dual, &facets, &edges, &vertices)
     }
+}
+
+/// The ids of the values from `lambda` on.
+fn passing(values: &[f64], lambda: f64) -> impl Iterator<Item = u32> {
+    (0..).zip(values).filter(move |&(_, &value)| value >= lambda).map(|(id, _)| id)
 }
 
 impl Simplification for Cells {
@@ -295,12 +300,7 @@ impl Simplification for Cells {
             )),
             _ => {}
         }
-        Ok(Simplified {
-            mesh,
-            asked: level,
-            native_level: Some(lambda),
-            diagnostics,
-            extras: Extras::default(),
-        })
+        let native_level = Some(lambda);
+        Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }
 }

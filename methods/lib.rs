@@ -113,11 +113,13 @@ pub fn registry() -> Vec<Registered> {
             )
             .on_request(),
     ];
-    let versioned = |registered: Registered| {
-        let version = version(&registered.method.info().id);
-        Registered { version: version.map(Into::into), ..registered }
-    };
-    methods.into_iter().map(versioned).collect()
+    methods
+        .into_iter()
+        .map(|registered| {
+            let version = version(&registered.method.info().id);
+            Registered { version: version.map(Into::into), ..registered }
+        })
+        .collect()
 }
 
 /// A text that changes whenever the sources that decide the results of a method do: its module, the
@@ -125,10 +127,6 @@ pub fn registry() -> Vec<Registered> {
 /// kernel, the dependencies, the compiler. `None` for an id without a module.
 pub fn version(id: &str) -> Option<String> {
     let module = id.replace('-', "_");
-    let hash_of = |module: &str| {
-        let mut hashes = env!("SOURCE_HASHES").split(';');
-        hashes.find_map(|pair| pair.strip_prefix(module)?.strip_prefix('='))
-    };
     let mut parts = vec![hash_of(&module)?];
     // These two hand their result to Q-MAT.
     if module == "coverage_axis" || module == "tight" {
@@ -137,6 +135,12 @@ pub fn version(id: &str) -> Option<String> {
     parts.push(hash_of("shared").unwrap_or_default());
     parts.extend([medial::SOURCE_HASH, medial::geometry::SOURCE_HASH, env!("BUILD")]);
     Some(parts.join(" "))
+}
+
+/// The hash of a module's sources, which the build script computes.
+fn hash_of(module: &str) -> Option<&'static str> {
+    let mut hashes = env!("SOURCE_HASHES").split(';');
+    hashes.find_map(|pair| pair.strip_prefix(module)?.strip_prefix('='))
 }
 
 /// The method with an id, or `None`. [`initial`] simplifies nothing and is not among them.

@@ -93,12 +93,14 @@ fn critical_scales(balls: &[Sphere]) -> Vec<f64> {
     let plan = Plan { max_leaf: LEAF, group: LEAF, padding: 0.0 };
     let tree = Tree::build(&boxes.collect::<Vec<_>>(), plan);
     let sorted: Vec<Sphere> = tree.order().iter().map(|&item| balls[item as usize]).collect();
-    let scale = |&ball: &Sphere| {
-        let mut search = CriticalScale { ball, balls: &sorted, best: f64::MAX };
-        tree.search(&mut search);
-        search.best
-    };
-    balls.par_iter().map(scale).collect()
+    balls
+        .par_iter()
+        .map(|&ball| {
+            let mut search = CriticalScale { ball, balls: &sorted, best: f64::MAX };
+            tree.search(&mut search);
+            search.best
+        })
+        .collect()
 }
 
 /// Search for the smallest scale at which another ball contains this one.

@@ -349,42 +349,23 @@ mod tests {
 
     use super::*;
 
-    /// Two boxes joined to an L, with one reflex edge in four pieces and flat edges between.
-    fn bracket() -> TriMesh {
-        // Profile in (x, z), counter-clockwise seen from -y.
-        let profile = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]];
-        let (n, steps) = (profile.len() as u32, 4_u32);
-        let vertices = (0..=steps)
-            .flat_map(|j| profile.map(|[x, z]| Vec3::new(x, f64::from(j) * 0.5, z)))
-            .collect();
-        let mut faces = Vec::new();
-        for j in 0..steps {
-            for i in 0..n {
-                let [a, b] = [j * n + i, j * n + (i + 1) % n];
-                faces.extend([[a, b + n, b], [a, a + n, b + n]]);
-            }
-        }
-        for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]] {
-            faces.push([a, b, c]);
-            let top = steps * n;
-            faces.push([top + a, top + c, top + b]);
-        }
-        TriMesh { vertices, faces }
-    }
-
     #[test]
     fn only_the_reflex_edge_and_its_vertices_are_fans() {
-        let mesh = bracket();
+        let mesh = medial_datasets::find("bracket").expect("in the catalogue").mesh(16);
         let report = medial::surface::validate(&mesh).expect("a solid");
         let shape = Shape::new("bracket", &mesh, report, ShapeOptions::default());
         let shape = shape.expect("an extent");
         let surface = Surface::of(&shape).expect("faces");
         let is_fan = |p| surface.is_fan(&surface.closest(shape.normalisation().forward(p), None));
-        // Over the reflex edge at (1, 1), between its vertices and at one of them.
-        assert!(is_fan(Vec3::new(0.9, 1.1, 0.9)) && is_fan(Vec3::new(0.9, 1.0, 0.9)));
-        // Under the top of the wall; next to the inner wall, over a flat edge too.
-        for p in [[0.5, 1.0, 2.9], [0.9, 0.9, 2.0], [0.9, 1.0, 2.0]] {
-            assert!(!is_fan(Vec3::from(p)), "{p:?}");
+        // Over the reflex edge at (0.4, 0.4), between its vertices and at one of them.
+        let at_vertex = mesh.vertices.iter().filter(|v| v.x == 0.4 && v.z == 0.4).map(|v| v.y);
+        for y in at_vertex.chain([0.33, 0.51]) {
+            assert!(is_fan(Vec3::new(0.35, y, 0.35)), "{y}");
+        }
+        // Under the top of the wall; next to the inner wall, over its flat edges too.
+        let flat = mesh.vertices.iter().filter(|v| v.x == 0.4 && v.z > 0.41 && v.z < 1.4);
+        for p in flat.map(|v| v - Vec3::X * 0.05).chain([Vec3::new(0.2, 0.5, 1.45)]) {
+            assert!(p.y < 0.1 || p.y > 0.9 || !is_fan(p), "{p:?}");
         }
     }
 

@@ -1,14 +1,9 @@
-//! From voxels to a medial mesh.
-//!
-//! A sphere for each voxel, an edge between 26-adjacent voxels, a triangle for three voxels that
-//! are mutually adjacent, except for those triangles that would close voids which the voxels do
-//! not have: the Betti numbers are those of the union of closed voxels, as
+//! From voxels to a medial mesh: a sphere for each voxel, an edge between 26-adjacent voxels, a
+//! triangle for three voxels that are mutually adjacent. Triangles are left out that would close
+//! voids, so that the Betti numbers are exactly those of the union of closed voxels, as
 //! [`cubical_betti`](medial::complex::cubical_betti) counts them.
 //!
 //! # Voids
-//! Triangles to be left out of the medial mesh, because they would close voids that the voxels do not
-//! have.
-//!
 //! The clique complex of the voxels has a simplex for any number of mutually 26-adjacent voxels. It
 //! has the homotopy type of the union of closed voxels, because boxes that meet in pairs have a common
 //! point (nerve theorem). A medial mesh has its triangles but not its tetrahedra, so each tetrahedron
@@ -23,12 +18,9 @@
 //!    are left out. Each of them lies on the boundary of a union of tetrahedra that does not contain
 //!    the ones before it. So no loop opens, and there is one void less.
 //!
-//! So the Betti numbers are those of the voxels, exactly.
-//!
 //! # Memory
-//! A sheet of a plain result is at least two voxels thick, and voxels that touch are joined. The
-//! triangles between them, and the tetrahedra that are checked for voids, far outnumber the voxels. So
-//! their memory is estimated before they are made.
+//! The triangles of thick sheets, and the tetrahedra that are checked for voids, far outnumber the
+//! voxels. So their memory is estimated before they are made.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -72,7 +64,12 @@ pub fn medial_mesh(
         }
         first.push(faces.len() as u32);
     }
-    let left_out = left_out(&Triangles { faces: &faces, first: &first }, &lengths, &around, run)?;
+    let tetrahedra = tetrahedra(&Triangles { faces: &faces, first: &first }, &around, run)?;
+    let mut collapse = Collapse::new(&tetrahedra, &lengths);
+    collapse.run(run)?;
+    let Collapse { is_open, mut left_out, .. } = collapse;
+    let rest = tetrahedra.iter().zip(is_open).filter(|&(_, is_open)| is_open);
+    reduce(rest.map(|(&tetrahedron, _)| tetrahedron), &lengths, &mut left_out, run)?;
     let mut left_out = left_out.into_iter();
     faces.retain(|_| left_out.next() == Some(false));
     Ok(MedialMesh { spheres: balls, edges, faces, contacts: None })
@@ -126,22 +123,6 @@ impl Triangles<'_> {
         let place = own.binary_search(&[a, b, c]).expect("adjacent voxels have a triangle");
         from + place as u32
     }
-}
-
-/// For each triangle whether it is left out. `lengths` are sums of the squared sides.
-fn left_out(
-    triangles: &Triangles<'_>,
-    lengths: &[u8],
-    around: &[Around],
-    run: &RunContext,
-) -> Result<Vec<bool>, SimplifyError> {
-    let tetrahedra = tetrahedra(triangles, around, run)?;
-    let mut collapse = Collapse::new(&tetrahedra, lengths);
-    collapse.run(run)?;
-    let Collapse { is_open, mut left_out, .. } = collapse;
-    let rest = (0..tetrahedra.len()).filter(|&k| is_open[k]).map(|k| tetrahedra[k]);
-    reduce(rest, lengths, &mut left_out, run)?;
-    Ok(left_out)
 }
 
 /// The block of 2 x 2 x 2 voxels at the lowest corner of a neighbourhood, and how far its bits move

@@ -110,9 +110,7 @@ impl<'s> Solid<'s> {
     }
 }
 
-// The lattice to work at.
-//
-// The lattice of the parameters, or a finer one if that loses parts of the solid.
+// The lattice to work at: that of the parameters, or a finer one if that loses parts of the solid.
 //
 // Variants that keep the topology of their start set need a start set with the solid's topology and
 // without missing limbs. Lattices finer by half are tried until one has both; else the best is taken:
@@ -284,6 +282,7 @@ pub struct Loss {
 }
 
 impl Solid<'_> {
+    /// The loss of a start set, if it is more than `accepted`, a fraction of the diagonal.
     fn loss_of_start(&self, start: &Descent, accepted: f64) -> Option<Loss> {
         // Spheres of voxels inside reach no farther than those at the border.
         let border: Vec<Voxel> = start
@@ -312,20 +311,20 @@ impl Solid<'_> {
         (distance > accepted).then_some(Loss { place, distance })
     }
 
-    /// The vertices, and the middles of faces.
+    /// The vertices and the middles of faces, or a part of them. Degenerate faces count for nothing.
     fn surface_points(&self) -> Vec<Vec3> {
         let mesh = self.shape.mesh();
         let mut seen = vec![false; mesh.vertices.len()];
         let mut points = Vec::with_capacity(mesh.faces.len() + seen.len());
-        for (index, face) in mesh.faces.iter().enumerate() {
-            let [a, b, c] = mesh.triangle(index);
+        for face in &mesh.faces {
+            let [a, b, c] = face.map(|v| mesh.vertices[v as usize]);
             if (b - a).cross(c - a).normalize_or_zero() == Vec3::ZERO {
                 continue;
             }
             points.push((a + b + c) / 3.0);
-            for (&v, place) in face.iter().zip([a, b, c]) {
+            for &v in face {
                 if !std::mem::replace(&mut seen[v as usize], true) {
-                    points.push(place);
+                    points.push(mesh.vertices[v as usize]);
                 }
             }
         }
@@ -416,9 +415,7 @@ impl Solid<'_> {
     }
 }
 
-// The published level.
-//
-// The paper's lattice, or the finest that fits.
+// The published level: the paper's lattice, or the finest that fits.
 //
 // Parameters set by the user are not changed. Otherwise the resolution is lowered until the voxels and
 // the medial mesh fit into memory, and a solid without a coarse voxel starts with fine ones.
@@ -476,8 +473,6 @@ pub(super) fn published<'s>(
     Ok((solid, base))
 }
 
-// A number of voxels.
-//
 // The axis with a number of voxels: a lattice as coarse as the count allows, then deletion.
 //
 // 1. The axis of the base has too many voxels, or too few. Of these, those on sheets grow in number

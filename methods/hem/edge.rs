@@ -402,8 +402,8 @@ impl Star {
 
     /// Sets the surviving end.
     pub(super) fn set_hub(&mut self, hub: Sphere) {
-        let reach = |m: &Sphere| m.centre.distance(hub.centre) + m.radius;
-        self.reach = self.spheres.iter().map(reach).fold(hub.radius, f64::max);
+        let reaches = self.spheres.iter().map(|m| m.centre.distance(hub.centre) + m.radius);
+        self.reach = reaches.fold(hub.radius, f64::max);
         self.hub = hub;
         // The rims do not touch the hub and stay.
         self.cones.renew(self.link.len());

@@ -435,9 +435,8 @@ fn sample_error(
     samples: &[Vec3],
     inside: Inside,
 ) -> Result<f64, SimplifyError> {
-    let largest = |distances: Vec<f64>| distances.into_iter().fold(0.0, |m, d| d.abs().max(m));
     if inside == Inside::Depth {
-        return Ok(largest(union.signed_batch(samples)));
+        return Ok(largest(&union.signed_batch(samples)));
     }
     // The union leaves out spheres inside cones, but their surfaces count in this reading.
     let spheres = MedialUnion::of_spheres(&mesh.spheres).map_err(no_union)?;
@@ -445,7 +444,12 @@ fn sample_error(
     for (distance, sphere) in distances.iter_mut().zip(spheres.unsigned_nearest_batch(samples)) {
         *distance = distance.min(sphere);
     }
-    Ok(largest(distances))
+    Ok(largest(&distances))
+}
+
+/// The largest absolute value.
+fn largest(distances: &[f64]) -> f64 {
+    distances.iter().fold(0.0, |largest, distance| distance.abs().max(largest))
 }
 
 /// The result of a search for a bound.

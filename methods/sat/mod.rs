@@ -43,8 +43,8 @@ use std::sync::Arc;
 use medial::complex::{AxisTally, MedialMesh, Sphere, UnionAxis, betti};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
@@ -115,10 +115,9 @@ fn prepare<'s>(
         return Err(SimplifyError::unsupported(why));
     }
     let run_again = run.clone();
-    let at = move |shape: &Shape| -> Result<Box<dyn Simplification>, SimplifyError> {
+    Ok(Box::new(ByKnob::of_samples(shape, PUBLISHED, run, move |shape| {
         Ok(Box::new(Prepared::new(shape, params, &run_again)?))
-    };
-    Ok(Box::new(ByKnob::of_samples(shape, PUBLISHED, run, at)?))
+    })?))
 }
 
 /// The balls of one shape, perturbed.
@@ -126,6 +125,10 @@ struct Prepared {
     spheres: Vec<Sphere>,
     params: SatParams,
     run: RunContext,
+}
+
+fn resized(balls: &[Sphere], factor: f64) -> Vec<Sphere> {
+    balls.iter().map(|ball| Sphere::new(ball.centre, ball.radius * factor)).collect()
 }
 
 /// The scale axis at one scale.
@@ -156,15 +159,18 @@ impl Prepared {
 impl Scaled {
     /// Steps 3 to 6.
     fn new(spheres: &[Sphere], params: &SatParams, scale: f64) -> Result<Self, SimplifyError> {
-        let resized = |balls: &[Sphere], factor: f64| -> Vec<Sphere> {
-            balls.iter().map(|b| Sphere::new(b.centre, b.radius * factor)).collect()
-        };
         let grown = resized(spheres, scale);
         let axis = UnionAxis::of_balls(&grown).map_err(ShapeError::from)?;
         let (mut mesh, removed_facets) = sheets::filtered(&axis, params.sat_angle);
         mesh.spheres = resized(&mesh.spheres, 1.0 / scale);
         let (tally, union_betti) = (*axis.tally(), axis.union_betti());
         Ok(Self { scale, mesh, tally, union_betti, removed_facets })
+    }
+
+    /// Logarithms of its scale, and of its size as a share of `exp(target)`.
+    fn point(&self, target: f64) -> (f64, f64) {
+        // Nothing at all counts as half a sphere.
+        (self.scale.ln(), (self.size() as f64).max(0.5).ln() - target)
     }
 
     /// Number of spheres.
@@ -210,13 +216,8 @@ impl Simplification for Prepared {
             Level::Spheres(count) => to_count(self, count, &mut diagnostics)?,
         };
         scaled.diagnose(self.spheres.len(), &mut diagnostics);
-        Ok(Simplified {
-            mesh: scaled.mesh.clone(),
-            asked: level,
-            native_level: Some(scaled.scale),
-            diagnostics,
-            extras: Extras::default(),
-        })
+        let (mesh, native_level) = (scaled.mesh.clone(), Some(scaled.scale));
+        Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }
 }
 
@@ -375,8 +376,7 @@ fn between(
     at: &mut impl FnMut(f64) -> Result<Arc<Scaled>, SimplifyError>,
 ) -> Result<Arc<Scaled>, SimplifyError> {
     let target = ((1.0 - TOLERANCE / 2.0) * count as f64).ln();
-    let point = |s: &Scaled| (s.scale.ln(), (s.size() as f64).max(0.5).ln() - target);
-    let (mut low, mut high) = (point(fine), point(&coarse));
+    let (mut low, mut high) = (fine.point(target), coarse.point(target));
     let mut last_was_above = None;
     for _ in 0..MAX_TRIES {
         if coarse.size() as f64 >= (1.0 - TOLERANCE) * count as f64 {
@@ -392,10 +392,10 @@ fn between(
         // Illinois: an end that stays twice counts half.
         let again = last_was_above == Some(is_above);
         if is_above {
-            low = point(&scaled);
+            low = scaled.point(target);
             high.1 *= if again { 0.5 } else { 1.0 };
         } else {
-            high = point(&scaled);
+            high = scaled.point(target);
             low.1 *= if again { 0.5 } else { 1.0 };
             if scaled.size() >= coarse.size() {
                 coarse = scaled;

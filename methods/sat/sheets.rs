@@ -57,11 +57,9 @@ impl Frontier {
         let mut edges_of_facet = Vec::new();
         for (f, facet) in axis.facets().enumerate() {
             let v = facet.polygon;
-            let side = |k: usize| {
-                let (a, b) = (v[k], v[(k + 1) % v.len()]);
-                id[&[a.min(b), a.max(b)]]
-            };
-            let sides: Vec<u32> = (0..v.len()).map(side).collect();
+            let next = v.iter().cycle().skip(1);
+            let sides: Vec<u32> =
+                v.iter().zip(next).map(|(&a, &b)| id[&[a.min(b), a.max(b)]]).collect();
             for &e in &sides {
                 facets_of_edge[e as usize].push(f as u32);
             }
@@ -88,10 +86,10 @@ impl Frontier {
 
     fn remove_below(&mut self, limit: f64) -> usize {
         // Angles are not negative, so their bits are in order.
-        let entry = |angle: f64, facet: u32| Reverse((angle.to_bits(), facet));
+        let key: Vec<u64> = self.angle.iter().map(|angle| angle.to_bits()).collect();
         let single = self.facets_of_edge.iter().filter(|f| f.len() == 1);
         let mut queue: BinaryHeap<_> =
-            single.map(|f| entry(self.angle[f[0] as usize], f[0])).collect();
+            single.map(|f| Reverse((key[f[0] as usize], f[0]))).collect();
         let mut removed = 0;
         while let Some(Reverse((_, facet))) = queue.pop() {
             if !self.facet_kept[facet as usize] {
@@ -102,7 +100,7 @@ impl Frontier {
             }
             removed += 1;
             for neighbour in self.remove(facet) {
-                queue.push(entry(self.angle[neighbour as usize], neighbour));
+                queue.push(Reverse((key[neighbour as usize], neighbour)));
             }
         }
         removed
