@@ -129,7 +129,7 @@ pub(super) fn valid_or_refused(subject: &Subject<'_>, name: &str) -> Answer {
         (subject.doing)(&place);
         match simplification.at(level) {
             Ok(result) => {
-                sound(&result, level).map_err(|why| Miss::Failed(format!("{place}: {why}")))?
+                sound(&result, level).map_err(|why| Miss::Failed(format!("{place}: {why}")))?;
             }
             // One remark is enough: the others are alike.
             Err(error) if remarks.is_empty() => remarks = refusal(&place, &error)?,

@@ -83,7 +83,7 @@ impl Worker {
         let (Some(requests), Some(output), Some(errors)) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take())
         else {
-            return Err(io::Error::other("a pipe of the worker is missing").into());
+            return Err(io::Error::other("a pipe of the worker is missing"));
         };
         let (sender, events) = mpsc::channel();
         thread::spawn(move || {
