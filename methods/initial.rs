@@ -7,23 +7,11 @@ use medial::simplifier::{
     Level, Method, MethodInfo, NoParams, RunContext, Simplification, Simplified, SimplifyError,
 };
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@article{AmentaBern1999,
-  author  = {Amenta, Nina and Bern, Marshall},
-  title   = {Surface reconstruction by {Voronoi} filtering},
-  journal = {Discrete and Computational Geometry},
-  volume  = {22},
-  number  = {4},
-  year    = {1999},
-  doi     = {10.1007/PL00009475}
-}";
-
 /// The initial medial mesh as a method.
 pub fn method() -> Method<NoParams> {
     let info = MethodInfo::new("initial", "Initial medial mesh")
         .citation("N. Amenta, M. Bern, 1999, Surface reconstruction by Voronoi filtering, doi:10.1007/PL00009475")
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["AmentaBern1999"]))
         .summary("Simplifies nothing: the inner part of the Voronoi diagram of the samples.")
         .published("the whole of it; there is no other level")
         .fixed();

@@ -82,18 +82,6 @@ fn scale(mesh: &MedialMesh) -> Scale {
     Scale { name: "lambda", range: 0.0..=1.0, inclusive: true, published }
 }
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@article{ChazalLieutier2005,
-  author  = {Chazal, Fr{\\'e}d{\\'e}ric and Lieutier, Andr{\\'e}},
-  title   = {The $\\lambda$-medial axis},
-  journal = {Graphical Models},
-  volume  = {67},
-  number  = {4},
-  year    = {2005},
-  doi     = {10.1016/j.gmod.2005.01.002}
-}";
-
 /// The lambda-medial axis as a method.
 pub fn method() -> Method<LambdaParams> {
     let info = MethodInfo::new("lambda", "Lambda-medial axis")
@@ -101,7 +89,7 @@ pub fn method() -> Method<LambdaParams> {
             "Frederic Chazal, Andre Lieutier 2005. The lambda-medial axis. Graphical Models 67(4). \
              https://doi.org/10.1016/j.gmod.2005.01.002",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["ChazalLieutier2005"]))
         .summary("Keeps the spheres whose contact points need the largest enclosing balls.")
         .native(NativeLevel::larger_is_coarser("lambda", "fraction of the bounding-box diagonal"))
         .published(

@@ -148,6 +148,15 @@ pub fn find(id: &str) -> Option<Box<dyn MedialSimplifier>> {
     registry().into_iter().map(|entry| entry.method).find(|method| method.info().id == id)
 }
 
+/// The entries of `references.bib` with these keys, as BibTeX.
+fn references(keys: &[&str]) -> String {
+    let all = include_str!("references.bib").split("\n\n").map(str::trim_end);
+    let found: Vec<&str> =
+        all.filter(|entry| keys.iter().any(|key| entry.contains(&format!("{{{key},")))).collect();
+    assert_eq!(found.len(), keys.len(), "no entry for one of {keys:?}");
+    found.join("\n")
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;

@@ -32,18 +32,6 @@ use rayon::prelude::*;
 
 use crate::ranked::{Published, Ranked, Scale};
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@article{MiklosGiesenPauly2010,
-  author  = {Miklos, Balint and Giesen, Joachim and Pauly, Mark},
-  title   = {Discrete scale axis representations for {3D} geometry},
-  journal = {ACM Transactions on Graphics},
-  volume  = {29},
-  number  = {4},
-  year    = {2010},
-  doi     = {10.1145/1778765.1778838}
-}";
-
 /// The pairwise scale filter as a method.
 pub fn method() -> Method<NoParams> {
     let info = MethodInfo::new("sat-pairwise", "Pairwise scale filter (not SAT)")
@@ -52,7 +40,7 @@ pub fn method() -> Method<NoParams> {
              https://doi.org/10.1145/2753755, of Miklos, Giesen, Pauly 2010, \
              https://doi.org/10.1145/1778765.1778838",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["MiklosGiesenPauly2010"]))
         .summary("Removes the spheres that another sphere contains once both are scaled.")
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
         .published("unsupported: it is described, not published, as a method");

@@ -134,25 +134,6 @@ fn scale(published: f64) -> Scale {
     Scale { name: "theta", range: 0.0..=180.0, inclusive: false, published }
 }
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@inproceedings{AttaliMontanvert1996,
-  author    = {Attali, Dominique and Montanvert, Annick},
-  title     = {Modeling noise for a better simplification of skeletons},
-  booktitle = {IEEE International Conference on Image Processing},
-  year      = {1996},
-  doi       = {10.1109/ICIP.1996.560357}
-}
-@article{FoskeyLinManocha2003,
-  author  = {Foskey, Mark and Lin, Ming C. and Manocha, Dinesh},
-  title   = {Efficient computation of a simplified medial axis},
-  journal = {Journal of Computing and Information Science in Engineering},
-  volume  = {3},
-  number  = {4},
-  year    = {2003},
-  doi     = {10.1115/1.1631582}
-}";
-
 /// The angle filter as a method.
 pub fn method() -> Method<AngleParams> {
     let info = MethodInfo::new("angle", "Angle filter")
@@ -163,7 +144,7 @@ pub fn method() -> Method<AngleParams> {
              Efficient computation of a simplified medial axis. Journal of Computing and Information \
              Science in Engineering 3(4). https://doi.org/10.1115/1.1631582",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["AttaliMontanvert1996", "FoskeyLinManocha2003"]))
         .summary("Keeps the spheres whose contact points subtend the largest angles.")
         .native(NativeLevel::larger_is_coarser("theta", "degrees of separation angle"))
         .published(

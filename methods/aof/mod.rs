@@ -83,16 +83,6 @@ pub use solid::{Base, Loss, Solid};
 /// Name of the extra that holds the [`LatticeVoxels`].
 pub const VOXELS: &str = "voxels";
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@inproceedings{StolpnerSiddiqi2006,
-  author    = {Stolpner, Svetlana and Siddiqi, Kaleem},
-  title     = {Revealing Significant Medial Structure in Polyhedral Meshes},
-  booktitle = {International Symposium on 3D Data Processing, Visualization and Transmission (3DPVT)},
-  year      = {2006},
-  doi       = {10.1109/3DPVT.2006.117}
-}";
-
 /// The average outward flux as a method.
 ///
 /// The published level has the paper's parameters where none are set. Cost `O(V N)` closest points for
@@ -103,7 +93,7 @@ pub fn method() -> Method<AofSettings> {
             "Svetlana Stolpner, Kaleem Siddiqi 2006. Revealing Significant Medial Structure in \
              Polyhedral Meshes. 3DPVT. https://doi.org/10.1109/3DPVT.2006.117",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["StolpnerSiddiqi2006"]))
         .summary(
             "Keeps the voxels into which the gradient of the distance flows, coarse to fine, \
              straight from the surface.",

@@ -86,29 +86,6 @@ pub struct CoverageAxis {
     keeping: Keeping,
 }
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@article{DouEtAl2022,
-  author  = {Dou, Zhiyang and Lin, Cheng and Xu, Rui and Yang, Lei and Xin, Shiqing and Komura, Taku
-             and Wang, Wenping},
-  title   = {Coverage Axis: Inner Point Selection for {3D} Shape Skeletonization},
-  journal = {Computer Graphics Forum},
-  volume  = {41},
-  number  = {2},
-  year    = {2022},
-  doi     = {10.1111/cgf.14484}
-}
-@article{WangEtAl2024,
-  author  = {Wang, Zimeng and Dou, Zhiyang and Xu, Rui and Lin, Cheng and Liu, Yuan and Long, Xiaoxiao
-             and Xin, Shiqing and Komura, Taku and Yuan, Xiaoming and Wang, Wenping},
-  title   = {Coverage Axis++: Efficient Inner Point Selection for {3D} Shape Skeletonization},
-  journal = {Computer Graphics Forum},
-  volume  = {43},
-  number  = {5},
-  year    = {2024},
-  doi     = {10.1111/cgf.15143}
-}";
-
 /// Coverage Axis and Coverage Axis++ as a method, with the collapse for `connection=qmat`.
 ///
 /// Answers all levels but an error bound. Memory: one bit for each candidate and sample.
@@ -122,7 +99,7 @@ pub fn method(keeping: Keeping) -> CoverageAxis {
              2024. Coverage Axis++: Efficient Inner Point Selection for 3D Shape Skeletonization. \
              Computer Graphics Forum 43(5). https://doi.org/10.1111/cgf.15143",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["DouEtAl2022", "WangEtAl2024"]))
         .summary(
             "Chooses inner spheres that, slightly inflated, cover the surface, and connects them by \
              their regions on the medial mesh.",

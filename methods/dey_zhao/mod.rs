@@ -134,16 +134,6 @@ impl DeyZhaoParams {
     }
 }
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@inproceedings{DeyZhao2002,
-  author    = {Dey, Tamal K. and Zhao, Wulue},
-  title     = {Approximate medial axis as a {Voronoi} subcomplex},
-  booktitle = {ACM Symposium on Solid Modeling and Applications},
-  year      = {2002},
-  doi       = {10.1145/566282.566333}
-}";
-
 /// The Voronoi subcomplex as a method.
 pub fn method() -> Method<DeyZhaoParams> {
     let info = MethodInfo::new("dey-zhao", "Dey-Zhao Voronoi subcomplex")
@@ -151,7 +141,7 @@ pub fn method() -> Method<DeyZhaoParams> {
             "Tamal K. Dey, Wulue Zhao 2002. Approximate medial axis as a Voronoi subcomplex. ACM \
              Symposium on Solid Modeling and Applications. https://doi.org/10.1145/566282.566333",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["DeyZhao2002"]))
         .summary(
             "Keeps the Voronoi facets whose Delaunay edge is steep to the surface, or long beside \
              the samples' spacing.",

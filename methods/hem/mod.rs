@@ -122,18 +122,6 @@ use serde::{Deserialize, Serialize};
 /// Cost at which [`Level::Published`] stops: the default of the authors' code.
 const PUBLISHED: f64 = 1e-4;
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@article{SunChoiYuWang2016,
-  author  = {Sun, Feng and Choi, Yi-King and Yu, Yizhou and Wang, Wenping},
-  title   = {Medial Meshes -- A Compact and Accurate Representation of Medial Axis Transform},
-  journal = {IEEE Transactions on Visualization and Computer Graphics},
-  volume  = {22},
-  number  = {3},
-  year    = {2016},
-  doi     = {10.1109/TVCG.2015.2448080}
-}";
-
 /// The HEM simplifier.
 ///
 /// Answers [`Level::Spheres`], and [`Level::Native`] with a bound that holds for every sample
@@ -159,7 +147,7 @@ pub fn method() -> Method<HemParams> {
              Accurate Representation of Medial Axis Transform. IEEE Transactions on Visualization \
              and Computer Graphics 22(3). https://doi.org/10.1109/TVCG.2015.2448080",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["SunChoiYuWang2016"]))
         .incremental()
         .summary(
             "Collapses the edges of the medial mesh in the order of the Hausdorff error from the \

@@ -65,16 +65,6 @@ use rayon::prelude::*;
 /// The scale of [`Level::Published`]: the least of the paper's Table 1.
 const PUBLISHED: f64 = 1.18;
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@inproceedings{FarajThieryBoubekeur2013,
-  author    = {Faraj, Noura and Thiery, Jean-Marc and Boubekeur, Tamy},
-  title     = {Progressive Medial Axis Filtration},
-  booktitle = {SIGGRAPH Asia 2013 Technical Briefs},
-  year      = {2013},
-  doi       = {10.1145/2542355.2542359}
-}";
-
 /// Progressive medial axis filtration as a method.
 ///
 /// Builds the whole hierarchy once, in `O(n log n)` for an initial mesh of bounded degree; then
@@ -86,7 +76,7 @@ pub fn method() -> Method<NoParams> {
              Filtration. SIGGRAPH Asia 2013 Technical Briefs. \
              https://doi.org/10.1145/2542355.2542359",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["FarajThieryBoubekeur2013"]))
         .summary(
             "Collapses each edge into its larger sphere, in the order of the scales at which that \
              absorbs the smaller one: the scale axis as a hierarchy.",

@@ -78,18 +78,6 @@ use serde::{Deserialize, Serialize};
 /// Spheres of [`Level::Published`]: the count of the paper's Table II.
 const PUBLISHED: usize = 100;
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@article{LiEtAl2015,
-  author  = {Li, Pan and Wang, Bin and Sun, Feng and Guo, Xiaohu and Zhang, Caiming and Wang, Wenping},
-  title   = {{Q-MAT}: Computing Medial Axis Transform by Quadratic Error Minimization},
-  journal = {ACM Transactions on Graphics},
-  volume  = {35},
-  number  = {1},
-  year    = {2015},
-  doi     = {10.1145/2753755}
-}";
-
 /// The Q-MAT simplifier.
 ///
 /// Answers [`Level::Spheres`]; a request finer than the one before starts anew. Cost
@@ -101,7 +89,7 @@ pub fn method() -> Method<QmatParams> {
              Computing Medial Axis Transform by Quadratic Error Minimization. ACM Transactions on \
              Graphics 35(1). https://doi.org/10.1145/2753755",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["LiEtAl2015"]))
         .incremental()
         .summary(
             "Collapses the edges of the medial mesh by slab quadric error and stability ratio, \

@@ -56,25 +56,6 @@ const PUBLISHED: f64 = 1.1;
 /// The largest scale: radii of up to a million diagonals, beyond which positions mean nothing.
 const LARGEST_SCALE: f64 = 1e6;
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@inproceedings{GiesenMiklosPaulyWormser2009,
-  author    = {Giesen, Joachim and Miklos, Balint and Pauly, Mark and Wormser, Camille},
-  title     = {The scale axis transform},
-  booktitle = {Symposium on Computational Geometry},
-  year      = {2009},
-  doi       = {10.1145/1542362.1542388}
-}
-@article{MiklosGiesenPauly2010,
-  author  = {Miklos, Balint and Giesen, Joachim and Pauly, Mark},
-  title   = {Discrete scale axis representations for {3D} geometry},
-  journal = {ACM Transactions on Graphics},
-  volume  = {29},
-  number  = {4},
-  year    = {2010},
-  doi     = {10.1145/1778765.1778838}
-}";
-
 /// The scale axis transform as a method.
 ///
 /// Has all levels. Each scale costs one regular and one Delaunay triangulation.
@@ -87,7 +68,7 @@ pub fn method() -> Method<SatParams> {
              2010. Discrete scale axis representations for 3D geometry. ACM Transactions on \
              Graphics 29(4). https://doi.org/10.1145/1778765.1778838",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["GiesenMiklosPaulyWormser2009", "MiklosGiesenPauly2010"]))
         .summary(
             "Grows all polar balls by a factor, takes the medial axis of their union, and shrinks \
              its balls back.",

@@ -126,16 +126,6 @@ pub struct PartInfo {
     pub removed: bool,
 }
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@inproceedings{TamHeidrich2003,
-  author    = {Tam, Roger and Heidrich, Wolfgang},
-  title     = {Shape simplification based on the medial axis transform},
-  booktitle = {IEEE Visualization},
-  year      = {2003},
-  doi       = {10.1109/VISUAL.2003.1250410}
-}";
-
 /// Pruning by parts as a method.
 ///
 /// Answers all levels. The axis is computed once for all; a level costs a few passes over it.
@@ -145,7 +135,7 @@ pub fn method() -> Method<TamHeidrichParams> {
             "Roger Tam, Wolfgang Heidrich 2003. Shape simplification based on the medial axis \
              transform. IEEE Visualization. https://doi.org/10.1109/VISUAL.2003.1250410",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["TamHeidrich2003"]))
         .summary(
             "Cuts the axis of the polar balls into its sheets and removes small ones from the \
              outside in, loops and components kept.",

@@ -102,16 +102,6 @@ const SAMPLES_PER_SPHERE: usize = 100;
 /// Most samples that a number of spheres asks for by itself: memory and time stay bounded.
 const MOST_DEFAULT_SAMPLES: usize = 100_000;
 
-/// The source as BibTeX.
-const BIBTEX: &str = "\
-@inproceedings{HuangKraemerTheryBechmann2024,
-  author    = {Huang, Qijia and Kraemer, Pierre and Thery, Sylvain and Bechmann, Dominique},
-  title     = {Dynamic skeletonization via variational medial axis sampling},
-  booktitle = {SIGGRAPH Asia 2024 Conference Papers},
-  year      = {2024},
-  url       = {https://huang46u.github.io/VMAS/}
-}";
-
 /// Variational medial axis sampling as a method.
 ///
 /// Answers [`Level::Spheres`] and [`Level::Published`], each from one sphere on: `O(P)` for each of some
@@ -123,7 +113,7 @@ pub fn method() -> Method<VmasParams> {
              skeletonization via variational medial axis sampling. SIGGRAPH Asia 2024 Conference \
              Papers. https://huang46u.github.io/VMAS/",
         )
-        .bibtex(BIBTEX)
+        .bibtex(crate::references(&["HuangKraemerTheryBechmann2024"]))
         .summary(
             "Clusters surface points by the sphere that fits them best, refits each sphere to its \
              cluster, pushes it back to the medial axis, and splits the worst.",
