@@ -4,8 +4,10 @@
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Level, Method, MethodInfo, NoParams, RunContext, Simplification, Simplified, SimplifyError,
+    Level, Method, MethodInfo, NoParams, RunContext, Simplified, SimplifyError,
 };
+
+use crate::Prepared;
 
 /// The initial medial mesh as a method.
 pub fn method() -> Method<NoParams> {
@@ -18,11 +20,7 @@ pub fn method() -> Method<NoParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    _params: NoParams,
-    _run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, _params: NoParams, _run: &RunContext) -> Prepared<'s> {
     let initial = shape.initial()?;
     Ok(Box::new(move |level: Level| match level {
         Level::Published => Ok(Simplified::new(initial.as_ref().clone(), level)),

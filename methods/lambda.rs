@@ -33,12 +33,13 @@ use medial::geometry::enclosing_ball;
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
-    Simplified, SimplifyError,
+    Simplified,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::ranked::{FacetSet, Published, Ranked, RankedFacets, Scale, Wanted};
+use crate::{Prepared, Result};
 
 medial::parameters! {
     /// Parameters of the lambda-medial axis.
@@ -100,11 +101,7 @@ pub fn method() -> Method<LambdaParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    params: LambdaParams,
-    _run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, params: LambdaParams, _run: &RunContext) -> Prepared<'s> {
     Ok(match params.variant {
         Variant::Vertex => Box::new(rank_spheres(shape)?),
         Variant::Cell if params.leftovers => Box::new(rank_cells(shape)?),
@@ -124,7 +121,7 @@ fn prepare<'s>(
 //   induced subcomplex can be asked for a number of spheres like every other method.
 
 /// Ranks the spheres of the initial medial mesh. `O(n log n)`.
-fn rank_spheres(shape: &Shape) -> Result<Ranked, SimplifyError> {
+fn rank_spheres(shape: &Shape) -> Result<Ranked> {
     let mesh = shape.initial()?;
     let mut diagnostics = Diagnostics::default();
     let contacts = shape.contacts(&mesh, &mut diagnostics)?;
@@ -173,7 +170,7 @@ pub(super) struct Cells {
 }
 
 /// Step 1. `O(n log n)`.
-fn rank_cells(shape: &Shape) -> Result<Cells, SimplifyError> {
+fn rank_cells(shape: &Shape) -> Result<Cells> {
     let FacetSet { mesh, facets, dual } = FacetSet::of(shape)?;
     let facet_value = facet_values(shape, &facets)?;
     let contacts = mesh.contacts.as_ref().expect("a Voronoi medial mesh has contacts");
@@ -225,14 +222,14 @@ fn enclosing_radius(contacts: &Contacts, ids: &[u32]) -> f64 {
 }
 
 /// The facets alone.
-fn rank_facets(shape: &Shape) -> Result<RankedFacets<'static>, SimplifyError> {
+fn rank_facets(shape: &Shape) -> Result<RankedFacets<'static>> {
     let set = FacetSet::of(shape)?;
     let value = facet_values(shape, &set.facets)?;
     let scale = scale(&set.mesh);
     Ok(RankedFacets::new(set, value, scale, Diagnostics::default()))
 }
 
-fn facet_values(shape: &Shape, facets: &VoronoiFacets) -> Result<Vec<f64>, SimplifyError> {
+fn facet_values(shape: &Shape, facets: &VoronoiFacets) -> Result<Vec<f64>> {
     let delaunay = shape.delaunay()?;
     let ends = (0..facets.len()).map(|facet| facets.ends(facet).map(|v| delaunay.point(v)));
     Ok(ends.map(|[p, q]| p.distance(q) / 2.0).collect())
@@ -265,7 +262,7 @@ fn passing(values: &[f64], lambda: f64) -> impl Iterator<Item = u32> {
 }
 
 impl Simplification for Cells {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let mut diagnostics = Diagnostics::default();
         let lambda = match self.scale.wanted(level, &mut diagnostics)? {
             Wanted::Spheres(spheres) => self.level_for(spheres),

@@ -24,6 +24,8 @@ use medial::simplifier::{
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use crate::{Prepared, Result};
+
 /// A count within this fraction below the requested one ends the search; comparisons at equal counts
 /// accept such a count.
 const TOLERANCE: f64 = 0.02;
@@ -110,8 +112,8 @@ impl SizeSearch {
         &self,
         count: usize,
         native: impl Fn(f64) -> f64,
-        make: impl Fn(f64) -> Result<Probe, SimplifyError>,
-    ) -> Result<Simplified, SimplifyError> {
+        make: impl Fn(f64) -> Result<Probe>,
+    ) -> Result<Simplified> {
         let mut path = Path::new(&self.knob, count);
         let mut best: Option<(f64, Probe)> = None;
         while let Some(value) = path.next {
@@ -145,7 +147,7 @@ impl SizeSearch {
         value: f64,
         reached: usize,
         diagnostics: &mut Diagnostics,
-    ) -> Result<(), SimplifyError> {
+    ) -> Result<()> {
         let Knob { unit, range, .. } = &self.knob;
         let (least, most) = (range.start(), range.end());
         if reached == 0 {
@@ -278,7 +280,7 @@ pub(crate) fn resampled(shape: &Shape, samples: f64) -> Shape {
 }
 
 /// A result, or an empty one where there is nothing inside at this value: the search goes on.
-fn or_empty(result: Result<Probe, SimplifyError>) -> Result<Probe, SimplifyError> {
+fn or_empty(result: Result<Probe>) -> Result<Probe> {
     match result {
         Err(
             SimplifyError::Unsupported { .. }
@@ -295,11 +297,8 @@ fn or_empty(result: Result<Probe, SimplifyError>) -> Result<Probe, SimplifyError
 // Methods that meet a number of spheres by a knob other than their level: the density of the samples,
 // or the resolution of a lattice (below).
 
-/// A method on one shape, as it is prepared.
-type Prepared<'s> = Box<dyn Simplification + 's>;
-
 /// Prepares a method at a value of the knob; without one, as the shape and the parameters have it.
-type Prepare<'s> = Box<dyn Fn(Option<f64>) -> Result<Prepared<'s>, SimplifyError> + Send + 's>;
+type Prepare<'s> = Box<dyn Fn(Option<f64>) -> Prepared<'s> + Send + 's>;
 
 /// A shape whose numbers of spheres are met by a knob. All other levels are those of the value that the
 /// shape and the parameters have. Nothing is kept between levels, so that each costs what it would
@@ -317,7 +316,7 @@ impl<'s> ByKnob<'s> {
         knob: Knob,
         native: f64,
         run: &RunContext,
-        prepare: impl Fn(Option<f64>) -> Result<Prepared<'s>, SimplifyError> + Send + 's,
+        prepare: impl Fn(Option<f64>) -> Prepared<'s> + Send + 's,
     ) -> Self {
         let search = SizeSearch::new(knob, run);
         Self { prepare: Box::new(prepare), search, native }
@@ -332,8 +331,8 @@ impl<'s> ByKnob<'s> {
         shape: &'s Shape,
         native: f64,
         run: &RunContext,
-        prepare: impl Fn(&Shape) -> Result<Prepared<'static>, SimplifyError> + Send + 's,
-    ) -> Result<Self, SimplifyError> {
+        prepare: impl Fn(&Shape) -> Prepared<'static> + Send + 's,
+    ) -> Result<Self> {
         shape.surface_tree()?;
         shape.inside_test();
         Ok(Self::new(Knob::samples(), native, run, move |samples| {
@@ -346,7 +345,7 @@ impl<'s> ByKnob<'s> {
 }
 
 impl Simplification for ByKnob<'_> {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let Level::Spheres(count @ 1..) = level else {
             return (self.prepare)(None)?.at(level);
         };
@@ -370,7 +369,7 @@ pub(crate) fn within<T: PartialOrd + Display>(
     name: &str,
     value: T,
     range: RangeInclusive<T>,
-) -> Result<(), SimplifyError> {
+) -> Result<()> {
     if range.contains(&value) {
         return Ok(());
     }

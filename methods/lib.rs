@@ -3,7 +3,7 @@
 //! Every method implements [`medial::simplifier::MedialSimplifier`] and knows neither the others
 //! nor the runner. [`registry`] lists them in the order of every table.
 
-use medial::simplifier::{Level, MedialSimplifier, Registered};
+use medial::simplifier::{Level, MedialSimplifier, Registered, Simplification, SimplifyError};
 
 pub mod angle;
 pub mod aof;
@@ -21,6 +21,12 @@ pub mod sat_pairwise;
 pub mod tam_heidrich;
 pub mod tight;
 pub mod vmas;
+
+/// The result of a method, or of a part of one.
+pub type Result<T, E = SimplifyError> = std::result::Result<T, E>;
+
+/// A method on one shape, ready for levels.
+type Prepared<'s> = Result<Box<dyn Simplification + 's>>;
 
 /// All methods, in the order of the tables. Those that take long are marked to run only when named.
 pub fn registry() -> Vec<Registered> {

@@ -11,6 +11,8 @@ use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Level, Simplification, Simplified, SimplifyError};
 use rayon::prelude::*;
 
+use crate::Result;
+
 /// An initial medial mesh with a value for each sphere; larger values are kept longer.
 pub(crate) struct Ranked {
     mesh: Arc<MedialMesh>,
@@ -70,7 +72,7 @@ impl Ranked {
 }
 
 impl Simplification for Ranked {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let mut diagnostics = self.prepared.clone();
         let (keep, native) = match self.scale.wanted(level, &mut diagnostics)? {
             Wanted::Spheres(asked) => self.by_count(asked, &mut diagnostics),
@@ -123,11 +125,7 @@ pub(crate) enum Wanted {
 
 impl Scale {
     /// The request of a level; a documented level is announced in `diagnostics`.
-    pub(crate) fn wanted(
-        &self,
-        level: Level,
-        diagnostics: &mut Diagnostics,
-    ) -> Result<Wanted, SimplifyError> {
+    pub(crate) fn wanted(&self, level: Level, diagnostics: &mut Diagnostics) -> Result<Wanted> {
         match level {
             Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
             Level::Spheres(count) => Ok(Wanted::Spheres(count)),
@@ -147,7 +145,7 @@ impl Scale {
     }
 
     /// Refuses a level that means nothing.
-    fn check(&self, level: f64) -> Result<(), SimplifyError> {
+    fn check(&self, level: f64) -> Result<()> {
         let Self { name, range, .. } = self;
         if range.contains(&level) {
             return Ok(());
@@ -235,14 +233,14 @@ impl FacetSet {
     ///
     /// # Errors
     /// As [`Shape::voronoi`]; when a medial mesh was given, which has no Voronoi facets.
-    pub(crate) fn of(shape: &Shape) -> Result<Self, SimplifyError> {
+    pub(crate) fn of(shape: &Shape) -> Result<Self> {
         Self::refuse_given(shape)?;
         let (facets, mesh) = (shape.facets()?, shape.voronoi()?);
         Ok(Self { mesh, facets, dual: shape.options().dual })
     }
 
     /// Refuses a shape with a given medial mesh.
-    pub(crate) fn refuse_given(shape: &Shape) -> Result<(), SimplifyError> {
+    pub(crate) fn refuse_given(shape: &Shape) -> Result<()> {
         if shape.has_given_initial() {
             let why = "it selects facets of the Voronoi diagram of the samples, and a given medial \
                        mesh has none: leave out --initial";
@@ -350,7 +348,7 @@ impl<'s> RankedFacets<'s> {
 }
 
 impl Simplification for RankedFacets<'_> {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         if self.set.facets.is_empty() {
             // A tetrahedron has a Voronoi vertex inside, but no facet around it.
             let why = "no Voronoi facet lies inside the surface as a whole, so that none can be \

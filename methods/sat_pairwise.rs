@@ -24,12 +24,10 @@ use std::ops::Range;
 use medial::complex::Sphere;
 use medial::geometry::trees::{Bounds, Node, Plan, Search, Tree};
 use medial::shape::Shape;
-use medial::simplifier::{
-    Diagnostics, Method, MethodInfo, NativeLevel, NoParams, RunContext, Simplification,
-    SimplifyError,
-};
+use medial::simplifier::{Diagnostics, Method, MethodInfo, NativeLevel, NoParams, RunContext};
 use rayon::prelude::*;
 
+use crate::Prepared;
 use crate::ranked::{Published, Ranked, Scale};
 
 /// The pairwise scale filter as a method.
@@ -47,11 +45,7 @@ pub fn method() -> Method<NoParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    _: NoParams,
-    _run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, _: NoParams, _run: &RunContext) -> Prepared<'s> {
     let mesh = shape.initial()?;
     let value = critical_scales(&mesh.spheres);
     let scale = Scale {

@@ -27,6 +27,7 @@ use medial::surface::{InsideTest, Side, TriangleBvh};
 use rayon::prelude::*;
 
 use super::AngleParams;
+use crate::Result;
 use crate::levels::{ByKnob, Knob};
 use crate::ranked::{Scale, Wanted, break_ties, mean};
 
@@ -107,7 +108,7 @@ pub(super) fn prepare(
     shape: &Shape,
     &AngleParams { resolution, theta, .. }: &AngleParams,
     run: &RunContext,
-) -> Result<Faces, SimplifyError> {
+) -> Result<Faces> {
     let tree = shape.surface_tree()?;
     let inside = shape.inside_test();
     let grid = Grid::new(shape, resolution);
@@ -147,7 +148,7 @@ fn directions(
     tree: &TriangleBvh,
     inside: &InsideTest,
     run: &RunContext,
-) -> Result<Vec<[f32; 3]>, SimplifyError> {
+) -> Result<Vec<[f32; 3]>> {
     let [x, y, z] = grid.size;
     let mut toward = Vec::with_capacity(grid.len());
     for slice in 0..z {
@@ -295,7 +296,7 @@ impl Faces {
 }
 
 impl Simplification for Faces {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let mut diagnostics = self.diagnostics.clone();
         let (count, native) = match self.scale.wanted(level, &mut diagnostics)? {
             Wanted::Spheres(spheres) => {
@@ -339,7 +340,7 @@ pub(super) fn prepare_by_resolution<'s>(
     shape: &'s Shape,
     params: AngleParams,
     run: &RunContext,
-) -> Result<ByKnob<'s>, SimplifyError> {
+) -> Result<ByKnob<'s>> {
     shape.surface_tree()?;
     shape.inside_test();
     // A sheet of area A has A R^2 faces, and about as many corners.

@@ -48,6 +48,7 @@ use crate::levels::ByKnob;
 use crate::ranked::{
     FacetSet, Published, Ranked, RankedFacets, Scale, Sheets, Wanted, Without, break_ties,
 };
+use crate::{Prepared, Result};
 
 medial::parameters! {
     /// Parameters of the angle filter.
@@ -106,7 +107,7 @@ pub enum FacetAngle {
 }
 
 impl AngleParams {
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         let [least, most] = [grid::MIN_RESOLUTION, grid::MAX_RESOLUTION];
         if !(least..=most).contains(&self.resolution) {
             return Err(SimplifyError::Parameter(format!(
@@ -155,11 +156,7 @@ pub fn method() -> Method<AngleParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    params: AngleParams,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, params: AngleParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     let scale = scale(params.theta);
     Ok(match (params.variant, params.size) {
@@ -190,7 +187,7 @@ fn prepare<'s>(
 //   has no angle; it gets `S = 0` and goes first.
 
 /// Ranks the spheres of the initial medial mesh. `O(n log n)`.
-fn rank_spheres(shape: &Shape, scale: Scale) -> Result<Ranked, SimplifyError> {
+fn rank_spheres(shape: &Shape, scale: Scale) -> Result<Ranked> {
     let mesh = shape.initial()?;
     let mut diagnostics = Diagnostics::default();
     let contacts = shape.contacts(&mesh, &mut diagnostics)?;
@@ -219,11 +216,7 @@ fn rank_spheres(shape: &Shape, scale: Scale) -> Result<Ranked, SimplifyError> {
 //   measured. The scale axis tool uses the mean of the vertices for its own filter.
 
 /// Ranks the Voronoi facets. `O(n)` for their vertices.
-fn rank_facets(
-    shape: &Shape,
-    at: FacetAngle,
-    scale: Scale,
-) -> Result<RankedFacets<'static>, SimplifyError> {
+fn rank_facets(shape: &Shape, at: FacetAngle, scale: Scale) -> Result<RankedFacets<'static>> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
     let values: Vec<f64> = (0..set.facets.len())
@@ -308,11 +301,7 @@ pub(super) struct Peeled {
 }
 
 /// Steps 1 to 4 for any number of samples, at the separation angle `theta`.
-fn peel_by_samples<'s>(
-    shape: &'s Shape,
-    theta: f64,
-    run: &RunContext,
-) -> Result<ByKnob<'s>, SimplifyError> {
+fn peel_by_samples<'s>(shape: &'s Shape, theta: f64, run: &RunContext) -> Result<ByKnob<'s>> {
     FacetSet::refuse_given(shape)?;
     let run_again = run.clone();
     ByKnob::of_samples(shape, theta, run, move |shape| {
@@ -322,7 +311,7 @@ fn peel_by_samples<'s>(
 
 /// Steps 1 to 3. `O(n log n)` in the number of facets, and as often over the sides of a sheet as a
 /// neighbour goes.
-fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled, SimplifyError> {
+fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
     let value: Vec<f64> = (0..set.facets.len())
@@ -429,7 +418,7 @@ impl Peeled {
 }
 
 impl Simplification for Peeled {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let mut diagnostics = self.diagnostics.clone();
         let (count, native) = match self.scale.wanted(level, &mut diagnostics)? {
             Wanted::Spheres(spheres) => {

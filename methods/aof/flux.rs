@@ -41,10 +41,12 @@ use medial::Vec3;
 use medial::complex::Sphere as Ball;
 use medial::geometry::planar_frame::PlanarFrame;
 use medial::shape::Shape;
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use medial::surface::{Closest, Feature, InsideTest, TriMesh, TriangleBvh};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+
+use crate::Result;
 
 /// How samples lie on a sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -126,7 +128,7 @@ impl Surface {
     ///
     /// # Errors
     /// When it has no face.
-    pub fn of(shape: &Shape) -> Result<Self, SimplifyError> {
+    pub fn of(shape: &Shape) -> Result<Self> {
         let (tree, inside) = (shape.surface_tree()?, shape.inside_test());
         Ok(Self { tree, inside, fans: fans(shape.mesh()) })
     }
@@ -249,9 +251,9 @@ impl Surface {
         sphere: &Sphere,
         centres: &[Vec3],
         run: &RunContext,
-    ) -> Result<Vec<Refined>, SimplifyError> {
+    ) -> Result<Vec<Refined>> {
         let done = AtomicUsize::new(0);
-        let parts: Result<Vec<Vec<Refined>>, SimplifyError> = centres
+        let parts: Result<Vec<Vec<Refined>>> = centres
             .par_chunks(TASK)
             .map(|centres_of_task| {
                 let refined = centres_of_task.iter().map(|&c| self.refined(sphere, c)).collect();

@@ -21,12 +21,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use medial::Vec3;
 use medial::complex::cubical_betti;
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use medial::surface::{Closest, Side, TriMesh};
 use rayon::prelude::*;
 
 use super::flux::{Sphere, Surface};
 use super::{AofParams, Dismiss, Start};
+use crate::Result;
 
 /// A lattice whose voxels have `resolution` along the longest side of the bounding box; its lower
 /// corner is that of the box.
@@ -369,12 +370,12 @@ pub(super) fn coarse_to_fine(
     params: &AofParams,
     wanted: Wanted,
     run: &RunContext,
-) -> Result<Descent, SimplifyError> {
+) -> Result<Descent> {
     let levels = levels(&grid, params)?;
     let blocks = blocks(surface, &grid);
     let done = AtomicUsize::new(0);
     let none = Tally { dismissed: vec![0; levels.len() - 1], ..Tally::default() };
-    let parts: Result<Vec<_>, SimplifyError> = blocks
+    let parts: Result<Vec<_>> = blocks
         .par_iter()
         .map(|block| {
             run.step(done.fetch_add(1, Ordering::Relaxed), blocks.len())?;
@@ -407,7 +408,7 @@ struct LatticeLevel {
 }
 
 /// From coarse to fine.
-fn levels(grid: &Grid, params: &AofParams) -> Result<Vec<LatticeLevel>, SimplifyError> {
+fn levels(grid: &Grid, params: &AofParams) -> Result<Vec<LatticeLevel>> {
     let counts = params.sample_counts()?.into_iter();
     let levels = counts.zip((0..params.levels).rev()).map(|(count, finer)| {
         let size = params.d.pow(finer);

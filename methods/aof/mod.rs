@@ -72,9 +72,11 @@ mod thinning;
 use medial::shape::Shape;
 use medial::simplifier::{
     Capability, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Simplified, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
+
+use crate::{Prepared, Result};
 
 pub use flux::{Refined, Sphere, Spiral, Surface};
 pub use lattice::{Bricks, Descent, Grid, LatticeVoxels, Place, Voxel, Wanted};
@@ -109,11 +111,7 @@ pub fn method() -> Method<AofSettings> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    settings: AofSettings,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, settings: AofSettings, run: &RunContext) -> Prepared<'s> {
     settings.at(Level::Published).validate()?;
     let params = settings.at(Level::Spheres(1)).validate()?;
     let solid = Solid::new(shape, params, run.clone())?;
@@ -129,7 +127,7 @@ fn prepare<'s>(
     }))
 }
 
-fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified, SimplifyError> {
+fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified> {
     let mut diagnostics = base.diagnostics.clone();
     let angle = match level {
         Level::Native(angle) => angle,
@@ -358,7 +356,7 @@ pub enum Dismiss {
 
 impl AofParams {
     /// The parameters if they are in their ranges.
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         let split = self.d.checked_pow(self.levels.saturating_sub(1));
         let problem = if !(1..=MAX_RESOLUTION).contains(&self.resolution) {
             format!(
@@ -388,7 +386,7 @@ impl AofParams {
     }
 
     /// Samples of each level, from coarse to fine.
-    pub(super) fn sample_counts(&self) -> Result<Vec<usize>, SimplifyError> {
+    pub(super) fn sample_counts(&self) -> Result<Vec<usize>> {
         let counts: Result<Vec<usize>, _> =
             self.samples.split('/').map(|word| word.trim().parse()).collect();
         let levels = self.levels as usize;

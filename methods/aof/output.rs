@@ -27,12 +27,13 @@ use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::LazyLock;
 
 use medial::complex::{MedialMesh, Sphere as Ball};
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use rayon::prelude::*;
 
 use super::lattice::{LatticeVoxels, Voxel};
 use super::solid::{BYTES_PER_VOXEL, Base, Solid};
 use super::thinning::{CENTRE, offset, ones, squared, touch};
+use crate::Result;
 
 /// The medial mesh on balls of sorted voxels.
 ///
@@ -41,11 +42,7 @@ use super::thinning::{CENTRE, offset, ones, squared, touch};
 ///
 /// # Panics
 /// If there is not one ball for each voxel.
-pub fn medial_mesh(
-    voxels: &[Voxel],
-    balls: Vec<Ball>,
-    run: &RunContext,
-) -> Result<MedialMesh, SimplifyError> {
+pub fn medial_mesh(voxels: &[Voxel], balls: Vec<Ball>, run: &RunContext) -> Result<MedialMesh> {
     assert_eq!(voxels.len(), balls.len(), "one ball for each voxel");
     let keys: Vec<[u16; 3]> = voxels.iter().map(Voxel::key).collect();
     let around: Vec<Around> =
@@ -135,7 +132,7 @@ fn tetrahedra(
     triangles: &Triangles<'_>,
     around: &[Around],
     run: &RunContext,
-) -> Result<Vec<[u32; 4]>, SimplifyError> {
+) -> Result<Vec<[u32; 4]>> {
     let before = (1_u32 << CENTRE) - 1;
     let (mut found, mut own): (Vec<[u32; 4]>, Vec<[u32; 3]>) = (Vec::new(), Vec::new());
     for (voxel, near) in (0_u32..).zip(around) {
@@ -195,7 +192,7 @@ impl<'a> Collapse<'a> {
         Self { tetrahedra, lengths, is_open, left_out, beside, free }
     }
 
-    fn run(&mut self, run: &RunContext) -> Result<(), SimplifyError> {
+    fn run(&mut self, run: &RunContext) -> Result<()> {
         let mut steps = 0_usize;
         while let Some((_, Reverse(triangle))) = self.free.pop() {
             let (count, tetrahedron) = self.beside[triangle as usize];
@@ -228,7 +225,7 @@ fn reduce(
     lengths: &[u8],
     left_out: &mut [bool],
     run: &RunContext,
-) -> Result<(), SimplifyError> {
+) -> Result<()> {
     // The longest triangles are the last ones.
     let mut by_last: BTreeMap<u32, Vec<(u8, u32)>> = BTreeMap::new();
     for (steps, tetrahedron) in tetrahedra.enumerate() {

@@ -14,6 +14,7 @@ use super::lattice::{Descent, Grid, LatticeVoxels, Voxel, Wanted, betti, coarse_
 use super::output::medial_mesh;
 use super::thinning::{FACES, Order, thin};
 use super::{AofParams, AofSettings, MAX_RESOLUTION, Start, Variant};
+use crate::Result;
 
 /// A solid, ready for any lattice.
 pub struct Solid<'s> {
@@ -31,11 +32,7 @@ impl<'s> Solid<'s> {
     ///
     /// # Errors
     /// When its surface has no face.
-    pub fn new(
-        shape: &'s Shape,
-        params: AofParams,
-        run: RunContext,
-    ) -> Result<Self, SimplifyError> {
+    pub fn new(shape: &'s Shape, params: AofParams, run: RunContext) -> Result<Self> {
         let surface = Surface::of(shape)?;
         let mesh = shape.mesh();
         let (mut volume, mut area) = (0.0, 0.0);
@@ -57,7 +54,7 @@ impl<'s> Solid<'s> {
     /// # Errors
     /// When the lattice is too fine, or its voxels would not fit into memory; when the run was
     /// cancelled.
-    pub fn descend(&self, resolution: u32, wanted: Wanted) -> Result<Descent, SimplifyError> {
+    pub fn descend(&self, resolution: u32, wanted: Wanted) -> Result<Descent> {
         self.check_resolution(resolution)?;
         coarse_to_fine(&self.surface, self.grid(resolution), &self.params, wanted, &self.run)
     }
@@ -73,7 +70,7 @@ impl<'s> Solid<'s> {
     ///
     /// # Errors
     /// When the run was cancelled.
-    pub fn axis(&self, start: &Descent, angle: f64) -> Result<LatticeVoxels, SimplifyError> {
+    pub fn axis(&self, start: &Descent, angle: f64) -> Result<LatticeVoxels> {
         let threshold = self.params.threshold(angle);
         let order = match self.params.variant {
             Variant::Plain => {
@@ -93,7 +90,7 @@ impl<'s> Solid<'s> {
     ///
     /// # Errors
     /// When the run was cancelled.
-    pub fn medial_mesh(&self, axis: &LatticeVoxels) -> Result<MedialMesh, SimplifyError> {
+    pub fn medial_mesh(&self, axis: &LatticeVoxels) -> Result<MedialMesh> {
         let centres = axis.points();
         let balls = if self.params.refine {
             let counts = self.params.sample_counts()?;
@@ -159,7 +156,7 @@ impl Solid<'_> {
     ///
     /// # Errors
     /// When no voxel fits into the solid; as [`Solid::descend`].
-    pub fn base(&self) -> Result<Base, SimplifyError> {
+    pub fn base(&self) -> Result<Base> {
         let mut diagnostics = Diagnostics::default();
         let requested = self.params.resolution;
         let mut descent = self.descend(requested, self.wanted())?;
@@ -211,11 +208,7 @@ impl Solid<'_> {
 
     /// The least resolution from the requested one whose start set has the topology of the solid and
     /// loses nothing, else the best that was tried.
-    fn faithful(
-        &self,
-        first: TriedStart,
-        diagnostics: &mut Diagnostics,
-    ) -> Result<TriedStart, SimplifyError> {
+    fn faithful(&self, first: TriedStart, diagnostics: &mut Diagnostics) -> Result<TriedStart> {
         let expected = self.shape.expected_betti();
         let requested = first.resolution;
         let mut all = vec![first];
@@ -359,7 +352,7 @@ const MAX_VISITS: f64 = 2e7;
 
 impl Solid<'_> {
     /// Refuses lattices that have too many voxels along a side or do not fit into memory.
-    fn check_resolution(&self, resolution: u32) -> Result<(), SimplifyError> {
+    fn check_resolution(&self, resolution: u32) -> Result<()> {
         if resolution > MAX_RESOLUTION {
             return Err(SimplifyError::Parameter(format!(
                 "resolution = {resolution}: above {MAX_RESOLUTION} voxels along the longest side"
@@ -369,11 +362,7 @@ impl Solid<'_> {
     }
 
     /// Refuses a lattice that needs more megabytes than the limit.
-    pub(super) fn check_memory(
-        &self,
-        resolution: u32,
-        megabytes: f64,
-    ) -> Result<(), SimplifyError> {
+    pub(super) fn check_memory(&self, resolution: u32, megabytes: f64) -> Result<()> {
         let limit = self.params.max_memory;
         if megabytes <= limit {
             return Ok(());
@@ -433,7 +422,7 @@ pub(super) fn published<'s>(
     shape: &'s Shape,
     settings: &AofSettings,
     run: &RunContext,
-) -> Result<(Solid<'s>, Base), SimplifyError> {
+) -> Result<(Solid<'s>, Base)> {
     let params = settings.at(Level::Published).validate()?;
     let published = params.resolution;
     let is_free = settings.resolution.is_auto();
@@ -509,7 +498,7 @@ impl Solid<'_> {
         base: &Base,
         count: usize,
         diagnostics: &mut Diagnostics,
-    ) -> Result<LatticeVoxels, SimplifyError> {
+    ) -> Result<LatticeVoxels> {
         let first = self.axis(&base.descent, self.params.angle)?;
         let mut search = Search {
             growth: Growth::of(&first, base.resolution),
@@ -551,7 +540,7 @@ impl Solid<'_> {
     }
 
     /// Step 2.
-    fn climb(&self, base: &Base, count: usize, search: &mut Search) -> Result<(), SimplifyError> {
+    fn climb(&self, base: &Base, count: usize, search: &mut Search) -> Result<()> {
         let mut at = search.high;
         while search.tried < MAX_TRIES && search.best.voxels.len() < count {
             let ideal = search.growth.resolution_of(AIM * count as f64);
@@ -580,12 +569,7 @@ impl Solid<'_> {
     }
 
     /// Step 3.
-    fn descend_to(
-        &self,
-        base: &Base,
-        count: usize,
-        search: &mut Search,
-    ) -> Result<(), SimplifyError> {
+    fn descend_to(&self, base: &Base, count: usize, search: &mut Search) -> Result<()> {
         let mut is_lost = false;
         while search.tried < MAX_TRIES && search.best.voxels.len() as f64 > ENOUGH * count as f64 {
             let Search { low, high, .. } = *search;
@@ -614,11 +598,7 @@ impl Solid<'_> {
     }
 
     /// The axis of a lattice; `None` where the topology or a part of the base is lost.
-    fn faithful_axis(
-        &self,
-        resolution: u32,
-        base: &Base,
-    ) -> Result<Option<LatticeVoxels>, SimplifyError> {
+    fn faithful_axis(&self, resolution: u32, base: &Base) -> Result<Option<LatticeVoxels>> {
         let start = self.descend(resolution, self.wanted())?;
         if let Some(topology) = base.topology {
             let betti = betti(start.voxels.iter());
@@ -635,7 +615,7 @@ impl Solid<'_> {
     }
 
     /// Step 4.
-    fn reduce_to(&self, axis: &mut LatticeVoxels, count: usize) -> Result<(), SimplifyError> {
+    fn reduce_to(&self, axis: &mut LatticeVoxels, count: usize) -> Result<()> {
         if self.params.variant == Variant::Plain {
             // Most negative flux first. Stable, so ties go by place; then back to the order of places.
             axis.voxels.sort_by(|a, b| a.flux.total_cmp(&b.flux));

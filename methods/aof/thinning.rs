@@ -34,9 +34,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 
 use super::lattice::{Bricks, Place, Voxel};
+use crate::Result;
 
 /// The voxels that are deleted, and their order.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +91,7 @@ impl Order {
 ///
 /// # Errors
 /// When the run was cancelled.
-pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<(), SimplifyError> {
+pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<()> {
     let total = voxels.len();
     let least = if let Order::Down { to } = order { to } else { 0 };
     let mut queue = BucketQueue::new(order.keys(voxels));

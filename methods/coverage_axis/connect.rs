@@ -14,6 +14,8 @@ use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::trees::PointTree;
 use medial::simplifier::{Diagnostics, SimplifyError};
 
+use crate::Result;
+
 /// Added to the length of every edge, as in the authors' code, so that none is 0.
 const LEAST_LENGTH: f64 = 1e-12;
 
@@ -35,7 +37,7 @@ pub(super) fn by_regions(
     anchors: &[u32],
     chosen: Vec<Sphere>,
     diagnostics: &mut Diagnostics,
-) -> Result<MedialMesh, SimplifyError> {
+) -> Result<MedialMesh> {
     let anchor_of = regions(initial, anchors);
     let lost = anchor_of.iter().filter(|&&anchor| anchor == NOBODY).count();
     diagnostics.count("vertices_that_no_anchor_reaches", lost);
@@ -58,10 +60,7 @@ pub(super) fn by_regions(
 ///
 /// # Errors
 /// When there are more spheres than vertices.
-pub(super) fn anchors(
-    initial: &MedialMesh,
-    chosen: &[Sphere],
-) -> Result<(Vec<u32>, usize), SimplifyError> {
+pub(super) fn anchors(initial: &MedialMesh, chosen: &[Sphere]) -> Result<(Vec<u32>, usize)> {
     let vertices = initial.spheres.len();
     if chosen.len() > vertices {
         return Err(SimplifyError::unsupported(format!(

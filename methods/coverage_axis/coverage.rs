@@ -2,10 +2,11 @@
 
 use medial::Vec3;
 use medial::complex::Sphere;
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use rayon::prelude::*;
 
 use super::{CoverageAxisParams, Penalty};
+use crate::Result;
 
 /// Bits of a word.
 pub(super) const WORD: usize = 64;
@@ -177,7 +178,7 @@ pub(super) fn choose(
     score: &Score,
     limit: usize,
     run: &RunContext,
-) -> Result<Picks, SimplifyError> {
+) -> Result<Picks> {
     let mut uncovered = coverage.coverable();
     let uncoverable = coverage.columns() - size(&uncovered);
     let mut left = size(&uncovered);

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::CoverageAxisParams;
 use super::coverage::{Bits, Coverage, WORD, is_subset, ones, size};
+use crate::Result;
 
 /// Nodes of branch and bound between two looks at the run.
 const NODES_OF_A_SLICE: u64 = 32;
@@ -55,7 +56,7 @@ pub(super) fn cover(
     coverage: &Coverage,
     params: &CoverageAxisParams,
     run: &RunContext,
-) -> Result<Cover, SimplifyError> {
+) -> Result<Cover> {
     let uncoverable = coverage.columns() - size(&coverage.coverable());
     let reduced = reduce(coverage);
     run.step(0, 1)?;
@@ -78,11 +79,7 @@ pub(super) fn cover(
 }
 
 /// What the reductions left to choose.
-fn solve(
-    reduced: &Reduced,
-    params: &CoverageAxisParams,
-    run: &RunContext,
-) -> Result<Cover, SimplifyError> {
+fn solve(reduced: &Reduced, params: &CoverageAxisParams, run: &RunContext) -> Result<Cover> {
     if reduced.rows.is_empty() {
         return Ok(Cover::default());
     }
@@ -137,7 +134,7 @@ fn search(
     mut options: SolveOptions,
     params: &CoverageAxisParams,
     run: &RunContext,
-) -> Result<SolveOutcome, SimplifyError> {
+) -> Result<SolveOutcome> {
     let began = Instant::now();
     options.time_limit = time_left(params, began);
     let gap = options.mip_gap;

@@ -66,19 +66,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::levels::within;
 use crate::levels::{Knob, Probe, SizeSearch};
+use crate::{Prepared, Result};
 
 /// Spheres that the authors' scripts choose at most.
 const PUBLISHED_PICKS: usize = 100;
 
 /// Collapses a medial mesh to a number of spheres, and spares some of them: a connection that another
 /// method lends, as `qmat::keeping`.
-pub type Keeping = fn(
-    &Arc<MedialMesh>,
-    &[u32],
-    usize,
-    &RunContext,
-    &mut Diagnostics,
-) -> Result<MedialMesh, SimplifyError>;
+pub type Keeping =
+    fn(&Arc<MedialMesh>, &[u32], usize, &RunContext, &mut Diagnostics) -> Result<MedialMesh>;
 
 /// Coverage Axis and Coverage Axis++ as a method; see [`method`].
 pub struct CoverageAxis {
@@ -115,12 +111,7 @@ impl MedialSimplifier for CoverageAxis {
         &self.info
     }
 
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    fn prepare<'s>(&self, shape: &'s Shape, params: &Params, run: &RunContext) -> Prepared<'s> {
         let params = params.typed::<CoverageAxisParams>()?.validate()?;
         // For all kinds of candidates, since the connection needs it.
         let initial = shape.initial()?;
@@ -134,7 +125,7 @@ impl MedialSimplifier for CoverageAxis {
             params,
             run: run.clone(),
         };
-        Ok(Box::new(Prepared { search: SizeSearch::new(knob(), run), axis }))
+        Ok(Box::new(PreparedCoverage { search: SizeSearch::new(knob(), run), axis }))
     }
 }
 
@@ -146,7 +137,7 @@ fn knob() -> Knob {
 }
 
 /// One shape, with its candidates.
-struct Prepared {
+struct PreparedCoverage {
     axis: Axis,
     search: SizeSearch,
 }
@@ -160,8 +151,8 @@ struct Axis {
     run: RunContext,
 }
 
-impl Simplification for Prepared {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+impl Simplification for PreparedCoverage {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let Self { axis, search } = self;
         let CoverageAxisParams { select, size, dilation, max_iter, .. } = axis.params;
         let by_picks = select == Select::Greedy && size == Size::Picks;
@@ -204,7 +195,7 @@ impl Simplification for Prepared {
 
 impl Axis {
     /// Steps 2 to 4, with at most so many spheres where they have an order.
-    fn at(&self, dilation: f64, most: usize) -> Result<Probe, SimplifyError> {
+    fn at(&self, dilation: f64, most: usize) -> Result<Probe> {
         let Instance { samples, spheres, too_small, side, .. } = &self.instance;
         let coverage = Coverage::new(samples, spheres, dilation * side);
         let mut diagnostics = Diagnostics::default();
@@ -230,7 +221,7 @@ impl Axis {
         coverage: &Coverage,
         most: usize,
         diagnostics: &mut Diagnostics,
-    ) -> Result<Vec<u32>, SimplifyError> {
+    ) -> Result<Vec<u32>> {
         let spheres = &self.instance.spheres;
         let picks = coverage::choose(spheres, coverage, &self.score, most, &self.run)?;
         diagnostics.count("uncoverable_samples", picks.uncoverable);
@@ -248,11 +239,7 @@ impl Axis {
         Ok(picks.chosen)
     }
 
-    fn exact(
-        &self,
-        coverage: &Coverage,
-        diagnostics: &mut Diagnostics,
-    ) -> Result<Vec<u32>, SimplifyError> {
+    fn exact(&self, coverage: &Coverage, diagnostics: &mut Diagnostics) -> Result<Vec<u32>> {
         let cover = exact::cover(coverage, &self.params, &self.run)?;
         diagnostics.count("uncoverable_samples", cover.uncoverable);
         diagnostics.count("reduced_candidates", cover.reduced[0]);
@@ -278,11 +265,7 @@ impl Axis {
     }
 
     /// Step 4.
-    fn connected(
-        &self,
-        chosen: &[u32],
-        diagnostics: &mut Diagnostics,
-    ) -> Result<MedialMesh, SimplifyError> {
+    fn connected(&self, chosen: &[u32], diagnostics: &mut Diagnostics) -> Result<MedialMesh> {
         let spheres: Vec<Sphere> =
             chosen.iter().map(|&ball| self.instance.spheres[ball as usize]).collect();
         let anchors = match &self.instance.vertices {
@@ -411,7 +394,7 @@ pub enum Connection {
 const DILATIONS: RangeInclusive<f64> = 1e-4..=1.0;
 
 impl CoverageAxisParams {
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         within("dilation", self.dilation, DILATIONS)?;
         within("uniformity", self.uniformity, 0.0..=1e6)?;
         within("centrality", self.centrality, 0.0..=1e6)?;
@@ -453,11 +436,7 @@ impl Instance {
     ///
     /// # Errors
     /// When the initial medial mesh cannot be built, or no random point is inside.
-    pub fn new(
-        shape: &Shape,
-        params: &CoverageAxisParams,
-        seed: u64,
-    ) -> Result<Self, SimplifyError> {
+    pub fn new(shape: &Shape, params: &CoverageAxisParams, seed: u64) -> Result<Self> {
         let sampling = Sampling::AreaUniform { count: params.samples, seed };
         let samples = sample(shape.mesh(), &sampling);
         let (low, high) = shape.mesh().bounding_box().unwrap_or_default();
@@ -488,7 +467,7 @@ fn random(
     (low, high): (Vec3, Vec3),
     points: usize,
     seed: u64,
-) -> Result<Vec<Sphere>, SimplifyError> {
+) -> Result<Vec<Sphere>> {
     let mut random = Pcg64::seed_from_u64(seed ^ STREAM);
     let mut points: Vec<Vec3> = (0..points)
         .map(|_| low + (high - low) * Vec3::new(random.random(), random.random(), random.random()))

@@ -57,8 +57,7 @@ use medial::complex::VoronoiFacets;
 use medial::geometry::{Delaunay, VertexId};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
-    SimplifyError,
+    Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext, SimplifyError,
 };
 use medial::surface::{InsideTest, Side};
 use serde::{Deserialize, Serialize};
@@ -67,6 +66,7 @@ use umbrella::{Place, Umbrellas};
 use crate::levels::ByKnob;
 use crate::ranked::{FacetSet, FacetValue, RankedFacets};
 use crate::ranked::{Published, Scale};
+use crate::{Prepared, Result};
 
 medial::parameters! {
     /// Parameters of the Voronoi subcomplex; the default is the paper's.
@@ -121,7 +121,7 @@ pub enum Condition {
 }
 
 impl DeyZhaoParams {
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         if !(self.theta > 0.0 && self.theta < 90.0) {
             let message = format!("theta = {} is not between 0 and 90 degrees", self.theta);
             return Err(SimplifyError::Parameter(message));
@@ -158,11 +158,7 @@ pub fn method() -> Method<DeyZhaoParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    params: DeyZhaoParams,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, params: DeyZhaoParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     Ok(match params.size {
         Size::Density => {
@@ -188,7 +184,7 @@ fn scale() -> Scale {
 }
 
 /// Steps 1 to 3 on the samples of a shape.
-fn selection(shape: &Shape, params: DeyZhaoParams) -> Result<RankedFacets<'static>, SimplifyError> {
+fn selection(shape: &Shape, params: DeyZhaoParams) -> Result<RankedFacets<'static>> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
     let umbrellas = Umbrellas::new(&delaunay, shape.cells()?.circumspheres());

@@ -5,13 +5,14 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use medial::complex::MedialMesh;
 use medial::complex::collapse::{Candidate, Collapse, CollapseComplex, CollapseQueue};
-use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, RunContext};
 use rayon::prelude::*;
 
 use super::SampleLists;
 use super::edge::Star;
 use super::edge::{Edge, Ground, NONE};
 use super::{Blocking, HemParams, Inside};
+use crate::Result;
 
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 256;
@@ -153,7 +154,7 @@ impl Contraction {
     }
 
     /// Steps 2 to 4, until told to stop or no edge may be collapsed.
-    pub(super) fn run_to(&mut self, stop: Stop, run: &RunContext) -> Result<(), SimplifyError> {
+    pub(super) fn run_to(&mut self, stop: Stop, run: &RunContext) -> Result<()> {
         let target = if let Stop::Spheres(target) = stop { target } else { 1 };
         let bound = if let Stop::Error(bound) = stop { bound } else { f64::INFINITY };
         let total = self.sphere_count().saturating_sub(target);

@@ -119,6 +119,8 @@ use medial::simplifier::{
 use medial::surface::TriangleBvh;
 use serde::{Deserialize, Serialize};
 
+use crate::{Prepared, Result};
+
 /// Cost at which [`Level::Published`] stops: the default of the authors' code.
 const PUBLISHED: f64 = 1e-4;
 
@@ -162,11 +164,7 @@ pub fn method() -> Method<HemParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    params: HemParams,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, params: HemParams, run: &RunContext) -> Prepared<'s> {
     let initial = shape.initial()?;
     if initial.spheres.is_empty() {
         return Err(ShapeError::EmptyMedialMesh.into());
@@ -181,11 +179,11 @@ fn prepare<'s>(
     let ruler = Ruler { samples: samples.touched(), inside: params.inside, surface };
     let contraction = Contraction::new(&initial, samples.clone(), params);
     let run = run.clone();
-    Ok(Box::new(Prepared { initial, samples, params, ruler, run, remarks, contraction }))
+    Ok(Box::new(PreparedHem { initial, samples, params, ruler, run, remarks, contraction }))
 }
 
 /// One shape, as far as it was contracted.
-struct Prepared {
+struct PreparedHem {
     initial: Arc<MedialMesh>,
     /// As assigned at the beginning.
     samples: SampleLists,
@@ -197,8 +195,8 @@ struct Prepared {
     contraction: Contraction,
 }
 
-impl Simplification for Prepared {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+impl Simplification for PreparedHem {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         match level {
             Level::Spheres(0) => {
                 Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
@@ -215,8 +213,8 @@ impl Simplification for Prepared {
     }
 }
 
-impl Prepared {
-    fn at_count(&mut self, target: usize) -> Result<Simplified, SimplifyError> {
+impl PreparedHem {
+    fn at_count(&mut self, target: usize) -> Result<Simplified> {
         let spheres = self.initial.spheres.len();
         let too_far = self.contraction.sphere_count() < target.min(spheres);
         self.contract(Stop::Spheres(target), too_far)?;
@@ -235,7 +233,7 @@ impl Prepared {
         answer(Level::Spheres(target), mesh, native_level, diagnostics)
     }
 
-    fn at_bound(&mut self, epsilon: f64) -> Result<Simplified, SimplifyError> {
+    fn at_bound(&mut self, epsilon: f64) -> Result<Simplified> {
         let too_far = self.contraction.largest() > epsilon;
         self.contract(Stop::Error(epsilon), too_far)?;
         let record = self.contraction.record();
@@ -276,7 +274,7 @@ impl Prepared {
         ))
     }
 
-    fn as_published(&mut self) -> Result<Simplified, SimplifyError> {
+    fn as_published(&mut self) -> Result<Simplified> {
         let too_far = self.contraction.largest() > PUBLISHED;
         self.contract(Stop::Error(PUBLISHED), too_far)?;
         let mesh = self.contraction.to_mesh();
@@ -295,7 +293,7 @@ impl Prepared {
         answer(Level::Published, mesh, Some(PUBLISHED), diagnostics)
     }
 
-    fn contract(&mut self, stop: Stop, anew: bool) -> Result<(), SimplifyError> {
+    fn contract(&mut self, stop: Stop, anew: bool) -> Result<()> {
         if anew {
             self.contraction = Contraction::new(&self.initial, self.samples.clone(), self.params);
         }
@@ -314,7 +312,7 @@ fn answer(
     mesh: MedialMesh,
     native_level: Option<f64>,
     diagnostics: Diagnostics,
-) -> Result<Simplified, SimplifyError> {
+) -> Result<Simplified> {
     mesh.check()?;
     Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
 }
@@ -395,7 +393,7 @@ impl Ruler {
     ///
     /// # Errors
     /// When the mesh has no union.
-    pub(super) fn error(&self, mesh: &MedialMesh) -> Result<f64, SimplifyError> {
+    pub(super) fn error(&self, mesh: &MedialMesh) -> Result<f64> {
         let union = MedialUnion::new(mesh).map_err(no_union)?;
         let at_samples = sample_error(mesh, &union, &self.samples, self.inside)?;
         let Some(surface) = &self.surface else {
@@ -422,7 +420,7 @@ fn sample_error(
     union: &MedialUnion,
     samples: &[Vec3],
     inside: Inside,
-) -> Result<f64, SimplifyError> {
+) -> Result<f64> {
     if inside == Inside::Depth {
         return Ok(largest(&union.signed_batch(samples)));
     }
@@ -469,8 +467,8 @@ pub(super) enum Found {
 pub(super) fn last_within(
     all: usize,
     bound: f64,
-    mut error_at: impl FnMut(usize) -> Result<f64, SimplifyError>,
-) -> Result<Found, SimplifyError> {
+    mut error_at: impl FnMut(usize) -> Result<f64>,
+) -> Result<Found> {
     let (mut best, mut measured) = ((f64::INFINITY, 0), 0);
     // Remembers the best state, for the message of a refusal.
     let mut is_within = |collapses: usize| {

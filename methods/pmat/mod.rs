@@ -62,6 +62,8 @@ use medial::simplifier::{
 };
 use rayon::prelude::*;
 
+use crate::{Prepared, Result};
+
 /// The scale of [`Level::Published`]: the least of the paper's Table 1.
 const PUBLISHED: f64 = 1.18;
 
@@ -90,11 +92,7 @@ pub fn method() -> Method<NoParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    _: NoParams,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, _: NoParams, run: &RunContext) -> Prepared<'s> {
     let initial = shape.initial()?;
     if initial.spheres.is_empty() {
         return Err(ShapeError::EmptyMedialMesh.into());
@@ -125,7 +123,7 @@ impl Levels {
     }
 
     /// The number of collapses that a level asks for.
-    fn stage_of(&self, level: Level) -> Result<usize, SimplifyError> {
+    fn stage_of(&self, level: Level) -> Result<usize> {
         match level {
             Level::Spheres(0) => {
                 Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
@@ -177,7 +175,7 @@ impl Levels {
 }
 
 impl Simplification for Levels {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let stage = self.stage_of(level)?;
         let scale = self.scale_at(stage);
         let mut extras = Extras::default();
@@ -250,7 +248,7 @@ impl Prioritised for Candidate {
 ///
 /// # Errors
 /// [`SimplifyError::Cancelled`] when the run was cancelled.
-fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>, SimplifyError> {
+fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>> {
     let spheres = &mesh.spheres;
     let total = spheres.len();
     let edges = mesh.edges.par_iter().with_min_len(TASK);

@@ -5,11 +5,12 @@ use std::collections::HashSet;
 
 use medial::complex::collapse::{Candidate, Collapse, CollapseComplex, CollapseQueue, replay};
 use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH, betti, stability_ratio};
-use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, RunContext};
 use rayon::prelude::*;
 
 use super::QmatParams;
 use super::quadric::{Quadric, Skipped, initial_quadrics};
+use crate::Result;
 
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 4096;
@@ -188,7 +189,7 @@ impl Contraction {
         initial: &MedialMesh,
         target: usize,
         run: &RunContext,
-    ) -> Result<(), SimplifyError> {
+    ) -> Result<()> {
         let total = self.sphere_count().saturating_sub(target);
         let first = self.tally.collapses;
         while self.sphere_count() > target {

@@ -75,6 +75,8 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::{Prepared, Result};
+
 /// Spheres of [`Level::Published`]: the count of the paper's Table II.
 const PUBLISHED: usize = 100;
 
@@ -115,7 +117,7 @@ pub fn keeping(
     target: usize,
     run: &RunContext,
     diagnostics: &mut Diagnostics,
-) -> Result<MedialMesh, SimplifyError> {
+) -> Result<MedialMesh> {
     let params = QmatParams::default().at(Level::Spheres(target));
     let mut contraction = Contraction::keeping(initial, params, kept);
     contraction.run_to(initial, target, run)?;
@@ -130,11 +132,7 @@ pub fn keeping(
     Ok(mesh)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    params: QmatParams,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, params: QmatParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     let initial = shape.initial()?;
     if initial.spheres.is_empty() {
@@ -143,19 +141,19 @@ fn prepare<'s>(
     run.step(0, initial.spheres.len())?;
     // At the preparation the level is unknown; most levels share the parameters of this one.
     let contraction = Contraction::new(&initial, params.at(Level::Spheres(1)));
-    Ok(Box::new(Prepared { initial, params, run: run.clone(), contraction }))
+    Ok(Box::new(PreparedQmat { initial, params, run: run.clone(), contraction }))
 }
 
 /// One shape, as far as it was contracted.
-struct Prepared {
+struct PreparedQmat {
     initial: Arc<MedialMesh>,
     params: QmatParams,
     run: RunContext,
     contraction: Contraction,
 }
 
-impl Simplification for Prepared {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+impl Simplification for PreparedQmat {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let target = match level {
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("at least one sphere must stay".to_owned()));
@@ -187,8 +185,8 @@ impl Simplification for Prepared {
     }
 }
 
-impl Prepared {
-    fn contract(&mut self, target: usize, level: Level) -> Result<(), SimplifyError> {
+impl PreparedQmat {
+    fn contract(&mut self, target: usize, level: Level) -> Result<()> {
         let params = self.params.at(level);
         let is_of_other = self.contraction.params() != params;
         // Collapses are not undone, so a finer level starts anew.
@@ -336,7 +334,7 @@ impl QmatParams {
         Self { topology_from: self.topology_from.at(level), ..self }
     }
 
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         let at_least_zero = [("k", self.k), ("k_boundary", self.k_boundary)];
         for (name, value) in at_least_zero {
             if !(value >= 0.0 && value.is_finite()) {

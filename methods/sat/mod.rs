@@ -49,6 +49,7 @@ use medial::simplifier::{
 use serde::{Deserialize, Serialize};
 
 use crate::levels::{ByKnob, perturbed, within};
+use crate::{Prepared, Result};
 
 /// Scale of [`Level::Published`]: the default of the authors' tool.
 const PUBLISHED: f64 = 1.1;
@@ -81,14 +82,10 @@ pub fn method() -> Method<SatParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    params: SatParams,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, params: SatParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     if params.size == Size::Scale {
-        return Ok(Box::new(Prepared::new(shape, params, run)?));
+        return Ok(Box::new(PreparedSat::new(shape, params, run)?));
     }
     if shape.has_given_initial() {
         let why = "it meets a number of spheres by sampling the surface, and a given medial mesh \
@@ -97,12 +94,12 @@ fn prepare<'s>(
     }
     let run_again = run.clone();
     Ok(Box::new(ByKnob::of_samples(shape, PUBLISHED, run, move |shape| {
-        Ok(Box::new(Prepared::new(shape, params, &run_again)?))
+        Ok(Box::new(PreparedSat::new(shape, params, &run_again)?))
     })?))
 }
 
 /// The balls of one shape, perturbed.
-struct Prepared {
+struct PreparedSat {
     spheres: Vec<Sphere>,
     params: SatParams,
     run: RunContext,
@@ -122,9 +119,9 @@ struct Scaled {
     removed_facets: usize,
 }
 
-impl Prepared {
+impl PreparedSat {
     /// Steps 1 and 2.
-    fn new(shape: &Shape, params: SatParams, run: &RunContext) -> Result<Self, SimplifyError> {
+    fn new(shape: &Shape, params: SatParams, run: &RunContext) -> Result<Self> {
         let balls = shape.inner_balls()?;
         run.step(0, balls.spheres.len())?;
         let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
@@ -132,14 +129,14 @@ impl Prepared {
     }
 
     /// The axis at a scale.
-    fn at_scale(&self, scale: f64) -> Result<Arc<Scaled>, SimplifyError> {
+    fn at_scale(&self, scale: f64) -> Result<Arc<Scaled>> {
         Scaled::new(&self.spheres, &self.params, scale).map(Arc::new)
     }
 }
 
 impl Scaled {
     /// Steps 3 to 6.
-    fn new(spheres: &[Sphere], params: &SatParams, scale: f64) -> Result<Self, SimplifyError> {
+    fn new(spheres: &[Sphere], params: &SatParams, scale: f64) -> Result<Self> {
         let grown = resized(spheres, scale);
         let axis = UnionAxis::of_balls(&grown).map_err(ShapeError::from)?;
         let (mut mesh, removed_facets) = sheets::filtered(&axis, params.sat_angle);
@@ -178,8 +175,8 @@ impl Scaled {
     }
 }
 
-impl Simplification for Prepared {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+impl Simplification for PreparedSat {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let mut diagnostics = Diagnostics::default();
         let scaled = match level {
             Level::Published => self.at_scale(PUBLISHED)?,
@@ -231,7 +228,7 @@ pub enum Size {
 }
 
 impl SatParams {
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         let ranges = [
             ("radius_factor", self.radius_factor, 0.5..=2.0),
             ("jitter", self.jitter, 0.0..=0.1),
@@ -274,11 +271,7 @@ const TOLERANCE: f64 = 0.01;
 
 /// The scale axis with the largest count that the search meets of those not above `count`; with a
 /// larger one, the smallest met, where there is none.
-fn to_count(
-    sat: &Prepared,
-    count: usize,
-    diagnostics: &mut Diagnostics,
-) -> Result<Arc<Scaled>, SimplifyError> {
+fn to_count(sat: &PreparedSat, count: usize, diagnostics: &mut Diagnostics) -> Result<Arc<Scaled>> {
     let mut tried = 0;
     let mut at = |scale: f64| {
         sat.run.step(tried, MAX_TRIES + 3)?;
@@ -315,10 +308,7 @@ enum Ladder {
 }
 
 /// Step 1.
-fn ladder(
-    count: usize,
-    at: &mut impl FnMut(f64) -> Result<Arc<Scaled>, SimplifyError>,
-) -> Result<Ladder, SimplifyError> {
+fn ladder(count: usize, at: &mut impl FnMut(f64) -> Result<Arc<Scaled>>) -> Result<Ladder> {
     let mut fine = at(1.0)?;
     if fine.size() <= count {
         return Ok(Ladder::First(fine));
@@ -354,8 +344,8 @@ fn between(
     fine: &Scaled,
     mut coarse: Arc<Scaled>,
     count: usize,
-    at: &mut impl FnMut(f64) -> Result<Arc<Scaled>, SimplifyError>,
-) -> Result<Arc<Scaled>, SimplifyError> {
+    at: &mut impl FnMut(f64) -> Result<Arc<Scaled>>,
+) -> Result<Arc<Scaled>> {
     let target = ((1.0 - TOLERANCE / 2.0) * count as f64).ln();
     let (mut low, mut high) = (fine.point(target), coarse.point(target));
     let mut last_was_above = None;

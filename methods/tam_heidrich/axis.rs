@@ -7,12 +7,13 @@ use medial::geometry::predicates::{Sign, orient3d};
 use medial::geometry::{CellId, Delaunay, PolarBall, Poles, PowerCrust};
 use medial::metrics::enclosed_volume;
 use medial::shape::{Shape, ShapeError};
-use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, RunContext};
 use medial::surface::{Side, TriangleBvh};
 use rayon::prelude::*;
 
 use super::parts::without_fins;
 use super::{AxisChoice, TamHeidrichParams};
+use crate::Result;
 use crate::levels::perturbed;
 
 /// A medial mesh with everything that pruning needs.
@@ -56,7 +57,7 @@ impl Axis {
         params: &TamHeidrichParams,
         run: &RunContext,
         diagnostics: &mut Diagnostics,
-    ) -> Result<Self, SimplifyError> {
+    ) -> Result<Self> {
         let given = shape.has_given_initial();
         let from_union = match params.axis {
             AxisChoice::Auto => !given,
@@ -91,7 +92,7 @@ impl Axis {
     }
 
     /// Gives each face the volume of the interior tetrahedra whose circumcentre it is nearest to.
-    fn share_out(&mut self, shape: &Shape) -> Result<(), SimplifyError> {
+    fn share_out(&mut self, shape: &Shape) -> Result<()> {
         if self.mesh.faces.is_empty() {
             return Ok(());
         }
@@ -123,7 +124,7 @@ fn of_union(
     params: &TamHeidrichParams,
     run: &RunContext,
     diagnostics: &mut Diagnostics,
-) -> Result<Axis, SimplifyError> {
+) -> Result<Axis> {
     let poles = match shape.has_given_initial() {
         true => DistinctBalls::given(&shape.inner_balls()?.spheres),
         false => DistinctBalls::of_samples(shape)?,
@@ -309,7 +310,7 @@ pub(super) fn merged(
     mesh: &MedialMesh,
     merge: f64,
     run: &RunContext,
-) -> Result<(MedialMesh, Vec<u32>), SimplifyError> {
+) -> Result<(MedialMesh, Vec<u32>)> {
     let mut complex = CollapseComplex::from_mesh(mesh);
     let mut into: Vec<u32> = (0..mesh.spheres.len() as u32).collect();
     let mut done = 0;

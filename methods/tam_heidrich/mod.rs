@@ -100,6 +100,7 @@ use schedule::Pruning;
 use serde::{Deserialize, Serialize};
 
 use crate::levels::within;
+use crate::{Prepared, Result};
 
 /// Name of the extra that holds the poles that are left, [`RemainingPoles`].
 pub const POLES: &str = "poles";
@@ -148,27 +149,23 @@ pub fn method() -> Method<TamHeidrichParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    params: TamHeidrichParams,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, params: TamHeidrichParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     let mut diagnostics = Diagnostics::default();
     let axis = Axis::of_shape(shape, &params, run, &mut diagnostics)?;
-    Ok(Box::new(Prepared { axis, params, diagnostics, run: run.clone() }))
+    Ok(Box::new(PreparedTamHeidrich { axis, params, diagnostics, run: run.clone() }))
 }
 
 /// The axis of one shape.
-struct Prepared {
+struct PreparedTamHeidrich {
     axis: Axis,
     params: TamHeidrichParams,
     diagnostics: Diagnostics,
     run: RunContext,
 }
 
-impl Simplification for Prepared {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+impl Simplification for PreparedTamHeidrich {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let (t_v, enough) = self.schedule(level)?;
         let diagnostics = self.diagnostics.clone();
         let mut pruning = Pruning::new(&self.axis, &self.params, diagnostics, &self.run, enough);
@@ -195,9 +192,9 @@ impl Simplification for Prepared {
     }
 }
 
-impl Prepared {
+impl PreparedTamHeidrich {
     /// The thresholds of the rounds by volume, and the number of spheres that is enough.
-    fn schedule(&self, level: Level) -> Result<(Vec<f64>, usize), SimplifyError> {
+    fn schedule(&self, level: Level) -> Result<(Vec<f64>, usize)> {
         let published = &self.params.t_v.0;
         match level {
             Level::Published => Ok((published.clone(), 0)),
@@ -219,7 +216,7 @@ impl Prepared {
         parts: &mut Parts,
         listed: &mut [PartInfo],
         diagnostics: &mut Diagnostics,
-    ) -> Result<(), SimplifyError> {
+    ) -> Result<()> {
         let ids = &self.params.remove.0;
         if ids.is_empty() {
             return Ok(());
@@ -422,7 +419,7 @@ impl<T> From<List<T>> for Vec<T> {
 }
 
 impl TamHeidrichParams {
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         let ranges = [
             ("drop", self.drop, 0.0..=1.0),
             ("radius_factor", self.radius_factor, 0.5..=2.0),

@@ -5,11 +5,12 @@
 //! all of them; the others remove a part only if that keeps loops and components at that moment. No
 //! round removes a part that touches nothing, so no component vanishes.
 
-use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, RunContext};
 
 use super::axis::Axis;
 use super::parts::{Graph, Parts, Remaining};
 use super::{Checked, TamHeidrichParams};
+use crate::Result;
 
 /// The threshold of a round.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +80,7 @@ impl<'a> Pruning<'a> {
 
     /// The published schedule: rounds by triangle count until they bring little, then one round for
     /// each `t_v`.
-    pub(super) fn published(&mut self, t_v: &[f64]) -> Result<(), SimplifyError> {
+    pub(super) fn published(&mut self, t_v: &[f64]) -> Result<()> {
         let params = self.params;
         let whole = self.remaining.betti();
         let mut before = 0;
@@ -105,7 +106,7 @@ impl<'a> Pruning<'a> {
     }
 
     /// Further rounds by volume, with twice the threshold each, until nothing can go.
-    pub(super) fn go_on(&mut self, mut t_v: f64) -> Result<(), SimplifyError> {
+    pub(super) fn go_on(&mut self, mut t_v: f64) -> Result<()> {
         // Every round at 100 per cent but the last removes something.
         loop {
             let last = t_v >= 100.0;
@@ -117,7 +118,7 @@ impl<'a> Pruning<'a> {
     }
 
     /// One round; the number of parts removed.
-    fn round(&mut self, measure: Measure) -> Result<usize, SimplifyError> {
+    fn round(&mut self, measure: Measure) -> Result<usize> {
         if self.is_enough() {
             return Ok(0);
         }

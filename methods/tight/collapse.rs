@@ -14,7 +14,7 @@ use medial::Vec3;
 use medial::complex::collapse::{CollapseComplex, folds_over};
 use medial::complex::{Crossings, Incidence, MedialMesh, MedialUnion, Primitive, Sphere};
 use medial::geometry::{Cone, SlabFace};
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use rayon::prelude::*;
 
 use super::goal::{Goal, Points, uncovered, union_of, vertices};
@@ -22,6 +22,7 @@ use super::rounds::{
     Block, Descent, LEAST_RADIUS, Objective, Rest, add_product, backward, cholesky, forward,
 };
 use super::start::{Sheets, corners};
+use crate::Result;
 
 /// Exponent of the price.
 const POWER: i32 = 8;
@@ -573,7 +574,7 @@ impl Patch<'_> {
         places: &[u32],
         stages: &[(f64, usize)],
         run: &RunContext,
-    ) -> Result<(), SimplifyError> {
+    ) -> Result<()> {
         let moving = around(mesh, places);
         let part = Part::of(mesh, &moving);
         let rest = match rest_of(mesh, &moving) {

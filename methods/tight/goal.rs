@@ -15,6 +15,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
+use crate::Result;
+
 /// Samples of the surface, below 500 spheres; twice as many from there on.
 const SAMPLES: usize = 10_000;
 
@@ -146,7 +148,7 @@ impl Goal {
     ///
     /// # Errors
     /// When the certificate would need too many pieces.
-    pub fn certified(&self, mesh: &MedialMesh, width: f64) -> Result<f64, SimplifyError> {
+    pub fn certified(&self, mesh: &MedialMesh, width: f64) -> Result<f64> {
         let certificate = certify(&self.surface, &self.tree, mesh, width.clamp(FINEST, 1.0));
         Ok(certificate.map_err(refused)?.upper)
     }
@@ -460,7 +462,7 @@ pub(super) fn residuals(
     near: &[NearestPrimitive],
     tolerance: f64,
     held: &mut [Held],
-) -> Result<Residuals, SimplifyError> {
+) -> Result<Residuals> {
     let union = union_of(mesh)?;
     let surface = points.samples.iter().map(|sample| sample.point);
     let places: Vec<Vec3> = surface.chain(points.interior.iter().map(|x| x.point)).collect();
@@ -525,7 +527,7 @@ pub(super) fn residuals(
     Ok(Residuals { rows, nearest })
 }
 
-pub(super) fn union_of(mesh: &MedialMesh) -> Result<MedialUnion, SimplifyError> {
+pub(super) fn union_of(mesh: &MedialMesh) -> Result<MedialUnion> {
     MedialUnion::new(mesh).map_err(|error| SimplifyError::Failed(error.to_string()))
 }
 

@@ -64,6 +64,8 @@ use medial::simplifier::{
 use rounds::{Descent, Objective, Polish, State};
 use start::Start;
 
+use crate::{Prepared, Result};
+
 /// Spheres of [`Level::Published`].
 const USUAL: usize = 100;
 
@@ -114,29 +116,24 @@ impl MedialSimplifier for Tight {
         &self.info
     }
 
-    fn prepare<'s>(
-        &self,
-        shape: &'s Shape,
-        params: &Params,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+    fn prepare<'s>(&self, shape: &'s Shape, params: &Params, run: &RunContext) -> Prepared<'s> {
         let params = params.typed::<TightParams>()?.validate()?;
         let start = Start::new(shape, Arc::clone(&self.starter), &params, run)?;
         let goal = Goal::new(shape, run.seed)?;
-        Ok(Box::new(Prepared { start, goal, params, run: run.clone() }))
+        Ok(Box::new(PreparedTight { start, goal, params, run: run.clone() }))
     }
 }
 
 /// One shape, with its start and its samples.
-struct Prepared {
+struct PreparedTight {
     start: Start,
     goal: Goal,
     params: TightParams,
     run: RunContext,
 }
 
-impl Simplification for Prepared {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+impl Simplification for PreparedTight {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let count = match level {
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("at least one sphere must stay".to_owned()));
@@ -154,9 +151,9 @@ impl Simplification for Prepared {
     }
 }
 
-impl Prepared {
+impl PreparedTight {
     /// The level by error.
-    fn within(&self, bound: f64) -> Result<Simplified, SimplifyError> {
+    fn within(&self, bound: f64) -> Result<Simplified> {
         let Self { start, goal, params, run } = self;
         let mut diagnostics = Diagnostics::default();
         start.describe(&mut diagnostics);
@@ -170,7 +167,7 @@ impl Prepared {
         start: MedialMesh,
         count: usize,
         diagnostics: &mut Diagnostics,
-    ) -> Result<MedialMesh, SimplifyError> {
+    ) -> Result<MedialMesh> {
         let Self { goal, params, run, .. } = self;
         let is_polish = start.spheres.len() <= count;
         diagnostics.count("crossing_faces_of_the_start", crossing_faces(&start).len());
@@ -202,14 +199,14 @@ fn answer(
     mesh: MedialMesh,
     native_level: Option<f64>,
     diagnostics: Diagnostics,
-) -> Result<Simplified, SimplifyError> {
+) -> Result<Simplified> {
     mesh.check()?;
     Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
 }
 
 /// # Errors
 /// When there are more spheres than can be placed together.
-fn bounded(spheres: usize) -> Result<(), SimplifyError> {
+fn bounded(spheres: usize) -> Result<()> {
     if spheres <= MOST {
         return Ok(());
     }
@@ -220,11 +217,7 @@ fn bounded(spheres: usize) -> Result<(), SimplifyError> {
 }
 
 /// Step 4: passes of collapses until `count` spheres are left, or no collapse is possible.
-fn reduced<'a>(
-    mut descent: Descent<'a>,
-    count: usize,
-    run: &RunContext,
-) -> Result<Descent<'a>, SimplifyError> {
+fn reduced<'a>(mut descent: Descent<'a>, count: usize, run: &RunContext) -> Result<Descent<'a>> {
     descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
     while descent.mesh.spheres.len() > count {
         let spheres = descent.mesh.spheres.len();
@@ -239,10 +232,7 @@ fn reduced<'a>(
 }
 
 /// Step 5, while it lowers the sum of the eighth powers.
-fn swapped_often<'a>(
-    mut descent: Descent<'a>,
-    run: &RunContext,
-) -> Result<Descent<'a>, SimplifyError> {
+fn swapped_often<'a>(mut descent: Descent<'a>, run: &RunContext) -> Result<Descent<'a>> {
     let mut each = (descent.mesh.spheres.len() / 12).max(2);
     descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
     let judge = Objective::power(8.0, descent.largest());
@@ -283,7 +273,7 @@ const MOST_ROUNDS: usize = 1_000;
 
 impl TightParams {
     /// The same parameters, if they make sense.
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         if !(self.lambda >= 0.0 && self.lambda.is_finite()) {
             let lambda = self.lambda;
             return Err(SimplifyError::Parameter(format!("lambda = {lambda} is not a weight")));
@@ -336,7 +326,7 @@ impl Within<'_> {
     ///
     /// # Errors
     /// When the bound is no length, or no state is within it.
-    pub fn fewest(&self, diagnostics: &mut Diagnostics) -> Result<State, SimplifyError> {
+    pub fn fewest(&self, diagnostics: &mut Diagnostics) -> Result<State> {
         let bound = self.bound;
         if !(bound > 0.0 && bound.is_finite()) {
             let why = format!("a bound of {bound} is not a positive fraction of the diagonal");
@@ -355,7 +345,7 @@ impl Within<'_> {
     }
 
     /// A state within the bound to begin with: more spheres until one is.
-    fn first(&self, diagnostics: &mut Diagnostics) -> Result<State, SimplifyError> {
+    fn first(&self, diagnostics: &mut Diagnostics) -> Result<State> {
         let mut wanted = self.params.start.max(MANY);
         let mut least = f64::INFINITY;
         loop {
@@ -380,7 +370,7 @@ impl Within<'_> {
     }
 
     /// The state after collapses to `count` spheres, if it is within the bound.
-    fn continued(&self, from: &MedialMesh, count: usize) -> Result<Option<State>, SimplifyError> {
+    fn continued(&self, from: &MedialMesh, count: usize) -> Result<Option<State>> {
         let descent = Descent::new(self.goal, self.goal.points(count), from.clone())?;
         let smaller = reduced(descent, count, self.run)?.mesh;
         if smaller.spheres.len() >= from.spheres.len() {
@@ -393,7 +383,7 @@ impl Within<'_> {
         self.held(state)
     }
 
-    fn polished(&self, mesh: MedialMesh, swaps: bool) -> Result<State, SimplifyError> {
+    fn polished(&self, mesh: MedialMesh, swaps: bool) -> Result<State> {
         let Self { goal, params, run, .. } = *self;
         let points = goal.points(mesh.spheres.len());
         let descent = Descent::new(goal, points, mesh)?;
@@ -401,7 +391,7 @@ impl Within<'_> {
     }
 
     /// The state with its certified error, if that is within the bound.
-    fn held(&self, state: State) -> Result<Option<State>, SimplifyError> {
+    fn held(&self, state: State) -> Result<Option<State>> {
         if state.error > self.bound {
             return Ok(None);
         }

@@ -16,7 +16,7 @@ use std::collections::{BTreeSet, HashSet};
 use medial::Vec3;
 use medial::complex::MedialMesh;
 use medial::metrics::PeakSearch;
-use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, RunContext};
 
 use super::TightParams;
 use super::collapse::{Guard, Still, clamp};
@@ -25,6 +25,7 @@ use super::goal::{
     residuals, uncovered, union_of, vertices,
 };
 use super::start::swapped;
+use crate::Result;
 
 /// Powers and steps before the first round.
 const WARM: [(f64, usize); 2] = [(4.0, 9), (8.0, 14)];
@@ -88,11 +89,7 @@ impl Polish<'_> {
     ///
     /// # Errors
     /// When the run is cancelled, or the mesh cannot be measured.
-    pub fn run(
-        &self,
-        mut descent: Descent<'_>,
-        diagnostics: &mut Diagnostics,
-    ) -> Result<State, SimplifyError> {
+    pub fn run(&self, mut descent: Descent<'_>, diagnostics: &mut Diagnostics) -> Result<State> {
         for (power, steps) in WARM {
             descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
         }
@@ -121,7 +118,7 @@ impl Polish<'_> {
         mesh: MedialMesh,
         points: &mut Points,
         witnesses: &mut Witnesses<'_>,
-    ) -> Result<State, SimplifyError> {
+    ) -> Result<State> {
         let error = witnesses.measure(&mesh, points)?;
         let mut now = State { mesh, error };
         let mut best = now.clone();
@@ -154,7 +151,7 @@ impl Polish<'_> {
         best: &mut State,
         points: &mut Points,
         witnesses: &mut Witnesses<'_>,
-    ) -> Result<usize, SimplifyError> {
+    ) -> Result<usize> {
         let mut each = (best.mesh.spheres.len() / SPHERES).max(1);
         let (mut skipped, mut idle, mut helped) = (0, 0, 0);
         let mut from = Descent::new(self.goal, std::mem::take(points), best.mesh.clone())?;
@@ -209,7 +206,7 @@ struct Witnesses<'a> {
 
 impl Witnesses<'_> {
     /// The error of a mesh, both ways. Where it is large, samples join `points`.
-    fn measure(&mut self, mesh: &MedialMesh, points: &mut Points) -> Result<f64, SimplifyError> {
+    fn measure(&mut self, mesh: &MedialMesh, points: &mut Points) -> Result<f64> {
         let Self { goal, search, .. } = self;
         let peaks = search.of(mesh).map_err(refused)?;
         let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
@@ -365,7 +362,7 @@ impl<'a> Descent<'a> {
     ///
     /// # Errors
     /// When the mesh has no union.
-    pub fn new(goal: &'a Goal, points: Points, mesh: MedialMesh) -> Result<Self, SimplifyError> {
+    pub fn new(goal: &'a Goal, points: Points, mesh: MedialMesh) -> Result<Self> {
         Self::of_part(goal, points, mesh, Rest::default(), 1.0)
     }
 
@@ -376,7 +373,7 @@ impl<'a> Descent<'a> {
         mut mesh: MedialMesh,
         rest: Rest,
         share: f64,
-    ) -> Result<Self, SimplifyError> {
+    ) -> Result<Self> {
         let Rest { fixed, limits, still } = rest;
         clamp(&mut mesh, goal);
         let mut held = places(&mesh, share);
@@ -402,12 +399,7 @@ impl<'a> Descent<'a> {
     ///
     /// # Errors
     /// When the run is cancelled.
-    pub fn run(
-        &mut self,
-        objective: Objective,
-        steps: usize,
-        run: &RunContext,
-    ) -> Result<(), SimplifyError> {
+    pub fn run(&mut self, objective: Objective, steps: usize, run: &RunContext) -> Result<()> {
         let tolerance = objective.tolerance();
         self.residuals.rows.retain(|row| objective.counts(row));
         let mut value = self.value(&objective);

@@ -10,13 +10,14 @@ use medial::geometry::trees::{Bounds, PointTree};
 use medial::geometry::{DisjointSets, triangles_meet};
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
-use medial::simplifier::{Diagnostics, Level, MedialSimplifier, Params, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, Level, MedialSimplifier, Params, RunContext};
 use medial::surface::{Sampling, Side};
 
 use super::collapse::{Passed, Patch};
 use super::goal::{Goal, Row, vertices};
 use super::rounds::{Descent, LEAST_RADIUS};
 use super::{MANY, TightParams, collapse};
+use crate::Result;
 
 /// Times that the samples are doubled at most.
 const DOUBLINGS: usize = 2;
@@ -46,7 +47,7 @@ impl Start {
         starter: Arc<dyn MedialSimplifier>,
         params: &TightParams,
         run: &RunContext,
-    ) -> Result<Self, SimplifyError> {
+    ) -> Result<Self> {
         // Built here, so that they count as substrates of the shape.
         shape.surface_tree()?;
         shape.inside_test();
@@ -113,7 +114,7 @@ impl Start {
         count: usize,
         run: &RunContext,
         diagnostics: &mut Diagnostics,
-    ) -> Result<MedialMesh, SimplifyError> {
+    ) -> Result<MedialMesh> {
         let initial = self.shape.initial()?;
         let wanted = self.least.max(MANY.saturating_mul(count));
         let mesh = if initial.spheres.len() <= if self.is_given { count } else { wanted } {
@@ -323,7 +324,7 @@ pub(super) fn swapped<'a>(
     each: usize,
     skipped: usize,
     run: &RunContext,
-) -> Result<Option<Descent<'a>>, SimplifyError> {
+) -> Result<Option<Descent<'a>>> {
     let count = descent.mesh.spheres.len();
     let crossing = crossing_faces(&descent.mesh).len();
     let Some(mut mesh) = with_inserted(descent, each, skipped) else { return Ok(None) };

@@ -92,6 +92,7 @@ use sampling::{Ended, NONE, Solid, Tally, VariationalSampling};
 use serde::{Deserialize, Serialize};
 
 use crate::levels::within;
+use crate::{Prepared, Result};
 
 /// Spheres of [`Level::Published`]: CGAL's default.
 const PUBLISHED: usize = 100;
@@ -123,11 +124,7 @@ pub fn method() -> Method<VmasParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(
-    shape: &'s Shape,
-    params: VmasParams,
-    run: &RunContext,
-) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+fn prepare<'s>(shape: &'s Shape, params: VmasParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     if shape.has_given_initial() {
         let why = "it samples the surface and starts from no medial mesh: leave out --initial";
@@ -135,19 +132,19 @@ fn prepare<'s>(
     }
     run.step(0, 1)?;
     let solid = Solid::new(shape, params.contact == Contact::Mesh)?;
-    Ok(Box::new(Prepared { shape, solid, params, run: run.clone() }))
+    Ok(Box::new(PreparedVmas { shape, solid, params, run: run.clone() }))
 }
 
 /// One shape.
-struct Prepared<'s> {
+struct PreparedVmas<'s> {
     shape: &'s Shape,
     solid: Solid<'s>,
     params: VmasParams,
     run: RunContext,
 }
 
-impl Simplification for Prepared<'_> {
-    fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
+impl Simplification for PreparedVmas<'_> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
         let asked = match level {
             Level::Spheres(0) => {
                 return Err(SimplifyError::Level("ask for at least one sphere".into()));
@@ -172,9 +169,9 @@ impl Simplification for Prepared<'_> {
     }
 }
 
-impl Prepared<'_> {
+impl PreparedVmas<'_> {
     /// Step 0.
-    fn points(&self, spheres: usize) -> Result<SurfacePoints, SimplifyError> {
+    fn points(&self, spheres: usize) -> Result<SurfacePoints> {
         let (mesh, VmasParams { samples, neighbours, .. }) = (self.shape.mesh(), self.params);
         let points = match self.params.points {
             Points::Vertices => SurfacePoints::of_vertices(mesh),
@@ -312,7 +309,7 @@ pub enum Connect {
 const MOST_SAMPLES: usize = 1_000_000;
 
 impl VmasParams {
-    fn validate(self) -> Result<Self, SimplifyError> {
+    fn validate(self) -> Result<Self> {
         within("samples", self.samples, 100..=MOST_SAMPLES)?;
         within("neighbours", self.neighbours, 2..=100)?;
         // Without the Euclidean part, two parallel planes leave a sphere undetermined.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::{Shape, ShapeError};
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use medial::surface::{InsideTest, Side, TriangleBvh};
 use rayon::prelude::*;
 use wide::f64x4;
@@ -14,6 +14,7 @@ use super::points::{GROUP, SurfacePoints, area_vector, in_lanes};
 use super::refit::{Residuals, refit};
 use super::shrinking_ball::{Ball, End, Touched, shrinking_ball};
 use super::{Connect, Points, VmasParams, edges, faces};
+use crate::Result;
 
 /// A round whose total error changes by less than this is at rest; a fraction of the squared longest side.
 const AT_REST: f64 = 1e-5;
@@ -91,7 +92,7 @@ impl<'a> VariationalSampling<'a> {
     ///
     /// # Errors
     /// When the run is cancelled.
-    pub fn run(&mut self, target: usize, run: &RunContext) -> Result<Ended, SimplifyError> {
+    pub fn run(&mut self, target: usize, run: &RunContext) -> Result<Ended> {
         let at_rest = AT_REST * self.solid.side * self.solid.side;
         let (mut most, mut without_gain) = (0, 0);
         let last = self.params.iterations - 1;
@@ -168,7 +169,7 @@ impl<'a> VariationalSampling<'a> {
     ///
     /// # Errors
     /// When a sphere is not valid.
-    pub fn mesh(&self, connect: Connect) -> Result<MedialMesh, SimplifyError> {
+    pub fn mesh(&self, connect: Connect) -> Result<MedialMesh> {
         let edges = edges(self.points, &self.labels);
         let faces = faces(self.points, &self.labels, &edges, connect);
         Ok(MedialMesh::from_simplices(self.spheres.clone(), edges, faces)?)

@@ -10,6 +10,7 @@ use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh, TriangleBvh};
 use medial_datasets::BuiltIn;
+use medial_methods::Result;
 use medial_methods::aof::{
     self, AofParams, Descent, Dismiss, Grid, LatticeVoxels, Solid, Sphere, Spiral, Surface,
     Variant, Voxel, Wanted,
@@ -27,11 +28,7 @@ fn solid<'s>(shape: &'s Shape, params: &AofParams) -> Solid<'s> {
 
 const HALF: Vec3 = Vec3::new(1.5, 1.0, 0.5);
 
-fn simplified(
-    shape: &Shape,
-    set: &[(&str, &str)],
-    level: Level,
-) -> Result<Simplified, SimplifyError> {
+fn simplified(shape: &Shape, set: &[(&str, &str)], level: Level) -> Result<Simplified> {
     aof::method().prepare(shape, &settings(set), &RunContext::default())?.at(level)
 }
 

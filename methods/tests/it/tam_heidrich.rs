@@ -7,6 +7,7 @@ use medial::complex::{MedialMesh, betti};
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
+use medial_methods::Result;
 use medial_methods::tam_heidrich::{self, OuterPoles, PartInfo, RemainingPoles, parts_of_faces};
 
 use crate::common::{self, shape_of};
@@ -15,11 +16,7 @@ fn built_in(id: &str) -> Shape {
     shape_of(&common::built_in(id))
 }
 
-fn try_at(
-    shape: &Shape,
-    params: &[(&str, &str)],
-    level: Level,
-) -> Result<Simplified, SimplifyError> {
+fn try_at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Result<Simplified> {
     let params = common::params(params);
     tam_heidrich::method().prepare(shape, &params, &RunContext::default())?.at(level)
 }
