@@ -12,8 +12,8 @@
 //! values, or when no value is left to try. The answer is the largest count met that does not exceed the
 //! request. No value is tried twice.
 
-use std::fmt::Display;
-use std::ops::RangeInclusive;
+use std::fmt::Debug;
+use std::ops::{Bound, RangeBounds, RangeInclusive};
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
@@ -362,19 +362,61 @@ impl Simplification for ByKnob<'_> {
     }
 }
 
-// Parameters that have a range.
+// Parameters and levels that have a range.
 
 /// Refuses a parameter outside its range; a NaN is outside every one.
-pub(crate) fn within<T: PartialOrd + Display>(
+pub(crate) fn within<T: PartialOrd + Debug>(
     name: &str,
     value: T,
-    range: RangeInclusive<T>,
+    range: impl RangeBounds<T>,
 ) -> Result<()> {
+    outside(name, value, range).map_or(Ok(()), |why| Err(SimplifyError::Parameter(why)))
+}
+
+/// Refuses a native level outside its range, as [`within`].
+pub(crate) fn level_within(name: &str, level: f64, range: impl RangeBounds<f64>) -> Result<f64> {
+    outside(name, level, range).map_or(Ok(level), |why| Err(SimplifyError::Level(why)))
+}
+
+fn outside<T: PartialOrd + Debug>(
+    name: &str,
+    value: T,
+    range: impl RangeBounds<T>,
+) -> Option<String> {
     if range.contains(&value) {
-        return Ok(());
+        return None;
     }
-    let (least, most) = (range.start(), range.end());
-    Err(SimplifyError::Parameter(format!("{name} = {value} is outside {least} to {most}")))
+    // An interval, because some ends are excluded, and the message has to say which.
+    let least = match range.start_bound() {
+        Bound::Included(least) => format!("[{least:?}"),
+        Bound::Excluded(least) => format!("({least:?}"),
+        Bound::Unbounded => "(-inf".to_owned(),
+    };
+    let most = match range.end_bound() {
+        Bound::Included(most) => format!("{most:?}]"),
+        Bound::Excluded(most) => format!("{most:?})"),
+        Bound::Unbounded => "inf)".to_owned(),
+    };
+    Some(format!("{name} = {value:?} is outside {least}, {most}"))
+}
+
+/// Refuses a level of no sphere.
+pub(crate) fn some_spheres(level: Level) -> Result<Level> {
+    match level {
+        Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".to_owned())),
+        level => Ok(level),
+    }
+}
+
+/// A result, once its mesh is known to be a valid complex.
+pub(crate) fn checked(
+    asked: Level,
+    mesh: MedialMesh,
+    native_level: Option<f64>,
+    diagnostics: Diagnostics,
+) -> Result<Simplified> {
+    mesh.check()?;
+    Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
 }
 
 // Balls in general position, for methods on unions of polar balls.

@@ -12,6 +12,7 @@ use medial::simplifier::{Diagnostics, Level, Simplification, Simplified, Simplif
 use rayon::prelude::*;
 
 use crate::Result;
+use crate::levels::{level_within, some_spheres};
 
 /// An initial medial mesh with a value for each sphere; larger values are kept longer.
 pub(crate) struct Ranked {
@@ -126,10 +127,11 @@ pub(crate) enum Wanted {
 impl Scale {
     /// The request of a level; a documented level is announced in `diagnostics`.
     pub(crate) fn wanted(&self, level: Level, diagnostics: &mut Diagnostics) -> Result<Wanted> {
-        match level {
-            Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
+        match some_spheres(level)? {
             Level::Spheres(count) => Ok(Wanted::Spheres(count)),
-            Level::Native(level) => self.check(level).map(|()| Wanted::Native(level)),
+            Level::Native(level) => {
+                level_within(self.name, level, self.range.clone()).map(Wanted::Native)
+            }
             Level::Published => match self.published {
                 Published::Native(level) => Ok(Wanted::Native(level)),
                 Published::Documented(level, whose) => {
@@ -142,20 +144,6 @@ impl Scale {
                 Published::None(why) => Err(SimplifyError::unsupported(why)),
             },
         }
-    }
-
-    /// Refuses a level that means nothing.
-    fn check(&self, level: f64) -> Result<()> {
-        let Self { name, range, .. } = self;
-        if range.contains(&level) {
-            return Ok(());
-        }
-        let (least, most) = (range.start(), range.end());
-        let message = match *most {
-            f64::MAX => format!("{name} = {level:?} is below {least}, or no number"),
-            _ => format!("{name} = {level:?} is outside {least} to {most}"),
-        };
-        Err(SimplifyError::Level(message))
     }
 }
 

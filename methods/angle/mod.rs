@@ -39,12 +39,12 @@ use medial::geometry::separation_angle;
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
-    Simplified, SimplifyError,
+    Simplified,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::levels::ByKnob;
+use crate::levels::{ByKnob, within};
 use crate::ranked::{
     FacetSet, Published, Ranked, RankedFacets, Scale, Sheets, Wanted, Without, break_ties,
 };
@@ -108,19 +108,8 @@ pub enum FacetAngle {
 
 impl AngleParams {
     fn validate(self) -> Result<Self> {
-        let [least, most] = [grid::MIN_RESOLUTION, grid::MAX_RESOLUTION];
-        if !(least..=most).contains(&self.resolution) {
-            return Err(SimplifyError::Parameter(format!(
-                "resolution = {}: give {least} to {most} voxels along the longest side",
-                self.resolution
-            )));
-        }
-        if !(0.0..=180.0).contains(&self.theta) {
-            return Err(SimplifyError::Parameter(format!(
-                "theta = {}: a separation angle has 0 to 180 degrees",
-                self.theta
-            )));
-        }
+        within("resolution", self.resolution, grid::MIN_RESOLUTION..=grid::MAX_RESOLUTION)?;
+        within("theta", self.theta, 0.0..=180.0)?;
         Ok(self)
     }
 }

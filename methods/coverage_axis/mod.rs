@@ -56,16 +56,15 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Extras, Level, MedialSimplifier, MethodInfo, NativeLevel, ParamFields, Params,
-    RunContext, Simplification, Simplified, SimplifyError,
+    Diagnostics, Level, MedialSimplifier, MethodInfo, NativeLevel, ParamFields, Params, RunContext,
+    Simplification, Simplified, SimplifyError,
 };
 use medial::surface::{Sampling, Side, sample};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use crate::levels::within;
-use crate::levels::{Knob, Probe, SizeSearch};
+use crate::levels::{Knob, Probe, SizeSearch, level_within, some_spheres, within};
 use crate::{Prepared, Result};
 
 /// Spheres that the authors' scripts choose at most.
@@ -156,21 +155,13 @@ impl Simplification for PreparedCoverage {
         let Self { axis, search } = self;
         let CoverageAxisParams { select, size, dilation, max_iter, .. } = axis.params;
         let by_picks = select == Select::Greedy && size == Size::Picks;
-        let (dilation, most) = match level {
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
+        let (dilation, most) = match some_spheres(level)? {
             Level::Spheres(count) if by_picks => (dilation, count),
             Level::Spheres(count) => {
                 // The search expects more spheres at larger values: it gets the inverse dilation.
                 return search.at(count, f64::recip, |value| axis.at(value.recip(), max_iter));
             }
-            Level::Native(delta) if DILATIONS.contains(&delta) => (delta, max_iter),
-            Level::Native(delta) => {
-                let (least, most) = (DILATIONS.start(), DILATIONS.end());
-                let message = format!("delta = {delta:?} is outside {least} to {most}");
-                return Err(SimplifyError::Level(message));
-            }
+            Level::Native(delta) => (level_within("delta", delta, DILATIONS)?, max_iter),
             Level::Published => (dilation, max_iter.min(PUBLISHED_PICKS)),
         };
         let Probe { mesh, mut diagnostics } = axis.at(dilation, most)?;
@@ -183,13 +174,8 @@ impl Simplification for PreparedCoverage {
                  delta = {dilation}; a smaller dilation or size=dilation takes more"
             ));
         }
-        Ok(Simplified {
-            mesh,
-            asked: level,
-            native_level: Some(dilation),
-            diagnostics,
-            extras: Extras::default(),
-        })
+        let native_level = Some(dilation);
+        Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }
 }
 

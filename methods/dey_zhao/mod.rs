@@ -50,22 +50,20 @@ mod tests;
 mod umbrella;
 
 use std::f64::consts::FRAC_PI_2;
+use std::ops::Bound;
 use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::VoronoiFacets;
 use medial::geometry::{Delaunay, VertexId};
 use medial::shape::{Shape, ShapeError};
-use medial::simplifier::{
-    Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext, SimplifyError,
-};
+use medial::simplifier::{Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext};
 use medial::surface::{InsideTest, Side};
 use serde::{Deserialize, Serialize};
 use umbrella::{Place, Umbrellas};
 
-use crate::levels::ByKnob;
-use crate::ranked::{FacetSet, FacetValue, RankedFacets};
-use crate::ranked::{Published, Scale};
+use crate::levels::{ByKnob, within};
+use crate::ranked::{FacetSet, FacetValue, Published, RankedFacets, Scale};
 use crate::{Prepared, Result};
 
 medial::parameters! {
@@ -122,14 +120,8 @@ pub enum Condition {
 
 impl DeyZhaoParams {
     fn validate(self) -> Result<Self> {
-        if !(self.theta > 0.0 && self.theta < 90.0) {
-            let message = format!("theta = {} is not between 0 and 90 degrees", self.theta);
-            return Err(SimplifyError::Parameter(message));
-        }
-        if !(self.rho > 0.0 && self.rho.is_finite()) {
-            let message = format!("rho = {} is not positive", self.rho);
-            return Err(SimplifyError::Parameter(message));
-        }
+        within("theta", self.theta, (Bound::Excluded(0.0), Bound::Excluded(90.0)))?;
+        within("rho", self.rho, (Bound::Excluded(0.0), Bound::Excluded(f64::INFINITY)))?;
         Ok(self)
     }
 }

@@ -119,6 +119,7 @@ use medial::simplifier::{
 use medial::surface::TriangleBvh;
 use serde::{Deserialize, Serialize};
 
+use crate::levels::{checked, some_spheres};
 use crate::{Prepared, Result};
 
 /// Cost at which [`Level::Published`] stops: the default of the authors' code.
@@ -197,10 +198,7 @@ struct PreparedHem {
 
 impl Simplification for PreparedHem {
     fn at(&mut self, level: Level) -> Result<Simplified> {
-        match level {
-            Level::Spheres(0) => {
-                Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
-            }
+        match some_spheres(level)? {
             Level::Spheres(count) => self.at_count(count),
             Level::Native(epsilon) if epsilon >= 0.0 && epsilon.is_finite() => {
                 self.at_bound(epsilon)
@@ -230,7 +228,7 @@ impl PreparedHem {
         }
         let native_level = Some(self.contraction.largest());
         let mesh = self.contraction.to_mesh();
-        answer(Level::Spheres(target), mesh, native_level, diagnostics)
+        checked(Level::Spheres(target), mesh, native_level, diagnostics)
     }
 
     fn at_bound(&mut self, epsilon: f64) -> Result<Simplified> {
@@ -251,7 +249,7 @@ impl PreparedHem {
         let mut diagnostics = self.diagnostics();
         diagnostics.count("taken_back_for_the_bound", record.len() - kept);
         let mesh = replay(&self.initial, &record[..kept]);
-        answer(Level::Native(epsilon), mesh, Some(epsilon), diagnostics)
+        checked(Level::Native(epsilon), mesh, Some(epsilon), diagnostics)
     }
 
     fn cannot_be_held(
@@ -290,7 +288,7 @@ impl PreparedHem {
                  {error:.3e} of the diagonal off the result"
             ));
         }
-        answer(Level::Published, mesh, Some(PUBLISHED), diagnostics)
+        checked(Level::Published, mesh, Some(PUBLISHED), diagnostics)
     }
 
     fn contract(&mut self, stop: Stop, anew: bool) -> Result<()> {
@@ -305,16 +303,6 @@ impl PreparedHem {
         self.contraction.diagnose(&mut diagnostics);
         diagnostics
     }
-}
-
-fn answer(
-    asked: Level,
-    mesh: MedialMesh,
-    native_level: Option<f64>,
-    diagnostics: Diagnostics,
-) -> Result<Simplified> {
-    mesh.check()?;
-    Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
 }
 
 // The parameters of HEM.

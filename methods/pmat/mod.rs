@@ -62,6 +62,7 @@ use medial::simplifier::{
 };
 use rayon::prelude::*;
 
+use crate::levels::{level_within, some_spheres};
 use crate::{Prepared, Result};
 
 /// The scale of [`Level::Published`]: the least of the paper's Table 1.
@@ -124,23 +125,16 @@ impl Levels {
 
     /// The number of collapses that a level asks for.
     fn stage_of(&self, level: Level) -> Result<usize> {
-        match level {
-            Level::Spheres(0) => {
-                Err(SimplifyError::Level("at least one sphere must stay".to_owned()))
-            }
+        let scale = match some_spheres(level)? {
             Level::Spheres(count) => {
                 let excess = self.hierarchy.initial().spheres.len().saturating_sub(count);
                 // Each collapse removes one sphere; components without edges remain.
-                Ok(excess.min(self.hierarchy.last_stage()))
+                return Ok(excess.min(self.hierarchy.last_stage()));
             }
-            Level::Native(scale) if scale >= 1.0 && scale.is_finite() => {
-                Ok(self.scales.partition_point(|&cost| cost <= scale))
-            }
-            Level::Native(scale) => Err(SimplifyError::Level(format!(
-                "s = {scale:?} is no scale: ask for a finite number of at least 1"
-            ))),
-            Level::Published => Ok(self.scales.partition_point(|&cost| cost <= PUBLISHED)),
-        }
+            Level::Native(scale) => level_within("s", scale, 1.0..f64::INFINITY)?,
+            Level::Published => PUBLISHED,
+        };
+        Ok(self.scales.partition_point(|&cost| cost <= scale))
     }
 
     /// The least scale at which no more spheres are left than at a stage.

@@ -75,6 +75,7 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::levels::{checked, some_spheres, within};
 use crate::{Prepared, Result};
 
 /// Spheres of [`Level::Published`]: the count of the paper's Table II.
@@ -154,66 +155,44 @@ struct PreparedQmat {
 
 impl Simplification for PreparedQmat {
     fn at(&mut self, level: Level) -> Result<Simplified> {
-        let target = match level {
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("at least one sphere must stay".to_owned()));
-            }
+        let mut diagnostics = Diagnostics::default();
+        let target = match some_spheres(level)? {
             Level::Spheres(count) => count,
-            Level::Published => PUBLISHED,
+            Level::Published => {
+                diagnostics.warn(format!(
+                    "the paper leaves the count to the user; {PUBLISHED} spheres as in its Table II"
+                ));
+                PUBLISHED
+            }
             Level::Native(_) => {
-                let why = "Q-MAT has no scalar of its own; ask for a number of spheres".to_owned();
-                return Err(SimplifyError::Unsupported { why });
+                let why = "Q-MAT has no scalar of its own; ask for a number of spheres";
+                return Err(SimplifyError::unsupported(why));
             }
         };
-        let mut diagnostics = Diagnostics::default();
-        if level == Level::Published {
-            diagnostics.warn(self.published_warning());
+        let spheres = self.initial.spheres.len();
+        if target >= spheres {
+            if target > spheres {
+                diagnostics.warn(format!(
+                    "{spheres} spheres instead of {target}: the initial medial mesh has no more"
+                ));
+            }
+            let mesh = MedialMesh::clone(&self.initial);
+            return Ok(Simplified { diagnostics, ..Simplified::new(mesh, level) });
         }
-        if target >= self.initial.spheres.len() {
-            return Ok(self.initial_mesh(level, target, diagnostics));
-        }
-        self.contract(target, level)?;
-        self.contraction.diagnose(&mut diagnostics);
-        let reached = self.contraction.sphere_count();
-        if reached > target {
-            let why = self.contraction.why_stopped();
-            diagnostics.warn(format!("{reached} spheres instead of {target}: {why}"));
-        }
-        let mesh = self.contraction.to_mesh();
-        mesh.check()?;
-        Ok(Simplified { diagnostics, ..Simplified::new(mesh, level) })
-    }
-}
-
-impl PreparedQmat {
-    fn contract(&mut self, target: usize, level: Level) -> Result<()> {
         let params = self.params.at(level);
         let is_of_other = self.contraction.params() != params;
         // Collapses are not undone, so a finer level starts anew.
         if is_of_other || self.contraction.sphere_count() < target {
             self.contraction = Contraction::new(&self.initial, params);
         }
-        self.contraction.run_to(&self.initial, target, &self.run)
-    }
-
-    fn initial_mesh(
-        &self,
-        asked: Level,
-        target: usize,
-        mut diagnostics: Diagnostics,
-    ) -> Simplified {
-        let spheres = self.initial.spheres.len();
-        if target > spheres {
-            diagnostics.warn(format!(
-                "{spheres} spheres instead of {target}: the initial medial mesh has no more"
-            ));
+        self.contraction.run_to(&self.initial, target, &self.run)?;
+        self.contraction.diagnose(&mut diagnostics);
+        let reached = self.contraction.sphere_count();
+        if reached > target {
+            let why = self.contraction.why_stopped();
+            diagnostics.warn(format!("{reached} spheres instead of {target}: {why}"));
         }
-        let mesh = MedialMesh::clone(&self.initial);
-        Simplified { diagnostics, ..Simplified::new(mesh, asked) }
-    }
-
-    fn published_warning(&self) -> String {
-        format!("the paper leaves the count to the user; {PUBLISHED} spheres as in its Table II")
+        checked(level, self.contraction.to_mesh(), None, diagnostics)
     }
 }
 
@@ -257,17 +236,21 @@ pub enum Boundary {
 
 /// From which sphere count on a collapse has to satisfy the link condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "TopologyWord", into = "TopologyWord")]
+#[serde(
+    rename_all = "lowercase",
+    expecting = "topology_from is a number of spheres, `all`, `never` or `auto`"
+)]
 pub enum TopologyFrom {
     /// From the first collapse on; at [`Level::Published`]
     /// from 200 spheres on, as in the paper.
     Auto,
     /// From the first collapse on.
     All,
-    /// While at most this many spheres are left: `η` of the paper's Algorithm 1.
-    Spheres(usize),
     /// Never.
     Never,
+    /// While at most this many spheres are left: `η` of the paper's Algorithm 1.
+    #[serde(untagged)]
+    Spheres(usize),
 }
 
 impl TopologyFrom {
@@ -290,44 +273,6 @@ impl TopologyFrom {
     }
 }
 
-/// How [`TopologyFrom`] is written.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[serde(untagged, expecting = "topology_from is a number of spheres, `all`, `never` or `auto`")]
-enum TopologyWord {
-    Spheres(usize),
-    Word(Word),
-}
-
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Word {
-    Auto,
-    All,
-    Never,
-}
-
-impl From<TopologyWord> for TopologyFrom {
-    fn from(word: TopologyWord) -> Self {
-        match word {
-            TopologyWord::Spheres(from) => Self::Spheres(from),
-            TopologyWord::Word(Word::Auto) => Self::Auto,
-            TopologyWord::Word(Word::All) => Self::All,
-            TopologyWord::Word(Word::Never) => Self::Never,
-        }
-    }
-}
-
-impl From<TopologyFrom> for TopologyWord {
-    fn from(from: TopologyFrom) -> Self {
-        match from {
-            TopologyFrom::Spheres(from) => Self::Spheres(from),
-            TopologyFrom::Auto => Self::Word(Word::Auto),
-            TopologyFrom::All => Self::Word(Word::All),
-            TopologyFrom::Never => Self::Word(Word::Never),
-        }
-    }
-}
-
 impl QmatParams {
     /// The parameters at a level.
     fn at(self, level: Level) -> Self {
@@ -335,18 +280,9 @@ impl QmatParams {
     }
 
     fn validate(self) -> Result<Self> {
-        let at_least_zero = [("k", self.k), ("k_boundary", self.k_boundary)];
-        for (name, value) in at_least_zero {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(SimplifyError::Parameter(format!("{name} = {value} is negative")));
-            }
-        }
-        if !(0.0..1.0).contains(&self.singular_ratio) {
-            let value = self.singular_ratio;
-            return Err(SimplifyError::Parameter(format!(
-                "singular_ratio = {value} is not in [0, 1)"
-            )));
-        }
+        within("k", self.k, 0.0..f64::INFINITY)?;
+        within("k_boundary", self.k_boundary, 0.0..f64::INFINITY)?;
+        within("singular_ratio", self.singular_ratio, 0.0..1.0)?;
         Ok(self)
     }
 }

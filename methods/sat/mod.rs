@@ -48,7 +48,7 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::levels::{ByKnob, perturbed, within};
+use crate::levels::{ByKnob, level_within, perturbed, some_spheres, within};
 use crate::{Prepared, Result};
 
 /// Scale of [`Level::Published`]: the default of the authors' tool.
@@ -178,18 +178,10 @@ impl Scaled {
 impl Simplification for PreparedSat {
     fn at(&mut self, level: Level) -> Result<Simplified> {
         let mut diagnostics = Diagnostics::default();
-        let scaled = match level {
+        let scaled = match some_spheres(level)? {
             Level::Published => self.at_scale(PUBLISHED)?,
-            Level::Native(scale) if (1.0..=LARGEST_SCALE).contains(&scale) => {
-                self.at_scale(scale)?
-            }
             Level::Native(scale) => {
-                return Err(SimplifyError::Level(format!(
-                    "s = {scale:?} is outside 1 to {LARGEST_SCALE:e}"
-                )));
-            }
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
+                self.at_scale(level_within("s", scale, 1.0..=LARGEST_SCALE)?)?
             }
             Level::Spheres(count) => to_count(self, count, &mut diagnostics)?,
         };
@@ -229,14 +221,9 @@ pub enum Size {
 
 impl SatParams {
     fn validate(self) -> Result<Self> {
-        let ranges = [
-            ("radius_factor", self.radius_factor, 0.5..=2.0),
-            ("jitter", self.jitter, 0.0..=0.1),
-            ("sat_angle", self.sat_angle, 0.0..=90.0),
-        ];
-        for (name, value, range) in ranges {
-            within(name, value, range)?;
-        }
+        within("radius_factor", self.radius_factor, 0.5..=2.0)?;
+        within("jitter", self.jitter, 0.0..=0.1)?;
+        within("sat_angle", self.sat_angle, 0.0..=90.0)?;
         Ok(self)
     }
 }

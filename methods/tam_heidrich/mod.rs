@@ -99,7 +99,7 @@ use parts::{Parts, Remaining};
 use schedule::Pruning;
 use serde::{Deserialize, Serialize};
 
-use crate::levels::within;
+use crate::levels::{level_within, some_spheres, within};
 use crate::{Prepared, Result};
 
 /// Name of the extra that holds the poles that are left, [`RemainingPoles`].
@@ -196,15 +196,12 @@ impl PreparedTamHeidrich {
     /// The thresholds of the rounds by volume, and the number of spheres that is enough.
     fn schedule(&self, level: Level) -> Result<(Vec<f64>, usize)> {
         let published = &self.params.t_v.0;
-        match level {
+        match some_spheres(level)? {
             Level::Published => Ok((published.clone(), 0)),
-            Level::Native(t) if (0.0..=100.0).contains(&t) => {
+            Level::Native(t) => {
+                let t = level_within("t_v", t, 0.0..=100.0)?;
                 Ok((vec![t; published.len().max(1)], 0))
             }
-            Level::Native(t) => {
-                Err(SimplifyError::Level(format!("t_v = {t:?} is outside 0 to 100 per cent")))
-            }
-            Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
             Level::Spheres(count) => Ok((published.clone(), count)),
         }
     }
@@ -420,16 +417,11 @@ impl<T> From<List<T>> for Vec<T> {
 
 impl TamHeidrichParams {
     fn validate(self) -> Result<Self> {
-        let ranges = [
-            ("drop", self.drop, 0.0..=1.0),
-            ("radius_factor", self.radius_factor, 0.5..=2.0),
-            ("jitter", self.jitter, 0.0..=0.1),
-            ("merge", self.merge, 0.0..=0.1),
-        ];
-        let t_v = self.t_v.0.iter().map(|&t| ("t_v", t, 0.0..=100.0));
-        for (name, value, range) in ranges.into_iter().chain(t_v) {
-            within(name, value, range)?;
-        }
+        within("drop", self.drop, 0.0..=1.0)?;
+        within("radius_factor", self.radius_factor, 0.5..=2.0)?;
+        within("jitter", self.jitter, 0.0..=0.1)?;
+        within("merge", self.merge, 0.0..=0.1)?;
+        self.t_v.0.iter().try_for_each(|&t| within("t_v", t, 0.0..=100.0))?;
         Ok(self)
     }
 }

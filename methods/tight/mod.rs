@@ -52,6 +52,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Bound;
 use std::sync::Arc;
 
 use goal::Goal;
@@ -64,6 +65,7 @@ use medial::simplifier::{
 use rounds::{Descent, Objective, Polish, State};
 use start::Start;
 
+use crate::levels::{checked, level_within, some_spheres, within};
 use crate::{Prepared, Result};
 
 /// Spheres of [`Level::Published`].
@@ -134,10 +136,7 @@ struct PreparedTight {
 
 impl Simplification for PreparedTight {
     fn at(&mut self, level: Level) -> Result<Simplified> {
-        let count = match level {
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("at least one sphere must stay".to_owned()));
-            }
+        let count = match some_spheres(level)? {
             Level::Spheres(count) => count,
             Level::Published => USUAL,
             Level::Native(bound) => return self.within(bound),
@@ -147,7 +146,7 @@ impl Simplification for PreparedTight {
         let start = self.start.mesh(count, &self.run, &mut diagnostics)?;
         bounded(start.spheres.len())?;
         let mesh = self.simplified(start, count, &mut diagnostics)?;
-        answer(level, mesh, None, diagnostics)
+        checked(level, mesh, None, diagnostics)
     }
 }
 
@@ -158,7 +157,7 @@ impl PreparedTight {
         let mut diagnostics = Diagnostics::default();
         start.describe(&mut diagnostics);
         let state = Within { start, goal, params, run, bound }.fewest(&mut diagnostics)?;
-        answer(Level::Native(bound), state.mesh, Some(state.error), diagnostics)
+        checked(Level::Native(bound), state.mesh, Some(state.error), diagnostics)
     }
 
     /// Steps 2 to 6.
@@ -192,16 +191,6 @@ impl PreparedTight {
         let state = Polish { goal, params, run, swaps: !is_polish }.run(descent, diagnostics)?;
         Ok(state.mesh)
     }
-}
-
-fn answer(
-    asked: Level,
-    mesh: MedialMesh,
-    native_level: Option<f64>,
-    diagnostics: Diagnostics,
-) -> Result<Simplified> {
-    mesh.check()?;
-    Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
 }
 
 /// # Errors
@@ -274,22 +263,9 @@ const MOST_ROUNDS: usize = 1_000;
 impl TightParams {
     /// The same parameters, if they make sense.
     fn validate(self) -> Result<Self> {
-        if !(self.lambda >= 0.0 && self.lambda.is_finite()) {
-            let lambda = self.lambda;
-            return Err(SimplifyError::Parameter(format!("lambda = {lambda} is not a weight")));
-        }
-        if !(100..=MOST_SAMPLES).contains(&self.samples) {
-            let samples = self.samples;
-            return Err(SimplifyError::Parameter(format!(
-                "samples = {samples}: from 100 to {MOST_SAMPLES}"
-            )));
-        }
-        if self.rounds > MOST_ROUNDS {
-            let rounds = self.rounds;
-            return Err(SimplifyError::Parameter(format!(
-                "rounds = {rounds}: at most {MOST_ROUNDS}"
-            )));
-        }
+        within("lambda", self.lambda, 0.0..f64::INFINITY)?;
+        within("samples", self.samples, 100..=MOST_SAMPLES)?;
+        within("rounds", self.rounds, 0..=MOST_ROUNDS)?;
         Ok(self)
     }
 }
@@ -328,10 +304,7 @@ impl Within<'_> {
     /// When the bound is no length, or no state is within it.
     pub fn fewest(&self, diagnostics: &mut Diagnostics) -> Result<State> {
         let bound = self.bound;
-        if !(bound > 0.0 && bound.is_finite()) {
-            let why = format!("a bound of {bound} is not a positive fraction of the diagonal");
-            return Err(SimplifyError::Level(why));
-        }
+        level_within("error", bound, (Bound::Excluded(0.0), Bound::Excluded(f64::INFINITY)))?;
         let mut kept = self.first(diagnostics)?;
         let mut share = FIRST_SHARE;
         while share < LAST_SHARE && kept.mesh.spheres.len() > 1 {

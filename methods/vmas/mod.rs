@@ -91,7 +91,7 @@ use rayon::prelude::*;
 use sampling::{Ended, NONE, Solid, Tally, VariationalSampling};
 use serde::{Deserialize, Serialize};
 
-use crate::levels::within;
+use crate::levels::{some_spheres, within};
 use crate::{Prepared, Result};
 
 /// Spheres of [`Level::Published`]: CGAL's default.
@@ -145,10 +145,7 @@ struct PreparedVmas<'s> {
 
 impl Simplification for PreparedVmas<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified> {
-        let asked = match level {
-            Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
-            }
+        let asked = match some_spheres(level)? {
             Level::Spheres(count) => count,
             Level::Published => PUBLISHED,
             Level::Native(_) => {
