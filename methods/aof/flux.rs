@@ -315,18 +315,16 @@ impl Ray<'_> {
         self.surface.tree.closest_within_from(q, bound, None).map(|other| other.point)
     }
 
-    /// The parameter at which the ray is equally far from the foot and from another point.
-    fn even(&self, other: Vec3) -> f64 {
-        let apart = other - self.closest.point;
-        0.5 * apart.length_squared() / self.gradient.dot(apart) - self.closest.distance
-    }
-
     /// Step 2: the point and its two closest points.
     fn localise(&self, length: f64, tolerance: f64) -> Option<(Vec3, [Vec3; 2])> {
         let mut second = self.other(length)?;
         let (mut low, mut high) = (0.0, length);
         for cut in 1_u32.. {
-            high = self.even(second).clamp(low, high);
+            // Where the ray is equally far from the foot and from the other point.
+            let apart = second - self.closest.point;
+            let even =
+                0.5 * apart.length_squared() / self.gradient.dot(apart) - self.closest.distance;
+            high = even.clamp(low, high);
             if high - low <= tolerance {
                 break;
             }

@@ -413,10 +413,7 @@ fn levels(grid: &Grid, params: &AofParams) -> Result<Vec<LatticeLevel>> {
     let levels = counts.zip((0..params.levels).rev()).map(|(count, finer)| {
         let size = params.d.pow(finer);
         let sphere = Sphere::new(params.spiral, count, grid.side * f64::from(size));
-        let dismissed_from = match params.dismiss {
-            Dismiss::Zero => 0.0,
-            Dismiss::Bias => -sphere.bias,
-        };
+        let dismissed_from = if params.dismiss == Dismiss::Zero { 0.0 } else { -sphere.bias };
         LatticeLevel { sphere, size, dismissed_from }
     });
     Ok(levels.collect())
@@ -561,18 +558,20 @@ fn cube(n: u32) -> impl Iterator<Item = [u32; 3]> {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
     use super::*;
 
     #[test]
     fn voxels_come_back_and_neighbourhoods_cross_bricks() {
         let mut bricks = Bricks::new([20, 17, 30]);
-        let mut state = 5_u64;
+        let mut rng = Pcg64::seed_from_u64(5);
         let mut kept = Vec::new();
-        for k in 0..20 * 17 * 30_u64 {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            let place = [k % 20, k / 20 % 17, k / 340].map(|x| x as u16);
-            if state >> 62 == 0 {
-                let voxel = Voxel { place, distance: k as f32, flux: -(k as f32) };
+        for k in 0..20 * 17 * 30_u16 {
+            let place = [k % 20, k / 20 % 17, k / 340];
+            if rng.random_range(0..4) == 0 {
+                let voxel = Voxel { place, distance: f32::from(k), flux: -f32::from(k) };
                 bricks.insert(voxel);
                 kept.push(voxel);
             }
@@ -583,8 +582,7 @@ mod tests {
             assert_eq!(bricks.get(voxel.place), Some(*voxel));
             let around = bricks.neighbourhood(voxel.place);
             for k in 0..27 {
-                let [dx, dy, dz] = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
-                let at = [dx, dy, dz];
+                let at = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
                 let at = [0, 1, 2].map(|i| i32::from(voxel.place[i]) + at[i]);
                 let there = kept.iter().any(|v| v.place.map(i32::from) == at);
                 assert_eq!(around >> k & 1 == 1, there);

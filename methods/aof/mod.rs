@@ -69,6 +69,8 @@ mod output;
 mod solid;
 mod thinning;
 
+use std::ops::Bound::{self, Excluded, Included};
+
 use medial::shape::Shape;
 use medial::simplifier::{
     Capability, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
@@ -76,6 +78,7 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::levels::{level_within, some_spheres, within};
 use crate::{Prepared, Result};
 
 pub use flux::{Refined, Sphere, Spiral, Surface};
@@ -130,16 +133,12 @@ fn prepare<'s>(shape: &'s Shape, settings: AofSettings, run: &RunContext) -> Pre
 fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified> {
     let mut diagnostics = base.diagnostics.clone();
     let angle = match level {
-        Level::Native(angle) => angle,
+        Level::Native(angle) => level_within("angle", angle, ANGLES)?,
         Level::Spheres(_) | Level::Published => solid.params.angle,
     };
-    let axis = match level {
-        Level::Spheres(0) => {
-            return Err(SimplifyError::Level("ask for at least one sphere".into()));
-        }
+    let axis = match some_spheres(level)? {
         Level::Spheres(count) => solid.with_count(base, count, &mut diagnostics)?,
         Level::Native(_) | Level::Published => {
-            check_angle(angle).map_err(SimplifyError::Level)?;
             solid.warn_of(base.loss, base.resolution, &mut diagnostics);
             solid.axis(&base.descent, angle)?
         }
@@ -163,6 +162,9 @@ pub(super) const MAX_RESOLUTION: u32 = 60_000;
 /// Most voxels along the longest side of a coarse voxel.
 const MAX_SPLIT: u32 = 1024;
 
+/// Object angles, in degrees.
+const ANGLES: (Bound<f64>, Bound<f64>) = (Excluded(0.0), Included(90.0));
+
 /// Samples of the three default levels.
 const SAMPLES: &str = "70/60/50";
 /// Voxels along the longest side in the paper's figures of the torus and the cow.
@@ -172,40 +174,25 @@ const PUBLISHED_FLUX: f64 = 0.2;
 /// `mu` on a sheet.
 const ON_SHEET: f64 = 0.5;
 
-/// A value, or that of the level.
+/// A value, or that of the level: most defaults are the paper's at the published level and our own at
+/// all others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "expected `auto`, a number or a word of the list")]
+#[serde(rename_all = "lowercase", expecting = "expected `auto`, a number or a word of the list")]
 pub enum Auto<T> {
-    /// The value.
-    Value(T),
     /// That of the level.
-    Word(AutoWord),
-}
-
-/// The word `auto`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum AutoWord {
-    /// `auto`.
     Auto,
+    /// The value.
+    #[serde(untagged)]
+    Value(T),
 }
 
 impl<T: Copy> Auto<T> {
     fn or(self, value: T) -> T {
         match self {
             Self::Value(value) => value,
-            Self::Word(AutoWord::Auto) => value,
+            Self::Auto => value,
         }
     }
-
-    fn is_auto(&self) -> bool {
-        matches!(self, Self::Word(_))
-    }
-}
-
-/// Most defaults are the paper's at the published level and our own at all others: `auto`.
-const fn auto<T>() -> Auto<T> {
-    Auto::Word(AutoWord::Auto)
 }
 
 medial::parameters! {
@@ -214,7 +201,7 @@ medial::parameters! {
     pub struct AofSettings {
         /// Voxels along the longest side of the bounding box, at the finest level; auto is 54, and
         /// 369 at the published level, or as many as fit into memory.
-        resolution: Auto<u32> = auto(), "voxels, or auto";
+        resolution: Auto<u32> = Auto::Auto, "voxels, or auto";
         /// `d`: each voxel is split into d x d x d.
         d: u32 = 3, "number";
         /// Levels of resolution, from coarse to fine.
@@ -224,25 +211,25 @@ medial::parameters! {
         samples: String = SAMPLES.to_owned(), "numbers, separated by /";
         /// `alpha`: object angle of the thinnest sheets that are kept, when no level names one; auto
         /// is 30, and 23.6 at the published level, where sheets have a flux of -0.2.
-        angle: Auto<f64> = auto(), "degrees, or auto";
+        angle: Auto<f64> = Auto::Auto, "degrees, or auto";
         /// Factor of the threshold -mu sin(angle); auto is 0.125 for plain and homotopy, where a sheet
         /// anywhere in a voxel keeps it, 0.375 for the end points of thinning, and 0.5 at the
         /// published level.
-        mu: Auto<f64> = auto(), "pure number, or auto";
+        mu: Auto<f64> = Auto::Auto, "pure number, or auto";
         /// Keep by threshold; delete simple voxels alone, outermost first; or thin by flux; auto is
         /// thinning, and plain at the published level.
-        variant: Auto<Variant> = auto(), "plain, homotopy, thinning or auto";
+        variant: Auto<Variant> = Auto::Auto, "plain, homotopy, thinning or auto";
         /// How samples lie on the sphere; auto is equal-area, and classic at the published level.
-        spiral: Auto<Spiral> = auto(), "equal-area, classic or auto";
+        spiral: Auto<Spiral> = Auto::Auto, "equal-area, classic or auto";
         /// Begin with the voxels whose spheres fit inside at the finest level, or at the coarsest as
         /// in the paper; auto is fine, and coarse at the published level where that has a voxel.
-        start: Auto<Start> = auto(), "fine, coarse or auto";
+        start: Auto<Start> = Auto::Auto, "fine, coarse or auto";
         /// Dismiss coarse voxels from a flux of 0 on, as in the paper, or of minus that of the samples
         /// in a constant field; auto is bias, and zero at the published level.
-        dismiss: Auto<Dismiss> = auto(), "zero, bias or auto";
+        dismiss: Auto<Dismiss> = Auto::Auto, "zero, bias or auto";
         /// Move centres onto the axis, between opposite closest points; auto is true, and false at the
         /// published level.
-        refine: Auto<bool> = auto(), "true, false or auto";
+        refine: Auto<bool> = Auto::Auto, "true, false or auto";
         /// Limit of the memory for voxels and the medial mesh.
         max_memory: f64 = 2000.0, "megabytes";
     }
@@ -251,32 +238,20 @@ medial::parameters! {
 impl AofSettings {
     /// The parameters at a level.
     pub fn at(&self, level: Level) -> AofParams {
-        let auto = match level {
-            Level::Published => AofParams {
-                resolution: PUBLISHED_RESOLUTION,
-                angle: (PUBLISHED_FLUX / ON_SHEET).asin().to_degrees(),
-                mu: ON_SHEET,
-                variant: Variant::Plain,
-                spiral: Spiral::Classic,
-                start: Start::Coarse,
-                dismiss: Dismiss::Zero,
-                refine: false,
-                ..AofParams::default()
-            },
-            _ => AofParams::default(),
-        };
+        // Of two values the first is the paper's, for the published level, the second ours.
+        let ours = usize::from(level != Level::Published);
         AofParams {
-            resolution: self.resolution.or(auto.resolution),
+            resolution: self.resolution.or([PUBLISHED_RESOLUTION, 54][ours]),
             d: self.d,
             levels: self.levels,
             samples: self.samples.clone(),
-            angle: self.angle.or(auto.angle),
-            mu: self.mu.or(auto.mu),
-            variant: self.variant.or(auto.variant),
-            spiral: self.spiral.or(auto.spiral),
-            start: self.start.or(auto.start),
-            dismiss: self.dismiss.or(auto.dismiss),
-            refine: self.refine.or(auto.refine),
+            angle: self.angle.or([(PUBLISHED_FLUX / ON_SHEET).asin().to_degrees(), 30.0][ours]),
+            mu: self.mu.or([ON_SHEET, 0.0][ours]),
+            variant: self.variant.or([Variant::Plain, Variant::Thinning][ours]),
+            spiral: self.spiral.or([Spiral::Classic, Spiral::EqualArea][ours]),
+            start: self.start.or([Start::Coarse, Start::Fine][ours]),
+            dismiss: self.dismiss.or([Dismiss::Zero, Dismiss::Bias][ours]),
+            refine: self.refine.or([false, true][ours]),
             max_memory: self.max_memory,
         }
     }
@@ -304,20 +279,7 @@ pub struct AofParams {
 
 impl Default for AofParams {
     fn default() -> Self {
-        Self {
-            resolution: 54,
-            d: 3,
-            levels: 3,
-            samples: SAMPLES.to_owned(),
-            angle: 30.0,
-            mu: 0.0,
-            variant: Variant::Thinning,
-            spiral: Spiral::EqualArea,
-            start: Start::Fine,
-            dismiss: Dismiss::Bias,
-            refine: true,
-            max_memory: 2000.0,
-        }
+        AofSettings::default().at(Level::Spheres(1))
     }
 }
 
@@ -357,56 +319,34 @@ pub enum Dismiss {
 impl AofParams {
     /// The parameters if they are in their ranges.
     fn validate(self) -> Result<Self> {
-        let split = self.d.checked_pow(self.levels.saturating_sub(1));
-        let problem = if !(1..=MAX_RESOLUTION).contains(&self.resolution) {
-            format!(
-                "resolution = {}: give 1 to {MAX_RESOLUTION} voxels along the longest side",
-                self.resolution
-            )
-        } else if self.levels == 0 || (self.levels > 1 && self.d < 2) {
-            format!(
-                "levels = {}, d = {}: give at least one level, and 2 or more for d",
-                self.levels, self.d
-            )
-        } else if split.is_none_or(|split| split > MAX_SPLIT) {
-            format!(
-                "levels = {}, d = {}: d^(levels - 1) is above {MAX_SPLIT}; give fewer levels",
-                self.levels, self.d
-            )
-        } else if !(self.mu >= 0.0 && self.mu <= 0.75) {
-            format!("mu = {:?}: give a number in [0, 0.75], such as 0.125", self.mu)
-        } else if !(self.max_memory > 0.0 && self.max_memory.is_finite()) {
-            format!("max_memory = {:?}: give megabytes, above 0", self.max_memory)
-        } else {
-            check_angle(self.angle).map_err(SimplifyError::Parameter)?;
-            self.sample_counts()?;
-            return Ok(self);
-        };
-        Err(SimplifyError::Parameter(problem))
+        within("resolution", self.resolution, 1..=MAX_RESOLUTION)?;
+        within("levels", self.levels, 1..)?;
+        within("d", self.d, if self.levels > 1 { 2.. } else { 0.. })?;
+        let split = self.d.checked_pow(self.levels - 1).unwrap_or(u32::MAX);
+        within("d^(levels - 1)", split, 0..=MAX_SPLIT)?;
+        within("mu", self.mu, 0.0..=0.75)?;
+        within("max_memory", self.max_memory, (Excluded(0.0), Excluded(f64::INFINITY)))?;
+        within("angle", self.angle, ANGLES)?;
+        self.sample_counts()?;
+        Ok(self)
     }
 
     /// Samples of each level, from coarse to fine.
     pub(super) fn sample_counts(&self) -> Result<Vec<usize>> {
-        let counts: Result<Vec<usize>, _> =
-            self.samples.split('/').map(|word| word.trim().parse()).collect();
         let levels = self.levels as usize;
-        let Some(mut counts) =
-            counts.ok().filter(|counts| counts.iter().all(|count| (8..=10_000).contains(count)))
-        else {
-            return Err(SimplifyError::Parameter(format!(
-                "samples = {}: give 8 to 10000 for each level, such as 70/60/50",
-                self.samples
-            )));
-        };
+        let words = self.samples.split('/').map(|word| word.trim().parse());
+        let mut counts = words.collect::<Result<Vec<usize>, _>>().unwrap_or_default();
+        let is_default = self.samples == SAMPLES;
         // The default is made for its own number of levels; of fewer, the coarse ones are left out.
-        if self.samples == SAMPLES {
+        if is_default {
             counts.drain(..counts.len().saturating_sub(levels));
-        } else if counts.len() != 1 && counts.len() != levels {
+        }
+        let has_one_each = is_default || counts.len() == 1 || counts.len() == levels;
+        if !has_one_each || !counts.iter().all(|count| (8..=10_000).contains(count)) {
             return Err(SimplifyError::Parameter(format!(
-                "samples = {}: {} numbers for {levels} levels; give one for each, from coarse to \
-                 fine, or one for all",
-                self.samples,
-                counts.len()
+                "samples = {}: give 8 to 10000 for each of {levels} levels, from coarse to fine, such \
+                 as {SAMPLES} for three, or one number for all",
+                self.samples
             )));
         }
         counts.resize(levels, counts[counts.len() - 1]);
@@ -436,12 +376,4 @@ fn number_or_text<'de, D: serde::Deserializer<'de>>(from: D) -> Result<String, D
         Given::Number(number) => number.to_string(),
         Given::Text(text) => text,
     })
-}
-
-/// An object angle is above 0 and at most a right angle.
-fn check_angle(angle: f64) -> Result<(), String> {
-    if angle > 0.0 && angle <= 90.0 {
-        return Ok(());
-    }
-    Err(format!("angle = {angle:?}: an object angle is above 0 and at most 90 degrees"))
 }

@@ -61,10 +61,8 @@ pub fn medial_mesh(voxels: &[Voxel], balls: Vec<Ball>, run: &RunContext) -> Resu
         }
         first.push(faces.len() as u32);
     }
-    let tetrahedra = tetrahedra(&Triangles { faces: &faces, first: &first }, &around, run)?;
-    let mut collapse = Collapse::new(&tetrahedra, &lengths);
-    collapse.run(run)?;
-    let Collapse { is_open, mut left_out, .. } = collapse;
+    let tetrahedra = tetrahedra(&faces, &first, &around, run)?;
+    let (is_open, mut left_out) = collapse(&tetrahedra, &lengths, run)?;
     let rest = tetrahedra.iter().zip(is_open).filter(|&(_, is_open)| is_open);
     reduce(rest.map(|(&tetrahedron, _)| tetrahedron), &lengths, &mut left_out, run)?;
     let mut left_out = left_out.into_iter();
@@ -105,31 +103,16 @@ static TOUCHING_AFTER: LazyLock<[u32; 27]> = LazyLock::new(|| {
     })
 });
 
-/// Triangles, by their voxels.
-struct Triangles<'a> {
-    /// Ascending.
-    faces: &'a [[u32; 3]],
-    /// For each voxel the first triangle of which it is the first corner, and one more at the end.
-    first: &'a [u32],
-}
-
-impl Triangles<'_> {
-    fn find(&self, [a, b, c]: [u32; 3]) -> u32 {
-        let (from, to) = (self.first[a as usize], self.first[a as usize + 1]);
-        let own = &self.faces[from as usize..to as usize];
-        let place = own.binary_search(&[a, b, c]).expect("adjacent voxels have a triangle");
-        from + place as u32
-    }
-}
-
 /// The block of 2 x 2 x 2 voxels at the lowest corner of a neighbourhood, and how far its bits move
 /// to the other corners.
 const BLOCK: u32 = 0o033_033;
 const CORNERS: [u32; 8] = [0, 1, 3, 4, 9, 10, 12, 13];
 
-/// Step 1: each tetrahedron as its four triangles.
+/// Step 1: each tetrahedron as its four triangles. `faces` ascend; `first` has for each voxel the first
+/// of which it is the first corner, and one more at the end.
 fn tetrahedra(
-    triangles: &Triangles<'_>,
+    faces: &[[u32; 3]],
+    first: &[u32],
     around: &[Around],
     run: &RunContext,
 ) -> Result<Vec<[u32; 4]>> {
@@ -156,67 +139,60 @@ fn tetrahedra(
         own.sort_unstable();
         own.dedup();
         found.extend(own.iter().map(|&[a, b, c]| {
-            [[voxel, a, b], [voxel, a, c], [voxel, b, c], [a, b, c]].map(|t| triangles.find(t))
+            [[voxel, a, b], [voxel, a, c], [voxel, b, c], [a, b, c]].map(|t| {
+                let [from, to] = [0, 1].map(|k| first[t[0] as usize + k]);
+                let place = faces[from as usize..to as usize].binary_search(&t);
+                from + place.expect("adjacent voxels have a triangle") as u32
+            })
         }));
     }
     Ok(found)
 }
 
-/// Step 2.
-struct Collapse<'a> {
-    tetrahedra: &'a [[u32; 4]],
-    lengths: &'a [u8],
-    is_open: Vec<bool>,
-    left_out: Vec<bool>,
-    /// For each triangle the number of tetrahedra left at it, and the exclusive or of their ids: with
-    /// one left, that is its id.
-    beside: Vec<(u32, u32)>,
-    /// Triangles that have, or had, one tetrahedron.
-    free: BinaryHeap<(u8, Reverse<u32>)>,
-}
-
-impl<'a> Collapse<'a> {
-    fn new(tetrahedra: &'a [[u32; 4]], lengths: &'a [u8]) -> Self {
-        let mut beside = vec![(0, 0); lengths.len()];
-        for (k, tetrahedron) in (0..).zip(tetrahedra) {
-            for &triangle in tetrahedron {
-                let (count, all): &mut (u32, u32) = &mut beside[triangle as usize];
-                *count += 1;
-                *all ^= k;
+/// Step 2: whether each tetrahedron is still a void, and whether each triangle is left out.
+fn collapse(
+    tetrahedra: &[[u32; 4]],
+    lengths: &[u8],
+    run: &RunContext,
+) -> Result<(Vec<bool>, Vec<bool>)> {
+    // For each triangle the number of tetrahedra left at it, and the exclusive or of their ids: with
+    // one left, that is its id.
+    let mut beside = vec![(0_u32, 0_u32); lengths.len()];
+    for (k, tetrahedron) in (0..).zip(tetrahedra) {
+        for &triangle in tetrahedron {
+            let (count, all) = &mut beside[triangle as usize];
+            *count += 1;
+            *all ^= k;
+        }
+    }
+    // Triangles that have, or had, one tetrahedron.
+    let free = (0..).zip(&beside).filter(|(_, (count, _))| *count == 1);
+    let mut free: BinaryHeap<(u8, Reverse<u32>)> =
+        free.map(|(t, _): (u32, _)| (lengths[t as usize], Reverse(t))).collect();
+    let (mut is_open, mut left_out) = (vec![true; tetrahedra.len()], vec![false; lengths.len()]);
+    let mut steps = 0_usize;
+    while let Some((_, Reverse(triangle))) = free.pop() {
+        let (count, tetrahedron) = beside[triangle as usize];
+        // Its tetrahedron may have been opened through another triangle meanwhile.
+        if count != 1 {
+            continue;
+        }
+        steps += 1;
+        if steps.is_multiple_of(65_536) {
+            run.step(steps, tetrahedra.len())?;
+        }
+        left_out[triangle as usize] = true;
+        is_open[tetrahedron as usize] = false;
+        for side in tetrahedra[tetrahedron as usize] {
+            let (count, all) = &mut beside[side as usize];
+            *count -= 1;
+            *all ^= tetrahedron;
+            if *count == 1 {
+                free.push((lengths[side as usize], Reverse(side)));
             }
         }
-        let free = (0..).zip(&beside).filter(|(_, (count, _))| *count == 1);
-        let free = free.map(|(t, _): (u32, _)| (lengths[t as usize], Reverse(t))).collect();
-        let is_open = vec![true; tetrahedra.len()];
-        let left_out = vec![false; lengths.len()];
-        Self { tetrahedra, lengths, is_open, left_out, beside, free }
     }
-
-    fn run(&mut self, run: &RunContext) -> Result<()> {
-        let mut steps = 0_usize;
-        while let Some((_, Reverse(triangle))) = self.free.pop() {
-            let (count, tetrahedron) = self.beside[triangle as usize];
-            // Its tetrahedron may have been opened through another triangle meanwhile.
-            if count != 1 {
-                continue;
-            }
-            steps += 1;
-            if steps.is_multiple_of(65_536) {
-                run.step(steps, self.tetrahedra.len())?;
-            }
-            self.left_out[triangle as usize] = true;
-            self.is_open[tetrahedron as usize] = false;
-            for side in self.tetrahedra[tetrahedron as usize] {
-                let (count, all) = &mut self.beside[side as usize];
-                *count -= 1;
-                *all ^= tetrahedron;
-                if *count == 1 {
-                    self.free.push((self.lengths[side as usize], Reverse(side)));
-                }
-            }
-        }
-        Ok(())
-    }
+    Ok((is_open, left_out))
 }
 
 /// Step 3.

@@ -13,8 +13,9 @@ use super::flux::{Sphere, Surface};
 use super::lattice::{Descent, Grid, LatticeVoxels, Voxel, Wanted, betti, coarse_to_fine};
 use super::output::medial_mesh;
 use super::thinning::{FACES, Order, thin};
-use super::{AofParams, AofSettings, MAX_RESOLUTION, Start, Variant};
+use super::{AofParams, AofSettings, Auto, MAX_RESOLUTION, Start, Variant};
 use crate::Result;
+use crate::levels::within;
 
 /// A solid, ready for any lattice.
 pub struct Solid<'s> {
@@ -60,10 +61,7 @@ impl<'s> Solid<'s> {
     }
 
     fn wanted(&self) -> Wanted {
-        match self.params.variant {
-            Variant::Plain => Wanted::Kept,
-            Variant::Homotopy | Variant::Thinning => Wanted::All,
-        }
+        if self.params.variant == Variant::Plain { Wanted::Kept } else { Wanted::All }
     }
 
     /// The axis of a lattice for an object angle in degrees.
@@ -78,8 +76,8 @@ impl<'s> Solid<'s> {
                 axis.voxels.retain(|voxel| voxel.flux <= threshold);
                 return Ok(axis);
             }
-            Variant::Homotopy => Order::OutermostFirst { threshold },
-            Variant::Thinning => Order::ByFlux { threshold },
+            Variant::Homotopy => Order::OutermostFirst(threshold),
+            Variant::Thinning => Order::ByFlux(threshold),
         };
         let mut voxels = start.voxels.clone();
         thin(&mut voxels, order, &self.run)?;
@@ -145,10 +143,6 @@ impl TriedStart {
         let expected = expected.unwrap_or(self.betti);
         self.betti.iter().zip(expected).map(|(&b, e)| b.abs_diff(e)).sum()
     }
-
-    fn is_faithful(&self, expected: Option<[u64; 3]>) -> bool {
-        self.voxels > 0 && self.loss.is_none() && self.difference(expected) == 0
-    }
 }
 
 impl Solid<'_> {
@@ -192,10 +186,8 @@ impl Solid<'_> {
     }
 
     fn tried(&self, resolution: u32, start: &Descent) -> TriedStart {
-        let betti = match self.params.variant {
-            Variant::Plain => [0; 3],
-            Variant::Homotopy | Variant::Thinning => betti(start.voxels.iter()),
-        };
+        let is_plain = self.params.variant == Variant::Plain;
+        let betti = if is_plain { [0; 3] } else { betti(start.voxels.iter()) };
         let loss = self.loss_of_start(start, self.accepted_loss());
         TriedStart { resolution, betti, voxels: start.tally.start, loss }
     }
@@ -213,7 +205,9 @@ impl Solid<'_> {
         let requested = first.resolution;
         let mut all = vec![first];
         for refinement in 1..=REFINEMENTS {
-            if all.last().is_some_and(|start| start.is_faithful(expected)) {
+            if all.last().is_some_and(|start| {
+                start.voxels > 0 && start.loss.is_none() && start.difference(expected) == 0
+            }) {
                 break;
             }
             let resolution =
@@ -353,11 +347,7 @@ const MAX_VISITS: f64 = 2e7;
 impl Solid<'_> {
     /// Refuses lattices that have too many voxels along a side or do not fit into memory.
     fn check_resolution(&self, resolution: u32) -> Result<()> {
-        if resolution > MAX_RESOLUTION {
-            return Err(SimplifyError::Parameter(format!(
-                "resolution = {resolution}: above {MAX_RESOLUTION} voxels along the longest side"
-            )));
-        }
+        within("resolution", resolution, 1..=MAX_RESOLUTION)?;
         self.check_memory(resolution, self.megabytes(resolution))
     }
 
@@ -395,13 +385,6 @@ impl Solid<'_> {
         }
         fits
     }
-
-    /// About how many voxels a lattice of a resolution visits: those inside, and a layer along the
-    /// surface.
-    fn visits(&self, resolution: u32) -> f64 {
-        let side = self.grid(resolution).side;
-        self.volume / side.powi(3) + 2.0 * self.area / (side * side)
-    }
 }
 
 // The published level: the paper's lattice, or the finest that fits.
@@ -425,19 +408,18 @@ pub(super) fn published<'s>(
 ) -> Result<(Solid<'s>, Base)> {
     let params = settings.at(Level::Published).validate()?;
     let published = params.resolution;
-    let is_free = settings.resolution.is_auto();
+    let is_free = settings.resolution == Auto::Auto;
     let mut solid = Solid::new(shape, params, run.clone())?;
     if is_free {
         solid.params.resolution = solid.fitting_resolution();
     }
-    let is_fine = settings.start.is_auto()
+    let is_fine = settings.start == Auto::Auto
         && solid.descend(solid.params.resolution, Wanted::Places)?.tally.start == 0;
     if is_fine {
         solid.params.start = Start::Fine;
     }
     let mut base = solid.base()?;
-    let lowerings = if is_free { MAX_LOWERINGS } else { 0 };
-    for _ in 0..lowerings {
+    for _ in 0..if is_free { MAX_LOWERINGS } else { 0 } {
         let axis = solid.axis(&base.descent, solid.params.angle)?;
         let share = solid.megabytes_with_output(&base, &axis) / solid.params.max_memory;
         if share <= 1.0 {
@@ -525,12 +507,12 @@ impl Solid<'_> {
             self.loss(&axis.grid, &axis.voxels, LOST * axis.grid.side)
         };
         self.warn_of(loss, lattice, diagnostics);
-        if axis.voxels.len() != count {
-            let why = match axis.voxels.len() < count {
+        let left = axis.voxels.len();
+        if left != count {
+            let why = match left < count {
                 true => "the axis has no more voxels",
                 false => "fewer would change the topology",
             };
-            let left = axis.voxels.len();
             diagnostics
                 .warn(format!("{left} spheres instead of {count}: at resolution {lattice} {why}"));
         }
@@ -547,7 +529,10 @@ impl Solid<'_> {
             // At least a sixteenth finer, so that few tries suffice; at most twice, since estimates
             // from a coarse lattice are poor.
             let next = ideal.clamp(at + 1 + at / 16, 2 * at + 1);
-            if self.check_resolution(next).is_err() || self.visits(next) > MAX_VISITS {
+            // A descent visits the voxels inside, and a layer along the surface.
+            let side = self.grid(next).side;
+            let visits = self.volume / side.powi(3) + 2.0 * self.area / (side * side);
+            if self.check_resolution(next).is_err() || visits > MAX_VISITS {
                 break;
             }
             search.tried += 1;
@@ -623,7 +608,7 @@ impl Solid<'_> {
             axis.voxels.sort_unstable_by_key(Voxel::key);
         } else {
             let mut voxels = axis.bricks();
-            thin(&mut voxels, Order::Down { to: count }, &self.run)?;
+            thin(&mut voxels, Order::Down(count), &self.run)?;
             *axis = LatticeVoxels::sorted(axis.grid, &voxels);
         }
         Ok(())

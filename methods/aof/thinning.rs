@@ -42,47 +42,38 @@ use crate::Result;
 /// The voxels that are deleted, and their order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
-    /// Those with a flux above the threshold, the smallest distance first.
-    OutermostFirst {
-        /// Flux at or below which a voxel stays.
-        threshold: f32,
-    },
-    /// All but end points with a flux at or below the threshold, the largest flux first.
-    ByFlux {
-        /// Flux at or below which an end point stays.
-        threshold: f32,
-    },
-    /// All, the largest flux first, until `to` voxels are left.
-    Down {
-        /// Number of voxels to leave.
-        to: usize,
-    },
+    /// Those with a flux above this threshold, the smallest distance first.
+    OutermostFirst(f32),
+    /// All but end points with a flux at or below this threshold, the largest flux first.
+    ByFlux(f32),
+    /// All, the largest flux first, until this number of voxels is left.
+    Down(usize),
 }
 
 impl Order {
     fn key(self, voxel: &Voxel) -> f32 {
         match self {
-            Self::OutermostFirst { .. } => voxel.distance,
-            Self::ByFlux { .. } | Self::Down { .. } => -voxel.flux,
+            Self::OutermostFirst(_) => voxel.distance,
+            Self::ByFlux(_) | Self::Down(_) => -voxel.flux,
         }
     }
 
     /// The range of the keys.
     fn keys(self, voxels: &Bricks) -> [f32; 2] {
         match self {
-            Self::OutermostFirst { .. } => {
+            Self::OutermostFirst(_) => {
                 [0.0, voxels.iter().map(|voxel| voxel.distance).fold(0.0, f32::max)]
             }
-            Self::ByFlux { .. } | Self::Down { .. } => [-1.0, 1.0],
+            Self::ByFlux(_) | Self::Down(_) => [-1.0, 1.0],
         }
     }
 
     fn may_go(self, voxel: &Voxel) -> bool {
-        !matches!(self, Self::OutermostFirst { threshold } if voxel.flux <= threshold)
+        !matches!(self, Self::OutermostFirst(threshold) if voxel.flux <= threshold)
     }
 
     fn stays(self, voxel: &Voxel, neighbourhood: u32) -> bool {
-        matches!(self, Self::ByFlux { threshold }
+        matches!(self, Self::ByFlux(threshold)
             if voxel.flux <= threshold && is_end_point(neighbourhood))
     }
 }
@@ -93,7 +84,7 @@ impl Order {
 /// When the run was cancelled.
 pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<()> {
     let total = voxels.len();
-    let least = if let Order::Down { to } = order { to } else { 0 };
+    let least = if let Order::Down(to) = order { to } else { 0 };
     let mut queue = BucketQueue::new(order.keys(voxels));
     // Places in the queue, and end points that must not be queued again.
     let mut barred = voxels.no_marks();
@@ -284,6 +275,8 @@ impl BucketQueue {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
     use rayon::prelude::*;
 
     use super::*;
@@ -312,12 +305,11 @@ mod tests {
 
     #[test]
     fn simple_voxels_have_the_known_count_and_agree_with_the_definition() {
-        let mut state = 7_u32;
-        for k in 0..4000_u32 {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let mut rng = Pcg64::seed_from_u64(7);
+        for k in 0..4000 {
             // Sparse and dense ones too.
-            let word = (state >> 3) & if k % 3 == 0 { state.rotate_left(9) } else { u32::MAX };
-            let word = (if k % 3 == 1 { word | state.rotate_left(17) } else { word }) & 0x7ff_ffff;
+            let [word, other] = [(); 2].map(|()| rng.random_range(0..1_u32 << 27));
+            let word = [word, word & other, word | other][k % 3];
             assert_eq!(is_simple(word), is_simple_by_definition(word), "{word:027b}");
         }
         let with_centre = |k: u32| (k & 0x1fff) | (k >> 13 << 14);
@@ -347,16 +339,12 @@ mod tests {
     #[test]
     fn places_leave_by_key_and_then_as_they_came() {
         let mut queue = BucketQueue::new([-1.0, 1.0]);
-        let mut state = 3_u64;
+        let mut rng = Pcg64::seed_from_u64(3);
         let mut expected: Vec<(usize, usize, Place)> = Vec::new();
-        let mut next = |limit: u64| {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 33) % limit
-        };
         for round in 0..20_000 {
-            if next(5) < 3 {
+            if rng.random_range(0..5) < 3 {
                 // Few keys, some of them beyond the range.
-                let key = next(12) as usize;
+                let key = rng.random_range(0..12_usize);
                 let place = [round as u16, (round >> 3) as u16, key as u16];
                 queue.push((key as f32 - 5.0) * 0.2 * 1.2, place);
                 expected.push((key.min(10), round, place));

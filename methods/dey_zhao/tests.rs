@@ -2,7 +2,7 @@
 
 use medial::geometry::{CellId, Delaunay, Pole, Poles, VertexId};
 use medial::shape::ShapeOptions;
-use medial::simplifier::Level;
+use medial::simplifier::{Level, Simplification};
 use medial::surface;
 
 use super::*;

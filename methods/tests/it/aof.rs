@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use medial::Vec3;
-use medial::complex::{self, betti, cubical_betti};
+use medial::complex::{betti, cubical_betti};
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh, TriangleBvh};
@@ -28,20 +28,15 @@ fn solid<'s>(shape: &'s Shape, params: &AofParams) -> Solid<'s> {
 
 const HALF: Vec3 = Vec3::new(1.5, 1.0, 0.5);
 
-fn simplified(shape: &Shape, set: &[(&str, &str)], level: Level) -> Result<Simplified> {
-    aof::method().prepare(shape, &settings(set), &RunContext::default())?.at(level)
+/// With the parameters of a text such as `variant=plain resolution=50`.
+fn simplified(shape: &Shape, text: &str, level: Level) -> Result<Simplified> {
+    let set: Vec<_> = text.split(' ').filter_map(|pair| pair.split_once('=')).collect();
+    aof::method().prepare(shape, &settings(&set), &RunContext::default())?.at(level)
 }
 
-/// Bytes of a result: everything that is written.
-fn bytes_of(result: &Simplified) -> Vec<u64> {
-    let ball = |s: &complex::Sphere| [s.centre.x, s.centre.y, s.centre.z, s.radius];
-    let simplices = result.mesh.edges.iter().flatten().chain(result.mesh.faces.iter().flatten());
-    let voxels = result.extras.get::<LatticeVoxels>().into_iter().flat_map(|voxels| &voxels.voxels);
-    let balls = result.mesh.spheres.iter().flat_map(ball).map(f64::to_bits);
-    balls
-        .chain(simplices.map(|&v| u64::from(v)))
-        .chain(voxels.flat_map(|v| [v.distance, v.flux].map(|x| u64::from(x.to_bits()))))
-        .collect()
+/// Everything that is written, to the last bit: numbers are printed with all their digits.
+fn all_of(result: &Simplified) -> String {
+    format!("{:?} {:?}", result.mesh, result.extras.get::<LatticeVoxels>())
 }
 
 fn params(variant: Variant) -> AofParams {
@@ -58,36 +53,6 @@ fn flux_in_box(spiral: Spiral, samples: usize, sigma: f64, centre: Vec3) -> f64 
     Surface::of(&shape).expect("faces").flux(&sphere, centre, 0)
 }
 
-#[test]
-fn a_plane_and_a_corner_of_45_degrees_have_their_closed_forms() {
-    for spiral in [Spiral::EqualArea, Spiral::Classic] {
-        let sigma = 0.01;
-        // A sheet at distance t sigma from the centre: -1/2 (1 - t^2) sin alpha. Off the centre the
-        // field jumps where it is not tangent, which samples resolve less well.
-        for t in [0.0, 0.3, 0.6, 0.9] {
-            let tolerance = if t == 0.0 { 0.002 } else { 0.007 };
-            let expected = -0.5 * (1.0 - t * t);
-            let middle = flux_in_box(spiral, 500, sigma, Vec3::new(0.1, 0.2, t * sigma));
-            assert!((middle - expected).abs() < tolerance, "{spiral:?} {t}: {middle}");
-            let depth = 0.2;
-            let across = Vec3::new(1.0, 0.0, -1.0).normalize() * (t * sigma);
-            let on_sheet = Vec3::new(HALF.x - depth, 0.1, HALF.z - depth);
-            let corner = flux_in_box(spiral, 500, sigma, on_sheet + across);
-            let expected = expected * 0.5_f64.sqrt();
-            assert!((corner - expected).abs() < tolerance, "{spiral:?} {t}: {corner}");
-        }
-    }
-}
-
-/// The box `3 x 2 x 1` with `resolution` voxels along its longest side.
-fn box_flux(resolution: u32) -> (Grid, f64, Vec<Voxel>) {
-    let shape = shape_of(&cuboid(HALF));
-    let solid = solid(&shape, &params(Variant::Plain));
-    let descent = solid.descend(resolution, Wanted::Kept).expect("fits");
-    let diagonal = shape.normalisation().diagonal;
-    (solid.grid(resolution), diagonal, descent.voxels.iter().collect())
-}
-
 /// Depths of a centre below the faces of the box, in its own units: along x, y, z.
 fn depths(grid: &Grid, diagonal: f64, voxel: &Voxel) -> Vec3 {
     HALF - (grid.centre(voxel.place) * diagonal).abs()
@@ -98,16 +63,19 @@ fn depths(grid: &Grid, diagonal: f64, voxel: &Voxel) -> Vec3 {
 /// offset of 0.58 sigma.
 #[test]
 fn sheets_of_the_box_have_the_flux_of_the_paper() {
+    let shape = shape_of(&cuboid(HALF));
+    let diagonal = shape.normalisation().diagonal;
+    let solid = solid(&shape, &params(Variant::Plain));
     // 99 voxels: 33 across the thickness, so that the middle sheet runs through centres. 90 voxels:
     // it runs midway between them.
     for (resolution, offset, flux, tolerance) in [(99, 0.0, 0.5, 0.012), (90, 0.5, 0.375, 0.03)] {
-        let (grid, diagonal, voxels) = box_flux(resolution);
+        let Descent { grid, voxels, .. } = solid.descend(resolution, Wanted::Kept).expect("fits");
         let sigma = grid.side * diagonal;
         // Away from seams, where two depths are the same, by 2 sigma.
         let seam = 2.0 * 2.0_f64.sqrt() * sigma;
         let (mut middle, mut inclined) = (0, 0);
-        for voxel in &voxels {
-            let Vec3 { x, y, z } = depths(&grid, diagonal, voxel);
+        for voxel in voxels.iter() {
+            let Vec3 { x, y, z } = depths(&grid, diagonal, &voxel);
             if (HALF.z - z - offset * sigma).abs() < 1e-9 && x.min(y) - z > seam {
                 middle += 1;
                 assert!((voxel.flux + flux).abs() < tolerance, "middle {voxel:?}");
@@ -178,50 +146,59 @@ fn at_most_two_voxels_across_a_sheet_along_the_lattice() {
     }
 }
 
-/// The shapes of a default comparison: voxels of all the others take minutes and show the same.
-fn usual_shapes() -> Vec<BuiltIn> {
-    medial_datasets::catalogue().into_iter().filter(|shape| shape.in_default).collect()
-}
-
-/// A void, a loop, two components, and a reflex edge.
-fn few_shapes() -> Vec<BuiltIn> {
-    ["hollow-sphere", "torus", "pair", "bracket"]
-        .map(|id| medial_datasets::find(id).expect("in the catalogue"))
-        .into()
-}
-
-fn assert_variants_keep_the_start(shapes: &[BuiltIn], resolutions: &[u32], of_base: u32) {
+/// On lattices of a resolution, and at an angle: homotopic variants keep the Betti numbers of the start
+/// set, the base has those of the solid, and medial meshes have those of their voxels.
+fn assert_topology_is_kept(shapes: &[BuiltIn], lattices: &[(u32, f64)], counts: &[usize]) {
     for built_in in shapes {
         let id = built_in.id;
         let shape = shape_of(&built_in.mesh(built_in.default_resolution));
-        for variant in [Variant::Homotopy, Variant::Thinning] {
-            for &resolution in resolutions {
-                let (axis, start) = axis_at(&shape, &params(variant), resolution, 30.0);
+        for &(resolution, angle) in lattices {
+            for variant in [Variant::Homotopy, Variant::Thinning] {
+                let (axis, start) = axis_at(&shape, &params(variant), resolution, angle);
                 let places: Vec<_> = start.voxels.iter().map(|v| v.place.map(u32::from)).collect();
-                let betti = axis.betti();
-                assert_eq!(betti, cubical_betti(&places), "{id} {variant:?} {resolution}");
+                assert_eq!(axis.betti(), cubical_betti(&places), "{id} {variant:?} {resolution}");
                 assert!(axis.voxels.len() <= places.len());
             }
+            for variant in ["plain", "homotopy", "thinning"] {
+                let text = format!("variant={variant} resolution={resolution} refine=false");
+                match simplified(&shape, &text, Level::Native(angle)) {
+                    Ok(result) => assert_same_topology(&result, &format!("{id} {text} {angle}")),
+                    Err(SimplifyError::Parameter(why)) => {
+                        assert!(why.contains("thinner than a voxel"), "{id} {text}: {why}");
+                    }
+                    Err(error) => panic!("{id} {text}: {error}"),
+                }
+            }
         }
-        let params = AofParams { resolution: of_base, ..params(Variant::Thinning) };
+        let params = AofParams { resolution: 48, ..params(Variant::Thinning) };
         let base = solid(&shape, &params).base().expect("fits");
         let places: Vec<_> = base.descent.voxels.iter().map(|v| v.place.map(u32::from)).collect();
         let betti = cubical_betti(&places);
         assert_eq!(betti, built_in.expected_betti, "{id} at {}", base.resolution);
         assert_eq!(base.topology, Some(betti));
+        for &count in counts {
+            let result = simplified(&shape, "", Level::Spheres(count)).expect("a count");
+            assert_same_topology(&result, &format!("{id} at {count}"));
+        }
     }
 }
 
 #[test]
-fn homotopic_variants_keep_the_topology_of_the_start_set() {
-    // Coarse lattices, where the start set falls apart.
-    assert_variants_keep_the_start(&few_shapes(), &[15, 24], 48);
+fn the_topology_is_kept_from_the_start_set_to_the_medial_mesh() {
+    // A void, a loop, two components, and a reflex edge.
+    let shapes = ["hollow-sphere", "torus", "pair", "bracket"]
+        .map(|id| medial_datasets::find(id).expect("in the catalogue"));
+    // Coarse start sets fall apart; a small angle leaves thick ones.
+    assert_topology_is_kept(&shapes, &[(14, 30.0), (15, 30.0), (24, 3.0)], &[60]);
 }
 
 #[test]
 #[ignore = "nightly"]
-fn homotopic_variants_keep_the_topology_on_all_shapes() {
-    assert_variants_keep_the_start(&usual_shapes(), &[15, 24, 60], 48);
+fn the_topology_is_kept_on_all_shapes() {
+    // Those of a default comparison: voxels of all the others take minutes and show the same.
+    let shapes = medial_datasets::catalogue().into_iter().filter(|shape| shape.in_default);
+    let lattices = [(14, 30.0), (15, 30.0), (24, 30.0), (30, 3.0), (40, 45.0), (60, 30.0)];
+    assert_topology_is_kept(&shapes.collect::<Vec<_>>(), &lattices, &[400, 60]);
 }
 
 /// Shared meshes: three holes, and four. The start set has them too, or a warning says where not.
@@ -278,52 +255,12 @@ fn assert_same_topology(result: &Simplified, what: &str) {
     assert_eq!(result.mesh.check(), Ok(()), "{what}");
 }
 
-fn assert_meshes_have_the_betti_numbers(
-    shapes: &[BuiltIn],
-    levels: &[(&str, f64)],
-    counts: &[usize],
-) {
-    for built_in in shapes {
-        let shape = shape_of(&built_in.mesh(built_in.default_resolution));
-        for variant in ["plain", "homotopy", "thinning"] {
-            for &(resolution, angle) in levels {
-                let set = [("variant", variant), ("resolution", resolution), ("refine", "false")];
-                let what = format!("{} {set:?} {angle}", built_in.id);
-                match simplified(&shape, &set, Level::Native(angle)) {
-                    Ok(result) => assert_same_topology(&result, &what),
-                    Err(SimplifyError::Parameter(why)) => {
-                        assert!(why.contains("thinner than a voxel"), "{what}: {why}");
-                    }
-                    Err(error) => panic!("{what}: {error}"),
-                }
-            }
-        }
-        for &count in counts {
-            let result = simplified(&shape, &[], Level::Spheres(count)).expect("a count");
-            assert_same_topology(&result, &format!("{} at {count}", built_in.id));
-        }
-    }
-}
-
-#[test]
-fn medial_meshes_have_the_betti_numbers_of_their_voxels() {
-    // Coarse ones fall apart; a small angle leaves thick ones.
-    assert_meshes_have_the_betti_numbers(&few_shapes(), &[("14", 30.0), ("24", 3.0)], &[60]);
-}
-
-#[test]
-#[ignore = "nightly"]
-fn medial_meshes_of_all_shapes_have_the_betti_numbers_of_their_voxels() {
-    let levels = [("14", 30.0), ("30", 3.0), ("40", 45.0)];
-    assert_meshes_have_the_betti_numbers(&usual_shapes(), &levels, &[400, 60]);
-}
-
 #[test]
 fn voxels_carry_the_distances_of_their_centres_and_their_flux() {
     let shape = built_in("bracket");
     let tree = shape.surface_tree().expect("faces");
-    let set = [("variant", "plain"), ("refine", "false")];
-    let result = simplified(&shape, &set, Level::Native(30.0)).expect("an angle");
+    let result = simplified(&shape, "variant=plain refine=false", Level::Native(30.0));
+    let result = result.expect("an angle");
     let voxels = result.extras.get::<LatticeVoxels>().expect("voxels");
     for (voxel, ball) in voxels.voxels.iter().zip(&result.mesh.spheres) {
         let centre = voxels.grid.centre(voxel.place);
@@ -331,27 +268,27 @@ fn voxels_carry_the_distances_of_their_centres_and_their_flux() {
         assert!((tree.closest(centre).distance - f64::from(voxel.distance)).abs() < 1e-7);
         assert!((-1.0..=-0.125 * 0.5).contains(&(voxel.flux - 1e-7)), "{voxel:?}");
     }
-    let [other] = &common::levels(&shape, "angle", &[], &[Level::Spheres(10)])[..] else {
-        panic!()
-    };
-    assert!(other.as_ref().expect("a count").extras.get::<LatticeVoxels>().is_none());
+    let other = common::levels(&shape, "angle", &[], &[Level::Spheres(10)]).remove(0);
+    assert!(other.expect("a count").extras.get::<LatticeVoxels>().is_none());
 }
 
-/// Closed forms over one plane, and next to its border.
+/// Over one plane, next to its border, and on sheets through and off the centre.
 #[test]
 fn the_flux_of_a_convex_solid_is_the_sum_over_its_nearest_planes() {
-    let sphere = Sphere::new(Spiral::Classic, 50, 0.01);
-    for centre in [[0.2, 0.1, 0.4], [1.4, 0.1, 0.0], [0.2, 0.1, 0.005], [1.4, 0.1, 0.395]] {
-        let centre = Vec3::from(centre);
-        let flux = flux_in_box(Spiral::Classic, 50, sphere.radius, centre);
-        let along = |n: &Vec3| {
-            let depth = HALF - (centre + *n * sphere.radius).abs();
-            let least = depth.min_element();
-            let axis = (0..3).find(|&axis| depth[axis] == least).expect("an axis");
-            -n[axis] * (centre + *n * sphere.radius)[axis].signum()
-        };
-        let expected = sphere.directions.iter().map(along).sum::<f64>() / 50.0;
-        assert!((flux - expected).abs() < 1e-12, "{centre}: {flux} {expected}");
+    for spiral in [Spiral::EqualArea, Spiral::Classic] {
+        let sphere = Sphere::new(spiral, 50, 0.01);
+        for centre in [[0.2, 0.1, 0.4], [1.4, 0.1, 0.0], [0.2, 0.1, 0.005], [1.4, 0.1, 0.395]] {
+            let centre = Vec3::from(centre);
+            let flux = flux_in_box(spiral, 50, sphere.radius, centre);
+            let along = |n: &Vec3| {
+                let depth = HALF - (centre + *n * sphere.radius).abs();
+                let least = depth.min_element();
+                let axis = (0..3).find(|&axis| depth[axis] == least).expect("an axis");
+                -n[axis] * (centre + *n * sphere.radius)[axis].signum()
+            };
+            let expected = sphere.directions.iter().map(along).sum::<f64>() / 50.0;
+            assert!((flux - expected).abs() < 1e-12, "{spiral:?} {centre}: {flux} {expected}");
+        }
     }
 }
 
@@ -359,14 +296,11 @@ fn the_flux_of_a_convex_solid_is_the_sum_over_its_nearest_planes() {
 fn one_and_two_threads_give_the_same_bytes() {
     let shape = built_in("bracket");
     for variant in ["plain", "homotopy", "thinning"] {
+        let text = format!("variant={variant} resolution=50");
         for level in [Level::Native(25.0), Level::Spheres(150)] {
-            let [one, two, three] = [1, 2, 3].map(|threads| {
-                with_threads(threads, || {
-                    let set = [("variant", variant), ("resolution", "50")];
-                    bytes_of(&simplified(&shape, &set, level).expect("a result"))
-                })
-            });
-            assert!(one.len() > 500);
+            let result = || all_of(&simplified(&shape, &text, level).expect("a result"));
+            let [one, two, three] = [1, 2, 3].map(|threads| with_threads(threads, result));
+            assert!(one.len() > 5000);
             assert!(one == two && one == three, "{variant} {level:?}");
         }
     }
@@ -374,14 +308,13 @@ fn one_and_two_threads_give_the_same_bytes() {
 
 #[test]
 fn larger_angles_leave_fewer_voxels() {
-    let shape = built_in("torus");
+    let (shape, angles) = (built_in("torus"), [5.0, 30.0, 60.0, 90.0].map(Level::Native));
     for variant in ["plain", "homotopy", "thinning"] {
         let set = [("variant", variant), ("resolution", "40")];
-        let run = RunContext::default();
-        let mut prepared = aof::method().prepare(&shape, &settings(&set), &run).expect("prepared");
-        let counts = [5.0, 30.0, 60.0, 90.0]
-            .map(|angle| prepared.at(Level::Native(angle)).expect("an angle").mesh.spheres.len());
-        assert!(counts.windows(2).all(|pair| pair[0] >= pair[1]), "{variant}: {counts:?}");
+        let found = common::levels(&shape, "aof", &set, &angles).into_iter();
+        let counts: Vec<_> =
+            found.map(|level| level.expect("an angle").mesh.spheres.len()).collect();
+        assert!(counts.is_sorted_by(|fine, coarse| fine >= coarse), "{variant}: {counts:?}");
         assert!(counts[0] > counts[3], "{variant}: {counts:?}");
     }
 }
@@ -407,7 +340,7 @@ fn cube_with_rod(rod: f64) -> TriMesh {
 fn a_limb_thinner_than_the_lattice_is_resolved_or_named() {
     // The lattice has voxels of 2.5 / 54 = 0.046: a rod of half width 0.03 has none.
     let shape = shape_of(&cube_with_rod(0.03));
-    let result = simplified(&shape, &[], Level::Native(30.0)).expect("an angle");
+    let result = simplified(&shape, "", Level::Native(30.0)).expect("an angle");
     let highest = |result: &Simplified| {
         let heights =
             result.mesh.spheres.iter().map(|s| shape.normalisation().backward(s.centre).z);
@@ -416,18 +349,17 @@ fn a_limb_thinner_than_the_lattice_is_resolved_or_named() {
     assert!(highest(&result) > 1.8, "{} {:?}", highest(&result), result.diagnostics);
     assert!(result.diagnostics.warnings.iter().any(|w| w.contains("instead of 54")));
     // The plain rule takes the lattice as it is, and one warning names the loss.
-    let plain = [("variant", "plain")];
-    let lost = simplified(&shape, &plain, Level::Native(30.0)).expect("an angle");
+    let lost = simplified(&shape, "variant=plain", Level::Native(30.0)).expect("an angle");
     assert!(highest(&lost) < 0.6, "{}", highest(&lost));
     let [warning] = &lost.diagnostics.warnings[..] else { panic!("{:?}", lost.diagnostics) };
     assert!(warning.contains("resolution = 54: the surface at"), "{warning}");
     assert!(warning.contains("2.0000"), "the end of the rod: {warning}");
-    let finer = [("variant", "plain"), ("resolution", "160")];
-    let found = simplified(&shape, &finer, Level::Native(30.0)).expect("an angle");
+    let found = simplified(&shape, "variant=plain resolution=160", Level::Native(30.0));
+    let found = found.expect("an angle");
     assert!(highest(&found) > 1.8, "{:?}", found.diagnostics);
     // A rod that no affordable lattice resolves.
     let shape = shape_of(&cube_with_rod(0.002));
-    let result = simplified(&shape, &[], Level::Native(30.0)).expect("an angle");
+    let result = simplified(&shape, "", Level::Native(30.0)).expect("an angle");
     assert!(result.diagnostics.warnings.iter().any(|w| w.contains("raise resolution")));
 }
 
@@ -435,23 +367,23 @@ fn a_limb_thinner_than_the_lattice_is_resolved_or_named() {
 fn counts_are_met_on_coarser_and_finer_lattices() {
     // A count below that of the lattice is met on a coarser one.
     for count in [500, 100] {
-        let result = simplified(&built_in("box"), &[], Level::Spheres(count)).expect("a count");
+        let result = simplified(&built_in("box"), "", Level::Spheres(count)).expect("a count");
         assert_eq!(result.mesh.spheres.len(), count);
         let counts: BTreeMap<_, _> = result.diagnostics.counts.into_iter().collect();
         assert_eq!(["voxel_b0", "voxel_b1", "voxel_b2"].map(|name| counts[name]), [1, 0, 0]);
         assert!(counts["lattice"] < 60);
     }
-    let set = [("resolution", "24")];
+    let text = "resolution=24";
     for id in ["bracket", "torus", "capsule"] {
         let shape = built_in(id);
-        let own = simplified(&shape, &set, Level::Native(30.0)).expect("an angle");
+        let own = simplified(&shape, text, Level::Native(30.0)).expect("an angle");
         let count = own.mesh.spheres.len() + 57;
-        let result = simplified(&shape, &set, Level::Spheres(count)).expect("a count");
+        let result = simplified(&shape, text, Level::Spheres(count)).expect("a count");
         assert_eq!(result.mesh.spheres.len(), count, "{id}: {:?}", result.diagnostics);
         assert_eq!(Some(betti(&result.mesh)), shape.expected_betti(), "{id}");
     }
     // A ball has one voxel on any lattice: the search for more ends with a warning.
-    let result = simplified(&built_in("sphere"), &set, Level::Spheres(500)).expect("a count");
+    let result = simplified(&built_in("sphere"), text, Level::Spheres(500)).expect("a count");
     assert!(result.mesh.spheres.len() < 500);
     assert!(result.diagnostics.warnings.iter().any(|w| w.contains("instead of 500")));
 }
@@ -459,28 +391,20 @@ fn counts_are_met_on_coarser_and_finer_lattices() {
 #[test]
 fn the_published_level_has_the_parameters_of_the_paper() {
     let shape = built_in("box");
-    let set = [("resolution", "99"), ("max_memory", "4000")];
-    let published = simplified(&shape, &set, Level::Published).expect("published");
-    let named = [
-        ("variant", "plain"),
-        ("spiral", "classic"),
-        ("start", "coarse"),
-        ("dismiss", "zero"),
-        ("refine", "false"),
-        ("mu", "0.5"),
-    ];
+    let lattice = "resolution=99 max_memory=4000";
+    let published = simplified(&shape, lattice, Level::Published).expect("published");
+    let named = "variant=plain spiral=classic start=coarse dismiss=zero refine=false mu=0.5";
     let angle = 0.4_f64.asin().to_degrees();
-    let same = simplified(&shape, &[&set[..], &named].concat(), Level::Native(angle));
-    assert_eq!(bytes_of(&published), bytes_of(&same.expect("an angle")));
+    let same = simplified(&shape, &format!("{lattice} {named}"), Level::Native(angle));
+    assert_eq!(all_of(&published), all_of(&same.expect("an angle")));
     let voxels = published.extras.get::<LatticeVoxels>().expect("voxels");
     assert!(!voxels.voxels.is_empty() && voxels.voxels.iter().all(|v| v.flux <= -0.2 + 1e-7));
     // Nothing set: the lattice of the paper, unless memory says otherwise.
-    let small = [("max_memory", "60")];
-    let lowered = simplified(&shape, &small, Level::Published).expect("published");
+    let lowered = simplified(&shape, "max_memory=60", Level::Published).expect("published");
     let warnings = &lowered.diagnostics.warnings;
     assert!(warnings.iter().any(|w| w.contains("instead of the published 369")), "{warnings:?}");
     // Set by the user it is refused instead.
-    let refused = simplified(&shape, &[("resolution", "369"), small[0]], Level::Published);
+    let refused = simplified(&shape, "resolution=369 max_memory=60", Level::Published);
     assert!(matches!(refused, Err(SimplifyError::Parameter(m)) if m.contains("max_memory")));
 }
 
@@ -498,53 +422,44 @@ fn what_is_dismissed_depends_on_the_rule() {
 
 #[test]
 fn bad_input_is_refused_by_name() {
-    let shape = built_in("box");
-    let count = Level::Spheres(10);
-    for (set, level, expected) in [
-        (
-            &[("resolution", "5000")][..],
-            count,
-            "above max_memory = 2000; lower resolution or raise",
-        ),
-        (&[("resolution", "0")], count, "resolution"),
-        (&[("resolution", "300"), ("max_memory", "8")], count, "above max_memory = 8;"),
-        (&[("max_memory", "1e-9")], count, "above max_memory = 0.000000001;"),
-        (&[("max_memory", "0")], count, "give megabytes"),
+    let (shape, count) = (built_in("box"), Level::Spheres(10));
+    for (text, level, expected) in [
+        ("resolution=5000", count, "above max_memory = 2000; lower resolution or raise"),
+        ("resolution=0", count, "resolution = 0 is outside [1, 60000]"),
+        ("resolution=300 max_memory=8", count, "above max_memory = 8;"),
+        ("max_memory=1e-9", count, "above max_memory = 0.000000001;"),
+        ("max_memory=0", count, "max_memory = 0.0 is outside (0.0, inf)"),
         // The voxels fit, their medial mesh does not.
-        (
-            &[("resolution", "60"), ("max_memory", "8"), ("variant", "plain")],
-            Level::Native(20.0),
-            "resolution = 60: about",
-        ),
-        (&[("resolution", "1"), ("variant", "plain")], count, "thinner than a voxel everywhere"),
-        (&[("mu", "1")], count, "[0, 0.75]"),
-        (&[("angle", "0")], count, "above 0"),
-        (&[("angle", "-10")], count, "above 0"),
-        (&[], Level::Native(0.0), "above 0"),
-        (&[], Level::Spheres(0), "at least one sphere"),
-        (&[("samples", "70/x")], count, "70/60/50"),
-        (&[("samples", "5")], count, "70/60/50"),
-        (&[("samples", "-50")], count, "70/60/50"),
-        (&[("samples", "60/50")], count, "one for each"),
-        (&[("samples", "80/70/60/50")], count, "one for each"),
-        (&[("samples", "70/60"), ("levels", "1")], count, "one for each"),
-        (&[("d", "1")], count, "2 or more"),
-        (&[("levels", "40")], count, "fewer levels"),
+        ("resolution=60 max_memory=8 variant=plain", Level::Native(20.0), "resolution = 60: about"),
+        ("resolution=1 variant=plain", count, "thinner than a voxel everywhere"),
+        ("mu=1", count, "mu = 1.0 is outside [0.0, 0.75]"),
+        ("angle=0", count, "angle = 0.0 is outside (0.0, 90.0]"),
+        ("angle=-10", count, "angle = -10.0 is outside (0.0, 90.0]"),
+        ("", Level::Native(0.0), "angle = 0.0 is outside (0.0, 90.0]"),
+        ("", Level::Spheres(0), "at least one sphere"),
+        ("samples=70/x", count, "such as 70/60/50"),
+        ("samples=5", count, "such as 70/60/50"),
+        ("samples=-50", count, "such as 70/60/50"),
+        ("samples=60/50", count, "for each of 3 levels"),
+        ("samples=80/70/60/50", count, "for each of 3 levels"),
+        ("samples=70/60 levels=1", count, "for each of 1 levels"),
+        ("d=1", count, "d = 1 is outside [2, inf)"),
+        ("levels=0", count, "levels = 0 is outside [1, inf)"),
+        ("levels=40", count, "d^(levels - 1) = 4294967295 is outside [0, 1024]"),
     ] {
-        match simplified(&shape, set, level) {
+        match simplified(&shape, text, level) {
             Err(SimplifyError::Parameter(message) | SimplifyError::Level(message)) => {
-                assert!(message.contains(expected), "{set:?}: {message}");
+                assert!(message.contains(expected), "{text}: {message}");
             }
-            other => panic!("{set:?}: {other:?}"),
+            other => panic!("{text}: {other:?}"),
         }
     }
-    for (samples, levels) in [("50", "3"), ("60/50", "2"), ("50", "2"), ("70/60/50", "2")] {
-        let set = [("samples", samples), ("levels", levels)];
-        assert!(simplified(&shape, &set, count).is_ok(), "{samples} for {levels} levels");
+    for text in ["samples=50", "samples=60/50 levels=2", "samples=50 levels=2", "levels=2"] {
+        assert!(simplified(&shape, text, count).is_ok(), "{text}");
     }
     // So thin that no lattice has a voxel, or only one beyond memory.
     for height in [1e-6, 1e-3] {
-        let refused = simplified(&shape_of(&cuboid(Vec3::new(1.0, 1.0, height))), &[], count);
+        let refused = simplified(&shape_of(&cuboid(Vec3::new(1.0, 1.0, height))), "", count);
         assert!(matches!(refused, Err(SimplifyError::Parameter(_))), "{height}");
     }
 }
@@ -555,16 +470,14 @@ fn cancelling_ends_the_run_at_every_stage() {
     let shape = built_in("torus");
     // Cancels after a number of reports; the outcome, and the number of all reports.
     let cancelled_after = |limit: usize| {
-        let run = RunContext::default();
-        let (flag, reports) = (run.cancel_flag(), Arc::new(AtomicUsize::new(0)));
-        let counted = Arc::clone(&reports);
+        let (run, reports) = (RunContext::default(), Arc::new(AtomicUsize::new(0)));
+        let (flag, counted) = (run.cancel_flag(), Arc::clone(&reports));
         let run = run.on_progress(move |progress| {
             assert!(progress.done <= progress.total, "{progress:?}");
             flag.store(counted.fetch_add(1, Relaxed) >= limit, Relaxed);
         });
-        let outcome = aof::method()
-            .prepare(&shape, &settings(&[]), &run)
-            .and_then(|mut prepared| prepared.at(Level::Native(30.0)));
+        let prepared = aof::method().prepare(&shape, &settings(&[]), &run);
+        let outcome = prepared.and_then(|mut prepared| prepared.at(Level::Native(30.0)));
         (outcome, reports.load(Relaxed))
     };
     let (outcome, all) = cancelled_after(usize::MAX);
