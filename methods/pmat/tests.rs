@@ -244,19 +244,4 @@ proptest! {
             prop_assert_eq!(c < d, g < h);
         }
     }
-
-    /// The key orders as the pair of cost and length does.
-    #[test]
-    fn keys_order_as_costs(x in prop::array::uniform4(0..6_u32), y in prop::array::uniform4(0..6_u32)) {
-        let edge = |[p, r, q, s]: [u32; 4]| {
-            let at = |x: u32, r: u32| sphere(f64::from(x) / 3.0, f64::from(r) / 5.0);
-            let ends = [at(p, r), at(q, s)];
-            let cost = absorption_scale(ends[0], ends[1]);
-            let length = ends[0].centre.distance(ends[1].centre);
-            (Key::of(ends), (cost, if cost.is_finite() { 0.0 } else { length }))
-        };
-        let ((key, pair), (other_key, other_pair)) = (edge(x), edge(y));
-        prop_assert_eq!(Some(key.cmp(&other_key)), pair.partial_cmp(&other_pair));
-        prop_assert_eq!(key.cost(), pair.0);
-    }
 }

@@ -399,36 +399,3 @@ fn k_boundary(a: Sphere, b: Sphere, params: &QmatParams) -> Option<(f64, f64)> {
         Boundary::None => None,
     }
 }
-
-#[cfg(test)]
-mod accumulate_tests {
-    use medial::geometry::Slab;
-    use rand::{RngExt, SeedableRng};
-    use rand_pcg::Pcg64;
-
-    use super::*;
-
-    #[test]
-    fn boundary_planes_close_slabs() {
-        let mut rng = Pcg64::seed_from_u64(7);
-        for _ in 0..2000 {
-            let [a, b, c] = [(); 3].map(|()| {
-                let centre = Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
-                Sphere::new(centre, rng.random::<f64>() * 0.5)
-            });
-            let Some(n) = boundary_edge_normal([a, b], c) else {
-                assert!(Cone::new(a, b).larger().is_some());
-                continue;
-            };
-            let (span, aside) = (b.centre - a.centre, c.centre - a.centre);
-            let turn = span.cross(aside).normalize();
-            assert!((n.length() - 1.0).abs() < 1e-13);
-            assert!((n.dot(span) + b.radius - a.radius).abs() < 1e-12);
-            assert!(n.dot(turn).abs() < 1e-9);
-            assert!(n.dot(aside - span * (aside.dot(span) / span.length_squared())) <= 0.0);
-        }
-        let line = [0.0, 1.0, 2.0].map(|x| Sphere::new(Vec3::X * x, 0.5));
-        assert_eq!(boundary_edge_normal([line[0], line[1]], line[2]), None);
-        assert_eq!(Slab::new(line).planes(), None);
-    }
-}

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, betti};
-use medial::geometry::{Cone, SlabPlanes};
 use medial::simplifier::{Params, RunContext};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -334,8 +333,8 @@ fn parameters_are_typed_and_checked() {
 }
 
 // ----------------------------------------------------------------------------
-// Quadrics against their definition, their null spaces, and the singularity test against
-// eigenvalues.
+// Quadrics against their definition, and the singularity test against eigenvalues. Those of slabs, cones
+// and boundaries are compared by what they lead to, with the oracle below.
 
 fn vector() -> impl Strategy<Value = Vec3> {
     prop::array::uniform3(-1.0..1.0f64).prop_map(Vec3::from)
@@ -343,14 +342,6 @@ fn vector() -> impl Strategy<Value = Vec3> {
 
 fn sphere() -> impl Strategy<Value = Sphere> {
     (vector(), 0.0..0.5f64).prop_map(|(centre, radius)| Sphere::new(centre, radius))
-}
-
-fn slab(spheres: [Sphere; 3]) -> Option<Quadric> {
-    let mut quadric = Quadric::default();
-    for normal in SlabPlanes::new(spheres)?.normals() {
-        quadric.add_plane(normal, spheres[0], 1.0);
-    }
-    Some(quadric)
 }
 
 proptest! {
@@ -374,41 +365,6 @@ proptest! {
             let moved = Sphere::new(best.centre + 1e-3 * step.0, best.radius + 1e-3 * step.1);
             prop_assert!(value(best) <= value(moved) + 1e-9);
         }
-    }
-
-    /// A slab's quadric vanishes on the affine span of its spheres and has no unique minimiser.
-    #[test]
-    fn slab_quadrics_vanish_on_the_affine_span(
-        spheres in prop::array::uniform3(sphere()),
-        weights in prop::array::uniform2(-2.0..2.0f64),
-    ) {
-        let Some(quadric) = slab(spheres) else { return Ok(()) };
-        let [a, b, c] = spheres;
-        let [s, t] = weights;
-        let mix = |x: f64, y: f64, z: f64| (1.0 - s - t) * x + s * y + t * z;
-        let centre = (1.0 - s - t) * a.centre + s * b.centre + t * c.centre;
-        let affine = Sphere::new(centre, mix(a.radius, b.radius, c.radius));
-        prop_assert!(quadric.value(affine) < 1e-24_f64.max(1e-13 * quadric.value(Sphere::new(centre, 9.0))));
-        prop_assert!(quadric.value(Sphere::new(centre, affine.radius + 0.1)) > 0.019);
-        prop_assert_eq!(quadric.minimiser(1e-10), None);
-    }
-
-    /// A cone's quadric does not depend on where the first of its four planes is, whatever the
-    /// frame: `A = [4s²uuᵀ + 2(1-s²)(I-uuᵀ), -4su; -4suᵀ, 4]`, null along the cone.
-    #[test]
-    fn cone_quadrics_do_not_depend_on_the_frame(a in sphere(), b in sphere(), at in sphere()) {
-        let Some(frame) = Cone::new(a, b).frame() else { return Ok(()) };
-        let mut quadric = Quadric::default();
-        for normal in frame.normals() {
-            quadric.add_plane(normal, a, 1.0);
-        }
-        let (w, dr) = (at.centre - a.centre, at.radius - a.radius);
-        let (u, s) = (frame.u, frame.s);
-        let along = w.dot(u);
-        let across = (w - along * u).length_squared();
-        let expected = 4.0 * (dr - s * along).powi(2) + 2.0 * (1.0 - s * s) * across;
-        prop_assert!((quadric.value(at) - expected).abs() < 1e-12);
-        prop_assert_eq!(quadric.minimiser(1e-10), None);
     }
 
     /// Whether a quadric is singular is decided by the eigenvalues of `A`, known here by making:

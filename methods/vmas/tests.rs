@@ -227,17 +227,6 @@ fn points_have_the_area_of_the_surface() {
 }
 
 #[test]
-fn normals_point_outwards() {
-    let shape = medial_datasets::find("sphere").expect("in the catalogue");
-    let mesh = shape.mesh(shape.default_resolution);
-    let outward = |points: SurfacePoints| {
-        points.normals.iter().zip(&points.positions).all(|(n, p)| n.dot(p.normalize()) > 0.95)
-    };
-    assert!(outward(SurfacePoints::of_vertices(&mesh)));
-    assert!(outward(SurfacePoints::of_samples(&mesh, 2_000, 0, 10)));
-}
-
-#[test]
 fn small_clusters_are_dropped_but_the_largest() {
     let sphere = |x: f64| Sphere::new(Vec3::splat(x), 1.0);
     let mut spheres = vec![sphere(0.0), sphere(1.0), sphere(2.0)];

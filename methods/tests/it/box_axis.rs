@@ -11,7 +11,6 @@ use medial::Vec3;
 use medial::complex::{Contacts, MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::Level;
-use medial::surface::TriMesh;
 
 use crate::common::{at, cuboid, shape_of};
 
@@ -98,71 +97,4 @@ fn lambda_eats_the_edges_up_to_its_root_two_fold() {
     }
     let beyond_half_thickness = (HALF.z + 1e-6) / diagonal;
     assert!(kept(&shape, &exact, "lambda", beyond_half_thickness).iter().all(|&kept| !kept));
-}
-
-/// A grid on the box's surface with `1 / h` points to a unit of length, welded and triangulated.
-fn sampled_box(per_unit: usize) -> TriMesh {
-    let counts = [0, 1, 2].map(|axis| (2.0 * HALF[axis] * per_unit as f64).round() as i64);
-    let mut ids = std::collections::BTreeMap::new();
-    let mut mesh = TriMesh::default();
-    let mut vertex = |lattice: [i64; 3], mesh: &mut TriMesh| {
-        *ids.entry(lattice).or_insert_with(|| {
-            let position = lattice.map(|k| k as f64 / per_unit as f64);
-            mesh.vertices.push(Vec3::from_array(position) - HALF);
-            mesh.vertices.len() as u32 - 1
-        })
-    };
-    for axis in 0..3 {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        for level in [0, counts[axis]] {
-            for i in 0..counts[u] {
-                for j in 0..counts[v] {
-                    let mut at = |du: i64, dv: i64| {
-                        let mut lattice = [level; 3];
-                        lattice[u] = i + du;
-                        lattice[v] = j + dv;
-                        vertex(lattice, &mut mesh)
-                    };
-                    let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
-                    let quad = if level == 0 { [a, d, c, b] } else { [a, b, c, d] };
-                    mesh.faces.push([quad[0], quad[1], quad[2]]);
-                    mesh.faces.push([quad[0], quad[2], quad[3]]);
-                }
-            }
-        }
-    }
-    mesh
-}
-
-#[test]
-fn angle_filter_on_a_sampled_box_finds_the_central_rectangle() {
-    let per_unit = 40;
-    let h = 1.0 / per_unit as f64;
-    let shape = shape_of(&sampled_box(per_unit));
-    let result = at(&shape, "angle", &[], Level::Native(100.0));
-    let normal = shape.normalisation();
-    let centres: Vec<Vec3> = result.spheres.iter().map(|s| normal.backward(s.centre)).collect();
-    assert!(!centres.is_empty());
-    let (reach_x, reach_y) = (HALF.x - HALF.z, HALF.y - HALF.z);
-    // The contacts are samples, up to h / sqrt 2 from the true ones on each side, so that a sheet
-    // of 90 degrees scatters by up to sqrt 2 h / r radians: it is surely below 100 degrees only
-    // from this radius on.
-    let resolved = 2.0_f64.sqrt() * h / 10.0_f64.to_radians();
-    for (sphere, centre) in result.spheres.iter().zip(&centres) {
-        let in_rectangle =
-            Vec3::new(centre.x.clamp(-reach_x, reach_x), centre.y.clamp(-reach_y, reach_y), 0.0);
-        if centre.distance(in_rectangle) > 2.0 * h {
-            let radius = sphere.radius * normal.diagonal;
-            assert!(radius < resolved, "{centre} of radius {radius} is off the rectangle");
-        }
-    }
-    let steps = 40;
-    for i in 0..=steps {
-        for j in 0..=steps {
-            let along = |k: i32, reach: f64| (f64::from(2 * k) / f64::from(steps) - 1.0) * reach;
-            let point = Vec3::new(along(i, reach_x), along(j, reach_y), 0.0);
-            let near = centres.iter().map(|c| c.distance(point)).fold(f64::INFINITY, f64::min);
-            assert!(near <= 2.0 * h, "{point} of the rectangle is {near} from every kept sphere");
-        }
-    }
 }
