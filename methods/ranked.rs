@@ -383,8 +383,10 @@ pub(crate) struct Sheets {
     sheets_at_sphere: Vec<Vec<u32>>,
     /// Whether a sphere has an edge without a facet.
     has_bare_edge: Vec<bool>,
-    bare_edges: Vec<[u32; 2]>,
-    bare_spheres: Vec<u32>,
+    /// Edges that lie in no facet: parts that are like curves.
+    pub bare_edges: Vec<[u32; 2]>,
+    /// Spheres without an edge or facet.
+    pub bare_spheres: Vec<u32>,
 }
 
 fn edge_id(mesh: &MedialMesh, a: u32, b: u32) -> u32 {
@@ -447,27 +449,18 @@ impl Sheets {
     pub(crate) fn len(&self) -> usize {
         self.edges.len()
     }
-
-    /// Edges that lie in no facet: parts that are like curves.
-    pub(crate) fn bare_edges(&self) -> &[[u32; 2]] {
-        &self.bare_edges
-    }
-
-    /// Spheres without an edge or facet.
-    pub(crate) fn bare_spheres(&self) -> &[u32] {
-        &self.bare_spheres
-    }
 }
 
 /// A complex while sheets are removed.
 pub(crate) struct Without<'a> {
     sheets: &'a Sheets,
-    gone: Vec<bool>,
+    /// Whether each sheet has been removed.
+    pub gone: Vec<bool>,
     /// Sheets left at each edge; at each sphere, with one more for edges that lie in no facet.
     at_edge: Vec<u32>,
     at_sphere: Vec<u32>,
-    /// Spheres left.
-    spheres: usize,
+    /// Number of spheres left.
+    pub spheres: usize,
 }
 
 impl<'a> Without<'a> {
@@ -486,16 +479,6 @@ impl<'a> Without<'a> {
             at_sphere,
             sheets,
         }
-    }
-
-    /// Whether a sheet has been removed.
-    pub(crate) fn is_gone(&self, sheet: usize) -> bool {
-        self.gone[sheet]
-    }
-
-    /// Number of spheres left.
-    pub(crate) fn spheres(&self) -> usize {
-        self.spheres
     }
 
     /// Whether removing a sheet leaves the Betti numbers as they are: a part of its border is free, and

@@ -316,7 +316,7 @@ fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled> {
         .collect();
     let sheets = Sheets::of(&set.mesh, &set.facets);
     let mut without = Without::none(&sheets);
-    let (mut removed, mut left) = (Vec::new(), vec![without.spheres()]);
+    let (mut removed, mut left) = (Vec::new(), vec![without.spheres]);
     let order = in_order(&set, &value);
     let mut place = vec![0; order.len()];
     (0..).zip(&order).for_each(|(rank, &sheet)| place[sheet as usize] = rank);
@@ -333,7 +333,7 @@ fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled> {
         let neighbours = without.remove(sheet as usize);
         effective = effective.max(value[sheet as usize]);
         removed.push((sheet, effective));
-        left.push(without.spheres());
+        left.push(without.spheres);
         open.extend(neighbours.into_iter().map(|sheet| place[sheet]));
     }
     let mut diagnostics = Diagnostics::default();
@@ -398,11 +398,11 @@ impl Peeled {
             without.remove(sheet as usize);
         }
         let facets: Vec<u32> = (0..self.set.facets.len())
-            .filter(|&facet| !without.is_gone(facet))
+            .filter(|&facet| !without.gone[facet])
             .map(|facet| facet as u32)
             .collect();
         let FacetSet { mesh, facets: all, dual } = &self.set;
-        all.subcomplex(mesh, *dual, &facets, self.sheets.bare_edges(), self.sheets.bare_spheres())
+        all.subcomplex(mesh, *dual, &facets, &self.sheets.bare_edges, &self.sheets.bare_spheres)
     }
 }
 

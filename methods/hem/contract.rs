@@ -4,13 +4,12 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use medial::complex::MedialMesh;
-use medial::complex::collapse::{Candidate, Collapse, CollapseComplex, CollapseQueue};
+use medial::complex::collapse::{Candidate, CollapseComplex, CollapseQueue};
 use medial::simplifier::{Diagnostics, RunContext};
 use rayon::prelude::*;
 
 use super::SampleLists;
-use super::edge::Star;
-use super::edge::{Edge, Ground, NONE};
+use super::edge::{Edge, Ground, NONE, Star};
 use super::{Blocking, HemParams, Inside};
 use crate::Result;
 
@@ -24,13 +23,15 @@ const JOB: usize = 4096;
 pub(super) struct Contraction {
     inside: Inside,
     blocking: Blocking,
-    complex: CollapseComplex,
-    samples: SampleLists,
+    /// The complex as it is now, with a record of the collapses.
+    pub complex: CollapseComplex,
+    /// The samples as they are assigned now.
+    pub samples: SampleLists,
     edges: Edges,
     queue: CollapseQueue,
     star: Star,
     /// Largest error of a collapse so far.
-    largest: f64,
+    pub largest: f64,
     tally: Tally,
 }
 
@@ -121,50 +122,24 @@ impl Contraction {
         Ground { complex: &self.complex, samples: &self.samples, inside: self.inside }
     }
 
-    /// Number of spheres left.
-    pub(super) fn sphere_count(&self) -> usize {
-        self.complex.sphere_count()
-    }
-
-    /// Largest error of a collapse so far.
-    pub(super) fn largest(&self) -> f64 {
-        self.largest
-    }
-
-    /// The mesh as it is now.
-    pub(super) fn to_mesh(&self) -> MedialMesh {
-        self.complex.to_mesh()
-    }
-
-    /// The collapses so far.
-    pub(super) fn record(&self) -> &[Collapse] {
-        self.complex.record()
-    }
-
     /// The stored errors of an edge.
     #[cfg(test)]
     pub(super) fn known(&self, ends: [u32; 2]) -> Option<Edge> {
         self.edges.get(&ends).copied()
     }
 
-    /// The samples as they are assigned now.
-    #[cfg(test)]
-    pub(super) fn samples(&self) -> &SampleLists {
-        &self.samples
-    }
-
     /// Steps 2 to 4, until told to stop or no edge may be collapsed.
     pub(super) fn run_to(&mut self, stop: Stop, run: &RunContext) -> Result<()> {
         let target = if let Stop::Spheres(target) = stop { target } else { 1 };
         let bound = if let Stop::Error(bound) = stop { bound } else { f64::INFINITY };
-        let total = self.sphere_count().saturating_sub(target);
-        let first = self.record().len();
-        while self.sphere_count() > target {
+        let total = self.complex.sphere_count().saturating_sub(target);
+        let first = self.complex.record().len();
+        while self.complex.sphere_count() > target {
             let Some(next) = self.cheapest(bound) else { break };
             let Taken { error, ends, survivor } = next;
             self.collapse(ends, survivor);
             self.largest = self.largest.max(error);
-            let done = self.record().len() - first;
+            let done = self.complex.record().len() - first;
             if done.is_multiple_of(REPORT_EVERY) {
                 run.step(done, total)?;
             }
@@ -343,7 +318,7 @@ impl Contraction {
     /// Counts of the whole run so far.
     pub(super) fn diagnose(&self, diagnostics: &mut Diagnostics) {
         let Self { tally, samples, star, .. } = self;
-        diagnostics.count("collapses", self.record().len());
+        diagnostics.count("collapses", self.complex.record().len());
         diagnostics.count("evaluations", tally.evaluations);
         diagnostics.count("rejected_by_link_condition", tally.held_by_topology);
         diagnostics.count("rejected_by_inversion", tally.held_by_inversion);

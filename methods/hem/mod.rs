@@ -104,13 +104,14 @@ mod edge;
 #[cfg(test)]
 mod tests;
 
+use std::error::Error;
 use std::sync::Arc;
 
 use contract::{Contraction, Stop};
 use medial::Vec3;
 use medial::complex::collapse::replay;
-use medial::complex::{MedialMesh, MedialUnion, UnionError};
-use medial::metrics::{EnvelopeOptions, MetricError, sample_envelope};
+use medial::complex::{MedialMesh, MedialUnion};
+use medial::metrics::{EnvelopeOptions, sample_envelope};
 use medial::shape::{ContactSets, Shape, ShapeError};
 use medial::simplifier::{
     Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
@@ -214,10 +215,10 @@ impl Simplification for PreparedHem {
 impl PreparedHem {
     fn at_count(&mut self, target: usize) -> Result<Simplified> {
         let spheres = self.initial.spheres.len();
-        let too_far = self.contraction.sphere_count() < target.min(spheres);
+        let too_far = self.contraction.complex.sphere_count() < target.min(spheres);
         self.contract(Stop::Spheres(target), too_far)?;
         let mut diagnostics = self.diagnostics();
-        let reached = self.contraction.sphere_count();
+        let reached = self.contraction.complex.sphere_count();
         if target > spheres {
             diagnostics.warn(format!(
                 "{spheres} spheres instead of {target}: the initial medial mesh has no more"
@@ -226,15 +227,15 @@ impl PreparedHem {
             let why = self.contraction.why_stopped();
             diagnostics.warn(format!("{reached} spheres instead of {target}: {why}"));
         }
-        let native_level = Some(self.contraction.largest());
-        let mesh = self.contraction.to_mesh();
+        let native_level = Some(self.contraction.largest);
+        let mesh = self.contraction.complex.to_mesh();
         checked(Level::Spheres(target), mesh, native_level, diagnostics)
     }
 
     fn at_bound(&mut self, epsilon: f64) -> Result<Simplified> {
-        let too_far = self.contraction.largest() > epsilon;
+        let too_far = self.contraction.largest > epsilon;
         self.contract(Stop::Error(epsilon), too_far)?;
-        let record = self.contraction.record();
+        let record = self.contraction.complex.record();
         let error_at = |collapses: usize| {
             self.run.step(record.len() - collapses, record.len())?;
             self.ruler.error(&replay(&self.initial, &record[..collapses]))
@@ -267,15 +268,15 @@ impl PreparedHem {
         SimplifyError::Level(format!(
             "epsilon = {epsilon} is held by none of the {measured} levels that were measured, from \
              {spheres} spheres to {}: the best, of {} spheres, is {error:.3e} of the diagonal {sides}",
-            spheres - self.contraction.record().len(),
+            spheres - self.contraction.complex.record().len(),
             spheres - best
         ))
     }
 
     fn as_published(&mut self) -> Result<Simplified> {
-        let too_far = self.contraction.largest() > PUBLISHED;
+        let too_far = self.contraction.largest > PUBLISHED;
         self.contract(Stop::Error(PUBLISHED), too_far)?;
-        let mesh = self.contraction.to_mesh();
+        let mesh = self.contraction.complex.to_mesh();
         let error = self.ruler.error(&mesh)?;
         let mut diagnostics = self.diagnostics();
         if error > PUBLISHED {
@@ -382,24 +383,21 @@ impl Ruler {
     /// # Errors
     /// When the mesh has no union.
     pub(super) fn error(&self, mesh: &MedialMesh) -> Result<f64> {
-        let union = MedialUnion::new(mesh).map_err(no_union)?;
+        let union = MedialUnion::new(mesh).map_err(unsupported)?;
         let at_samples = sample_error(mesh, &union, &self.samples, self.inside)?;
         let Some(surface) = &self.surface else {
             return Ok(at_samples);
         };
         let options = EnvelopeOptions { samples: ENVELOPE_SAMPLES, burial: MAX_BURIAL, seed: 0 };
-        let boundary = sample_envelope(mesh, &union, &options).map_err(no_boundary)?;
+        let boundary = sample_envelope(mesh, &union, &options).map_err(unsupported)?;
         let nearest = surface.closest_batch(&boundary);
         Ok(nearest.iter().map(|n| n.distance).fold(at_samples, f64::max))
     }
 }
 
-fn no_union(error: UnionError) -> SimplifyError {
-    SimplifyError::Unsupported { why: error.to_string() }
-}
-
-fn no_boundary(error: MetricError) -> SimplifyError {
-    SimplifyError::Unsupported { why: error.to_string() }
+/// For meshes without a union, and unions without a boundary.
+fn unsupported(error: impl Error) -> SimplifyError {
+    SimplifyError::unsupported(error.to_string())
 }
 
 /// Largest error of a sample against the whole union, in one of the two readings.
@@ -413,7 +411,7 @@ fn sample_error(
         return Ok(largest(&union.signed_batch(samples)));
     }
     // The union leaves out spheres inside cones, but their surfaces count in this reading.
-    let spheres = MedialUnion::of_spheres(&mesh.spheres).map_err(no_union)?;
+    let spheres = MedialUnion::of_spheres(&mesh.spheres).map_err(unsupported)?;
     let mut distances = union.unsigned_nearest_batch(samples);
     for (distance, sphere) in distances.iter_mut().zip(spheres.unsigned_nearest_batch(samples)) {
         *distance = distance.min(sphere);

@@ -12,12 +12,9 @@ use medial::simplifier::{Params, RunContext};
 use proptest::prelude::*;
 use rayon::prelude::*;
 
-use super::Inside;
-use super::SampleLists;
 use super::contract::{Contraction, Stop};
-use super::edge::Star;
-use super::edge::{Edge, Ground, NOISE};
-use super::*;
+use super::edge::{Edge, Ground, NOISE, Star};
+use super::{Inside, SampleLists, *};
 
 const READINGS: [Inside; 2] = [Inside::Depth, Inside::Surface];
 
@@ -105,7 +102,7 @@ fn follow(mut model: Model, checks_each: bool) -> usize {
     let touched = model.sample_lists().touched();
     let mut assigned = usize::MAX;
     loop {
-        let samples = contraction.samples();
+        let samples = &contraction.samples;
         assert_eq!(samples.touched(), touched, "samples were lost");
         assert!(samples.assigned() <= assigned, "samples were repeated");
         assigned = samples.assigned();
@@ -116,12 +113,12 @@ fn follow(mut model: Model, checks_each: bool) -> usize {
             assert_bounds_hold(&model, &contraction);
         }
         let expected = model.cheapest();
-        let done = contraction.record().len();
-        let target = contraction.sphere_count() - 1;
+        let done = contraction.complex.record().len();
+        let target = contraction.complex.sphere_count() - 1;
         contraction.run_to(Stop::Spheres(target), &RunContext::default()).unwrap();
-        let Some(&taken) = contraction.record().get(done) else {
+        let Some(&taken) = contraction.complex.record().get(done) else {
             assert!(expected.is_none() || target == 0, "{expected:?} was left");
-            return contraction.sphere_count();
+            return contraction.complex.sphere_count();
         };
         let (cost, ends, survivor) = expected.expect("nothing may be collapsed");
         if [taken.kept, taken.removed] != [ends[survivor], ends[1 - survivor]] {
@@ -222,13 +219,13 @@ fn run(model: &Model, stop: Stop) -> Contraction {
 fn a_straight_chain_is_free_but_for_its_ends() {
     let model = chain(9);
     let two = run(&model, Stop::Spheres(2));
-    assert_eq!(two.largest(), 0.0);
-    assert_eq!(two.to_mesh().spheres, [model.spheres[0], model.spheres[8]]);
+    assert_eq!(two.largest, 0.0);
+    assert_eq!(two.complex.to_mesh().spheres, [model.spheres[0], model.spheres[8]]);
     // The last collapse leaves the far end at the length of the chain.
     let one = run(&model, Stop::Spheres(1));
-    assert!((one.largest() - 1.0).abs() < 1e-15, "{}", one.largest());
-    assert_eq!(run(&model, Stop::Error(0.999)).to_mesh(), two.to_mesh());
-    assert_eq!(run(&model, Stop::Error(1.001)).to_mesh(), one.to_mesh());
+    assert!((one.largest - 1.0).abs() < 1e-15, "{}", one.largest);
+    assert_eq!(run(&model, Stop::Error(0.999)).complex.to_mesh(), two.complex.to_mesh());
+    assert_eq!(run(&model, Stop::Error(1.001)).complex.to_mesh(), one.complex.to_mesh());
 }
 
 #[test]
@@ -259,8 +256,8 @@ fn spheres_without_samples_vanish_first_and_contained_ones_cost_nothing() {
     let points = vec![-Vec3::X, Vec3::new(0.0, 1.0, 0.0), 4.0 * Vec3::X, Vec3::new(3.0, 1.0, 0.0)];
     let model = Model::new(&mesh, points, &[vec![0, 1], vec![], vec![], vec![2, 3]], Inside::Depth);
     let contraction = run(&model, Stop::Error(1e-9));
-    assert_eq!(contraction.to_mesh().spheres, [model.spheres[0], model.spheres[3]]);
-    assert_eq!(contraction.largest(), 0.0);
+    assert_eq!(contraction.complex.to_mesh().spheres, [model.spheres[0], model.spheres[3]]);
+    assert_eq!(contraction.largest, 0.0);
 }
 
 #[test]

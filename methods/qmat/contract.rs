@@ -20,14 +20,15 @@ const LARGE_STAR: usize = 2048;
 
 /// A medial mesh under contraction.
 pub(super) struct Contraction {
-    params: QmatParams,
-    complex: CollapseComplex,
+    pub params: QmatParams,
+    /// The complex as it is now.
+    pub complex: CollapseComplex,
     quadrics: Vec<Quadric>,
     queue: CollapseQueue,
     /// Spheres that stay as they are; none where the vector is empty.
     kept: Kept,
     skipped: Skipped,
-    tally: Tally,
+    pub tally: Tally,
 }
 
 /// Spheres that stay as they are.
@@ -67,11 +68,12 @@ impl Kept {
 
 /// Counts of what happened to popped candidates.
 #[derive(Clone, Copy, Debug, Default)]
-struct Tally {
+pub(super) struct Tally {
     collapses: usize,
     postponed: usize,
     held_by_topology: usize,
-    unlocked: usize,
+    /// Collapses that were taken against the link condition.
+    pub unlocked: usize,
     held_by_inversion: usize,
 }
 
@@ -151,21 +153,6 @@ impl Contraction {
         Self { params, complex, quadrics, queue, kept, skipped, tally: Tally::default() }
     }
 
-    /// The parameters that it is run with.
-    pub(super) fn params(&self) -> QmatParams {
-        self.params
-    }
-
-    /// Number of spheres left.
-    pub(super) fn sphere_count(&self) -> usize {
-        self.complex.sphere_count()
-    }
-
-    /// The complex as it is now.
-    pub(super) fn complex(&self) -> &CollapseComplex {
-        &self.complex
-    }
-
     /// All edges left, the cheapest first.
     pub(super) fn sorted_candidates(&self) -> Vec<Candidate> {
         let edges = self.complex.edges();
@@ -178,11 +165,6 @@ impl Contraction {
         all
     }
 
-    /// The mesh as it is now.
-    pub(super) fn to_mesh(&self) -> MedialMesh {
-        self.complex.to_mesh()
-    }
-
     /// Steps 3 to 5, until at most `target` spheres are left or no edge may be collapsed.
     pub(super) fn run_to(
         &mut self,
@@ -190,9 +172,9 @@ impl Contraction {
         target: usize,
         run: &RunContext,
     ) -> Result<()> {
-        let total = self.sphere_count().saturating_sub(target);
+        let total = self.complex.sphere_count().saturating_sub(target);
         let first = self.tally.collapses;
-        while self.sphere_count() > target {
+        while self.complex.sphere_count() > target {
             let Some(cheapest) = self.queue.pop(&self.complex) else {
                 let Some(Cluster { first, others, sphere }) = self.unlock(initial) else { break };
                 self.tally.unlocked += others.len();
@@ -235,14 +217,9 @@ impl Contraction {
         self.place(candidate)
     }
 
-    /// Whether some spheres stay as they are.
-    pub(super) fn keeps_spheres(&self) -> bool {
-        !self.kept.0.is_empty()
-    }
-
     /// Whether a collapse has to keep the topology now.
     pub(super) fn keeps_topology(&self) -> bool {
-        self.params.topology_from.applies(self.sphere_count())
+        self.params.topology_from.applies(self.complex.sphere_count())
     }
 
     /// Step 4: where the merged sphere goes.
@@ -299,12 +276,6 @@ impl Contraction {
         queue.wake(complex, removed);
         tally.collapses += 1;
         kept
-    }
-
-    /// How many collapses were taken against the link condition.
-    #[cfg(test)]
-    pub(super) fn unlocked(&self) -> usize {
-        self.tally.unlocked
     }
 
     /// Largest error of a remaining sphere against the slabs that were merged into it.
@@ -461,14 +432,14 @@ impl Contraction {
     /// `initial`, else the first such cluster of coincident spheres. `None` when there is neither.
     pub(super) fn unlock(&mut self, initial: &MedialMesh) -> Option<Cluster> {
         // A cluster may hold several spheres that are to be kept.
-        let is_tied = self.keeps_spheres() || !self.keeps_topology();
-        if is_tied || self.sphere_count() > MAX_UNLOCKED_SPHERES {
+        let is_tied = !self.kept.0.is_empty() || !self.keeps_topology();
+        if is_tied || self.complex.sphere_count() > MAX_UNLOCKED_SPHERES {
             return None;
         }
         // Computed on demand: few runs get here.
         let goal = betti(initial);
-        let mesh = self.to_mesh();
-        let ids: Vec<u32> = self.complex().vertices().collect();
+        let mesh = self.complex.to_mesh();
+        let ids: Vec<u32> = self.complex.vertices().collect();
         // The mesh numbers the vertices left by ascending id.
         let place = |id: u32| ids.partition_point(|&other| other < id) as u32;
         let now = difference(betti(&mesh), goal);
@@ -489,7 +460,7 @@ impl Contraction {
     /// The connected sets of three and more spheres whose centres are one point, in the order of
     /// their smallest ids.
     fn coincident_clusters(&self) -> Vec<Cluster> {
-        let complex = self.complex();
+        let complex = &self.complex;
         let mut seen = HashSet::new();
         let mut clusters = Vec::new();
         for first in complex.vertices() {

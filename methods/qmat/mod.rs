@@ -123,12 +123,12 @@ pub fn keeping(
     let mut contraction = Contraction::keeping(initial, params, kept);
     contraction.run_to(initial, target, run)?;
     contraction.diagnose(diagnostics);
-    let reached = contraction.sphere_count();
+    let reached = contraction.complex.sphere_count();
     if reached > target {
         let why = contraction.why_stopped();
         diagnostics.warn(format!("{reached} spheres instead of {target} are left: {why}"));
     }
-    let mesh = contraction.to_mesh();
+    let mesh = contraction.complex.to_mesh();
     mesh.check()?;
     Ok(mesh)
 }
@@ -180,19 +180,19 @@ impl Simplification for PreparedQmat {
             return Ok(Simplified { diagnostics, ..Simplified::new(mesh, level) });
         }
         let params = self.params.at(level);
-        let is_of_other = self.contraction.params() != params;
+        let is_of_other = self.contraction.params != params;
         // Collapses are not undone, so a finer level starts anew.
-        if is_of_other || self.contraction.sphere_count() < target {
+        if is_of_other || self.contraction.complex.sphere_count() < target {
             self.contraction = Contraction::new(&self.initial, params);
         }
         self.contraction.run_to(&self.initial, target, &self.run)?;
         self.contraction.diagnose(&mut diagnostics);
-        let reached = self.contraction.sphere_count();
+        let reached = self.contraction.complex.sphere_count();
         if reached > target {
             let why = self.contraction.why_stopped();
             diagnostics.warn(format!("{reached} spheres instead of {target}: {why}"));
         }
-        checked(level, self.contraction.to_mesh(), None, diagnostics)
+        checked(level, self.contraction.complex.to_mesh(), None, diagnostics)
     }
 }
 

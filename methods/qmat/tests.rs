@@ -21,7 +21,7 @@ fn params() -> QmatParams {
 fn contract(mesh: &MedialMesh, params: QmatParams, target: usize) -> (MedialMesh, Contraction) {
     let mut contraction = Contraction::new(mesh, params);
     contraction.run_to(mesh, target, &RunContext::default()).unwrap();
-    let result = contraction.to_mesh();
+    let result = contraction.complex.to_mesh();
     result.check().unwrap();
     (result, contraction)
 }
@@ -250,10 +250,10 @@ fn follow(mesh: &MedialMesh, params: QmatParams) -> [usize; 3] {
     let mut contraction = Contraction::new(mesh, params);
     let (mut fallbacks, mut collapses) = (0, 0);
     while let Some(expected) = oracle.next() {
-        let done = contraction.complex().record().len();
-        let target = contraction.sphere_count() - 1;
+        let done = contraction.complex.record().len();
+        let target = contraction.complex.sphere_count() - 1;
         contraction.run_to(mesh, target, &RunContext::default()).unwrap();
-        let record = contraction.complex().record();
+        let record = contraction.complex.record();
         assert_eq!(record.len(), done + 1, "{expected:?}");
         let taken = record[done];
         let ends = [taken.kept.min(taken.removed), taken.kept.max(taken.removed)];
@@ -264,13 +264,13 @@ fn follow(mesh: &MedialMesh, params: QmatParams) -> [usize; 3] {
         fallbacks += usize::from(expected.is_fallback);
         collapses += 1;
         oracle.collapse(taken.kept, taken.removed, taken.sphere);
-        let complex = contraction.complex();
+        let complex = &contraction.complex;
         assert_eq!([complex.edge_count(), complex.face_count()], oracle.sizes());
     }
     // Nothing is left but what only Betti numbers allow.
-    let (left, unlocked) = (contraction.sphere_count(), contraction.unlocked());
+    let (left, unlocked) = (contraction.complex.sphere_count(), contraction.tally.unlocked);
     contraction.run_to(mesh, 1, &RunContext::default()).unwrap();
-    assert!(contraction.sphere_count() == left || contraction.unlocked() > unlocked);
+    assert!(contraction.complex.sphere_count() == left || contraction.tally.unlocked > unlocked);
     [fallbacks, collapses, oracle.postponed]
 }
 
