@@ -143,7 +143,8 @@ impl Voxel {
 pub struct Bricks {
     there: Bits,
     values: Vec<Box<Values>>,
-    len: usize,
+    /// Number of voxels.
+    pub(super) len: usize,
 }
 
 /// Distance and flux of each voxel of a brick.
@@ -153,10 +154,6 @@ impl Bricks {
     /// An empty set for a lattice with these numbers of voxels along the axes.
     pub(super) fn new(size: [u32; 3]) -> Self {
         Self { there: Bits::new(size), values: Vec::new(), len: 0 }
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.len
     }
 
     /// Inserts a voxel that is not there yet.
@@ -576,7 +573,7 @@ mod tests {
                 kept.push(voxel);
             }
         }
-        assert_eq!(bricks.len(), kept.len());
+        assert_eq!(bricks.len, kept.len());
         assert_eq!(bricks.iter().count(), kept.len());
         for voxel in &kept {
             assert_eq!(bricks.get(voxel.place), Some(*voxel));
@@ -590,7 +587,7 @@ mod tests {
         }
         let gone = kept[kept.len() / 2];
         bricks.remove(gone.place);
-        assert_eq!((bricks.get(gone.place), bricks.len()), (None, kept.len() - 1));
+        assert_eq!((bricks.get(gone.place), bricks.len), (None, kept.len() - 1));
         assert_eq!(bricks.neighbourhood(gone.place) >> 13 & 1, 0);
     }
 }

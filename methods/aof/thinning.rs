@@ -83,7 +83,7 @@ impl Order {
 /// # Errors
 /// When the run was cancelled.
 pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<()> {
-    let total = voxels.len();
+    let total = voxels.len;
     let least = if let Order::Down(to) = order { to } else { 0 };
     let mut queue = BucketQueue::new(order.keys(voxels));
     // Places in the queue, and end points that must not be queued again.
@@ -98,12 +98,12 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<()> {
     }
     let mut steps = 0_usize;
     while let Some(place) = queue.pop() {
-        if voxels.len() <= least {
+        if voxels.len <= least {
             break;
         }
         steps += 1;
         if steps.is_multiple_of(65_536) {
-            run.step((total - voxels.len()).min(total), total)?;
+            run.step((total - voxels.len).min(total), total)?;
         }
         barred.clear(place);
         let neighbourhood = voxels.neighbourhood(place);

@@ -316,16 +316,3 @@ fn all_kinds_of_candidates_cover() {
         assert_eq!(count("uncovered_samples"), 0, "{candidates}");
     }
 }
-
-#[test]
-fn wrong_parameters_are_named() {
-    let shape = built_in("sphere");
-    for (key, value) in [("dilation", "0"), ("samples", "0"), ("nodes", "0"), ("penalty", "none")] {
-        let mut params = Params::none();
-        params.set(key, value);
-        let run = RunContext::default();
-        let method = crate::find("coverage-axis").unwrap();
-        let error = method.prepare(&shape, &params, &run).err().unwrap();
-        assert!(error.to_string().contains(key), "{error}");
-    }
-}

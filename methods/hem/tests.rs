@@ -8,7 +8,7 @@ use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::{Cone, Slab};
 use medial::shape::ShapeOptions;
-use medial::simplifier::{Params, RunContext};
+use medial::simplifier::RunContext;
 use proptest::prelude::*;
 use rayon::prelude::*;
 
@@ -276,21 +276,6 @@ fn a_level_within_the_bound_is_found() {
     let refused = search(160, &[]);
     assert!(matches!(refused, Found::None { best: 0, error: 2.0, measured: 16.. }), "{refused:?}");
     assert!(matches!(search(0, &[]), Found::None { best: 0, measured: 1, .. }));
-}
-
-#[test]
-fn parameters_are_typed() {
-    let typed = |key: &str, value: &str| {
-        let mut params = Params::none();
-        params.set(key, value);
-        params.typed::<HemParams>()
-    };
-    assert_eq!(typed("inside", "depth").unwrap(), HemParams::default());
-    assert_eq!(typed("inside", "surface").unwrap().inside, Inside::Surface);
-    for (key, value) in [("inside", "both"), ("outside", "depth")] {
-        let error = typed(key, value).unwrap_err().to_string();
-        assert!(error.starts_with("parameter: "), "{error}");
-    }
 }
 
 // The method without any cache, bound or early exit: the oracle of the tests.

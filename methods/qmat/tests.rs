@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, betti};
-use medial::simplifier::{Params, RunContext};
+use medial::simplifier::RunContext;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -306,30 +306,6 @@ fn order_placement_and_fallback_are_those_of_the_paper_by_brute_force() {
     }
     let [fallbacks, collapses, postponed] = totals;
     assert!(fallbacks > 10 && collapses > 3_000 && postponed > 50, "{totals:?}");
-}
-
-#[test]
-fn parameters_are_typed_and_checked() {
-    let typed = |key: &str, value: &str| {
-        let mut params = Params::none();
-        params.set(key, value);
-        params.typed::<QmatParams>().and_then(QmatParams::validate)
-    };
-    assert_eq!(Params::none().typed::<QmatParams>().unwrap(), QmatParams::default());
-    assert_eq!(typed("topology_from", "auto").unwrap(), QmatParams::default());
-    assert_eq!(typed("topology_from", "all").unwrap().topology_from, TopologyFrom::All);
-    assert_eq!(typed("topology_from", "never").unwrap().topology_from, TopologyFrom::Never);
-    assert_eq!(typed("topology_from", "50").unwrap().topology_from, TopologyFrom::Spheres(50));
-    assert_eq!(typed("boundary", "legacy").unwrap().boundary, Boundary::Legacy);
-    let refusals =
-        [("k", "-1"), ("topology_from", "some"), ("boundary", "soft"), ("singular_ratio", "1")];
-    for (key, value) in refusals {
-        let error = typed(key, value).unwrap_err().to_string();
-        assert!(error.starts_with("parameter: "), "{error}");
-    }
-    for described in QmatParams::describe() {
-        assert_eq!(typed(&described.name, &described.default).unwrap(), QmatParams::default());
-    }
 }
 
 // ----------------------------------------------------------------------------

@@ -4,11 +4,10 @@ use std::collections::BTreeSet;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere, UnionAxis, betti};
-use medial::simplifier::{Params, RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::TamHeidrichParams;
 use super::axis::{Axis, merged};
 use super::parts::{Graph, Parts, Remaining, levels, without_fins};
 
@@ -321,32 +320,4 @@ fn closed_pieces_have_no_level() {
     let parts = Parts::of(&remaining);
     assert_eq!((parts.len(), levels(&parts, &remaining)), (1, vec![0]));
     assert!(!parts.free[0]);
-}
-
-#[test]
-fn parameters_are_checked() {
-    let typed = |key: &str, value: &str| {
-        let mut params = Params::none();
-        params.set(key, value);
-        params.typed::<TamHeidrichParams>().and_then(TamHeidrichParams::validate)
-    };
-    for (key, value) in [
-        ("t_v", "-1"),
-        ("t_v", "1,many"),
-        ("t_v", "[1,101]"),
-        ("drop", "2"),
-        ("axis", "none"),
-        ("remove", "-3"),
-        ("radius_factor", "0"),
-        ("jitter", "1"),
-        ("merge", "1"),
-        ("t_t", "1.5"),
-    ] {
-        let error = typed(key, value);
-        assert!(matches!(error, Err(SimplifyError::Parameter(m)) if m.contains(key)), "{key}");
-    }
-    assert_eq!(typed("t_v", "1,10").expect("a list").t_v.0, [1.0, 10.0]);
-    assert_eq!(typed("t_v", "5").expect("a number").t_v.0, [5.0]);
-    assert_eq!(typed("remove", "[3,1]").expect("an array").remove.0, [3, 1]);
-    assert_eq!(typed("remove", "").expect("nothing").remove.0, [0; 0]);
 }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use medial::Vec3;
 use medial::complex::Sphere;
-use medial::simplifier::{Diagnostics, Params, SimplifyError};
+use medial::simplifier::Diagnostics;
 use medial::surface::TriMesh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -14,7 +14,7 @@ use super::refit::{Residuals, refit};
 use super::sampling::{
     Clusters, Ended, Energy, Misfit, NONE, assign, drop_small, misfits, to_split,
 };
-use super::{Connect, Refit, VmasParams, edges, explain, faces};
+use super::{Connect, Refit, edges, explain, faces};
 
 const ENERGY: Energy = Energy { lambda: 0.2 };
 
@@ -317,25 +317,4 @@ fn it_is_said_why_there_are_fewer_spheres() {
         let warnings = diagnostics.warnings.concat();
         assert!(warnings.contains(said) && warnings.is_empty() == said.is_empty(), "{warnings}");
     }
-}
-
-#[test]
-fn parameters_are_checked() {
-    for (key, value) in [
-        ("lambda", "0"),
-        ("lambda", "1.5"),
-        ("samples", "99"),
-        ("neighbours", "1"),
-        ("iterations", "0"),
-        ("points", "faces"),
-        ("refit", "none"),
-        ("contact", "1"),
-        ("connect", "all"),
-    ] {
-        let mut params = Params::none();
-        params.set(key, value);
-        let error = params.typed::<VmasParams>().and_then(VmasParams::validate);
-        assert!(matches!(error, Err(SimplifyError::Parameter(m)) if m.contains(key)), "{key}");
-    }
-    assert_eq!(VmasParams::default().validate().ok(), Some(VmasParams::default()));
 }

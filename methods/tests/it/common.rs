@@ -25,6 +25,14 @@ pub fn built_in(id: &str) -> TriMesh {
     shape.mesh(shape.default_resolution)
 }
 
+pub fn shape(id: &str, resolution: u32) -> Shape {
+    shape_of(&medial_datasets::find(id).expect("in the catalogue").mesh(resolution))
+}
+
+pub fn default_shape(id: &str) -> Shape {
+    shape_of(&built_in(id))
+}
+
 pub fn params(set: &[(&str, &str)]) -> Params {
     let mut params = Params::none();
     set.iter().for_each(|(key, value)| params.set(key, value));
@@ -47,6 +55,12 @@ pub fn at(shape: &Shape, method: &str, set: &[(&str, &str)], level: Level) -> Me
     let mesh = levels(shape, method, set, &[level]).remove(0).expect("a level").mesh;
     mesh.check().expect("a valid complex");
     mesh
+}
+
+/// The count of a name.
+pub fn count(found: &Simplified, name: &str) -> u64 {
+    let count = found.diagnostics.counts.iter().find(|count| count.0 == name);
+    count.unwrap_or_else(|| panic!("no count {name} in {:?}", found.diagnostics)).1
 }
 
 /// A box around the origin with half sides `half`, as twelve triangles.

@@ -95,11 +95,9 @@ fn each_condition_alone_keeps_a_part_and_both_keep_the_union() {
 }
 
 #[test]
-fn a_larger_strength_keeps_less_and_a_given_mesh_is_no_voronoi_diagram() {
+fn a_given_mesh_is_no_voronoi_diagram() {
     let mesh = built_in("capsule", 36);
     let shape = shape_of(&mesh, "vertices");
-    let counts = [0.5, 1.0, 2.0, 5.0].map(|t| at(&shape, &[], Level::Native(t)).mesh.faces.len());
-    assert!(counts.windows(2).all(|pair| pair[0] >= pair[1]), "{counts:?}");
     let given = MedialMesh::clone(&shape.initial().expect("an initial medial mesh"));
     let shape = shape_of(&mesh, "vertices").with_initial(&given);
     let refused = dey_zhao::method().prepare(&shape, &Params::none(), &RunContext::default());
@@ -123,8 +121,7 @@ fn a_number_of_spheres_is_the_published_result_of_fewer_samples() {
             let reached = found.mesh.spheres.len();
             assert!(reached <= count && reached * 100 >= 98 * count, "{reached} for {count}");
             assert_eq!(found.native_level, Some(1.0));
-            let counts = &found.diagnostics.counts;
-            let samples = counts.iter().find(|(name, _)| name == "samples").expect("a count").1;
+            let samples = common::count(&found, "samples");
             let again = match sampling {
                 "vertices" => format!("blue:{samples}"),
                 _ => format!("uniform:{samples}:7"),

@@ -8,7 +8,10 @@ use medial::simplifier::{Level, RunContext, Simplified, SimplifyError};
 use medial::surface::TriMesh;
 use medial::{Vec3, surface};
 
-use crate::common::{ANGLE, LAMBDA, at, built_in, levels, params, shape_of, with_threads};
+use crate::common::{
+    ANGLE, LAMBDA, at, built_in, count, default_shape, levels, params, shape, shape_of,
+    with_threads,
+};
 
 /// Numbers of spheres by ranking instead of sampling.
 const BY_RANKING: [[(&str, &str); 2]; 2] =
@@ -75,7 +78,7 @@ fn spacing(shape: &Shape) -> f64 {
 
 #[test]
 fn the_axis_above_a_right_angle_is_the_central_rectangle_of_a_box() {
-    let shape = shape_of(&medial_datasets::find("box").expect("in the catalogue").mesh(90));
+    let shape = shape("box", 90);
     let (cuboid, h) = (Cuboid::of(&shape), spacing(&shape));
     for set in [ANGLE[0], ANGLE[1], &[]] {
         let mesh = at(&shape, "angle", set, Level::Native(110.0));
@@ -99,7 +102,7 @@ fn the_axis_above_a_right_angle_is_the_central_rectangle_of_a_box() {
 
 #[test]
 fn the_smallest_angle_of_a_facet_keeps_no_more_than_its_barycentre() {
-    let shape = shape_of(&built_in("ellipsoid"));
+    let shape = default_shape("ellipsoid");
     for theta in [20.0, 60.0, 120.0] {
         let [mean, least] = [0, 1].map(|k| at(&shape, "angle", ANGLE[k], Level::Native(theta)));
         assert!(least.spheres.len() < mean.spheres.len(), "{theta}");
@@ -135,7 +138,7 @@ fn a_grid_separates_right_angles_and_straight_ones_exactly() {
 #[test]
 fn lambda_keeps_what_its_table_says_on_a_box_and_a_plate() {
     for id in ["box", "plate"] {
-        let shape = shape_of(&built_in(id));
+        let shape = default_shape(id);
         let (cuboid, h) = (Cuboid::of(&shape), spacing(&shape));
         let half = cuboid.thickness() / 2.0;
         for set in LAMBDA {
@@ -160,7 +163,7 @@ fn lambda_keeps_what_its_table_says_on_a_box_and_a_plate() {
 
 #[test]
 fn lambda_grows_from_facets_to_edges_to_vertices() {
-    let shape = shape_of(&built_in("bracket"));
+    let shape = default_shape("bracket");
     let (mesh, facets) = (shape.voronoi().expect("a mesh"), shape.facets().expect("facets"));
     let delaunay = shape.delaunay().expect("samples in space");
     let contacts = mesh.contacts.as_ref().expect("contacts");
@@ -186,7 +189,7 @@ fn lambda_grows_from_facets_to_edges_to_vertices() {
 
 #[test]
 fn lambda_cells_are_nested_and_leftovers_come_on_top() {
-    let shape = shape_of(&built_in("capsule"));
+    let shape = default_shape("capsule");
     let asked = [0.01, 0.03, 0.06, 0.1, 0.14].map(Level::Native);
     let [with, without] = LAMBDA.map(|set| levels(&shape, "lambda", set, &asked));
     let meshes = |all: Vec<Result<Simplified, SimplifyError>>| -> Vec<MedialMesh> {
@@ -200,7 +203,7 @@ fn lambda_cells_are_nested_and_leftovers_come_on_top() {
     for pair in with.windows(2) {
         assert!(pair[1].spheres.iter().all(|s| pair[0].spheres.contains(s)));
     }
-    let shape = shape_of(&built_in("blob"));
+    let shape = default_shape("blob");
     for count in [700, 100, 7] {
         // Neighbours whose enclosing balls rest on the same samples have the same value.
         let reached = at(&shape, "lambda", LAMBDA[0], Level::Spheres(count)).spheres.len();
@@ -211,7 +214,7 @@ fn lambda_cells_are_nested_and_leftovers_come_on_top() {
 #[test]
 fn sheets_go_without_a_change_of_topology() {
     for id in ["sphere", "box", "plate", "capsule", "torus", "hollow-sphere", "bracket", "pair"] {
-        let shape = shape_of(&built_in(id));
+        let shape = default_shape(id);
         let initial = shape.voronoi().expect("a mesh");
         let expected = betti(&initial);
         let asked = [0.0, 30.0, 60.0, 91.0, 120.0, 150.0, 180.0].map(Level::Native);
@@ -237,7 +240,7 @@ fn sheets_go_without_a_change_of_topology() {
 #[test]
 fn what_is_kept_of_the_tied_is_spread_over_the_shape() {
     // All facets of the middle sheet tie, and cut by their numbers they would be one end of it.
-    let shape = shape_of(&built_in("plate"));
+    let shape = default_shape("plate");
     let cuboid = Cuboid::of(&shape);
     let all = [
         ("angle", ANGLE[0]),
@@ -287,33 +290,13 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
     }
 }
 
-#[test]
-fn wrong_parameters_are_refused_by_name() {
-    let shape = shape_of(&built_in("box"));
-    for (method, key, value) in [
-        ("angle", "variant", "cell"),
-        ("angle", "resolution", "1"),
-        ("angle", "resolution", "100000"),
-        ("angle", "at", "middle"),
-        ("angle", "theta", "181"),
-        ("angle", "size", "angle"),
-        ("lambda", "variant", "facet"),
-        ("lambda", "leftovers", "maybe"),
-    ] {
-        let found = medial_methods::find(method).expect("registered");
-        let refused = found.prepare(&shape, &params(&[(key, value)]), &RunContext::default()).err();
-        let named = matches!(&refused, Some(SimplifyError::Parameter(why)) if why.contains(key));
-        assert!(named, "{method} {key} = {value}");
-    }
-}
-
 // ----------------------------------------------------------------------------
 // Which levels the variants of the angle filter and of the lambda-medial axis answer, and by what they meet a
 // number of spheres.
 
 #[test]
 fn counts_are_met_from_below_or_it_is_said() {
-    let shape = shape_of(&built_in("bracket"));
+    let shape = default_shape("bracket");
     let all = ANGLE.iter().map(|set| ("angle", *set)).chain(LAMBDA.map(|set| ("lambda", set)));
     for (method, set) in all {
         let asked = [600, 100, 20].map(Level::Spheres);
@@ -332,7 +315,7 @@ fn counts_are_met_from_below_or_it_is_said() {
 
 #[test]
 fn the_published_level_is_announced_and_is_a_native_one() {
-    let shape = shape_of(&built_in("bracket"));
+    let shape = default_shape("bracket");
     let all = ANGLE.iter().map(|set| ("angle", *set)).chain(LAMBDA.map(|set| ("lambda", set)));
     for (method, set) in all.chain([("angle", [].as_slice()), ("lambda", &[])]) {
         let published =
@@ -357,21 +340,17 @@ fn the_published_level_is_announced_and_is_a_native_one() {
 fn a_number_by_sampling_is_the_native_level_of_that_sampling() {
     let mesh = built_in("blob");
     let shape = shape_of(&mesh);
-    let count_of = |found: &Simplified, name: &str| {
-        let counts = &found.diagnostics.counts;
-        counts.iter().find(|(count, _)| count == name).expect("a count").1
-    };
     for set in [ANGLE[2], ANGLE[3]] {
         let found = levels(&shape, "angle", set, &[Level::Spheres(300)]).remove(0).expect("300");
         assert!((294..=300).contains(&found.mesh.spheres.len()), "{set:?}");
         let native = Level::Native(found.native_level.expect("theta"));
         let again = if set == ANGLE[2] {
-            let thousandths = count_of(&found, "resolution_in_thousandths");
+            let thousandths = count(&found, "resolution_in_thousandths");
             let resolution = format!("{}.{:03}", thousandths / 1000, thousandths % 1000);
             let set = [("variant", "grid"), ("resolution", resolution.as_str())];
             at(&shape, "angle", &set, native)
         } else {
-            let sampling = format!("blue:{}", count_of(&found, "samples"));
+            let sampling = format!("blue:{}", count(&found, "samples"));
             let options = ShapeOptions {
                 sampling: sampling.parse().expect("a sampling"),
                 ..ShapeOptions::default()
@@ -387,7 +366,7 @@ fn a_number_by_sampling_is_the_native_level_of_that_sampling() {
 #[test]
 fn few_spheres_by_sheets_are_spread_as_well_as_by_vertices() {
     for id in ["blob", "bracket", "torus"] {
-        let shape = shape_of(&built_in(id));
+        let shape = default_shape(id);
         let axis = shape.voronoi().expect("a mesh");
         let farthest = |set| {
             let kept = at(&shape, "angle", set, Level::Spheres(100)).spheres;

@@ -4,16 +4,10 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, betti};
 use medial::metrics::{EnvelopeOptions, sample_envelope};
 use medial::shape::Shape;
-use medial::simplifier::{
-    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError,
-};
+use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplification, Simplified};
 use medial_methods::hem;
 
-use crate::common::{params, shape_of, with_threads};
-
-fn shape(id: &str, resolution: u32) -> Shape {
-    shape_of(&medial_datasets::find(id).expect("in the catalogue").mesh(resolution))
-}
+use crate::common::{count, params, shape};
 
 fn prepare<'s>(shape: &'s Shape, inside: &str) -> Box<dyn Simplification + 's> {
     prepare_with(shape, "inside", inside)
@@ -26,11 +20,6 @@ fn prepare_with<'s>(shape: &'s Shape, key: &str, value: &str) -> Box<dyn Simplif
 
 fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified {
     simplification.at(Level::Spheres(count)).expect("a count")
-}
-
-fn count(result: &Simplified, name: &str) -> u64 {
-    let counts = &result.diagnostics.counts;
-    counts.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("no count {name}")).1
 }
 
 /// The samples of the initial mesh, of which the bound speaks.
@@ -55,18 +44,6 @@ fn errors(mesh: &MedialMesh, samples: &[Vec3]) -> [f64; 2] {
 }
 
 #[test]
-fn a_sampled_sphere_becomes_one_sphere() {
-    let shape = shape("sphere", 40);
-    let result = spheres(prepare(&shape, "depth").as_mut(), 1);
-    let &[sphere] = result.mesh.spheres.as_slice() else { panic!("{:?}", result.diagnostics) };
-    // The survivor is one of the Voronoi vertices.
-    let scale = shape.normalisation().diagonal;
-    assert!((sphere.radius * scale - 1.0).abs() < 1e-9, "{sphere:?}");
-    assert!(shape.normalisation().backward(sphere.centre).length() < 1e-9, "{sphere:?}");
-    assert!(result.native_level.is_some_and(|error| error < 1e-9));
-}
-
-#[test]
 fn survivors_are_spheres_of_the_initial_mesh() {
     let shape = shape("bracket", 9);
     let initial = shape.initial().expect("an initial medial mesh");
@@ -74,26 +51,6 @@ fn survivors_are_spheres_of_the_initial_mesh() {
         let result = spheres(prepare(&shape, inside).as_mut(), 60);
         assert_eq!(result.mesh.spheres.len(), 60);
         assert!(result.mesh.spheres.iter().all(|m| initial.spheres.contains(m)));
-    }
-}
-
-#[test]
-fn topology_is_kept_at_every_level() {
-    for (id, resolution, smallest) in [("torus", 26, 3), ("hollow-sphere", 20, 4)] {
-        let shape = shape(id, resolution);
-        let initial = shape.initial().expect("an initial medial mesh");
-        let expected = medial_datasets::find(id).expect("in the catalogue").expected_betti;
-        assert_eq!(betti(&initial), expected, "{id}: too coarse a sample for this test");
-        let mut simplification = prepare(&shape, "depth");
-        let mut count = initial.spheres.len();
-        while count > 1 {
-            count = if count > 60 { count * 9 / 10 } else { count - 1 };
-            let result = spheres(simplification.as_mut(), count);
-            assert_eq!(betti(&result.mesh), expected, "{id} at {count}");
-            let reached = result.mesh.spheres.len();
-            assert!(reached >= smallest, "{id}: {reached} spheres cannot hold this topology");
-            assert_eq!(reached > count, !result.diagnostics.warnings.is_empty(), "{id} at {count}");
-        }
     }
 }
 
@@ -208,43 +165,6 @@ fn levels_of_either_kind_do_not_depend_on_what_was_asked_before() {
 }
 
 #[test]
-fn levels_continue_start_anew_and_say_what_they_cannot_do() {
-    let shape = shape("capsule", 24);
-    let initial = shape.initial().expect("an initial medial mesh");
-    let mut simplification = prepare(&shape, "depth");
-    for count in [200, 80, 80, 120] {
-        let result = spheres(simplification.as_mut(), count);
-        assert_eq!(result.mesh, spheres(prepare(&shape, "depth").as_mut(), count).mesh);
-        assert_eq!(result.mesh.spheres.len(), count);
-    }
-    let more = spheres(simplification.as_mut(), initial.spheres.len() + 1);
-    assert_eq!(more.mesh.spheres, initial.spheres);
-    assert_eq!(more.diagnostics.warnings.len(), 1);
-    let published = simplification.at(Level::Published).expect("the rule of the code");
-    assert!(published.mesh.spheres.len() < initial.spheres.len());
-    for level in [Level::Spheres(0), Level::Native(-1.0), Level::Native(f64::NAN)] {
-        assert!(matches!(simplification.at(level), Err(SimplifyError::Level(_))), "{level}");
-    }
-}
-
-#[test]
-fn the_number_of_threads_changes_nothing() {
-    for inside in ["depth", "surface"] {
-        let results = [1, 2].map(|threads| {
-            with_threads(threads, || {
-                let shape = shape("blob", 14);
-                let mut simplification = prepare(&shape, inside);
-                [1000, 100, 10].map(|count| {
-                    let result = spheres(simplification.as_mut(), count);
-                    (result.mesh, result.native_level, result.diagnostics)
-                })
-            })
-        });
-        assert_eq!(results[0], results[1], "{inside}");
-    }
-}
-
-#[test]
 fn a_mesh_without_contacts_gets_the_nearest_samples() {
     let plain = shape("capsule", 24);
     let initial = plain.initial().expect("an initial medial mesh");
@@ -255,15 +175,4 @@ fn a_mesh_without_contacts_gets_the_nearest_samples() {
     assert_eq!((result.mesh.spheres.len(), result.diagnostics.warnings.len()), (30, 1));
     let [depth, _] = errors(&result.mesh, &touched(&initial));
     assert!(depth < 0.02, "{depth}");
-}
-
-#[test]
-fn a_cancelled_run_ends_as_cancelled() {
-    let shape = shape("capsule", 24);
-    let run = RunContext::default();
-    let mut simplification =
-        hem::method().prepare(&shape, &Params::none(), &run).expect("prepared");
-    run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-    let cancelled = simplification.at(Level::Spheres(10));
-    assert!(matches!(cancelled, Err(SimplifyError::Cancelled)));
 }

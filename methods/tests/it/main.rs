@@ -1,5 +1,6 @@
 //! The tests of the methods against real shapes, definitions and published figures.
 
+mod across;
 mod aof;
 mod box_axis;
 mod chain;

@@ -6,16 +6,10 @@ use medial::complex::betti;
 use medial::complex::collapse::{Collapse, CollapseComplex};
 use medial::complex::collapse::{Hierarchy, Step, replay};
 use medial::shape::Shape;
-use medial::simplifier::{
-    Level, MedialSimplifier, Params, RunContext, Simplification, SimplifyError,
-};
+use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplification};
 use medial_methods::pmat;
 
-use crate::common::shape_of;
-
-fn shape(id: &str, resolution: u32) -> Shape {
-    shape_of(&medial_datasets::find(id).expect("in the catalogue").mesh(resolution))
-}
+use crate::common::shape;
 
 fn prepare(shape: &Shape) -> Box<dyn Simplification + '_> {
     pmat::method().prepare(shape, &Params::none(), &RunContext::default()).expect("prepared")
@@ -69,38 +63,4 @@ fn the_published_level_is_the_least_published_scale_and_says_so() {
     assert_eq!(published.mesh, by_scale.mesh);
     let initial = shape.initial().expect("an initial medial mesh").spheres.len();
     assert!((2..initial).contains(&published.mesh.spheres.len()));
-}
-
-#[test]
-fn levels_are_asked_in_any_order() {
-    let shape = shape("capsule", 24);
-    let initial = shape.initial().expect("an initial medial mesh").spheres.len();
-    let mut simplification = prepare(&shape);
-    for count in [50, 400, 2, 120] {
-        let level = simplification.at(Level::Spheres(count)).expect("a count");
-        assert_eq!(level.mesh.spheres.len(), count);
-        assert!(level.native_level.is_none_or(|scale| scale >= 1.0));
-    }
-    let more = simplification.at(Level::Spheres(initial + 1)).expect("a count");
-    assert_eq!((more.mesh.spheres.len(), more.diagnostics.warnings.len()), (initial, 1));
-    let mut last = usize::MAX;
-    for scale in [1.0, 1.1, 1.5, 2.0, 4.0, 1e6] {
-        let level = simplification.at(Level::Native(scale)).expect("a scale");
-        assert!(level.mesh.spheres.len() <= last, "s = {scale}");
-        assert_eq!(level.native_level.map(|used| used <= scale), Some(true));
-        last = level.mesh.spheres.len();
-    }
-    for senseless in [0.99, f64::INFINITY, f64::NAN] {
-        let refused = simplification.at(Level::Native(senseless));
-        assert!(matches!(refused, Err(SimplifyError::Level(_))), "s = {senseless}");
-    }
-}
-
-#[test]
-fn one_thread_and_two_build_the_same_hierarchy() {
-    let built = [1, 2].map(|threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| hierarchy(&shape("bracket", 8)))
-    });
-    assert_eq!(built[0], built[1]);
 }

@@ -6,11 +6,7 @@ use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplification, Si
 use medial::surface;
 use medial_methods::qmat;
 
-use crate::common::{self, shape_of};
-
-fn shape(id: &str, resolution: u32) -> Shape {
-    shape_of(&medial_datasets::find(id).expect("in the catalogue").mesh(resolution))
-}
+use crate::common::{self, default_shape, shape, shape_of};
 
 fn prepare<'s>(shape: &'s Shape, params: &[(&str, &str)]) -> Box<dyn Simplification + 's> {
     let params = common::params(params);
@@ -19,38 +15,6 @@ fn prepare<'s>(shape: &'s Shape, params: &[(&str, &str)]) -> Box<dyn Simplificat
 
 fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified {
     simplification.at(Level::Spheres(count)).expect("a count")
-}
-
-#[test]
-fn a_sampled_sphere_becomes_one_sphere() {
-    // Radius 1 and bounding-box diagonal sqrt(12); the published result is 3e-7 off.
-    let shape = shape("sphere", 40);
-    let result = spheres(prepare(&shape, &[]).as_mut(), 1);
-    assert_eq!(result.mesh.spheres.len(), 1);
-    let sphere = result.mesh.spheres[0];
-    let scale = shape.normalisation().diagonal;
-    assert!((sphere.radius * scale - 1.0).abs() < 1e-6, "{sphere:?}");
-    assert!(shape.normalisation().backward(sphere.centre).length() < 1e-6, "{sphere:?}");
-}
-
-#[test]
-fn topology_is_kept_at_every_level() {
-    for (id, resolution, smallest) in [("torus", 26, 3), ("hollow-sphere", 20, 4)] {
-        let shape = shape(id, resolution);
-        let initial = shape.initial().expect("an initial medial mesh");
-        let expected = medial_datasets::find(id).expect("in the catalogue").expected_betti;
-        assert_eq!(betti(&initial), expected, "{id}: too coarse a sample for this test");
-        let mut simplification = prepare(&shape, &[]);
-        let mut count = initial.spheres.len();
-        while count > 1 {
-            count = if count > 60 { count * 9 / 10 } else { count - 1 };
-            let result = spheres(simplification.as_mut(), count);
-            assert_eq!(betti(&result.mesh), expected, "{id} at {count}");
-            let reached = result.mesh.spheres.len();
-            assert!(reached >= smallest, "{id}: {reached} spheres cannot hold this topology");
-            assert_eq!(reached > count, !result.diagnostics.warnings.is_empty(), "{id} at {count}");
-        }
-    }
 }
 
 /// The default on every built-in shape whose initial mesh has the topology of the solid.
@@ -76,7 +40,7 @@ fn by_default_what_the_initial_mesh_has_is_kept_on_every_built_in_shape() {
 /// What is published checks from 200 spheres on, and only there does that decide.
 #[test]
 fn the_published_level_checks_from_200_spheres_on() {
-    let shape = shape("frame", medial_datasets::find("frame").expect("a frame").default_resolution);
+    let shape = default_shape("frame");
     let at = |params: &[(&str, &str)], level: Level| {
         prepare(&shape, params).at(level).expect("a level").mesh
     };
@@ -107,20 +71,4 @@ fn topology_is_kept_at_every_level_of_real_meshes() {
             assert_eq!(betti(&result.mesh), expected, "{} at {count}", path.display());
         }
     }
-}
-
-#[test]
-fn all_spheres_and_more_are_the_initial_mesh() {
-    let shape = shape("capsule", 24);
-    let initial = shape.initial().expect("an initial medial mesh");
-    let mut simplification = prepare(&shape, &[]);
-    for count in [200, 80, 80, 120] {
-        assert_eq!(spheres(simplification.as_mut(), count).mesh.spheres.len(), count);
-    }
-    let all = spheres(simplification.as_mut(), initial.spheres.len());
-    assert_eq!((&all.mesh, all.diagnostics.warnings.len()), (&*initial, 0));
-    let more = spheres(simplification.as_mut(), initial.spheres.len() + 1);
-    assert_eq!((&more.mesh, more.diagnostics.warnings.len()), (&*initial, 1));
-    let published = simplification.at(Level::Published).expect("the count of Table II");
-    assert_eq!(published.mesh.spheres.len(), 100);
 }

@@ -8,11 +8,7 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Simplified};
 use medial::surface::{self, TriMesh};
 
-use crate::common::{self, levels, shape_of, with_threads};
-
-fn built_in(id: &str) -> Shape {
-    shape_of(&common::built_in(id))
-}
+use crate::common::{self, count, default_shape, levels, shape_of, with_threads};
 
 fn at(shape: &Shape, set: &[(&str, &str)], level: Level) -> Simplified {
     levels(shape, "sat", set, &[level]).remove(0).expect("a scale axis")
@@ -41,7 +37,7 @@ fn excess(a: &[Sphere], b: &[Sphere]) -> f64 {
 #[test]
 fn scale_one_leaves_the_union_of_polar_balls() {
     for id in ["torus", "bracket", "blob", "capsule"] {
-        let shape = built_in(id);
+        let shape = default_shape(id);
         let balls = shape.inner_balls().expect("poles").spheres.clone();
         let result = at(&shape, &[], Level::Native(1.0));
         let spheres = &result.mesh.spheres;
@@ -53,7 +49,7 @@ fn scale_one_leaves_the_union_of_polar_balls() {
 #[test]
 fn scale_one_has_the_topology_of_the_solid() {
     for id in ["sphere", "box", "capsule", "torus", "hollow-sphere", "blob", "bracket"] {
-        let shape = built_in(id);
+        let shape = default_shape(id);
         let result = at(&shape, &[], Level::Native(1.0));
         assert_eq!(Some(betti(&result.mesh)), shape.expected_betti(), "{id}");
     }
@@ -61,7 +57,7 @@ fn scale_one_has_the_topology_of_the_solid() {
 
 #[test]
 fn a_torn_result_is_said_to_be_torn() {
-    let shape = built_in("box");
+    let shape = default_shape("box");
     let pure = [("radius_factor", "1"), ("jitter", "0")];
     let result = at(&shape, &pure, Level::Native(1.0));
     assert_eq!(betti(&result.mesh) != [1, 0, 0], !result.diagnostics.warnings.is_empty());
@@ -191,7 +187,7 @@ fn shared_meshes_have_valid_axes_for_any_number_of_threads() {
 
 #[test]
 fn larger_scales_leave_fewer_spheres_and_counts_are_met() {
-    let shape = built_in("blob");
+    let shape = default_shape("blob");
     let sizes =
         [1.0, 1.1, 1.3, 1.6, 2.0].map(|s| at(&shape, &[], Level::Native(s)).mesh.spheres.len());
     assert!(sizes.windows(2).all(|w| w[1] < w[0]), "{sizes:?}");
@@ -212,9 +208,7 @@ fn a_number_by_density_is_the_published_scale_of_fewer_samples() {
     let reached = found.mesh.spheres.len();
     assert!((490..=500).contains(&reached), "{reached}");
     assert_eq!(found.native_level, Some(1.1));
-    let counts = &found.diagnostics.counts;
-    let samples = counts.iter().find(|(name, _)| name == "samples").expect("a count").1;
-    let sampling = format!("blue:{samples}").parse().expect("a sampling");
+    let sampling = format!("blue:{}", count(&found, "samples")).parse().expect("a sampling");
     let options = ShapeOptions { sampling, ..ShapeOptions::default() };
     let report = surface::validate(&mesh).expect("a solid");
     let sampled = Shape::new("blob", &mesh, report, options).expect("an extent");

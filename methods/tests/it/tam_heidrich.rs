@@ -10,11 +10,7 @@ use medial::surface::{self, TriMesh};
 use medial_methods::Result;
 use medial_methods::tam_heidrich::{self, OuterPoles, PartInfo, RemainingPoles, parts_of_faces};
 
-use crate::common::{self, shape_of};
-
-fn built_in(id: &str) -> Shape {
-    shape_of(&common::built_in(id))
-}
+use crate::common::{self, count, default_shape, shape_of, with_threads};
 
 fn try_at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Result<Simplified> {
     let params = common::params(params);
@@ -25,11 +21,6 @@ fn at(shape: &Shape, params: &[(&str, &str)], level: Level) -> Simplified {
     let result = try_at(shape, params, level).expect("an answer");
     result.mesh.check().expect("a valid complex");
     result
-}
-
-fn count(result: &Simplified, name: &str) -> u64 {
-    let found = result.diagnostics.counts.iter().find(|c| c.0 == name);
-    found.unwrap_or_else(|| panic!("no count {name} in {:?}", result.diagnostics)).1
 }
 
 /// The Betti numbers after each round, from the start on, and whether each checked the topology.
@@ -53,7 +44,7 @@ const NO_ROUNDS: [(&str, &str); 2] = [("t_t_rounds", "0"), ("t_v", "")];
 #[test]
 fn the_exact_axis_of_a_box_has_twelve_parts_of_level_one_and_one_of_level_two() {
     let exact = medial_datasets::find("box").and_then(|b| b.axis()).expect("known").mesh;
-    let shape = built_in("box").with_initial(&exact);
+    let shape = default_shape("box").with_initial(&exact);
     let result = at(&shape, &NO_ROUNDS, Level::Published);
     assert_eq!(result.mesh.faces.len(), exact.faces.len());
     let of_level = |level| parts(&result).iter().filter(|p| p.level == level).collect::<Vec<_>>();
@@ -91,7 +82,7 @@ fn sheet(half: Vec3, centre: Vec3) -> (usize, f64) {
 
 #[test]
 fn the_largest_parts_of_a_sampled_box_are_its_sheets() {
-    let (half, shape) = (Vec3::new(1.5, 1.0, 0.5), built_in("box"));
+    let (half, shape) = (Vec3::new(1.5, 1.0, 0.5), default_shape("box"));
     let back = shape.normalisation();
     // Rectangle; triangle and trapezoids down to the edges along x, y and z.
     let slope = half.z * 2.0_f64.sqrt();
@@ -138,7 +129,7 @@ fn the_largest_parts_of_a_sampled_box_are_its_sheets() {
 #[test]
 fn loops_survive_every_checked_round() {
     for id in ["torus", "double-torus", "frame", "hollow-sphere", "coil", "pair"] {
-        let shape = built_in(id);
+        let shape = default_shape(id);
         let schedules: [&[(&str, &str)]; 3] = [
             &[],
             &[("t_t_rounds", "0"), ("t_v", "1,5,20,100,100")],
@@ -163,7 +154,7 @@ fn loops_survive_every_checked_round() {
 
 #[test]
 fn counts_are_met_from_either_side_and_results_are_nested() {
-    let shape = built_in("blob");
+    let shape = default_shape("blob");
     let whole = at(&shape, &NO_ROUNDS, Level::Published).mesh;
     let mut finer = whole.clone();
     let mut t_v = 0.0;
@@ -204,7 +195,7 @@ fn counts_are_met_from_either_side_and_results_are_nested() {
 #[test]
 fn another_seed_leaves_nearly_as_many_spheres() {
     for id in ["blob", "bracket", "torus"] {
-        let shape = built_in(id);
+        let shape = default_shape(id);
         let left = [0, 1, 2, 3].map(|seed| {
             let mut run = RunContext::default();
             run.seed = seed;
@@ -223,7 +214,7 @@ fn another_seed_leaves_nearly_as_many_spheres() {
 /// The surface of the remaining poles, in units of the box of 3 by 2 by 1.
 #[test]
 fn the_power_crust_takes_the_poles_that_are_left() {
-    let shape = built_in("box");
+    let shape = default_shape("box");
     let diagonal = shape.normalisation().diagonal;
     let volume = |poles: &RemainingPoles, outer| {
         let crust = poles.power_crust(&shape, outer).expect("a crust");
@@ -253,7 +244,7 @@ fn the_power_crust_takes_the_poles_that_are_left() {
 
 #[test]
 fn a_part_goes_by_hand_and_nothing_else() {
-    let shape = built_in("blob");
+    let shape = default_shape("blob");
     let plain = at(&shape, &[], Level::Published);
     let limb = parts(&plain).iter().find(|p| p.removable && p.triangles > 5).expect("a limb");
     let id = limb.id.to_string();
@@ -277,7 +268,7 @@ fn a_part_goes_by_hand_and_nothing_else() {
 
 #[test]
 fn any_axis_can_be_pruned() {
-    let shape = built_in("bracket");
+    let shape = default_shape("bracket");
     let voronoi = at(&shape, &[("axis", "initial")], Level::Published);
     assert!(voronoi.mesh.contacts.is_some());
     let union = at(&shape, &[("axis", "union")], Level::Published);
@@ -285,7 +276,7 @@ fn any_axis_can_be_pruned() {
     assert_ne!(union.mesh, voronoi.mesh);
     let back = shape.normalisation();
     let given = voronoi.mesh.transformed(back.diagonal, |p| back.backward(p));
-    let given = built_in("bracket").with_initial(&given);
+    let given = default_shape("bracket").with_initial(&given);
     for axis in ["auto", "union", "initial"] {
         let result = at(&given, &[("axis", axis)], Level::Published);
         assert!(!result.diagnostics.warnings.is_empty(), "it says whose volumes these are");
@@ -294,20 +285,9 @@ fn any_axis_can_be_pruned() {
     }
 }
 
-#[test]
-fn senseless_levels_are_refused() {
-    let shape = built_in("box");
-    for level in [Level::Spheres(0), Level::Native(-1.0), Level::Native(101.0)] {
-        assert!(matches!(try_at(&shape, &[], level), Err(SimplifyError::Level(_))), "{level}");
-    }
-}
-
 fn for_threads(name: &str, mesh: &TriMesh, level: Level) -> Simplified {
-    let results = [1, 2].map(|threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.expect("a pool").install(|| at(&shape_of(mesh), &[], level))
-    });
-    let [one, two] = results;
+    let [one, two] =
+        [1, 2].map(|threads| with_threads(threads, || at(&shape_of(mesh), &[], level)));
     assert_eq!(one.mesh, two.mesh, "{name}");
     assert_eq!(parts(&one), parts(&two), "{name}");
     assert_eq!(one.diagnostics, two.diagnostics, "{name}");

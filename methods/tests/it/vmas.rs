@@ -10,7 +10,7 @@ use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified};
 use medial::surface::{self, TriMesh};
 use medial_methods::vmas;
 
-use crate::common::{built_in, params, shape_of};
+use crate::common::{built_in, default_shape, params, shape_of};
 
 fn at(shape: &Shape, text: &str, level: Level) -> Simplified {
     let vmas = vmas::method();
@@ -62,7 +62,7 @@ fn sixteen_spheres_of_a_torus_are_a_ring() {
 
 #[test]
 fn one_sphere_of_a_ball_is_the_ball() {
-    let shape = shape_of(&built_in("sphere"));
+    let shape = default_shape("sphere");
     for text in ["", "points=vertices", "refit=published", "points=vertices:refit=published"] {
         let mesh = spheres(&shape, text, 1).mesh;
         let [ball] = mesh.spheres[..] else { panic!("one sphere") };
@@ -87,19 +87,6 @@ fn mean_errors_are_those_of_the_authors_program() {
         let judge = shape.judge(None, options).expect("a judge");
         let found = 100.0 * judge.distances(&result.mesh).expect("distances").mean;
         assert!((found / mean - 1.0).abs() < 0.15, "{name}: {found} but {mean}");
-    }
-}
-
-#[test]
-fn one_thread_and_two_give_the_same_bytes() {
-    let mesh = built_in("bracket");
-    for text in ["", "points=vertices:refit=published:connect=faces", "contact=mesh"] {
-        let results = [1, 2].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("a pool").install(|| spheres(&shape_of(&mesh), text, 60))
-        });
-        assert_eq!(results[0].mesh, results[1].mesh, "{text}");
-        assert_eq!(results[0].diagnostics, results[1].diagnostics, "{text}");
     }
 }
 
