@@ -7,11 +7,11 @@
 //! <https://doi.org/10.1111/cgf.15143>. The formulas are those of the authors' public programs; of the
 //! papers only the abstracts were at hand.
 //!
-//! 1. Samples of the surface are to be covered; candidates are spheres inside (`candidates.rs`).
+//! 1. Samples of the surface are to be covered; candidates are spheres inside (this file).
 //! 2. A ball inflated by `delta` covers the samples that it contains (`coverage.rs`).
-//! 3. Coverage Axis takes a smallest set of balls that covers all samples (`reduce.rs`, `exact.rs`);
+//! 3. Coverage Axis takes a smallest set of balls that covers all samples (`exact.rs`);
 //!    Coverage Axis++ one ball after the other, by what it covers, how far it is from those chosen, and
-//!    how small it is (`greedy.rs`).
+//!    how small it is (`coverage.rs`).
 //! 4. The spheres chosen, with the radii that they had, are connected (`connect.rs`).
 //!
 //! # Notation

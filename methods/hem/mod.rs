@@ -33,7 +33,7 @@
 //! they were evaluated for: `mu <= min |s| over the star <= |sigma of the star|`. They do not bound
 //! the error of the result. A far primitive can hold a sample deeper than its own star does; and a
 //! collapse next to `j` changes primitives of the star of `j`, but its error covers the samples of
-//! its own ends only. So a bound ([`Level::Native`]) is enforced by measurement (file `bound.rs`):
+//! its own ends only. So a bound ([`Level::Native`]) is enforced by measurement (this file):
 //!
 //! - Edges are collapsed until the cheapest one costs more than the bound.
 //! - The error of every sample is measured against the whole union, with the same `inside`.

@@ -53,7 +53,7 @@
 //!   blocks pockets of spheres for good.
 //! - Even so the condition is sufficient, not necessary. When it rejects every edge left, at 500
 //!   spheres or fewer, an edge is taken whose collapse brings the Betti numbers no farther from those
-//!   of the initial mesh (`unlock.rs`); section 4.5 would stop. With `topology_from=200` this also
+//!   of the initial mesh (`contract.rs`); section 4.5 would stop. With `topology_from=200` this also
 //!   removes voids that unchecked collapses made.
 //! - A minimiser farther from the midpoint of its edge than the two balls extend, `d + max r`, is
 //!   not used, as if `A` were singular. Where slabs are nearly parallel, `A` can pass as invertible

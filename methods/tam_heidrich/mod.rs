@@ -4,14 +4,14 @@
 //! Visualization, <https://doi.org/10.1109/VISUAL.2003.1250410>.
 //!
 //! 1. Sections 2.1 and 3: the medial axis of the union of the inner polar balls, triangulated (file
-//!    `axis.rs`). Duplicates are merged as the samples tell: polar balls of cospherical samples before it
-//!    is made (file `duplicates.rs`), facets between corners at one sample after (file `fins.rs`), and
-//!    vertices that are left nearly at one position (file `merge.rs`).
+//!    `axis.rs`). Duplicates are recognised by their samples and merged: polar balls of cospherical samples
+//!    before it is made, facets between corners at one sample after (file `parts.rs`), and vertices that
+//!    are left nearly at one position.
 //! 2. Section 4.2: each inner pole is the circumcentre of a Delaunay tetrahedron. The volume of a part
 //!    is that of the tetrahedra whose poles lie on it, divided by the volume of the solid. A pole on
 //!    several parts counts for each.
 //! 3. Section 4.1: parts grow over edges of two triangles. Level 1 starts from free edges, each
-//!    further level beside the one before (file `parts.rs`; levels in `graph.rs`).
+//!    further level beside the one before (file `parts.rs`).
 //! 4. Section 6: rounds by triangle count without any test of topology, at most `t_t_rounds`. *They end
 //!    after the first that removes less than a quarter (`drop`) of what the one before it did*: the
 //!    paper's "dramatic drop", for which it has no number (file `schedule.rs`).
@@ -64,7 +64,7 @@
 //!   The results are 0.2 % larger. The paper merges equal corners before it makes the Voronoi diagram of
 //!   them; here those that stem from one sample are a little apart, and what the merging would not have
 //!   made is removed afterwards, as far as that keeps the topology: the facets between two of them
-//!   (`fins.rs`), and the vertices nearer than `merge` radii. Merged before, they contradict the dual complex
+//!   (`parts.rs`), and the vertices nearer than `merge` radii. Merged before, they contradict the dual complex
 //!   of the balls, and facets stay open.
 //! - The axis of the union is exact, not the subset of the Voronoi diagram of the corners that
 //!   intersects the power shape.
@@ -77,7 +77,7 @@
 //! - A part that equals a threshold is removed.
 //! - The power crust (section 5) is not made here. The poles for it, inner ones on the remaining parts and
 //!   outer ones with or without those of removed features, come from the extras ([`RemainingPoles`], file
-//!   `crust.rs`); the spheres of the medial mesh are no substitute, since most of them are corners of sheets
+//!   `axis.rs`); the spheres of the medial mesh are no substitute, since most of them are corners of sheets
 //!   and not poles. Where the medial mesh was given, or `axis=initial` was asked, there are none.
 
 mod axis;
