@@ -88,14 +88,6 @@ impl Grid {
         self.origin + self.side * Vec3::from(self.voxel(index).map(|n| n as f64 + 0.5))
     }
 
-    fn corner_id(&self, [x, y, z]: [usize; 3]) -> u32 {
-        ((z * (self.size[1] + 1) + y) * (self.size[0] + 1) + x) as u32
-    }
-
-    fn corner_count(&self) -> usize {
-        self.size.iter().map(|n| n + 1).product()
-    }
-
     fn corner(&self, id: u32) -> Vec3 {
         let (id, [x, y]) = (id as usize, [self.size[0] + 1, self.size[1] + 1]);
         let place = [id % x, id / x % y, id / (x * y)].map(|n| n as f64);
@@ -198,7 +190,8 @@ impl Grid {
             return None;
         }
         let stride = self.size[..axis].iter().product::<usize>();
-        let [a, b] = [voxel, voxel + stride].map(|v| vector(toward[v]));
+        let [a, b] = [voxel, voxel + stride]
+            .map(|v| Vec3::from(toward[v].map(f64::from)).normalize_or_zero());
         if a == Vec3::ZERO || b == Vec3::ZERO || b[axis] <= a[axis] {
             return None;
         }
@@ -212,7 +205,8 @@ impl Grid {
             at[axis] += 1;
             at[(axis + 1) % 3] += u;
             at[(axis + 2) % 3] += v;
-            self.corner_id(at)
+            let [x, y, z] = at;
+            ((z * (self.size[1] + 1) + y) * (self.size[0] + 1) + x) as u32
         });
         Some(Face { angle, corners })
     }
@@ -224,14 +218,10 @@ const ANGLE_STEP: f64 = 1.0 / (1 << 20) as f64;
 /// Unit vectors whose sum is no longer are opposite: directions are kept in single precision.
 const OPPOSITE: f64 = 1e-6;
 
-fn vector(v: [f32; 3]) -> Vec3 {
-    Vec3::from(v.map(f64::from)).normalize_or_zero()
-}
-
 /// Distances of the corners of some faces from the surface; negative for those outside and for
 /// all others.
 fn radii(grid: &Grid, faces: &[Face], tree: &TriangleBvh, inside: &InsideTest) -> Vec<f64> {
-    let mut used = vec![false; grid.corner_count()];
+    let mut used = vec![false; grid.size.iter().map(|n| n + 1).product()];
     for corner in faces.iter().flat_map(|face| face.corners) {
         used[corner as usize] = true;
     }

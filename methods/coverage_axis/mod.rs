@@ -124,15 +124,12 @@ impl MedialSimplifier for CoverageAxis {
             params,
             run: run.clone(),
         };
-        Ok(Box::new(PreparedCoverage { search: SizeSearch::new(knob(), run), axis }))
+        // The inverse dilation gives more spheres when it is turned up, as a search expects of a knob.
+        let range = 1.0 / DILATIONS.end()..=1.0 / DILATIONS.start();
+        let (count, unit) = ("inverse_dilation_in_thousandths", "longest sides over the dilation");
+        let knob = Knob { count, unit, range, steps: 1e3, rate: 0.5, exponent: 1.3 };
+        Ok(Box::new(PreparedCoverage { search: SizeSearch::new(knob, run), axis }))
     }
-}
-
-/// The dilation as a knob that gives more spheres when it is turned up: its inverse.
-fn knob() -> Knob {
-    let range = 1.0 / DILATIONS.end()..=1.0 / DILATIONS.start();
-    let (count, unit) = ("inverse_dilation_in_thousandths", "longest sides over the dilation");
-    Knob { count, unit, range, steps: 1e3, rate: 0.5, exponent: 1.3 }
 }
 
 /// One shape, with its candidates.

@@ -137,11 +137,6 @@ impl Levels {
         Ok(self.scales.partition_point(|&cost| cost <= scale))
     }
 
-    /// The least scale at which no more spheres are left than at a stage.
-    fn scale_at(&self, stage: usize) -> f64 {
-        stage.checked_sub(1).map_or(1.0, |last| self.scales[last].max(1.0))
-    }
-
     fn diagnose(&self, level: Level, stage: usize) -> Diagnostics {
         let mut diagnostics = Diagnostics::default();
         let infinite = stage - self.scales[..stage].partition_point(|cost| cost.is_finite());
@@ -171,7 +166,8 @@ impl Levels {
 impl Simplification for Levels {
     fn at(&mut self, level: Level) -> Result<Simplified> {
         let stage = self.stage_of(level)?;
-        let scale = self.scale_at(stage);
+        // The least scale at which no more spheres are left than at this stage.
+        let scale = stage.checked_sub(1).map_or(1.0, |last| self.scales[last].max(1.0));
         let mut extras = Extras::default();
         extras.insert_shared(Arc::clone(&self.hierarchy));
         Ok(Simplified {

@@ -128,23 +128,18 @@ impl PreparedSat {
         Ok(Self { spheres, params, run: run.clone() })
     }
 
-    /// The axis at a scale.
+    /// Steps 3 to 6: the axis at a scale.
     fn at_scale(&self, scale: f64) -> Result<Arc<Scaled>> {
-        Scaled::new(&self.spheres, &self.params, scale).map(Arc::new)
+        let grown = resized(&self.spheres, scale);
+        let axis = UnionAxis::of_balls(&grown).map_err(ShapeError::from)?;
+        let (mut mesh, removed_facets) = sheets::filtered(&axis, self.params.sat_angle);
+        mesh.spheres = resized(&mesh.spheres, 1.0 / scale);
+        let (tally, union_betti) = (*axis.tally(), axis.union_betti());
+        Ok(Arc::new(Scaled { scale, mesh, tally, union_betti, removed_facets }))
     }
 }
 
 impl Scaled {
-    /// Steps 3 to 6.
-    fn new(spheres: &[Sphere], params: &SatParams, scale: f64) -> Result<Self> {
-        let grown = resized(spheres, scale);
-        let axis = UnionAxis::of_balls(&grown).map_err(ShapeError::from)?;
-        let (mut mesh, removed_facets) = sheets::filtered(&axis, params.sat_angle);
-        mesh.spheres = resized(&mesh.spheres, 1.0 / scale);
-        let (tally, union_betti) = (*axis.tally(), axis.union_betti());
-        Ok(Self { scale, mesh, tally, union_betti, removed_facets })
-    }
-
     /// Logarithms of its scale, and of its size as a share of `exp(target)`.
     fn point(&self, target: f64) -> (f64, f64) {
         // Nothing at all counts as half a sphere.

@@ -275,7 +275,7 @@ impl AxisPoles {
         on_axis: impl Iterator<Item = (u32, u32)>,
     ) -> Self {
         let inner = on_axis.map(|(ball, sphere)| {
-            (poles.balls[ball as usize], sphere, poles.samples_of(ball).to_vec())
+            (poles.balls[ball as usize], sphere, poles.samples[ball as usize].clone())
         });
         Self { inner: inner.collect(), samples }
     }
@@ -439,11 +439,6 @@ impl DistinctBalls {
     pub(super) fn given(balls: &[Sphere]) -> Self {
         let (samples, volumes) = (vec![Vec::new(); balls.len()], vec![0.0; balls.len()]);
         Self { balls: balls.to_vec(), samples, volumes }
-    }
-
-    /// The samples that a ball passes through.
-    pub(super) fn samples_of(&self, ball: u32) -> &[u32] {
-        &self.samples[ball as usize]
     }
 
     /// For each corner of the union of the balls, moved and grown to `moved`, its sample.

@@ -155,7 +155,10 @@ impl Simplification for PreparedVmas<'_> {
         };
         let points = self.points(asked)?;
         // Each sphere needs points of its own.
-        let target = asked.min(self.most_spheres(&points));
+        let target = asked.min(match self.params.points {
+            Points::Samples => (points.len() / SAMPLES_PER_SPHERE).max(1),
+            Points::Vertices => points.len(),
+        });
         let mut sampling = VariationalSampling::new(&points, &self.solid, self.params);
         let ended = sampling.run(target, &self.run)?;
         let mesh = sampling.mesh(self.params.connect)?;
@@ -182,14 +185,6 @@ impl PreparedVmas<'_> {
             return Err(SimplifyError::unsupported("the surface has no area"));
         }
         Ok(points)
-    }
-
-    /// The largest number of spheres that is tried.
-    fn most_spheres(&self, points: &SurfacePoints) -> usize {
-        match self.params.points {
-            Points::Samples => (points.len() / SAMPLES_PER_SPHERE).max(1),
-            Points::Vertices => points.len(),
-        }
     }
 }
 
