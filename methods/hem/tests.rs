@@ -247,20 +247,6 @@ fn directed_errors_by_hand() {
 }
 
 #[test]
-fn spheres_without_samples_vanish_first_and_contained_ones_cost_nothing() {
-    // A large ball, one inside it, and one apart that touches nothing.
-    let spheres = [(0.0, 1.0), (0.3, 0.5), (1.6, 0.2), (3.0, 1.0)];
-    let spheres = spheres.map(|(x, r)| Sphere::new(x * Vec3::X, r)).to_vec();
-    let edges = vec![[0, 1], [0, 2], [2, 3]];
-    let mesh = MedialMesh::from_simplices(spheres, edges, vec![]).unwrap();
-    let points = vec![-Vec3::X, Vec3::new(0.0, 1.0, 0.0), 4.0 * Vec3::X, Vec3::new(3.0, 1.0, 0.0)];
-    let model = Model::new(&mesh, points, &[vec![0, 1], vec![], vec![], vec![2, 3]], Inside::Depth);
-    let contraction = run(&model, Stop::Error(1e-9));
-    assert_eq!(contraction.complex.to_mesh().spheres, [model.spheres[0], model.spheres[3]]);
-    assert_eq!(contraction.largest, 0.0);
-}
-
-#[test]
 fn a_level_within_the_bound_is_found() {
     let search = |all: usize, good: &'static [usize]| {
         let error = |t: usize| Ok(if good.contains(&t) { 1.0 } else { 2.0 + t as f64 });

@@ -90,17 +90,6 @@ fn stable_boundaries_stay_where_they_are() {
 }
 
 #[test]
-fn a_chain_of_cones_keeps_its_ends() {
-    let spheres = spheres_at((0..20).map(|i| (Vec3::new(f64::from(i) / 19.0, 0.0, 0.0), 0.05)));
-    let edges = (0..19).map(|i| [i, i + 1]).collect();
-    let initial = MedialMesh::from_simplices(spheres, edges, vec![]).unwrap();
-    let (mesh, _) = contract(&initial, params(), 2);
-    assert_eq!(mesh.edges, [[0, 1]]);
-    let length = mesh.spheres[0].centre.distance(mesh.spheres[1].centre);
-    assert!((length - 1.0).abs() < 1e-9, "{length}");
-}
-
-#[test]
 fn coincident_centres_go_first_and_keep_loops() {
     // A triangle of lone edges, each vertex doubled by a coincident one.
     let corners = [Vec3::ZERO, Vec3::X, Vec3::new(0.4, 0.9, 0.0)];
@@ -150,35 +139,6 @@ fn a_star_of_thousands_of_edges_is_contracted() {
     let initial = MedialMesh::from_simplices(spheres, edges, vec![]).unwrap();
     let (mesh, _) = contract(&initial, params(), leaves as usize - 200);
     assert_eq!(mesh.edges.len(), mesh.spheres.len() - 1);
-}
-
-#[test]
-fn the_topology_is_kept_from_the_given_count_on() {
-    // A closed strip: an annulus of 3 by 24 spheres.
-    let around = 24_u32;
-    let spheres = spheres_at((0..3 * around).map(|v| {
-        let angle = f64::from(v / 3) / f64::from(around) * std::f64::consts::TAU;
-        let reach = 0.4 + 0.02 * f64::from(v % 3) + 0.003 * (3.0 * angle).sin();
-        (Vec3::new(reach * angle.cos(), reach * angle.sin(), 0.0), 0.05)
-    }));
-    let at = |i: u32, j: u32| (i % around) * 3 + j;
-    let faces = (0..around)
-        .flat_map(|i| (0..2).map(move |j| (i, j)))
-        .flat_map(|(i, j)| {
-            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            [[a, b, c], [a, c, d]]
-        })
-        .collect();
-    let initial = MedialMesh::from_simplices(spheres, vec![], faces).unwrap();
-    assert_eq!(betti(&initial), [1, 1, 0]);
-    for topology_from in [TopologyFrom::All, TopologyFrom::Spheres(200)] {
-        let (mesh, _) = contract(&initial, QmatParams { topology_from, ..params() }, 1);
-        assert_eq!((mesh.spheres.len(), betti(&mesh)), (3, [1, 1, 0]));
-    }
-    for topology_from in [TopologyFrom::Never, TopologyFrom::Spheres(0)] {
-        let (mesh, _) = contract(&initial, QmatParams { topology_from, ..params() }, 1);
-        assert_eq!(mesh.spheres.len(), 1);
-    }
 }
 
 /// Spheres that agree up to rounding, in any order.

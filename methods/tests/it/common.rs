@@ -20,6 +20,13 @@ pub fn shape_of(mesh: &TriMesh) -> Shape {
     Shape::new("shape", mesh, report, ShapeOptions::default()).expect("an extent")
 }
 
+pub fn sampled(mesh: &TriMesh, sampling: &str) -> Shape {
+    let report = surface::validate(mesh).expect("a solid");
+    let sampling = sampling.parse().expect("a sampling");
+    let options = ShapeOptions { sampling, ..ShapeOptions::default() };
+    Shape::new("shape", mesh, report, options).expect("an extent")
+}
+
 pub fn built_in(id: &str) -> TriMesh {
     let shape = medial_datasets::find(id).expect("in the catalogue");
     shape.mesh(shape.default_resolution)

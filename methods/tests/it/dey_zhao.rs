@@ -3,21 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_8};
 
+use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
-use medial::shape::{Shape, ShapeOptions};
+use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{Side, TriMesh};
-use medial::{Vec3, surface};
 use medial_methods::dey_zhao;
 
-use crate::common;
-
-fn shape_of(mesh: &TriMesh, sampling: &str) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    let sampling = sampling.parse().expect("a sampling");
-    let options = ShapeOptions { sampling, ..ShapeOptions::default() };
-    Shape::new("shape", mesh, report, options).expect("an extent")
-}
+use crate::common::{self, sampled as shape_of};
 
 fn built_in(id: &str, resolution: u32) -> TriMesh {
     medial_datasets::find(id).expect("in the catalogue").mesh(resolution)

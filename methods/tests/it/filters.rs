@@ -1,16 +1,14 @@
 //! The variants of the angle filter and of the lambda-medial axis: thresholds on boxes and plates,
 //! incidence, topology, scale.
 
+use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::geometry::enclosing_ball;
-use medial::shape::{Shape, ShapeOptions};
+use medial::shape::Shape;
 use medial::simplifier::{Level, RunContext, Simplified, SimplifyError};
-use medial::surface::TriMesh;
-use medial::{Vec3, surface};
 
 use crate::common::{
-    ANGLE, LAMBDA, at, built_in, count, default_shape, levels, params, shape, shape_of,
-    with_threads,
+    ANGLE, LAMBDA, at, built_in, count, default_shape, levels, params, sampled, shape, shape_of,
 };
 
 /// Numbers of spheres by ranking instead of sampling.
@@ -257,24 +255,6 @@ fn what_is_kept_of_the_tied_is_spread_over_the_shape() {
 }
 
 #[test]
-fn scale_by_a_power_of_two_and_threads_change_nothing() {
-    let mesh = built_in("bracket");
-    let all = ANGLE.iter().map(|set| ("angle", *set, 70.0));
-    for (method, set, level) in all.chain(LAMBDA.map(|set| ("lambda", set, 0.04))) {
-        let level = Level::Native(level);
-        let plain = at(&shape_of(&mesh), method, set, level);
-        assert!(!plain.spheres.is_empty());
-        let vertices = mesh.vertices.iter().map(|&v| v * 512.0).collect();
-        let scaled = TriMesh { vertices, faces: mesh.faces.clone() };
-        assert_eq!(plain, at(&shape_of(&scaled), method, set, level), "{method} {set:?}");
-        for threads in [1, 3] {
-            let again = with_threads(threads, || at(&shape_of(&mesh), method, set, level));
-            assert_eq!(plain, again, "{method} {set:?}");
-        }
-    }
-}
-
-#[test]
 fn variants_of_voronoi_facets_refuse_a_given_mesh() {
     let mesh = built_in("box");
     let given = shape_of(&mesh).voronoi().expect("a mesh");
@@ -351,13 +331,7 @@ fn a_number_by_sampling_is_the_native_level_of_that_sampling() {
             at(&shape, "angle", &set, native)
         } else {
             let sampling = format!("blue:{}", count(&found, "samples"));
-            let options = ShapeOptions {
-                sampling: sampling.parse().expect("a sampling"),
-                ..ShapeOptions::default()
-            };
-            let report = surface::validate(&mesh).expect("a solid");
-            let sampled = Shape::new("shape", &mesh, report, options).expect("an extent");
-            at(&sampled, "angle", set, native)
+            at(&sampled(&mesh, &sampling), "angle", set, native)
         };
         assert_eq!(found.mesh, again, "{set:?}");
     }

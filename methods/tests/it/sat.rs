@@ -8,7 +8,7 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Simplified};
 use medial::surface::{self, TriMesh};
 
-use crate::common::{self, count, default_shape, levels, shape_of, with_threads};
+use crate::common::{self, count, default_shape, levels, sampled, shape_of, with_threads};
 
 fn at(shape: &Shape, set: &[(&str, &str)], level: Level) -> Simplified {
     levels(shape, "sat", set, &[level]).remove(0).expect("a scale axis")
@@ -208,10 +208,7 @@ fn a_number_by_density_is_the_published_scale_of_fewer_samples() {
     let reached = found.mesh.spheres.len();
     assert!((490..=500).contains(&reached), "{reached}");
     assert_eq!(found.native_level, Some(1.1));
-    let sampling = format!("blue:{}", count(&found, "samples")).parse().expect("a sampling");
-    let options = ShapeOptions { sampling, ..ShapeOptions::default() };
-    let report = surface::validate(&mesh).expect("a solid");
-    let sampled = Shape::new("blob", &mesh, report, options).expect("an extent");
+    let sampled = sampled(&mesh, &format!("blue:{}", count(&found, "samples")));
     assert_eq!(found.mesh, at(&sampled, &[], Level::Published).mesh);
     // Other levels are those of the shape's own samples.
     let own = at(&shape, &[("size", "density")], Level::Native(1.3));
