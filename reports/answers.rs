@@ -531,7 +531,7 @@ pub(crate) fn equal_error_figure(
     let figure = Figure {
         stem: "overview-equal-error".to_owned(),
         title: "Equal error: median of the fewest spheres, searched for".to_owned(),
-        x: ("Hausdorff error kept (% of diagonal)".to_owned(), Scale::Log),
+        x: "Hausdorff error kept (% of diagonal)".to_owned(),
         y: ("spheres".to_owned(), Scale::Log),
         curves: (0..comparison.series.len()).map(curve).collect(),
         front: false,

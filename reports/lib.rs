@@ -9,7 +9,6 @@
 //! | `metric` | the columns: name, unit, direction, definition |
 //! | `summary` | means over meshes at equal numbers of spheres and at native levels |
 //! | `answers` | which method for which purpose, at equal counts and equal errors |
-//! | `scaling` | growth of time and memory with the input |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures, and their SVG |
 //! | [`history`] | one file for each run, change points over many runs |
@@ -32,7 +31,6 @@ mod pictures;
 mod plots;
 mod record;
 pub mod render;
-mod scaling;
 mod summary;
 mod tables;
 mod terminal;

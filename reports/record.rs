@@ -396,6 +396,11 @@ impl From<Level> for Target {
 }
 
 impl Target {
+    /// Whether it is a level of the method's own, the published one included.
+    pub(crate) fn is_native(self) -> bool {
+        matches!(self, Self::Published | Self::Native(_))
+    }
+
     /// The level of the method, or the error bound.
     pub fn level(self) -> Result<Level, f64> {
         match self {

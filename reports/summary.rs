@@ -15,10 +15,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::header::Header;
 use crate::metric::{COMPARED, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
-use crate::plots::{Curve, Figure, Scale, native_points};
 use crate::record::{Record, Status, Target};
 use crate::tables::{Cell, Column, Row, Table};
-use crate::text::{counted, file_stems, grouped, significant};
+use crate::text::{counted, grouped, significant};
 
 /// The method that others are put in relation to, where it ran with its defaults.
 const REFERENCE: &str = "qmat";
@@ -312,9 +311,7 @@ pub(crate) fn native_curves(comparison: &Comparison<'_>) -> Vec<NativeCurve> {
 fn native_curve(comparison: &Comparison<'_>, series: usize) -> Option<NativeCurve> {
     let mut own: Vec<&Entry<'_>> =
         comparison.entries.iter().filter(|entry| entry.series == series).collect();
-    own.retain(|entry| {
-        matches!(comparison.levels[entry.level], Target::Native(_) | Target::Published)
-    });
+    own.retain(|entry| comparison.levels[entry.level].is_native());
     let set = OwnSet::of(own.iter().map(|entry| (entry.level, entry.mesh, entry.measured())));
     let mut points = Vec::new();
     for &level in &set.levels {
@@ -394,64 +391,6 @@ pub(crate) fn native_table(
             Column::text("topology right"),
         ],
     }
-}
-
-/// One figure for each method with a scalar of its own: its errors against that scalar.
-pub(crate) fn native_figures(
-    comparison: &Comparison<'_>,
-    natives: &[NativeCurve],
-    header: &Header,
-) -> Vec<Figure> {
-    let stems = file_stems(comparison.series.iter().map(String::as_str));
-    let mut figures = vec![];
-    for native in natives {
-        let mut points = native_points(comparison, native, |point| match point.level {
-            Target::Native(value) => Some((value, point.hausdorff)),
-            _ => None,
-        });
-        if points.len() < 2 {
-            continue;
-        }
-        let levels = || points.iter().map(|point| point.x);
-        let least = levels().fold(f64::INFINITY, f64::min);
-        let most = levels().fold(f64::NEG_INFINITY, f64::max);
-        let is_log = least > 0.0 && most > 20.0 * least;
-        let mut last = f64::NEG_INFINITY;
-        for point in &mut points {
-            let place = match is_log {
-                true => (point.x / least).ln() / (most / least).ln(),
-                false => (point.x - least) / (most - least),
-            };
-            // Tags an eighth of the axis apart do not cover each other.
-            if (place - last).abs() >= 0.125 {
-                point.tag = point.spheres.map(|spheres| grouped(spheres.round() as u64));
-                last = place;
-            }
-        }
-        let name = comparison.series[native.series].clone();
-        let native_axis = header.native_axis(comparison.methods[native.series]);
-        figures.push(Figure {
-            stem: format!("overview-level-{}", stems[native.series]),
-            title: format!("{name}: Hausdorff error against its native level"),
-            x: (
-                native_axis.unwrap_or("native level").to_owned(),
-                if is_log { Scale::Log } else { Scale::Linear },
-            ),
-            y: ("Hausdorff error (% of diagonal)".to_owned(), Scale::Log),
-            curves: vec![Curve {
-                series: native.series,
-                label: format!("spheres, over {}", counted(native.over, "mesh", "meshes")),
-                name,
-                of: "mean".to_owned(),
-                points,
-                line: None,
-                dashed: true,
-            }],
-            front: false,
-            leading: false,
-        });
-    }
-    figures
 }
 
 /// Caption of the table of means.

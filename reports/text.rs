@@ -25,6 +25,15 @@ pub(crate) fn round_up(value: f64) -> f64 {
     found.unwrap_or(10.0) * power
 }
 
+/// The multiples of a round step in a range, and the step: the range has at most `most` of them.
+pub(crate) fn round_steps(low: f64, high: f64, most: f64) -> (f64, Vec<f64>) {
+    let step = round_up((high - low) / most);
+    // An end that misses a multiple by rounding alone still has it.
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    (step, (first..=last).map(|k| k as f64 * step).collect())
+}
+
 /// A count with commas between the thousands: `34,702`.
 pub(crate) fn grouped(count: u64) -> String {
     let digits = count.to_string();

@@ -16,8 +16,7 @@ use crate::page::{MeshPart, MeshView, Page};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
 use crate::plots::{Figure, mean_figures, mesh_figures};
 use crate::record::Record;
-use crate::scaling::{scaling, scaling_figures, scaling_table};
-use crate::summary::{MEANS, by_count, means_table, native_curves, native_figures, native_table};
+use crate::summary::{MEANS, by_count, means_table, native_curves, native_table};
 use crate::tables::{Table, mesh_table, to_csv, to_latex, to_markdown};
 use crate::text::file_stems;
 use crate::view3d::text_of;
@@ -44,7 +43,7 @@ pub fn write_report(
     let comparison = Comparison::new(records);
     let is_one = comparison.meshes.len() == 1;
     let (summaries, bounds) = (by_count(&comparison), by_bound(&comparison));
-    let (natives, scaling) = (native_curves(&comparison), scaling(&comparison));
+    let natives = native_curves(&comparison);
     let how = header.how();
     let mut files = Files { dir, written: Vec::new() };
     let csv = to_csv(&comparison).map_err(|error| ReportError::content("results.csv", error))?;
@@ -58,15 +57,11 @@ pub fn write_report(
         means.push(native_table(&comparison, &natives, header, &how));
     }
     means.retain(|table| !table.rows.is_empty());
-    let growth = scaling.as_ref().map(|scaling| scaling_table(&comparison, scaling, &how));
     let purposes: Vec<Table> = answers.iter().chain(&wins).cloned().collect();
     let all_means: Vec<Table> = equal_error.iter().chain(&means).cloned().collect();
-    let growths: Vec<Table> = growth.into_iter().collect();
-    for (stem, title, tables) in [
-        ("summary", "Summary", &all_means),
-        ("overview-purpose", "Which method?", &purposes),
-        ("overview-scaling", "Time and memory against input size", &growths),
-    ] {
+    for (stem, title, tables) in
+        [("summary", "Summary", &all_means), ("overview-purpose", "Which method?", &purposes)]
+    {
         if stem == "summary" || !tables.is_empty() {
             files.write_tables(stem, title, tables)?;
         }
@@ -74,8 +69,6 @@ pub fn write_report(
 
     let mut figures = mean_figures(&comparison, &summaries, &natives);
     figures.extend(equal_error_figure(&comparison, &bounds));
-    figures.extend(scaling.iter().flat_map(|scaling| scaling_figures(&comparison, scaling)));
-    figures.extend(native_figures(&comparison, &natives, header));
     files.write_plots(&figures)?;
 
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
@@ -118,7 +111,6 @@ pub fn write_report(
         ("equal-error", "Equal error", equal_error),
         ("means", if is_one { "Native levels" } else { "Means over meshes" }, means),
         ("wins", "Method against method", wins.into_iter().collect()),
-        ("scaling", "Time and memory against input size", growths),
     ];
     let page = Page {
         header,

@@ -11,8 +11,9 @@ const plotOf = (figure) => {
   const laid = ([x, y], more) => ({ u: lay("x", x), v: lay("y", y), x, y, ...more });
   const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, isFront]) =>
     laid([x, y], { n, spheres, isFront, curve })).filter(({ u, v }) => Number.isFinite(u) && Number.isFinite(v)));
-  const lines = figure.curves.flatMap((curve) => (curve.line ?? curve.points).map((at) => laid(at, { curve })));
-  const tags = figure.curves.flatMap((curve) => curve.tags.map(([k, text]) => laid(curve.points[k], { text, curve })));
+  const lines = figure.curves.flatMap((curve) => curve.points.map((at) => laid(at, { curve })));
+  const tags = figure.curves.flatMap((curve) => curve.points.filter((point) => point[5] !== null)
+    .map((point) => laid(point, { text: point[5], curve })));
   const front = points.filter((point) => point.isFront).sort((a, b) => a.x - b.x);
 
   // A linear axis begins at zero, a logarithmic one spans at least a factor of two, or a single value

@@ -4,13 +4,14 @@ use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-use crate::text::{grouped, round_up, significant};
+use crate::text::{grouped, round_steps, significant};
 
 /// Width of a letter beneath an axis, with its share of the gap to the next label; of the axis' length.
 const WIDTH_OF_LETTER: f64 = 0.018;
 
 /// How values are laid out along an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub(crate) enum Scale {
     /// From zero.
     Linear,
@@ -18,22 +19,11 @@ pub(crate) enum Scale {
     Log,
 }
 
-impl Scale {
-    /// The name of the scale in the page's plots.
-    pub(crate) fn key(self) -> &'static str {
-        match self {
-            Self::Linear => "linear",
-            Self::Log => "log",
-        }
-    }
-}
-
-/// An axis fitted to its data.
-#[derive(Clone)]
+/// An axis fitted to its data. Plotters' own logarithmic axis has ticks at decades alone, and labels that collide.
 pub(crate) struct Axis {
     scale: Scale,
-    /// Both ends, as laid out.
-    ends: (f64, f64),
+    /// The values at both ends.
+    ends: [f64; 2],
     /// Values at the ticks, ascending.
     pub(crate) ticks: Vec<f64>,
 }
@@ -46,36 +36,30 @@ impl Axis {
             .filter(|value| value.is_finite() && (scale != Scale::Log || *value > 0.0))
             .map(|value| (value, value))
             .reduce(|(low, high), (a, b)| (low.min(a), high.max(b)))?;
-        match scale {
+        let ticks = match scale {
             Scale::Log => {
                 // At least a factor of two, or a single value would have no scale at all.
                 let widen = (2.0 * low / high).max(1.0).sqrt();
                 (low, high) = (low / widen / 1.12, high * widen * 1.12);
+                log_ticks(low, high)
             }
-            Scale::Linear => (low, high) = (low.min(0.0), (high * 1.05).max(1e-12)),
-        }
-        let ends = (lay_out(scale, low), lay_out(scale, high));
-        Some(Self { scale, ends, ticks: round_numbers(scale, low, high) })
+            Scale::Linear => {
+                (low, high) = (low.min(0.0), (high * 1.05).max(1e-12));
+                round_steps(low, high, 5.0).1
+            }
+        };
+        Some(Self { scale, ends: [low, high], ticks })
     }
 
     /// Where a value lies between the ends of the axis, from 0 to 1.
-    pub(crate) fn place(&self, value: f64) -> f64 {
-        let (low, high) = self.ends;
-        let placed = (lay_out(self.scale, value) - low) / (high - low);
+    fn place(&self, value: f64) -> f64 {
+        let [at, low, high] = [value, self.ends[0], self.ends[1]].map(|value| match self.scale {
+            Scale::Log => value.log10(),
+            Scale::Linear => value,
+        });
+        let place = (at - low) / (high - low);
         // What has no logarithm goes to the lower end.
-        if placed.is_finite() { placed.clamp(0.0, 1.0) } else { 0.0 }
-    }
-
-    /// The text at a tick.
-    pub(crate) fn label(value: f64) -> String {
-        let rounded: f64 = significant(value, 3).parse().unwrap_or(value);
-        if rounded == 0.0 {
-            "0".to_owned()
-        } else if (1000.0..1e15).contains(&rounded) {
-            grouped(rounded as u64)
-        } else {
-            format!("{rounded}")
-        }
+        if place.is_finite() { place.clamp(0.0, 1.0) } else { 0.0 }
     }
 }
 
@@ -92,34 +76,27 @@ impl Ranged for Axis {
     }
 
     fn range(&self) -> Range<f64> {
-        match self.scale {
-            Scale::Linear => self.ends.0..self.ends.1,
-            Scale::Log => 10f64.powf(self.ends.0)..10f64.powf(self.ends.1),
-        }
+        self.ends[0]..self.ends[1]
     }
 }
 
 impl ValueFormatter<f64> for Axis {
     fn format(value: &f64) -> String {
-        Self::label(*value)
+        label(*value)
     }
 }
 
-fn lay_out(scale: Scale, value: f64) -> f64 {
-    match scale {
-        Scale::Linear => value,
-        Scale::Log => value.log10(),
+fn label(value: f64) -> String {
+    let rounded: f64 = significant(value, 3).parse().unwrap_or(value);
+    match rounded {
+        0.0 => "0".to_owned(),
+        1000.0..1e15 => grouped(rounded as u64),
+        _ => rounded.to_string(),
     }
 }
 
-/// Round numbers within a range: multiples on a linear axis, the densest of three decade patterns
-/// that stays readable on a logarithmic one.
-fn round_numbers(scale: Scale, low: f64, high: f64) -> Vec<f64> {
-    if scale == Scale::Linear {
-        let step = round_up((high - low) / 5.0);
-        let first = (low / step).ceil() as i64;
-        return (first..).map(|k| k as f64 * step).take_while(|&value| value <= high).collect();
-    }
+/// The densest of four decade patterns that stays readable on a logarithmic axis.
+fn log_ticks(low: f64, high: f64) -> Vec<f64> {
     let patterns: [&[f64]; 4] =
         [&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
     let mut sparsest: Vec<f64> = Vec::new();
@@ -130,7 +107,7 @@ fn round_numbers(scale: Scale, low: f64, high: f64) -> Vec<f64> {
             .collect();
         let collide = sparsest.windows(2).any(|pair| {
             let gap = (pair[1] / pair[0]).log10() / (high / low).log10();
-            gap < WIDTH_OF_LETTER * Axis::label(pair[1]).len() as f64
+            gap < WIDTH_OF_LETTER * label(pair[1]).len() as f64
         });
         if sparsest.len() <= 8 && !collide {
             return sparsest;
@@ -145,21 +122,19 @@ fn round_numbers(scale: Scale, low: f64, high: f64) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn labels(scale: Scale, values: &[f64]) -> Vec<String> {
-        let axis = Axis::fit(scale, values.iter().copied()).unwrap();
-        axis.ticks.iter().map(|&tick| Axis::label(tick)).collect()
-    }
-
     #[test]
     fn ticks_are_round_and_few() {
-        assert_eq!(labels(Scale::Log, &[50.0, 1000.0]), ["50", "100", "200", "500", "1,000"]);
-        assert_eq!(
-            labels(Scale::Log, &[0.4, 1.9]),
-            ["0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1", "2"]
-        );
-        // 50,000 and 60,000 would touch.
-        assert_eq!(labels(Scale::Log, &[9000.0, 60000.0]), ["10,000", "20,000", "50,000"]);
-        assert_eq!(labels(Scale::Linear, &[3.0, 48.0]), ["0", "20", "40"]);
+        for (scale, values, expected) in [
+            (Scale::Log, [50.0, 1000.0], "50 100 200 500 1,000"),
+            (Scale::Log, [0.4, 1.9], "0.4 0.5 0.6 0.7 0.8 0.9 1 2"),
+            // 50,000 and 60,000 would touch.
+            (Scale::Log, [9000.0, 60000.0], "10,000 20,000 50,000"),
+            (Scale::Linear, [3.0, 48.0], "0 20 40"),
+        ] {
+            let axis = Axis::fit(scale, values).unwrap();
+            let labels: Vec<String> = axis.ticks.iter().copied().map(label).collect();
+            assert_eq!(labels.join(" "), expected);
+        }
     }
 
     #[test]

@@ -8,21 +8,21 @@ mod svg;
 
 use serde_json::{Value, json};
 
-use crate::comparison::{Comparison, Entry, reached};
+use crate::comparison::{Comparison, reached};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
-use crate::record::Target;
+use crate::record::Record;
 use crate::summary::{CountSummary, NativeCurve};
 use crate::text::{grouped, significant};
 
 pub(crate) use self::axis::Scale;
 pub(crate) use self::svg::{FONTS, symbol};
 
-/// A figure before it is drawn.
+/// A figure before it is drawn. Its horizontal axis is logarithmic.
 pub(crate) struct Figure {
     /// File name without folder and extension.
     pub(crate) stem: String,
     pub(crate) title: String,
-    pub(crate) x: (String, Scale),
+    pub(crate) x: String,
     pub(crate) y: (String, Scale),
     pub(crate) curves: Vec<Curve>,
     /// Whether less is better on both axes, so that some points dominate others.
@@ -42,8 +42,6 @@ pub(crate) struct Curve {
     pub(crate) of: String,
     /// In the order in which they are joined.
     pub(crate) points: Vec<Point>,
-    /// Drawn instead of a line through the points, such as a fit.
-    pub(crate) line: Option<Vec<(f64, f64)>>,
     pub(crate) dashed: bool,
 }
 
@@ -78,27 +76,21 @@ impl Figure {
     /// The figure for the script of the page: numbers with five digits.
     pub(crate) fn to_json(&self) -> Value {
         let front = self.front();
+        let rounded = |value| significant(value, 5).parse().unwrap_or(value);
         let curves = self.curves.iter().enumerate().map(|(index, curve)| {
             let points = curve.points.iter().enumerate().map(|(k, point)| {
                 let is_front = u8::from(front.contains(&(index, k)));
-                let spheres = point.spheres.map(rounded);
-                json!([rounded(point.x), rounded(point.y), point.n, spheres, is_front])
+                let [x, y] = [point.x, point.y].map(rounded);
+                json!([x, y, point.n, point.spheres.map(rounded), is_front, point.tag])
             });
-            // By index, since few points have a tag.
-            let tags = curve.points.iter().enumerate();
-            let tags = tags.filter_map(|(k, point)| Some(json!([k, point.tag.as_ref()?])));
-            let line: Option<Vec<[f64; 2]>> = (curve.line.as_ref())
-                .map(|line| line.iter().map(|&(x, y)| [rounded(x), rounded(y)]).collect());
             json!({
                 "series": curve.series, "label": curve.label, "name": curve.name, "of": curve.of,
-                "dashed": curve.dashed, "line": line,
-                "points": points.collect::<Vec<_>>(), "tags": tags.collect::<Vec<_>>(),
+                "dashed": curve.dashed, "points": points.collect::<Vec<_>>(),
             })
         });
-        let [x, y] =
-            [&self.x, &self.y].map(|(title, scale)| json!({"title": title, "scale": scale.key()}));
         json!({
-            "title": self.title, "leading": self.leading, "x": x, "y": y,
+            "title": self.title, "leading": self.leading,
+            "x": {"title": self.x, "scale": Scale::Log}, "y": {"title": self.y.0, "scale": self.y.1},
             "curves": curves.collect::<Vec<_>>(),
         })
     }
@@ -130,139 +122,114 @@ impl Figure {
     }
 }
 
-fn rounded(value: f64) -> f64 {
-    significant(value, 5).parse().unwrap_or(value)
-}
-
 /// A family of figures: one for each mesh, and one of the means over all.
 struct Kind {
     name: &'static str,
     title: &'static str,
     axis: &'static str,
     y: &'static Metric,
-    scale: Scale,
-    /// Seconds rather than spheres along the bottom.
-    against_time: bool,
-    /// Whether less is better on both axes.
-    front: bool,
 }
 
-impl Kind {
-    const fn of(name: &'static str, axis: &'static str, y: &'static Metric) -> Self {
-        Self { name, title: name, axis, y, scale: Scale::Log, against_time: false, front: true }
-    }
-}
-
-static KINDS: [Kind; 5] = [
-    Kind {
-        title: "Hausdorff error against spheres",
-        ..Kind::of("hausdorff", "Hausdorff error (% of diagonal)", &HAUSDORFF)
-    },
-    Kind {
-        title: "Hausdorff error against time",
-        against_time: true,
-        ..Kind::of("time", "Hausdorff error (% of diagonal)", &HAUSDORFF)
-    },
-    Kind {
-        title: "Mean error against spheres",
-        ..Kind::of("mean", "mean error (% of diagonal)", &MEAN_ERROR)
-    },
-    Kind {
-        title: "Triangle quality: mean smallest angle",
-        scale: Scale::Linear,
-        front: false,
-        ..Kind::of("angles", "mean smallest angle (degrees)", &MIN_ANGLE)
-    },
-    Kind {
-        title: "Spikes left",
-        scale: Scale::Linear,
-        front: false,
-        ..Kind::of("spikes", "spikes", &SPIKES)
-    },
+const KINDS: [Kind; 5] = [
+    kind(
+        "hausdorff",
+        "Hausdorff error against spheres",
+        "Hausdorff error (% of diagonal)",
+        &HAUSDORFF,
+    ),
+    kind("time", "Hausdorff error against time", "Hausdorff error (% of diagonal)", &HAUSDORFF),
+    kind("mean", "Mean error against spheres", "mean error (% of diagonal)", &MEAN_ERROR),
+    kind(
+        "angles",
+        "Triangle quality: mean smallest angle",
+        "mean smallest angle (degrees)",
+        &MIN_ANGLE,
+    ),
+    kind("spikes", "Spikes left", "spikes", &SPIKES),
 ];
 
+const fn kind(
+    name: &'static str,
+    title: &'static str,
+    axis: &'static str,
+    y: &'static Metric,
+) -> Kind {
+    Kind { name, title, axis, y }
+}
+
 impl Kind {
+    /// Seconds rather than spheres along the bottom.
+    fn is_over_time(&self) -> bool {
+        self.name == "time"
+    }
+
     fn figure(&self, stem: &str, of: &str, curves: Vec<Curve>) -> Option<Figure> {
-        let x = if self.against_time { TOTAL_SECONDS.axis_title() } else { "spheres".to_owned() };
+        // Errors span orders of magnitude, and less of them is better at any cost.
+        let is_error = [&HAUSDORFF, &MEAN_ERROR].iter().any(|error| error.key == self.y.key);
         let figure = Figure {
             stem: format!("{stem}-{}", self.name),
             title: format!("{of}: {}", self.title),
-            x: (x, Scale::Log),
-            y: (self.axis.to_owned(), self.scale),
+            x: if self.is_over_time() { "time (s)".to_owned() } else { "spheres".to_owned() },
+            y: (self.axis.to_owned(), if is_error { Scale::Log } else { Scale::Linear }),
             curves,
-            front: self.front,
+            front: is_error,
             leading: matches!(self.name, "hausdorff" | "time"),
         };
         figure.with_points()
     }
 
-    /// The point of a result or mean with so many spheres; the count is a tag where no axis has it.
-    fn point(&self, spheres: f64, seconds: Option<f64>, y: Option<f64>) -> Option<Point> {
-        let x = if self.against_time { seconds? } else { spheres };
-        Some(Point {
-            spheres: self.against_time.then_some(spheres),
-            compared: true,
-            ..Point::at(x, y?)
-        })
-    }
-
-    /// Tags both ends of a curve over time with their counts.
-    fn tag_ends(&self, points: &mut [Point]) {
-        let last = points.len().saturating_sub(1);
-        for (k, point) in points.iter_mut().enumerate() {
-            let spheres = point.spheres.filter(|_| k == 0 || k == last);
-            point.tag = spheres.map(|spheres| grouped(spheres as u64));
-        }
-    }
-}
-
-/// The figures of one mesh.
-pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str) -> Vec<Figure> {
-    (KINDS.iter())
-        .filter_map(|kind| {
-            let series = 0..comparison.series.len();
-            let curves = series.flat_map(|series| mesh_curves(comparison, mesh, series, kind));
-            kind.figure(&format!("mesh-{stem}"), &comparison.meshes[mesh], curves.collect())
-        })
-        .collect()
-}
-
-/// Every measured result of one method on one mesh, from many spheres to few: those at counts and
-/// error bounds as a line, those at native levels as dashes.
-fn mesh_curves(comparison: &Comparison<'_>, mesh: usize, series: usize, kind: &Kind) -> Vec<Curve> {
-    let mut curves = vec![];
-    for dashed in [false, true] {
-        let mut entries: Vec<&Entry<'_>> = comparison
-            .of_mesh(mesh)
-            .filter(|entry| entry.series == series && entry.measured())
-            .filter(|entry| {
-                matches!(entry.record.simplify.level, Target::Native(_) | Target::Published)
-                    == dashed
+    /// A curve of results or means: spheres, seconds and y of each, the meshes behind it, and of how many. Those over
+    /// all meshes are compared. Over time both ends are tagged with their number of spheres, which no axis shows.
+    fn curve(
+        &self,
+        series: usize,
+        (name, of): (&str, &str),
+        points: impl IntoIterator<Item = (f64, Option<f64>, Option<f64>, [usize; 2])>,
+    ) -> Curve {
+        let mut points: Vec<Point> = (points.into_iter())
+            .filter_map(|(spheres, seconds, y, [n, all])| {
+                let (x, spheres) =
+                    if self.is_over_time() { (seconds?, Some(spheres)) } else { (spheres, None) };
+                Some(Point { x, y: y?, n: Some(n), spheres, compared: n == all, tag: None })
             })
             .collect();
-        entries.sort_by_key(|entry| std::cmp::Reverse(reached(entry.record)));
-        let mut points = vec![];
-        for record in entries.into_iter().map(|entry| entry.record) {
-            let Some(spheres) = reached(record) else { continue };
-            let point = kind.point(spheres as f64, TOTAL_SECONDS.of(record), kind.y.of(record));
-            points.extend(point.map(|point| Point { n: Some(1), ..point }));
+        for k in [0, points.len().saturating_sub(1)] {
+            if let Some(point) = points.get_mut(k) {
+                point.tag = point.spheres.map(|spheres| grouped(spheres as u64));
+            }
         }
-        kind.tag_ends(&mut points);
-        curves.push(Curve {
-            series,
-            label: comparison.series[series].clone(),
-            name: comparison.series[series].clone(),
-            of: comparison.meshes[mesh].clone(),
-            points,
-            line: None,
-            dashed,
-        });
+        let [label, name, of] = [name, name, of].map(str::to_owned);
+        Curve { series, label, name, of, points, dashed: false }
     }
-    // One row in the legend for both.
-    if !curves[0].points.is_empty() {
-        curves[1].label.clear();
+}
+
+/// The figures of one mesh: every measured result of each method, from many spheres to few. Those at counts and error
+/// bounds are a line, those at native levels dashes.
+pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str) -> Vec<Figure> {
+    let mut figures = vec![];
+    for kind in &KINDS {
+        let mut curves: Vec<Curve> = vec![];
+        for (series, dashed) in (0..comparison.series.len()).flat_map(|s| [(s, false), (s, true)]) {
+            let mut records: Vec<&Record> = (comparison.of_mesh(mesh))
+                .filter(|entry| entry.series == series && entry.measured())
+                .map(|entry| entry.record)
+                .filter(|record| record.simplify.level.is_native() == dashed)
+                .collect();
+            records.sort_by_key(|record| std::cmp::Reverse(reached(record)));
+            let points = records.into_iter().filter_map(|record| {
+                Some((reached(record)? as f64, TOTAL_SECONDS.of(record), kind.y.of(record), [1, 1]))
+            });
+            let names = (&*comparison.series[series], &*comparison.meshes[mesh]);
+            let mut curve = Curve { dashed, ..kind.curve(series, names, points) };
+            // One row in the legend for both.
+            if dashed && curves.last().is_some_and(|solid| !solid.points.is_empty()) {
+                curve.label.clear();
+            }
+            curves.push(curve);
+        }
+        figures.extend(kind.figure(&format!("mesh-{stem}"), &comparison.meshes[mesh], curves));
     }
-    curves
+    figures
 }
 
 /// Figures of the means over all meshes; with dashes the means at native levels.
@@ -277,25 +244,21 @@ pub(crate) fn mean_figures(
             .map(|series| mean_curve(comparison, summaries, series, kind))
             .collect();
         for native in natives {
-            let mut points = native_points(comparison, native, |point| match kind.name {
-                "hausdorff" => Some((point.spheres, point.hausdorff)),
-                "mean" => Some((point.spheres, point.mean)),
-                _ => None,
-            });
-            // The axis shows the spheres.
-            points.iter_mut().for_each(|point| point.spheres = None);
             let series = native.series;
-            let is_named = !curves[series].points.is_empty();
             let name = format!("{} (native levels)", comparison.series[series]);
-            curves.push(Curve {
-                series,
-                label: if is_named { String::new() } else { name.clone() },
-                name,
-                of: "mean".to_owned(),
-                points,
-                line: None,
-                dashed: true,
+            let points = native.points.iter().map(|point| {
+                let y = match kind.name {
+                    "hausdorff" => Some(point.hausdorff),
+                    "mean" => Some(point.mean),
+                    _ => None,
+                };
+                (point.spheres, None, y, [native.over, comparison.meshes.len()])
             });
+            let mut curve = Curve { dashed: true, ..kind.curve(series, (&name, "mean"), points) };
+            if !curves[series].points.is_empty() {
+                curve.label.clear();
+            }
+            curves.push(curve);
         }
         let of = format!("All meshes, {} means", kind.y.mean.word());
         figures.extend(kind.figure("overview", &of, curves));
@@ -309,42 +272,20 @@ fn mean_curve(
     series: usize,
     kind: &Kind,
 ) -> Curve {
-    let name = comparison.series[series].clone();
+    let name = &comparison.series[series];
     let mut label = name.clone();
-    let mut points = Vec::new();
-    for summary in summaries {
-        let Some(row) = summary.rows.iter().find(|row| row.series == series) else { continue };
-        let (seconds, y) = (row.mean(&TOTAL_SECONDS), row.mean(kind.y));
-        let Some(point) = kind.point(summary.count as f64, seconds, y) else { continue };
-        let over = row.over(kind.y);
-        let compared = summary.is_whole_of(row, kind.y);
-        points.push(Point { n: Some(over), compared, ..point });
+    let points = summaries.iter().filter_map(|summary| {
+        let row = summary.rows.iter().find(|row| row.series == series)?;
+        let (y, over) = (row.mean(kind.y)?, row.over(kind.y));
         // The set of meshes is the same at each count that has a mean.
         if over != summary.meshes {
             label = format!("{name} ({over} of {})", summary.meshes);
         }
-    }
-    kind.tag_ends(&mut points);
-    Curve { series, label, name, of: "mean".to_owned(), points, line: None, dashed: false }
-}
-
-/// The means of a method at its native levels as points.
-pub(crate) fn native_points(
-    comparison: &Comparison<'_>,
-    native: &NativeCurve,
-    place: impl Fn(&crate::summary::NativePoint) -> Option<(f64, f64)>,
-) -> Vec<Point> {
-    (native.points.iter())
-        .filter_map(|point| {
-            let (x, y) = place(point)?;
-            Some(Point {
-                n: Some(native.over),
-                spheres: Some(point.spheres),
-                compared: native.over == comparison.meshes.len(),
-                ..Point::at(x, y)
-            })
-        })
-        .collect()
+        let of = [over, summary.meshes];
+        Some((summary.count as f64, row.mean(&TOTAL_SECONDS), Some(y), of))
+    });
+    let curve = kind.curve(series, (name, "mean"), points);
+    Curve { label, ..curve }
 }
 
 #[cfg(test)]
@@ -358,12 +299,11 @@ mod tests {
 
     #[test]
     fn the_front_holds_the_points_that_nothing_dominates() {
-        let axis = || (String::new(), Scale::Log);
         let mut figure = Figure {
             stem: String::new(),
             title: String::new(),
-            x: axis(),
-            y: axis(),
+            x: String::new(),
+            y: (String::new(), Scale::Log),
             curves: vec![
                 curve(0, &[(1.0, 5.0), (2.0, 3.0), (4.0, 3.0)], true),
                 curve(1, &[(1.5, 6.0), (3.0, 1.0), (3.0, 0.5)], true),

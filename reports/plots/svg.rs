@@ -7,12 +7,11 @@
 
 use std::fmt::Display;
 
-use plotters::chart::ChartContext;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::axis::Axis;
+use super::axis::{Axis, Scale};
 use super::{Curve, Figure, Point};
 use crate::text::{printable, shortened};
 use crate::write::ReportError;
@@ -25,61 +24,36 @@ const LEGEND_ROW: i32 = 42;
 const INK: RGBColor = RGBColor(0x20, 0x21, 0x24);
 const GRID: RGBColor = RGBColor(0xE3, 0xE5, 0xE8);
 
-const COLOURS: [RGBColor; 12] = [
-    RGBColor(0x00, 0x72, 0xB2),
-    RGBColor(0xD5, 0x5E, 0x00),
-    RGBColor(0x00, 0x9E, 0x73),
-    RGBColor(0xCC, 0x79, 0xA7),
-    RGBColor(0xE6, 0x9F, 0x00),
-    RGBColor(0x56, 0xB4, 0xE9),
-    RGBColor(0x88, 0x22, 0x55),
-    RGBColor(0x99, 0x99, 0x33),
-    RGBColor(0x77, 0x77, 0x77),
-    RGBColor(0x6A, 0x51, 0xA3),
-    RGBColor(0x44, 0xAA, 0x99),
-    RGBColor(0xA6, 0x56, 0x28),
+const COLOURS: [u32; 12] = [
+    0x0072B2, 0xD55E00, 0x009E73, 0xCC79A7, 0xE69F00, 0x56B4E9, 0x882255, 0x999933, 0x777777,
+    0x6A51A3, 0x44AA99, 0xA65628,
 ];
 
-type Marker = (&'static str, bool, &'static [(i32, i32)]);
-
-/// Markers: name of the page's symbol, whether it is hollow, and its outline in pixels.
-/// A disc has no outline, a cross has two strokes of two points.
-const MARKERS: [Marker; 11] = [
-    ("circle", false, &[]),
-    ("square", false, &[(-7, -7), (7, -7), (7, 7), (-7, 7), (-7, -7)]),
-    ("triangle", false, &[(0, -10), (9, 7), (-9, 7), (0, -10)]),
-    ("diamond", false, &[(0, -11), (9, 0), (0, 11), (-9, 0), (0, -11)]),
-    (
-        "star",
-        false,
-        &[
-            (0, -11),
-            (3, -4),
-            (10, -3),
-            (5, 2),
-            (6, 10),
-            (0, 6),
-            (-6, 10),
-            (-5, 2),
-            (-10, -3),
-            (-3, -4),
-            (0, -11),
-        ],
-    ),
-    ("times", true, &[(-8, -8), (8, 8), (-8, 8), (8, -8)]),
-    ("circle", true, &[]),
-    ("square", true, &[(-7, -7), (7, -7), (7, 7), (-7, 7), (-7, -7)]),
-    ("plus", true, &[(-10, 0), (10, 0), (0, -10), (0, 10)]),
-    ("triangle", true, &[(0, -10), (9, 7), (-9, 7), (0, -10)]),
-    ("diamond", true, &[(0, -11), (9, 0), (0, 11), (-9, 0), (0, -11)]),
+/// Markers by the page's names of symbols, and whether they are hollow.
+const MARKERS: [(&str, bool); 11] = [
+    ("circle", false),
+    ("square", false),
+    ("triangle", false),
+    ("diamond", false),
+    ("star", false),
+    ("times", true),
+    ("circle", true),
+    ("square", true),
+    ("plus", true),
+    ("triangle", true),
+    ("diamond", true),
 ];
 
 /// Colour, symbol, and whether it is hollow. Twelve colours and eleven markers repeat together only
 /// after 132 series.
 pub(crate) fn symbol(series: usize) -> (String, &'static str, bool) {
-    let RGBColor(r, g, b) = COLOURS[series % COLOURS.len()];
-    let (name, hollow, _) = MARKERS[series % MARKERS.len()];
-    (format!("#{r:02x}{g:02x}{b:02x}"), name, hollow)
+    let (name, hollow) = MARKERS[series % MARKERS.len()];
+    (format!("#{:06x}", COLOURS[series % COLOURS.len()]), name, hollow)
+}
+
+fn colour(series: usize) -> RGBColor {
+    let [_, r, g, b] = COLOURS[series % COLOURS.len()].to_be_bytes();
+    RGBColor(r, g, b)
 }
 
 /// The fonts that the texts of all figures name, the first one that is there.
@@ -97,13 +71,13 @@ fn font(size: i32, at: HPos) -> TextStyle<'static> {
     text.pos(Pos::new(at, VPos::Center))
 }
 
-type Chart<'a, 'b, B> = ChartContext<'a, B, Cartesian2d<Axis, Axis>>;
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Figure {
     /// The figure as SVG; `None` where there is no point to draw.
     pub(crate) fn to_svg(&self) -> Result<Option<String>, ReportError> {
         let points: Vec<&Point> = self.curves.iter().flat_map(|curve| &curve.points).collect();
-        let x = Axis::fit(self.x.1, points.iter().map(|point| point.x));
+        let x = Axis::fit(Scale::Log, points.iter().map(|point| point.x));
         let y = Axis::fit(self.y.1, points.iter().map(|point| point.y));
         let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
         let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 1;
@@ -113,12 +87,7 @@ impl Figure {
         Ok(Some(svg))
     }
 
-    fn draw<B: DrawingBackend>(
-        &self,
-        x: Axis,
-        y: Axis,
-        area: &DrawingArea<B, Shift>,
-    ) -> Result<(), ReportError> {
+    fn draw(&self, x: Axis, y: Axis, area: &Area<'_>) -> Result<(), ReportError> {
         area.fill(&WHITE).map_err(failed)?;
         let title = printable(&shortened(&self.title, 76));
         area.draw(&Text::new(title, (28, 40), font(30, HPos::Left))).map_err(failed)?;
@@ -146,13 +115,32 @@ impl Figure {
             .y_labels(y_ticks)
             .label_style((FONTS, 24.0 * 1.24).into_font().color(&INK))
             .axis_desc_style((FONTS, 26.0 * 1.24).into_font().color(&INK))
-            .x_desc(&self.x.0)
+            .x_desc(&self.x)
             .y_desc(&self.y.0)
             .draw()
             .map_err(failed)?;
+        let inner = chart.plotting_area().strip_coord_spec();
         let mut taken = Vec::new();
         for curve in &self.curves {
-            draw_curve(&mut chart, curve, &mut taken)?;
+            let stroke = colour(curve.series).stroke_width(4);
+            let line = curve.points.iter().map(|point| (point.x, point.y));
+            if curve.dashed {
+                let dashes = DashedLineSeries::new(line, 14, 10, stroke);
+                chart.draw_series(dashes).map_err(failed)?;
+            } else {
+                chart.draw_series(LineSeries::new(line, stroke)).map_err(failed)?;
+            }
+            for point in &curve.points {
+                let (left, top) = chart.backend_coord(&(point.x, point.y));
+                // Relative to the plot, without its margins.
+                let at = (left - inner.get_base_pixel().0, top - inner.get_base_pixel().1);
+                draw_marker(&inner, curve.series, at)?;
+                let free = point.tag.as_ref().and_then(|tag| free_place(at, tag, &mut taken));
+                if let (Some(tag), Some(at)) = (&point.tag, free) {
+                    let text = Text::new(tag.clone(), at, font(20, HPos::Left));
+                    inner.draw(&text).map_err(failed)?;
+                }
+            }
         }
         let front: Vec<(f64, f64)> = (self.front().into_iter())
             .map(|(curve, point)| &self.curves[curve].points[point])
@@ -168,22 +156,16 @@ impl Figure {
         area.present().map_err(failed)
     }
 
-    fn draw_legend<B: DrawingBackend>(
-        &self,
-        area: &DrawingArea<B, Shift>,
-        has_front: bool,
-    ) -> Result<(), ReportError> {
+    fn draw_legend(&self, area: &Area<'_>, has_front: bool) -> Result<(), ReportError> {
         let mut y = 36;
         for curve in self.curves.iter().filter(|curve| !curve.label.is_empty()) {
-            let stroke = COLOURS[curve.series % COLOURS.len()].stroke_width(4);
+            let stroke = colour(curve.series).stroke_width(4);
             // A dash on either side of the marker.
             let dashes = if curve.dashed { vec![(0, 10), (38, 48)] } else { vec![(0, 48)] };
             for (from, to) in dashes {
                 area.draw(&PathElement::new(vec![(from, y), (to, y)], stroke)).map_err(failed)?;
             }
-            for shape in marker::<B>(curve.series, (24, y)) {
-                area.draw(&shape).map_err(failed)?;
-            }
+            draw_marker(area, curve.series, (24, y))?;
             area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))
                 .map_err(failed)?;
             y += LEGEND_ROW;
@@ -199,37 +181,6 @@ impl Figure {
 
 fn legend_text(curve: &Curve) -> String {
     printable(&shortened(&curve.label, 26))
-}
-
-fn draw_curve<B: DrawingBackend>(
-    chart: &mut Chart<'_, '_, B>,
-    curve: &Curve,
-    taken: &mut Vec<[i32; 4]>,
-) -> Result<(), ReportError> {
-    let stroke = COLOURS[curve.series % COLOURS.len()].stroke_width(4);
-    let line = match &curve.line {
-        Some(line) => line.clone(),
-        None => curve.points.iter().map(|point| (point.x, point.y)).collect(),
-    };
-    if curve.dashed {
-        let dashes = DashedLineSeries::new(line, 14, 10, stroke);
-        chart.draw_series(dashes).map_err(failed)?;
-    } else {
-        chart.draw_series(LineSeries::new(line, stroke)).map_err(failed)?;
-    }
-    let area = chart.plotting_area().strip_coord_spec();
-    let origin = area.get_base_pixel();
-    for point in &curve.points {
-        let (x, y) = chart.backend_coord(&(point.x, point.y));
-        let at = (x - origin.0, y - origin.1);
-        for shape in marker::<B>(curve.series, at) {
-            area.draw(&shape).map_err(failed)?;
-        }
-        let Some(tag) = &point.tag else { continue };
-        let Some(at) = free_place(at, tag, taken) else { continue };
-        area.draw(&Text::new(tag.clone(), at, font(20, HPos::Left))).map_err(failed)?;
-    }
-    Ok(())
 }
 
 /// A place for a tag next to a pixel that no other tag covers: at the right above or below, or at
@@ -250,30 +201,41 @@ fn free_place((x, y): (i32, i32), tag: &str, taken: &mut Vec<[i32; 4]>) -> Optio
     })
 }
 
-/// The marker of a series around a pixel. Hollow ones hide the line beneath, so that they differ
+/// Draws the marker of a series around a pixel. Hollow ones hide the line beneath, so that they differ
 /// from filled ones.
-fn marker<B: DrawingBackend>(
-    series: usize,
-    (x, y): (i32, i32),
-) -> Vec<DynElement<'static, B, (i32, i32)>> {
-    let colour = COLOURS[series % COLOURS.len()];
-    let (name, hollow, outline) = MARKERS[series % MARKERS.len()];
-    let stroke = colour.stroke_width(4);
-    let path: Vec<(i32, i32)> = outline.iter().map(|&(a, b)| (x + a, y + b)).collect();
-    let fill = if hollow { WHITE } else { colour };
+fn draw_marker(area: &Area<'_>, series: usize, (x, y): (i32, i32)) -> Result<(), ReportError> {
+    let (colour, (name, hollow)) = (colour(series), MARKERS[series % MARKERS.len()]);
+    let (stroke, fill) = (colour.stroke_width(4), if hollow { WHITE } else { colour });
+    // Corners, the turn of the first one from the top as a share of a circle, radii of every other corner.
+    let (corners, turn, radii) = match name {
+        "triangle" => (3, 0.0, [10.0; 2]),
+        "star" => (10, 0.0, [11.0, 5.0]),
+        "square" => (4, 0.125, [10.0; 2]),
+        "times" => (4, 0.125, [11.5; 2]),
+        "circle" => (0, 0.0, [8.0; 2]),
+        _ => (4, 0.0, [10.5; 2]), // diamond and plus
+    };
+    let corner = |k: usize| {
+        let angle = std::f64::consts::TAU * (k as f64 / f64::from(corners) + turn);
+        let [across, up] = [angle.sin(), angle.cos()].map(|part| (radii[k % 2] * part).round());
+        (x + across as i32, y - up as i32)
+    };
     match name {
-        "times" | "plus" => {
-            path.chunks(2).map(|ends| PathElement::new(ends.to_vec(), stroke).into_dyn()).collect()
+        "circle" => [fill.filled(), stroke]
+            .into_iter()
+            .try_for_each(|style| area.draw(&Circle::new((x, y), 8, style))),
+        // Opposite corners are the ends of a stroke.
+        "times" | "plus" => [0, 1]
+            .into_iter()
+            .try_for_each(|k| area.draw(&PathElement::new(vec![corner(k), corner(k + 2)], stroke))),
+        _ => {
+            let outline: Vec<(i32, i32)> = (0..corners as usize).map(corner).collect();
+            let closed = outline.iter().chain(&outline[..1]).copied().collect::<Vec<_>>();
+            area.draw(&Polygon::new(outline, fill.filled()))
+                .and_then(|()| area.draw(&PathElement::new(closed, stroke)))
         }
-        "circle" => vec![
-            Circle::new((x, y), 8, fill.filled()).into_dyn(),
-            Circle::new((x, y), 8, stroke).into_dyn(),
-        ],
-        _ => vec![
-            Polygon::new(path.clone(), fill.filled()).into_dyn(),
-            PathElement::new(path, stroke).into_dyn(),
-        ],
     }
+    .map_err(failed)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use png::{BitDepth, ColorType, Compression, Encoder};
 
 use super::RenderError;
 use super::scene::Scale;
-use crate::text::round_up;
+use crate::text::round_steps;
 
 /// What is behind everything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -302,16 +302,12 @@ fn ticks(lo: f64, hi: f64) -> Vec<(f64, String)> {
     if hi <= lo {
         return vec![(lo, crate::text::significant(lo, 3).replace('-', "−"))];
     }
-    let step = round_up((hi - lo) / (TICKS + 1.0));
+    let (step, values) = round_steps(lo, hi, TICKS + 1.0);
     // Decimals that show all digits of a step of 1, 2 or 5 times a power of ten.
     let decimals = (-step.log10() - 1e-9).ceil().clamp(0.0, 12.0) as usize;
-    let first = (lo / step - 1e-9).ceil() as i64;
-    let last = (hi / step + 1e-9).floor() as i64;
-    (first..=last)
-        .map(|k| k as f64 * step)
-        // A minus sign: a hyphen is shorter and hard to see.
-        .map(|value| (value, format!("{value:.decimals$}").replace('-', "−")))
-        .collect()
+    // A minus sign: a hyphen is shorter and hard to see.
+    let text = |value| format!("{value:.decimals$}").replace('-', "−");
+    values.into_iter().map(|value| (value, text(value))).collect()
 }
 
 #[cfg(test)]
@@ -326,7 +322,7 @@ mod tests {
         assert_eq!(words(-2.0, 2.0), "−2 −1 0 1 2");
         assert_eq!(words(0.0, 0.05), "0.00 0.01 0.02 0.03 0.04 0.05");
         assert_eq!(words(3.0, 3.0), "3.00");
-        assert_eq!([0.3, 1.0, 1.2, 7.0].map(round_up), [0.5, 1.0, 2.0, 10.0]);
+        assert_eq!([0.3, 1.0, 1.2, 7.0].map(crate::text::round_up), [0.5, 1.0, 2.0, 10.0]);
     }
 
     #[test]

@@ -6,4 +6,3 @@ mod diff;
 mod history;
 mod journal;
 mod report;
-mod scaling;

@@ -217,9 +217,10 @@ fn bounds_and_own_levels_have_tables_of_their_own() {
     assert!(rows[0].contains("| qmat | 4 of 4 | 200 | 1.00 | 4 meshes |"), "{}", rows[0]);
     assert!(rows[1].contains("| angle | 3 of 4 | 400 | 2.00 | 3 meshes |"), "{}", rows[1]);
     assert!(summary.contains("| angle | 60 theta (degrees) | 4 of 4 | 300 |"), "{summary}");
-    for plot in ["plots/overview-equal-error.svg", "plots/overview-level-angle.svg"] {
-        assert!(files.contains_key(plot), "{plot}");
-    }
+    assert!(files.contains_key("plots/overview-equal-error.svg"));
+    let svg = text(&files, "plots/overview-hausdorff.svg");
+    assert!(svg.contains("angle (native levels)"), "{svg}");
+    assert!(svg.contains("font-family=\"Helvetica, Arial, sans-serif\""), "{svg}");
     let [_, bulk] = documents(text(&files, "index.html"));
     assert!(bulk["columns"]["item/reason"].to_string().contains("the lowest is 1.2 %"));
 }
