@@ -113,8 +113,6 @@ pub struct Metric {
     pub(crate) value: Value,
     /// `unit` over the unit of the JSON: 100 for shares, which are shown as percentages.
     times: f64,
-    /// Whether the comparison tables have a column for it.
-    is_compared: bool,
     /// Whether `diff` calls an increase beyond its threshold a regression.
     pub(crate) is_gate: bool,
 }
@@ -169,12 +167,6 @@ impl Metric {
         if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) }
     }
 
-    /// Name and unit for a plot's axis.
-    pub(crate) fn axis_title(&self) -> String {
-        let unit = if self.unit == "%" { "% of the diagonal" } else { self.unit };
-        if unit.is_empty() { self.title.to_owned() } else { format!("{} ({unit})", self.title) }
-    }
-
     const fn new(
         key: &'static str,
         title: &'static str,
@@ -195,14 +187,12 @@ impl Metric {
             definition: "",
             value,
             times,
-            is_compared: false,
             is_gate: false,
         }
     }
 
-    /// Gives it a column in the comparison tables, whose page defines it.
-    const fn compared(mut self, definition: &'static str) -> Self {
-        self.is_compared = true;
+    /// Defines it on the page.
+    const fn defined(mut self, definition: &'static str) -> Self {
         self.definition = definition;
         self
     }
@@ -259,33 +249,90 @@ const fn count(key: &'static str, title: &'static str, value: Measured) -> Metri
 /// Threshold on the stability ratio whose spikes stand in the tables; the CSV has the others, too.
 pub(crate) const SPIKE_RATIO: f64 = 0.1;
 
-/// Every metric, in the order of the CSV and of `medial evaluate`.
-pub const METRICS: &[Metric] = &[
+// The metrics of the comparison tables, which plots and answers name.
+pub(crate) const HAUSDORFF: Metric =
     length("hausdorff", "Hausdorff", |e| Some(e.distances.hausdorff))
-        .compared(
+        .defined(
             "The larger of two sampled maxima: from the surface to the union of the spheres, \
          cones and slabs, and from the boundary of that union back to the surface.",
         )
-        .gate(),
-    length("epsilon", "ε", |e| Some(e.distances.epsilon))
-        .compared(
-            "The error of the Q-MAT paper: the largest distance from a surface sample to the \
+        .gate();
+
+pub(crate) const EPSILON: Metric = length("epsilon", "ε", |e| Some(e.distances.epsilon))
+    .defined(
+        "The error of the Q-MAT paper: the largest distance from a surface sample to the \
          nearest surface of a sphere, cone or slab, whether that surface is buried in another \
          one or not.",
-        )
-        .gate(),
-    length("mean", "mean error", |e| Some(e.distances.mean))
-        .compared(
-            "Mean over area-uniform surface samples of the absolute signed distance to the union. \
+    )
+    .gate();
+
+pub(crate) const MEAN_ERROR: Metric = length("mean", "mean error", |e| Some(e.distances.mean))
+    .defined(
+        "Mean over area-uniform surface samples of the absolute signed distance to the union. \
          Less noisy than a maximum, which a single unlucky collapse decides.",
-        )
-        .gate(),
+    )
+    .gate();
+
+pub(crate) const SPHERES_ONLY: Metric =
     length("spheres_only", "balls only", |e| Some(e.distances.spheres_only))
-        .compared(
+        .defined(
             "The largest distance from a surface sample to the union of the balls alone, without \
          cones and slabs: it separates good spheres from good connectivity.",
         )
-        .gate(),
+        .gate();
+
+pub(crate) const MIN_ANGLE: Metric =
+    angle("min_angle_mean", "min angle", |e| e.quality.min_angle_mean).defined(
+        "Mean over the medial triangles of the smallest angle. Triangles of zero area are \
+         left out and counted apart.",
+    );
+
+pub(crate) const BELOW_30: Metric =
+    share("below_30", "below 30°", "% of triangles", |e| e.quality.below_30)
+        .defined("Share of the medial triangles whose smallest angle is below 30 degrees.");
+
+pub(crate) const SPIKES: Metric = count("spikes", "spikes", |e| {
+    let by_ratio = &e.spikes.by_ratio;
+    let at = by_ratio.iter().find(|at| (at.threshold - SPIKE_RATIO).abs() < 1e-9)?;
+    Some(at.spikes as f64)
+})
+.defined(
+    "Connected components of the medial edges with a stability ratio below 0.1 that reach \
+         the boundary of the medial mesh. Smooth shapes have some even on their exact axis; \
+         the CSV holds the other thresholds and measures.",
+);
+
+pub(crate) const TOTAL_SECONDS: Metric = Metric::new(
+    "seconds_total",
+    "time",
+    "s",
+    (Better::Lower, Digits::Significant, GEOMETRIC),
+    Value::Record(|record| Some(record.simplify.seconds?.total)),
+)
+.defined(
+    "Wall-clock seconds as if this level had been asked alone: the shared substrates that \
+         the method uses, its preparation, and the simplification. Evaluation is never \
+         included.",
+);
+
+/// The columns of the comparison tables.
+pub(crate) const COMPARED: [&Metric; 8] = [
+    &HAUSDORFF,
+    &EPSILON,
+    &MEAN_ERROR,
+    &SPHERES_ONLY,
+    &MIN_ANGLE,
+    &BELOW_30,
+    &SPIKES,
+    &TOTAL_SECONDS,
+];
+
+/// Every metric, in the order of the CSV and of `medial evaluate`.
+pub const METRICS: &[Metric] = &[
+    HAUSDORFF,
+    EPSILON,
+    MEAN_ERROR,
+    SPHERES_ONLY,
     length("epsilon_union", "surface to union, max", |e| Some(e.distances.epsilon_union)).gate(),
     length("reverse", "union to surface, max", |e| Some(e.distances.reverse)).gate(),
     length("rms", "rms error", |e| Some(e.distances.rms)).gate(),
@@ -301,26 +348,13 @@ pub const METRICS: &[Metric] = &[
     length("protrusion", "outside the solid, max", |e| e.protrusion).gate(),
     share("centres_outside", "centres outside", "% of spheres", |e| e.centres_outside).gate(),
     share("volume_error", "volume error", "% of the volume", |e| e.volume_error).gate(),
-    angle("min_angle_mean", "min angle", |e| e.quality.min_angle_mean).compared(
-        "Mean over the medial triangles of the smallest angle. Triangles of zero area are \
-         left out and counted apart.",
-    ),
+    MIN_ANGLE,
     angle("max_angle_mean", "max angle", |e| e.quality.max_angle_mean).neutral(),
-    share("below_30", "below 30°", "% of triangles", |e| e.quality.below_30)
-        .compared("Share of the medial triangles whose smallest angle is below 30 degrees."),
+    BELOW_30,
     share("below_10", "below 10°", "% of triangles", |e| e.quality.below_10),
     share("below_1", "below 1°", "% of triangles", |e| e.quality.below_1),
     count("zero_area", "zero-area triangles", |e| Some(e.quality.zero_area as f64)),
-    count("spikes", "spikes", |e| {
-        let by_ratio = &e.spikes.by_ratio;
-        let at = by_ratio.iter().find(|at| (at.threshold - SPIKE_RATIO).abs() < 1e-9)?;
-        Some(at.spikes as f64)
-    })
-    .compared(
-        "Connected components of the medial edges with a stability ratio below 0.1 that reach \
-         the boundary of the medial mesh. Smooth shapes have some even on their exact axis; \
-         the CSV holds the other thresholds and measures.",
-    ),
+    SPIKES,
     count("dangling_edges", "dangling edges", |e| Some(e.spikes.dangling_edges as f64)),
     count("fins", "fins", |e| Some(e.spikes.fins as f64)),
     count("idle_spheres", "idle spheres", |e| Some(e.spikes.idle_spheres as f64)),
@@ -347,70 +381,8 @@ pub const METRICS: &[Metric] = &[
     count("samples", "samples of the surface", |e| Some(e.distances.samples as f64)).neutral(),
     count("reverse_samples", "samples of the union", |e| Some(e.distances.reverse_samples as f64))
         .neutral(),
-    Metric::new(
-        "seconds_total",
-        "time",
-        "s",
-        (Better::Lower, Digits::Significant, GEOMETRIC),
-        Value::Record(|record| Some(record.simplify.seconds?.total)),
-    )
-    .compared(
-        "Wall-clock seconds as if this level had been asked alone: the shared substrates that \
-         the method uses, its preparation, and the simplification. Evaluation is never \
-         included.",
-    ),
+    TOTAL_SECONDS,
 ];
-
-/// The metric with a key, at compile time: a key that no metric has stops the build.
-const fn named(key: &str) -> Metric {
-    // Loops and comparisons by hand: iterators and `==` of texts are not constant.
-    let mut index = 0;
-    while index < METRICS.len() {
-        let (a, b) = (METRICS[index].key.as_bytes(), key.as_bytes());
-        let mut same = 0;
-        while same < a.len() && same < b.len() && a[same] == b[same] {
-            same += 1;
-        }
-        if same == a.len() && same == b.len() {
-            return METRICS[index];
-        }
-        index += 1;
-    }
-    panic!("no metric has this key")
-}
-
-// The metrics that plots and answers name.
-pub(crate) static HAUSDORFF: Metric = named("hausdorff");
-pub(crate) static EPSILON: Metric = named("epsilon");
-pub(crate) static MEAN_ERROR: Metric = named("mean");
-pub(crate) static SPHERES_ONLY: Metric = named("spheres_only");
-pub(crate) static MIN_ANGLE: Metric = named("min_angle_mean");
-pub(crate) static BELOW_30: Metric = named("below_30");
-pub(crate) static SPIKES: Metric = named("spikes");
-pub(crate) static TOTAL_SECONDS: Metric = named("seconds_total");
-
-const COMPARED_METRICS: usize = {
-    let (mut compared, mut index) = (0, 0);
-    while index < METRICS.len() {
-        compared += METRICS[index].is_compared as usize;
-        index += 1;
-    }
-    compared
-};
-
-/// The columns of the comparison tables, in the order of [`METRICS`].
-pub(crate) static COMPARED: [&Metric; COMPARED_METRICS] = {
-    let mut compared = [&METRICS[0]; COMPARED_METRICS];
-    let (mut filled, mut index) = (0, 0);
-    while index < METRICS.len() {
-        if METRICS[index].is_compared {
-            compared[filled] = &METRICS[index];
-            filled += 1;
-        }
-        index += 1;
-    }
-    compared
-};
 
 /// Every metric that was measured on at least one of some medial meshes: a row with its name and unit, and a cell for
 /// each mesh, `-` where it was not measured there.
