@@ -15,7 +15,7 @@ use crate::metric::{HAUSDORFF, MIN_ANGLE, Mean, TOTAL_SECONDS, median};
 use crate::plots::{Curve, Figure, Point, Scale};
 use crate::record::{Record, Status, Target};
 use crate::summary::{Ratio, reference, topology};
-use crate::tables::{Cell, Column, Row, Table};
+use crate::tables::{Cell, Column, Table};
 use crate::text::{counted, grouped, significant};
 
 /// Number of spheres that one level is compared at: of those that were asked the one nearest to it.
@@ -76,11 +76,12 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         .map(Column::text)
         .into(),
         rows,
+        grouped: false,
     })
 }
 
 /// The answers at one number of spheres.
-fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Row> {
+fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Vec<Cell>> {
     let spheres = counted(spheres, "sphere", "spheres");
     let error = error_question(errors_at(comparison, level), format!("lowest error at {spheres}"));
     let triangles = Question {
@@ -93,7 +94,7 @@ fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Ro
         text: |value| format!("least angle {:.1}°", 60.0 - value),
         of: "its distance from 60°",
     };
-    let mut rows: Vec<Row> = answers(comparison, &error);
+    let mut rows: Vec<Vec<Cell>> = answers(comparison, &error);
     rows.push(right_everywhere(comparison, level, &spheres));
     rows.extend(answers(comparison, &triangles));
     rows
@@ -109,7 +110,7 @@ fn error_question(values: Vec<Values>, title: String) -> Question {
 }
 
 /// The cost of an error of at most [`BOUND`], at whichever level costs least on a mesh.
-fn within_bound(comparison: &Comparison<'_>) -> Vec<Row> {
+fn within_bound(comparison: &Comparison<'_>) -> Vec<Vec<Cell>> {
     type Cost = (&'static str, fn(&Record) -> Option<f64>, fn(f64) -> String, &'static str);
     let costs: [Cost; 3] = [
         (
@@ -263,7 +264,7 @@ impl Lead {
 
 /// The rows of a question: the best median, and where that is another the best on the most meshes. None where no
 /// method has a median.
-fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Row> {
+fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Vec<Cell>> {
     let values = question.values.iter().enumerate();
     let mut ranks: Vec<Rank> = values.map(|(series, values)| Rank::of(series, values)).collect();
     ranks.retain(|rank| rank.median.is_some());
@@ -279,15 +280,20 @@ fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Row> {
 }
 
 /// The row of the first of the ranked methods.
-fn answer(comparison: &Comparison<'_>, question: &Question, title: String, ranks: &[Rank]) -> Row {
+fn answer(
+    comparison: &Comparison<'_>,
+    question: &Question,
+    title: String,
+    ranks: &[Rank],
+) -> Vec<Cell> {
     let first = ranks[0].series;
     let known = question.values[first].iter().flatten();
     let met = known.clone().filter(|value| value.is_finite()).count();
     let mut cells = vec![
-        Cell::new(title),
+        Cell::from(title),
         Cell { best: true, ..name(comparison, first) },
         Cell::optional(ranks[0].median.map(question.text)),
-        Cell::new(format!("{met} of {}", counted(known.count(), "mesh", "meshes"))),
+        Cell::from(format!("{met} of {}", counted(known.count(), "mesh", "meshes"))),
     ];
     let runner_up = ranks.get(1).and_then(|rank| {
         let lead = Lead::of(&question.values[first], &question.values[rank.series])?;
@@ -296,16 +302,16 @@ fn answer(comparison: &Comparison<'_>, question: &Question, title: String, ranks
     cells.extend(match runner_up {
         Some((second, lead)) => [
             name(comparison, second),
-            Cell::new(format!("{} of {}", significant(lead.ratio, 2), question.of)),
-            Cell::new(lead.counts()),
+            Cell::from(format!("{} of {}", significant(lead.ratio, 2), question.of)),
+            Cell::from(lead.counts()),
         ],
-        None => [Cell::new("no other"), Cell::optional(None), Cell::optional(None)],
+        None => [Cell::from("no other"), Cell::optional(None), Cell::optional(None)],
     });
-    Row { cells, starts_group: false }
+    cells
 }
 
 /// The row of the methods with the topology of the solid on every mesh, the one of the lowest error first.
-fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) -> Row {
+fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) -> Vec<Cell> {
     let errors = errors_at(comparison, level);
     let mut ranks = vec![];
     for (series, errors) in errors.iter().enumerate() {
@@ -321,15 +327,15 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
     ranks.sort_by(by_median);
     let title = format!("topology right everywhere, lowest error at {spheres}");
     if ranks.is_empty() {
-        let mut cells = vec![Cell::new(title), Cell::new("none")];
+        let mut cells = vec![Cell::from(title), Cell::from("none")];
         cells.extend([(); 5].map(|()| Cell::optional(None)));
-        return Row { cells, starts_group: false };
+        return cells;
     }
     answer(comparison, &error_question(errors, title.clone()), title, &ranks)
 }
 
 fn name(comparison: &Comparison<'_>, series: usize) -> Cell {
-    Cell::new(comparison.series[series].as_str())
+    Cell::from(comparison.series[series].as_str())
 }
 
 /// For each two methods, on how many meshes the one of the row has the lower error, an equal one, the higher one.
@@ -353,7 +359,7 @@ pub(crate) fn wins_table(comparison: &Comparison<'_>, how: &str) -> Option<Table
             let best = lead.as_ref().is_some_and(|lead| lead.worse == 0 && lead.better > 0);
             cells.push(Cell { best, ..Cell::optional(lead.map(|lead| lead.counts())) });
         }
-        rows.push(Row { cells, starts_group: false });
+        rows.push(cells);
     }
     Some(Table {
         caption: format!("Method against method at {}", counted(spheres, "sphere", "spheres")),
@@ -367,6 +373,7 @@ pub(crate) fn wins_table(comparison: &Comparison<'_>, how: &str) -> Option<Table
         ],
         rows,
         columns,
+        grouped: false,
     })
 }
 
@@ -452,8 +459,8 @@ pub(crate) fn equal_error_table(
     bounds: &[BoundSummary],
     how: &str,
 ) -> Option<Table> {
-    let yardstick = reference(comparison).map(|series| comparison.series[series].as_str());
-    let mut rows = Vec::new();
+    type Place<'b> = (f64, &'b BoundRow);
+    let mut rows: Vec<Place<'_>> = vec![];
     for bound in bounds {
         let mut sorted: Vec<&BoundRow> = bound.rows.iter().collect();
         // Fewest spheres first. Rows without a median follow, the one that keeps the error most often first.
@@ -461,53 +468,43 @@ pub(crate) fn equal_error_table(
             let [few, many] = [a, b].map(|row| row.spheres.unwrap_or(f64::INFINITY));
             few.total_cmp(&many).then(b.met.cmp(&a.met))
         });
-        for (index, row) in sorted.into_iter().enumerate() {
-            rows.push(Row { cells: bound_cells(comparison, bound, row), starts_group: index == 0 });
-        }
+        rows.extend(sorted.into_iter().map(|row| (bound.percent, row)));
     }
-    (!rows.is_empty()).then(|| Table {
+    let yardstick = reference(comparison).map_or("reference", |series| &comparison.series[series]);
+    let whole =
+        |value: Option<f64>| Cell::optional(value.map(|value| grouped(value.round() as u64)));
+    let rows = Table::of(&rows)
+        .number("error (%)", |(percent, _)| percent.to_string())
+        .text("method", |(_, row)| comparison.series[row.series].as_str())
+        .text("kept on", |(_, row)| format!("{} of {}", row.met, row.asked))
+        .number("spheres ↓", |(_, row)| whole(row.spheres))
+        .number(format!("÷ {yardstick}"), |(_, row)| {
+            Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3)))
+        })
+        .text("on", |(_, row)| {
+            Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
+        })
+        .number("stored numbers ↓", |(_, row)| whole(row.numbers))
+        .number("total (s) ↓", |(_, row)| {
+            Cell::optional(row.seconds.map(|seconds| significant(seconds, 3)))
+        })
+        .text("topology right", |(_, row)| Cell::share(row.topology))
+        .text("failed", |(_, row)| match row.failed {
+            0 => "none".to_owned(),
+            failed => failed.to_string(),
+        });
+    let note = "Searched for on each mesh among counts and the method's own levels; fewer spheres at \
+         the same error are better. Medians over all meshes, where one on which no level keeps \
+         the error counts as infinitely many; a dash: so on half of them. The ratio is the \
+         geometric mean of the numbers of spheres in relation to the named method's, on the \
+         meshes where both keep the error. Stored numbers: floats of the medial mesh. Seconds \
+         are those of the level found, without the search.";
+    (!rows.table.rows.is_empty()).then(|| Table {
         caption: "Equal error: the fewest spheres within a Hausdorff error".to_owned(),
-        notes: vec![
-            how.to_owned(),
-            "Searched for on each mesh among counts and the method's own levels; fewer spheres at \
-             the same error are better. Medians over all meshes, where one on which no level keeps \
-             the error counts as infinitely many; a dash: so on half of them. The ratio is the \
-             geometric mean of the numbers of spheres in relation to the named method's, on the \
-             meshes where both keep the error. Stored numbers: floats of the medial mesh. Seconds \
-             are those of the level found, without the search."
-                .to_owned(),
-        ],
-        columns: vec![
-            Column::number("error (%)"),
-            Column::text("method"),
-            Column::text("kept on"),
-            Column::number("spheres ↓"),
-            Column::number(format!("÷ {}", yardstick.unwrap_or("reference"))),
-            Column::text("on"),
-            Column::number("stored numbers ↓"),
-            Column::number("total (s) ↓"),
-            Column::text("topology right"),
-            Column::text("failed"),
-        ],
-        rows,
+        notes: vec![how.to_owned(), note.to_owned()],
+        grouped: true,
+        ..rows.table
     })
-}
-
-fn bound_cells(comparison: &Comparison<'_>, bound: &BoundSummary, row: &BoundRow) -> Vec<Cell> {
-    let [spheres, numbers] = [row.spheres, row.numbers]
-        .map(|value| Cell::optional(value.map(|value| grouped(value.round() as u64))));
-    vec![
-        Cell::new(bound.percent.to_string()),
-        Cell::new(comparison.series[row.series].as_str()),
-        Cell::new(format!("{} of {}", row.met, row.asked)),
-        spheres,
-        Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3))),
-        Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes"))),
-        numbers,
-        Cell::optional(row.seconds.map(|seconds| significant(seconds, 3))),
-        Cell::share(row.topology),
-        Cell::new(if row.failed > 0 { row.failed.to_string() } else { "none".to_owned() }),
-    ]
 }
 
 /// Fewest spheres against the error that they keep.

@@ -16,7 +16,7 @@ use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::header::Header;
 use crate::metric::{COMPARED, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::{Record, Status, Target};
-use crate::tables::{Cell, Column, Row, Table};
+use crate::tables::{Cell, Table};
 use crate::text::{counted, grouped, significant};
 
 /// The method that others are put in relation to, where it ran with its defaults.
@@ -348,48 +348,34 @@ pub(crate) fn native_table(
     header: &Header,
     how: &str,
 ) -> Table {
-    let mut rows = vec![];
-    for curve in curves {
-        let axis = header.native_axis(comparison.methods[curve.series]);
-        for (index, point) in curve.points.iter().enumerate() {
-            let level = match (point.level, axis) {
+    type Place<'c> = (&'c NativeCurve, &'c NativePoint);
+    let points: Vec<Place<'_>> = curves
+        .iter()
+        .flat_map(|curve| curve.points.iter().map(move |point| (curve, point)))
+        .collect();
+    let rows = Table::of(&points)
+        .text("method", |(curve, _)| comparison.series[curve.series].as_str())
+        .text("level", |(curve, point)| {
+            match (point.level, header.native_axis(comparison.methods[curve.series])) {
                 (Target::Native(value), Some(axis)) => format!("{value} {axis}"),
                 (level, _) => level_label(level),
-            };
-            let cells = vec![
-                Cell::new(comparison.series[curve.series].as_str()),
-                Cell::new(level),
-                Cell::share((curve.over, curve.asked)),
-                Cell::new(grouped(point.spheres.round() as u64)),
-                Cell::new(significant(point.hausdorff, 3)),
-                Cell::new(significant(point.mean, 3)),
-                Cell::new(significant(point.seconds, 3)),
-                Cell::share(point.topology),
-            ];
-            rows.push(Row { cells, starts_group: index == 0 });
-        }
-    }
+            }
+        })
+        .text("means over", |(curve, _)| Cell::share((curve.over, curve.asked)))
+        .number("spheres", |(_, point)| grouped(point.spheres.round() as u64))
+        .number(HAUSDORFF.heading(), |(_, point)| significant(point.hausdorff, 3))
+        .number(MEAN_ERROR.heading(), |(_, point)| significant(point.mean, 3))
+        .number("total (s)", |(_, point)| significant(point.seconds, 3))
+        .text("topology right", |(_, point)| Cell::share(point.topology));
+    let note = "Geometric means over one set of meshes for each method: those with a result at all \
+         its levels. The level is the method's own scalar, with its name and unit. Spheres are \
+         what the level leaves; compare errors at equal numbers of them. Lengths in % of the \
+         bounding-box diagonal.";
     Table {
         caption: "Every method at levels of its own".to_owned(),
-        notes: vec![
-            how.to_owned(),
-            "Geometric means over one set of meshes for each method: those with a result at all \
-             its levels. The level is the method's own scalar, with its name and unit. Spheres are \
-             what the level leaves; compare errors at equal numbers of them. Lengths in % of the \
-             bounding-box diagonal."
-                .to_owned(),
-        ],
-        rows,
-        columns: vec![
-            Column::text("method"),
-            Column::text("level"),
-            Column::text("means over"),
-            Column::number("spheres"),
-            Column::number(HAUSDORFF.heading()),
-            Column::number(MEAN_ERROR.heading()),
-            Column::number("total (s)"),
-            Column::text("topology right"),
-        ],
+        notes: vec![how.to_owned(), note.to_owned()],
+        grouped: true,
+        ..rows.table
     }
 }
 
@@ -402,74 +388,69 @@ pub(crate) fn means_table(
     summaries: &[CountSummary],
     how: &str,
 ) -> Table {
-    let yardstick = reference(comparison).map(|series| comparison.series[series].as_str());
-    let mut columns = vec![
-        Column::number("spheres"),
-        Column::text("method"),
-        Column::text("means over"),
-        Column::number(format!("Hausdorff ÷ {}", yardstick.unwrap_or("reference"))),
-        Column::text("on"),
-    ];
-    columns.extend(COMPARED.iter().map(|metric| Column::number(metric.heading())));
-    columns.extend(["substrate (s)", "prepare (s)", "simplify (s)"].map(Column::number));
-    columns.extend([Column::text("topology right"), Column::text("without a result")]);
-    let mut rows = Vec::new();
-    for summary in summaries {
-        for (index, row) in summary.rows.iter().enumerate() {
-            rows.push(Row { cells: cells(comparison, summary, row), starts_group: index == 0 });
-        }
+    type Place<'s> = (&'s CountSummary, &'s SeriesSummary);
+    let rows: Vec<Place<'_>> = summaries
+        .iter()
+        .flat_map(|summary| summary.rows.iter().map(move |row| (summary, row)))
+        .collect();
+    let yardstick = reference(comparison).map_or("reference", |series| &comparison.series[series]);
+    let mut rows = Table::of(&rows)
+        .number("spheres", |(summary, _)| grouped(summary.count as u64))
+        .text("method", |(_, row)| comparison.series[row.series].as_str())
+        .text("means over", |(_, row)| Cell::share((row.over, row.asked)))
+        .number(format!("Hausdorff ÷ {yardstick}"), |(_, row)| {
+            Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3)))
+        })
+        .text("on", |(_, row)| {
+            Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
+        });
+    for metric in COMPARED {
+        rows = rows.number(metric.heading(), |(summary, row)| mean_cell(summary, row, metric));
     }
+    for (stage, title) in ["substrate (s)", "prepare (s)", "simplify (s)"].into_iter().enumerate() {
+        rows = rows.number(title, move |(summary, row)| {
+            Cell::optional(row.stages.map(|stages| {
+                let seconds = significant(stages[stage], 3);
+                if row.over == summary.meshes { seconds } else { format!("({seconds})") }
+            }))
+        });
+    }
+    rows = rows.text("topology right", |(_, row)| Cell::share(row.topology));
+    rows = rows.text("without a result", |(_, row)| without_result(row));
+    let notes = [
+        how,
+        "Geometric means of errors and total time, arithmetic means of angles, shares, spikes \
+         and stages. Each method is averaged over one set of meshes of its own for all counts: \
+         those on which it reached every count that it reached on enough of them. Means over \
+         all meshes read beside each other; in parentheses are those over fewer, with their number \
+         where some of the set have no such value, as an angle where there is no triangle. Across \
+         different sets, compare the ratio: the geometric mean of the Hausdorff errors in \
+         relation to the named method's, on the meshes where both reached the count.",
+        "Lengths in % of the bounding-box diagonal; seconds of wall clock. Arrows: which way \
+         is better. Bold: best of the means over all meshes.",
+    ];
     Table {
         caption: MEANS.to_owned(),
-        notes: vec![
-            how.to_owned(),
-            "Geometric means of errors and total time, arithmetic means of angles, shares, spikes \
-             and stages. Each method is averaged over one set of meshes of its own for all counts: \
-             those on which it reached every count that it reached on enough of them. Means over \
-             all meshes read beside each other; in parentheses are those over fewer, with their number \
-             where some of the set have no such value, as an angle where there is no triangle. Across \
-             different sets, compare the ratio: the geometric mean of the Hausdorff errors in \
-             relation to the named method's, on the meshes where both reached the count."
-                .to_owned(),
-            "Lengths in % of the bounding-box diagonal; seconds of wall clock. Arrows: which way \
-             is better. Bold: best of the means over all meshes."
-                .to_owned(),
-        ],
-        columns,
-        rows,
+        notes: notes.map(str::to_owned).into(),
+        grouped: true,
+        ..rows.table
     }
 }
 
-fn cells(comparison: &Comparison<'_>, summary: &CountSummary, row: &SeriesSummary) -> Vec<Cell> {
-    let mut cells = vec![
-        Cell::new(grouped(summary.count as u64)),
-        Cell::new(comparison.series[row.series].as_str()),
-        Cell::share((row.over, row.asked)),
-        Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3))),
-        Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes"))),
-    ];
-    cells.extend(COMPARED.iter().map(|metric| {
-        let Some(mean) = row.mean(metric) else { return Cell::optional(None) };
-        let (text, over) = (metric.format_mean(mean), row.over(metric));
-        let is_whole = summary.is_whole_of(row, metric);
-        // Two means that read the same are equally good.
-        let best =
-            is_whole && best(summary, metric).is_some_and(|best| metric.format_mean(best) == text);
-        let text = match is_whole {
-            true => text,
-            false if over == row.over => format!("({text})"),
-            false => format!("({text}; {over})"),
-        };
-        Cell { text, best }
-    }));
-    for stage in 0..3 {
-        cells.push(Cell::optional(row.stages.map(|stages| {
-            let seconds = significant(stages[stage], 3);
-            if row.over == summary.meshes { seconds } else { format!("({seconds})") }
-        })));
-    }
-    cells.extend([Cell::share(row.topology), Cell::new(without_result(row))]);
-    cells
+/// A mean, in parentheses where it is not over all meshes.
+fn mean_cell(summary: &CountSummary, row: &SeriesSummary, metric: &Metric) -> Cell {
+    let Some(mean) = row.mean(metric) else { return Cell::optional(None) };
+    let (text, over) = (metric.format_mean(mean), row.over(metric));
+    let is_whole = summary.is_whole_of(row, metric);
+    // Two means that read the same are equally good.
+    let best =
+        is_whole && best(summary, metric).is_some_and(|best| metric.format_mean(best) == text);
+    let text = match is_whole {
+        true => text,
+        false if over == row.over => format!("({text})"),
+        false => format!("({text}; {over})"),
+    };
+    Cell { text, best }
 }
 
 /// What became of the meshes that are in no mean.

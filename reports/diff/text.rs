@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use super::{Change, Diff, ItemName, Meaning, Timing, Unlike};
-use crate::tables::{Cell, Column, Row, Table, escape, left_out, to_markdown};
+use super::{Change, Diff, ItemName, Meaning, Unlike};
+use crate::tables::{Cell, Table, escape, left_out, to_markdown};
 use crate::text::{counted, significant};
 
 /// Rows of a table of changes; the JSON has all.
@@ -71,20 +71,20 @@ fn sides(diff: &Diff) -> String {
 }
 
 fn change_table(caption: &str, changes: &[&Change]) -> Table {
-    let titles = ["mesh", "method", "level", "what", "old", "new", "change"];
-    let rows = changes.iter().take(MOST_ROWS).map(|change| {
-        let ItemName { mesh, method, level } = &change.item;
-        let relative = change.relative.map(|share| format!("{:+.2} %", 100.0 * share));
-        let texts = [mesh, method, level, &change.what].map(|text| Cell::new(text.as_str()));
-        let values = [&change.old, &change.new].map(|value| Cell::new(shown(value)));
-        let cells = texts.into_iter().chain(values).chain([Cell::optional(relative)]).collect();
-        Row { cells, starts_group: false }
-    });
+    let rows = Table::of(&changes[..changes.len().min(MOST_ROWS)])
+        .text("mesh", |change| change.item.mesh.clone())
+        .text("method", |change| change.item.method.clone())
+        .text("level", |change| change.item.level.clone())
+        .text("what", |change| change.what.clone())
+        .text("old", |change| shown(&change.old))
+        .text("new", |change| shown(&change.new))
+        .text("change", |change| {
+            Cell::optional(change.relative.map(|share| format!("{:+.2} %", 100.0 * share)))
+        });
     Table {
         caption: format!("{caption}: {}", counted(changes.len(), "change", "changes")),
         notes: left_out(changes.len(), MOST_ROWS),
-        columns: titles.map(Column::text).into(),
-        rows: rows.collect(),
+        ..rows.table
     }
 }
 
@@ -98,37 +98,19 @@ fn shown(value: &Value) -> String {
 }
 
 fn timing_table(diff: &Diff) -> Table {
-    let titles = [
-        "method",
-        "mesh",
-        "clock",
-        "results × repetitions",
-        "new ÷ old",
-        "99 % interval",
-        "agree",
-        "",
-    ];
-    let rows = diff.timings.iter().map(|timing| {
-        let Timing { method, mesh, clock, results, repetitions, ratio, interval, .. } = timing;
-        let [low, high] = interval;
-        let meaning = match timing.meaning {
-            Some(Meaning::Regression) => "slower",
-            Some(Meaning::Improvement) => "faster",
-            _ => "",
-        };
-        let texts = [
-            method.clone(),
-            mesh.clone().unwrap_or_else(|| "all".to_owned()),
-            (*clock).to_owned(),
-            format!("{results} × {repetitions}"),
-            format!("{ratio:.3}"),
-            format!("{low:.3} to {high:.3}"),
-            format!("{:.0} %", 100.0 * timing.agreement),
-        ];
-        let mut cells: Vec<Cell> = texts.into_iter().map(Cell::new).collect();
-        cells.push(Cell { best: timing.meaning.is_some(), ..Cell::new(meaning) });
-        Row { cells, starts_group: false }
-    });
+    let rows = Table::of(&diff.timings)
+        .text("method", |timing| timing.method.clone())
+        .text("mesh", |timing| timing.mesh.clone().unwrap_or_else(|| "all".to_owned()))
+        .text("clock", |timing| timing.clock)
+        .text("results × repetitions", |t| format!("{} × {}", t.results, t.repetitions))
+        .text("new ÷ old", |timing| format!("{:.3}", timing.ratio))
+        .text("99 % interval", |t| format!("{:.3} to {:.3}", t.interval[0], t.interval[1]))
+        .text("agree", |timing| format!("{:.0} %", 100.0 * timing.agreement))
+        .text("", |timing| match timing.meaning {
+            Some(Meaning::Regression) => Cell { best: true, ..Cell::from("slower") },
+            Some(Meaning::Improvement) => Cell { best: true, ..Cell::from("faster") },
+            _ => Cell::from(""),
+        });
     let options = &diff.options;
     let together = match options.alternating {
         true => "Both builds ran alternately.",
@@ -144,12 +126,7 @@ fn timing_table(diff: &Diff) -> Table {
         100.0 * options.seconds,
         200.0 * options.seconds
     );
-    Table {
-        caption: "Seconds".to_owned(),
-        notes: vec![note],
-        columns: titles.map(Column::text).into(),
-        rows: rows.collect(),
-    }
+    Table { caption: "Seconds".to_owned(), notes: vec![note], ..rows.table }
 }
 
 fn results(count: usize, what: &str) -> String {

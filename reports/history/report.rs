@@ -1,7 +1,9 @@
 //! The findings as Markdown for terminals, and as a page.
 
+use serde_json::Value;
+
 use super::{Change, Findings};
-use crate::tables::{Cell, Column, Row, Table, left_out, to_html, to_markdown};
+use crate::tables::{Cell, Table, left_out, to_html, to_markdown};
 use crate::text::{counted, escape_html, significant};
 
 /// More rows of one kind are counted, not listed: the JSON has them all.
@@ -83,38 +85,30 @@ impl Findings<'_> {
 }
 
 fn table((caption, changes): (&str, Vec<&Change>)) -> Table {
+    let shown = |value: &Value| match value.as_str() {
+        Some(text) => text.to_owned(),
+        None => value.as_f64().map_or("–".to_owned(), |number| significant(number, 4)),
+    };
+    let rows = Table::of(&changes[..changes.len().min(MOST_ROWS)])
+        .text("run", |change| change.first_after.date.clone())
+        .text("commits", |change| {
+            let commits = [&change.last_before, &change.first_after];
+            commits.map(|run| short(&run.commit)).join("..")
+        })
+        .text("series", |change| change.series.clone())
+        .text("what", |change| change.what)
+        .text("change", move |change| format!("{} → {}", shown(&change.from), shown(&change.to)))
+        .text("size", |change| change.ratio.map_or(String::new(), percent))
+        .text("", |change| match (change.shared, change.worse) {
+            (true, _) => Cell::from("most series: the machine or the compiler"),
+            (false, true) => Cell { best: true, ..Cell::from("worse") },
+            (false, false) => Cell::from(""),
+        });
     Table {
         caption: format!("{caption}: {}", changes.len()),
         notes: left_out(changes.len(), MOST_ROWS),
-        columns: ["run", "commits", "series", "what", "change", "size", ""]
-            .map(Column::text)
-            .into(),
-        rows: changes.iter().take(MOST_ROWS).map(|change| row(change)).collect(),
+        ..rows.table
     }
-}
-
-fn row(change: &Change) -> Row {
-    let [from, to] = [&change.from, &change.to].map(|value| match value.as_str() {
-        Some(text) => text.to_owned(),
-        None => value.as_f64().map_or("–".to_owned(), |number| significant(number, 4)),
-    });
-    let meaning = match (change.shared, change.worse) {
-        (true, _) => "most series: the machine or the compiler",
-        (false, true) => "worse",
-        (false, false) => "",
-    };
-    let commits = [&change.last_before, &change.first_after].map(|run| short(&run.commit));
-    let cells = [
-        change.first_after.date.clone(),
-        commits.join(".."),
-        change.series.clone(),
-        change.what.to_owned(),
-        format!("{from} → {to}"),
-        change.ratio.map_or(String::new(), percent),
-    ];
-    let mut cells: Vec<Cell> = cells.into_iter().map(Cell::new).collect();
-    cells.push(Cell { best: change.worse && !change.shared, ..Cell::new(meaning) });
-    Row { cells, starts_group: false }
 }
 
 /// A ratio as a change in percent: `+10.3 %`.

@@ -20,7 +20,7 @@ use crate::header::{Header, RunNote};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, SPHERES_ONLY};
 use crate::plots::{FONTS, Figure, symbol};
 use crate::record::{Machine, Status};
-use crate::tables::{Cell, Column, Row, Table, warnings};
+use crate::tables::{Table, warnings};
 use crate::text::{counted, escape_html, grouped, known_betti, printable};
 use crate::write::BIBTEX;
 
@@ -302,32 +302,21 @@ impl Page<'_> {
             places.push(format!("{} ({level})", self.comparison.meshes[entry.mesh]));
         }
         let runs: usize = groups.values().map(Vec::len).sum();
-        let mut rows = vec![];
-        for ((series, status, reason), places) in &groups {
-            let cells = vec![
-                Cell::new(self.comparison.series[*series].as_str()),
-                Cell::new(status.to_string()),
-                Cell::new(*reason),
-                Cell::new(places.len().to_string()),
-                Cell::new(abridged(places)),
-            ];
-            rows.push(Row { cells, starts_group: false });
-        }
+        type Group<'a> = ((usize, Status, &'a str), Vec<String>);
+        let groups: Vec<Group<'_>> = groups.into_iter().collect();
+        let rows = Table::of(&groups)
+            .text("method", |group| self.comparison.series[group.0.0].as_str())
+            .text("status", |group| group.0.1.to_string())
+            .text("reason", |group| group.0.2)
+            .number("runs", |(_, places)| places.len().to_string())
+            .text("meshes (requested)", |(_, places)| abridged(places));
         (runs > 0).then(|| Table {
             caption: format!(
                 "{} of {} without the requested result",
                 grouped(runs as u64),
                 counted(self.comparison.entries.len(), "run", "runs")
             ),
-            notes: vec![],
-            columns: vec![
-                Column::text("method"),
-                Column::text("status"),
-                Column::text("reason"),
-                Column::number("runs"),
-                Column::text("meshes (requested)"),
-            ],
-            rows,
+            ..rows.table
         })
     }
 

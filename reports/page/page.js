@@ -46,11 +46,11 @@ const written = (value, digits) => {
 const dot = (series) => make("span", { class: "dot", style: `background:${report.series[series].colour}` });
 
 // A table as Rust describes it: a cell is a text, or an object where it is the best of its group.
-const tableOf = ({ columns, rows }) => {
+const tableOf = ({ columns, rows, grouped }) => {
   const kind = (k) => (columns[k].number ? "num" : null);
   const head = make("tr", {}, ...columns.map(({ title }, k) => make("th", { scope: "col", class: kind(k) }, title)));
-  const body = rows.map(({ cells, starts_group: group }) =>
-    make("tr", { class: group ? "group" : null }, ...cells.map((cell, k) => {
+  const body = rows.map((cells, row) =>
+    make("tr", { class: grouped && cells[0] !== rows[row - 1]?.[0] ? "group" : null }, ...cells.map((cell, k) => {
       const inner = cell.best === undefined ? cell : make("strong", {}, cell.best);
       const long = !columns[k].number && (cell.best ?? cell).length > 60;
       return make("td", { class: long ? "wrap" : kind(k) }, inner);

@@ -200,7 +200,7 @@ const resultsOf = (bulk) => {
     if (!Array.isArray(value)) return typeof value === "object" ? JSON.stringify(value) : String(value);
     if (typeof value[0] !== "object") return value.join(typeof value[0] === "string" ? "\n" : ", ");
     const names = Object.keys(value[0]).map((name) => ({ title: name.replaceAll("_", " "), number: true }));
-    return tableOf({ columns: names, rows: value.map((item) => ({ cells: Object.values(item).map(valueOf) })) });
+    return tableOf({ columns: names, rows: value.map((item) => Object.values(item).map(valueOf)) });
   };
 
   // Columns are left out by one rule, not cell by cell.

@@ -3,7 +3,7 @@
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::{COMPARED, Metric};
 use crate::summary::pick;
-use crate::tables::{Cell, Column, Row, Table};
+use crate::tables::{Cell, Table};
 use crate::text::{betti, grouped, known_betti, printable};
 
 /// The values that the bold numbers equal, for each level by [`COMPARED`].
@@ -69,47 +69,29 @@ pub(crate) fn remark(entry: &Entry<'_>) -> String {
 /// The table of one mesh. `how` tells the command line and version that made it.
 pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) -> Table {
     let best = Best::of_mesh(comparison, mesh);
-    let mut columns =
-        vec![Column::number("requested"), Column::text("method"), Column::number("spheres")];
-    columns.extend(COMPARED.iter().map(|metric| Column::number(metric.heading())));
-    columns.extend([Column::text("Betti"), Column::text("as solid"), Column::text("remark")]);
-    let mut level = None;
-    let rows = comparison.of_mesh(mesh).map(|entry| {
-        let starts_group = level.replace(entry.level) != Some(entry.level);
-        Row { cells: cells(comparison, entry, &best), starts_group }
-    });
-    Table {
-        caption: format!("{}: every method at every level", comparison.meshes[mesh]),
-        notes: notes(comparison, mesh, how),
-        rows: rows.collect(),
-        columns,
+    let entries: Vec<Entry<'_>> = comparison.of_mesh(mesh).copied().collect();
+    let mut rows = Table::of(&entries)
+        .number("requested", |entry| level_label(entry.record.simplify.level))
+        .text("method", |entry| comparison.series[entry.series].as_str())
+        .number("spheres", |entry| {
+            Cell::optional(reached(entry.record).map(|count| grouped(count as u64)))
+        });
+    for metric in COMPARED {
+        rows = rows.number(metric.heading(), |entry| match metric.of(entry.record) {
+            Some(value) => {
+                Cell { text: metric.format(value), best: best.is_best(entry, metric, value) }
+            }
+            None => Cell::optional(None),
+        });
     }
-}
-
-fn cells(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<Cell> {
-    let record = entry.record;
-    let mut cells = vec![
-        Cell::new(level_label(record.simplify.level)),
-        Cell::new(comparison.series[entry.series].as_str()),
-        Cell::optional(reached(record).map(|count| grouped(count as u64))),
-    ];
-    cells.extend(COMPARED.iter().map(|metric| match metric.of(record) {
-        Some(value) => {
-            Cell { text: metric.format(value), best: best.is_best(entry, metric, value) }
-        }
-        None => Cell::optional(None),
-    }));
-    cells.extend([
-        Cell::optional(record.evaluate.as_ref().map(|evaluation| betti(evaluation.betti))),
-        Cell::new(topology_verdict(entry)),
-        Cell::new(remark(entry)),
-    ]);
-    cells
-}
-
-fn notes(comparison: &Comparison<'_>, mesh: usize, how: &str) -> Vec<String> {
+    rows = rows.text("Betti", |entry| {
+        let evaluation = entry.record.evaluate.as_ref();
+        Cell::optional(evaluation.map(|evaluation| betti(evaluation.betti)))
+    });
+    rows = rows.text("as solid", topology_verdict);
+    rows = rows.text("remark", remark);
     let mut notes = vec![how.to_owned()];
-    if let Some(initial) = comparison.of_mesh(mesh).find_map(|entry| entry.record.initial) {
+    if let Some(initial) = entries.iter().find_map(|entry| entry.record.initial) {
         notes.push(format!(
             "Initial medial mesh: {} spheres, {} edges, {} faces; Betti numbers {}; the solid's: {}.",
             grouped(initial.spheres),
@@ -120,7 +102,12 @@ fn notes(comparison: &Comparison<'_>, mesh: usize, how: &str) -> Vec<String> {
         ));
     }
     notes.push(UNITS.to_owned());
-    notes
+    Table {
+        caption: format!("{}: every method at every level", comparison.meshes[mesh]),
+        notes,
+        grouped: true,
+        ..rows.table
+    }
 }
 
 /// Units and the meaning of bold, under every table of one mesh.

@@ -13,27 +13,67 @@ pub(crate) use self::csv::{flatten, to_csv, warnings};
 pub(crate) use self::mesh::{Best, mesh_table, remark, topology_verdict};
 
 /// A table before it takes a format.
-#[derive(Clone, Serialize)]
+#[derive(Clone, Default, Serialize)]
 pub(crate) struct Table {
     /// One sentence above the table.
     pub(crate) caption: String,
     /// Units, definitions, and the meaning of bold. The first one is the command that made it.
     pub(crate) notes: Vec<String>,
     pub(crate) columns: Vec<Column>,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<Vec<Cell>>,
+    /// Whether rows with the same first cell are a group, with a rule above it.
+    pub(crate) grouped: bool,
 }
 
 impl Table {
+    /// A table with a row for each item, and no column yet.
+    pub(crate) fn of<T>(items: &[T]) -> Rows<'_, T> {
+        let rows = items.iter().map(|_| vec![]).collect();
+        Rows { items, table: Self { rows, ..Self::default() } }
+    }
+
     /// The table without some columns, by their titles.
     pub(crate) fn without(mut self, titles: &[&str]) -> Self {
         // From the right, so that places to the left stay valid.
         for column in (0..self.columns.len()).rev() {
             if titles.contains(&self.columns[column].title.as_str()) {
                 self.columns.remove(column);
-                self.rows.iter_mut().for_each(|row| drop(row.cells.remove(column)));
+                self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
             }
         }
         self
+    }
+}
+
+/// A table that columns are added to, each with the cell that it has in the row of an item.
+pub(crate) struct Rows<'i, T> {
+    items: &'i [T],
+    pub(crate) table: Table,
+}
+
+impl<T> Rows<'_, T> {
+    /// Adds a column of texts.
+    pub(crate) fn text<C: Into<Cell>>(
+        mut self,
+        title: impl Into<String>,
+        cell: impl Fn(&T) -> C,
+    ) -> Self {
+        self.table.columns.push(Column { title: title.into(), number: false });
+        for (row, item) in self.table.rows.iter_mut().zip(self.items) {
+            row.push(cell(item).into());
+        }
+        self
+    }
+
+    /// Adds a column of numbers.
+    pub(crate) fn number<C: Into<Cell>>(
+        self,
+        title: impl Into<String>,
+        cell: impl Fn(&T) -> C,
+    ) -> Self {
+        let mut rows = self.text(title, cell);
+        rows.table.columns.iter_mut().next_back().expect("just added").number = true;
+        rows
     }
 }
 
@@ -56,20 +96,9 @@ impl Column {
         Self { title: title.into(), number: false }
     }
 
-    pub(crate) fn number(title: impl Into<String>) -> Self {
-        Self { title: title.into(), number: true }
-    }
-
     fn class(&self) -> &'static str {
         if self.number { " class=\"num\"" } else { "" }
     }
-}
-
-/// A row; `starts_group` draws a rule above it.
-#[derive(Clone, Serialize)]
-pub(crate) struct Row {
-    pub(crate) cells: Vec<Cell>,
-    pub(crate) starts_group: bool,
 }
 
 /// One cell.
@@ -80,14 +109,16 @@ pub(crate) struct Cell {
     pub(crate) best: bool,
 }
 
-impl Cell {
-    pub(crate) fn new(text: impl Into<String>) -> Self {
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Self {
         Self { text: text.into(), best: false }
     }
+}
 
+impl Cell {
     /// A dash where there is nothing.
     pub(crate) fn optional(text: Option<String>) -> Self {
-        Self::new(text.unwrap_or_else(|| "–".to_owned()))
+        text.unwrap_or_else(|| "–".to_owned()).into()
     }
 
     /// `3 of 4`; a dash of none.
@@ -120,7 +151,7 @@ pub(crate) fn to_markdown(table: &Table) -> String {
     let rules = table.columns.iter().map(|column| if column.number { "---:" } else { "---" });
     text.push_str(&markdown_line(rules.map(str::to_owned)));
     for row in &table.rows {
-        text.push_str(&markdown_line(row.cells.iter().map(|cell| {
+        text.push_str(&markdown_line(row.iter().map(|cell| {
             let text = escape(&cell.text);
             if cell.best { format!("**{text}**") } else { text }
         })));
@@ -137,7 +168,7 @@ pub(crate) fn to_html(table: &Table) -> String {
     html.push_str("</tr></thead>\n<tbody>\n");
     for row in &table.rows {
         html.push_str("<tr>");
-        for (cell, column) in row.cells.iter().zip(&table.columns) {
+        for (cell, column) in row.iter().zip(&table.columns) {
             let text = escape_html(&cell.text);
             let text = if cell.best { format!("<strong>{text}</strong>") } else { text };
             html.push_str(&format!("<td{}>{text}</td>", column.class()));
@@ -194,12 +225,14 @@ pub(crate) fn to_latex(table: &Table, label: &str) -> String {
     text.push_str(&format!("\\begin{{tabular}}{{{alignment}}}\n\\toprule\n"));
     let titles: Vec<String> = table.columns.iter().map(|c| escape_latex(&c.title)).collect();
     text.push_str(&format!("{} \\\\\n", titles.join(" & ")));
-    for (index, row) in table.rows.iter().enumerate() {
-        // The first rule separates the head, whether or not a group starts.
-        if index == 0 || row.starts_group {
+    let mut group = None;
+    for row in &table.rows {
+        // The first rule separates the head, whether or not there are groups.
+        if group.is_none_or(|group: &str| table.grouped && group != row[0].text) {
             text.push_str("\\midrule\n");
         }
-        let cells = row.cells.iter().map(|cell| {
+        group = Some(&row[0].text);
+        let cells = row.iter().map(|cell| {
             let text = escape_latex(&cell.text);
             if cell.best { format!("\\textbf{{{text}}}") } else { text }
         });
@@ -218,7 +251,7 @@ pub(crate) fn to_latex(table: &Table, label: &str) -> String {
 /// The alignment of a column: a text that would be wider than a third of a line wraps.
 fn align(table: &Table, column: usize) -> &'static str {
     const LONG: usize = 40;
-    let mut texts = table.rows.iter().filter_map(|row| row.cells.get(column));
+    let mut texts = table.rows.iter().filter_map(|row| row.get(column));
     match table.columns[column].number {
         true => "r",
         false if texts.any(|cell| cell.text.chars().count() > LONG) => "p{0.3\\linewidth}",
@@ -284,18 +317,13 @@ mod tests {
 
     #[test]
     fn long_texts_wrap_and_wide_tables_are_shrunk() {
-        let cells = vec![Cell::new("x".repeat(60)), Cell::new("short"), Cell::new("1")];
-        let table = Table {
-            caption: "A caption".to_owned(),
-            notes: vec![],
-            columns: vec![Column::text("a"), Column::text("b"), Column::number("c")],
-            rows: vec![Row { cells, starts_group: false }],
-        };
+        let rows = Table::of(&[60, 60]).text("a", |&n| "x".repeat(n)).text("b", |_| "short");
+        let table = rows.number("c", |_| "1").table;
         let latex = to_latex(&table, "label");
         assert!(latex.contains("\\begin{tabular}{p{0.3\\linewidth}lr}"), "{latex}");
         assert!(latex.contains("\\ifdefined\\resizebox"), "{latex}");
         let count = |c: char| latex.chars().filter(|&other| other == c).count();
         assert_eq!(count('{'), count('}'), "{latex}");
-        assert_eq!(table.without(&["b", "z"]).rows[0].cells.len(), 2);
+        assert_eq!(table.without(&["b", "z"]).rows[0].len(), 2);
     }
 }
