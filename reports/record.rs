@@ -17,7 +17,9 @@ use serde::{Deserialize, Serialize};
 use crate::text::{counted, megabytes};
 
 /// What became of one item.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// A valid medial mesh came out.
@@ -34,6 +36,8 @@ pub enum Status {
     /// The input was refused before the method saw it, or by a check of the method's own.
     Refused,
     /// The method returned an error.
+    // The default: a record that nobody completes must not count as a result.
+    #[default]
     Failed,
     /// The method panicked, or its process was killed by a signal.
     Panicked,
@@ -102,7 +106,7 @@ impl fmt::Display for Status {
 }
 
 /// One line of `results.jsonl`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Key of the level of the item: records with the same key are of the same work, and the last
     /// one counts. Empty in records of older builds.
@@ -120,19 +124,16 @@ pub struct Record {
     /// What became of the item.
     pub status: Status,
     /// Why, where the status is not `ok`: one sentence for the user.
-    #[serde(default)]
     pub reason: Option<String>,
     /// What was asked of the method, and what it answered.
     pub simplify: Simplify,
     /// What was measured on the answer. Absent where there is none, or where it was not measured.
-    #[serde(default)]
     pub evaluate: Option<Evaluation>,
     /// Wall-clock seconds of the evaluation; part of no method's time. The levels of a method are
     /// measured side by side, and levels with the same result once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evaluate_seconds: Option<f64>,
     /// The medial mesh that every simplifier of this shape starts from.
-    #[serde(default)]
     pub initial: Option<Initial>,
     /// What the result depends on beside input, method and level.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -169,7 +170,7 @@ pub struct Record {
 /// The `simplify` object: one method at one level.
 ///
 /// Only what was asked is always there; the rest is absent where the run did not get so far.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Simplify {
     /// What became of the run.
     pub status: Status,
@@ -187,38 +188,29 @@ pub struct Simplify {
     /// The level that was asked.
     pub level: Target,
     /// Number of spheres that was reached.
-    #[serde(default)]
     pub reached: Option<usize>,
     /// The method's own level that was used, where it has one.
-    #[serde(default)]
     pub native_level: Option<f64>,
     /// Spheres of the result.
-    #[serde(default)]
     pub spheres: Option<usize>,
     /// Edges of the result.
-    #[serde(default)]
     pub edges: Option<usize>,
     /// Faces of the result.
-    #[serde(default)]
     pub faces: Option<usize>,
     /// Wall-clock seconds of each shared substrate that the method used, whoever built it first.
     #[serde(default)]
     pub substrates: BTreeMap<String, f64>,
     /// Wall-clock seconds by stage.
-    #[serde(default)]
     pub seconds: Option<Stages>,
     /// Seconds of the process on all processors, by stage.
-    #[serde(default)]
     pub cpu_seconds: Option<Stages>,
     /// The most memory that the run needed at one time, in bytes: live bytes of the heap with the
     /// substrates that the method used, as if it had been alone.
-    #[serde(default)]
     pub peak_bytes: Option<u64>,
     /// Seconds by the method's own clock, for programs that tell them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub own_seconds: Option<OwnSeconds>,
     /// Threads that the method was given.
-    #[serde(default)]
     pub threads: Option<usize>,
     /// Named counts of the method, such as `rejected_by_link_condition`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -234,28 +226,7 @@ pub struct Simplify {
 impl Simplify {
     /// A request without an answer: what a run that failed at once leaves behind.
     pub fn asked(method: impl Into<String>, level: Target, status: Status) -> Self {
-        Self {
-            status,
-            method: method.into(),
-            variant: None,
-            params: Params::none(),
-            seed: 0,
-            level,
-            reached: None,
-            native_level: None,
-            spheres: None,
-            edges: None,
-            faces: None,
-            substrates: BTreeMap::new(),
-            seconds: None,
-            cpu_seconds: None,
-            peak_bytes: None,
-            own_seconds: None,
-            threads: None,
-            diagnostics: BTreeMap::new(),
-            warnings: Vec::new(),
-            version: String::new(),
-        }
+        Self { status, method: method.into(), level, ..Self::default() }
     }
 }
 
@@ -328,7 +299,6 @@ pub struct Initial {
     /// Betti numbers over Z2, where they were computed.
     pub betti: Option<[u64; 3]>,
     /// What the solid's own topology demands: components, total genus, cavities.
-    #[serde(default)]
     pub expected_betti: Option<[u64; 3]>,
 }
 
@@ -371,10 +341,11 @@ impl fmt::Display for Machine {
 
 /// The target of a run: a level of the method, or an error bound that the runner meets by a search
 /// among such levels.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Target {
     /// [`Level::Published`].
+    #[default]
     Published,
     /// [`Level::Spheres`].
     Spheres(usize),

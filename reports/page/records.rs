@@ -193,9 +193,8 @@ mod tests {
     use crate::record::{Simplify, Status};
 
     fn record(level: Target) -> Record {
-        let simplify = serde_json::to_value(Simplify::asked("qmat", level, Status::Ok)).unwrap();
-        let json = serde_json::json!({"mesh": "bear", "status": "ok", "simplify": simplify});
-        serde_json::from_value(json).unwrap()
+        let simplify = Simplify::asked("qmat", level, Status::Ok);
+        Record { mesh: "bear".to_owned(), status: Status::Ok, simplify, ..Record::default() }
     }
 
     #[test]

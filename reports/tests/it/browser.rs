@@ -1,5 +1,5 @@
-//! The page in a browser, from disk and without a network: no error, no request, and its script
-//! answers.
+//! The page in a browser, from disk and without a network: no error, no request, and the answers of
+//! `page_checks.txt`.
 
 use std::io::{Read, Write};
 use std::path::Path;
@@ -120,11 +120,6 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    fn text(&mut self, expression: &str) -> String {
-        let value = self.value(expression);
-        value.as_str().unwrap_or_else(|| panic!("{expression}: {value}")).to_owned()
-    }
-
     /// Waits for what must become true.
     fn until(&mut self, expression: &str) {
         let start = Instant::now();
@@ -154,19 +149,12 @@ impl Browser {
         [0, 1].map(|k: usize| place[k].as_f64().unwrap())
     }
 
-    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2]) {
-        let button = if kind == "mouseMoved" { "none" } else { "left" };
-        let params = json!({"type": kind, "x": x, "y": y, "button": button, "clickCount": 1});
+    fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], held: u32) {
+        let button = if kind == "mouseMoved" && held == 0 { "none" } else { "left" };
+        let params = json!({
+            "type": kind, "x": x, "y": y, "button": button, "buttons": held, "clickCount": 1,
+        });
         self.call("Input.dispatchMouseEvent", params);
-    }
-
-    fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
-        self.mouse("mouseMoved", from);
-        self.mouse("mousePressed", from);
-        let params =
-            json!({"type": "mouseMoved", "x": to[0], "y": to[1], "button": "left", "buttons": 1});
-        self.call("Input.dispatchMouseEvent", params);
-        self.mouse("mouseReleased", to);
     }
 
     fn key(&mut self, key: &str, code: u32) {
@@ -179,6 +167,39 @@ impl Browser {
             self.call("Input.dispatchKeyEvent", params);
         }
     }
+
+    /// Takes steps: each line is a word and what it is about, as the head of the file says.
+    fn run(&mut self, steps: &str) {
+        for (number, line) in steps.lines().enumerate() {
+            let Some((word, what)) = line.split_once(' ').filter(|_| !line.starts_with('#')) else {
+                continue;
+            };
+            match word {
+                "do" => drop(self.value(&format!("{what}; 0"))),
+                "is" => {
+                    let (expression, expected) = what.rsplit_once(" == ").unwrap();
+                    let expected: Value = serde_json::from_str(expected).unwrap();
+                    assert_eq!(self.value(expression), expected, "line {}: {line}", number + 1);
+                }
+                "until" => self.until(what),
+                "key" => {
+                    let (key, code) = what.split_once(' ').unwrap();
+                    self.key(key, code.parse().unwrap());
+                }
+                "over" | "click" | "drag" => {
+                    let [x, y] = self.centre(what);
+                    self.mouse("mouseMoved", [x, y], 0);
+                    if word != "over" {
+                        let by = if word == "drag" { 60.0 } else { 0.0 };
+                        self.mouse("mousePressed", [x, y], 1);
+                        self.mouse("mouseMoved", [x + by, y + by], 1);
+                        self.mouse("mouseReleased", [x + by, y + by], 0);
+                    }
+                }
+                _ => panic!("line {}: no such step: {line}", number + 1),
+            }
+        }
+    }
 }
 
 impl Drop for Browser {
@@ -186,179 +207,6 @@ impl Drop for Browser {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
-}
-
-/// Chooses in a field of the filters as a user does.
-fn choose(browser: &mut Browser, field: &str, value: &str) {
-    browser.value(&format!(
-        "{{ const field = document.querySelector('.filters').elements['{field}']; \
-         field.value = '{value}'; field.dispatchEvent(new Event('input', {{bubbles: true}})); }}"
-    ));
-}
-
-const SHOWN: &str = "document.querySelector('.filters output').textContent";
-const ROWS: &str = "[...document.querySelectorAll('.sortable > tbody > tr[data-mesh]')]";
-
-fn check_filters(browser: &mut Browser) {
-    let all = SHAPES.len() * METHODS.len() * COUNTS.len();
-    assert_eq!(browser.text(SHOWN), format!("{all} of {all} rows"));
-    choose(browser, "method", "qmat");
-    let of_method = SHAPES.len() * COUNTS.len();
-    assert_eq!(browser.text(SHOWN), format!("{of_method} of {all} rows"));
-    assert_eq!(browser.value(&format!("{ROWS}.every(row => row.dataset.method === 'qmat')")), true);
-    choose(browser, "text", "bear 1,000");
-    assert_eq!(browser.text(SHOWN), format!("1 of {all} rows"));
-    choose(browser, "text", "");
-    browser.until("location.hash === '#results?method=qmat'");
-
-    browser.value("document.querySelector('th[data-key=hausdorff] button').click()");
-    assert_eq!(
-        browser.value("document.querySelector('th[data-key=hausdorff]').ariaSort"),
-        "ascending"
-    );
-    let column = "[...document.querySelectorAll('.sortable > thead th')].findIndex(h => h.dataset.key === 'hausdorff')";
-    let ascending = format!(
-        "(() => {{ const column = {column}; \
-         const values = {ROWS}.map(row => parseFloat(row.children[column].dataset.v)); \
-         return values.length === {of_method} && values.every((v, k) => !k || v >= values[k - 1]); }})()"
-    );
-    assert_eq!(browser.value(&ascending), true);
-    browser.until("location.hash === '#results?method=qmat&sort=hausdorff'");
-}
-
-/// The address brings back what was chosen.
-fn check_address(browser: &mut Browser) {
-    browser.value("location.hash = '#results?asked=100&sort=-spikes&columns=spikes+edges'");
-    let all = SHAPES.len() * METHODS.len() * COUNTS.len();
-    browser.until(&format!("{SHOWN} === '{} of {all} rows'", SHAPES.len() * METHODS.len()));
-    assert_eq!(
-        browser.value("document.querySelector('th[data-key=spikes]').ariaSort"),
-        "descending"
-    );
-    let is_shown =
-        |key: &str| format!("document.querySelector('th[data-key={key}]').offsetWidth > 0");
-    for (key, shown) in [("mesh", true), ("edges", true), ("spikes", true), ("hausdorff", false)] {
-        assert_eq!(browser.value(&is_shown(key)), shown, "{key}");
-    }
-    browser.value("document.querySelector('.filters').reset()");
-    browser.until(&format!("{SHOWN} === '{all} of {all} rows'"));
-    browser.value("location.hash = '#mesh-ant'");
-    browser.until("document.getElementById('mesh-ant').open");
-    browser.value("document.getElementById('mesh-ant').open = false");
-}
-
-/// The section of a mesh is made when it is opened, with plots that answer.
-fn check_meshes(browser: &mut Browser) {
-    let last = format!("document.querySelectorAll('details.mesh')[{}]", SHAPES.len() - 1);
-    assert_eq!(browser.value(&format!("{last}.querySelector('figure') === null")), true);
-    browser.value(&format!("{last}.open = true"));
-    browser.until(&format!("{last}.querySelector('svg.chart[tabindex]') !== null"));
-    assert_eq!(browser.value(&format!("{last}.querySelectorAll('figure.plot').length > 1")), true);
-    let link = browser.text(&format!("{last}.querySelector('a').getAttribute('href')"));
-    assert_eq!(link, "#results?mesh=box");
-    browser.value(&format!("{last}.open = false"));
-}
-
-fn check_details(browser: &mut Browser) {
-    browser.value("document.querySelector('button.more').focus()");
-    browser.key("Enter", 13);
-    browser.until("document.querySelector('tr.detail') !== null");
-    let detail = browser.text("document.querySelector('tr.detail').textContent");
-    assert!(detail.contains("medial simplify bear -m qmat --spheres 1000 --seed 1"), "{detail}");
-    assert!(detail.contains("rejected by link condition"), "{detail}");
-    browser.key("Enter", 13);
-    browser.until("document.querySelector('tr.detail') === null");
-    // The rest of the rows comes with scrolling.
-    browser.value("document.querySelector('.scroll.tall').scrollTop = 1e9");
-    let all = SHAPES.len() * METHODS.len() * COUNTS.len();
-    browser.until(&format!("{ROWS}.length === {all}"));
-}
-
-/// Head and first columns stay in sight, above the rows that scroll beneath them.
-fn check_sticky(browser: &mut Browser) {
-    for input in ["edges", "faces", "epsilon", "spheres_only", "below_30"] {
-        browser.value(&format!("document.querySelector('input[value={input}]').click()"));
-    }
-    browser.centre("document.querySelector('.scroll.tall')");
-    browser.value(
-        "{ const box = document.querySelector('.scroll.tall'); box.scrollLeft = 200; \
-         box.scrollTop = 300; }",
-    );
-    assert_eq!(browser.value("document.querySelector('.scroll.tall').scrollLeft > 0"), true);
-    for column in ["mesh", "asked", "method"] {
-        let in_front = format!(
-            "(() => {{ const head = document.querySelector('th[data-key={column}]'); \
-             const box = head.getBoundingClientRect(); \
-             return [0.1, 0.9].every(part => head.contains(document.elementFromPoint(\
-             box.x + box.width / 2, box.y + part * box.height))); }})()"
-        );
-        assert_eq!(browser.value(&in_front), true, "{column}");
-    }
-    browser.value("document.querySelector('.filters').reset()");
-}
-
-/// The chart is drawn anew for each view: always the one that is in the document now.
-const CHART: &str = "document.querySelector('figure.plot svg.chart')";
-const SPOKEN: &str = "document.querySelector('figure.plot output').textContent";
-const WHOLE: &str = "document.querySelector('figure.plot .whole').hidden";
-const LEGEND: &str = "document.querySelector('figure.plot .legend button')";
-
-fn check_plots(browser: &mut Browser) {
-    let tips = format!(
-        "[...{CHART}.querySelectorAll('g[aria-label=tip]')].map(g => g.textContent).join('')"
-    );
-    assert_eq!(browser.text(&tips), "");
-    let mark = browser.centre(&format!("{CHART}.querySelector('g[aria-label=dot] > *')"));
-    // The first movement brings the mouse into the plot.
-    browser.mouse("mouseMoved", [mark[0] + 40.0, mark[1] + 40.0]);
-    browser.mouse("mouseMoved", mark);
-    browser.until(&format!("{tips}.includes('qmat') && {tips}.includes('n = 13 meshes')"));
-
-    browser.value(&format!("{CHART}.focus()"));
-    browser.key("ArrowDown", 40);
-    let first = browser.text(SPOKEN);
-    browser.key("ArrowDown", 40);
-    let next = browser.text(SPOKEN);
-    assert!(first.contains("qmat") && !next.is_empty() && next != first, "{first} {next}");
-    browser.key("ArrowRight", 39);
-    assert_ne!(browser.text(SPOKEN), next);
-    browser.key("Escape", 27);
-    assert_eq!(browser.text(SPOKEN), "");
-
-    browser.value(&format!("{LEGEND}.focus()"));
-    browser.key("Enter", 13);
-    let state = format!("{LEGEND}.getAttribute('aria-pressed')");
-    let drawn = format!(
-        "(() => {{ const colour = {LEGEND}.querySelector('path').getAttribute('stroke'); \
-         return [...{CHART}.querySelectorAll('g[aria-label=line] path')]\
-         .filter(path => path.getAttribute('stroke') === colour).length; }})()"
-    );
-    assert_eq!((browser.text(&state), browser.value(&drawn)), ("false".into(), json!(0)));
-    let at = browser.centre(LEGEND);
-    browser.mouse("mousePressed", at);
-    browser.mouse("mouseReleased", at);
-    assert_eq!((browser.text(&state), browser.value(&drawn)), ("true".into(), json!(1)));
-
-    let marks = format!("{CHART}.querySelectorAll('g[aria-label=dot] > *')");
-    let all = browser.value(&format!("{marks}.length"));
-    let from = browser.centre(&format!("{marks}[1]"));
-    browser.drag(from, [from[0] + 60.0, from[1] + 60.0]);
-    assert_eq!(browser.value(WHOLE), false);
-    assert_ne!(browser.value(&format!("{marks}.length")), all);
-    browser.key("Escape", 27);
-    assert_eq!(browser.value(WHOLE), true);
-
-    browser.value(&format!("{CHART}.focus()"));
-    browser.key("+", 187);
-    assert_eq!(browser.value(WHOLE), false);
-    browser.key("-", 189);
-    assert_eq!(browser.value(WHOLE), true);
-    let larger = browser.centre("document.querySelector('figure.plot [aria-label=enlarge]')");
-    browser.mouse("mousePressed", larger);
-    browser.mouse("mouseReleased", larger);
-    assert_eq!(browser.value(WHOLE), false);
-    browser.value("document.querySelector('figure.plot .whole').click()");
-    assert_eq!(browser.value(WHOLE), true);
 }
 
 /// A cube, and the medial mesh of a smaller one in it.
@@ -380,76 +228,6 @@ fn write_views(folder: &Path, records: &[Record]) {
     }
 }
 
-/// How many pixels of a 3D view are drawn, and a sum that tells two pictures apart.
-const DRAWN: &str = "window.drawn = (canvas) => { \
-    const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d'); \
-    copy.drawImage(canvas, 0, 0); \
-    const pixels = copy.getImageData(0, 0, canvas.width, canvas.height).data; \
-    let count = 0, sum = 0; \
-    for (let k = 0; k < pixels.length; k += 4) if (pixels[k + 3]) { \
-        count += 1; sum = (sum * 31 + k + pixels[k] + pixels[k + 1]) % 1000003; } \
-    return { count, sum }; }";
-
-/// Both sides show something, move together, and are gone when they are closed.
-fn check_views(browser: &mut Browser) {
-    browser.value(DRAWN);
-    let canvases = "[...document.querySelectorAll('.side canvas')]";
-    let all_drawn =
-        format!("{canvases}.length === 2 && {canvases}.every(c => drawn(c).count > 5000)");
-    browser.value("document.querySelector('.view3d > button').click()");
-    browser.until(&all_drawn);
-    for kind in ["union", "errors", "surface", "axis"] {
-        browser.value(&format!(
-            "window.before = {canvases}.map(c => drawn(c).sum); \
-             for (const side of document.querySelectorAll('.side')) {{ \
-             const select = side.querySelectorAll('select')[1]; select.value = '{kind}'; \
-             select.dispatchEvent(new Event('change')); }}"
-        ));
-        browser.until(&format!("{canvases}.every((c, k) => drawn(c).sum !== before[k])"));
-        assert_eq!(browser.value(&all_drawn), true, "{kind}");
-    }
-    browser.value(&format!("before = {canvases}.map(c => drawn(c).sum); {canvases}[1].focus()"));
-    browser.key("ArrowRight", 39);
-    browser.until(&format!("{canvases}.every((c, k) => drawn(c).sum !== before[k])"));
-    // The same results on both sides, seen alike.
-    let sums = browser.value(&format!("{canvases}.map(c => drawn(c).sum)"));
-    assert_eq!(sums[0], sums[1]);
-
-    // Another one, from its file, takes the place of the first.
-    browser.value("document.querySelectorAll('script.view')[1].remove()");
-    browser.value("location.hash = '#mesh-dolphin'");
-    let second = "document.querySelector('#mesh-dolphin .view3d')";
-    browser.until(&format!("{second} !== null"));
-    browser.value(&format!("{second}.querySelector('button').click()"));
-    browser.until(&format!("{second}.querySelectorAll('canvas').length === 2"));
-    browser.until(&all_drawn);
-    browser.value(&format!("{second}.querySelector('button').click()"));
-    assert_eq!(browser.value(&format!("{canvases}.length")), 0);
-}
-
-/// A button copies its text, or selects it where the browser lets no page copy.
-fn check_papers(browser: &mut Browser) {
-    browser.value("location.hash = '#papers'");
-    browser.until("document.getElementById('papers').open");
-    browser.value("window.copied = [...document.querySelectorAll('.paste')].pop()");
-    let at = browser.centre("copied.querySelector('button')");
-    browser.mouse("mousePressed", at);
-    browser.mouse("mouseReleased", at);
-    browser.until("copied.querySelector('output').textContent !== ''");
-    if browser.text("copied.querySelector('output').textContent").starts_with("Selected") {
-        let selected = browser.text("getSelection().toString()");
-        assert!(selected.starts_with("@article{qmat,") && selected.contains("@misc{medial,"));
-    }
-    // And where there is nothing to copy with.
-    browser.value(
-        "{ Object.defineProperty(navigator, 'clipboard', {value: undefined}); \
-         copied.querySelector('button').click(); }",
-    );
-    browser.until("copied.querySelector('output').textContent.startsWith('Selected')");
-    let selected = browser.text("getSelection().toString()");
-    assert!(selected.starts_with("@article{qmat,") && selected.contains("@misc{medial,"));
-}
-
 #[test]
 fn the_page_answers_from_disk() {
     let folder = tempfile::tempdir().unwrap();
@@ -459,14 +237,7 @@ fn the_page_answers_from_disk() {
     write_views(folder.path(), &records);
     write_report(folder.path(), &records, &header(&METHODS)).unwrap();
     browser.open(&format!("file://{}/index.html", folder.path().display()));
-    check_filters(&mut browser);
-    check_address(&mut browser);
-    check_meshes(&mut browser);
-    check_details(&mut browser);
-    check_sticky(&mut browser);
-    check_plots(&mut browser);
-    check_views(&mut browser);
-    check_papers(&mut browser);
+    browser.run(include_str!("page_checks.txt"));
 
     let mut requests = 0;
     for event in &browser.events {

@@ -7,9 +7,9 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use flate2::read::GzDecoder;
 use medial::metrics::{Counts, Distances, Evaluation, RatioSpikes, Spikes, TriangleQuality};
-use medial_reports::Target;
 use medial_reports::{
     Header, Initial, Machine, MethodNote, Record, Repetition, RunNote, Simplify, Stages, Status,
+    Target,
 };
 use serde_json::Value;
 
@@ -171,26 +171,16 @@ pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
     simplify.threads = Some(1);
     simplify.version = "0.1.0".to_owned();
     Record {
-        key: String::new(),
         mesh: mesh.to_owned(),
         dataset: Some("made-up".to_owned()),
-        mesh_hash: None,
         status,
-        reason: None,
         simplify,
-        evaluate: None,
-        evaluate_seconds: None,
-        initial: None,
-        conditions: None,
-        result_hash: None,
         seeds: BTreeMap::from([("evaluation".to_owned(), 7), ("method".to_owned(), 1)]),
-        repetitions: Vec::new(),
         machine: machine(),
-        method_version: String::new(),
         binary_hash: "3f9c0d".to_owned(),
         command: "medial compare --spheres 1000,500,200,100".to_owned(),
         version: "0.1.0".to_owned(),
-        artifact: None,
+        ..Record::default()
     }
 }
 
@@ -221,19 +211,14 @@ pub fn header(methods: &[&str]) -> Header {
         published: "a count of 1,000 spheres".to_owned(),
         native: Some("theta (degrees)".to_owned()),
     };
-    Header {
-        title: String::new(),
-        runs: vec![RunNote {
-            command: "medial compare --spheres 1000,500,200,100".to_owned(),
-            version: "0.1.0".to_owned(),
-            binary_hash: "3f9c0d".to_owned(),
-            date: Some("2026-01-31 12:00 UTC".to_owned()),
-            machine: None,
-        }],
-        methods: methods.iter().map(note).collect(),
-        study: None,
-        notes: Vec::new(),
-    }
+    let run = RunNote {
+        command: "medial compare --spheres 1000,500,200,100".to_owned(),
+        version: "0.1.0".to_owned(),
+        binary_hash: "3f9c0d".to_owned(),
+        date: Some("2026-01-31 12:00 UTC".to_owned()),
+        machine: None,
+    };
+    Header { runs: vec![run], methods: methods.iter().map(note).collect(), ..Header::default() }
 }
 
 /// A whole comparison with a few failures of every kind.
