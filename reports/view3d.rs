@@ -212,21 +212,16 @@ fn halved(mesh: &TriMesh, longest: f64) -> TriMesh {
             })
         })
     };
+    let old = mesh.vertices.len() as u32;
     let mut faces = Vec::with_capacity(mesh.faces.len());
     for &[a, b, c] in &mesh.faces {
-        // Every case keeps the orientation; two halved sides leave a corner and a quadrangle of two faces.
-        match [middle(a, b), middle(b, c), middle(c, a)] {
-            [None, None, None] => faces.push([a, b, c]),
-            [Some(x), None, None] => faces.extend([[a, x, c], [x, b, c]]),
-            [None, Some(x), None] => faces.extend([[b, x, a], [x, c, a]]),
-            [None, None, Some(x)] => faces.extend([[c, x, b], [x, a, b]]),
-            [Some(x), Some(y), None] => faces.extend([[x, b, y], [a, x, y], [a, y, c]]),
-            [None, Some(x), Some(y)] => faces.extend([[x, c, y], [b, x, y], [b, y, a]]),
-            [Some(y), None, Some(x)] => faces.extend([[x, a, y], [c, x, y], [c, y, b]]),
-            [Some(x), Some(y), Some(z)] => {
-                faces.extend([[a, x, z], [x, b, y], [z, y, c], [x, y, z]]);
-            }
-        }
+        // Around the face, the middles of halved sides among its corners.
+        let ring = [(a, b), (b, c), (c, a)].map(|(p, q)| [Some(p), middle(p, q)]);
+        let mut ring: Vec<u32> = ring.into_iter().flatten().flatten().collect();
+        // A fan from a middle: from a corner it would have a face without area.
+        let start = ring.iter().position(|&vertex| vertex >= old).unwrap_or(0);
+        ring.rotate_left(start);
+        faces.extend((2..ring.len()).map(|k| [ring[0], ring[k - 1], ring[k]]));
     }
     TriMesh { vertices, faces }
 }

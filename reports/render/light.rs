@@ -47,25 +47,23 @@ pub(super) fn mix(a: Light, b: Light, share: f32) -> Light {
     std::array::from_fn(|k| a[k] + share * (b[k] - a[k]))
 }
 
-/// The colour of facets.
+/// The colours of facets by their places in a colour map; of a plain colour one.
 #[derive(Clone, Debug)]
-pub(super) enum Paint {
-    Plain(Light),
-    /// A colour map as a table of 256 places.
-    Map(Vec<Light>),
-}
+pub(super) struct Paint(Vec<Light>);
 
 impl Paint {
+    pub(super) fn plain(light: Light) -> Self {
+        Self(vec![light])
+    }
+
     pub(super) fn map(map: ColourMap) -> Self {
-        Self::Map((0..256).map(|k| decode(map.at(f64::from(k) / 255.0))).collect())
+        Self((0..256).map(|k| decode(map.at(f64::from(k) / 255.0))).collect())
     }
 
     /// The light at a place from 0 to 1.
     pub(super) fn at(&self, place: f32) -> Light {
-        match self {
-            Self::Plain(light) => *light,
-            Self::Map(table) => table[(place.clamp(0.0, 1.0) * 255.0 + 0.5) as usize],
-        }
+        let last = (self.0.len() - 1) as f32;
+        self.0[(place.clamp(0.0, 1.0) * last + 0.5) as usize]
     }
 }
 

@@ -21,7 +21,7 @@ mod tests;
 pub use camera::{Camera, Frame};
 pub use medial::ColourMap;
 pub use picture::{Background, Bar, Picture};
-pub use scene::{AxisColour, Layer, Scale, Scene};
+pub use scene::{Layer, Scale, Scene};
 pub use strip::{ColourBy, Errors, Panel, Strip, strip};
 
 /// The longest side of a picture, in pixels. Edge functions stay exact up to it.

@@ -44,22 +44,16 @@ impl Background {
 /// A picture of 8-bit sRGB pixels with straight alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    width: usize,
-    height: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
     /// Row by row from the top.
-    pixels: Vec<[u8; 4]>,
+    pub(super) pixels: Vec<[u8; 4]>,
 }
 
 impl Picture {
     /// A picture of the background alone.
     pub(super) fn blank([width, height]: [usize; 2], background: Background) -> Self {
         Self { width, height, pixels: vec![background.pixel(); width * height] }
-    }
-
-    /// A picture of the pixels given, row by row.
-    pub(super) fn of([width, height]: [usize; 2], pixels: Vec<[u8; 4]>) -> Self {
-        debug_assert_eq!(pixels.len(), width * height);
-        Self { width, height, pixels }
     }
 
     /// Width in pixels.
@@ -70,11 +64,6 @@ impl Picture {
     /// Height in pixels.
     pub fn height(&self) -> usize {
         self.height
-    }
-
-    /// Red, green, blue (sRGB) and alpha (straight) of every pixel, row by row from the top.
-    pub fn pixels(&self) -> &[[u8; 4]] {
-        &self.pixels
     }
 
     /// A pixel, from the top left corner.

@@ -1,11 +1,12 @@
 //! The scene: what can be drawn, and the facets that it becomes.
 
 use medial::complex::{MedialMesh, Sphere};
+use medial::geometry::DisjointSets;
 use medial::surface::TriMesh;
 use medial::{ColourMap, Vec3};
 use rayon::prelude::*;
 
-use super::camera::{Camera, Frame};
+use super::camera::Frame;
 use super::light::{GLASS, Paint, crevices, decode, encode};
 use super::picture::{Background, Picture};
 use super::raster::{Batch, Facet, Kind, Lines, Look, PixelLight, rasterise};
@@ -45,18 +46,9 @@ pub enum Layer<'a> {
     Axis {
         /// The medial mesh.
         mesh: &'a MedialMesh,
-        /// Its colours.
-        colour: AxisColour,
+        /// The colours of the spheres' radii; without them one colour for sheets and one for curves.
+        colour: Option<Scale>,
     },
-}
-
-/// What a medial mesh is coloured by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AxisColour {
-    /// One colour for sheets, one for curves.
-    Plain,
-    /// The radii of the spheres.
-    Radius(Scale),
 }
 
 /// A colour map over a range of values.
@@ -97,14 +89,15 @@ impl Scene<'_> {
     /// ```
     /// use medial::Vec3;
     /// use medial::surface::TriMesh;
-    /// use medial_reports::render::{Background, Camera, Layer, Scene};
+    /// use medial_reports::render::{Background, Camera, Frame, Layer, Scene};
     ///
     /// let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
     /// let faces = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
     /// let tetrahedron = TriMesh { vertices, faces };
     /// let layers = vec![Layer::Surface(&tetrahedron)];
     /// let scene = Scene { layers, size: [320, 240], background: Background::WHITE };
-    /// let picture = scene.picture(&scene.frame(&Camera::fitting(&tetrahedron))?)?;
+    /// let camera = Camera::fitting(&tetrahedron);
+    /// let picture = scene.picture(&Frame::fit(&camera, &tetrahedron.vertices)?)?;
     /// assert_eq!(picture.pixel(0, 0), Some([255; 4]));
     /// assert!(picture.to_png()?.starts_with(b"\x89PNG"));
     /// # Ok::<(), medial_reports::render::RenderError>(())
@@ -129,16 +122,8 @@ impl Scene<'_> {
         let pixels = (lights.par_iter().zip(&shares))
             .map(|(light, &share)| composed(light, share, self.background))
             .collect();
-        Ok(Picture::of(self.size, pixels))
-    }
-
-    /// Sets a camera up so that the first layer that has points fills the picture.
-    ///
-    /// # Errors
-    /// As [`Frame::fit`].
-    pub fn frame(&self, camera: &Camera) -> Result<Frame, RenderError> {
-        let points = self.layers.iter().map(Layer::points).find(|points| !points.is_empty());
-        Frame::fit(camera, &points.unwrap_or_default())
+        let [width, height] = self.size;
+        Ok(Picture { width, height, pixels })
     }
 }
 
@@ -202,22 +187,11 @@ impl Canvas<'_> {
 }
 
 impl Layer<'_> {
-    /// The points by which a camera is set up: those of surfaces, else the centres of spheres.
-    fn points(&self) -> Vec<Vec3> {
-        match self {
-            Self::Surface(mesh)
-            | Self::Glass(mesh)
-            | Self::Ghost(mesh)
-            | Self::Values { mesh, .. } => mesh.vertices.clone(),
-            Self::Axis { mesh, .. } => mesh.spheres.iter().map(|s| s.centre).collect(),
-        }
-    }
-
     /// Adds the facets of the layer.
     fn add_to(&self, batches: &mut Vec<Batch>, canvas: &Canvas<'_>) -> Result<(), RenderError> {
         let (facets, look) = match *self {
             Self::Surface(mesh) => {
-                let paint = Paint::Plain(decode(GREY));
+                let paint = Paint::plain(decode(GREY));
                 let look = Look { paint, lines: canvas.lines(SHARP_INK), kind: Kind::Solid };
                 (surface_facets(mesh, |_, _| 0.5), look)
             }
@@ -225,7 +199,7 @@ impl Layer<'_> {
                 // Rims are more opaque: what varies along a facet is how much it faces the eye.
                 let facing = |_, normal| canvas.frame.back.dot(normal).abs() as f32;
                 let kind = if matches!(self, Self::Ghost(_)) { Kind::Ghost } else { Kind::Glass };
-                let paint = Paint::Plain([0.0; 3]);
+                let paint = Paint::plain([0.0; 3]);
                 (surface_facets(mesh, facing), Look { paint, lines: canvas.lines(GLASS_INK), kind })
             }
             Self::Values { mesh, values, scale } => {
@@ -249,35 +223,24 @@ impl Layer<'_> {
 
 /// The facets of a surface: smooth, with lines along its sharp edges. `place` in the colour map is by vertex and normal.
 fn surface_facets(mesh: &TriMesh, place: impl Fn(u32, Vec3) -> f32 + Sync) -> Vec<Facet> {
-    let creases = creases(mesh);
+    let flat: Vec<Vec3> = (0..mesh.faces.len())
+        .into_par_iter()
+        .map(|face| {
+            let [a, b, c] = mesh.triangle(face);
+            // Of unit sides: the square of a tiny length would vanish.
+            let (u, v) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
+            u.cross(v).normalize_or_zero()
+        })
+        .collect();
+    let (normals, sharp) = (smooth_normals(mesh, &flat), sharp_sides(mesh, &flat));
     (mesh.faces.par_iter().enumerate())
         .map(|(face, corners)| {
-            let normals = creases.normals[face];
-            Facet {
-                corners: mesh.triangle(face),
-                normals,
-                places: std::array::from_fn(|k| place(corners[k], normals[k])),
-                lines: creases.sharp[face].map(u8::from),
-            }
+            let normals = normals[face];
+            let places = std::array::from_fn(|k| place(corners[k], normals[k]));
+            let lines = sharp[face].map(u8::from);
+            Facet { corners: mesh.triangle(face), normals, places, lines }
         })
         .collect()
-}
-
-impl AxisColour {
-    /// Where a sphere is in the colour map.
-    fn place(self, sphere: &Sphere) -> f32 {
-        match self {
-            Self::Radius(scale) => scale.place(sphere.radius),
-            Self::Plain => 1.0,
-        }
-    }
-
-    fn paint(self, plain: [u8; 3]) -> Paint {
-        match self {
-            Self::Radius(scale) => Paint::map(scale.map),
-            Self::Plain => Paint::Plain(decode(plain)),
-        }
-    }
 }
 
 /// The number of an edge in a medial mesh, whose edges are sorted.
@@ -286,7 +249,7 @@ fn edge_of(mesh: &MedialMesh, a: u32, b: u32) -> Option<usize> {
 }
 
 /// Faces as flat facets with lines along their sides; edges without a face as tubes, spheres without an edge as balls.
-fn axis_batches(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> [Batch; 2] {
+fn axis_batches(mesh: &MedialMesh, colour: Option<Scale>, canvas: &Canvas<'_>) -> [Batch; 2] {
     // How many faces each edge has.
     let mut uses = vec![0; mesh.edges.len()];
     for &[a, b, c] in &mesh.faces {
@@ -294,6 +257,8 @@ fn axis_batches(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> [
             edge.into_iter().for_each(|edge| uses[edge] += 1);
         }
     }
+    let place = |sphere: &Sphere| colour.map_or(1.0, |scale| scale.place(sphere.radius));
+    let paint = |plain| colour.map_or_else(|| Paint::plain(decode(plain)), |s| Paint::map(s.map));
     let sheet = |face: &[u32; 3]| {
         let spheres = face.map(|v| &mesh.spheres[v as usize]);
         let corners = spheres.map(|sphere| sphere.centre);
@@ -303,7 +268,7 @@ fn axis_batches(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> [
             let used = edge_of(mesh, face[k], face[(k + 1) % 3]).map_or(0, |edge| uses[edge]);
             if used == 1 { 2 } else { 1 }
         });
-        Facet { corners, normals: [flat; 3], places: spheres.map(|s| colour.place(s)), lines }
+        Facet { corners, normals: [flat; 3], places: spheres.map(place), lines }
     };
     let mut lengths: Vec<f64> = (mesh.edges.iter())
         .map(|edge| edge.map(|v| mesh.spheres[v as usize].centre))
@@ -316,7 +281,7 @@ fn axis_batches(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> [
     let lines = canvas.lines(SHEET_INK * fade.clamp(0.0, 1.0) as f32);
     let sheets = Batch {
         facets: mesh.faces.par_iter().map(sheet).collect(),
-        look: Look { paint: colour.paint(SHEET), lines, kind: Kind::Solid },
+        look: Look { paint: paint(SHEET), lines, kind: Kind::Solid },
     };
 
     let radius = TUBE * canvas.shorter / canvas.scale;
@@ -326,8 +291,7 @@ fn axis_batches(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> [
     for (ends, used) in mesh.edges.iter().zip(uses) {
         if used == 0 {
             let spheres = ends.map(|v| &mesh.spheres[v as usize]);
-            let places = spheres.map(|sphere| colour.place(sphere));
-            tube(spheres.map(|sphere| sphere.centre), radius, places, &mut facets);
+            tube(spheres.map(|sphere| sphere.centre), radius, spheres.map(place), &mut facets);
         }
         for &v in ends {
             has_edge[v as usize] = true;
@@ -338,62 +302,55 @@ fn axis_batches(mesh: &MedialMesh, colour: AxisColour, canvas: &Canvas<'_>) -> [
         // Balls close the ends of tubes.
         let size = if has_tube[v] { 1.0 } else { DOT };
         if has_tube[v] || !has_edge[v] {
-            ball(sphere.centre, size * radius, colour.place(sphere), &mut facets);
+            ball(sphere.centre, size * radius, place(sphere), &mut facets);
         }
     }
-    let look = Look { paint: colour.paint(CURVE), lines: None, kind: Kind::Solid };
+    let look = Look { paint: paint(CURVE), lines: None, kind: Kind::Solid };
     [sheets, Batch { facets, look }]
 }
 
-/// Sides of a tube: with smooth normals no corner shows at a few pixels' width.
-const TUBE_SIDES: usize = 10;
+/// Sides of a tube or ball: with smooth normals no corner shows at a few pixels' width.
+const SIDES: usize = 12;
 
-/// A tube between two points, with its place in the colour map at both. Open: balls close its ends.
-fn tube(ends: [Vec3; 2], radius: f64, places: [f32; 2], into: &mut Vec<Facet>) {
-    let Some(along) = (ends[1] - ends[0]).try_normalize() else { return };
-    let (u, v) = along.any_orthonormal_pair();
-    for k in 0..TUBE_SIDES {
-        // The last side ends exactly where the first one begins.
-        let n = [k, (k + 1) % TUBE_SIDES].map(|spoke| {
-            let turn = std::f64::consts::TAU * spoke as f64 / TUBE_SIDES as f64;
-            turn.cos() * u + turn.sin() * v
-        });
-        // Corners are a side and an end.
-        for corners in [[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]] {
+/// The facets of a round shape from rings of points: each ring by the centre and radius of its circle, the share of its
+/// normals that points along the axis, and its place in the colour map.
+fn lathe(axis: Vec3, rings: &[(Vec3, f64, f64, f32)], into: &mut Vec<Facet>) {
+    let (u, v) = axis.any_orthonormal_pair();
+    // Corners are a ring and a spoke; the last spoke is exactly the first one.
+    let corner = |(ring, spoke): (usize, usize)| {
+        let (centre, radius, along, place) = rings[ring];
+        let (sin, cos) = (std::f64::consts::TAU * (spoke % SIDES) as f64 / SIDES as f64).sin_cos();
+        let across = cos * u + sin * v;
+        let normal = (1.0 - along * along).max(0.0).sqrt() * across + along * axis;
+        (centre + radius * across, normal, place)
+    };
+    for (ring, spoke) in (1..rings.len()).flat_map(|ring| (0..SIDES).map(move |s| (ring, s))) {
+        let [a, b] = [(ring - 1, spoke), (ring - 1, spoke + 1)];
+        let [c, d] = [(ring, spoke + 1), (ring, spoke)];
+        for corners in [[a, b, c], [a, c, d]].map(|corners| corners.map(corner)) {
             into.push(Facet {
-                corners: corners.map(|(side, end): (usize, usize)| ends[end] + radius * n[side]),
-                normals: corners.map(|(side, _)| n[side]),
-                places: corners.map(|(_, end)| places[end]),
+                corners: corners.map(|(at, ..)| at),
+                normals: corners.map(|(_, normal, _)| normal),
+                places: corners.map(|(.., place)| place),
                 lines: [0; 3],
             });
         }
     }
 }
 
-/// A ball is an octahedron with each side cut into so many parts, blown up.
-const BALL_CUTS: usize = 4;
+/// A tube between two points, with its place in the colour map at both. Open: balls close its ends.
+fn tube(ends: [Vec3; 2], radius: f64, places: [f32; 2], into: &mut Vec<Facet>) {
+    let Some(along) = (ends[1] - ends[0]).try_normalize() else { return };
+    lathe(along, &[0, 1].map(|k| (ends[k], radius, 0.0, places[k])), into);
+}
 
 fn ball(centre: Vec3, radius: f64, place: f32, into: &mut Vec<Facet>) {
-    for octant in 0..8 {
-        let signs = [0, 1, 2].map(|bit| if octant >> bit & 1 == 0 { 1.0 } else { -1.0 });
-        for i in 0..BALL_CUTS {
-            for j in 0..BALL_CUTS - i {
-                let up = [[i, j], [i + 1, j], [i, j + 1]];
-                let down = [[i + 1, j], [i + 1, j + 1], [i, j + 1]];
-                // The last triangle of a row has none beside it that points down.
-                let has_down = i + j + 1 < BALL_CUTS;
-                for triangle in std::iter::once(up).chain(has_down.then_some(down)) {
-                    let normals = triangle.map(|[i, j]| {
-                        let k = BALL_CUTS - i - j;
-                        let at = Vec3::new(i as f64, j as f64, k as f64);
-                        (Vec3::from_array(signs) * at).normalize()
-                    });
-                    let corners = normals.map(|n| centre + radius * n);
-                    into.push(Facet { corners, normals, places: [place; 3], lines: [0; 3] });
-                }
-            }
-        }
-    }
+    // Circles of latitude; those of the poles are points.
+    let rings = std::array::from_fn::<_, { SIDES / 2 + 1 }, _>(|k| {
+        let (sin, cos) = (std::f64::consts::TAU * k as f64 / SIDES as f64).sin_cos();
+        (centre + radius * cos * Vec3::Y, radius * sin, cos, place)
+    });
+    lathe(Vec3::Y, &rings, into);
 }
 
 /// Faces at a larger angle to each other, in degrees, meet in a sharp edge.
@@ -407,129 +364,78 @@ const MOST_AROUND: usize = 64;
 /// shorter ones are noise of a smooth surface, a drilled hole is longer.
 const SHORTEST: f64 = 0.06;
 
-/// Normals and sharp sides of every face.
-struct Creases {
-    /// At the three corners.
-    normals: Vec<[Vec3; 3]>,
-    /// Whether the side from corner `k` to `k + 1` is sharp, or has no or several faces beyond, and is part of a long
-    /// crease.
-    sharp: Vec<[bool; 3]>,
-}
-
-/// Finds normals that are smooth where the surface is, and its sharp edges: round parts look round, and edges of
-/// machine parts stay sharp. Cost linear in the surface's size but for a sort of its sides.
+/// Normals at the corners of every face that are smooth where the surface is: round parts look round, and edges of
+/// machine parts stay sharp. Cost linear in the surface's size.
 ///
 /// A corner takes the mean of the faces around its vertex that are within [`CREASE`] of its own face, weighted by the
 /// sine of their angle there over the lengths of its sides, which is exact on a sphere (N. Max, "Weights for computing
 /// vertex normals from facet normals", J. Graphics Tools 4 (1999)).
-fn creases(mesh: &TriMesh) -> Creases {
-    let flat: Vec<Vec3> = (0..mesh.faces.len())
-        .into_par_iter()
-        .map(|face| {
-            let [a, b, c] = mesh.triangle(face);
-            // Of unit sides: the square of a tiny length would vanish.
-            let (u, v) = ((b - a).normalize_or_zero(), (c - a).normalize_or_zero());
-            u.cross(v).normalize_or_zero()
-        })
-        .collect();
-    // The faces around vertex v, and which of their corners it is: around[start[v]..start[v + 1]].
-    let mut start = vec![0_u32; mesh.vertices.len() + 1];
-    mesh.faces.iter().flatten().for_each(|&vertex| start[vertex as usize + 1] += 1);
-    for k in 1..start.len() {
-        start[k] += start[k - 1];
-    }
-    let mut next = start.clone();
-    let mut around = vec![[0; 2]; 3 * mesh.faces.len()];
+fn smooth_normals(mesh: &TriMesh, flat: &[Vec3]) -> Vec<[Vec3; 3]> {
+    // The faces around each vertex, and which of their corners it is.
+    let mut around: Vec<Vec<(usize, usize)>> = vec![vec![]; mesh.vertices.len()];
     for (face, corners) in mesh.faces.iter().enumerate() {
         for (corner, &vertex) in corners.iter().enumerate() {
-            let free = &mut next[vertex as usize];
-            around[*free as usize] = [face as u32, corner as u32];
-            *free += 1;
+            around[vertex as usize].push((face, corner));
         }
     }
     let smooth = CREASE.to_radians().cos();
     let corner = |face: usize, vertex: u32| {
-        let [from, to] = [0, 1].map(|k| start[vertex as usize + k] as usize);
-        if to - from > MOST_AROUND {
+        let around = &around[vertex as usize];
+        if around.len() > MOST_AROUND {
             return flat[face];
         }
-        let sum: Vec3 = (around[from..to].iter())
-            .filter(|at| flat[face].dot(flat[at[0] as usize]) > smooth)
-            .map(|&[face, corner]| {
-                let points = mesh.triangle(face as usize);
-                let [a, b, c] = [0, 1, 2].map(|k| points[(corner as usize + k) % 3]);
+        let alike = around.iter().filter(|(other, _)| flat[face].dot(flat[*other]) > smooth);
+        let sum: Vec3 = alike
+            .map(|&(face, corner)| {
+                let points = mesh.triangle(face);
+                let [a, b, c] = [0, 1, 2].map(|k| points[(corner + k) % 3]);
                 let (u, v) = (b - a, c - a);
                 let lengths = u.length() * v.length();
                 let sine = u.cross(v).length() / lengths;
                 // Zero lengths: a face without area has no say.
-                if sine.is_finite() { sine / lengths * flat[face as usize] } else { Vec3::ZERO }
+                if sine.is_finite() { sine / lengths * flat[face] } else { Vec3::ZERO }
             })
             .sum();
         sum.normalize_or(flat[face])
     };
-    let normals = (0..mesh.faces.len()).into_par_iter();
-    let normals = normals.map(|face| mesh.faces[face].map(|v| corner(face, v))).collect();
-    let mut sharp = sharp_sides(mesh, &flat, smooth);
-    drop_short(mesh, &mut sharp);
-    Creases { normals, sharp }
+    let faces = mesh.faces.par_iter().enumerate();
+    faces.map(|(face, corners)| corners.map(|vertex| corner(face, vertex))).collect()
 }
 
-fn sharp_sides(mesh: &TriMesh, flat: &[Vec3], smooth: f64) -> Vec<[bool; 3]> {
-    let mut sides: Vec<([u32; 2], u32)> = (0..3 * mesh.faces.len() as u32)
+/// For each face whether its side from corner `k` to `k + 1` is sharp and part of a long crease. Cost that of a sort of
+/// the sides.
+fn sharp_sides(mesh: &TriMesh, flat: &[Vec3]) -> Vec<[bool; 3]> {
+    let smooth = CREASE.to_radians().cos();
+    let mut sides: Vec<([u32; 2], usize)> = (0..3 * mesh.faces.len())
         .into_par_iter()
         .map(|side| {
-            let corners = mesh.faces[side as usize / 3];
-            let [a, b] = [corners[side as usize % 3], corners[(side as usize + 1) % 3]];
+            let corners = mesh.faces[side / 3];
+            let [a, b] = [corners[side % 3], corners[(side % 3 + 1) % 3]];
             ([a.min(b), a.max(b)], side)
         })
         .collect();
     sides.par_sort_unstable();
-    let mut sharp = vec![[false; 3]; mesh.faces.len()];
     // An edge with one face, or with more than two, is always sharp.
-    for edge in sides.chunk_by(|a, b| a.0 == b.0) {
-        let is_smooth = match edge {
-            [(_, a), (_, b)] => flat[*a as usize / 3].dot(flat[*b as usize / 3]) > smooth,
-            _ => false,
-        };
-        for (_, side) in edge {
-            sharp[*side as usize / 3][*side as usize % 3] = !is_smooth;
-        }
-    }
-    sharp
-}
-
-/// Drops the sharp sides that are connected to few others.
-fn drop_short(mesh: &TriMesh, sharp: &mut [[bool; 3]]) {
-    let sides: Vec<[usize; 4]> = (0..3 * sharp.len())
-        .map(|side| (side / 3, side % 3))
-        .filter(|&(face, k)| sharp[face][k])
-        .map(|(face, k)| {
-            let corners = mesh.faces[face];
-            [face, k, corners[k] as usize, corners[(k + 1) % 3] as usize]
-        })
-        .collect();
-    // Connected by common vertices: a forest whose roots are the least vertex of each set.
-    let mut parent: Vec<usize> = (0..mesh.vertices.len()).collect();
-    for &[_, _, a, b] in &sides {
-        let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-        parent[a.max(b)] = a.min(b);
+    let edges = sides.chunk_by(|a, b| a.0 == b.0).filter(|edge| match edge {
+        [(_, a), (_, b)] => flat[a / 3].dot(flat[b / 3]) <= smooth,
+        _ => true,
+    });
+    let edges: Vec<_> = edges.collect();
+    // Creases are connected by common vertices.
+    let mut creases = DisjointSets::singletons(mesh.vertices.len());
+    for edge in &edges {
+        creases.join(edge[0].0[0], edge[0].0[1]);
     }
     let mut lengths = vec![0.0; mesh.vertices.len()];
-    for &[_, _, a, b] in &sides {
-        // Either face of an edge has it among its sides.
-        lengths[root(&mut parent, a)] += 0.5 * mesh.vertices[a].distance(mesh.vertices[b]);
+    for edge in &edges {
+        let [a, b] = edge[0].0;
+        lengths[creases.find(a) as usize] +=
+            mesh.vertices[a as usize].distance(mesh.vertices[b as usize]);
     }
     let diagonal = mesh.bounding_box().map_or(0.0, |(lo, hi)| lo.distance(hi));
-    for [face, k, a, _] in sides {
-        sharp[face][k] = lengths[root(&mut parent, a)] >= SHORTEST * diagonal;
+    let mut sharp = vec![[false; 3]; mesh.faces.len()];
+    for &([a, _], side) in edges.into_iter().flatten() {
+        sharp[side / 3][side % 3] = lengths[creases.find(a) as usize] >= SHORTEST * diagonal;
     }
-}
-
-/// The first vertex of a connected set; paths are halved on the way.
-fn root(parent: &mut [usize], mut vertex: usize) -> usize {
-    while parent[vertex] != vertex {
-        parent[vertex] = parent[parent[vertex]];
-        vertex = parent[vertex];
-    }
-    vertex
+    sharp
 }

@@ -5,7 +5,7 @@ use medial::surface::TriMesh;
 
 use super::camera::{Camera, Frame};
 use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, text_width};
-use super::scene::{AxisColour, Layer, Scale, Scene};
+use super::scene::{Layer, Scale, Scene};
 use super::{RenderError, check_size};
 use crate::text::{round_up, significant};
 
@@ -21,16 +21,11 @@ pub enum ColourBy {
 
 impl ColourBy {
     /// The colours for some medial meshes of a shape with this bounding-box diagonal, and the bar that explains them.
-    pub fn of(self, meshes: &[&MedialMesh], diagonal: f64) -> (AxisColour, Option<Bar>) {
-        match self {
-            Self::Plain => (AxisColour::Plain, None),
-            Self::Radius => {
-                let scale = Scale::radii(meshes.iter().copied());
-                let title = vec!["radius".into(), "% of diagonal".into()];
-                let bar = Bar { scale, times: 100.0 / diagonal, title, note: vec![] };
-                (AxisColour::Radius(scale), Some(bar))
-            }
-        }
+    pub fn of(self, meshes: &[&MedialMesh], diagonal: f64) -> (Option<Scale>, Option<Bar>) {
+        let scale = (self == Self::Radius).then(|| Scale::radii(meshes.iter().copied()));
+        let title = vec!["radius".into(), "% of diagonal".into()];
+        let bar = |scale| Bar { scale, times: 100.0 / diagonal, title, note: vec![] };
+        (scale, scale.map(bar))
     }
 }
 
@@ -134,16 +129,13 @@ pub fn strip<'a>(panels: &'a [Panel<'a>], strip: &'a Strip<'a>) -> Result<Pictur
     let frame = Frame::fit(&strip.camera, &strip.surface.vertices)?;
     let meshes: Vec<&MedialMesh> = panels.iter().map(|panel| panel.axis).collect();
     let (colour, bar) = strip.colour.of(&meshes, strip.diagonal);
-    let across = strip.across.max(1);
     let mut rows = vec![];
-    for some in panels.chunks(across) {
-        let mut row = PanelRow { cells: vec![], bar: None };
-        for panel in some {
+    for some in panels.chunks(strip.across.max(1)) {
+        let cells = some.iter().map(|panel| {
             let axis = Layer::Axis { mesh: panel.axis, colour };
-            let layers = vec![axis, Layer::Glass(strip.surface)];
-            row.cells.push(Some((layers, panel.caption.clone())));
-        }
-        rows.push(row);
+            Some((vec![axis, Layer::Glass(strip.surface)], &*panel.caption))
+        });
+        rows.push(PanelRow { cells: cells.collect(), bar: None });
     }
     // One bar explains all lines.
     rows[0].bar = bar;
@@ -151,17 +143,14 @@ pub fn strip<'a>(panels: &'a [Panel<'a>], strip: &'a Strip<'a>) -> Result<Pictur
     if !errors.is_empty() {
         let first = rows.len();
         let end = strip.max_error.unwrap_or_else(|| Errors::common_scale(&errors, strip.diagonal));
-        for some in panels.chunks(across) {
-            let mut row = PanelRow { cells: vec![], bar: None };
-            for panel in some {
-                // A panel without errors keeps its place empty: columns stay one medial mesh each.
-                row.cells.push(panel.errors.as_ref().map(|errors| {
-                    let &Errors { mesh, values, .. } = errors;
-                    let layer = Layer::Values { mesh, values, scale: Scale::errors(end) };
-                    (vec![layer, Layer::Ghost(strip.surface)], errors.caption.clone())
-                }));
-            }
-            rows.push(row);
+        for some in panels.chunks(strip.across.max(1)) {
+            // A panel without errors keeps its place empty: columns stay one medial mesh each.
+            let cells = some.iter().map(|panel| {
+                let Errors { mesh, values, caption } = panel.errors.as_ref()?;
+                let layer = Layer::Values { mesh, values, scale: Scale::errors(end) };
+                Some((vec![layer, Layer::Ghost(strip.surface)], &**caption))
+            });
+            rows.push(PanelRow { cells: cells.collect(), bar: None });
         }
         rows[first].bar = Some(Errors::bar(&errors, end, strip.diagonal));
     }
@@ -170,7 +159,7 @@ pub fn strip<'a>(panels: &'a [Panel<'a>], strip: &'a Strip<'a>) -> Result<Pictur
 
 /// A row of panels: the layers and the caption of each, and the bar at the end.
 struct PanelRow<'a> {
-    cells: Vec<Option<(Vec<Layer<'a>>, String)>>,
+    cells: Vec<Option<(Vec<Layer<'a>>, &'a str)>>,
     bar: Option<Bar>,
 }
 
@@ -193,7 +182,7 @@ fn draw(rows: Vec<PanelRow<'_>>, strip: &Strip<'_>, frame: &Frame) -> Result<Pic
             let Some((layers, words)) = cell else { continue };
             let scene = Scene { layers, size, background };
             picture.paste(&scene.picture(frame)?, [k * width, top]);
-            let words = fitted(&words, letter, width as f64 - letter);
+            let words = fitted(words, letter, width as f64 - letter);
             let middle = (k as f64 + 0.5) * width as f64;
             let left = middle - 0.5 * text_width(&words, letter);
             picture.write([left, (top + height) as f64 + 1.3 * letter], &words, letter, ink);

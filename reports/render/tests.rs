@@ -37,10 +37,20 @@ fn front() -> Camera {
     Camera::new(Vec3::Z, Vec3::Y)
 }
 
-fn picture_of(layers: Vec<Layer<'_>>, camera: &Camera, background: Background) -> Picture {
-    let scene = Scene { layers, size: [240, 200], background };
-    let frame = scene.frame(camera).expect("a frame");
-    scene.picture(&frame).expect("a picture")
+/// A picture with the camera set up by a mesh.
+fn picture_of(layers: Vec<Layer<'_>>, mesh: &TriMesh, background: Background) -> Picture {
+    picture_from(layers, &front(), mesh, [240, 200], background)
+}
+
+fn picture_from(
+    layers: Vec<Layer<'_>>,
+    camera: &Camera,
+    mesh: &TriMesh,
+    size: [usize; 2],
+    background: Background,
+) -> Picture {
+    let frame = Frame::fit(camera, &mesh.vertices).expect("a frame");
+    Scene { layers, size, background }.picture(&frame).expect("a picture")
 }
 
 /// The radius on the picture follows from the margin: the shape fills the shorter side.
@@ -48,8 +58,8 @@ fn picture_of(layers: Vec<Layer<'_>>, camera: &Camera, background: Background) -
 fn a_sphere_is_a_disc() {
     let mesh = sphere(3.0, 48);
     let layers = vec![Layer::Surface(&mesh)];
-    let picture = picture_of(layers, &front(), Background::Transparent);
-    let alpha = picture.pixels().iter().map(|pixel| f64::from(pixel[3]) / 255.0);
+    let picture = picture_of(layers, &mesh, Background::Transparent);
+    let alpha = picture.pixels.iter().map(|pixel| f64::from(pixel[3]) / 255.0);
     let (area, radius) = (alpha.sum::<f64>(), 100.0 - 0.04 * 200.0);
     let expected = PI * radius * radius;
     assert!((area / expected - 1.0).abs() < 0.004, "{area} for {expected}");
@@ -64,7 +74,7 @@ fn the_middle_of_a_sphere_has_the_light_of_the_lamp() {
     let values = vec![1.0; mesh.vertices.len()];
     let scale = Scale { lo: 0.0, hi: 1.0, map: ColourMap::Viridis };
     let layers = vec![Layer::Values { mesh: &mesh, values: &values, scale }];
-    let picture = picture_of(layers, &front(), Background::WHITE);
+    let picture = picture_of(layers, &mesh, Background::WHITE);
     let Some([r, g, b, 255]) = picture.pixel(120, 100) else { panic!("opaque") };
     let full = decode(ColourMap::Viridis.at(1.0));
     let strength =
@@ -83,14 +93,13 @@ fn what_is_nearer_hides_what_is_behind() {
     let red = Layer::Values { mesh: &near, values: &values, scale: at(-1.0) };
     let blue = Layer::Values { mesh: &far, values: &values, scale: at(0.0) };
     for layers in [vec![blue, red], vec![red, blue]] {
-        let scene = Scene { layers, size: [100, 100], background: Background::WHITE };
-        let frame = Frame::fit(&front(), &far.vertices).expect("a frame");
-        let picture = scene.picture(&frame).expect("a picture");
-        let redder = |x: usize, y: usize| picture.pixel(x, y).is_some_and(|[r, _, b, _]| r > b);
-        assert!(redder(50, 50) && !redder(10, 10));
-        let behind = Frame::fit(&Camera::new(-Vec3::Z, Vec3::Y), &far.vertices).expect("a frame");
-        let picture = scene.picture(&behind).expect("a picture");
-        assert!(picture.pixel(50, 50).is_some_and(|[r, _, b, _]| r < b));
+        let [before, behind] = [Vec3::Z, -Vec3::Z].map(|direction| {
+            let camera = Camera::new(direction, Vec3::Y);
+            let picture =
+                picture_from(layers.clone(), &camera, &far, [100, 100], Background::WHITE);
+            move |x, y| picture.pixel(x, y).is_some_and(|[r, _, b, _]| r > b)
+        });
+        assert!(before(50, 50) && !before(10, 10) && !behind(50, 50));
     }
 }
 
@@ -115,10 +124,8 @@ fn threads_change_no_byte() {
         pool.install(|| {
             let (colour, _) = ColourBy::Radius.of(&[&axis], 2.0);
             let layers = vec![Layer::Axis { mesh: &axis, colour }, Layer::Glass(&surface)];
-            let camera = Camera::fitting(&surface);
-            let scene = Scene { layers, size: [203, 151], background: Background::Transparent };
-            let frame = Frame::fit(&camera, &surface.vertices).expect("a frame");
-            scene.picture(&frame).and_then(|picture| picture.to_png()).expect("a file")
+            let (camera, clear) = (Camera::fitting(&surface), Background::Transparent);
+            picture_from(layers, &camera, &surface, [203, 151], clear).to_png().expect("a file")
         })
     };
     assert!(file(1) == file(4));
@@ -127,11 +134,8 @@ fn threads_change_no_byte() {
 #[test]
 fn sheets_curves_and_isolated_spheres_show_inside_glass() {
     let (surface, axis) = (sphere(1.0, 24), axis());
-    let layers =
-        vec![Layer::Axis { mesh: &axis, colour: AxisColour::Plain }, Layer::Glass(&surface)];
-    let scene = Scene { layers, size: [400, 400], background: Background::Transparent };
-    let frame = Frame::fit(&front(), &surface.vertices).expect("a frame");
-    let picture = scene.picture(&frame).expect("a picture");
+    let layers = vec![Layer::Axis { mesh: &axis, colour: None }, Layer::Glass(&surface)];
+    let picture = picture_from(layers, &front(), &surface, [400, 400], Background::Transparent);
     // A unit is 184 pixels.
     let at = |x: f64, y: f64| {
         picture.pixel((200.0 + 184.0 * x) as usize, (200.0 - 184.0 * y) as usize).expect("a pixel")
@@ -155,12 +159,10 @@ fn every_srgb_code_survives_decoding() {
 #[test]
 fn a_ghost_is_what_is_missing() {
     let (whole, part) = (square(1.0, 0.5), square(0.5, 0.0));
-    let frame = Frame::fit(&front(), &whole.vertices).expect("a frame");
     let [with, without] = [true, false].map(|ghost| {
         let mut layers = vec![Layer::Surface(&part)];
         layers.extend(ghost.then_some(Layer::Ghost(&whole)));
-        let scene = Scene { layers, size: [100, 100], background: Background::Transparent };
-        scene.picture(&frame).expect("a picture")
+        picture_from(layers, &front(), &whole, [100, 100], Background::Transparent)
     });
     assert_eq!(with.pixel(50, 50), without.pixel(50, 50));
     assert_eq!(without.pixel(15, 15).map(|pixel| pixel[3]), Some(0));
@@ -173,8 +175,9 @@ fn facets_neither_gape_nor_overlap() {
     let mesh = square(1.0, 0.0);
     let camera = Camera::new(Vec3::new(0.3, 0.2, 1.0), Vec3::new(0.1, 1.0, 0.0));
     let [solid, glass] = [Layer::Surface(&mesh), Layer::Glass(&mesh)].map(|layer| {
-        let picture = picture_of(vec![layer], &camera, Background::Transparent);
-        let alpha: Vec<u8> = picture.pixels().iter().map(|pixel| pixel[3]).collect();
+        let clear = Background::Transparent;
+        let picture = picture_from(vec![layer], &camera, &mesh, [240, 200], clear);
+        let alpha: Vec<u8> = picture.pixels.iter().map(|pixel| pixel[3]).collect();
         (0..40).map(|k| alpha[(80 + k) * 240 + 100 + k]).collect::<Vec<_>>()
     });
     assert!(solid.iter().all(|&alpha| alpha == 255));
@@ -223,7 +226,6 @@ fn what_makes_no_picture_is_said() {
     let few = scene(vec![values], [100, 100]).picture(&frame);
     assert_eq!(few, Err(RenderError::Values { values: 1, vertices }));
     let nothing = scene(vec![], [100, 100]);
-    assert_eq!(nothing.frame(&front()), Err(RenderError::Empty));
     let background = nothing.picture(&frame).expect("a picture");
-    assert!(background.pixels().iter().all(|pixel| *pixel == [255; 4]));
+    assert!(background.pixels.iter().all(|pixel| *pixel == [255; 4]));
 }
