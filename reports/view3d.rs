@@ -215,9 +215,14 @@ fn halved(mesh: &TriMesh, longest: f64) -> TriMesh {
     let old = mesh.vertices.len() as u32;
     let mut faces = Vec::with_capacity(mesh.faces.len());
     for &[a, b, c] in &mesh.faces {
+        let middles = [middle(a, b), middle(b, c), middle(c, a)];
+        if let [Some(x), Some(y), Some(z)] = middles {
+            faces.extend([[a, x, z], [x, b, y], [z, y, c], [x, y, z]]);
+            continue;
+        }
         // Around the face, the middles of halved sides among its corners.
-        let ring = [(a, b), (b, c), (c, a)].map(|(p, q)| [Some(p), middle(p, q)]);
-        let mut ring: Vec<u32> = ring.into_iter().flatten().flatten().collect();
+        let ring = [a, b, c].into_iter().zip(middles).flat_map(|(v, middle)| [Some(v), middle]);
+        let mut ring: Vec<u32> = ring.flatten().collect();
         // A fan from a middle: from a corner it would have a face without area.
         let start = ring.iter().position(|&vertex| vertex >= old).unwrap_or(0);
         ring.rotate_left(start);

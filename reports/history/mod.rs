@@ -88,9 +88,6 @@ pub struct Findings<'a> {
     pub changes: Vec<Change>,
 }
 
-/// A quantity by its name.
-type Measured<T> = (&'static str, fn(&Point) -> T);
-
 /// A noisy quantity; `None` where a run did not measure it.
 type Noisy = fn(&Point) -> Option<f64>;
 
@@ -98,20 +95,20 @@ type Noisy = fn(&Point) -> Option<f64>;
 const FEWEST: usize = 3;
 
 /// The noisy quantities.
-const NOISY: [Measured<Option<f64>>; 2] =
+const NOISY: [(&str, Noisy); 2] =
     [("seconds", |point| point.seconds), ("bytes", |point| point.bytes.map(|bytes| bytes as f64))];
 
 /// The exact quantities.
-const EXACT: [Measured<Value>; 6] = [
-    ("status", |point| json!(point.status.to_string())),
-    ("topology", |point| {
-        point.topology.map_or(Value::Null, |t| json!(if t { "right" } else { "wrong" }))
-    }),
-    ("hausdorff", |point| json!(point.hausdorff)),
-    ("mean", |point| json!(point.mean)),
-    ("spheres", |point| json!(point.spheres)),
-    ("result", |point| json!(point.result)),
-];
+fn exact(point: &Point) -> [(&'static str, Value); 6] {
+    [
+        ("status", json!(point.status.to_string())),
+        ("topology", json!(point.topology.map(|right| if right { "right" } else { "wrong" }))),
+        ("hausdorff", json!(point.hausdorff)),
+        ("mean", json!(point.mean)),
+        ("spheres", json!(point.spheres)),
+        ("result", json!(point.result)),
+    ]
+}
 
 impl<'a> Findings<'a> {
     /// What some runs show, the oldest first. `least_step` is the least change of seconds and memory, as a share.
@@ -127,20 +124,19 @@ impl<'a> Findings<'a> {
             }
         }
         let mut findings = Self {
-            runs: runs.iter().map(Run::name).collect(),
+            runs: (runs.iter())
+                .map(|run| RunName { date: run.date.clone(), commit: run.commit.clone() })
+                .collect(),
             tracks: tracks.into_values().collect(),
             regressions: 0,
             change_points: vec![],
             changes: vec![],
         };
-        for track in 0..findings.tracks.len() {
-            for quantity in NOISY {
-                let found = findings.steps(track, quantity, least_step);
-                findings.change_points.extend(found);
-            }
-            let found = findings.differences(track);
-            findings.changes.extend(found);
-        }
+        let tracks = 0..findings.tracks.len();
+        let steps = tracks.clone().flat_map(|track| NOISY.map(|quantity| (track, quantity)));
+        let steps = steps.flat_map(|(track, of)| findings.steps(track, of, least_step)).collect();
+        let changes = tracks.flat_map(|track| findings.differences(track)).collect();
+        (findings.change_points, findings.changes) = (steps, changes);
         for changes in [&mut findings.change_points, &mut findings.changes] {
             // Stable: within a run the order of the series remains.
             changes.sort_by_key(|change| std::cmp::Reverse(change.run));
@@ -156,27 +152,23 @@ impl<'a> Findings<'a> {
     }
 
     /// The change points of a noisy quantity.
-    fn steps(
-        &self,
-        track: usize,
-        (what, of): (&'static str, Noisy),
-        least_step: f64,
-    ) -> Vec<Change> {
+    fn steps(&self, track: usize, (what, of): (&'static str, Noisy), least: f64) -> Vec<Change> {
         let measured = measured(&self.tracks[track], of);
         let values: Vec<f64> = measured.iter().map(|(_, value)| *value).collect();
-        let Some(&(newest, last)) = measured.last() else { return vec![] };
-        let mut changes = vec![];
+        let Some((&(newest, last), before)) = measured.split_last() else { return vec![] };
+        let steps = change_points(&values, least);
         // A change point is news on one run alone: where it was not found without that run.
-        let mut earlier = None;
-        for step in change_points(&values, least_step) {
-            let earlier = earlier
-                .get_or_insert_with(|| change_points(&values[..values.len() - 1], least_step));
+        let earlier = match steps.is_empty() {
+            true => vec![],
+            false => change_points(&values[..before.len()], least),
+        };
+        let change = |step: ChangePoint| {
             let was_found = earlier.iter().any(|other| {
                 other.at.abs_diff(step.at) <= SAME_PLACE
                     && (other.ratio > 1.0) == (step.ratio > 1.0)
             });
             let [before, after] = [measured[step.at - 1], measured[step.at]];
-            changes.push(Change {
+            Change {
                 from: json!(before.1),
                 to: json!(last),
                 ratio: Some(step.ratio),
@@ -185,9 +177,9 @@ impl<'a> Findings<'a> {
                 // A series that the newest run lacks has its change points from an earlier run.
                 news: newest + 1 == self.runs.len() && !was_found,
                 ..self.change(track, what, [before.0, after.0])
-            });
-        }
-        changes
+            }
+        };
+        steps.into_iter().map(change).collect()
     }
 
     /// Whether the series that ran with this one moved alike at a run, by at least half as much in the median. All are
@@ -196,10 +188,9 @@ impl<'a> Findings<'a> {
         let setting = self.tracks[track].setting;
         let alike = self.tracks.iter().filter(|other| other.setting == setting);
         let shifts: Vec<f64> = alike.filter_map(|other| shift(&measured(other, of), run)).collect();
-        let needed = 0.5 * ratio.ln();
-        shifts.len() > FEWEST
-            && median(&shifts)
-                .is_some_and(|shift| shift * needed > 0.0 && shift.abs() >= needed.abs())
+        // As shares of the own one: positive in the same direction.
+        let usual = median(&shifts).map_or(0.0, |shift| shift / ratio.ln());
+        shifts.len() > FEWEST && usual >= 0.5
     }
 
     /// The differences of exact quantities between neighbouring runs.
@@ -207,8 +198,7 @@ impl<'a> Findings<'a> {
         let mut found = vec![];
         for pair in self.tracks[track].points.windows(2) {
             let [(before, old), (after, new)] = [pair[0], pair[1]];
-            for (what, of) in EXACT {
-                let (from, to) = (of(old), of(new));
+            for ((what, from), (_, to)) in exact(old).into_iter().zip(exact(new)) {
                 if from == to {
                     continue;
                 }

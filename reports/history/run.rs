@@ -4,36 +4,26 @@
 //! and never replaced.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
 
-use super::RunName;
 use crate::comparison::row_name;
+use crate::journal::replace_file;
 use crate::metric::median;
 use crate::record::{Machine, Record, Stages, Status};
 use crate::text::printable;
 
-/// Why a run cannot be stored, or a history cannot be read.
+/// Why a run cannot be stored, or a history cannot be read: the file or option, and what is wrong with it.
 #[derive(Debug, thiserror::Error)]
-pub enum HistoryError {
-    /// A file or folder cannot be read or written, or is not as it was written.
-    #[error("{}: {message}", path.display())]
-    File {
-        /// The file or folder.
-        path: PathBuf,
-        /// What is wrong.
-        message: String,
-    },
-    /// Records, commit and date do not make a run.
-    #[error("{0}")]
-    NoRun(String),
-}
+#[error("{0}")]
+pub struct HistoryError(String);
 
 impl HistoryError {
-    fn file(path: &Path, message: impl ToString) -> Self {
-        Self::File { path: path.to_owned(), message: message.to_string() }
+    fn file(path: &Path, message: impl Display) -> Self {
+        Self(format!("{}: {message}", path.display()))
     }
 }
 
@@ -92,16 +82,18 @@ impl Run {
     /// # Errors
     /// When there is no record, the records are of several machines or studies, or commit or date are malformed.
     pub fn of_records(records: &[Record], commit: &str, date: &str) -> Result<Self, HistoryError> {
-        let invalid = |message: String| Err(HistoryError::NoRun(message));
+        let invalid = |message: String| Err(HistoryError(message));
         if !(8..=64).contains(&commit.len()) || !commit.bytes().all(|b| b.is_ascii_hexdigit()) {
             return invalid(format!("--commit {commit}: expected 8 to 64 hexadecimal digits"));
         }
         // The date is sorted as text and is part of a file name.
-        let has_day = date.get(..10).is_some_and(|day| {
-            let mut bytes = day.bytes().enumerate();
-            bytes.all(|(k, b)| if k == 4 || k == 7 { b == b'-' } else { b.is_ascii_digit() })
-        });
-        if !has_day || !date.bytes().all(|b| b.is_ascii_alphanumeric() || b"-+:.".contains(&b)) {
+        let is_date = date.len() >= 10
+            && date.bytes().enumerate().all(|(k, b)| match k {
+                4 | 7 => b == b'-',
+                0..10 => b.is_ascii_digit(),
+                _ => b.is_ascii_alphanumeric() || b"-+:.".contains(&b),
+            });
+        if !is_date {
             return invalid(format!("--date {date}: expected YYYY-MM-DD or YYYY-MM-DDTHH:MM:SSZ"));
         }
         let Some(last) = records.last() else { return invalid("no record".to_owned()) };
@@ -137,10 +129,6 @@ impl Run {
         Ok(run)
     }
 
-    pub(super) fn name(&self) -> RunName {
-        RunName { date: self.date.clone(), commit: self.commit.clone() }
-    }
-
     fn file_name(&self) -> String {
         format!("{}-{}.json", &self.date[..10], &self.commit[..8])
     }
@@ -152,31 +140,28 @@ impl Run {
     /// When the folder cannot be written, or has another run of this date and commit.
     pub fn add_to(&self, folder: &Path) -> Result<(PathBuf, bool), HistoryError> {
         let path = folder.join(self.file_name());
-        self.store(folder, &path)
-            .map_err(|error| HistoryError::file(&path, error))
-            .map(|is_new| (path, is_new))
-    }
-
-    fn store(&self, folder: &Path, path: &Path) -> io::Result<bool> {
-        let text = serde_json::to_string(self)? + "\n";
-        fs::create_dir_all(folder)?;
-        match fs::read_to_string(path) {
-            Ok(old) if old == text => Ok(false),
-            Ok(_) => Err(io::Error::other(
-                "this run is stored with other content; remove the file to replace it",
-            )),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                medial::write_atomically(path, |out| out.write_all(text.as_bytes()))?;
-                Ok(true)
+        let failed = |error: io::Error| HistoryError::file(&path, error);
+        let text = serde_json::to_string(self).map_err(|error| failed(error.into()))? + "\n";
+        match fs::read_to_string(&path) {
+            Ok(old) if old == text => return Ok((path, false)),
+            Ok(_) => {
+                let message =
+                    "this run is stored with other content; remove the file to replace it";
+                return Err(HistoryError::file(&path, message));
             }
-            Err(error) => Err(error),
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(error)),
+            Err(_) => {}
         }
+        replace_file(&path, text.as_bytes()).map_err(failed)?;
+        Ok((path, true))
     }
 
     fn read(path: &Path) -> Result<Self, HistoryError> {
         let text = fs::read_to_string(path).map_err(|error| HistoryError::file(path, error))?;
-        let run = serde_json::from_str(&text).map_err(|error| HistoryError::file(path, error))?;
+        let run: Self =
+            serde_json::from_str(&text).map_err(|error| HistoryError::file(path, error))?;
         let Self { date, commit, .. } = &run;
+        // Long enough to have a file name.
         let is_named = date.len() >= 10 && commit.len() >= 8;
         match is_named && path.file_name().is_some_and(|name| *name == *run.file_name()) {
             true => Ok(run),
@@ -197,11 +182,9 @@ pub fn read_runs(folder: &Path) -> Result<(Vec<Run>, Vec<HistoryError>), History
     paths.sort();
     let (mut runs, mut damaged) = (vec![], vec![]);
     for path in paths {
-        match Run::read(&path) {
-            Ok(run) => runs.push(run),
-            Err(error) => damaged.push(error),
-        }
+        Run::read(&path).map_or_else(|error| damaged.push(error), |run| runs.push(run));
     }
+    // Stable: runs of one date keep the order of their files.
     runs.sort_by(|a, b| a.date.cmp(&b.date));
     Ok((runs, damaged))
 }
