@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::Target;
 
 use crate::record::{Record, Status};
-use crate::text::{grouped, printable};
+use crate::text::{counted, grouped, printable};
 
 /// Largest relative difference between the spheres reached and the spheres asked at which two
 /// results still count as results at the same number of spheres. Methods that search on a level
@@ -102,16 +102,16 @@ impl<'a> Comparison<'a> {
     /// Arranges records. Of several records of one item the last one counts.
     pub(crate) fn new(records: &'a [Record]) -> Self {
         let hashes = Hashes::of(records);
-        let counted = counted_records(records, &hashes);
-        let superseded = records.len() - counted.len();
-        let mesh_keys = first_seen(counted.iter().map(|record| hashes.key(record)));
-        let series_keys = first_seen(counted.iter().copied().map(SeriesKey::of));
-        let mut levels: Vec<Target> = counted.iter().map(|record| record.simplify.level).collect();
+        let latest = latest_records(records, &hashes);
+        let superseded = records.len() - latest.len();
+        let mesh_keys = first_seen(latest.iter().map(|record| hashes.key(record)));
+        let series_keys = first_seen(latest.iter().copied().map(SeriesKey::of));
+        let mut levels: Vec<Target> = latest.iter().map(|record| record.simplify.level).collect();
         levels.sort_by(|&a, &b| compare_levels(a, b));
         levels.dedup_by(|a, b| compare_levels(*a, *b).is_eq());
 
         let mut by_item = BTreeMap::new();
-        for record in counted {
+        for record in latest {
             let mesh = mesh_keys.1[&hashes.key(record)];
             let series = series_keys.1[&SeriesKey::of(record)];
             let level = levels
@@ -163,13 +163,9 @@ impl<'a> Comparison<'a> {
     pub(crate) fn cautions(&self) -> Vec<String> {
         let records = || self.entries.iter().map(|entry| entry.record);
         let mut cautions = Vec::new();
-        match self.superseded {
-            0 => {}
-            1 => cautions
-                .push("An earlier record was replaced by a later one of the same item.".to_owned()),
-            many => cautions.push(format!(
-                "{many} earlier records were replaced by later ones of the same items."
-            )),
+        if self.superseded > 0 {
+            let records = counted(self.superseded, "earlier record was", "earlier records were");
+            cautions.push(format!("{records} replaced by a later one of the same item."));
         }
         let builds: BTreeSet<&str> = records().map(|r| r.binary_hash.as_str()).collect();
         if builds.len() > 1 {
@@ -193,7 +189,7 @@ impl<'a> Comparison<'a> {
 
 /// The records that count: of one mesh, row and level the last one, whatever build made it. Records
 /// of an older build stay where the newer one has none.
-fn counted_records<'a>(records: &'a [Record], hashes: &Hashes<'a>) -> Vec<&'a Record> {
+fn latest_records<'a>(records: &'a [Record], hashes: &Hashes<'a>) -> Vec<&'a Record> {
     let mut last = BTreeMap::new();
     for (index, record) in records.iter().enumerate() {
         let level = serde_json::to_string(&record.simplify.level).unwrap_or_default();

@@ -110,17 +110,13 @@ impl Header {
     /// How the files were made: a sentence that stands in each of them.
     pub(crate) fn how(&self) -> String {
         let Some(run) = self.runs.last() else { return "Made by medial.".to_owned() };
-        let version =
-            if run.version.is_empty() { String::new() } else { format!(" {}", run.version) };
-        let date = run.date.as_ref().map_or(String::new(), |date| format!(", {date}"));
-        let earlier = match self.runs.len() {
-            1 => String::new(),
-            runs => format!(" in {runs} runs, the last one"),
-        };
-        if run.command.is_empty() {
-            format!("Made by medial{version}{earlier}{date}.")
-        } else {
-            format!("Made by medial{version}{earlier}{date}, with: {}", run.command)
-        }
+        let version = Some(format!(" {}", run.version)).filter(|_| !run.version.is_empty());
+        let several = self.runs.len() > 1;
+        let earlier = several.then(|| format!(" in {} runs, the last one", self.runs.len()));
+        let date = run.date.as_ref().map(|date| format!(", {date}"));
+        let command = Some(format!(", with: {}", run.command)).filter(|_| !run.command.is_empty());
+        let end = command.unwrap_or_else(|| ".".to_owned());
+        let parts = [version, earlier, date].map(Option::unwrap_or_default).concat();
+        format!("Made by medial{parts}{end}")
     }
 }

@@ -5,6 +5,7 @@
 //! it. A new metric needs its computation in `medial::metrics` and one entry here.
 
 use medial::metrics::Evaluation;
+use serde::Serialize;
 
 use crate::record::Record;
 use crate::text::{grouped, significant};
@@ -76,8 +77,9 @@ pub(crate) fn median(values: &[f64]) -> Option<f64> {
 pub(crate) const GEOMETRIC: Mean = Mean::Geometric { floor: 1e-6 };
 
 /// How a number is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Digits {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Digits {
     /// Three significant digits.
     Significant,
     /// One decimal.
@@ -107,7 +109,7 @@ pub struct Metric {
     /// Which way it is better.
     pub better: Better,
     pub(crate) mean: Mean,
-    digits: Digits,
+    pub(crate) digits: Digits,
     /// One or two sentences for the page, of compared metrics. METHODOLOGY.md defines all.
     pub definition: &'static str,
     pub(crate) value: Value,
@@ -141,15 +143,6 @@ impl Metric {
         match self.digits {
             Digits::Count => format!("{value:.1}"),
             _ => self.format(value),
-        }
-    }
-
-    /// How the page writes its values.
-    pub(crate) fn digits(&self) -> &'static str {
-        match self.digits {
-            Digits::Significant => "significant",
-            Digits::Tenths => "tenths",
-            Digits::Count => "count",
         }
     }
 

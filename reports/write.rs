@@ -51,20 +51,18 @@ pub fn write_report(
 
     let answers = purpose_table(&comparison, &how);
     let wins = wins_table(&comparison, &how).filter(|_| !is_one);
-    let equal_error = equal_error_table(&comparison, &bounds, &how);
+    let mut equal_error: Vec<Table> =
+        equal_error_table(&comparison, &bounds, &how).into_iter().collect();
     let mut means = vec![means_table(&comparison, &summaries, &how)];
     if !natives.is_empty() {
         means.push(native_table(&comparison, &natives, header, &how));
     }
     means.retain(|table| !table.rows.is_empty());
-    let purposes: Vec<Table> = answers.iter().chain(&wins).cloned().collect();
     let all_means: Vec<Table> = equal_error.iter().chain(&means).cloned().collect();
-    for (stem, title, tables) in
-        [("summary", "Summary", &all_means), ("overview-purpose", "Which method?", &purposes)]
-    {
-        if stem == "summary" || !tables.is_empty() {
-            files.write_tables(stem, title, tables)?;
-        }
+    files.write_tables("summary", "Summary", &all_means)?;
+    let purposes: Vec<Table> = answers.iter().chain(&wins).cloned().collect();
+    if !purposes.is_empty() {
+        files.write_tables("overview-purpose", "Which method?", &purposes)?;
     }
 
     let mut figures = mean_figures(&comparison, &summaries, &natives);
@@ -98,7 +96,6 @@ pub fn write_report(
     files.write("header.json", &header_json)?;
     let shown = pictures.values().flat_map(|strip| [strip.file.clone(), strip.view_file()]);
     files.remove_stale(&shown.map(|file| dir.join(file)).collect::<Vec<_>>())?;
-    let mut equal_error: Vec<Table> = equal_error.into_iter().collect();
     if is_one {
         // Means over one mesh are its results, and counts of meshes are ones.
         means.retain(|table| table.caption != MEANS);

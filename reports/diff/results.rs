@@ -45,16 +45,10 @@ enum LevelKey {
     Other(String),
 }
 
-/// How it was run and measured: has to agree.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Settings<'a> {
-    sampling: &'a str,
-    dual: &'a str,
-    samples: usize,
-    threads: Option<usize>,
-}
+/// How it was run and measured, by name: has to agree.
+type Settings = [(&'static str, String); 4];
 
-type Arranged<'a> = BTreeMap<Asked<'a>, BTreeMap<Settings<'a>, &'a Record>>;
+type Arranged<'a> = BTreeMap<Asked<'a>, BTreeMap<Settings, &'a Record>>;
 
 impl<'a> Pairs<'a> {
     pub(super) fn new(old: &'a [Record], new: &'a [Record]) -> Self {
@@ -71,8 +65,8 @@ impl<'a> Pairs<'a> {
     /// Sorts out the records of one question.
     fn sort_out(
         &mut self,
-        old: &BTreeMap<Settings<'a>, &'a Record>,
-        new: &BTreeMap<Settings<'a>, &'a Record>,
+        old: &BTreeMap<Settings, &'a Record>,
+        new: &BTreeMap<Settings, &'a Record>,
     ) {
         for (settings, old) in old {
             let item = name(old);
@@ -83,7 +77,7 @@ impl<'a> Pairs<'a> {
                 },
                 // The newer set has this result under other settings alone: name the first difference found.
                 (None, Some((others, _))) => {
-                    self.unlike.push(Unlike { item, why: settings.differences(others) });
+                    self.unlike.push(Unlike { item, why: differences(settings, others) });
                 }
                 (None, None) => self.missing.push(item),
             }
@@ -104,7 +98,7 @@ fn arranged(records: &[Record]) -> Arranged<'_> {
                 level => LevelKey::Other(level_label(level)),
             },
         };
-        arranged.entry(asked).or_default().insert(Settings::of(record), record);
+        arranged.entry(asked).or_default().insert(settings(record), record);
     }
     arranged
 }
@@ -123,34 +117,22 @@ fn other_mesh(old: &Record, new: &Record) -> Option<String> {
     (a != b).then(|| format!("the mesh has other content: {b:.12}, {a:.12} before"))
 }
 
-impl<'a> Settings<'a> {
-    fn of(record: &'a Record) -> Self {
-        let conditions = record.conditions.as_ref();
-        Self {
-            sampling: conditions.map_or("", |c| &c.sampling),
-            dual: conditions.map_or("", |c| &c.dual),
-            samples: conditions.map_or(0, |c| c.samples),
-            threads: record.simplify.threads,
-        }
-    }
+fn settings(record: &Record) -> Settings {
+    let conditions = record.conditions.clone().unwrap_or_default();
+    let threads = record.simplify.threads;
+    [
+        ("sampling", conditions.sampling),
+        ("dual", conditions.dual),
+        ("samples", conditions.samples.to_string()),
+        ("threads", threads.map_or("unknown".to_owned(), |threads| threads.to_string())),
+    ]
+}
 
-    /// In words, what another one has otherwise.
-    fn differences(&self, other: &Self) -> String {
-        let differing = self.named().into_iter().zip(other.named()).filter(|(old, new)| old != new);
-        let lines: Vec<String> = differing
-            .map(|((what, old), (_, new))| format!("{what} {new}, {old} before"))
-            .collect();
-        lines.join("; ")
-    }
-
-    fn named(&self) -> [(&'static str, String); 4] {
-        [
-            ("sampling", self.sampling.to_owned()),
-            ("dual", self.dual.to_owned()),
-            ("samples", self.samples.to_string()),
-            ("threads", self.threads.map_or("unknown".to_owned(), |n| n.to_string())),
-        ]
-    }
+/// In words, what the newer settings have otherwise.
+fn differences(old: &Settings, new: &Settings) -> String {
+    let differing = old.iter().zip(new).filter(|(old, new)| old != new);
+    let lines = differing.map(|((what, old), (_, new))| format!("{what} {new}, {old} before"));
+    lines.collect::<Vec<_>>().join("; ")
 }
 
 /// Errors below this share of the diagonal are rounding.
@@ -161,10 +143,7 @@ const LEAST_MEMORY: f64 = 1e6;
 
 /// The changes from one record to the other. Time linear in the length of the records.
 pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
-    let mut changes = memory(pair, options).into_iter().collect();
-    if alike(pair.old, pair.new) {
-        return changes;
-    }
+    let mut changes: Vec<Change> = memory(pair, options).into_iter().collect();
     let (old, mut new) = (facts(pair.old), facts(pair.new));
     for (what, old) in old {
         let new = new.remove(&what).unwrap_or(Value::Null);
@@ -175,16 +154,6 @@ pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
     let appeared = new.into_iter().filter(|(_, value)| !value.is_null());
     changes.extend(appeared.map(|(what, new)| change(pair, what, Value::Null, new, options)));
     changes
-}
-
-/// Whether nothing deterministic differs: so with most pairs, and comparing them is faster than taking them apart.
-fn alike(old: &Record, new: &Record) -> bool {
-    let (a, b) = (&old.simplify, &new.simplify);
-    (old.status, &old.evaluate, old.initial, &old.result_hash)
-        == (new.status, &new.evaluate, new.initial, &new.result_hash)
-        && (a.reached, a.native_level, a.spheres, a.edges, a.faces)
-            == (b.reached, b.native_level, b.spheres, b.edges, b.faces)
-        && (&a.diagnostics, &a.warnings) == (&b.diagnostics, &b.warnings)
 }
 
 fn change(pair: &Pair<'_>, what: String, old: Value, new: Value, options: &DiffOptions) -> Change {
@@ -250,26 +219,29 @@ fn memory(pair: &Pair<'_>, options: &DiffOptions) -> Option<Change> {
     (meaning != Meaning::Changed).then_some(change)
 }
 
+/// The deterministic parts of a record, one by one: seconds and memory stand between them, and differ from run to run.
+const EXACT: [&str; 11] = [
+    "status",
+    "result_hash",
+    "simplify/reached",
+    "simplify/native_level",
+    "simplify/spheres",
+    "simplify/edges",
+    "simplify/faces",
+    "simplify/warnings",
+    "simplify/diagnostics",
+    "evaluate",
+    "initial",
+];
+
 /// Every deterministic number of a record, by its key.
 fn facts(record: &Record) -> BTreeMap<String, Value> {
     let mut facts = BTreeMap::new();
-    let simplify = &record.simplify;
-    // Named one by one: seconds and memory stand between them, and differ from run to run.
-    let whole = [
-        ("status", serde_json::to_value(record.status)),
-        ("result_hash", serde_json::to_value(&record.result_hash)),
-        ("simplify.reached", serde_json::to_value(simplify.reached)),
-        ("simplify.native_level", serde_json::to_value(simplify.native_level)),
-        ("simplify.spheres", serde_json::to_value(simplify.spheres)),
-        ("simplify.edges", serde_json::to_value(simplify.edges)),
-        ("simplify.faces", serde_json::to_value(simplify.faces)),
-        ("simplify.warnings", serde_json::to_value(&simplify.warnings)),
-        ("simplify.diagnostics", serde_json::to_value(&simplify.diagnostics)),
-        ("evaluate", serde_json::to_value(&record.evaluate)),
-        ("initial", serde_json::to_value(record.initial)),
-    ];
-    for (key, value) in whole {
-        take_apart(key, value.unwrap_or(Value::Null), &mut facts);
+    // A record that was read from JSON can be written as such.
+    let whole = serde_json::to_value(record).unwrap_or_default();
+    for path in EXACT {
+        let value = whole.pointer(&format!("/{path}")).cloned().unwrap_or_default();
+        take_apart(&path.replace('/', "."), value, &mut facts);
     }
     facts
 }

@@ -153,7 +153,7 @@ impl Page<'_> {
         let metrics = COMPARED.iter().map(|metric| {
             // Hidden at first, so that the table fits a screen.
             let rare = [&EPSILON, &SPHERES_ONLY, &BELOW_30].iter().any(|rare| rare.key == metric.key);
-            json!({"key": metric.key, "title": metric.heading(), "digits": metric.digits(), "shown": !rare})
+            json!({"key": metric.key, "title": metric.heading(), "digits": metric.digits, "shown": !rare})
         });
         let mut sections: Vec<Value> = Vec::new();
         for (id, title, tables) in &self.sections {
