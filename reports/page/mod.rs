@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, RunNote};
-use crate::metric::{BELOW_30, COMPARED, EPSILON, SPHERES_ONLY};
+use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
 use crate::plots::{FONTS, Figure, symbol};
 use crate::record::{Machine, Status};
 use crate::tables::{Table, warnings};
@@ -204,13 +204,11 @@ impl Page<'_> {
             "methods": methods.collect::<Vec<_>>(),
             "definitions": definitions(),
             "papers": (!comparison.entries.is_empty()).then(|| papers(self.bibtex)),
-            "files": self.files(),
             "too_many": (comparison.entries.len() > records::MOST).then(|| format!(
                 "{} results are too many for a table on a page. results.csv holds every number, and \
                  each mesh has a table in tables/.",
                 grouped(comparison.entries.len() as u64)
             )),
-            "units": UNITS,
         })
     }
 
@@ -340,25 +338,7 @@ impl Page<'_> {
         }
         groups.iter().map(|(warning, places)| [(*warning).to_owned(), abridged(places)]).collect()
     }
-
-    /// The files next to the page and their content.
-    fn files(&self) -> Vec<[String; 2]> {
-        let mut files = vec![
-            ["results.jsonl", "the records, one JSON object on each line"],
-            ["results.csv", "every number of every record, one row for each"],
-        ];
-        if !self.sections.is_empty() {
-            files.push(["tables/summary.md", "means over meshes; further tables next to it"]);
-            files.push(["tables/summary.tex", "the same as LaTeX"]);
-        }
-        files.iter().map(|file| file.map(str::to_owned)).collect()
-    }
 }
-
-/// Units and the meaning of bold, below the table of results.
-const UNITS: &str = "Lengths in % of the bounding-box diagonal of the input; seconds of wall clock, \
-    shared substrates included. Arrows: which way is better. Bold: best for this mesh at this number \
-    of spheres, among results that reached it to within 2 %. results.csv holds every recorded number.";
 
 /// The page's head shows the command once for all tables: it is the first note of each.
 fn without_command(table: &Table) -> Table {
@@ -398,44 +378,13 @@ fn papers(bibtex: &str) -> Value {
     json!({"about": about, "texts": [[title, format!("./{BIBTEX}"), bibtex]]})
 }
 
-/// The meaning of each column.
+/// The meaning of each metric. The page knows those of its other words.
 fn definitions() -> Vec<[String; 2]> {
-    let general = [
-        [
-            "requested, spheres",
-            "The requested number of spheres, and the number of the result. Results compare at equal \
-             numbers, reached to within 2 %.",
-        ],
-        [
-            "%",
-            "Lengths are percentages of the diagonal of the input's bounding box; results.jsonl and \
-             results.csv hold them as fractions.",
-        ],
-        [
-            "substrate, prepare, simplify",
-            "The stages of the time. Substrates are the parts that methods share (samples, Delaunay \
-             triangulation, inside test, initial medial mesh): they count for each method that uses \
-             them, whichever method built them first. Then the method's work for all levels, then \
-             its work for this level.",
-        ],
-        [
-            "Betti",
-            "Betti numbers over Z2 of the medial mesh: components, independent loops, enclosed \
-             bubbles. A medial axis has those of its solid: components, total genus, cavities.",
-        ],
-        [
-            "status",
-            "ok; other count: a result with another number of spheres; unsupported: the method does \
-             not do this, which is no failure; refused: the input was not accepted; failed, panicked, \
-             timed out, out of memory: the run ended so; invalid output: the output is no medial \
-             mesh.",
-        ],
-    ];
-    let metrics = COMPARED.iter().map(|metric| {
+    let definition = |metric: &Metric| {
         let means = metric.mean.word();
         [metric.heading(), format!("{} Means over meshes are {means}.", metric.definition)]
-    });
-    metrics.chain(general.map(|pair| pair.map(str::to_owned))).collect()
+    };
+    COMPARED.map(definition).into()
 }
 
 #[cfg(test)]

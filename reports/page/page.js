@@ -32,6 +32,32 @@ const evaluated = async (id) => {
 
 const report = JSON.parse(document.getElementById("report").textContent);
 
+// The words of the tables that are no metric.
+const WORDS = [
+  ["requested, spheres", "The requested number of spheres, and the number of the result. Results compare at equal numbers, " +
+    "reached to within 2 %."],
+  ["%", "Lengths are percentages of the diagonal of the input's bounding box; results.jsonl and results.csv hold them as " +
+    "fractions."],
+  ["substrate, prepare, simplify", "The stages of the time. Substrates are the parts that methods share (samples, Delaunay " +
+    "triangulation, inside test, initial medial mesh): they count for each method that uses them, whichever method built " +
+    "them first. Then the method's work for all levels, then its work for this level."],
+  ["Betti", "Betti numbers over Z2 of the medial mesh: components, independent loops, enclosed bubbles. A medial axis has " +
+    "those of its solid: components, total genus, cavities."],
+  ["status", "ok; other count: a result with another number of spheres; unsupported: the method does not do this, which is " +
+    "no failure; refused: the input was not accepted; failed, panicked, timed out, out of memory: the run ended so; " +
+    "invalid output: the output is no medial mesh."],
+];
+const UNITS = "Lengths in % of the bounding-box diagonal of the input; seconds of wall clock, shared substrates included. " +
+  "Arrows: which way is better. Bold: best for this mesh at this number of spheres, among results that reached it to " +
+  "within 2 %. results.csv holds every recorded number.";
+// Next to the page. The last two where there are means.
+const FILES = [
+  ["results.jsonl", "the records, one JSON object on each line"],
+  ["results.csv", "every number of every record, one row for each"],
+  ["tables/summary.md", "means over meshes; further tables next to it"],
+  ["tables/summary.tex", "the same as LaTeX"],
+];
+
 // Numbers with three significant digits, one decimal, or none, as the metric says.
 const written = (value, digits) => {
   if (value === null || value === undefined) return "–";
@@ -187,12 +213,12 @@ const start = async () => {
   if (others.length) folds.push(late(fold("plots", "More plots"), () => [plotsOf(others)]));
   if (report.warnings.length) folds.push(fold("warnings", "Warnings", listOf(report.warnings)));
   if (report.methods.length) folds.push(fold("methods", "Methods", methodsOf()));
-  folds.push(fold("definitions", "Definitions", listOf(report.definitions)));
+  folds.push(fold("definitions", "Definitions", listOf([...report.definitions, ...WORDS])));
   if (report.papers) {
     const { about, texts } = report.papers;
     folds.push(fold("papers", "For papers", make("p", {}, about), ...texts.map((text) => paste(...text))));
   }
-  folds.push(fold("files", "Files", make("ul", {}, ...report.files.map(([path, text]) =>
+  folds.push(fold("files", "Files", make("ul", {}, ...FILES.slice(0, report.sections.some(({ id }) => id !== "failures") ? 4 : 2).map(([path, text]) =>
     make("li", {}, make("a", { href: `./${path}` }, path), `: ${text}`)))));
   main.append(...parts, make("section", { id: "more" }, ...folds));
   const named = [...main.querySelectorAll(":scope > section > h2, :scope > section > details.fold > summary")];

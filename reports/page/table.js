@@ -279,5 +279,5 @@ const resultsOf = (bulk) => {
   show();
   // The address may name rows: read once the section stands in the document.
   queueMicrotask(read);
-  return section("results", "Results", form, box, note(report.units));
+  return section("results", "Results", form, box, note(UNITS));
 };
