@@ -6,7 +6,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 4 | length of the head, little-endian as all that follows |
-//! | head | JSON, [`Head`]; filled up with spaces to a multiple of four |
+//! | head | JSON, what the arrays mean; filled up with spaces to a multiple of four |
 //! | `u32` | faces of the surface, three vertices each, as differences from the number before |
 //! | for each result | spheres, four `f32` each; edges, two `u32` each; faces, three `u32` each |
 //! | `u16` | vertices of the surface, in steps from the lowest corner |
@@ -20,7 +20,7 @@ use std::collections::HashMap;
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion};
 use medial::surface::TriMesh;
-use serde::Serialize;
+use serde_json::json;
 
 use crate::page::pack;
 use crate::render::{Camera, ColourMap, Errors, Scale};
@@ -44,32 +44,6 @@ pub struct View3d<'a> {
     surface: TriMesh,
     results: Vec<(String, &'a MedialMesh)>,
     errors: Vec<Vec<f64>>,
-}
-
-/// What the arrays mean.
-#[derive(Serialize)]
-struct Head {
-    direction: [f64; 3],
-    up: [f64; 3],
-    /// Vertices and faces of the surface.
-    surface: [usize; 2],
-    low: [f64; 3],
-    /// Length of a step, and of the diagonal of the surface.
-    step: f64,
-    diagonal: f64,
-    /// Error at the ends of the colours, in % of the diagonal.
-    largest_error: f64,
-    /// Radii at the ends of the colours.
-    radii: [f64; 2],
-    colours: [Vec<[u8; 3]>; 2],
-    results: Vec<ResultHead>,
-}
-
-#[derive(Serialize)]
-struct ResultHead {
-    label: String,
-    /// Spheres, edges, faces.
-    counts: [usize; 3],
 }
 
 impl<'a> View3d<'a> {
@@ -102,35 +76,33 @@ impl<'a> View3d<'a> {
     }
 
     /// The file of the view with a name.
-    ///
-    /// # Errors
-    /// When a number cannot be written.
-    pub fn script(&self, name: &str) -> Result<String, String> {
+    pub fn script(&self, name: &str) -> String {
         let Self { camera, surface, errors, .. } = self;
         let (low, high) = surface.bounding_box().unwrap_or_default();
         let diagonal = low.distance(high);
         let step = (high - low).max_element() / f64::from(u16::MAX);
         let end = Errors::common_scale(&self.errors().iter().collect::<Vec<_>>(), diagonal);
         let radii = Scale::radii(self.results.iter().map(|(_, axis)| *axis));
-        let head = Head {
-            direction: camera.direction.to_array(),
-            up: camera.up.to_array(),
-            surface: [surface.vertices.len(), surface.faces.len()],
-            low: low.to_array(),
-            step,
-            diagonal,
-            largest_error: 100.0 * end / diagonal,
-            radii: [radii.lo, radii.hi],
-            colours: [ColourMap::Viridis, ColourMap::Diverging]
-                .map(|map| (0..COLOURS).map(|k| map.at(k as f64 / (COLOURS - 1) as f64)).collect()),
-            results: (self.results.iter())
-                .map(|(label, axis)| ResultHead {
-                    label: label.clone(),
-                    counts: [axis.spheres.len(), axis.edges.len(), axis.faces.len()],
-                })
-                .collect(),
-        };
-        let mut head = serde_json::to_vec(&head).map_err(|error| error.to_string())?;
+        let colours = [ColourMap::Viridis, ColourMap::Diverging].map(|map| {
+            (0..COLOURS).map(|k| map.at(k as f64 / (COLOURS - 1) as f64)).collect::<Vec<_>>()
+        });
+        let results = self.results.iter().map(|(label, axis)| {
+            json!({"label": label, "counts": [axis.spheres.len(), axis.edges.len(), axis.faces.len()]})
+        });
+        let head = json!({
+            "direction": camera.direction.to_array(),
+            "up": camera.up.to_array(),
+            "surface": [surface.vertices.len(), surface.faces.len()],
+            "low": low.to_array(),
+            "step": step,
+            "diagonal": diagonal,
+            // At the ends of the colours, in % of the diagonal.
+            "largest_error": 100.0 * end / diagonal,
+            "radii": [radii.lo, radii.hi],
+            "colours": colours,
+            "results": results.collect::<Vec<_>>(),
+        });
+        let mut head = head.to_string().into_bytes();
         // The browser reads the arrays in place, which must begin at a multiple of four.
         head.resize(head.len().next_multiple_of(4), b' ');
         let mut bytes = (head.len() as u32).to_le_bytes().to_vec();
@@ -139,7 +111,7 @@ impl<'a> View3d<'a> {
         for values in errors {
             bytes.extend(values.iter().map(|error| byte_of(error / end)));
         }
-        Ok(format!("{START}{}{MIDDLE}{}{END}", serde_json::Value::from(name), pack(&bytes)))
+        format!("{START}{}{MIDDLE}{}{END}", serde_json::Value::from(name), pack(&bytes))
     }
 
     /// Everything but the errors.
@@ -312,8 +284,8 @@ mod tests {
         let view = View3d::new(&surface, vec![("a \"b\"".into(), &axis)]).unwrap();
         let [errors] = view.errors().try_into().unwrap();
         assert!((errors.values[0] - 0.1).abs() < 1e-12 && (errors.values[1] - 0.2).abs() < 1e-12);
-        let script = view.script("mesh-x").unwrap();
-        assert_eq!(script, view.script("mesh-x").unwrap());
+        let script = view.script("mesh-x");
+        assert_eq!(script, view.script("mesh-x"));
         let packed = BASE64_STANDARD.decode(text_of(&script).unwrap()).unwrap();
         assert_eq!(text_of(&script.replace(END, "</script>\");\n")), None);
         let mut bytes = vec![];

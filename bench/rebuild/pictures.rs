@@ -48,7 +48,7 @@ fn draw_strip(dir: &Path, wanted: &PictureStrip, input: Option<&Input>) -> Resul
     let captions = wanted.panels.iter().map(|(_, caption)| caption.clone());
     let view = View3d::new(&input.mesh, captions.zip(&axes).collect())?;
     write(&dir.join(&wanted.file), &picture(wanted, input, &axes, &view)?)?;
-    write(&dir.join(wanted.view_file()), view.script(&wanted.view)?.as_bytes())
+    write(&dir.join(wanted.view_file()), view.script(&wanted.view).as_bytes())
 }
 
 /// The strip as PNG: medial meshes, and below them the surface with the errors of each.

@@ -245,24 +245,13 @@ impl Bar {
             y += LINE * size;
         }
         let bar_top = y - 0.4 * size;
-        self.colours(picture, [left, bar_top], tall, size, ink);
         y = bar_top + tall + LINE * size + 0.6 * size;
         for line in &self.note {
             picture.write([left, y], line, size, ink);
             y += LINE * size;
         }
-    }
-
-    fn colours(
-        &self,
-        picture: &mut Picture,
-        [left, top]: [f64; 2],
-        tall: f64,
-        size: f64,
-        ink: [u8; 3],
-    ) {
         let (x, wide) = (left.round() as i64, (WIDTH * size).round() as i64);
-        let (first, rows) = (top.round() as i64, tall.round() as i64);
+        let (first, rows) = (bar_top.round() as i64, tall.round() as i64);
         for row in 0..rows {
             let rgb = self.scale.map.at(1.0 - (row as f64 + 0.5) / rows as f64);
             let is_end = row == 0 || row + 1 == rows;

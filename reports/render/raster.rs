@@ -38,17 +38,9 @@ pub(super) struct Batch {
 #[derive(Clone, Debug)]
 pub(super) struct Look {
     pub(super) paint: Paint,
-    pub(super) lines: Option<Lines>,
+    /// Share of ink of the lines along sides, 0 to 1; the facets on both sides of one draw a half each.
+    pub(super) ink: f32,
     pub(super) kind: Kind,
-}
-
-/// Lines along the sides of facets.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Lines {
-    /// Half the width of a line of width 1, in pixels; the facets on both sides draw a half each.
-    pub(super) half_width: f32,
-    /// Share of ink, 0 to 1.
-    pub(super) opacity: f32,
 }
 
 /// How a batch hides what is behind it.
@@ -61,6 +53,10 @@ pub(super) enum Kind {
     /// As glass, and seen only where nothing solid is, before or behind.
     Ghost,
 }
+
+/// Width of lines, as a share of the picture's shorter side, and the least in pixels.
+const LINE_WIDTH: f64 = 0.0016;
+const LEAST_LINE: f64 = 0.9;
 
 /// Samples along a side of a pixel.
 const SIDE: usize = 3;
@@ -106,21 +102,19 @@ pub(super) fn rasterise(batches: Vec<Batch>, frame: &Frame, size: [usize; 2]) ->
         );
         looks.push(look);
     }
-    let picture = FacetPicture { facets: &facets, looks: &looks, lamp: Lamp::new(frame) };
+    let line = (LINE_WIDTH * size[0].min(size[1]) as f64).max(LEAST_LINE);
+    let half_line = 0.5 * line * (STEPS * SIDE as i64) as f64;
+    let lamp = Lamp::new(frame);
+    let picture = FacetPicture { facets: &facets, looks: &looks, lamp, half_line };
     let rows: Vec<Vec<PixelLight>> = (by_band(&facets, size[1]).into_par_iter().enumerate())
         .map(|(band, list)| {
             // The last band is cut off at the lower edge of the picture.
             let rows = band * BAND * SIDE..((band + 1) * BAND).min(size[1]) * SIDE;
             let columns = size[0] * SIDE;
             let count = rows.len() * columns;
-            let band = Band {
-                rows,
-                columns,
-                nearness: vec![f64::NEG_INFINITY; count],
-                front: vec![NONE; count],
-                through: vec![1.0; count],
-            };
-            band.draw(&picture, &list)
+            let (front, through) = (vec![NONE; count], vec![1.0; count]);
+            let nearness = vec![f64::NEG_INFINITY; count];
+            Band { rows, columns, nearness, front, through }.draw(&picture, &list)
         })
         .collect();
     rows.concat()
@@ -144,6 +138,8 @@ struct FacetPicture<'a> {
     facets: &'a [PlacedFacet],
     looks: &'a [Look],
     lamp: Lamp,
+    /// Half the width of a line of width 1, in steps.
+    half_line: f64,
 }
 
 impl FacetPicture<'_> {
@@ -161,10 +157,12 @@ impl FacetPicture<'_> {
         let w = sides.weights(sum.map(|sum| sum / count));
         let normal = w[0] * facet.normals[0] + w[1] * facet.normals[1] + w[2] * facet.normals[2];
         let light = self.lamp.shade(normal, look.paint.at(weighted(&w, facet.places)));
-        let Some(lines) = look.lines.filter(|_| facet.lines != [0; 3]) else { return light };
-        let ends = sides.line_ends(facet, lines);
+        if look.ink <= 0.0 || facet.lines == [0; 3] {
+            return light;
+        }
+        let ends = sides.line_ends(facet.lines, self.half_line);
         let on_line = share.samples(corner).filter(|at| sides.is_on_line(&ends, *at)).count();
-        mix(light, LINE, lines.opacity * on_line as f32 / count as f32)
+        mix(light, LINE, look.ink * on_line as f32 / count as f32)
     }
 }
 
@@ -192,8 +190,7 @@ impl Band {
         }
         // Glass comes last: behind solid facets it does not show.
         for id in glass {
-            let facet = &picture.facets[id as usize];
-            self.lay_over(facet, picture.look(facet));
+            self.lay_over(picture, &picture.facets[id as usize]);
         }
         let (rows, columns) = (self.rows.len() / SIDE, self.columns / SIDE);
         let pixels = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
@@ -211,11 +208,10 @@ impl Band {
         });
     }
 
-    fn lay_over(&mut self, facet: &PlacedFacet, look: &Look) {
+    fn lay_over(&mut self, picture: &FacetPicture<'_>, facet: &PlacedFacet) {
         let (top, columns) = (self.rows.start, self.columns);
-        let sides = Sides::new(facet);
-        let lines = look.lines.filter(|_| facet.lines != [0; 3]);
-        let lines = lines.map(|lines| (lines.opacity, sides.line_ends(facet, lines)));
+        let (look, sides) = (picture.look(facet), Sides::new(facet));
+        let ends = sides.line_ends(facet.lines, picture.half_line);
         facet.scan(&sides, self.rows.clone(), columns, |row, column, nearness| {
             let sample = (row - top) * columns + column;
             let is_seen = match look.kind {
@@ -224,10 +220,7 @@ impl Band {
             };
             if is_seen {
                 let at = middle(row, column);
-                let line = match &lines {
-                    Some((opacity, ends)) if sides.is_on_line(ends, at) => *opacity,
-                    _ => 0.0,
-                };
+                let line = if sides.is_on_line(&ends, at) { look.ink } else { 0.0 };
                 let facing = weighted(&sides.weights(at), facet.places);
                 self.through[sample] *= 1.0 - glass_opacity(facing).max(line);
             }
@@ -436,16 +429,13 @@ impl Sides {
         [w[1] / sum, w[2] / sum, w[0] / sum]
     }
 
-    /// How large the edge functions are where lines end; negative without a line.
-    fn line_ends(&self, facet: &PlacedFacet, lines: Lines) -> [f64; 3] {
-        let half = f64::from(lines.half_width) * (STEPS * SIDE as i64) as f64;
+    /// How large the edge functions are where lines of some widths end; negative without a line.
+    fn line_ends(&self, widths: [u8; 3], half_line: f64) -> [f64; 3] {
         std::array::from_fn(|k| {
             // An edge function is the distance from the side times its length.
-            let (dx, dy) = (self.along_y[k] as f64, self.along_x[k] as f64);
-            match facet.lines[k] {
-                0 => -1.0,
-                width => half * f64::from(width) * (dx * dx + dy * dy).sqrt(),
-            }
+            let [x, y] = [self.along_x[k], self.along_y[k]].map(|along| along as f64);
+            let length = (x * x + y * y).sqrt();
+            if widths[k] == 0 { -1.0 } else { half_line * f64::from(widths[k]) * length }
         })
     }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::camera::Frame;
 use super::light::{GLASS, Paint, crevices, decode, encode};
 use super::picture::{Background, Picture};
-use super::raster::{Batch, Facet, Kind, Lines, Look, PixelLight, rasterise};
+use super::raster::{Batch, Facet, Kind, Look, PixelLight, rasterise};
 use super::{RenderError, check_size};
 
 /// What a picture is of, but for the camera.
@@ -157,10 +157,6 @@ const CURVE: [u8; 3] = [0xD5, 0x5E, 0x00];
 const TUBE: f64 = 0.0042;
 const DOT: f64 = 1.7;
 
-/// Width of lines, as a share of the picture's shorter side, and the least in pixels.
-const LINE_WIDTH: f64 = 0.0016;
-const LEAST_LINE: f64 = 0.9;
-
 /// Edges shorter than the first, in pixels, have no lines, since these would cover the faces; longer than the second,
 /// full ones.
 const LINE_FADE: [f64; 2] = [3.0, 12.0];
@@ -179,20 +175,13 @@ struct Canvas<'a> {
     shorter: f64,
 }
 
-impl Canvas<'_> {
-    fn lines(&self, opacity: f32) -> Option<Lines> {
-        let width = (LINE_WIDTH * self.shorter).max(LEAST_LINE);
-        (opacity > 0.0).then_some(Lines { half_width: (0.5 * width) as f32, opacity })
-    }
-}
-
 impl Layer<'_> {
     /// Adds the facets of the layer.
     fn add_to(&self, batches: &mut Vec<Batch>, canvas: &Canvas<'_>) -> Result<(), RenderError> {
         let (facets, look) = match *self {
             Self::Surface(mesh) => {
                 let paint = Paint::plain(decode(GREY));
-                let look = Look { paint, lines: canvas.lines(SHARP_INK), kind: Kind::Solid };
+                let look = Look { paint, ink: SHARP_INK, kind: Kind::Solid };
                 (surface_facets(mesh, |_, _| 0.5), look)
             }
             Self::Glass(mesh) | Self::Ghost(mesh) => {
@@ -200,7 +189,7 @@ impl Layer<'_> {
                 let facing = |_, normal| canvas.frame.back.dot(normal).abs() as f32;
                 let kind = if matches!(self, Self::Ghost(_)) { Kind::Ghost } else { Kind::Glass };
                 let paint = Paint::plain([0.0; 3]);
-                (surface_facets(mesh, facing), Look { paint, lines: canvas.lines(GLASS_INK), kind })
+                (surface_facets(mesh, facing), Look { paint, ink: GLASS_INK, kind })
             }
             Self::Values { mesh, values, scale } => {
                 let (vertices, given) = (mesh.vertices.len(), values.len());
@@ -208,7 +197,7 @@ impl Layer<'_> {
                     return Err(RenderError::Values { values: given, vertices });
                 }
                 // No lines: ink would be taken for a value.
-                let look = Look { paint: Paint::map(scale.map), lines: None, kind: Kind::Solid };
+                let look = Look { paint: Paint::map(scale.map), ink: 0.0, kind: Kind::Solid };
                 (surface_facets(mesh, |v, _| scale.place(values[v as usize])), look)
             }
             Self::Axis { mesh, colour } => {
@@ -278,10 +267,10 @@ fn axis_batches(mesh: &MedialMesh, colour: Option<Scale>, canvas: &Canvas<'_>) -
     // By the median, so that the lines of one mesh are all alike.
     let median = lengths.get(lengths.len() / 2).map_or(0.0, |length| length * canvas.scale);
     let fade = (median - LINE_FADE[0]) / (LINE_FADE[1] - LINE_FADE[0]);
-    let lines = canvas.lines(SHEET_INK * fade.clamp(0.0, 1.0) as f32);
+    let ink = SHEET_INK * fade.clamp(0.0, 1.0) as f32;
     let sheets = Batch {
         facets: mesh.faces.par_iter().map(sheet).collect(),
-        look: Look { paint: paint(SHEET), lines, kind: Kind::Solid },
+        look: Look { paint: paint(SHEET), ink, kind: Kind::Solid },
     };
 
     let radius = TUBE * canvas.shorter / canvas.scale;
@@ -305,7 +294,7 @@ fn axis_batches(mesh: &MedialMesh, colour: Option<Scale>, canvas: &Canvas<'_>) -
             ball(sphere.centre, size * radius, place(sphere), &mut facets);
         }
     }
-    let look = Look { paint: paint(CURVE), lines: None, kind: Kind::Solid };
+    let look = Look { paint: paint(CURVE), ink: 0.0, kind: Kind::Solid };
     [sheets, Batch { facets, look }]
 }
 

@@ -1,7 +1,7 @@
 //! The page in a browser, from disk and without a network: no error, no request, and the answers of
 //! `page_checks.txt`.
 
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -58,19 +58,13 @@ impl Browser {
             .spawn()
             .unwrap();
         let to = child.stdin.take().unwrap();
-        let mut out = child.stdout.take().unwrap();
+        let out = BufReader::new(child.stdout.take().unwrap());
         let (send, from) = channel();
         thread::spawn(move || {
-            let mut pending = Vec::new();
-            let mut piece = [0; 1 << 16];
-            while let Ok(length @ 1..) = out.read(&mut piece) {
-                pending.extend_from_slice(&piece[..length]);
-                while let Some(end) = pending.iter().position(|&byte| byte == 0) {
-                    let message: Vec<u8> = pending.drain(..=end).collect();
-                    let message = serde_json::from_slice(&message[..end]).unwrap();
-                    if send.send(message).is_err() {
-                        return;
-                    }
+            // A zero byte ends each message.
+            for message in out.split(0).map_while(Result::ok) {
+                if send.send(serde_json::from_slice(&message).unwrap()).is_err() {
+                    return;
                 }
             }
         });
@@ -223,7 +217,7 @@ fn write_views(folder: &Path, records: &[Record]) {
     std::fs::create_dir(folder.join("views")).unwrap();
     for strip in picture_strips(records) {
         let results = strip.panels.iter().map(|(_, caption)| (caption.clone(), &axis)).collect();
-        let script = View3d::new(&surface, results).unwrap().script(&strip.view).unwrap();
+        let script = View3d::new(&surface, results).unwrap().script(&strip.view);
         std::fs::write(folder.join(strip.view_file()), script).unwrap();
     }
 }
