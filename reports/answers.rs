@@ -338,45 +338,6 @@ fn name(comparison: &Comparison<'_>, series: usize) -> Cell {
     Cell::from(comparison.series[series].as_str())
 }
 
-/// For each two methods, on how many meshes the one of the row has the lower error, an equal one, the higher one.
-pub(crate) fn wins_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
-    let (level, spheres) = usual_level(comparison)?;
-    let errors = errors_at(comparison, level);
-    let shown: Vec<usize> = (0..errors.len())
-        .filter(|&series| errors[series].iter().flatten().any(|error| error.is_finite()))
-        .collect();
-    if shown.len() < 2 {
-        return None;
-    }
-    let mut columns = vec![Column::text("method")];
-    columns.extend(shown.iter().map(|&s| Column::text(comparison.series[s].as_str())));
-    let mut rows = vec![];
-    for &first in &shown {
-        let mut cells = vec![name(comparison, first)];
-        for &second in &shown {
-            // No method has a lead on itself.
-            let lead = Lead::of(&errors[first], &errors[second]).filter(|_| first != second);
-            let best = lead.as_ref().is_some_and(|lead| lead.worse == 0 && lead.better > 0);
-            cells.push(Cell { best, ..Cell::optional(lead.map(|lead| lead.counts())) });
-        }
-        rows.push(cells);
-    }
-    Some(Table {
-        caption: format!("Method against method at {}", counted(spheres, "sphere", "spheres")),
-        notes: vec![
-            how.to_owned(),
-            format!(
-                "On how many meshes the Hausdorff error of the row's method is lower than that of the column's, equal \
-                 within {:.0} %, higher; on the meshes where both reached the count. Bold: never higher.",
-                100.0 * EQUAL
-            ),
-        ],
-        rows,
-        columns,
-        grouped: false,
-    })
-}
-
 /// All methods at one error bound.
 pub(crate) struct BoundSummary {
     /// The bound, in % of the diagonal.

@@ -42,7 +42,7 @@ pub(crate) struct Entry<'a> {
 impl Entry<'_> {
     /// Whether a measured result stands here.
     pub(crate) fn measured(&self) -> bool {
-        measured(self.record)
+        self.record.status.has_result() && self.record.evaluate.is_some()
     }
 
     /// Whether the result may be compared with others asked for the same number of spheres.
@@ -54,11 +54,6 @@ impl Entry<'_> {
             _ => false,
         }
     }
-}
-
-/// Whether a record holds a result and its measures.
-pub(crate) fn measured(record: &Record) -> bool {
-    record.status.has_result() && record.evaluate.is_some()
 }
 
 /// The number of spheres of the result.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 
-use crate::answers::{by_bound, equal_error_figure, equal_error_table, purpose_table, wins_table};
+use crate::answers::{by_bound, equal_error_figure, equal_error_table, purpose_table};
 use crate::comparison::Comparison;
 use crate::header::Header;
 use crate::journal::replace_file;
@@ -50,7 +50,6 @@ pub fn write_report(
     files.write("results.csv", &csv)?;
 
     let answers = purpose_table(&comparison, &how);
-    let wins = wins_table(&comparison, &how).filter(|_| !is_one);
     let mut equal_error: Vec<Table> =
         equal_error_table(&comparison, &bounds, &how).into_iter().collect();
     let mut means = vec![means_table(&comparison, &summaries, &how)];
@@ -60,9 +59,8 @@ pub fn write_report(
     means.retain(|table| !table.rows.is_empty());
     let all_means: Vec<Table> = equal_error.iter().chain(&means).cloned().collect();
     files.write_tables("summary", "Summary", &all_means)?;
-    let purposes: Vec<Table> = answers.iter().chain(&wins).cloned().collect();
-    if !purposes.is_empty() {
-        files.write_tables("overview-purpose", "Which method?", &purposes)?;
+    if answers.is_some() {
+        files.write_tables("overview-purpose", "Which method?", answers.as_slice())?;
     }
 
     let mut figures = mean_figures(&comparison, &summaries, &natives);
@@ -107,7 +105,6 @@ pub fn write_report(
     let sections = [
         ("equal-error", "Equal error", equal_error),
         ("means", if is_one { "Native levels" } else { "Means over meshes" }, means),
-        ("wins", "Method against method", wins.into_iter().collect()),
     ];
     let page = Page {
         header,

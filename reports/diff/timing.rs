@@ -164,42 +164,44 @@ fn groups<'p, 'a>(pairs: &[&'p Pair<'a>]) -> Vec<Group<'p, 'a>> {
 }
 
 fn cpu_of_substrates(record: &Record) -> f64 {
-    typical(record, |repetition| repetition.cpu_seconds, |stages| stages.substrate)
+    let seconds = seconds(record, |repetition| repetition.cpu_seconds, |stages| stages.substrate);
+    median(&seconds).unwrap_or(0.0)
 }
 
-/// The median of a time over the repetitions of a record.
-fn typical(record: &Record, clock: Clock, part: Part) -> f64 {
-    let all: Vec<f64> = record.repetitions.iter().map(|r| part(&clock(r))).collect();
-    median(&all).unwrap_or(0.0)
+/// A time of each repetition of a record.
+fn seconds(record: &Record, clock: Clock, part: Part) -> Vec<f64> {
+    record.repetitions.iter().map(|repetition| part(&clock(repetition))).collect()
 }
 
-impl<'a> Group<'_, 'a> {
-    /// The pairs that take long enough on both sides.
-    fn long(&self, clock: Clock) -> Vec<&Pair<'a>> {
-        let long = self.pairs.iter().filter(|pair| {
-            let sides = [pair.old, pair.new].map(|record| typical(record, clock, self.part));
-            sides.iter().all(|&seconds| seconds >= LEAST_SECONDS)
-        });
-        long.copied().collect()
-    }
-
+impl Group<'_, '_> {
     /// The row by one clock; `None` where all times are too short.
     fn timing(
         &self,
         &(name, clock, is_gate): &(&'static str, Clock, bool),
         options: &DiffOptions,
     ) -> Option<Timing> {
-        let pairs = self.long(clock);
-        let repetitions = pairs.iter().map(|pair| repetitions(pair)).min()?;
-        let sides = pairs.iter().map(|pair| [pair.old, pair.new]);
-        let [old, new] = [0, 1].map(|side| {
-            let records: Vec<&Record> = sides.clone().map(|sides| sides[side]).collect();
-            (0..repetitions).map(|k| self.mean_logarithm(&records, clock, k)).collect::<Vec<_>>()
+        // For each pair the seconds of the repetitions of both sides, where these take long enough.
+        let mut pairs: Vec<[Vec<f64>; 2]> = (self.pairs.iter())
+            .map(|pair| [pair.old, pair.new].map(|record| seconds(record, clock, self.part)))
+            .collect();
+        pairs.retain(|sides| {
+            sides
+                .iter()
+                .all(|seconds| median(seconds).is_some_and(|typical| typical >= LEAST_SECONDS))
         });
+        let repetitions = pairs.iter().flatten().map(Vec::len).min()?;
+        let mean_logarithm = |side: usize, of: &dyn Fn(&[f64]) -> f64| {
+            let seconds = pairs.iter().map(|sides| of(&sides[side]).max(f64::MIN_POSITIVE));
+            seconds.map(f64::ln).sum::<f64>() / pairs.len() as f64
+        };
+        let [old, new] = [0, 1].map(|side| -> Vec<f64> {
+            (0..repetitions).map(|k| mean_logarithm(side, &|seconds| seconds[k])).collect()
+        });
+        let least = |seconds: &[f64]| seconds.iter().copied().fold(f64::INFINITY, f64::min);
+        let fastest = mean_logarithm(1, &least) - mean_logarithm(0, &least);
         let Shift { mean, interval, agreement } = Shift::new(&old, &new, options.alternating);
         let alone = if self.mesh.is_some() { 2.0 } else { 1.0 };
         let threshold = (alone * options.seconds).ln_1p();
-        let fastest = self.fastest_shift(&pairs, clock);
         // The smaller of the two shifts, where they have one sign.
         let least = if mean * fastest > 0.0 { mean.abs().min(fastest.abs()) } else { 0.0 };
         let is_certain = agreement >= AGREEMENT && interval[0] * interval[1] > 0.0;
@@ -218,25 +220,6 @@ impl<'a> Group<'_, 'a> {
             agreement,
             meaning,
         })
-    }
-
-    /// The mean logarithm of new over old seconds, of the fastest repetitions alone.
-    fn fastest_shift(&self, pairs: &[&Pair<'_>], clock: Clock) -> f64 {
-        let shifts = pairs.iter().map(|pair| {
-            let [old, new] = [pair.old, pair.new].map(|record| {
-                let seconds = record.repetitions.iter().map(|r| (self.part)(&clock(r)));
-                seconds.fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE).ln()
-            });
-            new - old
-        });
-        shifts.sum::<f64>() / pairs.len().max(1) as f64
-    }
-
-    /// Of the seconds of repetition `k`, over some records.
-    fn mean_logarithm(&self, records: &[&Record], clock: Clock, k: usize) -> f64 {
-        let seconds = records.iter().map(|record| (self.part)(&clock(&record.repetitions[k])));
-        let sum: f64 = seconds.map(|seconds| seconds.max(f64::MIN_POSITIVE).ln()).sum();
-        sum / records.len().max(1) as f64
     }
 }
 
