@@ -234,41 +234,33 @@ fn by_meshes(a: &Rank, b: &Rank) -> Ordering {
     a.missed.cmp(&b.missed).then_with(|| by_median(a, b))
 }
 
-/// How one series stands beside another, on the meshes where both have a result.
-struct Lead {
-    /// Geometric mean of the ratios.
-    ratio: f64,
-    better: usize,
-    equal: usize,
-    worse: usize,
+/// How one series stands beside another, on the meshes where both have a result: the geometric mean of the ratios, and
+/// on how many it is better, equal, worse.
+fn lead(first: &Values, second: &Values) -> Option<(f64, String)> {
+    let ratios: Vec<f64> = (first.iter().zip(second))
+        .filter_map(|(a, b)| Some(((*a)?, (*b)?)))
+        .filter(|(a, b)| a.is_finite() && b.is_finite())
+        // Floors: a quotient of zeros is no number.
+        .map(|(a, b)| a.max(1e-9) / b.max(1e-9))
+        .collect();
+    let ratio = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
+    let equal = ratios.iter().filter(|ratio| ratio.ln().abs() <= EQUAL).count();
+    let better = ratios.iter().filter(|ratio| ratio.ln() < -EQUAL).count();
+    Some((ratio, format!("{better}, {equal}, {}", ratios.len() - equal - better)))
 }
 
-impl Lead {
-    fn of(first: &Values, second: &Values) -> Option<Self> {
-        let ratios: Vec<f64> = (first.iter().zip(second))
-            .filter_map(|(a, b)| Some(((*a)?, (*b)?)))
-            .filter(|(a, b)| a.is_finite() && b.is_finite())
-            // Floors: a quotient of zeros is no number.
-            .map(|(a, b)| a.max(1e-9) / b.max(1e-9))
-            .collect();
-        let ratio = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
-        let equal = ratios.iter().filter(|ratio| ratio.ln().abs() <= EQUAL).count();
-        let better = ratios.iter().filter(|ratio| ratio.ln() < -EQUAL).count();
-        Some(Self { ratio, better, equal, worse: ratios.len() - equal - better })
-    }
-
-    fn counts(&self) -> String {
-        format!("{}, {}, {}", self.better, self.equal, self.worse)
-    }
+/// The series that have a median, the best first.
+fn ranked(values: &[Values]) -> Vec<Rank> {
+    let ranks = values.iter().enumerate().map(|(series, values)| Rank::of(series, values));
+    let mut ranks: Vec<Rank> = ranks.filter(|rank| rank.median.is_some()).collect();
+    ranks.sort_by(by_median);
+    ranks
 }
 
 /// The rows of a question: the best median, and where that is another the best on the most meshes. None where no
 /// method has a median.
 fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Vec<Cell>> {
-    let values = question.values.iter().enumerate();
-    let mut ranks: Vec<Rank> = values.map(|(series, values)| Rank::of(series, values)).collect();
-    ranks.retain(|rank| rank.median.is_some());
-    ranks.sort_by(by_median);
+    let mut ranks = ranked(&question.values);
     let Some(first) = ranks.first().map(|rank| rank.series) else { return vec![] };
     let mut rows = vec![answer(comparison, question, question.title.clone(), &ranks)];
     ranks.sort_by(by_meshes);
@@ -296,14 +288,13 @@ fn answer(
         Cell::from(format!("{met} of {}", counted(known.count(), "mesh", "meshes"))),
     ];
     let runner_up = ranks.get(1).and_then(|rank| {
-        let lead = Lead::of(&question.values[first], &question.values[rank.series])?;
-        Some((rank.series, lead))
+        Some((rank.series, lead(&question.values[first], &question.values[rank.series])?))
     });
     cells.extend(match runner_up {
-        Some((second, lead)) => [
+        Some((second, (ratio, counts))) => [
             name(comparison, second),
-            Cell::from(format!("{} of {}", significant(lead.ratio, 2), question.of)),
-            Cell::from(lead.counts()),
+            Cell::from(format!("{} of {}", significant(ratio, 2), question.of)),
+            Cell::from(counts),
         ],
         None => [Cell::from("no other"), Cell::optional(None), Cell::optional(None)],
     });
@@ -313,18 +304,14 @@ fn answer(
 /// The row of the methods with the topology of the solid on every mesh, the one of the lowest error first.
 fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) -> Vec<Cell> {
     let errors = errors_at(comparison, level);
-    let mut ranks = vec![];
-    for (series, errors) in errors.iter().enumerate() {
+    let mut ranks = ranked(&errors);
+    ranks.retain(|&Rank { series, .. }| {
         let mut own = comparison.at(series, level);
         own.retain(|entry| entry.comparable());
         let (right, _) = topology(&own);
         // Of all meshes that it ran on: one without a result is not right.
-        if right > 0 && right == errors.iter().flatten().count() {
-            ranks.push(Rank::of(series, errors));
-        }
-    }
-    ranks.retain(|rank| rank.median.is_some());
-    ranks.sort_by(by_median);
+        right > 0 && right == errors[series].iter().flatten().count()
+    });
     let title = format!("topology right everywhere, lowest error at {spheres}");
     if ranks.is_empty() {
         let mut cells = vec![Cell::from(title), Cell::from("none")];

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::header::Header;
 use crate::metric::{COMPARED, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
-use crate::record::{Record, Status, Target};
+use crate::record::{Record, Stages, Status, Target};
 use crate::tables::{Cell, Table};
 use crate::text::{counted, grouped, significant};
 
@@ -47,8 +47,8 @@ pub(crate) struct SeriesSummary {
     pub(crate) failed: usize,
     /// Meshes for which it does not do this.
     pub(crate) unsupported: usize,
-    /// Means of [`COMPARED`], in that order, and the number of meshes that each is over.
-    pub(crate) means: [Option<(f64, usize)>; COMPARED.len()],
+    /// Means of [`COMPARED`] by their keys, and the number of meshes that each is over.
+    means: BTreeMap<&'static str, (f64, usize)>,
     /// Hausdorff error in relation to the reference's.
     pub(crate) ratio: Option<Ratio>,
     /// Arithmetic means of substrate, prepare and simplify seconds.
@@ -80,17 +80,12 @@ impl Ratio {
 impl SeriesSummary {
     /// The mean of one of [`COMPARED`].
     pub(crate) fn mean(&self, metric: &Metric) -> Option<f64> {
-        self.mean_over(metric).map(|(mean, _)| mean)
+        self.means.get(metric.key).map(|(mean, _)| *mean)
     }
 
     /// Meshes that the mean of a metric is over: where a result has no triangle, say, there is no angle.
     pub(crate) fn over(&self, metric: &Metric) -> usize {
-        self.mean_over(metric).map_or(0, |(_, over)| over)
-    }
-
-    fn mean_over(&self, metric: &Metric) -> Option<(f64, usize)> {
-        let index = COMPARED.iter().position(|other| other.key == metric.key)?;
-        self.means[index]
+        self.means.get(metric.key).map_or(0, |(_, over)| *over)
     }
 }
 
@@ -195,9 +190,34 @@ fn at_count(
         kept.retain(|entry| {
             set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
         });
-        let ratio = ratio(&entries, &yardstick);
-        let known = COMPARED.map(|metric| set.known(comparison, series, metric));
-        rows.push(SeriesSummary { ratio, ..summarise(series, &entries, &kept, &known) });
+        let mut means = BTreeMap::new();
+        for metric in COMPARED {
+            let known = set.known(comparison, series, metric);
+            let values = kept.iter().filter(|entry| known.contains(&entry.mesh));
+            let values: Vec<f64> = values.filter_map(|entry| metric.of(entry.record)).collect();
+            // A mean over less than half of the meshes tells of others than those that were asked for.
+            let enough = 2 * values.len() >= entries.len();
+            let mean = metric.mean.of(&values).filter(|_| enough);
+            means.extend(mean.map(|mean| (metric.key, (mean, values.len()))));
+        }
+        let mut reached = entries.clone();
+        reached.retain(|entry| entry.comparable());
+        let statuses = || entries.iter().map(|entry| entry.record.status);
+        let failed = statuses().filter(|status| status.is_failure()).count();
+        let unsupported = statuses().filter(|&status| status == Status::Unsupported).count();
+        rows.push(SeriesSummary {
+            series,
+            over: kept.len(),
+            asked: entries.len(),
+            reached: reached.len(),
+            missed: entries.len() - reached.len() - failed - unsupported,
+            failed,
+            unsupported,
+            means,
+            ratio: ratio(&entries, &yardstick),
+            stages: mean_stages(&kept),
+            topology: topology(&reached),
+        });
     }
     CountSummary { count, meshes: meshes.len(), rows }
 }
@@ -212,51 +232,13 @@ fn ratio(entries: &[&Entry<'_>], reference: &[&Entry<'_>]) -> Option<Ratio> {
     }))
 }
 
-/// The row of one series from all its entries and those that are averaged.
-fn summarise(
-    series: usize,
-    entries: &[&Entry<'_>],
-    kept: &[&Entry<'_>],
-    known: &[BTreeSet<usize>; COMPARED.len()],
-) -> SeriesSummary {
-    let mut reached = entries.to_vec();
-    reached.retain(|entry| entry.comparable());
-    let statuses = || entries.iter().map(|entry| entry.record.status);
-    let failed = statuses().filter(|status| status.is_failure()).count();
-    let unsupported = statuses().filter(|&status| status == Status::Unsupported).count();
-    SeriesSummary {
-        series,
-        over: kept.len(),
-        asked: entries.len(),
-        reached: reached.len(),
-        missed: entries.len() - reached.len() - failed - unsupported,
-        failed,
-        unsupported,
-        means: std::array::from_fn(|index| {
-            let metric = COMPARED[index];
-            let values = kept.iter().filter(|entry| known[index].contains(&entry.mesh));
-            let values: Vec<f64> = values.filter_map(|entry| metric.of(entry.record)).collect();
-            // A mean over less than half of the meshes tells of others than those that were asked for.
-            let enough = 2 * values.len() >= entries.len();
-            metric.mean.of(&values).filter(|_| enough).map(|mean| (mean, values.len()))
-        }),
-        ratio: None,
-        stages: mean_stages(kept),
-        topology: topology(&reached),
-    }
-}
-
 /// Arithmetic means of the stages, which add up as stages must.
 fn mean_stages(entries: &[&Entry<'_>]) -> Option<[f64; 3]> {
-    let stages: Vec<_> = entries.iter().filter_map(|entry| entry.record.simplify.seconds).collect();
-    let mut sums = [0.0; 3];
-    for stage in &stages {
-        for (sum, seconds) in sums.iter_mut().zip([stage.substrate, stage.prepare, stage.simplify])
-        {
-            *sum += seconds;
-        }
-    }
-    (!stages.is_empty()).then(|| sums.map(|sum| sum / stages.len() as f64))
+    let stages: Vec<Stages> =
+        entries.iter().filter_map(|entry| entry.record.simplify.seconds).collect();
+    let parts: [fn(&Stages) -> f64; 3] = [|s| s.substrate, |s| s.prepare, |s| s.simplify];
+    (!stages.is_empty())
+        .then(|| parts.map(|part| stages.iter().map(part).sum::<f64>() / stages.len() as f64))
 }
 
 /// Results with the solid's Betti numbers, and results where both are known.

@@ -153,20 +153,8 @@ mod tests {
     fn stems_are_safe_and_distinct() {
         let names = ["bear", "../../etc/passwd", "Bear", "", "..", "a b", "a/b", "日本", ".hidden"];
         let stems = file_stems(names);
-        assert_eq!(
-            stems,
-            [
-                "bear",
-                "_.._etc_passwd",
-                "Bear-2",
-                "unnamed",
-                "unnamed-2",
-                "a_b",
-                "a_b-2",
-                "__",
-                "hidden"
-            ]
-        );
+        let expected = "bear _.._etc_passwd Bear-2 unnamed unnamed-2 a_b a_b-2 __ hidden";
+        assert_eq!(stems.join(" "), expected);
         assert!(file_stems(["x".repeat(500).as_str()])[0].len() <= 80);
     }
 

@@ -2,6 +2,7 @@
 //!
 //! The same input always gives the same result, so that any difference is one of the program and needs no statistics.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use serde_json::Value;
@@ -29,21 +30,8 @@ pub(super) struct Pair<'a> {
     pub(super) new: &'a Record,
 }
 
-/// What was asked: the same in both sets.
-#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct Asked<'a> {
-    mesh: &'a str,
-    row: String,
-    seed: u64,
-    level: LevelKey,
-}
-
-/// A level with an order: counts from many to few, then the others.
-#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
-enum LevelKey {
-    Spheres(std::cmp::Reverse<usize>),
-    Other(String),
-}
+/// The request, which is the same in both sets: mesh, row, seed, level. Counts are from many to few, before other levels.
+type Asked<'a> = (&'a str, String, u64, (Reverse<usize>, String));
 
 /// How it was run and measured, by name: has to agree.
 type Settings = [(&'static str, String); 4];
@@ -54,34 +42,26 @@ impl<'a> Pairs<'a> {
     pub(super) fn new(old: &'a [Record], new: &'a [Record]) -> Self {
         let (old, mut new) = (arranged(old), arranged(new));
         let mut pairs = Self { both: vec![], missing: vec![], added: vec![], unlike: vec![] };
-        for (asked, records) in old {
-            pairs.sort_out(&records, &new.remove(&asked).unwrap_or_default());
+        for (asked, old) in old {
+            let new = new.remove(&asked).unwrap_or_default();
+            for (settings, old) in &old {
+                let item = name(old);
+                match (new.get(settings), new.first_key_value()) {
+                    (Some(new), _) => match other_mesh(old, new) {
+                        None => pairs.both.push(Pair { item, old, new }),
+                        Some(why) => pairs.unlike.push(Unlike { item, why }),
+                    },
+                    // The newer set has this result under other settings alone: name the first difference found.
+                    (None, Some((others, _))) => {
+                        pairs.unlike.push(Unlike { item, why: differences(settings, others) });
+                    }
+                    (None, None) => pairs.missing.push(item),
+                }
+            }
         }
         let rest = new.into_values().flat_map(BTreeMap::into_values);
         pairs.added.extend(rest.map(name));
         pairs
-    }
-
-    /// Sorts out the records of one question.
-    fn sort_out(
-        &mut self,
-        old: &BTreeMap<Settings, &'a Record>,
-        new: &BTreeMap<Settings, &'a Record>,
-    ) {
-        for (settings, old) in old {
-            let item = name(old);
-            match (new.get(settings), new.first_key_value()) {
-                (Some(new), _) => match other_mesh(old, new) {
-                    None => self.both.push(Pair { item, old, new }),
-                    Some(why) => self.unlike.push(Unlike { item, why }),
-                },
-                // The newer set has this result under other settings alone: name the first difference found.
-                (None, Some((others, _))) => {
-                    self.unlike.push(Unlike { item, why: differences(settings, others) });
-                }
-                (None, None) => self.missing.push(item),
-            }
-        }
     }
 }
 
@@ -89,15 +69,11 @@ impl<'a> Pairs<'a> {
 fn arranged(records: &[Record]) -> Arranged<'_> {
     let mut arranged = Arranged::new();
     for record in records {
-        let asked = Asked {
-            mesh: &record.mesh,
-            row: row_name(record),
-            seed: record.simplify.seed,
-            level: match record.simplify.level {
-                Target::Spheres(count) => LevelKey::Spheres(std::cmp::Reverse(count)),
-                level => LevelKey::Other(level_label(level)),
-            },
+        let level = match record.simplify.level {
+            Target::Spheres(count) => (Reverse(count), String::new()),
+            level => (Reverse(0), level_label(level)),
         };
+        let asked = (record.mesh.as_str(), row_name(record), record.simplify.seed, level);
         arranged.entry(asked).or_default().insert(settings(record), record);
     }
     arranged

@@ -122,58 +122,40 @@ impl Figure {
     }
 }
 
-/// A family of figures: one for each mesh, and one of the means over all.
-struct Kind {
-    name: &'static str,
-    title: &'static str,
-    axis: &'static str,
-    y: &'static Metric,
-}
+/// A family of figures, one for each mesh and one of the means over all: name, title, and the metric upwards.
+struct Kind(&'static str, &'static str, &'static Metric);
 
 const KINDS: [Kind; 5] = [
-    kind(
-        "hausdorff",
-        "Hausdorff error against spheres",
-        "Hausdorff error (% of diagonal)",
-        &HAUSDORFF,
-    ),
-    kind("time", "Hausdorff error against time", "Hausdorff error (% of diagonal)", &HAUSDORFF),
-    kind("mean", "Mean error against spheres", "mean error (% of diagonal)", &MEAN_ERROR),
-    kind(
-        "angles",
-        "Triangle quality: mean smallest angle",
-        "mean smallest angle (degrees)",
-        &MIN_ANGLE,
-    ),
-    kind("spikes", "Spikes left", "spikes", &SPIKES),
+    Kind("hausdorff", "Hausdorff error against spheres", &HAUSDORFF),
+    Kind("time", "Hausdorff error against time", &HAUSDORFF),
+    Kind("mean", "Mean error against spheres", &MEAN_ERROR),
+    Kind("angles", "Triangle quality: mean smallest angle", &MIN_ANGLE),
+    Kind("spikes", "Spikes left", &SPIKES),
 ];
-
-const fn kind(
-    name: &'static str,
-    title: &'static str,
-    axis: &'static str,
-    y: &'static Metric,
-) -> Kind {
-    Kind { name, title, axis, y }
-}
 
 impl Kind {
     /// Seconds rather than spheres along the bottom.
     fn is_over_time(&self) -> bool {
-        self.name == "time"
+        self.0 == "time"
     }
 
     fn figure(&self, stem: &str, of: &str, curves: Vec<Curve>) -> Option<Figure> {
+        let Self(name, title, _) = self;
         // Errors span orders of magnitude, and less of them is better at any cost.
-        let is_error = [&HAUSDORFF, &MEAN_ERROR].iter().any(|error| error.key == self.y.key);
+        let (y, scale) = match *name {
+            "angles" => ("mean smallest angle (degrees)", Scale::Linear),
+            "spikes" => ("spikes", Scale::Linear),
+            "mean" => ("mean error (% of diagonal)", Scale::Log),
+            _ => ("Hausdorff error (% of diagonal)", Scale::Log),
+        };
         let figure = Figure {
-            stem: format!("{stem}-{}", self.name),
-            title: format!("{of}: {}", self.title),
+            stem: format!("{stem}-{name}"),
+            title: format!("{of}: {title}"),
             x: if self.is_over_time() { "time (s)".to_owned() } else { "spheres".to_owned() },
-            y: (self.axis.to_owned(), if is_error { Scale::Log } else { Scale::Linear }),
+            y: (y.to_owned(), scale),
             curves,
-            front: is_error,
-            leading: matches!(self.name, "hausdorff" | "time"),
+            front: scale == Scale::Log,
+            leading: matches!(*name, "hausdorff" | "time"),
         };
         figure.with_points()
     }
@@ -217,7 +199,7 @@ pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str)
                 .collect();
             records.sort_by_key(|record| std::cmp::Reverse(reached(record)));
             let points = records.into_iter().filter_map(|record| {
-                Some((reached(record)? as f64, TOTAL_SECONDS.of(record), kind.y.of(record), [1, 1]))
+                Some((reached(record)? as f64, TOTAL_SECONDS.of(record), kind.2.of(record), [1, 1]))
             });
             let names = (&*comparison.series[series], &*comparison.meshes[mesh]);
             let mut curve = Curve { dashed, ..kind.curve(series, names, points) };
@@ -247,7 +229,7 @@ pub(crate) fn mean_figures(
             let series = native.series;
             let name = format!("{} (native levels)", comparison.series[series]);
             let points = native.points.iter().map(|point| {
-                let y = match kind.name {
+                let y = match kind.0 {
                     "hausdorff" => Some(point.hausdorff),
                     "mean" => Some(point.mean),
                     _ => None,
@@ -260,7 +242,7 @@ pub(crate) fn mean_figures(
             }
             curves.push(curve);
         }
-        let of = format!("All meshes, {} means", kind.y.mean.word());
+        let of = format!("All meshes, {} means", kind.2.mean.word());
         figures.extend(kind.figure("overview", &of, curves));
     }
     figures
@@ -276,7 +258,7 @@ fn mean_curve(
     let mut label = name.clone();
     let points = summaries.iter().filter_map(|summary| {
         let row = summary.rows.iter().find(|row| row.series == series)?;
-        let (y, over) = (row.mean(kind.y)?, row.over(kind.y));
+        let (y, over) = (row.mean(kind.2)?, row.over(kind.2));
         // The set of meshes is the same at each count that has a mean.
         if over != summary.meshes {
             label = format!("{name} ({over} of {})", summary.meshes);

@@ -5,7 +5,7 @@
 //! yellow, which vanish on a dark or a light page, and with three of Paul Tol's muted scheme. A
 //! method keeps its colour and its marker in every figure of a report.
 
-use std::fmt::Display;
+use std::error::Error;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -61,9 +61,8 @@ pub(crate) const FONTS: &str = "Helvetica, Arial, sans-serif";
 
 const FRONT: &str = "not dominated";
 
-fn failed(error: impl Display) -> ReportError {
-    ReportError::content("a plot", format!("plot: {error}"))
-}
+/// Any error of plotters: only writing can fail, and a text takes everything.
+type Drawn = Result<(), Box<dyn Error>>;
 
 fn font(size: i32, at: HPos) -> TextStyle<'static> {
     // The backend divides sizes by 1.24.
@@ -83,14 +82,15 @@ impl Figure {
         let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 1;
         let size = (WIDTH as u32, HEIGHT.max(rows as i32 * LEGEND_ROW + 120) as u32);
         let mut svg = String::new();
-        self.draw(x, y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())?;
+        self.draw(x, y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())
+            .map_err(|error| ReportError::content("a plot", format!("plot: {error}")))?;
         Ok(Some(svg))
     }
 
-    fn draw(&self, x: Axis, y: Axis, area: &Area<'_>) -> Result<(), ReportError> {
-        area.fill(&WHITE).map_err(failed)?;
+    fn draw(&self, x: Axis, y: Axis, area: &Area<'_>) -> Drawn {
+        area.fill(&WHITE)?;
         let title = printable(&shortened(&self.title, 76));
-        area.draw(&Text::new(title, (28, 40), font(30, HPos::Left))).map_err(failed)?;
+        area.draw(&Text::new(title, (28, 40), font(30, HPos::Left)))?;
         let (_, below) = area.split_vertically(68);
         let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
         let legend_width = (88 + 14 * longest.unwrap_or(0).max(FRONT.len()) as i32).min(460);
@@ -103,8 +103,7 @@ impl Figure {
             .margin_bottom(12)
             .x_label_area_size(88)
             .y_label_area_size(116)
-            .build_cartesian_2d(x, y)
-            .map_err(failed)?;
+            .build_cartesian_2d(x, y)?;
         chart
             .configure_mesh()
             .bold_line_style(GRID.stroke_width(2))
@@ -117,8 +116,7 @@ impl Figure {
             .axis_desc_style((FONTS, 26.0 * 1.24).into_font().color(&INK))
             .x_desc(&self.x)
             .y_desc(&self.y.0)
-            .draw()
-            .map_err(failed)?;
+            .draw()?;
         let inner = chart.plotting_area().strip_coord_spec();
         let mut taken = Vec::new();
         for curve in &self.curves {
@@ -126,9 +124,9 @@ impl Figure {
             let line = curve.points.iter().map(|point| (point.x, point.y));
             if curve.dashed {
                 let dashes = DashedLineSeries::new(line, 14, 10, stroke);
-                chart.draw_series(dashes).map_err(failed)?;
+                chart.draw_series(dashes)?;
             } else {
-                chart.draw_series(LineSeries::new(line, stroke)).map_err(failed)?;
+                chart.draw_series(LineSeries::new(line, stroke))?;
             }
             for point in &curve.points {
                 let (left, top) = chart.backend_coord(&(point.x, point.y));
@@ -138,7 +136,7 @@ impl Figure {
                 let free = point.tag.as_ref().and_then(|tag| free_place(at, tag, &mut taken));
                 if let (Some(tag), Some(at)) = (&point.tag, free) {
                     let text = Text::new(tag.clone(), at, font(20, HPos::Left));
-                    inner.draw(&text).map_err(failed)?;
+                    inner.draw(&text)?;
                 }
             }
         }
@@ -150,30 +148,28 @@ impl Figure {
         let has_front = front.len() > 1;
         if has_front {
             let line = LineSeries::new(front, INK.stroke_width(2));
-            chart.draw_series(line).map_err(failed)?;
+            chart.draw_series(line)?;
         }
         self.draw_legend(&legend, has_front)?;
-        area.present().map_err(failed)
+        Ok(area.present()?)
     }
 
-    fn draw_legend(&self, area: &Area<'_>, has_front: bool) -> Result<(), ReportError> {
+    fn draw_legend(&self, area: &Area<'_>, has_front: bool) -> Drawn {
         let mut y = 36;
         for curve in self.curves.iter().filter(|curve| !curve.label.is_empty()) {
             let stroke = colour(curve.series).stroke_width(4);
             // A dash on either side of the marker.
             let dashes = if curve.dashed { vec![(0, 10), (38, 48)] } else { vec![(0, 48)] };
             for (from, to) in dashes {
-                area.draw(&PathElement::new(vec![(from, y), (to, y)], stroke)).map_err(failed)?;
+                area.draw(&PathElement::new(vec![(from, y), (to, y)], stroke))?;
             }
             draw_marker(area, curve.series, (24, y))?;
-            area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))
-                .map_err(failed)?;
+            area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))?;
             y += LEGEND_ROW;
         }
         if has_front {
-            area.draw(&PathElement::new(vec![(0, y), (48, y)], INK.stroke_width(2)))
-                .map_err(failed)?;
-            area.draw(&Text::new(FRONT, (62, y), font(24, HPos::Left))).map_err(failed)?;
+            area.draw(&PathElement::new(vec![(0, y), (48, y)], INK.stroke_width(2)))?;
+            area.draw(&Text::new(FRONT, (62, y), font(24, HPos::Left)))?;
         }
         Ok(())
     }
@@ -203,7 +199,7 @@ fn free_place((x, y): (i32, i32), tag: &str, taken: &mut Vec<[i32; 4]>) -> Optio
 
 /// Draws the marker of a series around a pixel. Hollow ones hide the line beneath, so that they differ
 /// from filled ones.
-fn draw_marker(area: &Area<'_>, series: usize, (x, y): (i32, i32)) -> Result<(), ReportError> {
+fn draw_marker(area: &Area<'_>, series: usize, (x, y): (i32, i32)) -> Drawn {
     let (colour, (name, hollow)) = (colour(series), MARKERS[series % MARKERS.len()]);
     let (stroke, fill) = (colour.stroke_width(4), if hollow { WHITE } else { colour });
     // Corners, the turn of the first one from the top as a share of a circle, radii of every other corner.
@@ -235,7 +231,7 @@ fn draw_marker(area: &Area<'_>, series: usize, (x, y): (i32, i32)) -> Result<(),
                 .and_then(|()| area.draw(&PathElement::new(closed, stroke)))
         }
     }
-    .map_err(failed)
+    .map_err(Into::into)
 }
 
 #[cfg(test)]

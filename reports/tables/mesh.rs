@@ -1,40 +1,40 @@
 //! The table of one mesh: every method at every level, failures included.
 
+use std::collections::BTreeMap;
+
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::{COMPARED, Metric};
 use crate::summary::pick;
 use crate::tables::{Cell, Table};
 use crate::text::{betti, grouped, known_betti, printable};
 
-/// The values that the bold numbers equal, for each level by [`COMPARED`].
-pub(crate) struct Best(Vec<[Option<f64>; COMPARED.len()]>);
+/// The values that the bold numbers equal, by level and key of one of [`COMPARED`].
+pub(crate) struct Best(BTreeMap<(usize, &'static str), f64>);
 
 impl Best {
     /// The best values of one mesh, for each level at which at least two results compare.
     pub(crate) fn of_mesh(comparison: &Comparison<'_>, mesh: usize) -> Self {
-        let mut levels = vec![];
-        for level in 0..comparison.levels.len() {
-            let here: Vec<&Entry<'_>> = comparison
-                .of_mesh(mesh)
-                .filter(|entry| entry.level == level && entry.comparable())
-                .collect();
-            levels.push(COMPARED.map(|metric| {
-                let values: Vec<f64> =
-                    here.iter().filter_map(|entry| metric.of(entry.record)).collect();
-                // A single result is no best.
-                let best = values.iter().copied().reduce(|a, b| pick(metric, a, b));
-                best.filter(|_| values.len() > 1)
-            }));
+        let mut values: BTreeMap<_, Vec<f64>> = BTreeMap::new();
+        for entry in comparison.of_mesh(mesh).filter(|entry| entry.comparable()) {
+            for metric in COMPARED {
+                let here = values.entry((entry.level, metric.key)).or_default();
+                here.extend(metric.of(entry.record));
+            }
         }
-        Self(levels)
+        // A single result is no best.
+        values.retain(|_, values| values.len() > 1);
+        let best = values.into_iter().filter_map(|((level, key), values)| {
+            let metric = COMPARED.into_iter().find(|metric| metric.key == key)?;
+            Some(((level, key), values.into_iter().reduce(|a, b| pick(metric, a, b))?))
+        });
+        Self(best.collect())
     }
 
     /// Whether a value of an entry is the best of its level, as far as it is written.
     pub(crate) fn is_best(&self, entry: &Entry<'_>, metric: &Metric, value: f64) -> bool {
-        let column = COMPARED.iter().position(|other| other.key == metric.key);
-        let best = column.and_then(|column| self.0[entry.level][column]);
+        let best = self.0.get(&(entry.level, metric.key));
         // Two numbers that read the same are equally good.
-        entry.comparable() && best.is_some_and(|best| metric.format(best) == metric.format(value))
+        entry.comparable() && best.is_some_and(|&best| metric.format(best) == metric.format(value))
     }
 }
 
