@@ -410,13 +410,9 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_unique_and_the_tables_have_their_columns() {
+    fn keys_are_unique_and_hold_those_of_the_tables() {
         let keys: BTreeSet<&str> = METRICS.iter().map(|metric| metric.key).collect();
         assert_eq!(keys.len(), METRICS.len());
-        let compared = COMPARED.map(|metric| metric.key).join(" ");
-        assert_eq!(
-            compared,
-            "hausdorff epsilon mean spheres_only min_angle_mean below_30 spikes seconds_total"
-        );
+        assert!(COMPARED.iter().all(|metric| keys.contains(metric.key)));
     }
 }

@@ -150,8 +150,8 @@ impl FacetPicture<'_> {
     /// The light of a facet on some samples of a pixel, whose first sample is at this column and row. It is lit once,
     /// in their middle: only its outline and its lines need every sample.
     fn light(&self, share: &FacetShare, corner: [usize; 2]) -> Light {
-        let facet = &self.facets[share.id as usize];
-        let (look, sides) = (self.look(facet), Sides::new(facet));
+        let placed = &self.facets[share.id as usize];
+        let (look, sides, facet) = (self.look(placed), Sides::new(placed), &placed.facet);
         let sum = share.samples(corner).fold([0; 2], |sum, at| [sum[0] + at[0], sum[1] + at[1]]);
         let count = i64::from(share.mask.count_ones());
         let w = sides.weights(sum.map(|sum| sum / count));
@@ -211,7 +211,7 @@ impl Band {
     fn lay_over(&mut self, picture: &FacetPicture<'_>, facet: &PlacedFacet) {
         let (top, columns) = (self.rows.start, self.columns);
         let (look, sides) = (picture.look(facet), Sides::new(facet));
-        let ends = sides.line_ends(facet.lines, picture.half_line);
+        let ends = sides.line_ends(facet.facet.lines, picture.half_line);
         facet.scan(&sides, self.rows.clone(), columns, |row, column, nearness| {
             let sample = (row - top) * columns + column;
             let is_seen = match look.kind {
@@ -221,7 +221,7 @@ impl Band {
             if is_seen {
                 let at = middle(row, column);
                 let line = if sides.is_on_line(&ends, at) { look.ink } else { 0.0 };
-                let facing = weighted(&sides.weights(at), facet.places);
+                let facing = weighted(&sides.weights(at), facet.facet.places);
                 self.through[sample] *= 1.0 - glass_opacity(facing).max(line);
             }
         });
@@ -297,9 +297,7 @@ struct PlacedFacet {
     batch: u32,
     at: [[i64; 2]; 3],
     nearness: [f64; 3],
-    normals: [Vec3; 3],
-    places: [f32; 3],
-    lines: [u8; 3],
+    facet: Facet,
 }
 
 impl PlacedFacet {
@@ -317,17 +315,16 @@ impl PlacedFacet {
                 at[k][axis] = (steps + FARTHEST + 0.5) as i64 - FARTHEST as i64;
             }
         }
-        let Facet { normals, places, lines, .. } = facet;
         let nearness = projected.map(|p| p[2]);
-        let mut placed = Self { batch, at, nearness, normals, places, lines };
+        let mut placed = Self { batch, at, nearness, facet };
         let area = placed.area();
         if area < 0 {
             placed.at.swap(1, 2);
             placed.nearness.swap(1, 2);
-            placed.normals.swap(1, 2);
-            placed.places.swap(1, 2);
+            placed.facet.normals.swap(1, 2);
+            placed.facet.places.swap(1, 2);
             // Side k lies between corners k and k + 1: the middle one stays.
-            placed.lines.swap(0, 2);
+            placed.facet.lines.swap(0, 2);
         }
         (area != 0).then_some(placed)
     }

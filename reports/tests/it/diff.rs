@@ -3,19 +3,13 @@
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
 use medial_reports::{Record, Repetition, Stages};
 
-use super::common::{SHAPES, comparison};
+use super::common::{self, SHAPES, comparison};
 
 const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
 
 fn diff(old: &[Record], new: &[Record]) -> Diff {
     let options = DiffOptions { alternating: true, ..DiffOptions::default() };
     Diff::new(["before".into(), "after".into()], old, new, options)
-}
-
-/// A number from -1 to 1 that looks random.
-fn jitter(seed: usize) -> f64 {
-    let mixed = medial::geometry::hash::splitmix(seed as u64);
-    (mixed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
 /// Records with ten repetitions, each with a noise of some share of its seconds, on a machine whose load in the moment
@@ -26,8 +20,8 @@ fn timed(seed: usize, noise: f64, factor: impl Fn(&Record) -> f64) -> Vec<Record
         let Some(stages) = record.simplify.seconds else { continue };
         let factor = factor(record);
         let lap = |k: usize| {
-            let load = 1.25 + 0.25 * jitter(k);
-            let random = 1.0 + noise * jitter((seed * 1000 + place) * 10 + k + 77);
+            let load = 1.25 + 0.25 * (2.0 * common::noise(k, 0, 0) - 1.0);
+            let random = 1.0 + noise * (2.0 * common::noise(seed, place, k + 77) - 1.0);
             let all = load * random * factor;
             let stages = Stages::new(
                 load * random * stages.substrate,

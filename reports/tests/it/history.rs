@@ -5,13 +5,7 @@ use std::fs;
 use medial_reports::history::{Findings, Run, read_runs};
 use medial_reports::{Record, Repetition, Stages, Status};
 
-use super::common::{failed, ok};
-
-/// A number in [-1, 1) that depends on its arguments alone.
-fn noise(run: usize, series: usize) -> f64 {
-    let mixed = medial::geometry::hash::splitmix((run * 1000 + series) as u64);
-    (mixed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-}
+use super::common::{failed, noise, ok};
 
 /// The records of a run of 16 series; `change` alters a record and its seconds.
 fn records(run: usize, change: impl Fn(&mut Record, &mut f64)) -> Vec<Record> {
@@ -25,7 +19,7 @@ fn records(run: usize, change: impl Fn(&mut Record, &mut f64)) -> Vec<Record> {
                 let evaluation = record.evaluate.as_mut().expect("measured");
                 (evaluation.betti, evaluation.expected_betti) = ([1, 0, 0], Some([1, 0, 0]));
                 let mut seconds =
-                    0.2 * (rank + 1) as f64 * (1.0 + 0.04 * noise(run, records.len()));
+                    0.2 * (rank + 1) as f64 * (0.96 + 0.08 * noise(run, records.len(), 0));
                 change(&mut record, &mut seconds);
                 let stages = Stages::new(0.1, seconds / 2.0, seconds / 2.0);
                 record.repetitions = vec![Repetition { seconds: stages, cpu_seconds: stages }];
