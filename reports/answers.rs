@@ -283,7 +283,7 @@ fn answer(
     let met = known.clone().filter(|value| value.is_finite()).count();
     let mut cells = vec![
         Cell::from(title),
-        Cell { best: true, ..name(comparison, first) },
+        Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
         Cell::optional(ranks[0].median.map(question.text)),
         Cell::from(format!("{met} of {}", counted(known.count(), "mesh", "meshes"))),
     ];
@@ -292,7 +292,7 @@ fn answer(
     });
     cells.extend(match runner_up {
         Some((second, (ratio, counts))) => [
-            name(comparison, second),
+            Cell::from(comparison.series[second].as_str()),
             Cell::from(format!("{} of {}", significant(ratio, 2), question.of)),
             Cell::from(counts),
         ],
@@ -319,10 +319,6 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
         return cells;
     }
     answer(comparison, &error_question(errors, title.clone()), title, &ranks)
-}
-
-fn name(comparison: &Comparison<'_>, series: usize) -> Cell {
-    Cell::from(comparison.series[series].as_str())
 }
 
 /// All methods at one error bound.

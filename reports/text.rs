@@ -52,14 +52,9 @@ pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{} {}", grouped(count as u64), if count == 1 { one } else { many })
 }
 
-/// Betti numbers as `1, 4, 0`.
-pub(crate) fn betti(numbers: [u64; 3]) -> String {
-    format!("{}, {}, {}", numbers[0], numbers[1], numbers[2])
-}
-
-/// The same where they were computed.
-pub(crate) fn known_betti(numbers: Option<[u64; 3]>) -> String {
-    numbers.map_or("unknown".to_owned(), betti)
+/// Betti numbers as `1, 4, 0`, where they were computed.
+pub(crate) fn betti(numbers: Option<[u64; 3]>) -> String {
+    numbers.map_or("unknown".to_owned(), |[b0, b1, b2]| format!("{b0}, {b1}, {b2}"))
 }
 
 /// Memory in MB of a million bytes.

@@ -131,24 +131,17 @@ const PICTURES: usize = 3 << 20;
 /// Characters of the 3D views that are part of the page; further ones are read when they are opened.
 const VIEWS_INSIDE: usize = 2 << 20;
 
-/// The picture of a mesh's results, if it is in the folder: within the page, while there is room.
-fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<(String, String)> {
+/// The address of the picture of a mesh's results, if it is in the folder: within the page, while there is room.
+fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<String> {
     let strip = strip?;
     let bytes = fs::read(dir.join(&strip.file)).ok()?;
-    let words = format!(
-        "{}: medial meshes, asked for one number of spheres, coloured by radius, with the surface as glass; their Hausdorff \
-         errors in % of the diagonal. Below them the surface: red where the reconstruction reaches beyond it, blue where \
-         it falls short",
-        strip.mesh
-    );
-    let address = match room.checked_sub(bytes.len()) {
+    Some(match room.checked_sub(bytes.len()) {
         Some(left) => {
             *room = left;
             format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes))
         }
         None => format!("./{}", strip.file),
-    };
-    Some((address, words))
+    })
 }
 
 /// The 3D view of a mesh's results, if it is in the folder: within the page, while there is room.
@@ -248,9 +241,7 @@ impl Files<'_> {
     /// Removes what an earlier report left under the names that only a report gives.
     /// The pictures and views that are `shown` stay.
     fn remove_stale(&self, shown: &[PathBuf]) -> Result<(), ReportError> {
-        let ours: [(&str, &[&str]); 4] =
-            [("tables", &["md", "tex"]), ("plots", &["svg"]), (FOLDER, &["png"]), (VIEWS, &["js"])];
-        for (folder, extensions) in ours {
+        for folder in ["tables", "plots", FOLDER, VIEWS] {
             let folder = self.dir.join(folder);
             let failed = |source| ReportError::Io { path: folder.clone(), source };
             let entries = match fs::read_dir(&folder) {
@@ -262,7 +253,9 @@ impl Files<'_> {
                 // Files of the user, whose names begin otherwise, stay.
                 let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
                 let ours = (name.starts_with("mesh-") || name.starts_with("overview-"))
-                    && name.rsplit_once('.').is_some_and(|(_, end)| extensions.contains(&end));
+                    && name
+                        .rsplit_once('.')
+                        .is_some_and(|(_, end)| ["md", "tex", "svg", "png", "js"].contains(&end));
                 if ours && !self.written.contains(&path) && !shown.contains(&path) {
                     fs::remove_file(&path).map_err(failed)?;
                 }

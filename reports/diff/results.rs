@@ -117,9 +117,12 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// More memory than this is needed before a share of it counts, in bytes.
 const LEAST_MEMORY: f64 = 1e6;
 
+/// Key of the peak of memory.
+const MEMORY: &str = "simplify.peak_bytes";
+
 /// The changes from one record to the other. Time linear in the length of the records.
 pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
-    let mut changes: Vec<Change> = memory(pair, options).into_iter().collect();
+    let mut changes = vec![];
     let (old, mut new) = (facts(pair.old), facts(pair.new));
     for (what, old) in old {
         let new = new.remove(&what).unwrap_or(Value::Null);
@@ -129,6 +132,8 @@ pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
     }
     let appeared = new.into_iter().filter(|(_, value)| !value.is_null());
     changes.extend(appeared.map(|(what, new)| change(pair, what, Value::Null, new, options)));
+    // With several threads memory is not quite the same each time: within its threshold it is not listed.
+    changes.retain(|change: &Change| change.what != MEMORY || change.meaning != Meaning::Changed);
     changes
 }
 
@@ -148,6 +153,7 @@ fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffO
     match key {
         "status" => of_truth(pair.old.status.is_ok(), pair.new.status.is_ok()),
         "betti" | "union.betti" => of_truth(is_expected(pair.old, old), is_expected(pair.new, new)),
+        MEMORY => of_size(old, new, options.memory, LEAST_MEMORY),
         // Under an error bound the number of spheres is the result.
         "simplify.spheres" if is_bounded => of_size(old, new, 0.0, 0.5),
         key if METRICS.iter().any(|metric| metric.is_gate && metric.path == key) => {
@@ -182,21 +188,8 @@ fn of_size(old: &Value, new: &Value, share: f64, least: f64) -> Meaning {
     }
 }
 
-/// A change of the peak of memory beyond its threshold. With several threads it is not quite the same each time, so
-/// smaller ones are not listed.
-fn memory(pair: &Pair<'_>, options: &DiffOptions) -> Option<Change> {
-    let [old, new] = [pair.old, pair.new].map(|record| record.simplify.peak_bytes);
-    let (old, new) = (Value::from(old?), Value::from(new?));
-    let enough = options.memory.max(LEAST_MEMORY / old.as_f64()?.max(1.0));
-    let meaning = of_size(&old, &new, enough, 0.0);
-    let relative = Some(new.as_f64()? / old.as_f64()?.max(1.0) - 1.0);
-    let (item, what) = (pair.item.clone(), "simplify.peak_bytes".to_owned());
-    let change = Change { item, what, old, new, relative, meaning };
-    (meaning != Meaning::Changed).then_some(change)
-}
-
-/// The deterministic parts of a record, one by one: seconds and memory stand between them, and differ from run to run.
-const EXACT: [&str; 11] = [
+/// The parts of a record that are compared, one by one: seconds stand between them, and differ from run to run.
+const COMPARED: [&str; 12] = [
     "status",
     "result_hash",
     "simplify/reached",
@@ -204,18 +197,19 @@ const EXACT: [&str; 11] = [
     "simplify/spheres",
     "simplify/edges",
     "simplify/faces",
+    "simplify/peak_bytes",
     "simplify/warnings",
     "simplify/diagnostics",
     "evaluate",
     "initial",
 ];
 
-/// Every deterministic number of a record, by its key.
+/// Every compared number of a record, by its key.
 fn facts(record: &Record) -> BTreeMap<String, Value> {
     let mut facts = BTreeMap::new();
     // A record that was read from JSON can be written as such.
     let whole = serde_json::to_value(record).unwrap_or_default();
-    for path in EXACT {
+    for path in COMPARED {
         let value = whole.pointer(&format!("/{path}")).cloned().unwrap_or_default();
         take_apart(&path.replace('/', "."), value, &mut facts);
     }

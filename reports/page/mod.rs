@@ -18,11 +18,10 @@ use serde_json::{Value, json};
 use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, RunNote};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
-use crate::plots::{FONTS, Figure, symbol};
+use crate::plots::{Figure, symbol};
 use crate::record::{Machine, Status};
 use crate::tables::{Table, warnings};
-use crate::text::{counted, escape_html, grouped, known_betti, printable};
-use crate::write::BIBTEX;
+use crate::text::{betti, counted, escape_html, grouped, printable};
 
 /// Everything that the page is made of.
 pub(crate) struct Page<'a> {
@@ -45,8 +44,8 @@ pub(crate) struct MeshPart {
     /// Name of its files.
     pub(crate) stem: String,
     pub(crate) figures: Vec<Figure>,
-    /// The address of a picture of its results, and its description.
-    pub(crate) picture: Option<(String, String)>,
+    /// The address of a picture of its results.
+    pub(crate) picture: Option<String>,
     pub(crate) view: Option<MeshView>,
 }
 
@@ -203,7 +202,7 @@ impl Page<'_> {
             "warnings": self.warnings(),
             "methods": methods.collect::<Vec<_>>(),
             "definitions": definitions(),
-            "papers": (!comparison.entries.is_empty()).then(|| papers(self.bibtex)),
+            "papers": (!comparison.entries.is_empty()).then_some(self.bibtex),
             "too_many": (comparison.entries.len() > records::MOST).then(|| format!(
                 "{} results are too many for a table on a page. results.csv holds every number, and \
                  each mesh has a table in tables/.",
@@ -263,8 +262,8 @@ impl Page<'_> {
                     "initial medial mesh",
                     format!("{spheres} spheres, {edges} edges, {faces} faces")
                 ]),
-                json!(["its Betti numbers", known_betti(initial.betti)]),
-                json!(["Betti numbers of the solid", known_betti(initial.expected_betti)]),
+                json!(["its Betti numbers", betti(initial.betti)]),
+                json!(["Betti numbers of the solid", betti(initial.expected_betti)]),
             ];
             if wrong {
                 let verdict = "wrong before any simplification: methods that start here inherit it";
@@ -278,8 +277,7 @@ impl Page<'_> {
             "stem": part.stem,
             "brief": brief,
             "measured": entries().any(|entry| entry.measured()),
-            "picture": part.picture.as_ref().map(|picture| &picture.0),
-            "words": part.picture.as_ref().map(|picture| &picture.1),
+            "picture": part.picture,
             "view": view.map(|view| json!({"name": view.name, "file": format!("./{}", view.file)})),
             "initial": initial,
         })
@@ -365,17 +363,6 @@ fn abridged(items: &[String]) -> String {
         text.push_str(&format!(" and {} more", items.len() - SHOWN));
     }
     text
-}
-
-/// Texts to copy into a paper: title, file, text.
-fn papers(bibtex: &str) -> Value {
-    let about = format!(
-        "plots/ holds all plots as SVG, lettered in {FONTS}; tables/ holds all tables as LaTeX for \
-         \\input. They need no package; booktabs gives finer rules, graphicx shrinks wide tables to \
-         the width of the text. A plot as PDF: rsvg-convert -f pdf -o x.pdf plots/x.svg (librsvg)."
-    );
-    let title = "BibTeX of the methods and the program";
-    json!({"about": about, "texts": [[title, format!("./{BIBTEX}"), bibtex]]})
 }
 
 /// The meaning of each metric. The page knows those of its other words.

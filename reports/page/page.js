@@ -91,9 +91,12 @@ const listOf = (pairs) =>
 
 const strip = (mesh, link) => {
   if (!mesh.picture) return null;
-  const image = make("img", { src: mesh.picture, alt: mesh.words });
+  const words = `${mesh.name}: medial meshes, asked for one number of spheres, coloured by radius, with the surface as ` +
+    "glass; their Hausdorff errors in % of the diagonal. Below them the surface: red where the reconstruction reaches " +
+    "beyond it, blue where it falls short";
+  const image = make("img", { src: mesh.picture, alt: words });
   return make("figure", { class: "strip" }, link ? make("a", { href: link }, image) : image,
-    make("figcaption", {}, mesh.words));
+    make("figcaption", {}, words));
 };
 
 // Picture, 3D view, initial medial mesh and curves of one mesh.
@@ -215,8 +218,11 @@ const start = async () => {
   if (report.methods.length) folds.push(fold("methods", "Methods", methodsOf()));
   folds.push(fold("definitions", "Definitions", listOf([...report.definitions, ...WORDS])));
   if (report.papers) {
-    const { about, texts } = report.papers;
-    folds.push(fold("papers", "For papers", make("p", {}, about), ...texts.map((text) => paste(...text))));
+    const about = "plots/ holds all plots as SVG, lettered in Helvetica, Arial or another sans-serif; tables/ holds all " +
+      "tables as LaTeX for \\input. They need no package; booktabs gives finer rules, graphicx shrinks wide tables to the " +
+      "width of the text. A plot as PDF: rsvg-convert -f pdf -o x.pdf plots/x.svg (librsvg).";
+    const bibtex = ["BibTeX of the methods and the program", "./tables/methods.bib", report.papers];
+    folds.push(fold("papers", "For papers", make("p", {}, about), paste(...bibtex)));
   }
   folds.push(fold("files", "Files", make("ul", {}, ...FILES.slice(0, report.sections.some(({ id }) => id !== "failures") ? 4 : 2).map(([path, text]) =>
     make("li", {}, make("a", { href: `./${path}` }, path), `: ${text}`)))));

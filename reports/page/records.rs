@@ -1,9 +1,8 @@
-//! All records for the page: one column for each number, so that equal values are stored once and
-//! the browser parses one short document.
+//! All records for the page: one column for each number, so that the browser parses one document without keys.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::COMPARED;
@@ -14,20 +13,23 @@ use crate::text::significant;
 /// A table of more results takes a browser's memory and minutes.
 pub(super) const MOST: usize = 20_000;
 
-/// The columns of all entries by path. Below `table` are those of the table of results, below the
-/// names of a record's parts its values as recorded.
-pub(super) fn all_columns(comparison: &Comparison<'_>) -> Map<String, Value> {
+/// The columns of all entries by path, null where a record has no value. Below `table` are those of the table of
+/// results, below the names of a record's parts its values as recorded.
+pub(super) fn all_columns(comparison: &Comparison<'_>) -> BTreeMap<String, Vec<Value>> {
     let mut best: Option<(usize, Best)> = None;
-    let mut rows = Vec::with_capacity(comparison.entries.len());
-    for entry in &comparison.entries {
+    let mut columns: BTreeMap<String, Vec<Value>> = BTreeMap::new();
+    for (index, entry) in comparison.entries.iter().enumerate() {
         // Entries are sorted by mesh.
         let best = match &mut best {
             Some((mesh, best)) if *mesh == entry.mesh => best,
             slot => &mut slot.insert((entry.mesh, Best::of_mesh(comparison, entry.mesh))).1,
         };
-        rows.push(row(entry, best));
+        for (path, value) in row(entry, best) {
+            let empty = || vec![Value::Null; comparison.entries.len()];
+            columns.entry(path).or_insert_with(empty)[index] = value;
+        }
     }
-    columns(rows)
+    columns
 }
 
 fn row(entry: &Entry<'_>, best: &Best) -> Vec<(String, Value)> {
@@ -65,34 +67,6 @@ fn row(entry: &Entry<'_>, best: &Best) -> Vec<(String, Value)> {
     ];
     row.extend(cells.map(|(name, value)| (format!("table/{name}"), value)));
     row
-}
-
-/// Columns from rows: the values in order, or distinct values with the index of each row's where at
-/// most half of them are distinct.
-fn columns(rows: Vec<Vec<(String, Value)>>) -> Map<String, Value> {
-    let count = rows.len();
-    let mut columns: BTreeMap<String, Vec<Value>> = BTreeMap::new();
-    for (index, row) in rows.into_iter().enumerate() {
-        for (path, value) in row {
-            columns.entry(path).or_insert_with(|| vec![Value::Null; count])[index] = value;
-        }
-    }
-    let encoded = columns.into_iter().map(|(path, column)| {
-        let mut distinct: HashMap<String, usize> = HashMap::new();
-        let mut values = Vec::new();
-        let mut of = Vec::with_capacity(count);
-        for value in &column {
-            let next = values.len();
-            let index = *distinct.entry(value.to_string()).or_insert(next);
-            if index == next {
-                values.push(value);
-            }
-            of.push(index);
-        }
-        let is_short = 2 * values.len() <= count;
-        (path, if is_short { json!({"values": values, "of": of}) } else { Value::Array(column) })
-    });
-    encoded.collect()
 }
 
 /// A link to a file in the folder of the page, percent-encoded. `None` for a path that leaves that
@@ -216,15 +190,6 @@ mod tests {
         assert_eq!(repeat_command(&of), "medial simplify dataset:bear -m qmat --level 0.25");
         of.dataset = Some("of-others".to_owned());
         assert_eq!(repeat_command(&of), "medial simplify bear -m qmat --level 0.25");
-    }
-
-    #[test]
-    fn columns_keep_every_value_of_every_row() {
-        let rows = [json!({"a": 1, "b": "x"}), json!({"a": 2, "b": "x"}), json!({"b": "x"})];
-        let rows = rows.map(|row| row.as_object().unwrap().clone().into_iter().collect());
-        let columns = columns(rows.into_iter().collect());
-        assert_eq!(columns["a"], json!([1, 2, null]));
-        assert_eq!(columns["b"], json!({"values": ["x"], "of": [0, 0, 0]}));
     }
 
     #[test]

@@ -4,11 +4,10 @@ const resultsOf = (bulk) => {
   const CHUNK = 250;
   const FACETS = ["mesh", "method", "asked", "status"];
   const count = bulk.rows;
-  // A column is one value for each row, or distinct values and the index of each row's.
   const columnOf = (path) => {
     const column = bulk.columns[path];
     if (!column) return () => null;
-    return Array.isArray(column) ? (row) => column[row] : (row) => column.values[column.of[row]];
+    return (row) => column[row];
   };
   const table = { mesh: columnOf("table/mesh"), series: columnOf("table/series"), best: columnOf("table/best") };
   const texts = {};

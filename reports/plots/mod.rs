@@ -15,7 +15,7 @@ use crate::summary::{CountSummary, NativeCurve};
 use crate::text::{grouped, significant};
 
 pub(crate) use self::axis::Scale;
-pub(crate) use self::svg::{FONTS, symbol};
+pub(crate) use self::svg::symbol;
 
 /// A figure before it is drawn. Its horizontal axis is logarithmic.
 pub(crate) struct Figure {

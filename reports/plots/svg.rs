@@ -57,7 +57,7 @@ fn colour(series: usize) -> RGBColor {
 }
 
 /// The fonts that the texts of all figures name, the first one that is there.
-pub(crate) const FONTS: &str = "Helvetica, Arial, sans-serif";
+const FONTS: &str = "Helvetica, Arial, sans-serif";
 
 const FRONT: &str = "not dominated";
 

@@ -69,12 +69,3 @@ pub enum RenderError {
     #[error("PNG: {0}")]
     Png(String),
 }
-
-/// Rejects a picture that is too small to be one, or too large for the exact arithmetic of edges.
-fn check_size([width, height]: [usize; 2]) -> Result<(), RenderError> {
-    let sides = FEWEST_PIXELS..=MOST_PIXELS;
-    match sides.contains(&width) && sides.contains(&height) {
-        true => Ok(()),
-        false => Err(RenderError::Size { width, height }),
-    }
-}

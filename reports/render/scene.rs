@@ -10,7 +10,7 @@ use super::camera::Frame;
 use super::light::{GLASS, Paint, crevices, decode, encode};
 use super::picture::{Background, Picture};
 use super::raster::{Batch, Facet, Kind, Look, PixelLight, rasterise};
-use super::{RenderError, check_size};
+use super::{FEWEST_PIXELS, MOST_PIXELS, RenderError};
 
 /// What a picture is of, but for the camera.
 #[derive(Clone, Debug)]
@@ -106,7 +106,11 @@ impl Scene<'_> {
     /// # Errors
     /// When a side of the picture is out of range, or a layer's values are not one for each vertex.
     pub fn picture(&self, frame: &Frame) -> Result<Picture, RenderError> {
-        check_size(self.size)?;
+        let [width, height] = self.size;
+        // Too small to be a picture, or too large for the exact arithmetic of edges.
+        if !self.size.iter().all(|side| (FEWEST_PIXELS..=MOST_PIXELS).contains(side)) {
+            return Err(RenderError::Size { width, height });
+        }
         let canvas = Canvas {
             frame,
             scale: frame.scale(self.size),
@@ -122,7 +126,6 @@ impl Scene<'_> {
         let pixels = (lights.par_iter().zip(&shares))
             .map(|(light, &share)| composed(light, share, self.background))
             .collect();
-        let [width, height] = self.size;
         Ok(Picture { width, height, pixels })
     }
 }

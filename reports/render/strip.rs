@@ -3,10 +3,10 @@
 use medial::complex::MedialMesh;
 use medial::surface::TriMesh;
 
+use super::RenderError;
 use super::camera::{Camera, Frame};
 use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, text_width};
 use super::scene::{Layer, Scale, Scene};
-use super::{RenderError, check_size};
 use crate::text::{round_up, significant};
 
 /// What medial meshes are coloured by, before the scale is known.
@@ -125,33 +125,32 @@ pub fn strip<'a>(panels: &'a [Panel<'a>], strip: &'a Strip<'a>) -> Result<Pictur
     if panels.is_empty() {
         return Err(RenderError::Empty);
     }
-    check_size(strip.size)?;
     let frame = Frame::fit(&strip.camera, &strip.surface.vertices)?;
     let meshes: Vec<&MedialMesh> = panels.iter().map(|panel| panel.axis).collect();
     let (colour, bar) = strip.colour.of(&meshes, strip.diagonal);
-    let mut rows = vec![];
-    for some in panels.chunks(strip.across.max(1)) {
-        let cells = some.iter().map(|panel| {
-            let axis = Layer::Axis { mesh: panel.axis, colour };
-            Some((vec![axis, Layer::Glass(strip.surface)], &*panel.caption))
-        });
-        rows.push(PanelRow { cells: cells.collect(), bar: None });
-    }
+    let lines = || panels.chunks(strip.across.max(1));
+    let axis = |panel: &'a Panel<'a>| {
+        let axis = Layer::Axis { mesh: panel.axis, colour };
+        Some((vec![axis, Layer::Glass(strip.surface)], &*panel.caption))
+    };
+    let mut rows: Vec<PanelRow<'_>> = lines()
+        .map(|some| PanelRow { cells: some.iter().map(axis).collect(), bar: None })
+        .collect();
     // One bar explains all lines.
     rows[0].bar = bar;
     let errors: Vec<&Errors<'_>> = panels.iter().filter_map(|p| p.errors.as_ref()).collect();
     if !errors.is_empty() {
         let first = rows.len();
         let end = strip.max_error.unwrap_or_else(|| Errors::common_scale(&errors, strip.diagonal));
-        for some in panels.chunks(strip.across.max(1)) {
-            // A panel without errors keeps its place empty: columns stay one medial mesh each.
-            let cells = some.iter().map(|panel| {
-                let Errors { mesh, values, caption } = panel.errors.as_ref()?;
-                let layer = Layer::Values { mesh, values, scale: Scale::errors(end) };
-                Some((vec![layer, Layer::Ghost(strip.surface)], &**caption))
-            });
-            rows.push(PanelRow { cells: cells.collect(), bar: None });
-        }
+        // A panel without errors keeps its place empty: columns stay one medial mesh each.
+        let error = |panel: &'a Panel<'a>| {
+            let Errors { mesh, values, caption } = panel.errors.as_ref()?;
+            let layer = Layer::Values { mesh, values, scale: Scale::errors(end) };
+            Some((vec![layer, Layer::Ghost(strip.surface)], &**caption))
+        };
+        rows.extend(
+            lines().map(|some| PanelRow { cells: some.iter().map(error).collect(), bar: None }),
+        );
         rows[first].bar = Some(Errors::bar(&errors, end, strip.diagonal));
     }
     draw(rows, strip, &frame)

@@ -38,10 +38,6 @@ fn front() -> Camera {
 }
 
 /// A picture with the camera set up by a mesh.
-fn picture_of(layers: Vec<Layer<'_>>, mesh: &TriMesh, background: Background) -> Picture {
-    picture_from(layers, &front(), mesh, [240, 200], background)
-}
-
 fn picture_from(
     layers: Vec<Layer<'_>>,
     camera: &Camera,
@@ -58,7 +54,7 @@ fn picture_from(
 fn a_sphere_is_a_disc() {
     let mesh = sphere(3.0, 48);
     let layers = vec![Layer::Surface(&mesh)];
-    let picture = picture_of(layers, &mesh, Background::Transparent);
+    let picture = picture_from(layers, &front(), &mesh, [240, 200], Background::Transparent);
     let alpha = picture.pixels.iter().map(|pixel| f64::from(pixel[3]) / 255.0);
     let (area, radius) = (alpha.sum::<f64>(), 100.0 - 0.04 * 200.0);
     let expected = PI * radius * radius;
@@ -74,7 +70,7 @@ fn the_middle_of_a_sphere_has_the_light_of_the_lamp() {
     let values = vec![1.0; mesh.vertices.len()];
     let scale = Scale { lo: 0.0, hi: 1.0, map: ColourMap::Viridis };
     let layers = vec![Layer::Values { mesh: &mesh, values: &values, scale }];
-    let picture = picture_of(layers, &mesh, Background::WHITE);
+    let picture = picture_from(layers, &front(), &mesh, [240, 200], Background::WHITE);
     let Some([r, g, b, 255]) = picture.pixel(120, 100) else { panic!("opaque") };
     let full = decode(ColourMap::Viridis.at(1.0));
     let strength =

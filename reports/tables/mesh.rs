@@ -6,7 +6,7 @@ use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::{COMPARED, Metric};
 use crate::summary::pick;
 use crate::tables::{Cell, Table};
-use crate::text::{betti, grouped, known_betti, printable};
+use crate::text::{betti, grouped, printable};
 
 /// The values that the bold numbers equal, by level and key of one of [`COMPARED`].
 pub(crate) struct Best(BTreeMap<(usize, &'static str), f64>);
@@ -86,7 +86,7 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
     }
     rows = rows.text("Betti", |entry| {
         let evaluation = entry.record.evaluate.as_ref();
-        Cell::optional(evaluation.map(|evaluation| betti(evaluation.betti)))
+        Cell::optional(evaluation.map(|evaluation| betti(Some(evaluation.betti))))
     });
     rows = rows.text("as solid", topology_verdict);
     rows = rows.text("remark", remark);
@@ -97,8 +97,8 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
             grouped(initial.spheres),
             grouped(initial.edges),
             grouped(initial.faces),
-            known_betti(initial.betti),
-            known_betti(initial.expected_betti),
+            betti(initial.betti),
+            betti(initial.expected_betti),
         ));
     }
     notes.push(UNITS.to_owned());

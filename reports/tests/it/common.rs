@@ -165,7 +165,12 @@ pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
         status,
         simplify,
         seeds: BTreeMap::from([("evaluation".to_owned(), 7), ("method".to_owned(), 1)]),
-        machine: machine(),
+        machine: Machine {
+            cpu: "Example 9000".to_owned(),
+            cores: 2,
+            os: "Linux x86_64".to_owned(),
+            memory: 8_000_000_000,
+        },
         binary_hash: "3f9c0d".to_owned(),
         command: "medial compare --spheres 1000,500,200,100".to_owned(),
         version: "0.1.0".to_owned(),
@@ -176,16 +181,6 @@ pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
 /// The same with a reason.
 pub fn failed(mesh: &str, method: &str, count: usize, status: Status, reason: &str) -> Record {
     Record { reason: Some(reason.to_owned()), ..asked(mesh, method, count, status) }
-}
-
-/// A machine that never was.
-pub fn machine() -> Machine {
-    Machine {
-        cpu: "Example 9000".to_owned(),
-        cores: 2,
-        os: "Linux x86_64".to_owned(),
-        memory: 8_000_000_000,
-    }
 }
 
 /// A header for made-up records.

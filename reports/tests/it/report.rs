@@ -218,7 +218,9 @@ fn bounds_and_own_levels_have_tables_of_their_own() {
     assert!(svg.contains("angle (native levels)"), "{svg}");
     assert!(svg.contains("font-family=\"Helvetica, Arial, sans-serif\""), "{svg}");
     let [_, bulk] = documents(text(&files, "index.html"));
-    assert!(bulk["columns"]["item/reason"].to_string().contains("the lowest is 1.2 %"));
+    let reasons = bulk["columns"]["item/reason"].as_array().unwrap();
+    assert_eq!((reasons.len(), reasons.iter().filter(|r| !r.is_null()).count()), (32, 1));
+    assert!(reasons.contains(&"the lowest is 1.2 %".into()));
 }
 
 #[test]
@@ -254,9 +256,8 @@ fn a_spreadsheet_finds_no_formula_in_the_csv() {
         assert!(cell.parse::<f64>().is_ok(), "{cell}");
     }
     let cells: Vec<&str> = rows.iter().flat_map(csv::StringRecord::iter).collect();
-    for expected in ["'=HYPERLINK(0)", "'@bear", "'-1 faces", "'+medial"] {
-        assert!(cells.contains(&expected), "{expected}");
-    }
+    let quoted = ["'=HYPERLINK(0)", "'@bear", "'-1 faces", "'+medial"];
+    assert!(quoted.iter().all(|expected| cells.contains(expected)), "{cells:?}");
     // Numbers, the negative ones too, stay numbers.
     assert!(cells.contains(&record.evaluate.unwrap().distances.hausdorff.to_string().as_str()));
     assert!(cells.contains(&"-2"), "the Euler characteristic");
@@ -342,7 +343,7 @@ fn the_bibliography_has_each_method_that_ran_once() {
     assert_eq!(keys, ["@article{qmat,", "@article{angle,", "@misc{medial,"]);
     assert!(bibliography.contains("note = {Version 0.1.0}"), "{bibliography}");
     let [page, _] = documents(text(&files, "index.html"));
-    assert_eq!(page["papers"]["texts"][0][2], bibliography);
+    assert_eq!(page["papers"], bibliography);
     let titles = page["methods"].as_array().unwrap().iter().map(|method| &method["home"]);
     assert_eq!(
         titles.collect::<Vec<_>>(),
