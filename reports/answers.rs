@@ -200,7 +200,7 @@ struct Rank {
 impl Rank {
     fn of(series: usize, values: &Values) -> Self {
         let mut known: Vec<f64> = values.iter().flatten().copied().collect();
-        known.sort_by(f64::total_cmp);
+        known.sort_by(f64::total_cmp); // infinities last
         let middle =
             [known.len().saturating_sub(1) / 2, known.len() / 2].map(|k| known.get(k).copied());
         let median = match middle {
@@ -263,7 +263,7 @@ fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Vec<Cell>> {
     let mut ranks = ranked(&question.values);
     let Some(first) = ranks.first().map(|rank| rank.series) else { return vec![] };
     let mut rows = vec![answer(comparison, question, question.title.clone(), &ranks)];
-    ranks.sort_by(by_meshes);
+    ranks.sort_by(by_meshes); // the second question, of the same methods
     if ranks[0].series != first {
         let title = format!("{}, on the most meshes", question.title);
         rows.push(answer(comparison, question, title, &ranks));
@@ -351,7 +351,7 @@ pub(crate) fn by_bound(comparison: &Comparison<'_>) -> Vec<BoundSummary> {
     let reference = reference(comparison);
     let mut summaries = vec![];
     for (level, target) in comparison.levels.iter().enumerate() {
-        let Target::MaxError(bound) = target else { continue };
+        let Target::MaxError(bound) = target else { continue }; // others have tables of their own
         let yardstick = reference.map_or(vec![], |series| comparison.at(series, level));
         let rows = (0..comparison.series.len())
             .map(|series| (series, comparison.at(series, level)))
@@ -392,7 +392,7 @@ fn median_of(
     value: impl Fn(&Record) -> Option<f64>,
 ) -> Option<f64> {
     let mut values: Vec<f64> = met.iter().filter_map(|entry| value(entry.record)).collect();
-    values.resize(asked, f64::INFINITY);
+    values.resize(asked, f64::INFINITY); // a failure is no cheap result
     // The upper median: at least half of the meshes need no more.
     median(&values).filter(|value| value.is_finite())
 }

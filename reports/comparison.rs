@@ -86,7 +86,7 @@ fn compare_levels(a: Target, b: Target) -> Ordering {
     // Numbers that fall along the order are negated.
     let [a, b] = [a, b].map(|level| match level {
         Target::Spheres(count) => (0, -(count as f64)),
-        Target::MaxError(bound) => (1, -bound),
+        Target::MaxError(bound) => (1, -bound), // loose to tight, as counts get fewer
         Target::Published => (2, 0.0),
         Target::Native(value) => (3, value),
     });
@@ -111,7 +111,7 @@ impl<'a> Comparison<'a> {
             let series = series_keys.1[&SeriesKey::of(record)];
             let level = levels
                 .partition_point(|&level| compare_levels(level, record.simplify.level).is_lt());
-            by_item.insert((mesh, level, series), record);
+            by_item.insert((mesh, level, series), record); // the last one stays
         }
         // The order of the map is that of the tables: by mesh, level and series.
         let entries = by_item
@@ -185,7 +185,7 @@ impl<'a> Comparison<'a> {
 /// The records that count: of one mesh, row and level the last one, whatever build made it. Records
 /// of an older build stay where the newer one has none.
 fn latest_records<'a>(records: &'a [Record], hashes: &Hashes<'a>) -> Vec<&'a Record> {
-    let mut last = BTreeMap::new();
+    let mut last = BTreeMap::new(); // by item, the index of its last record
     for (index, record) in records.iter().enumerate() {
         let level = serde_json::to_string(&record.simplify.level).unwrap_or_default();
         last.insert((hashes.key(record), SeriesKey::of(record).asked(), level), index);
@@ -200,7 +200,7 @@ fn first_seen<K: Ord + Clone>(keys: impl Iterator<Item = K>) -> (Vec<K>, BTreeMa
     let mut index = BTreeMap::new();
     for key in keys {
         index.entry(key.clone()).or_insert_with(|| {
-            order.push(key);
+            order.push(key); // the user's order, which no map keeps
             order.len() - 1
         });
     }
@@ -243,7 +243,7 @@ fn mesh_labels(keys: &[MeshKey<'_>]) -> Vec<String> {
         let hash = short(key.hash.unwrap_or("no hash"));
         labels.push(printable(&match shared {
             true => format!("{} ({hash})", key.name),
-            false => key.name.to_owned(),
+            false => key.name.to_owned(), // hashes are noise where names suffice
         }));
     }
     labels

@@ -96,7 +96,7 @@ impl Header {
             // Variants of a method share its publication, and BibTeX stops at a key that stands twice.
             let entry = note.bibtex.trim();
             if !entry.is_empty() && !entries.iter().any(|known| known == entry) {
-                entries.push(entry.to_owned());
+                entries.push(entry.to_owned()); // in the order of the methods
             }
         }
         let version = self.runs.last().map_or("", |run| &run.version);

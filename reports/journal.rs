@@ -169,7 +169,7 @@ fn to_line(record: &Record) -> Result<String, JournalError> {
         Ok((line, back == *record))
     });
     let message = match written {
-        Ok((line, true)) => return Ok(line + "\n"),
+        Ok((line, true)) => return Ok(line + "\n"), // reads back bit for bit
         Ok((_, false)) => "a number is not finite".to_owned(),
         Err(error) => error.to_string(),
     };

@@ -68,7 +68,7 @@ impl Mean {
 /// The upper median.
 pub(crate) fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
+    sorted.sort_by(f64::total_cmp); // not a number comes last
     sorted.get(sorted.len() / 2).copied()
 }
 
@@ -142,7 +142,7 @@ impl Metric {
     pub(crate) fn format_mean(&self, value: f64) -> String {
         match self.digits {
             Digits::Count => format!("{value:.1}"),
-            _ => self.format(value),
+            _ => self.format(value), // angles and lengths read alike
         }
     }
 
@@ -171,7 +171,7 @@ impl Metric {
         let times = if unit.is_empty() || unit.as_bytes()[0] != b'%' { 1.0 } else { 100.0 };
         Self {
             key,
-            path: key,
+            path: key, // most keys are their own path
             title,
             unit,
             better,
@@ -198,7 +198,7 @@ impl Metric {
 
     /// Takes the direction away: a size.
     const fn neutral(mut self) -> Self {
-        self.better = Better::Neither;
+        self.better = Better::Neither; // no arrow, never bold
         self
     }
 

@@ -65,7 +65,7 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
         let record = entry.record;
         // A file of another program has one number of spheres, whatever that is.
         let at_level = entry.level == level || record.status == Status::External;
-        let shown = at_level && entry.measured();
+        let shown = at_level && entry.measured(); // a caption names the error
         let Some(artifact) = record.artifact.clone().filter(|_| shown) else { continue };
         let mut caption = comparison.series[entry.series].clone();
         if let Some(spheres) = reached(record) {
@@ -76,12 +76,12 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
         }
         let strip = strips.entry(entry.mesh).or_insert_with(|| PictureStrip {
             mesh: comparison.meshes[entry.mesh].clone(),
-            mesh_hash: record.mesh_hash.clone(),
+            mesh_hash: record.mesh_hash.clone(), // the caller finds the surface by it
             file: String::new(),
             view: String::new(),
             panels: vec![],
         });
-        strip.panels.push((artifact, caption));
+        strip.panels.push((artifact, caption)); // in the order of the table
     }
     // A name depends on all panels of the strip.
     for (&mesh, strip) in &mut strips {

@@ -131,7 +131,7 @@ pub(crate) struct OwnSet {
 impl OwnSet {
     /// From each level and mesh that was asked, and whether the result there counts.
     pub(crate) fn of(entries: impl Iterator<Item = (usize, usize, bool)>) -> Self {
-        let mut asked = BTreeSet::new();
+        let mut asked = BTreeSet::new(); // failures included
         let mut reached: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
         for (level, mesh, counts) in entries {
             asked.insert(mesh);
@@ -144,7 +144,7 @@ impl OwnSet {
             let rarest = reached.iter().min_by_key(|(level, meshes)| (meshes.len(), **level));
             match rarest.map(|(&level, _)| level) {
                 Some(rarest) if 2 * meshes.len() < asked || meshes.is_empty() => {
-                    reached.remove(&rarest);
+                    reached.remove(&rarest); // each round drops one, so the loop ends
                 }
                 _ => return Self { levels: reached.into_keys().collect(), meshes, asked },
             }
@@ -163,7 +163,7 @@ impl OwnSet {
         for entry in &comparison.entries {
             let is_own = entry.series == series && self.levels.contains(&entry.level);
             if is_own && metric.of(entry.record).is_none() {
-                known.remove(&entry.mesh);
+                known.remove(&entry.mesh); // at one level unknown, at all levels left out
             }
         }
         known
@@ -182,9 +182,9 @@ fn at_count(
     for (series, set) in sets.iter().enumerate() {
         let entries = comparison.at(series, level);
         if entries.is_empty() {
-            continue;
+            continue; // this method was not requested at this count
         }
-        meshes.extend(entries.iter().map(|entry| entry.mesh));
+        meshes.extend(entries.iter().map(|entry| entry.mesh)); // of any method
         // A count that has no mean leaves no entry.
         let mut kept = entries.clone();
         kept.retain(|entry| {
@@ -201,7 +201,7 @@ fn at_count(
             means.extend(mean.map(|mean| (metric.key, (mean, values.len()))));
         }
         let mut reached = entries.clone();
-        reached.retain(|entry| entry.comparable());
+        reached.retain(|entry| entry.comparable()); // of all meshes, not of the own set
         let statuses = || entries.iter().map(|entry| entry.record.status);
         let failed = statuses().filter(|status| status.is_failure()).count();
         let unsupported = statuses().filter(|&status| status == Status::Unsupported).count();
@@ -301,7 +301,7 @@ fn native_curve(comparison: &Comparison<'_>, series: usize) -> Option<NativeCurv
         kept.retain(|entry| set.meshes.contains(&entry.mesh));
         points.extend(native_point(comparison.levels[level], &kept));
     }
-    points.sort_by(|a, b| b.spheres.total_cmp(&a.spheres));
+    points.sort_by(|a, b| b.spheres.total_cmp(&a.spheres)); // fine to coarse
     let (over, asked) = (set.meshes.len(), set.asked);
     (!points.is_empty()).then_some(NativeCurve { series, over, asked, points })
 }

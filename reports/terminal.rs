@@ -66,7 +66,7 @@ fn start(comparison: &Comparison<'_>) -> String {
     point.map_or_else(String::new, |point| {
         let (hausdorff, mean) =
             (HAUSDORFF.format_mean(point.hausdorff), MEAN_ERROR.format_mean(point.mean));
-        let (right, known) = point.topology;
+        let (right, known) = point.topology; // methods inherit what is wrong here
         format!(
             "initial medial mesh: Hausdorff {hausdorff} %, mean {mean} %, topology right on {right} of {known}\n\n"
         )

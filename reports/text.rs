@@ -100,13 +100,13 @@ pub(crate) fn file_stems<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<St
         let base = base.trim_start_matches('.').trim_end_matches('.');
         let base = if base.is_empty() { "unnamed" } else { base };
         let mut stem = base.to_owned();
-        let mut number = 2;
+        let mut number = 2; // the first one has none
         // Case-insensitive file systems would overwrite `bear` with `Bear`.
         while stems.iter().any(|other| other.eq_ignore_ascii_case(&stem)) {
             stem = format!("{base}-{number}");
             number += 1;
         }
-        stems.push(stem);
+        stems.push(stem); // taken for those that follow
     }
     stems
 }

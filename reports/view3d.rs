@@ -163,7 +163,7 @@ fn refined(mesh: &TriMesh) -> TriMesh {
     while mesh.vertices.len() < REFINED {
         let finer = halved(&mesh, longest);
         if finer.vertices.len() == mesh.vertices.len() {
-            break;
+            break; // no edge was too long
         }
         mesh = finer;
     }
@@ -174,7 +174,7 @@ fn refined(mesh: &TriMesh) -> TriMesh {
 /// comes apart.
 fn halved(mesh: &TriMesh, longest: f64) -> TriMesh {
     let mut vertices = mesh.vertices.clone();
-    let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
+    let mut middles: HashMap<[u32; 2], u32> = HashMap::new(); // looked up, never iterated
     let mut middle = |a: u32, b: u32| {
         let [p, q] = [a, b].map(|v| mesh.vertices[v as usize]);
         (p.distance(q) > longest).then(|| {
@@ -190,7 +190,7 @@ fn halved(mesh: &TriMesh, longest: f64) -> TriMesh {
         let middles = [middle(a, b), middle(b, c), middle(c, a)];
         if let [Some(x), Some(y), Some(z)] = middles {
             faces.extend([[a, x, z], [x, b, y], [z, y, c], [x, y, z]]);
-            continue;
+            continue; // while all edges are long
         }
         // Around the face, the middles of halved sides among its corners.
         let ring = [a, b, c].into_iter().zip(middles).flat_map(|(v, middle)| [Some(v), middle]);
@@ -208,7 +208,7 @@ fn coarsened(mesh: &TriMesh) -> TriMesh {
     let (low, high) = mesh.bounding_box().unwrap_or_default();
     let cell = (CELL * low.distance(high)).max(f64::MIN_POSITIVE);
     let mut vertices = vec![];
-    let mut cells: HashMap<[i64; 3], u32> = HashMap::new();
+    let mut cells: HashMap<[i64; 3], u32> = HashMap::new(); // looked up, never iterated
     let places: Vec<u32> = (mesh.vertices.iter())
         .map(|&vertex| {
             let key = ((vertex - low) / cell).floor().to_array().map(|x| x as i64);

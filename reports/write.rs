@@ -56,7 +56,7 @@ pub fn write_report(
     if !natives.is_empty() {
         means.push(native_table(&comparison, &natives, header, &how));
     }
-    means.retain(|table| !table.rows.is_empty());
+    means.retain(|table| !table.rows.is_empty()); // a study of error bounds alone has none
     let all_means: Vec<Table> = equal_error.iter().chain(&means).cloned().collect();
     files.write_tables("summary", "Summary", &all_means)?;
     if answers.is_some() {
@@ -137,7 +137,7 @@ fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option
     let bytes = fs::read(dir.join(&strip.file)).ok()?;
     Some(match room.checked_sub(bytes.len()) {
         Some(left) => {
-            *room = left;
+            *room = left; // first come, first embedded
             format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes))
         }
         None => format!("./{}", strip.file),
@@ -148,7 +148,7 @@ fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option
 fn view(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<MeshView> {
     let strip = strip?;
     let file = strip.view_file();
-    let script = fs::read_to_string(dir.join(&file)).ok()?;
+    let script = fs::read_to_string(dir.join(&file)).ok()?; // drawn by the caller, if at all
     let text = text_of(&script)?;
     let left = room.checked_sub(text.len());
     *room = left.unwrap_or(*room);
@@ -203,7 +203,7 @@ impl Files<'_> {
         let path = self.dir.join(name);
         replace_file(&path, bytes)
             .map_err(|source| ReportError::Io { path: path.clone(), source })?;
-        self.written.push(path);
+        self.written.push(path); // so that it is not taken for stale
         Ok(())
     }
 

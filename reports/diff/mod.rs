@@ -141,7 +141,7 @@ impl Diff {
         // Stable: within one meaning the order of the pairs remains.
         changes.sort_by_key(|change| change.meaning);
         let (timings, untimed) = timing::timings(&both, &options);
-        let [first, second] = names;
+        let [first, second] = names; // as given, older first
         Self {
             sides: [side(first, old), side(second, new)],
             options,
@@ -172,7 +172,7 @@ fn side(name: String, records: &[Record]) -> Side {
     let [mut versions, mut builds, mut machines] = [const { BTreeSet::new() }; 3];
     for record in records {
         versions.insert(record.version.clone());
-        builds.insert(record.binary_hash.clone());
+        builds.insert(record.binary_hash.clone()); // resumed stores hold several
         machines.insert(record.machine.to_string());
     }
     // Records of external results know no build.

@@ -43,7 +43,7 @@ impl<'a> Pairs<'a> {
         let (old, mut new) = (arranged(old), arranged(new));
         let mut pairs = Self { both: vec![], missing: vec![], added: vec![], unlike: vec![] };
         for (asked, old) in old {
-            let new = new.remove(&asked).unwrap_or_default();
+            let new = new.remove(&asked).unwrap_or_default(); // what is left was added
             for (settings, old) in &old {
                 let item = name(old);
                 match (new.get(settings), new.first_key_value()) {
@@ -123,7 +123,7 @@ const MEMORY: &str = "simplify.peak_bytes";
 /// The changes from one record to the other. Time linear in the length of the records.
 pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
     let mut changes = vec![];
-    let (old, mut new) = (facts(pair.old), facts(pair.new));
+    let (old, mut new) = (facts(pair.old), facts(pair.new)); // sorted by key
     for (what, old) in old {
         let new = new.remove(&what).unwrap_or(Value::Null);
         if old != new {

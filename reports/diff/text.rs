@@ -90,7 +90,7 @@ fn change_table(caption: &str, changes: &[&Change]) -> Table {
 
 fn shown(value: &Value) -> String {
     match value {
-        Value::Null => "none".to_owned(),
+        Value::Null => "none".to_owned(), // appeared or vanished
         Value::String(text) => text.chars().take(16).collect(),
         Value::Number(number) if number.is_f64() => significant(number.as_f64().unwrap_or(0.0), 6),
         other => other.to_string().chars().take(48).collect(),
@@ -124,7 +124,7 @@ fn timing_table(diff: &Diff) -> Table {
          ({:.0} % on a single mesh), in the mean and by the fastest repetitions, with an interval that excludes 1, and \
          nine of ten repetitions on that side. {together}",
         100.0 * options.seconds,
-        200.0 * options.seconds
+        200.0 * options.seconds // one mesh has fewer results to average
     );
     Table { caption: "Seconds".to_owned(), notes: vec![note], ..rows.table }
 }
@@ -147,7 +147,7 @@ fn listed(names: &[ItemName]) -> String {
 /// Why results cannot be compared, each reason once.
 fn unlike(unlike: &[Unlike]) -> String {
     let mut reasons: Vec<&str> = unlike.iter().map(|unlike| unlike.why.as_str()).collect();
-    reasons.sort_unstable();
+    reasons.sort_unstable(); // equal reasons become neighbours
     reasons.dedup();
     let mut text = String::new();
     for why in reasons {

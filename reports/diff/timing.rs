@@ -90,7 +90,7 @@ struct Group<'p, 'a> {
 /// A row for each method over all meshes by each clock, and rows for single meshes where they mean something. And why
 /// some seconds were not compared.
 pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>, Vec<String>) {
-    let mut untimed = Vec::new();
+    let mut untimed = Vec::new(); // reasons, in the order of the checks
     let timed: Vec<&Pair<'_>> = pairs.iter().filter(|pair| same_machine(pair)).collect();
     if timed.len() < pairs.len() {
         untimed.push(format!(
@@ -137,7 +137,7 @@ fn groups<'p, 'a>(pairs: &[&'p Pair<'a>]) -> Vec<Group<'p, 'a>> {
         rows.entry((method, Some(mesh))).or_default().push(pair);
         let most = largest.entry(mesh).or_insert(pair);
         if cpu_of_substrates(pair.old) > cpu_of_substrates(most.old) {
-            *most = pair;
+            *most = pair; // the largest use holds the others
         }
     }
     let mut groups = vec![];
@@ -189,7 +189,7 @@ impl Group<'_, '_> {
                 .iter()
                 .all(|seconds| median(seconds).is_some_and(|typical| typical >= LEAST_SECONDS))
         });
-        let repetitions = pairs.iter().flatten().map(Vec::len).min()?;
+        let repetitions = pairs.iter().flatten().map(Vec::len).min()?; // the same laps of all pairs
         let mean_logarithm = |side: usize, of: &dyn Fn(&[f64]) -> f64| {
             let seconds = pairs.iter().map(|sides| of(&sides[side]).max(f64::MIN_POSITIVE));
             seconds.map(f64::ln).sum::<f64>() / pairs.len() as f64
@@ -247,7 +247,7 @@ impl Shift {
                 new - old
             })
             .collect();
-        means.sort_by(f64::total_cmp);
+        means.sort_by(f64::total_cmp); // percentiles
         let tail = (0.5 * (1.0 - CONFIDENCE) * RESAMPLES as f64) as usize;
         let (mut agreeing, mut compared) = (0, 0);
         for (i, a) in old.iter().enumerate() {

@@ -130,7 +130,7 @@ fn partition(sums: &Sums, sigma: f64) -> Vec<usize> {
             let error = sums.squared_error(start, end) / (sigma * sigma);
             let cost = best[start].0 + error + PENALTY;
             if cost < best[end].0 {
-                best[end] = (cost, start);
+                best[end] = (cost, start); // of equal costs the earliest start
             }
         }
     }
@@ -138,7 +138,7 @@ fn partition(sums: &Sums, sigma: f64) -> Vec<usize> {
     while bounds[bounds.len() - 1] > 0 {
         bounds.push(best[bounds[bounds.len() - 1]].1);
     }
-    bounds.reverse();
+    bounds.reverse(); // followed from the end
     bounds
 }
 

@@ -127,7 +127,7 @@ impl<'a> Findings<'a> {
             runs: (runs.iter())
                 .map(|run| RunName { date: run.date.clone(), commit: run.commit.clone() })
                 .collect(),
-            tracks: tracks.into_values().collect(),
+            tracks: tracks.into_values().collect(), // sorted by series, for equal pages
             regressions: 0,
             change_points: vec![],
             changes: vec![],
@@ -200,7 +200,7 @@ impl<'a> Findings<'a> {
             let [(before, old), (after, new)] = [pair[0], pair[1]];
             for ((what, from), (_, to)) in exact(old).into_iter().zip(exact(new)) {
                 if from == to {
-                    continue;
+                    continue; // nearly always
                 }
                 let ratio = from.as_f64().zip(to.as_f64()).map(|(from, to)| to / from);
                 let worse = match what {

@@ -64,7 +64,7 @@ impl Findings<'_> {
     fn settings(&self) -> Vec<String> {
         let mut settings: Vec<_> = self.tracks.iter().map(|track| track.setting).collect();
         settings.sort_unstable();
-        settings.dedup();
+        settings.dedup(); // one machine needs no mention
         if settings.len() == 1 {
             return vec![];
         }

@@ -100,7 +100,7 @@ impl Run {
         let mut run = Self {
             date: date.to_owned(),
             commit: commit.to_ascii_lowercase(),
-            version: printable(&last.version),
+            version: printable(&last.version), // shown on a page
             machine: machine(&last.machine),
             conditions: conditions(last),
             series: vec![],
@@ -125,7 +125,7 @@ impl Run {
             // Otherwise a first time-out would begin another history.
             point.mesh_hash = hashes.get(&point.mesh).cloned().unwrap_or_default();
         }
-        run.series = series.into_values().collect();
+        run.series = series.into_values().collect(); // sorted, so that equal runs are equal files
         Ok(run)
     }
 
@@ -200,7 +200,7 @@ impl Point {
             mesh: printable(&record.mesh),
             mesh_hash: record.mesh_hash.as_deref().map(first_digits).unwrap_or_default(),
             method: printable(&row_name(record)),
-            level: record.simplify.level.to_string(),
+            level: record.simplify.level.to_string(), // stable across versions
             status: record.status,
             seconds: seconds.filter(|_| record.status.has_result()).and_then(|s| rounded(s, 4)),
             bytes: record.simplify.peak_bytes,

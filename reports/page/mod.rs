@@ -95,7 +95,7 @@ impl Page<'_> {
             library.push_str(&packed("controls", include_str!("vendor/OrbitControls.js")));
         }
         for view in views {
-            let Some(text) = &view.text else { continue };
+            let Some(text) = &view.text else { continue }; // read from its file when opened
             let name = escape_html(&view.name);
             library.push_str(&format!(
                 "<script type=\"text/plain\" class=\"view\" id=\"view-{name}\">{text}</script>\n"
@@ -106,7 +106,7 @@ impl Page<'_> {
             include_str!("table.js"),
             include_str!("plots.js"),
             include_str!("view3d.js"),
-            "start();\n",
+            "start();\n", // after all parts are defined
         ];
         // The parts of the template in their order: no value can be taken for a place of another.
         let parts = [
@@ -123,7 +123,7 @@ impl Page<'_> {
             let (before, after) = rest.split_once(place).expect("the template has each place");
             html.push_str(before);
             html.push_str(&text);
-            rest = after;
+            rest = after; // never searched again: a value may look like a place
         }
         html + rest
     }
@@ -181,7 +181,7 @@ impl Page<'_> {
             }
             // Medians, shares and counts of meshes say nothing about one mesh.
             let mut table = table.clone().without(&["meshes", "better, equal, worse"]);
-            table.notes.clear();
+            table.notes.clear(); // they explain medians
             table.columns[2].title = "result".to_owned();
             table
         });

@@ -77,7 +77,7 @@ pub(super) fn local_link(path: &str) -> Option<String> {
         && !path.contains('\\')
         && path.split('/').all(|part| !part.is_empty() && part != ".." && part != ".");
     if !inside {
-        return None;
+        return None; // no link is better than one that leads out
     }
     let mut link = String::from("./");
     for byte in path.bytes() {
@@ -95,7 +95,7 @@ fn repeat_command(record: &Record) -> String {
     let simplify = &record.simplify;
     let mut words: Vec<String> = ["medial", "simplify"].map(str::to_owned).into();
     words.push(mesh_argument(record));
-    words.extend(["-m".to_owned(), simplify.method.clone()]);
+    words.extend(["-m".to_owned(), simplify.method.clone()]); // params belong to it
     for (key, value) in &simplify.params.0 {
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         words.extend(["--set".to_owned(), format!("{key}={value}")]);

@@ -69,7 +69,7 @@ impl Point {
 impl Figure {
     /// The figure without its empty curves; `None` where no curve is left.
     pub(crate) fn with_points(mut self) -> Option<Self> {
-        self.curves.retain(|curve| !curve.points.is_empty());
+        self.curves.retain(|curve| !curve.points.is_empty()); // no legend without a mark
         (!self.curves.is_empty()).then_some(self)
     }
 
@@ -102,7 +102,7 @@ impl Figure {
         for (index, curve) in self.curves.iter().enumerate().filter(|_| self.front) {
             for (k, p) in curve.points.iter().enumerate() {
                 if p.compared && p.x > 0.0 && p.y.is_finite() {
-                    all.push((p.x, p.y, index, k));
+                    all.push((p.x, p.y, index, k)); // indices break ties
                 }
             }
         }
@@ -114,7 +114,7 @@ impl Figure {
         all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut lowest = f64::INFINITY;
         all.retain(|&(_, y, _, _)| {
-            let is_lower = y < lowest;
+            let is_lower = y < lowest; // strictly: of equal ones the left one stays
             lowest = lowest.min(y);
             is_lower
         });

@@ -88,7 +88,7 @@ impl Figure {
     }
 
     fn draw(&self, x: Axis, y: Axis, area: &Area<'_>) -> Drawn {
-        area.fill(&WHITE)?;
+        area.fill(&WHITE)?; // dark viewers would swallow the ink
         let title = printable(&shortened(&self.title, 76));
         area.draw(&Text::new(title, (28, 40), font(30, HPos::Left)))?;
         let (_, below) = area.split_vertically(68);
@@ -118,7 +118,7 @@ impl Figure {
             .y_desc(&self.y.0)
             .draw()?;
         let inner = chart.plotting_area().strip_coord_spec();
-        let mut taken = Vec::new();
+        let mut taken = Vec::new(); // shared by all curves: tags of two must not meet
         for curve in &self.curves {
             let stroke = colour(curve.series).stroke_width(4);
             let line = curve.points.iter().map(|point| (point.x, point.y));
@@ -132,7 +132,7 @@ impl Figure {
                 let (left, top) = chart.backend_coord(&(point.x, point.y));
                 // Relative to the plot, without its margins.
                 let at = (left - inner.get_base_pixel().0, top - inner.get_base_pixel().1);
-                draw_marker(&inner, curve.series, at)?;
+                draw_marker(&inner, curve.series, at)?; // above its own line
                 let free = point.tag.as_ref().and_then(|tag| free_place(at, tag, &mut taken));
                 if let (Some(tag), Some(at)) = (&point.tag, free) {
                     let text = Text::new(tag.clone(), at, font(20, HPos::Left));
@@ -165,7 +165,7 @@ impl Figure {
             }
             draw_marker(area, curve.series, (24, y))?;
             area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))?;
-            y += LEGEND_ROW;
+            y += LEGEND_ROW; // unlabelled curves take no row
         }
         if has_front {
             area.draw(&PathElement::new(vec![(0, y), (48, y)], INK.stroke_width(2)))?;

@@ -77,7 +77,7 @@ fn standing_axes(mesh: &TriMesh) -> [Vec3; 3] {
         // The longest extent lies across, the shortest is looked along. Signs were chosen one by one, so the third
         // axis as found may make a left-handed system.
         let [across, up, _] = principal;
-        return [across, up, across.cross(up)];
+        return [across, up, across.cross(up)]; // right-handed
     }
     // y is up in most files of shapes. Where a shape is flat along y, z must be.
     if y < x.min(z) {
@@ -169,7 +169,7 @@ impl Frame {
             along.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), x| (lo.min(x), hi.max(x)))
         });
         if ranges.iter().any(|(lo, hi)| lo > hi) {
-            return Err(RenderError::Empty);
+            return Err(RenderError::Empty); // no point was finite
         }
         let middle = ranges.map(|(lo, hi)| 0.5 * (lo + hi));
         let half = [0, 1].map(|k: usize| 0.5 * (ranges[k].1 - ranges[k].0));

@@ -102,7 +102,7 @@ impl Lamp {
         let side = if normal.dot(self.back) < 0.0 { -1.0 } else { 1.0 };
         // A face without area has no normal, and is lit from everywhere alone.
         let length = normal.length().max(f64::MIN_POSITIVE);
-        let toward_lamp = side * normal.dot(self.direction) / length;
+        let toward_lamp = side * normal.dot(self.direction) / length; // not yet of length 1
         let strength = AMBIENT + (1.0 - AMBIENT) * toward_lamp.max(0.0) as f32;
         colour.map(|c| c * strength)
     }
@@ -150,7 +150,7 @@ pub(super) fn crevices(pixels: &[PixelLight], [width, height]: [usize; 2]) -> Ve
     };
     let share = |(index, here): (usize, &PixelLight)| {
         if here.covered == 0.0 {
-            return 1.0;
+            return 1.0; // background has no crevice
         }
         let (x, y) = ((index % width) as i64, (index / width) as i64);
         let mut hidden = 0.0;

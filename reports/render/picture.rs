@@ -95,7 +95,7 @@ impl Picture {
 
     /// Writes text that begins at a point on its baseline. `size` is the height of a capital, in pixels.
     pub(super) fn write(&mut self, [x, y]: [f64; 2], text: &str, size: f64, ink: [u8; 3]) {
-        let mut pen = x;
+        let mut pen = x; // in fractions of a pixel
         for character in text.chars() {
             let (metrics, texels) = FONT.rasterize(character, FINE as f32 * em(size) as f32);
             // The glyph is drawn FINE times too large and averaged, so that letters keep their distances.
@@ -135,7 +135,7 @@ impl Picture {
         let mut encoder = Encoder::new(&mut bytes, self.width as u32, self.height as u32);
         encoder.set_color(if opaque { ColorType::Rgb } else { ColorType::Rgba });
         encoder.set_depth(BitDepth::Eight);
-        encoder.set_compression(Compression::Balanced);
+        encoder.set_compression(Compression::Balanced); // smaller takes longer than drawing
         (encoder.write_header())
             .and_then(|mut writer| writer.write_image_data(&data).and_then(|()| writer.finish()))
             .map_err(|error| RenderError::Png(error.to_string()))?;
@@ -173,7 +173,7 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
 /// Text cut so that it is not wider than `most`, with dots at the cut.
 pub(super) fn fitted(text: &str, size: f64, most: f64) -> String {
     if text_width(text, size) <= most {
-        return text.to_owned();
+        return text.to_owned(); // nearly always
     }
     let ends = text.char_indices().rev().map(|(end, _)| format!("{}…", &text[..end]));
     ends.into_iter().find(|cut| text_width(cut, size) <= most).unwrap_or_default()

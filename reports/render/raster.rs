@@ -100,7 +100,7 @@ pub(super) fn rasterise(batches: Vec<Batch>, frame: &Frame, size: [usize; 2]) ->
         facets.par_extend(
             some.into_par_iter().filter_map(|f| PlacedFacet::new(&project, id as u32, f)),
         );
-        looks.push(look);
+        looks.push(look); // by the number of its batch
     }
     let line = (LINE_WIDTH * size[0].min(size[1]) as f64).max(LEAST_LINE);
     let half_line = 0.5 * line * (STEPS * SIDE as i64) as f64;
@@ -203,7 +203,7 @@ impl Band {
             let sample = (row - top) * columns + column;
             if nearness > self.nearness[sample] {
                 self.nearness[sample] = nearness;
-                self.front[sample] = id;
+                self.front[sample] = id; // of equal depth the first one stays
             }
         });
     }
@@ -246,7 +246,7 @@ impl Band {
                 share.mask |= 1 << k;
             }
             let depth = -self.nearness[sample] as f32;
-            sum.covered += 1.0;
+            sum.covered += 1.0; // whatever glass is in front
             sum.depth += depth;
             sum.farthest = sum.farthest.max(depth);
         }

@@ -208,7 +208,7 @@ impl Layer<'_> {
                 return Ok(());
             }
         };
-        batches.push(Batch { facets, look });
+        batches.push(Batch { facets, look }); // of equal depth the earlier layer stays
         Ok(())
     }
 }
@@ -406,7 +406,7 @@ fn sharp_sides(mesh: &TriMesh, flat: &[Vec3]) -> Vec<[bool; 3]> {
             ([a.min(b), a.max(b)], side)
         })
         .collect();
-    sides.par_sort_unstable();
+    sides.par_sort_unstable(); // no two are equal, so the order is one
     // An edge with one face, or with more than two, is always sharp.
     let edges = sides.chunk_by(|a, b| a.0 == b.0).filter(|edge| match edge {
         [(_, a), (_, b)] => flat[a / 3].dot(flat[b / 3]) <= smooth,

@@ -55,7 +55,7 @@ impl Errors<'_> {
         let mut ends: Vec<f64> = (all.iter())
             .map(|errors| {
                 let mut sizes: Vec<f64> = errors.values.iter().map(|value| value.abs()).collect();
-                sizes.sort_by(f64::total_cmp);
+                sizes.sort_by(f64::total_cmp); // a total order: the same scale each time
                 let place = (sizes.len().saturating_sub(1) as f64 * SPANNED) as usize;
                 sizes.get(place).copied().unwrap_or(0.0)
             })

@@ -27,7 +27,7 @@ const LAST: &str = "diagonal evaluation_seed evaluate_seconds betti_0 betti_1 be
 /// Beginnings of paths that are no part of a column's name, and their replacement. The first one
 /// that fits counts.
 const NAMES: [(&str, &str); 10] = [
-    ("evaluate/seed", "evaluation_seed"),
+    ("evaluate/seed", "evaluation_seed"), // `seed` is the method's
     ("evaluate/quality/", ""),
     ("evaluate/counts/", ""),
     ("evaluate/spikes/", ""),
@@ -42,13 +42,13 @@ const NAMES: [(&str, &str); 10] = [
 /// Parts that other columns hold, or one column as JSON because their keys are names.
 const SKIPPED: [&str; 11] = [
     "simplify/status",
-    "simplify/version",
+    "simplify/version", // that of the record
     "simplify/level",
     "simplify/warnings",
     "simplify/params",
     "simplify/diagnostics",
     "evaluate/warnings",
-    "evaluate/counts/spheres",
+    "evaluate/counts/spheres", // those of `simplify`
     "evaluate/counts/edges",
     "evaluate/counts/faces",
     "item/seeds",
@@ -77,7 +77,7 @@ fn descend(path: String, value: Value, values: &mut Vec<(String, Value)>) {
                 descend(format!("{path}/{key}"), value, values);
             }
         }
-        value => values.push((path, value)),
+        value => values.push((path, value)), // lists stay whole
     }
 }
 
@@ -92,9 +92,9 @@ pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error>
         .collect();
     let found: BTreeSet<&str> = rows.iter().flatten().map(|(name, _)| name.as_str()).collect();
     let further: Vec<&str> = found.into_iter().filter(|name| !columns.contains(name)).collect();
-    columns.extend(further);
+    columns.extend(further); // such as substrates, whose names vary
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(&columns)?;
+    writer.write_record(&columns)?; // also without a row
     for row in &rows {
         writer
             .write_record(columns.iter().map(|&name| row.get(name).map_or("", String::as_str)))?;

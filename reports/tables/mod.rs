@@ -206,7 +206,7 @@ pub(crate) fn to_latex(table: &Table, label: &str) -> String {
     for note in &table.notes {
         text.push_str(&format!("% {}\n", printable(note)));
     }
-    text.push_str(RULES);
+    text.push_str(RULES); // harmless in a document that has booktabs
     text.push_str("\\begin{table}\n\\centering\n\\scriptsize\n\\setlength{\\tabcolsep}{3pt}\n");
     let caption = escape_latex(&table.caption);
     text.push_str(&format!("\\caption{{{caption}}}\n\\label{{tab:{label}}}\n\\sbox0{{%\n"));
@@ -220,7 +220,7 @@ pub(crate) fn to_latex(table: &Table, label: &str) -> String {
         if group.is_none_or(|group: &str| table.grouped && group != row[0].text) {
             text.push_str("\\midrule\n");
         }
-        group = Some(&row[0].text);
+        group = Some(&row[0].text); // rows come sorted by it
         let cells = row.iter().map(|cell| {
             let text = escape_latex(&cell.text);
             if cell.best { format!("\\textbf{{{text}}}") } else { text }
