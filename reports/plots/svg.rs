@@ -2,7 +2,7 @@
 //! the right of the data.
 //!
 //! The first colours are those of Okabe and Ito (2008, "Color universal design") without black and
-//! yellow, which vanish on a dark or a light page, and with three of Paul Tol's muted scheme. A
+//! yellow, which vanish on a dark or a light page, and with three of Paul Tol's that show on both. A
 //! method keeps its colour and its marker in every figure of a report.
 
 use std::error::Error;
@@ -25,8 +25,8 @@ const INK: RGBColor = RGBColor(0x20, 0x21, 0x24);
 const GRID: RGBColor = RGBColor(0xE3, 0xE5, 0xE8);
 
 const COLOURS: [u32; 12] = [
-    0x0072B2, 0xD55E00, 0x009E73, 0xCC79A7, 0xE69F00, 0x56B4E9, 0x882255, 0x999933, 0x777777,
-    0x6A51A3, 0x44AA99, 0xA65628,
+    0x0072B2, 0xD55E00, 0x009E73, 0xCC79A7, 0xE69F00, 0x56B4E9, 0xAA3377, 0x999933, 0x777777,
+    0x8073AC, 0x44AA99, 0xA65628,
 ];
 
 /// Markers by the page's names of symbols, and whether they are hollow.
