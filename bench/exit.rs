@@ -108,11 +108,8 @@ impl From<PlanError> for Failure {
 impl From<PublicError> for Failure {
     fn from(error: PublicError) -> Self {
         match error {
-            PublicError::Unknown { .. }
-            | PublicError::Missing { .. }
-            | PublicError::Name { .. }
-            | PublicError::NoFolder => Self::usage(error),
-            _ => Self::input(error),
+            PublicError::File { .. } => Self::input(error),
+            _ => Self::usage(error),
         }
     }
 }

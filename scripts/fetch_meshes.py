@@ -183,7 +183,13 @@ def module_to_off(data):
 
 def take(archive, meshes, folder, fetched, problems):
     """Store the meshes of an archive whose content matches the catalogue. Returns the number of
-    files that the catalogue lists."""
+    files that the catalogue lists. A file that is a mesh itself is known by its content."""
+    data = archive.read_bytes()
+    for mesh in meshes:
+        if mesh["sha256"] == digest(data):
+            store(folder, mesh, data)
+            fetched.append(mesh["name"])
+            return 1
     by_path, listed = {}, 0
     for mesh in meshes:
         by_path.setdefault(mesh["path"], []).append(mesh)
@@ -225,7 +231,7 @@ def main():
     parser.add_argument("--cache", type=Path, default=default_cache())
     parser.add_argument("--catalogue", type=Path, default=default_catalogue())
     parser.add_argument("--from", dest="archives", action="append", default=[], type=Path,
-                        metavar="ARCHIVE", help="take meshes from this archive, fetch nothing")
+                        metavar="ARCHIVE", help="take meshes from this archive or file, fetch nothing")
     parser.add_argument("--timeout", type=float, default=600, metavar="SECONDS",
                         help="end a client after SECONDS [600]")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -263,7 +269,7 @@ def main():
         missing = [mesh for mesh in wanted.values()
                    if mesh["package"] == package["id"] and not is_stored(folder, mesh)]
         if missing and package["id"].startswith("file:"):
-            reason = f"in no package; get it from {package['id'][5:]}, then `medial datasets add`"
+            reason = f"in no package; get it from {package['id'][5:]} and pass it with --from"
             problems.update((mesh["name"], reason) for mesh in missing)
         elif missing:
             print(f"{package['id']} {package['version']}: {len(missing)} missing", file=sys.stderr)

@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: the built-in shapes that
     /// `datasets list` says].
     meshes: Vec<MeshArgument>,
-    /// A set of meshes beside those named: `builtin`, `public`, `defective`, `small`, `papers`, `added`, a package as in
+    /// A set of meshes beside those named: `builtin`, `public`, `defective`, `small`, `papers`, a package as in
     /// `deb:libcgal-demo`, or the name of one mesh; can be given several times.
     #[arg(long, value_name = "SET")]
     dataset: Vec<String>,

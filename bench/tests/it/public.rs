@@ -296,30 +296,17 @@ fn sets_are_compared_under_their_names() {
 }
 
 #[test]
-fn a_users_file_is_recognised() {
+fn a_users_copy_is_recognised_by_its_content() {
     let machine = Machine::new();
+    let (code, _, stderr) = machine.run(&["info", "dataset:cap"]);
+    assert!(code == 2 && stderr.contains("fetch --from FILE"), "{stderr}");
     fs::write(machine.at("Some Name.off"), content("cap")).expect("written");
-    let (code, object, _) = machine.json(&["datasets", "add", "Some Name.off"]);
-    assert_eq!(code, 0);
-    assert_eq!(object["known"], "cap");
+    let (code, object, _) = machine.json(&["datasets", "fetch", "cap", "--from", "Some Name.off"]);
+    assert_eq!((code, &object["fetched"]), (0, &serde_json::json!(["cap"])), "{object}");
     assert_eq!(machine.run(&["info", "dataset:cap"]).0, 0);
-
     let compare = ["compare", "--methods", "qmat", "--spheres", "10", "--counts-only", "--quiet"];
-    let (code, ..) =
-        machine.run(&[&compare[..], &["--samples", "200", "--dataset", "papers"]].concat());
-    assert_eq!(code, 0);
+    let words = [&compare[..], &["--samples", "200", "--dataset", "papers"]].concat();
+    assert_eq!(machine.run(&words).0, 0);
     let records = records(&machine.at("medial-report"));
     assert_eq!((&records[0]["mesh"], &records[0]["dataset"]), (&"cap".into(), &"papers".into()));
-
-    // What nobody knows has the name of its file, unless that is another's.
-    fs::write(machine.at("ball.off"), off("ellipsoid", 10)).expect("written");
-    let (code, _, stderr) = machine.run(&["datasets", "add", "ball.off"]);
-    assert!(code == 2 && stderr.contains("give another `--name`"), "{stderr}");
-    let (code, object, _) = machine.json(&["datasets", "add", "ball.off", "--name", "mine"]);
-    assert_eq!((code, &object["known"]), (0, &Value::Null), "{object}");
-    let (_, object, _) = machine.json(&["datasets", "list"]);
-    assert_eq!(object["added"].as_array().map(Vec::len), Some(2), "{object}");
-    fs::write(machine.at("bad.off"), "OFF\n1 1\n").expect("written");
-    let (code, _, stderr) = machine.run(&["datasets", "add", "bad.off"]);
-    assert!(code == 1 && stderr.contains("bad.off"), "{stderr}");
 }
