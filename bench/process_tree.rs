@@ -192,6 +192,28 @@ fn pid_of(pid: u32) -> Option<rustix::process::Pid> {
     rustix::process::Pid::from_raw(i32::try_from(pid).ok()?)
 }
 
+/// What a signal means to the author of a method. Numbers that are not listed differ between systems.
+pub fn signal_name(signal: i32) -> String {
+    let name = match signal {
+        1 => "SIGHUP",
+        2 => "SIGINT",
+        3 => "SIGQUIT",
+        4 => "SIGILL, an illegal instruction",
+        5 => "SIGTRAP",
+        6 => "SIGABRT: it gave up by itself",
+        8 => "SIGFPE, an impossible computation",
+        9 => "SIGKILL; the system may have done so for lack of memory",
+        11 => "SIGSEGV, an access to memory that is not its own",
+        13 => "SIGPIPE",
+        14 => "SIGALRM",
+        15 => "SIGTERM",
+        24 => "SIGXCPU, a limit of processor time",
+        25 => "SIGXFSZ, a limit of the size of files",
+        _ => return format!("signal {signal}"),
+    };
+    name.to_owned()
+}
+
 /// The children of a process, as the kernel lists them for each of its threads.
 fn children(pid: u32) -> Option<Vec<u32>> {
     let mut children = Vec::new();

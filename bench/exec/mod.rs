@@ -26,6 +26,7 @@ use crate::exec::protocol::{CheckItem, Event, Request};
 use crate::exec::worker::{Said, Worker, WorkerOptions};
 use crate::measure::answer::Fault;
 use crate::measure::failure_record;
+use crate::process_tree::signal_name;
 use crate::provenance::Provenance;
 use crate::study::item::{Item, Limits, SceneSpec};
 
@@ -461,29 +462,11 @@ pub fn ended(
 fn how_it_ended(status: ExitStatus) -> String {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        let name = signal_name(signal);
-        let by =
-            if signal == 9 { " (by the system for lack of memory, or by somebody)" } else { "" };
-        return format!("its process was ended by signal {signal}{name}{by}");
+        return format!("its process was ended by {}", signal_name(signal));
     }
     match status.code() {
         Some(code) => format!("its process ended itself with exit code {code}"),
         None => "its process ended".to_owned(),
-    }
-}
-
-/// The name of a signal that methods meet, in parentheses.
-fn signal_name(signal: i32) -> &'static str {
-    match signal {
-        4 => " (SIGILL)",
-        6 => " (SIGABRT)",
-        7 => " (SIGBUS)",
-        8 => " (SIGFPE)",
-        9 => " (SIGKILL)",
-        11 => " (SIGSEGV)",
-        15 => " (SIGTERM)",
-        25 => " (SIGXFSZ)",
-        _ => "",
     }
 }
 

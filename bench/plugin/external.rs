@@ -1,10 +1,12 @@
 //! A program as a method: its parameters and files, its command, and the meaning of its exit code, its output and its
 //! last words.
 
-use std::fs::{self, File};
+use std::collections::BTreeMap;
+use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitStatus};
+use std::sync::Arc;
 
 use medial::complex::{self, MedialMesh, Radii, ReadOptions};
 use medial::shape::Shape;
@@ -13,12 +15,15 @@ use medial::simplifier::{
     Simplified, SimplifyError,
 };
 use medial::surface::{self, TriMesh};
-use serde_json::{Value, json};
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
-use super::declaration::{AnswerUnits, Declaration, LevelKind, Word};
+use super::declaration::{Declaration, LevelKind, OutputUnits, Word};
 use super::program::{self, Ended, NoEnd};
+use crate::process_tree::signal_name;
+use crate::provenance::hex;
 
 /// Variable of the environment that names the folder in which temporary folders are made.
 pub const SCRATCH: &str = "MEDIAL_SCRATCH";
@@ -31,15 +36,13 @@ pub const SCRATCH: &str = "MEDIAL_SCRATCH";
 #[derive(Debug)]
 pub struct External {
     info: MethodInfo,
-    declaration: Declaration,
-    /// Where the program runs, and relative paths start.
-    folder: PathBuf,
+    declaration: Arc<Declaration>,
     fingerprint: String,
 }
 
 impl External {
-    pub(super) fn new(declaration: Declaration, folder: &Path) -> io::Result<Self> {
-        let fingerprint = fingerprint(&declaration, folder)?;
+    pub(super) fn new(declaration: Declaration) -> io::Result<Self> {
+        let fingerprint = fingerprint(&declaration)?;
         let mut info = MethodInfo::new(declaration.id.clone(), declaration.title.clone())
             .citation(declaration.citation.clone())
             .summary(format!("An external program: {}.", declaration.written.join(" ")))
@@ -50,7 +53,7 @@ impl External {
         if declaration.levels.contains(&LevelKind::Published) {
             info = info.published("what the program does without a level");
         }
-        Ok(Self { info, declaration, folder: folder.to_owned(), fingerprint })
+        Ok(Self { info, declaration: Arc::new(declaration), fingerprint })
     }
 
     /// SHA-256 over the declaration and the files that its command names: an edited script is not
@@ -119,31 +122,15 @@ impl MedialSimplifier for External {
         }
         values.push(("seed".to_owned(), run.seed.to_string()));
         values.push(("threads".to_owned(), rayon::current_num_threads().to_string()));
-        let Declaration { id, levels, program, arguments, fit, .. } = &self.declaration;
-        Ok(Box::new(Prepared {
-            shape,
-            id: id.clone(),
-            levels: levels.clone(),
-            fits: *fit == AnswerUnits::Auto,
-            program: program.clone(),
-            arguments: arguments.clone(),
-            folder: self.folder.clone(),
-            values,
-            run: run.clone(),
-            scratch,
-        }))
+        let declaration = Arc::clone(&self.declaration);
+        Ok(Box::new(PreparedProgram { shape, declaration, values, run: run.clone(), scratch }))
     }
 }
 
 /// One shape in files.
-struct Prepared<'s> {
+struct PreparedProgram<'s> {
     shape: &'s Shape,
-    id: String,
-    levels: Vec<LevelKind>,
-    fits: bool,
-    program: PathBuf,
-    arguments: Vec<Word>,
-    folder: PathBuf,
+    declaration: Arc<Declaration>,
     /// Every placeholder but those of a level, with its text.
     values: Vec<(String, String)>,
     run: RunContext,
@@ -151,11 +138,11 @@ struct Prepared<'s> {
     scratch: TempDir,
 }
 
-impl Simplification for Prepared<'_> {
+impl Simplification for PreparedProgram<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         self.check(level)?;
         let output = self.scratch.path().join("output.ma");
-        // What an earlier level left there must not be taken for the answer to this one.
+        // What an earlier level left there must not be taken for the output at this one.
         match fs::remove_file(&output) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 return Err(cannot("clear {output}", error));
@@ -166,24 +153,24 @@ impl Simplification for Prepared<'_> {
             Ok(ended) => ended,
             Err(NoEnd::Cancelled) => return Err(SimplifyError::Cancelled),
             Err(NoEnd::System(error)) => {
-                return Err(cannot(&format!("run {}", self.program.display()), error));
+                let program = self.declaration.program.display();
+                return Err(cannot(&format!("run {program}"), error));
             }
         };
-        let Self { id, shape, fits, .. } = self;
-        answer(&Task { id, shape, level, output: &output, fits: *fits }, ended)
+        check_status(&self.declaration.id, ended.status, &ended.stderr)?;
+        self.result(level, &output, &ended)
     }
 }
 
-impl Prepared<'_> {
+impl PreparedProgram<'_> {
     fn check(&self, level: Level) -> Result<(), SimplifyError> {
-        if !self.levels.contains(&LevelKind::of(level)) {
-            let known: Vec<&str> = self.levels.iter().map(|kind| kind.name()).collect();
-            let why = format!(
-                "the plug-in {} is not asked for {level}: its levels are {}",
-                self.id,
-                known.join(", ")
-            );
-            return Err(SimplifyError::unsupported(why));
+        let Declaration { id, levels, .. } = &*self.declaration;
+        if !levels.contains(&LevelKind::of(level)) {
+            let known: Vec<String> = levels.iter().map(|kind| kind.name()).collect();
+            let known = known.join(", ");
+            return Err(SimplifyError::unsupported(format!(
+                "the plug-in {id} is not asked for {level}: its levels are {known}"
+            )));
         }
         match level {
             Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
@@ -195,8 +182,8 @@ impl Prepared<'_> {
     }
 
     fn command(&self, level: Level, output: &Path) -> Command {
-        let mut command = Command::new(&self.program);
-        for word in &self.arguments {
+        let mut command = Command::new(&self.declaration.program);
+        for word in &self.declaration.arguments {
             command.arg(word.fill(|name| match (name, level) {
                 ("output", _) => output.to_string_lossy().into_owned(),
                 ("spheres", Level::Spheres(count)) => count.to_string(),
@@ -208,8 +195,88 @@ impl Prepared<'_> {
                 }
             }));
         }
-        command.current_dir(&self.folder);
+        command.current_dir(&self.declaration.folder);
         command
+    }
+
+    /// The result of a program that says that it is done.
+    fn result(
+        &self,
+        level: Level,
+        output: &Path,
+        ended: &Ended,
+    ) -> Result<Simplified, SimplifyError> {
+        let (mesh, notes) = self.read(output)?;
+        let report = Report::of(&ended.stdout);
+        let mut simplified = Simplified::new(mesh, level);
+        simplified.native_level = match level {
+            Level::Native(value) => report.native_level.or(Some(value)),
+            _ => report.native_level,
+        };
+        let diagnostics = &mut simplified.diagnostics;
+        report.warnings.into_iter().chain(notes).for_each(|warning| diagnostics.warn(warning));
+        if ended.strays > 0 {
+            let (count, were) = (ended.strays, if ended.strays == 1 { "was" } else { "were" });
+            diagnostics.warn(format!(
+                "the program had left {count} of its processes behind, which {were} ended"
+            ));
+        }
+        simplified.extras.insert(ProgramPeak(ended.peak));
+        if let Some(seconds) = report.seconds {
+            simplified.extras.insert(seconds);
+        }
+        Ok(simplified)
+    }
+
+    /// The medial mesh of the output in normalised units, and what was repaired.
+    fn read(&self, output: &Path) -> Result<(MedialMesh, Vec<String>), SimplifyError> {
+        let invalid = |why: String| Err(SimplifyError::InvalidOutput(why));
+        let metadata = match fs::metadata(output) {
+            Err(_) => return invalid("exit 0, but no file at {output}".to_owned()),
+            // A device or a pipe could be read without end.
+            Ok(metadata) if !metadata.is_file() => {
+                return invalid("exit 0, but what is at {output} is not a file".to_owned());
+            }
+            Ok(metadata) => metadata,
+        };
+        let bytes = metadata.len();
+        if bytes > LARGEST_OUTPUT {
+            return invalid(format!(
+                "the file at {{output}} has {bytes} bytes, {LARGEST_OUTPUT} at most"
+            ));
+        }
+        let bytes = match fs::read(output) {
+            Ok(bytes) => bytes,
+            Err(error) => return invalid(format!("the file at {{output}}: {error}")),
+        };
+        let strict = ReadOptions { radii: Radii::NotNegative, ..ReadOptions::default() };
+        let mut loaded = match complex::parse_ma_with(bytes, "", strict) {
+            Ok(loaded) => loaded,
+            Err(error) => {
+                // The file's name is a temporary one and says nothing.
+                let line = error.line.map_or_else(String::new, |line| format!(", line {line}"));
+                return invalid(format!("the file at {{output}}{line}: {}", error.kind));
+            }
+        };
+        if self.declaration.fit == OutputUnits::Auto
+            && let Some(fit) = self.shape.fit_if_needed(&loaded.mesh)?
+        {
+            loaded.mesh = fit.similarity.mesh(&loaded.mesh);
+            loaded.notes.push(format!("fitted: {fit}"));
+        }
+        let normal = self.shape.normalisation();
+        let mesh = loaded.mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p));
+        mesh.check()?;
+        for (id, sphere) in mesh.spheres.iter().enumerate() {
+            let reach = sphere.centre.abs().max_element().max(sphere.radius);
+            if reach > LARGEST_SPHERE {
+                return invalid(format!(
+                    "sphere {id} reaches {reach:.1e} diagonals of the surface away from it: write the units of \
+                     {{surface}}"
+                ));
+            }
+        }
+        Ok((mesh, loaded.notes))
     }
 }
 
@@ -243,39 +310,23 @@ fn text_like(value: &Value, default: &str) -> Result<String, &'static str> {
 }
 
 /// SHA-256 of a declaration and of every file that a word of its command names.
-fn fingerprint(declaration: &Declaration, folder: &Path) -> io::Result<String> {
+fn fingerprint(declaration: &Declaration) -> io::Result<String> {
     let Declaration { id, title, citation, levels, native, params, written, fit, .. } = declaration;
     let declared = json!([id, title, citation, levels, native, params, written, fit]);
     let mut hasher = Sha256::new();
     hasher.update(declared.to_string());
-    let words = declaration.arguments.iter().filter_map(Word::plain).map(|word| folder.join(word));
+    let words = declaration.arguments.iter().filter_map(Word::plain);
+    let words = words.map(|word| declaration.folder.join(word));
     // A program from PATH is part of the machine, one beside the file is part of the plug-in.
     let own = written.first().is_some_and(|program| program.contains('/'));
     let files = own.then(|| declaration.program.clone()).into_iter().chain(words);
     for (place, file) in files.enumerate().filter(|(_, file)| file.is_file()) {
-        hasher.update(format!("\n{place} {}\n", fs::metadata(&file)?.len()));
-        io::copy(&mut File::open(&file)?, &mut Hashed(&mut hasher))?;
+        let bytes = fs::read(&file)?;
+        // With its place and its length: otherwise bytes could move from one file to the next unnoticed.
+        hasher.update(format!("\n{place} {}\n", bytes.len()));
+        hasher.update(bytes);
     }
-    Ok(hexadecimal(&hasher.finalize()))
-}
-
-/// Bytes of a digest as text.
-pub(super) fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Hashes what is written.
-struct Hashed<'a>(&'a mut Sha256);
-
-impl io::Write for Hashed<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.update(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
+    Ok(hex(&hasher.finalize()))
 }
 
 /// Exit code of a program that does not do what it was asked, which is an answer and no failure.
@@ -288,41 +339,6 @@ const LARGEST_SPHERE: f64 = 1e12;
 /// Most resident bytes of a program and its descendants together, as far as they were looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProgramPeak(pub u64);
-
-/// What a program was asked for.
-struct Task<'a> {
-    id: &'a str,
-    shape: &'a Shape,
-    level: Level,
-    output: &'a Path,
-    /// Whether the answer may be in other units, which are then found.
-    fits: bool,
-}
-
-/// The result of a program that has ended.
-fn answer(task: &Task<'_>, ended: Ended) -> Result<Simplified, SimplifyError> {
-    check_status(task.id, ended.status, &ended.stderr)?;
-    let (mesh, notes) = read(task)?;
-    let report = Report::of(&ended.stdout);
-    let mut simplified = Simplified::new(mesh, task.level);
-    simplified.native_level = match task.level {
-        Level::Native(value) => report.native_level.or(Some(value)),
-        _ => report.native_level,
-    };
-    let diagnostics = &mut simplified.diagnostics;
-    report.warnings.into_iter().chain(notes).for_each(|warning| diagnostics.warn(warning));
-    if ended.strays > 0 {
-        let (count, were) = (ended.strays, if ended.strays == 1 { "was" } else { "were" });
-        diagnostics.warn(format!(
-            "the program had left {count} of its processes behind, which {were} ended"
-        ));
-    }
-    simplified.extras.insert(ProgramPeak(ended.peak));
-    if let Some(seconds) = report.seconds {
-        simplified.extras.insert(seconds);
-    }
-    Ok(simplified)
-}
 
 /// Nothing, if the program says that it is done.
 fn check_status(id: &str, status: ExitStatus, stderr: &str) -> Result<(), SimplifyError> {
@@ -341,85 +357,14 @@ fn check_status(id: &str, status: ExitStatus, stderr: &str) -> Result<(), Simpli
         }
         None => {
             let said = said.map_or_else(String::new, |line| format!("; it said: {line}"));
-            let by = ending(status);
+            #[cfg(unix)]
+            let signal = std::os::unix::process::ExitStatusExt::signal(&status).unwrap_or(0);
+            #[cfg(not(unix))]
+            let signal = 0;
+            let by = signal_name(signal);
             Err(SimplifyError::Crashed(format!("{id} was ended by {by}{said}")))
         }
     }
-}
-
-/// What ended a program that did not end by itself.
-#[cfg(unix)]
-fn ending(status: ExitStatus) -> String {
-    let signal = std::os::unix::process::ExitStatusExt::signal(&status).unwrap_or(0);
-    const NAMES: [(i32, &str); 14] = [
-        (1, "SIGHUP"),
-        (2, "SIGINT"),
-        (3, "SIGQUIT"),
-        (4, "SIGILL, an illegal instruction"),
-        (5, "SIGTRAP"),
-        (6, "SIGABRT: it gave up by itself"),
-        (8, "SIGFPE, an impossible computation"),
-        (9, "SIGKILL; the system may have done so for lack of memory"),
-        (11, "SIGSEGV, an access to memory that is not its own"),
-        (13, "SIGPIPE"),
-        (14, "SIGALRM"),
-        (15, "SIGTERM"),
-        (24, "SIGXCPU, a limit of processor time"),
-        (25, "SIGXFSZ, a limit of the size of files"),
-    ];
-    // Numbers beside these differ between systems.
-    let name = NAMES.iter().find(|(number, _)| *number == signal);
-    name.map_or_else(|| format!("signal {signal}"), |(_, name)| (*name).to_owned())
-}
-
-#[cfg(not(unix))]
-fn ending(status: ExitStatus) -> String {
-    status.to_string()
-}
-
-/// The medial mesh of the output in normalised units, and what was repaired.
-fn read(task: &Task<'_>) -> Result<(MedialMesh, Vec<String>), SimplifyError> {
-    let Ok(metadata) = fs::metadata(task.output) else {
-        return Err(SimplifyError::InvalidOutput("exit 0, but no file at {output}".to_owned()));
-    };
-    if !metadata.is_file() {
-        return Err(SimplifyError::InvalidOutput(
-            "exit 0, but what is at {output} is not a file".to_owned(),
-        ));
-    }
-    let bytes = metadata.len();
-    if bytes > LARGEST_OUTPUT {
-        let message = format!("the file at {{output}} has {bytes} bytes, {LARGEST_OUTPUT} at most");
-        return Err(SimplifyError::InvalidOutput(message));
-    }
-    let bytes = fs::read(task.output).map_err(|error| {
-        SimplifyError::InvalidOutput(format!("the file at {{output}}: {error}"))
-    })?;
-    let strict = ReadOptions { radii: Radii::NotNegative, ..ReadOptions::default() };
-    let mut loaded = complex::parse_ma_with(bytes, "", strict).map_err(|error| {
-        // The file's name is a temporary one and says nothing.
-        let line = error.line.map_or_else(String::new, |line| format!(", line {line}"));
-        SimplifyError::InvalidOutput(format!("the file at {{output}}{line}: {}", error.kind))
-    })?;
-    if task.fits
-        && let Some(fit) = task.shape.fit_if_needed(&loaded.mesh)?
-    {
-        loaded.mesh = fit.similarity.mesh(&loaded.mesh);
-        loaded.notes.push(format!("fitted: {fit}"));
-    }
-    let normal = task.shape.normalisation();
-    let mesh = loaded.mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p));
-    mesh.check()?;
-    for (id, sphere) in mesh.spheres.iter().enumerate() {
-        let reach = sphere.centre.abs().max_element().max(sphere.radius);
-        if reach > LARGEST_SPHERE {
-            return Err(SimplifyError::InvalidOutput(format!(
-                "sphere {id} reaches {reach:.1e} diagonals of the surface away from it: write the units of \
-                 {{surface}}"
-            )));
-        }
-    }
-    Ok((mesh, loaded.notes))
 }
 
 /// More or longer warnings than this are a program that writes its log there.
@@ -428,7 +373,8 @@ const MOST_WARNINGS: usize = 50;
 const LONGEST_WARNING: usize = 1000;
 
 /// Seconds that a program measured by itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
 pub struct OwnSeconds {
     /// Work that does not depend on the level.
     pub prepare: Option<f64>,
@@ -436,64 +382,45 @@ pub struct OwnSeconds {
     pub simplify: Option<f64>,
 }
 
-/// What a program said, as far as it can be understood.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// What a program reports of itself.
+#[derive(Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
 struct Report {
     seconds: Option<OwnSeconds>,
     native_level: Option<f64>,
     /// Its own, then those on the report.
     warnings: Vec<String>,
+    #[serde(flatten)]
+    unknown: BTreeMap<String, Value>,
 }
 
 impl Report {
-    /// The last line that is a JSON object, or nothing.
+    /// The last line that is a JSON object. Programs print what they like: a report that makes no sense costs no
+    /// result, only a warning.
     fn of(stdout: &str) -> Self {
-        let mut report = Self::default();
-        let mut objects = stdout.lines().rev().filter_map(|line| {
-            serde_json::from_str::<serde_json::Map<String, Value>>(line.trim()).ok()
-        });
-        let Some(object) = objects.next() else { return report };
-        let mut remarks = Vec::new();
-        for (key, value) in object {
-            let understood = match key.as_str() {
-                "seconds" => report.set_seconds(&value, &mut remarks),
-                "native_level" => value.as_f64().map(|level| report.native_level = Some(level)),
-                "warnings" => report.set_warnings(&value),
-                _ => {
-                    remarks.push(format!("its report has a key `{}`, ignored", clean(&key)));
-                    Some(())
-                }
-            };
-            if understood.is_none() {
-                remarks.push(format!("its report has no sensible `{key}`, ignored"));
+        let mut objects = stdout
+            .lines()
+            .rev()
+            .filter_map(|line| serde_json::from_str::<Map<_, _>>(line.trim()).ok());
+        let Some(object) = objects.next() else { return Self::default() };
+        let mut report = match serde_json::from_value::<Self>(Value::Object(object)) {
+            Ok(report) => report,
+            Err(why) => {
+                let ignored = format!("its report makes no sense and is ignored: {why}");
+                return Self { warnings: vec![clean(&ignored)], ..Self::default() };
             }
+        };
+        report.warnings.truncate(MOST_WARNINGS);
+        report.warnings.iter_mut().for_each(|warning| *warning = clean(warning));
+        for key in std::mem::take(&mut report.unknown).into_keys() {
+            report.warnings.push(format!("its report has a key `{}`, ignored", clean(&key)));
         }
-        report.warnings.extend(remarks);
+        let seconds = report.seconds.unwrap_or_default();
+        if [seconds.prepare, seconds.simplify].into_iter().flatten().any(|seconds| seconds < 0.0) {
+            report.warnings.push("its report has negative seconds, ignored".to_owned());
+            report.seconds = None;
+        }
         report
-    }
-
-    fn set_seconds(&mut self, value: &Value, remarks: &mut Vec<String>) -> Option<()> {
-        let mut seconds = OwnSeconds::default();
-        for (key, value) in value.as_object()? {
-            let number = value.as_f64().filter(|seconds| *seconds >= 0.0);
-            match key.as_str() {
-                "prepare" => seconds.prepare = Some(number?),
-                "simplify" => seconds.simplify = Some(number?),
-                other => {
-                    remarks
-                        .push(format!("its report has a key `seconds.{}`, ignored", clean(other)));
-                }
-            }
-        }
-        self.seconds = Some(seconds);
-        Some(())
-    }
-
-    fn set_warnings(&mut self, value: &Value) -> Option<()> {
-        let list = value.as_array()?;
-        let texts: Option<Vec<&str>> = list.iter().map(Value::as_str).collect();
-        self.warnings = texts?.into_iter().take(MOST_WARNINGS).map(clean).collect();
-        Some(())
     }
 }
 
@@ -519,11 +446,10 @@ mod tests {
         let report = Report::of(text);
         assert_eq!(report.native_level, Some(2.5));
         assert_eq!(report.seconds, Some(OwnSeconds { prepare: None, simplify: Some(3.0) }));
-        assert_eq!(report.warnings[0], "thin");
-        assert!(report.warnings[1].contains("seconds.io") && report.warnings[2].contains("extra"));
+        assert!(report.warnings[0] == "thin" && report.warnings[1].contains("`extra`"));
         for odd in ["{\"seconds\": 3}", "{\"seconds\": {\"prepare\": -1}}", "{\"warnings\": [1]}"] {
             let report = Report::of(odd);
-            assert!(report.warnings[0].contains("no sensible"), "{odd}: {report:?}");
+            assert!(report.warnings[0].contains("ignored"), "{odd}: {report:?}");
             assert_eq!(report.seconds, None);
         }
         assert_eq!(Report::of("nothing\n"), Report::default());

@@ -24,16 +24,15 @@ use std::fs;
 use std::path::Path;
 
 use medial::simplifier::Registered;
-use sha2::{Digest, Sha256};
 
-use external::hexadecimal;
+use crate::provenance::hex_digest;
 
 mod declaration;
 mod external;
 mod program;
 
+pub use declaration::PluginError;
 pub(crate) use declaration::is_id;
-pub use declaration::{PluginError, PluginFault};
 pub use external::{External, OwnSeconds, ProgramPeak, SCRATCH};
 
 /// Reads and checks a file of plug-ins: its methods, in its order.
@@ -42,7 +41,8 @@ pub use external::{External, OwnSeconds, ProgramPeak, SCRATCH};
 /// When the file cannot be read or is wrong: the error names the line and says what to do. An id that
 /// is among `taken`, those of the methods that there are, is wrong too.
 pub fn load(path: &Path, taken: &[&str]) -> Result<Vec<External>, PluginError> {
-    let text = fs::read_to_string(path).map_err(|error| refused(path, error))?;
+    let text =
+        fs::read_to_string(path).map_err(|why| refused(path, format!("cannot be read: {why}")))?;
     parse(path, &text, taken)
 }
 
@@ -55,15 +55,13 @@ pub fn parse(path: &Path, text: &str, taken: &[&str]) -> Result<Vec<External>, P
     let absolute = std::path::absolute(path).map_err(|error| refused(path, error))?;
     let folder = absolute.parent().unwrap_or(Path::new("/"));
     let declarations = declaration::read(path, text, folder, taken)?;
-    declarations
-        .into_iter()
-        .map(|declared| External::new(declared, folder).map_err(|error| refused(path, error)))
-        .collect()
+    let methods = declarations.into_iter().map(External::new);
+    methods.collect::<Result<_, _>>().map_err(|error| refused(path, error))
 }
 
 /// The refusal of a whole file.
-fn refused(path: &Path, fault: impl Into<PluginFault>) -> PluginError {
-    PluginError { file: path.to_owned(), line: None, fault: fault.into() }
+fn refused(path: &Path, why: impl ToString) -> PluginError {
+    PluginError { file: path.to_owned(), line: None, message: why.to_string() }
 }
 
 /// A host of the command loads methods from files of its own language, as the Python package does with classes. The
@@ -76,20 +74,12 @@ pub trait ScriptLoader: Send + Sync {
     fn load(&self, path: &Path) -> Result<Vec<Registered>, String>;
 }
 
-/// A method of a file of classes, and the SHA-256 of that file: an edited class is not taken for the old one.
-pub struct ScriptMethod {
-    /// The method.
-    pub method: Registered,
-    /// The hash.
-    pub fingerprint: String,
-}
-
 /// Whether a plug-in file holds classes of Python rather than declarations of programs.
 pub fn is_script(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "py")
 }
 
-/// The methods of a file of classes.
+/// The methods of a file of classes, and the SHA-256 of that file: an edited class is not taken for the old one.
 ///
 /// # Errors
 /// When there is no loader or it refuses the file, and when an id is no id or among `taken`.
@@ -97,28 +87,30 @@ pub fn load_script(
     path: &Path,
     loader: Option<&dyn ScriptLoader>,
     taken: &[&str],
-) -> Result<Vec<ScriptMethod>, PluginError> {
-    let loader = loader.ok_or_else(|| refused(path, PluginFault::NoInterpreter))?;
+) -> Result<(Vec<Registered>, String), PluginError> {
+    let loader = loader.ok_or_else(|| {
+        let why = "Python classes run in the command of the Python package: `pip install medialaxis`, and use its \
+                   `medial`; or declare a program that runs them, in a TOML file";
+        refused(path, why)
+    })?;
     let bytes = fs::read(path).map_err(|error| refused(path, error))?;
-    let fingerprint = hexadecimal(&Sha256::digest(&bytes));
-    let methods = loader.load(path).map_err(|why| refused(path, PluginFault::Script(why)))?;
+    let methods = loader.load(path).map_err(|why| refused(path, why))?;
     if methods.is_empty() {
-        return Err(refused(path, PluginFault::NoClass));
+        let why = "no class is a method; put @medial_axis.simplifier before one";
+        return Err(refused(path, why));
     }
     let mut ids: Vec<&str> = taken.to_vec();
     for method in &methods {
         let id = &*method.method.info().id;
         if !is_id(id) {
-            return Err(refused(path, PluginFault::Id(id.to_owned())));
+            return Err(refused(path, declaration::wrong_id(id)));
         }
         if ids.contains(&id) {
-            return Err(refused(path, PluginFault::TakenId(id.to_owned())));
+            return Err(refused(path, declaration::taken_id(id)));
         }
         ids.push(id);
     }
-    Ok((methods.into_iter())
-        .map(|method| ScriptMethod { method, fingerprint: fingerprint.clone() })
-        .collect())
+    Ok((methods, hex_digest(&bytes)))
 }
 
 #[cfg(test)]
@@ -174,8 +166,7 @@ mod tests {
         let file = dir.path().join("mine.py");
         let fingerprints = ["a", "a", "b"].map(|text| {
             fs::write(&file, text).expect("a file");
-            let mut loaded = load_script(&file, Some(&Ids(&["mine"])), &[]).expect("a method");
-            loaded.remove(0).fingerprint
+            load_script(&file, Some(&Ids(&["mine"])), &[]).expect("a method").1
         });
         assert_eq!(fingerprints[0], fingerprints[1]);
         assert_ne!(fingerprints[0], fingerprints[2]);

@@ -7,8 +7,7 @@ use medial::simplifier::{Chain, Level, MedialSimplifier, MethodInfo, Presentatio
 use medial_methods::initial;
 use serde::{Serialize, Serializer};
 
-use crate::plugin;
-use crate::plugin::{PluginError, ScriptLoader, ScriptMethod};
+use crate::plugin::{self, PluginError, ScriptLoader};
 use crate::provenance::hex_digest;
 
 /// Id of the pseudo-method that returns the initial medial mesh.
@@ -161,9 +160,8 @@ impl Registry {
         }
         let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
         let new: Vec<Entry> = if plugin::is_script(&file) {
-            (plugin::load_script(&file, self.loader.as_deref(), &taken)?.into_iter())
-                .map(|ScriptMethod { method, fingerprint }| Entry::new(method, Some(fingerprint)))
-                .collect()
+            let (methods, hash) = plugin::load_script(&file, self.loader.as_deref(), &taken)?;
+            methods.into_iter().map(|method| Entry::new(method, Some(hash.clone()))).collect()
         } else {
             (plugin::load(&file, &taken)?.into_iter())
                 .map(|external| {

@@ -118,7 +118,8 @@ impl MethodInfo {
 }
 
 /// The scalar that a method is controlled by in its paper.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct NativeLevel {
     /// Name in the paper, such as `theta`.
     pub name: Text,

@@ -95,9 +95,9 @@ const MEDIAL: Layers<'_> = &[
 /// Inside `medial-bench`.
 const BENCH: Layers<'_> = &[
     &["host", "process_tree"],
+    &["progress", "provenance"],
     &["plugin"],
     &["check"],
-    &["progress", "provenance"],
     &["study"],
     &["measure"],
     &["store"],

@@ -14,8 +14,6 @@ mod history;
 mod hostile;
 mod layers;
 mod plugin;
-mod plugin_files;
-mod plugins;
 mod process_tree;
 mod public;
 mod readers;

@@ -17,7 +17,26 @@ use medial_bench::plugin::{self, External, OwnSeconds, ProgramPeak, SCRATCH};
 use medial_test_support::skip;
 use tempfile::TempDir;
 
-use crate::plugins::{VALID, entry, written};
+/// Writes a file of plug-ins into a new folder.
+fn written(toml: &str, files: &[(&str, &str)]) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).expect("written");
+    }
+    let path = folder.path().join("plugins.toml");
+    fs::write(&path, toml).expect("written");
+    (folder, path)
+}
+
+/// A declaration with one entry, and lines that are added to it.
+fn entry(command: &str, levels: &str, more: &str) -> String {
+    format!(
+        "[[method]]\nid = \"x\"\ntitle = \"X\"\ncommand = {command}\nlevels = {levels}\n{more}\n"
+    )
+}
+
+/// Two balls and the edge between them, somewhere in the shape.
+const VALID: &str = "printf '2 1 0\\nv 0 0 0 0.5\\nv 0.1 0 0 0.5\\ne 0 1\\n' > \"$1\"\n";
 
 fn shape() -> Shape {
     let mesh = medial_datasets::find("capsule").expect("in the catalogue").mesh(12);
@@ -307,4 +326,73 @@ fn temporary_files_are_where_they_are_wanted_and_go() {
         .output()
         .expect("runs");
     assert!(probe.status.success(), "{}", String::from_utf8_lossy(&probe.stdout));
+}
+
+#[test]
+fn a_changed_script_or_declaration_has_another_fingerprint() {
+    let toml = entry(r#"["sh", "run.sh", "{output}", "{spheres}"]"#, r#"["spheres"]"#, "");
+    let (folder, path) = written(&toml, &[("run.sh", VALID)]);
+    let fingerprint = || plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint().to_owned();
+    let first = fingerprint();
+    assert!(first.len() == 64 && first == fingerprint());
+    fs::write(folder.path().join("run.sh"), format!("{VALID}#")).expect("written");
+    let second = fingerprint();
+    fs::write(&path, toml.replace("title = \"X\"", "title = \"Y\"")).expect("written");
+    let third = fingerprint();
+    assert!(first != second && second != third && first != third);
+    // The same files in another folder are the same plug-in.
+    let (_elsewhere, path) = written(&toml, &[("run.sh", VALID)]);
+    assert_eq!(plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint(), first);
+}
+
+/// A wrong declaration is refused with its line and a reason that has these words.
+#[test]
+fn wrong_declarations_are_refused_with_their_line() {
+    let good = r#"["sh", "run.sh", "{output}", "{spheres}"]"#;
+    let spheres = r#"["spheres"]"#;
+    let command = |words: &str| entry(words, spheres, "");
+    let more = |lines: &str| entry(good, spheres, lines);
+    let params = |list: &str| more(&format!("params = [{list}]"));
+    let cases = [
+        (more("colour = 1"), 6, "unknown field `colour`"),
+        (params("{ name = \"k\", defualt = 1 }"), 6, "unknown field `defualt`"),
+        (more("title = "), 6, ""),
+        (command("[]"), 4, "the command is empty"),
+        (command(r#"["no-such-program", "{output}", "{spheres}"]"#), 4, "in PATH"),
+        (command(r#"["./run.sh", "{output}", "{spheres}"]"#), 4, "may not be executed"),
+        (
+            command(r#"["{k}", "{output}", "{spheres}"]"#),
+            4,
+            "the program \"{k}\" has a placeholder",
+        ),
+        (command(r#"["sh", "run.sh", "{spheres}"]"#), 4, "no argument has {output}"),
+        (command(r#"["sh", "{output}"]"#), 5, "no argument has {spheres}"),
+        (command(r#"["sh", "{output", "{spheres}"]"#), 4, "a brace"),
+        (command(r#"["sh", "{output}", "{spheres}", "{native}"]"#), 4, "levels has no \"native\""),
+        (command(r#"["sh", "{output}", "{spheres}", "{depth}"]"#), 4, "{depth} is neither"),
+        (params("{ name = \"k\", default = 1 }"), 6, "no argument has {k}"),
+        (params("{ name = \"seed\", default = 1 }"), 6, "`seed` is the name of a placeholder"),
+        (params("{ name = \"k\", default = [1] }"), 6, "`k` has a default"),
+        (params("{ name = \"k\", default = 1 },\n{ name = \"k\", default = 2 }"), 7, "above"),
+        (entry(good, "[]", ""), 5, "no level is declared"),
+        (entry(good, r#"["spheres", "native"]"#, ""), 5, "describe it"),
+        (entry(good, r#"["balls"]"#, ""), 5, "unknown variant `balls`"),
+        (command(good).replace("\"x\"", "\"My X\""), 2, "the id \"My X\""),
+        (command(good) + &command(good), 8, "a method above is called `x`"),
+        ("[[method]]\nid = \"x\"\n".to_owned(), 1, "missing field"),
+    ];
+    for (toml, line, words) in cases {
+        let (_folder, path) = written(&toml, &[("run.sh", VALID)]);
+        let error = plugin::load(&path, &[]).expect_err(&toml);
+        let text = error.to_string();
+        assert!(text.contains("plugins.toml") && text.contains(words), "{toml}: {text}");
+        assert_eq!(error.line, Some(line), "{toml}: {text}");
+    }
+    let (_folder, path) = written("", &[]);
+    let error = plugin::load(&path, &[]).expect_err("nothing is declared");
+    assert!(error.line.is_none() && error.message.contains("[[method]]"), "{error}");
+    assert!(plugin::load(Path::new("no/such/file.toml"), &[]).is_err());
+    let all = r#"["sh", "run.sh", "{output}"]"#;
+    let (_folder, path) = written(&entry(all, r#"["published"]"#, ""), &[("run.sh", VALID)]);
+    assert!(plugin::load(&path, &[]).is_ok());
 }
