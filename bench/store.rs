@@ -6,12 +6,13 @@
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{BufRead, BufReader, Read, Seek, Write};
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
-use medial_reports::{Journal, JournalError, Status, Target, read_records};
-use serde::{Deserialize, Serialize};
+use medial_reports::{Journal, JournalError, Record, Status, Target, read_records};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use crate::study::item::Item;
 
@@ -19,6 +20,8 @@ use crate::study::item::Item;
 pub const RESULTS: &str = "results.jsonl";
 /// Name of the folder of the results as `.ma`.
 pub const AXES: &str = "axes";
+/// Name of the page of a report.
+pub const PAGE: &str = "index.html";
 /// Name of the file that names the process that holds a store.
 const LOCK: &str = ".lock";
 
@@ -29,38 +32,27 @@ pub struct Store {
     _lock: File,
     journal: Journal,
     known: HashMap<String, Known>,
-    /// Whether the page of an earlier state of the records was removed.
-    page_withdrawn: bool,
+    /// Number of records that this process has added.
+    pub added: usize,
     /// Remarks about the folder as it was found.
     pub remarks: Vec<String>,
 }
 
-/// The facts that decide whether a level has to be run again.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Known {
-    status: Status,
-    repetitions: usize,
-    seconds_limit: f64,
-    bytes_limit: u64,
-}
-
-/// The fields of a record that a store needs.
+/// The facts of a record that decide whether its level has to be run again.
 #[derive(Deserialize)]
-struct Stub {
+struct Known {
     #[serde(default)]
     key: String,
     status: Status,
     #[serde(default)]
-    repetitions: Vec<serde::de::IgnoredAny>,
-    #[serde(default)]
-    conditions: Option<StubConditions>,
+    repetitions: Vec<IgnoredAny>,
+    conditions: Option<KnownLimits>,
 }
 
-#[derive(Deserialize)]
-struct StubConditions {
-    #[serde(default)]
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(default)]
+struct KnownLimits {
     seconds_limit: f64,
-    #[serde(default)]
     bytes_limit: u64,
 }
 
@@ -109,19 +101,17 @@ impl Store {
         if dir.exists() && !dir.is_dir() {
             return Err(StoreError::NotAFolder(dir.to_owned()));
         }
-        let failed = |path: &Path| {
-            let path = path.to_owned();
-            move |source| StoreError::Io { path, source }
-        };
-        fs::create_dir_all(dir).map_err(failed(dir))?;
+        fs::create_dir_all(dir).map_err(io_error(dir))?;
         let is_store = [LOCK, journal, "study.toml"].iter().any(|name| dir.join(name).exists());
-        if !is_store && fs::read_dir(dir).map_err(failed(dir))?.next().is_some() {
+        if !is_store && fs::read_dir(dir).map_err(io_error(dir))?.next().is_some() {
             return Err(StoreError::NotAStore(dir.to_owned()));
         }
+        // Before anything is repaired: another process may be in the middle of a line.
         let lock = lock(dir, command)?;
         let path = dir.join(journal);
+        let (known, was_torn) = read_known(&path).map_err(io_error(&path))?;
         let mut remarks = Vec::new();
-        if cut_torn_line(&path).map_err(failed(&path))? {
+        if was_torn {
             remarks.push(format!(
                 "{}: its last line was incomplete, the trace of a process that was ended while it \
                  wrote; it was removed, and its item is run again",
@@ -129,16 +119,8 @@ impl Store {
             ));
         }
         remove_temporaries(dir);
-        let known = read_known(&path).map_err(failed(&path))?;
         let journal = Journal::open(&path)?;
-        Ok(Self {
-            dir: dir.to_owned(),
-            _lock: lock,
-            journal,
-            known,
-            page_withdrawn: false,
-            remarks,
-        })
+        Ok(Self { dir: dir.to_owned(), _lock: lock, journal, known, added: 0, remarks })
     }
 
     /// The folder.
@@ -152,80 +134,49 @@ impl Store {
     /// # Errors
     /// When a file cannot be removed.
     pub fn clear(&mut self, journal: &str) -> Result<(), StoreError> {
-        self.withdraw_page()?;
         remove_artifacts(&self.dir, &self.dir.join(journal));
-        for name in [journal, "header.json", "study.toml", "results.csv"] {
-            let path = self.dir.join(name);
-            remove(&path).map_err(|source| StoreError::Io { path, source })?;
+        for name in [PAGE, journal, "header.json", "study.toml", "results.csv"] {
+            remove(&self.dir.join(name))?;
         }
         self.known.clear();
         self.journal = Journal::open(self.dir.join(journal))?;
         Ok(())
     }
 
-    /// Whether there is a record with a key.
-    pub fn has(&self, key: &str) -> bool {
-        self.known.contains_key(key)
-    }
-
     /// The levels of an item that have to be run: levels without a record, levels that were ended by a
-    /// limit that is larger now, and failed levels if failures are to be retried.
-    pub fn missing(&self, item: &Item, failures: Failures) -> Vec<Target> {
+    /// limit that is larger now, and failed levels if these are to be retried.
+    pub fn missing(&self, item: &Item, retry_failed: bool) -> Vec<Target> {
         (item.levels.iter().zip(item.keys()))
             .filter(|(_, key)| {
                 let known = self.known.get(key);
-                known.is_none_or(|known| known.is_incomplete(item, failures))
+                known.is_none_or(|known| known.is_incomplete(item, retry_failed))
             })
             .map(|(&level, _)| level)
             .collect()
     }
 
-    /// Adds lines: records, or what holds a record with what belongs beside it.
+    /// Adds records.
     ///
     /// # Errors
     /// When they cannot be written.
-    pub fn keep(&mut self, lines: &[impl Serialize]) -> Result<(), StoreError> {
+    pub fn keep(&mut self, records: &[Record]) -> Result<(), StoreError> {
         // Before the first line: a page next to more records than it shows would be wrong, however the run ends.
-        self.withdraw_page()?;
-        Ok(self.journal.append_lines(lines)?)
-    }
-
-    /// Removes the page, which no longer matches the records.
-    fn withdraw_page(&mut self) -> Result<(), StoreError> {
-        if !self.page_withdrawn {
-            let path = self.dir.join("index.html");
-            remove(&path).map_err(|source| StoreError::Io { path, source })?;
-            self.page_withdrawn = true;
-        }
-        Ok(())
-    }
-}
-
-/// How levels that failed before are treated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failures {
-    /// Their records stand.
-    Kept,
-    /// They are run again.
-    Retried,
-}
-
-impl From<bool> for Failures {
-    /// From the option `--retry-failed`.
-    fn from(retry: bool) -> Self {
-        if retry { Self::Retried } else { Self::Kept }
+        remove(&self.dir.join(PAGE))?;
+        self.added += records.len();
+        Ok(self.journal.append_lines(records)?)
     }
 }
 
 impl Known {
-    fn is_incomplete(&self, item: &Item, failures: Failures) -> bool {
+    fn is_incomplete(&self, item: &Item, retry_failed: bool) -> bool {
+        let limits = self.conditions.unwrap_or_default();
         match self.status {
-            Status::TimedOut if item.limits.seconds > self.seconds_limit => true,
-            Status::OutOfMemory if item.limits.bytes > self.bytes_limit => true,
-            status if status.is_failure() => failures == Failures::Retried,
+            Status::TimedOut if item.limits.seconds > limits.seconds_limit => true,
+            Status::OutOfMemory if item.limits.bytes > limits.bytes_limit => true,
+            status if status.is_failure() => retry_failed,
             // A file is not timed.
             Status::External => false,
-            status => status.has_result() && self.repetitions < item.repeat,
+            status => status.has_result() && self.repetitions.len() < item.repeat,
         }
     }
 }
@@ -233,10 +184,9 @@ impl Known {
 /// Takes the lock and writes down who holds it.
 fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
     let path = dir.join(LOCK);
-    let failed = |source| StoreError::Io { path: path.clone(), source };
     let mut options = OpenOptions::new();
-    let mut file =
-        options.read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+    let file = options.read(true).write(true).create(true).truncate(false).open(&path);
+    let mut file = file.map_err(io_error(&path))?;
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
@@ -250,82 +200,44 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
         }
         // Some file systems have no locks; two runs into one folder go unnoticed there.
         Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
-        Err(TryLockError::Error(error)) => return Err(failed(error)),
+        Err(TryLockError::Error(error)) => return Err(io_error(&path)(error)),
     }
     let holder = format!("process {} (`{command}`)", std::process::id());
-    file.set_len(0).map_err(failed)?;
-    file.rewind().map_err(failed)?;
-    file.write_all(holder.as_bytes()).map_err(failed)?;
+    let written = file
+        .set_len(0)
+        .and_then(|()| file.rewind())
+        .and_then(|()| file.write_all(holder.as_bytes()));
+    written.map_err(io_error(&path))?;
     Ok(file)
 }
 
-/// Cuts off an incomplete last line; returns whether there was one.
-fn cut_torn_line(path: &Path) -> io::Result<bool> {
-    let mut file = match OpenOptions::new().read(true).append(true).open(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+/// The state of each key, from its last line, and whether the last line was incomplete. It is cut off then.
+fn read_known(path: &Path) -> io::Result<(HashMap<String, Known>, bool)> {
+    let file = match OpenOptions::new().read(true).append(true).open(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Default::default()),
         file => file?,
     };
-    let (whole, torn) = last_line(&mut file)?;
-    if torn.is_empty() {
-        return Ok(false);
-    }
-    // A complete record that only lacks its line break is kept.
-    if serde_json::from_slice::<serde::de::IgnoredAny>(&torn).is_ok() {
-        file.write_all(b"\n")?;
-        return Ok(false);
-    }
-    file.set_len(whole)?;
-    Ok(true)
-}
-
-/// What stands behind the last line break, and where it begins. Read from the end: of millions of records nobody wants
-/// to wait for the first.
-fn last_line(file: &mut File) -> io::Result<(u64, Vec<u8>)> {
-    const STEP: u64 = 1 << 16;
-    let length = file.metadata()?.len();
-    let (mut begin, mut tail) = (length, Vec::new());
-    while begin > 0 {
-        let from = begin.saturating_sub(STEP);
-        let mut piece = vec![0; (begin - from) as usize];
-        file.seek(SeekFrom::Start(from))?;
-        file.read_exact(&mut piece)?;
-        piece.extend(tail);
-        (begin, tail) = (from, piece);
-        if let Some(end) = tail.iter().rposition(|&byte| byte == b'\n') {
-            return Ok((begin + end as u64 + 1, tail.split_off(end + 1)));
-        }
-    }
-    Ok((0, tail))
-}
-
-/// The state of each key, from its last line.
-fn read_known(path: &Path) -> io::Result<HashMap<String, Known>> {
-    let mut file = match File::open(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(HashMap::new()),
-        file => BufReader::new(file?),
-    };
-    let mut known = HashMap::new();
-    let mut line = Vec::new();
+    let (mut known, mut line, mut whole) = (HashMap::new(), Vec::new(), 0);
+    let mut lines = BufReader::new(&file);
     // Line by line: millions of records need not fit into memory for their states.
-    while file.read_until(b'\n', &mut line)? > 0 {
-        if let Some(stub) = stub(line.trim_ascii_end()) {
-            let limits = stub.conditions;
-            let (seconds_limit, bytes_limit) =
-                limits.map_or((0.0, 0), |limits| (limits.seconds_limit, limits.bytes_limit));
-            let repetitions = stub.repetitions.len();
-            known.insert(
-                stub.key,
-                Known { status: stub.status, repetitions, seconds_limit, bytes_limit },
-            );
+    while lines.read_until(b'\n', &mut line)? > 0 {
+        if !line.ends_with(b"\n") {
+            if serde_json::from_slice::<IgnoredAny>(&line).is_err() {
+                file.set_len(whole)?;
+                return Ok((known, true));
+            }
+            // A complete record that only lacks its line break is kept.
+            (&file).write_all(b"\n")?;
+        }
+        whole += line.len() as u64;
+        if let Ok(record) = serde_json::from_slice::<Known>(&line)
+            && !record.key.is_empty()
+        {
+            known.insert(record.key.clone(), record);
         }
         line.clear();
     }
-    Ok(known)
-}
-
-fn stub(line: &[u8]) -> Option<Stub> {
-    let stub = serde_json::from_slice::<Stub>(line).ok();
-    stub.filter(|stub| !stub.key.is_empty())
+    Ok((known, false))
 }
 
 /// Removes the medial meshes that records name. A file that cannot be removed stays: without a record
@@ -360,9 +272,15 @@ fn remove_temporaries(dir: &Path) {
     }
 }
 
-fn remove(path: &Path) -> io::Result<()> {
+fn remove(path: &Path) -> Result<(), StoreError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        other => other,
+        other => other.map_err(io_error(path)),
     }
+}
+
+/// An error of the file system with the path that it is about.
+fn io_error(path: &Path) -> impl Fn(io::Error) -> StoreError {
+    let path = path.to_owned();
+    move |source| StoreError::Io { path: path.clone(), source }
 }

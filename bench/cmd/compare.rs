@@ -8,15 +8,14 @@ use medial_reports::{Record, Status};
 use serde_json::json;
 
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
-use crate::exec::queue::{PlanError, Tally, count, missing, refused_params, run_items};
+use crate::exec::queue::{Contender, PlanError, count, missing, refused_params, run_items};
 use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
-use crate::progress::Progress;
 use crate::provenance::Provenance;
 use crate::rebuild::{self, Rebuilt};
-use crate::store::{AXES, RESULTS, Store};
+use crate::store::{AXES, PAGE, RESULTS, Store};
 use crate::study::external::Given;
 use crate::study::item::Item;
 use crate::study::registry::Registry;
@@ -117,47 +116,47 @@ pub fn run(
     arguments.apply_to_methods(&mut study, registry)?;
     let provenance = Provenance::here();
     let here = Here::of(&provenance);
-    let items = study.items(registry, &here)?;
-    let shard = arguments.shard.as_deref().map(Shard::parse).transpose()?;
-    let items = match shard {
-        Some(shard) => shard.share(items),
-        None => items,
-    };
+    let mut items = study.items(registry, &here)?;
+    if let Some(shard) = arguments.shard.as_deref().map(Shard::parse).transpose()? {
+        items = shard.share(items);
+    }
     let interrupted = interrupt::listen();
     let axes = Some(arguments.out.join(AXES));
-    let mut supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);
-    let mut store = Store::open(&arguments.out, RESULTS, &provenance.command)?;
+    let supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);
+    let store = Store::open(&arguments.out, RESULTS, &provenance.command)?;
     store.remarks.iter().for_each(|remark| note(global, remark));
-    let (left, mut tally) = match arguments.fresh {
-        true => (items.clone(), Tally::default()),
-        false => missing(&items, &store, arguments.retry_failed.into()),
+    let mut side = Contender { build: None, supervisor, store };
+    let (left, found) = match arguments.fresh {
+        true => (items.clone(), 0),
+        false => missing(&items, &side.store, arguments.retry_failed),
     };
     // Before anything is cleared: a misspelt parameter must not cost earlier results.
-    if let Some(why) = refused_params(&left, &mut supervisor)? {
+    if let Some(why) = refused_params(&left, &mut side.supervisor)? {
         return Err(Failure::usage(why));
     }
     // No result is touched before this line.
     if arguments.fresh {
-        store.clear(RESULTS)?;
+        side.store.clear(RESULTS)?;
     }
     if !left.is_empty() {
         rebuild::write_study(&arguments.out, &study)?;
     }
-    let mut progress = Progress::new(global.progress(), left.len());
-    let ended = run_items(&left, &mut supervisor, &mut progress, &mut |_, kept: &[Record]| {
-        tally.run += kept.len();
-        store.keep(kept)
-    });
-    drop(progress);
-    drop(supervisor);
-    match ended {
-        Err(PlanError::Run(RunError::Interrupted)) => return Ok(interrupt_message(&left, tally)),
-        ended => ended?,
+    let ended = run_items(&left, std::slice::from_mut(&mut side), global.progress());
+    let run = side.store.added;
+    if matches!(ended, Err(PlanError::Run(RunError::Interrupted))) {
+        let levels: usize = left.iter().map(|item| item.levels.len()).sum();
+        print_error(&format!(
+            "interrupted: {run} of {levels} results were made and are kept; the same command goes on from there"
+        ));
+        return Ok(Exit::Interrupted);
     }
+    ended?;
+    // The store stays locked until its report is written; a worker would only hold memory.
+    side.supervisor.renew();
     let Rebuilt { records, files, undrawn, .. } =
-        rebuild::refresh(&arguments.out, registry, &provenance, tally.run)?;
+        rebuild::refresh(&arguments.out, registry, &provenance, run)?;
     undrawn.iter().for_each(|why| note(global, why));
-    finish(&of_items(records, &items), tally, &arguments.out, &files, global)
+    finish(&of_items(records, &items), [run, found], &arguments.out, &files, global)
 }
 
 /// The study that the command line asks for, on top of the file where one is given.
@@ -202,7 +201,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     study.threads = global.threads.or(study.threads);
     study.plugins.extend(global.plugins.iter().map(absolute));
     arguments.substrate.apply(&mut study)?;
-    arguments.measure.apply(&mut study)?;
+    study.samples = arguments.measure.samples.unwrap_or(study.samples);
     Ok(study)
 }
 
@@ -260,15 +259,6 @@ fn named<'s>(
     Ok(rows)
 }
 
-fn interrupt_message(left: &[Item], tally: Tally) -> Exit {
-    let levels: usize = left.iter().map(|item| item.levels.len()).sum();
-    print_error(&format!(
-        "interrupted: {} of {levels} results were made and are kept; the same command goes on from there",
-        tally.run
-    ));
-    Exit::Interrupted
-}
-
 /// The records of some items, in the order of the items.
 fn of_items(records: Vec<Record>, items: &[Item]) -> Vec<Record> {
     // The last record of a key counts.
@@ -280,18 +270,18 @@ fn of_items(records: Vec<Record>, items: &[Item]) -> Vec<Record> {
 /// Prints the summary and decides the exit code.
 fn finish(
     records: &[Record],
-    tally: Tally,
+    [run, found]: [usize; 2],
     out: &Path,
     files: &[PathBuf],
     global: &Global,
 ) -> Result<Exit, Failure> {
     let ok = records.iter().filter(|record| record.status.is_ok()).count();
-    let page = out.join("index.html");
+    let page = out.join(PAGE);
     if global.json {
         let by_status: serde_json::Map<String, serde_json::Value> =
             Status::ALL.iter().map(|&s| (s.key().to_owned(), count(records, s).into())).collect();
         let object = json!({
-            "out": out, "records": records.len(), "run": tally.run, "found": tally.found,
+            "out": out, "records": records.len(), "run": run, "found": found,
             "status": by_status, "results": out.join(RESULTS), "page": page, "files": files,
         });
         print_json(&object, &[]);
@@ -304,11 +294,9 @@ fn finish(
             files => format!(" ({files} as given)"),
         };
         print_line(&format!(
-            "{ok} of {} results as asked{given}{}; {} run now, {} found; page: {}",
+            "{ok} of {} results as asked{given}{}; {run} run now, {found} found; page: {}",
             records.len(),
             others(records),
-            tally.run,
-            tally.found,
             page.display()
         ));
     }

@@ -10,22 +10,18 @@ use medial_reports::Record;
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
 
 use crate::args::Global;
-use crate::exec::queue::{Build, Contender, PlanError, missing_in_either, run_alternately};
+use crate::exec::queue::{Build, Contender, PlanError, run_items};
 use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_raw};
-use crate::progress::Progress;
 use crate::provenance::Provenance;
 use crate::rebuild::records;
 use crate::store::{AXES, RESULTS, Store};
 use crate::study::item::Item;
 use crate::study::registry::Registry;
 use crate::study::{Here, Study};
-
-/// The folders of the two sides of `--run`.
-const SIDES: [&str; 2] = ["old", "new"];
 
 /// Arguments of `diff`.
 #[derive(Debug, Args)]
@@ -136,27 +132,25 @@ fn alternate(
     for file in &study.plugins {
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
-    let builds = [Build::of(&arguments.old), Build::of(&arguments.new)];
-    let [old, new] = builds.map(|build| build.map_err(Failure::input));
     let here = Provenance::here();
     let items = study.items(registry, &Here::of(&here))?;
     let interrupted = interrupt::listen();
-    let contender = |build: Build, side: &str| -> Result<Contender<'_>, Failure> {
+    let mut sides = Vec::new();
+    for (program, side) in [(&arguments.old, "old"), (&arguments.new, "new")] {
+        let build = Build::of(program).map_err(Failure::input)?;
         let folder = arguments.out.join(side);
         let store = Store::open(&folder, RESULTS, &here.command)?;
         store.remarks.iter().for_each(|remark| note(global, remark));
         let axes = Some(folder.join(AXES));
         let supervisor = Supervisor::new(registry.files(), &build.provenance, axes, interrupted);
         let supervisor = supervisor.of_program(&build.program);
-        Ok(Contender { build, supervisor, store })
-    };
-    let mut contenders = [contender(old?, SIDES[0])?, contender(new?, SIDES[1])?];
-    let left = missing_in_either(&items, &contenders);
-    let turns = left.iter().map(|item| item.repeat).sum();
-    let mut progress = Progress::new(global.progress(), turns);
-    let ended = run_alternately(&left, &mut contenders, &mut progress);
-    drop(progress);
-    match ended {
+        sides.push(Contender { build: Some(build), supervisor, store });
+    }
+    let mut left = items.clone();
+    left.retain(|item| {
+        sides.iter().any(|side| !side.store.missing(&side.own(item), false).is_empty())
+    });
+    match run_items(&left, &mut sides, global.progress()) {
         Err(PlanError::Run(RunError::Interrupted)) => {
             print_error(
                 "interrupted: what was finished is kept; the same command goes on from there",
@@ -165,7 +159,7 @@ fn alternate(
         }
         ended => ended?,
     }
-    let [old, new] = contenders.map(|contender| requested_records(&contender, &items, global));
+    let [old, new] = [&sides[0], &sides[1]].map(|side| requested_records(side, &items, global));
     Ok(Some([old?, new?]))
 }
 
@@ -175,7 +169,7 @@ fn requested_records(
     items: &[Item],
     global: &Global,
 ) -> Result<Vec<Record>, Failure> {
-    let keys = items.iter().flat_map(|item| contender.build.own(item).keys());
+    let keys = items.iter().flat_map(|item| contender.own(item).keys());
     let keys: HashSet<String> = keys.collect();
     let mut records = some_records(contender.store.dir(), global)?;
     records.retain(|record| keys.contains(&record.key));

@@ -16,7 +16,7 @@ use crate::files;
 use crate::output::{print_json, print_line};
 use crate::provenance::Provenance;
 use crate::rebuild::{Rebuilt, STUDY, rebuild, records, write_study};
-use crate::store::{RESULTS, Store};
+use crate::store::{PAGE, RESULTS, Store};
 use crate::study::registry::Registry;
 use crate::study::{Here, Study};
 
@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         for warning in &warnings {
             print_line(&format!("warning: {warning}"));
         }
-        let page = dir.join("index.html");
+        let page = dir.join(PAGE);
         print_line(&format!("{} records; page: {}", records.len(), page.display()));
     }
     Ok(Exit::Done)

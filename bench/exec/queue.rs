@@ -1,5 +1,5 @@
-//! Lists of items: what a store lacks is run and every record kept; and two builds that take turns, so that a
-//! loaded machine slows both alike.
+//! Lists of items: what a store lacks is run and every record kept, by one program or by two builds that take turns,
+//! so that a loaded machine slows both alike.
 //!
 //! Each repetition of two builds has a worker of its own on either side: where a process happens to lie in memory
 //! changes its speed by more than many a regression. Within a repetition the two sides follow each other item by
@@ -13,19 +13,10 @@ use medial_reports::{Record, Status};
 
 use crate::exec::{RunError, Supervisor, merge};
 use crate::measure::median;
-use crate::progress::Progress;
+use crate::progress::{Progress, Verbosity};
 use crate::provenance::{Provenance, hex_digest};
-use crate::store::{Failures, Store, StoreError};
+use crate::store::{Store, StoreError};
 use crate::study::item::{Item, MethodSpec};
-
-/// The counts of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    /// Levels that were run now.
-    pub run: usize,
-    /// Levels whose records were there already.
-    pub found: usize,
-}
 
 /// Why a run ended early.
 #[derive(Debug, thiserror::Error)]
@@ -38,21 +29,18 @@ pub enum PlanError {
     Store(#[from] StoreError),
 }
 
-/// Takes the records of an item as soon as they are complete.
-pub type Keep<'a> = dyn FnMut(&Item, &[Record]) -> Result<(), StoreError> + 'a;
-
-/// The items with the levels that are missing in a store, and what was found there.
-pub fn missing(items: &[Item], store: &Store, failures: Failures) -> (Vec<Item>, Tally) {
-    let mut tally = Tally::default();
+/// The items with the levels that are missing in a store, and the number of levels that are there.
+pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>, usize) {
+    let mut found = 0;
     let mut left = Vec::new();
     for item in items {
-        let levels = store.missing(item, failures);
-        tally.found += item.levels.len() - levels.len();
+        let levels = store.missing(item, retry_failed);
+        found += item.levels.len() - levels.len();
         if !levels.is_empty() {
             left.push(Item { levels, ..item.clone() });
         }
     }
-    (left, tally)
+    (left, found)
 }
 
 /// Why a method does not take its parameters, found before anything is run, by preparing on the smallest of shapes.
@@ -75,69 +63,81 @@ pub fn refused_params(
     Ok(None)
 }
 
-/// Runs items and passes their records to `keep`, as soon as each item is done. With repetitions, the
+/// Runs items on each side and keeps their records there, as soon as each item is done. With repetitions, the
 /// items of one scene take turns, so that a slow minute of the machine does not affect one method
 /// alone; then their records are kept after the last turn.
 ///
 /// # Errors
-/// When the user interrupts, no worker can be started, or `keep` fails.
+/// When the user interrupts, no worker can be started, or records cannot be kept.
 pub fn run_items(
     items: &[Item],
-    supervisor: &mut Supervisor<'_>,
-    progress: &mut Progress,
-    keep: &mut Keep<'_>,
+    sides: &mut [Contender<'_>],
+    verbosity: Verbosity,
 ) -> Result<(), PlanError> {
+    let turns = items.iter().map(|item| item.repeat.max(1)).sum();
+    let mut progress = Progress::new(verbosity, turns);
     for scene in items.chunk_by(|a, b| a.scene == b.scene) {
-        let mut waiting: Vec<(&Item, Vec<Record>)> = Vec::new();
-        for item in scene {
+        let mut waiting: Vec<(&Item, Vec<Vec<Record>>)> = Vec::new();
+        for (place, item) in scene.iter().enumerate() {
             progress.at(&format!("{}: {}", item.scene.mesh, item.method.label()));
-            let kept = supervisor.run(item)?;
-            failures(&kept.iter().collect::<Vec<_>>())
-                .iter()
-                .for_each(|remark| progress.remark(remark));
-            if item.repeat <= 1 {
-                keep(item, &finished(kept))?;
-            } else {
-                waiting.push((item, kept));
+            let mut kept = vec![vec![]; sides.len()];
+            for side in order(place, sides.len()) {
+                kept[side] = sides[side].supervisor.run(&sides[side].own(item))?;
+                failures(&kept[side]).iter().for_each(|remark| progress.remark(remark));
             }
             progress.done();
+            match item.repeat {
+                0 | 1 => keep(sides, kept)?,
+                _ => waiting.push((item, kept)),
+            }
         }
         let turns = waiting.iter().map(|(item, _)| item.repeat).max().unwrap_or(1);
         for turn in 2..=turns {
-            for (item, kept) in &mut waiting {
-                if turn <= item.repeat && kept.iter().any(|r| r.status.has_result()) {
-                    progress.at(&format!(
-                        "{}: {}, repetition {turn} of {}",
-                        item.scene.mesh,
-                        item.method.label(),
-                        item.repeat
-                    ));
-                    let again = supervisor.again(item)?;
-                    merge(kept, turn, again);
+            if sides.len() > 1 {
+                sides.iter_mut().for_each(|side| side.supervisor.renew());
+            }
+            for (place, (item, kept)) in waiting.iter_mut().enumerate() {
+                let (mesh, method) = (&item.scene.mesh, item.method.label());
+                progress.at(&format!("{mesh}: {method}, repetition {turn} of {}", item.repeat));
+                for side in order(place + turn, sides.len()) {
+                    let has_result = kept[side].iter().any(|r| r.status.has_result());
+                    if turn <= item.repeat && has_result {
+                        let again = sides[side].supervisor.again(&sides[side].own(item))?;
+                        merge(&mut kept[side], turn, again);
+                    }
                 }
+                progress.done();
             }
         }
-        for (item, kept) in waiting {
-            keep(item, &finished(kept))?;
+        for (_, kept) in waiting {
+            keep(sides, kept)?;
         }
     }
     Ok(())
 }
 
-/// The records, with their seconds replaced by those of the median repetition.
-pub(crate) fn finished(mut kept: Vec<Record>) -> Vec<Record> {
-    for record in &mut kept {
-        if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
-            record.simplify.seconds = Some(seconds);
-            record.simplify.cpu_seconds = median(&record.repetitions, |r| r.cpu_seconds);
+/// The sides in the order of a turn: each begins as often as the others.
+fn order(turn: usize, sides: usize) -> impl Iterator<Item = usize> {
+    (0..sides).map(move |side| (side + turn) % sides)
+}
+
+/// Keeps the records of each side, with their seconds replaced by those of the median repetition.
+fn keep(sides: &mut [Contender<'_>], kept: Vec<Vec<Record>>) -> Result<(), StoreError> {
+    for (side, mut records) in sides.iter_mut().zip(kept) {
+        for record in &mut records {
+            if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
+                record.simplify.seconds = Some(seconds);
+                record.simplify.cpu_seconds = median(&record.repetitions, |r| r.cpu_seconds);
+            }
         }
+        side.store.keep(&records)?;
     }
-    kept
+    Ok(())
 }
 
 /// One remark for each failure, or a single one if all levels failed for the same reason.
-fn failures(records: &[&Record]) -> Vec<String> {
-    let failed: Vec<&&Record> = records.iter().filter(|r| r.status.is_failure()).collect();
+fn failures(records: &[Record]) -> Vec<String> {
+    let failed: Vec<&Record> = records.iter().filter(|r| r.status.is_failure()).collect();
     let alike = failed.len() == records.len()
         && failed.iter().all(|r| r.status == failed[0].status && r.reason == failed[0].reason);
     let shown = if alike { 1 } else { failed.len() };
@@ -217,99 +217,24 @@ impl Build {
         };
         Ok(Self { program, provenance })
     }
-
-    /// An item as this build has to run it.
-    pub fn own(&self, item: &Item) -> Item {
-        // Two builds are compared as such: the version of a method is not known of another program.
-        let binary = self.provenance.binary_hash.clone();
-        Item { version: binary.clone(), binary, ..item.clone() }
-    }
 }
 
-/// A build with its store and what gives it items.
+/// A side of a run: a program with its workers and its store.
 pub struct Contender<'a> {
-    /// The build.
-    pub build: Build,
+    /// The build, where it is another program than the running one.
+    pub build: Option<Build>,
     /// Its supervisor, whose workers are of this build.
     pub supervisor: Supervisor<'a>,
     /// Where its records are kept.
     pub store: Store,
 }
 
-/// An item that is under way on both sides.
-type Running<'i> = (&'i Item, [Vec<Record>; 2]);
-
-/// Runs on both sides what either lacks, mesh by mesh, all repetitions in turn, and keeps the records.
-///
-/// # Errors
-/// As [`run_items`].
-pub fn run_alternately(
-    items: &[Item],
-    contenders: &mut [Contender<'_>; 2],
-    progress: &mut Progress,
-) -> Result<(), PlanError> {
-    for scene in items.chunk_by(|a, b| a.scene == b.scene) {
-        let mut running: Vec<Running<'_>> = Vec::new();
-        for item in scene {
-            progress.at(&format!("{}: {}", item.scene.mesh, item.method.label()));
-            let mut kept = [vec![], vec![]];
-            for side in order(running.len()) {
-                let Contender { build, supervisor, .. } = &mut contenders[side];
-                kept[side] = supervisor.run(&build.own(item))?;
-            }
-            running.push((item, kept));
-            progress.done();
-        }
-        let turns = scene.iter().map(|item| item.repeat).max().unwrap_or(1);
-        for turn in 2..=turns {
-            repeat(&mut running, turn, contenders, progress)?;
-        }
-        for (_, kept) in running {
-            for (kept, contender) in kept.into_iter().zip(contenders.iter_mut()) {
-                contender.store.keep(&finished(kept))?;
-            }
-        }
+impl Contender<'_> {
+    /// An item as this side has to run it.
+    pub fn own(&self, item: &Item) -> Item {
+        let Some(build) = &self.build else { return item.clone() };
+        // Two builds are compared as such: the version of a method is not known of another program.
+        let binary = build.provenance.binary_hash.clone();
+        Item { version: binary.clone(), binary, ..item.clone() }
     }
-    Ok(())
-}
-
-/// The items that either side lacks in its store.
-pub fn missing_in_either(items: &[Item], contenders: &[Contender<'_>; 2]) -> Vec<Item> {
-    let mut lacking = items.to_vec();
-    lacking.retain(|item| {
-        contenders.iter().any(|contender| {
-            let own = contender.build.own(item);
-            !contender.store.missing(&own, Failures::Kept).is_empty()
-        })
-    });
-    lacking
-}
-
-/// One more repetition of all items of a mesh.
-fn repeat(
-    running: &mut [Running<'_>],
-    turn: usize,
-    contenders: &mut [Contender<'_>; 2],
-    progress: &mut Progress,
-) -> Result<(), PlanError> {
-    contenders.iter_mut().for_each(|contender| contender.supervisor.renew());
-    for (place, (item, kept)) in running.iter_mut().enumerate() {
-        let (scene, method) = (&item.scene.mesh, item.method.label());
-        progress.at(&format!("{scene}: {method}, repetition {turn} of {}", item.repeat));
-        for side in order(place + turn) {
-            let has_result = kept[side].iter().any(|r| r.status.has_result());
-            if turn <= item.repeat && has_result {
-                let Contender { build, supervisor, .. } = &mut contenders[side];
-                let again = supervisor.again(&build.own(item))?;
-                merge(&mut kept[side], turn, again);
-            }
-        }
-        progress.done();
-    }
-    Ok(())
-}
-
-/// Which side begins.
-fn order(turn: usize) -> [usize; 2] {
-    if turn.is_multiple_of(2) { [0, 1] } else { [1, 0] }
 }

@@ -14,13 +14,13 @@ use std::time::Duration;
 use std::{io, thread};
 
 use medial::complex::MedialMesh;
-use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, MethodInfo, RunContext, Simplification, SimplifyError};
+use medial::shape::ShapeOptions;
+use medial::simplifier::{Level, MethodInfo, RunContext, SimplifyError};
 use medial_reports::{Record, Status};
 
 use crate::check::{Outcome, Subject};
 use crate::exec::protocol::{CheckItem, Event, Request, send};
-use crate::measure::answer::{Bounds, Fault, LevelRun, answer, panic_message};
+use crate::measure::answer::{Bounds, Fault, LevelRun, answer, panic_message, preparing};
 use crate::measure::{Scene, failure_record, judge, mesh_hash, record, repetition};
 use crate::plugin::SCRATCH;
 use crate::provenance::Provenance;
@@ -39,10 +39,14 @@ pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
     for request in requests() {
         let served = match request {
             Request::Run { item, axes, provenance } => {
-                run(registry, &mut scene, &item, axes.as_deref(), &provenance)
+                run(registry, &mut scene, &item, &mut |scene, runs| {
+                    send_records(&item, axes.as_deref(), &provenance, scene, &runs)
+                })
             }
             Request::Probe { item } => probe(registry, &item),
-            Request::Again { item } => again(registry, &mut scene, &item),
+            Request::Again { item } => {
+                run(registry, &mut scene, &item, &mut |_, runs| send_repetitions(runs))
+            }
             Request::Check(item) => put_to(registry, &item),
         };
         if served.and_then(|()| send(&Event::Finished)).is_err() {
@@ -105,69 +109,86 @@ fn enter<'s>(scene: &'s mut Option<Scene>, item: &Item) -> Result<&'s mut Scene,
     Ok(scene)
 }
 
+/// Runs the method of an item: `report` gets the results of its levels, then that of each bound.
 fn run(
     registry: &Registry,
     scene: &mut Option<Scene>,
     item: &Item,
-    axes: Option<&Path>,
-    provenance: &Provenance,
+    report: &mut dyn FnMut(&Scene, Vec<LevelRun>) -> io::Result<()>,
 ) -> io::Result<()> {
     send(&Event::Loading)?;
     let scene = match enter(scene, item) {
-        Ok(scene) => scene,
+        Ok(scene) => &*scene,
         Err(why) => return send(&Event::Refused(why)),
     };
     send(&Event::Preparing(scene.input.hash.clone()))?;
-    let report = |runs: &[LevelRun]| -> io::Result<()> {
-        send(&Event::Measuring)?;
-        for (run, verdict) in runs.iter().zip(judge(scene, runs)) {
-            let record = record(item, scene, run, verdict, provenance, axes);
-            let record =
-                if survives_json(&record) { record } else { unreadable(item, run, provenance) };
-            send(&Event::Record(Box::new(record)))?;
-        }
-        Ok(())
-    };
+    let entry = find(registry, &item.method);
+    let (unknown, context) = (MethodInfo::default(), RunContext::with_seed(item.seed));
+    let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
+    let prepare = preparing(|view| match &entry {
+        Ok(entry) => entry.method().prepare(view, &item.method.params, &context),
+        Err(why) => Err(SimplifyError::Failed(why.clone())),
+    });
     let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
     if !levels.is_empty() {
-        report(&answer_levels(registry, item, scene, &levels))?;
+        let view = scene.shape().view();
+        // The supervisor notices by itself when the pipe is closed.
+        let asked = |level: Level| drop(send(&Event::Asked(level.into())));
+        report(scene, answer(&view, info, || prepare(&view), &levels, asked))?;
     }
+    let mut bounds: Vec<f64> =
+        item.levels.iter().filter_map(|target| target.level().err()).collect();
+    if bounds.is_empty() {
+        return Ok(());
+    }
+    bounds.sort_by(|a, b| b.total_cmp(a));
+    let measure = |mesh: &MedialMesh| {
+        let distances = scene.judge.distances(&scene.carried(mesh));
+        distances.map(|distances| distances.hausdorff).map_err(|error| error.to_string())
+    };
+    let search = Bounds {
+        shape: scene.shape(),
+        info,
+        sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation().sweep),
+        prepare: &prepare,
+        measure: &measure,
+        searching: &|bound| drop(send(&Event::Searching(bound))),
+        trying: &|_| {},
+    };
     // Each bound is recorded before the next, tighter one is searched: a method that ends its worker
     // at a tight bound loses none of the looser ones.
-    answer_bounds(registry, item, scene, &mut |run| report(std::slice::from_ref(&run)))
+    search.answer(&bounds, &mut |run, _| report(scene, vec![run]))
 }
 
-/// Whether a record reads back as it is: JSON has no infinity and no NaN, and writes `null`.
-fn survives_json(record: &Record) -> bool {
-    let text = serde_json::to_string(record).unwrap_or_default();
-    serde_json::from_str::<Record>(&text).is_ok_and(|back| back == *record)
-}
-
-/// The record that replaces one that cannot be read back.
-fn unreadable(item: &Item, run: &LevelRun, provenance: &Provenance) -> Record {
-    let reason = "a number of its record is not finite".to_owned();
-    let fault = Fault { status: Status::InvalidOutput, reason };
-    failure_record(item, run.level, &fault, provenance)
-}
-
-fn again(registry: &Registry, scene: &mut Option<Scene>, item: &Item) -> io::Result<()> {
-    send(&Event::Loading)?;
-    let scene = match enter(scene, item) {
-        Ok(scene) => scene,
-        Err(why) => return send(&Event::Refused(why)),
-    };
-    send(&Event::Preparing(scene.input.hash.clone()))?;
-    let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
-    for run in answer_levels(registry, item, scene, &levels) {
-        report_repetition(run)?;
+/// Measures results and sends their records.
+fn send_records(
+    item: &Item,
+    axes: Option<&Path>,
+    provenance: &Provenance,
+    scene: &Scene,
+    runs: &[LevelRun],
+) -> io::Result<()> {
+    send(&Event::Measuring)?;
+    for (run, verdict) in runs.iter().zip(judge(scene, runs)) {
+        let mut record = record(item, scene, run, verdict, provenance, axes);
+        // JSON has no infinity and no NaN, and writes `null`: such a record does not read back as it is.
+        let text = serde_json::to_string(&record).unwrap_or_default();
+        if serde_json::from_str::<Record>(&text).map_or(true, |back| back != record) {
+            let reason = "a number of its record is not finite".to_owned();
+            let fault = Fault { status: Status::InvalidOutput, reason };
+            record = failure_record(item, run.level, &fault, provenance);
+        }
+        send(&Event::Record(Box::new(record)))?;
     }
-    answer_bounds(registry, item, scene, &mut report_repetition)
+    Ok(())
 }
 
-fn report_repetition(LevelRun { level, outcome, times }: LevelRun) -> io::Result<()> {
-    // The hash alone: the supervisor compares it with that of the first run.
-    let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
-    send(&Event::Repeated(level, outcome))
+/// Sends times and hashes alone: the supervisor compares these with those of the first run.
+fn send_repetitions(runs: Vec<LevelRun>) -> io::Result<()> {
+    runs.into_iter().try_for_each(|LevelRun { level, outcome, times }| {
+        let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
+        send(&Event::Repeated(level, outcome))
+    })
 }
 
 /// Prepares the method of an item on a very small shape.
@@ -190,76 +211,6 @@ fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-/// The results of an item's method at some of its levels.
-fn answer_levels(
-    registry: &Registry,
-    item: &Item,
-    scene: &Scene,
-    levels: &[Level],
-) -> Vec<LevelRun> {
-    let entry = find(registry, &item.method);
-    let context = RunContext::with_seed(item.seed);
-    let unknown = MethodInfo::default();
-    let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
-    let view = scene.shape().view();
-    answer(
-        &view,
-        info,
-        || match &entry {
-            Ok(entry) => entry.method().prepare(&view, &item.method.params, &context),
-            Err(why) => Err(SimplifyError::Failed(why.clone())),
-        },
-        levels,
-        // The supervisor notices by itself when the pipe is closed.
-        |level| drop(send(&Event::Asked(level.into()))),
-    )
-}
-
-/// The results of an item's method for its error bounds, from the loosest to the tightest. Each goes
-/// to `each` before the next search begins.
-fn answer_bounds(
-    registry: &Registry,
-    item: &Item,
-    scene: &Scene,
-    each: &mut dyn FnMut(LevelRun) -> io::Result<()>,
-) -> io::Result<()> {
-    let mut bounds: Vec<f64> =
-        item.levels.iter().filter_map(|target| target.level().err()).collect();
-    if bounds.is_empty() {
-        return Ok(());
-    }
-    bounds.sort_by(|a, b| b.total_cmp(a));
-    let entry = find(registry, &item.method);
-    let context = RunContext::with_seed(item.seed);
-    let prepare = preparing(|view| match &entry {
-        Ok(entry) => entry.method().prepare(view, &item.method.params, &context),
-        Err(why) => Err(SimplifyError::Failed(why.clone())),
-    });
-    let unknown = MethodInfo::default();
-    let measure = |mesh: &MedialMesh| {
-        let distances = scene.judge.distances(&scene.carried(mesh));
-        distances.map(|distances| distances.hausdorff).map_err(|error| error.to_string())
-    };
-    let search = Bounds {
-        shape: scene.shape(),
-        info: entry.as_ref().map_or(&unknown, |entry| entry.method().info()),
-        sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation().sweep),
-        prepare: &prepare,
-        measure: &measure,
-        searching: &|bound| drop(send(&Event::Searching(bound))),
-    };
-    search.answer(&bounds, each)
-}
-
-/// Returns its argument, a closure that starts a simplification on any view. Passing the closure
-/// through this function makes the compiler infer its lifetimes.
-fn preparing<F>(begin: F) -> F
-where
-    F: for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError>,
-{
-    begin
 }
 
 /// Runs one case of the conformance corpus on a method.
@@ -298,11 +249,4 @@ fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, St
         return Err(format!("{label}: {what} has changed since the run was planned"));
     }
     Ok(entry)
-}
-
-impl Fault {
-    /// Whether a worker that reported this may be in a broken state.
-    pub fn taints(&self) -> bool {
-        self.status == Status::Panicked
-    }
 }

@@ -5,7 +5,6 @@
 //! Measuring and writing come later and are not timed.
 
 use std::any::Any;
-use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use medial::heap::Usage;
@@ -259,6 +258,15 @@ pub(crate) fn panic_message(payload: &(dyn Any + Send)) -> String {
 pub type Prepare<'a> =
     dyn for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError> + 'a;
 
+/// Returns its argument, a closure that starts a simplification on any view. Passing the closure
+/// through this function makes the compiler infer its lifetimes.
+pub fn preparing<F>(begin: F) -> F
+where
+    F: for<'v> Fn(&'v Shape) -> Result<Box<dyn Simplification + 'v>, SimplifyError>,
+{
+    begin
+}
+
 /// A search for levels within error bounds.
 pub struct Bounds<'a> {
     /// The shape.
@@ -273,53 +281,59 @@ pub struct Bounds<'a> {
     pub measure: &'a Measure<'a>,
     /// Gets each bound before the search for it.
     pub searching: &'a dyn Fn(Target),
+    /// Gets each level before it is tried.
+    pub trying: &'a dyn Fn(Level),
 }
 
 impl Bounds<'_> {
-    /// A run for each bound, given from large to small: `each` gets it before the next search begins.
-    /// The seconds are those of the level found, without the search.
+    /// A run for each bound, given from large to small, with the level of the search that it is a run of: `each` gets
+    /// it before the next search begins. The seconds are those of the level found, without the search.
     ///
     /// # Errors
     /// When `each` fails.
-    pub fn answer(
+    pub fn answer<E>(
         &self,
         bounds: &[f64],
-        each: &mut dyn FnMut(LevelRun) -> io::Result<()>,
-    ) -> io::Result<()> {
-        let failed = |&bound: &f64, fault: &Fault| LevelRun {
+        each: &mut dyn FnMut(LevelRun, Option<Found>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let failed = |bound: f64, fault: Fault| LevelRun {
             level: Target::MaxError(bound),
-            outcome: Err(fault.clone()),
+            outcome: Err(fault),
             times: Times::default(),
         };
         let view = self.shape.view();
         let begun = guarded(|| Ok((view.initial()?.spheres.len(), (self.prepare)(&view)?)));
         let (most, mut simplification) = match begun {
             Ok(begun) => begun,
-            Err(fault) => return bounds.iter().try_for_each(|bound| each(failed(bound, &fault))),
+            Err(fault) => {
+                return bounds.iter().try_for_each(|&b| each(failed(b, fault.clone()), None));
+            }
         };
         let mut search =
-            Search::new(simplification.as_mut(), self.sweep, most, self.measure, &|_| {});
+            Search::new(simplification.as_mut(), self.sweep, most, self.measure, self.trying);
         let mut broken: Option<Fault> = None;
         // The loosest bound first: the levels tried for it help the others.
-        for bound in bounds {
-            (self.searching)(Target::MaxError(*bound));
+        for &bound in bounds {
+            (self.searching)(Target::MaxError(bound));
             let found = match &broken {
                 Some(fault) => Err(fault.clone()),
-                None => guarded(|| search.within(*bound)),
+                None => guarded(|| search.within(bound)),
             };
-            let run = match found {
-                Ok(Found { within: Some(probe), .. }) => self.timed(probe.level, *bound),
+            // A method that panicked is in no state to be asked again.
+            broken = found.as_ref().err().filter(|fault| fault.status == Status::Panicked).cloned();
+            match found {
                 Ok(found) => {
-                    let reason = found.refusal(*bound);
-                    failed(bound, &Fault { status: Status::BoundMissed, reason })
+                    let run = match found.within {
+                        Some(probe) => self.timed(probe.level, bound),
+                        None => {
+                            let reason = found.refusal(bound);
+                            failed(bound, Fault { status: Status::BoundMissed, reason })
+                        }
+                    };
+                    each(run, Some(found))?;
                 }
-                Err(fault) => {
-                    // A method that panicked is in no state to be asked again.
-                    broken = (fault.status == Status::Panicked).then(|| fault.clone());
-                    failed(bound, &fault)
-                }
-            };
-            each(run)?;
+                Err(fault) => each(failed(bound, fault), None)?,
+            }
         }
         Ok(())
     }

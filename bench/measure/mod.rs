@@ -156,8 +156,8 @@ impl SceneSpec {
 /// The measurements of one result.
 #[derive(Clone)]
 pub struct Verdict {
-    /// The evaluation; `None` if none was requested.
-    pub evaluation: Option<Result<Evaluation, MetricError>>,
+    /// The evaluation.
+    pub evaluation: Result<Evaluation, MetricError>,
     /// Wall-clock seconds of the evaluation.
     pub seconds: f64,
     /// SHA-256 of the result.
@@ -187,11 +187,9 @@ fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
     let hash = mesh_hash(mesh);
     let mesh = scene.carried(mesh);
     let begun = Instant::now();
-    let evaluation = (measure.samples > 0).then(|| {
-        let certified =
-            measure.certify.map(|width| scene.judge.certify(&mesh, width)).transpose()?;
-        Ok(Evaluation { certified, ..scene.judge.evaluate(&mesh)? })
-    });
+    let certified = measure.certify.map(|width| scene.judge.certify(&mesh, width)).transpose();
+    let evaluation = certified
+        .and_then(|certified| Ok(Evaluation { certified, ..scene.judge.evaluate(&mesh)? }));
     let seconds = begun.elapsed().as_secs_f64();
     Verdict { evaluation, seconds, hash }
 }
@@ -289,7 +287,8 @@ pub fn record(
     record.initial = scene.initial();
     // To read a file says nothing of the time that its program took.
     if !is_given {
-        fill_costs(&mut record, &run.times);
+        record.repetitions = vec![repetition(&run.times)];
+        fill_costs(&mut record.simplify, &run.times);
     }
     let Ok(result) = &run.outcome else { return record };
     if record.status.is_ok() {
@@ -304,7 +303,7 @@ pub fn record(
     if let Some(Verdict { evaluation, seconds, hash }) = verdict {
         record.result_hash = Some(hash);
         match evaluation {
-            Some(Ok(evaluation)) => {
+            Ok(evaluation) => {
                 // The level found by a search was run again: only the error of this run counts.
                 if let Target::MaxError(bound) = run.level
                     && evaluation.distances.hausdorff > bound
@@ -318,8 +317,7 @@ pub fn record(
                 record.evaluate = Some(evaluation);
                 record.evaluate_seconds = Some(seconds);
             }
-            Some(Err(error)) => record.simplify.warnings.push(format!("not measured: {error}")),
-            None => {}
+            Err(error) => record.simplify.warnings.push(format!("not measured: {error}")),
         }
     }
     if let Some(axes) = axes {
@@ -332,13 +330,12 @@ pub fn record(
 }
 
 /// Copies what the result cost.
-fn fill_costs(record: &mut Record, times: &Times) {
-    record.repetitions = vec![repetition(times)];
-    record.simplify.substrates =
+pub fn fill_costs(simplify: &mut Simplify, times: &Times) {
+    simplify.substrates =
         times.substrates.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect();
-    record.simplify.seconds = Some(times.seconds());
-    record.simplify.cpu_seconds = Some(times.cpu_seconds());
-    record.simplify.peak_bytes = Some(times.peak_bytes);
+    simplify.seconds = Some(times.seconds());
+    simplify.cpu_seconds = Some(times.cpu_seconds());
+    simplify.peak_bytes = Some(times.peak_bytes);
 }
 
 /// Copies the facts of the result itself: counts, level, remarks.

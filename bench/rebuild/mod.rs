@@ -12,7 +12,7 @@ use medial_reports::{
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::provenance::Provenance;
-use crate::store::RESULTS;
+use crate::store::{PAGE, RESULTS};
 use crate::study::Study;
 use crate::study::registry::Registry;
 
@@ -62,7 +62,7 @@ pub fn refresh(
     added: usize,
 ) -> Result<Rebuilt, Failure> {
     let (records, warnings) = records(dir)?;
-    if added == 0 && dir.join("index.html").exists() {
+    if added == 0 && dir.join(PAGE).exists() {
         return Ok(Rebuilt { records, files: vec![], warnings, undrawn: vec![] });
     }
     let mut header = header(dir, &records, registry, &warnings);

@@ -88,7 +88,7 @@ pub enum Dual {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measure {
-    /// Surface samples beside the vertices, and about as many on the union; 0: not measured.
+    /// Surface samples beside the vertices, and about as many on the union.
     pub samples: usize,
     /// Levels of division of space for the volume difference; 0 leaves it out.
     pub volume_depth: u32,
@@ -179,11 +179,8 @@ impl MethodSpec {
 impl Measure {
     /// The options of the judge.
     pub fn judge_options(&self) -> JudgeOptions {
-        JudgeOptions {
-            samples: self.samples.max(1),
-            volume_depth: self.volume_depth,
-            seed: self.seed,
-        }
+        let Self { samples, volume_depth, seed, .. } = *self;
+        JudgeOptions { samples, volume_depth, seed }
     }
 }
 
