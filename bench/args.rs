@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use medial::complex::{Radii, ReadOptions};
 use medial::metrics::JudgeOptions;
 use medial::shape::ShapeOptions;
@@ -11,10 +12,12 @@ use medial::surface::Sampling;
 
 use crate::exit::Failure;
 use crate::progress::Verbosity;
-use crate::study::external::{AxisOptions, FitBy, RadiiFrom};
 use crate::study::item::Dual;
 use crate::study::registry::{Entry, Registry};
-use crate::study::{Study, no_such_method};
+use crate::study::{MOST_SAMPLES, Study, no_such_method};
+
+/// More threads than this serve nobody and can exhaust the system.
+const MOST_THREADS: u64 = 1024;
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]
@@ -23,7 +26,12 @@ pub struct Global {
     #[arg(long, global = true)]
     pub json: bool,
     /// Number of threads [default: all processors].
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(
+        long,
+        global = true,
+        value_name = "N",
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_THREADS)
+    )]
     pub threads: Option<usize>,
     /// No progress on standard error.
     #[arg(long, short, global = true)]
@@ -74,6 +82,15 @@ impl SubstrateArguments {
         Ok(if seeded { sampling } else { sampling.with_seed(self.seed()) })
     }
 
+    /// The options of a shape.
+    ///
+    /// # Errors
+    /// When the sampling is not understood.
+    pub fn shape_options(&self) -> Result<ShapeOptions, Failure> {
+        let dual = self.dual.unwrap_or_default().into();
+        Ok(ShapeOptions { sampling: self.sampling()?, dual })
+    }
+
     /// Puts what is given into a study.
     ///
     /// # Errors
@@ -93,19 +110,19 @@ impl SubstrateArguments {
 pub struct MeasureArguments {
     /// Surface samples for the error, beside the mesh's vertices; as many on the reconstruction
     /// [default: 50000, `compare` 10000].
-    #[arg(long, value_name = "N")]
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_SAMPLES as u64)
+    )]
     pub samples: Option<usize>,
 }
 
 impl MeasureArguments {
-    /// Puts what is given into a study.
-    ///
-    /// # Errors
-    /// When no sample is asked for, or more than fit into memory.
-    pub fn apply(&self, study: &mut Study) -> Result<(), Failure> {
-        let defaults = JudgeOptions { samples: study.samples, ..JudgeOptions::default() };
-        study.samples = judge_options(self, defaults, 0)?.samples;
-        Ok(())
+    /// The options of the judge.
+    pub fn judge_options(&self, seed: u64) -> JudgeOptions {
+        let defaults = JudgeOptions::default();
+        JudgeOptions { samples: self.samples.unwrap_or(defaults.samples), seed, ..defaults }
     }
 }
 
@@ -127,74 +144,52 @@ impl ReadArguments {
     }
 }
 
-/// How a medial mesh from a file is brought to its surface.
-#[derive(Clone, Debug, Default, Args)]
-pub struct AxisArguments {
-    /// How the file is read.
-    #[command(flatten)]
-    pub read: ReadArguments,
-    /// Where radii come from: `surface` takes the distance of each centre to the surface, for files without radii
-    /// or with other numbers in their place.
-    #[arg(long, value_enum, default_value_t)]
-    pub radii: RadiiFrom,
-    /// The units of the medial mesh: those of the surface, or whatever scale and shift fit it best, which are said.
-    #[arg(long, value_enum, default_value_t)]
-    pub fit: FitBy,
-}
-
-impl AxisArguments {
-    /// What they ask of the reader.
-    pub fn options(&self) -> AxisOptions {
-        let ReadArguments { lenient, block } = self.read;
-        AxisOptions { lenient, block, radii: self.radii, fit: self.fit }
-    }
-}
-
 /// A mesh argument: a file, `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
 pub type MeshArgument = PathBuf;
 
-/// The options of a shape from the command line.
+/// Reads a positive and finite number.
 ///
 /// # Errors
-/// When the sampling is not understood.
-pub fn shape_options(arguments: &SubstrateArguments) -> Result<ShapeOptions, Failure> {
-    let dual = arguments.dual.unwrap_or_default().into();
-    Ok(ShapeOptions { sampling: arguments.sampling()?, dual })
+/// When it is none.
+pub fn positive(text: &str) -> Result<f64, String> {
+    number(text, |x| x > 0.0, "a positive number")
 }
 
-/// The options of the judge from the command line.
+/// Reads a fraction from 0 on.
 ///
 /// # Errors
-/// When no sample is asked for, or more than fit into memory.
-pub fn judge_options(
-    arguments: &MeasureArguments,
-    defaults: JudgeOptions,
-    seed: u64,
-) -> Result<JudgeOptions, Failure> {
-    let samples = arguments.samples.unwrap_or(defaults.samples);
-    if !(1..=MOST_SAMPLES).contains(&samples) {
-        let message = format!("--samples {samples}: ask for 1 to {MOST_SAMPLES} samples");
-        return Err(Failure::usage(message));
-    }
-    Ok(JudgeOptions { samples, seed, ..defaults })
+/// When it is none.
+pub fn share(text: &str) -> Result<f64, String> {
+    number(text, |x| x >= 0.0, "a fraction from 0 on, such as 0.05")
 }
 
-/// More samples than this are taken for a slip.
-const MOST_SAMPLES: usize = 10_000_000;
-
-/// Parameters from `key=value` words.
+/// Reads a positive fraction of at most 1.
 ///
 /// # Errors
-/// When a word has no `=`.
-pub fn params(words: &[String]) -> Result<Params, Failure> {
+/// When it is none.
+pub fn fraction(text: &str) -> Result<f64, String> {
+    number(text, |x| x > 0.0 && x <= 1.0, "more than 0 and at most 1")
+}
+
+fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|&x: &f64| x.is_finite() && is_wanted(x));
+    number.ok_or_else(|| format!("expected {expected}"))
+}
+
+/// Reads `KEY=VALUE`.
+///
+/// # Errors
+/// When there is no `=`.
+pub fn key_value(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("write key=value")?;
+    Ok((key.to_owned(), value.to_owned()))
+}
+
+/// Parameters from keys and values.
+pub fn params(words: &[(String, String)]) -> Params {
     let mut params = Params::none();
-    for word in words {
-        let (key, value) = word
-            .split_once('=')
-            .ok_or_else(|| Failure::usage(format!("--set {word}: write key=value")))?;
-        params.set(key, value);
-    }
-    Ok(params)
+    words.iter().for_each(|(key, value)| params.set(key, value));
+    params
 }
 
 /// The method with an id.

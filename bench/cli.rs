@@ -180,17 +180,10 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
     }
 }
 
-/// More threads than this serve nobody and can exhaust the system.
-const MOST_THREADS: usize = 1024;
-
 fn set_threads(threads: Option<usize>) -> Result<(), Failure> {
     let Some(threads) = threads else {
         return Ok(());
     };
-    if !(1..=MOST_THREADS).contains(&threads) {
-        let message = format!("--threads {threads}: ask for 1 to {MOST_THREADS} threads");
-        return Err(Failure::usage(message));
-    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     pool.map_err(|error| Failure::usage(format!("--threads {threads}: {error}")))
 }

@@ -9,7 +9,7 @@ use crate::exec::queue::PlanError;
 use crate::store::StoreError;
 use crate::study::StudyError;
 use crate::study::library::PublicError;
-use crate::study::source::{InputError, Source};
+use crate::study::source::InputError;
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,11 +60,6 @@ impl Failure {
     pub fn at(path: &Path, message: impl Display) -> Self {
         Self::input(format!("{}: {message}", path.display()))
     }
-
-    /// The user's input is wrong, and the message does not name it by itself.
-    pub fn of(source: &Source, message: impl ToString) -> Self {
-        Self::input(format!("{source}: {}", message.to_string()))
-    }
 }
 
 impl From<StudyError> for Failure {
@@ -73,9 +68,7 @@ impl From<StudyError> for Failure {
             StudyError::Input(error) => error.into(),
             StudyError::Library(error) => error.into(),
             StudyError::File { .. } => Self::input(error),
-            StudyError::Value(_) | StudyError::Method { .. } | StudyError::Registry(_) => {
-                Self::usage(error)
-            }
+            _ => Self::usage(error),
         }
     }
 }
@@ -119,10 +112,8 @@ impl From<InputError> for Failure {
         match error {
             InputError::Read { .. } | InputError::Surface(_) => Self::input(error),
             InputError::Library(error) => error.into(),
-            InputError::NoSuchShape(_)
-            | InputError::Resolution(_)
-            | InputError::OutOfRange { .. }
-            | InputError::TooManyVertices { .. } => Self::usage(error),
+            // A name or a resolution of the command line.
+            _ => Self::usage(error),
         }
     }
 }

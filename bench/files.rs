@@ -5,11 +5,21 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use medial::complex::LoadedMa;
-use medial::shape::{Fit, Shape};
+use medial::shape::{Fit, Shape, ShapeOptions};
 
-use crate::args::AxisArguments;
 use crate::exit::Failure;
-use crate::study::external::read_axis;
+use crate::study::external::{AxisOptions, read_axis};
+use crate::study::source::{Input, Source};
+
+/// Reads a surface or makes a built-in one, and the shape of it. What is wrong names the surface.
+///
+/// # Errors
+/// When it does not exist, is refused, or has no extent.
+pub fn shape_of(mesh: &Path, options: ShapeOptions) -> Result<(Input, Shape), Failure> {
+    let input = Input::load(&Source::parse(mesh)?)?;
+    let shape = input.shape(options).map_err(|error| Failure::at(mesh, error))?;
+    Ok((input, shape))
+}
 
 /// Reads a medial mesh that was made for a shape, in input units, and the change of units that brought it there, if one
 /// was asked for.
@@ -19,9 +29,9 @@ use crate::study::external::read_axis;
 pub fn medial_mesh_for(
     path: &Path,
     shape: &Shape,
-    arguments: &AxisArguments,
+    options: AxisOptions,
 ) -> Result<(LoadedMa, Option<Fit>), Failure> {
-    read_axis(path, shape, &arguments.options()).map_err(Failure::input)
+    read_axis(path, shape, &options).map_err(Failure::input)
 }
 
 /// What a file holds is told by its first bytes; no header of a PLY file is longer than so many.

@@ -4,6 +4,7 @@
 use std::io::{self, Write};
 use std::sync::OnceLock;
 
+use medial::shape::Cost;
 use medial_reports::printable;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -97,5 +98,41 @@ pub fn counted(number: u64, noun: &str) -> String {
         (_, "vertex") => format!("{number} vertices"),
         (_, "mesh") => format!("{number} meshes"),
         _ => format!("{number} {noun}s"),
+    }
+}
+
+/// The costs of the stages of a verb, in their order.
+#[derive(Default)]
+pub struct StageCosts(Vec<(&'static str, Cost)>);
+
+impl StageCosts {
+    /// Does the work of a stage and adds its cost.
+    pub fn timed<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
+        let (done, cost) = Cost::of(work);
+        self.add(stage, cost);
+        done
+    }
+
+    /// Adds a cost to that of a stage.
+    pub fn add(&mut self, stage: &'static str, cost: Cost) {
+        match self.0.iter_mut().find(|(known, _)| *known == stage) {
+            Some((_, sum)) => *sum += cost,
+            None => self.0.push((stage, cost)),
+        }
+    }
+
+    /// Wall-clock seconds and processor seconds by stage, and of all as `total`.
+    pub fn seconds(&self) -> [Map<String, Value>; 2] {
+        [|cost: &Cost| cost.seconds, |cost: &Cost| cost.cpu_seconds].map(|part| {
+            // A fold from +0, because an empty sum is -0 and prints as such.
+            let total = self.0.iter().fold(0.0, |sum, (_, cost)| sum + part(cost));
+            let stages = self.0.iter().map(|(stage, cost)| (*stage, part(cost)));
+            stages.chain([("total", total)]).map(|(k, v)| (k.to_owned(), v.into())).collect()
+        })
+    }
+
+    /// Wall-clock seconds of all stages.
+    pub fn total(&self) -> f64 {
+        self.0.iter().map(|(_, cost)| cost.seconds).sum()
     }
 }

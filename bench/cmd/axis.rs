@@ -1,21 +1,17 @@
 //! `medial axis MESH -o x.ma`: the initial Voronoi medial mesh.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use medial::complex;
-use medial::metrics;
-use medial::shape::Cost;
+use medial::{complex, metrics};
 use serde_json::json;
 
-use crate::args::{Global, MeshArgument, SubstrateArguments, shape_options};
+use crate::args::{Global, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
-use crate::files::check_output;
-use crate::output::{counted, print_json, print_line};
+use crate::files::{check_output, shape_of};
+use crate::output::{StageCosts, counted, print_json, print_line};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
-use crate::study::source::{Input, Source};
 
 /// Arguments of `axis`.
 #[derive(Debug, Args)]
@@ -34,18 +30,16 @@ pub struct Arguments {
 /// # Errors
 /// When the surface is refused, cannot be triangulated, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
-    let options = shape_options(&arguments.substrate)?;
+    let options = arguments.substrate.shape_options()?;
     check_output(arguments.output.as_deref())?;
     let line = StageLine::new(global.stages());
     line.at("reading");
-    let (input, read) = Cost::of(|| Input::load(&source));
-    let input = input?;
-    let shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
+    let mut stages = StageCosts::default();
+    let (input, shape) = stages.timed("read", || shape_of(&arguments.mesh, options))?;
     line.at("computing the medial mesh");
-    let mesh = shape.voronoi().map_err(|error| Failure::of(&source, error))?;
+    let mesh = shape.voronoi().map_err(|error| Failure::at(&arguments.mesh, error))?;
     line.at("counting components, loops and voids");
-    let (betti, _) = Cost::of(|| complex::betti(&mesh));
+    let betti = complex::betti(&mesh);
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
@@ -53,22 +47,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     drop(line);
     let counts = metrics::counts(&mesh);
-    let mut stages = BTreeMap::from([("read", read)]);
-    let mut total = read;
     for (substrate, cost) in shape.used() {
         let stage = match substrate.name() {
             "facets" | "medial_mesh" => "extract",
             "inside_test" => "inside",
             name => name,
         };
-        *stages.entry(stage).or_default() += cost;
-        total += cost;
+        stages.add(stage, cost);
     }
-    stages.insert("total", total);
-    let by_stage = |part: fn(&Cost) -> f64| -> serde_json::Map<String, serde_json::Value> {
-        stages.iter().map(|(&stage, cost)| (stage.to_owned(), part(cost).into())).collect()
-    };
-    let [seconds, cpu_seconds] = [by_stage(|c| c.seconds), by_stage(|c| c.cpu_seconds)];
+    let [seconds, cpu_seconds] = stages.seconds();
     let expected = shape.expected_betti();
     let mut warnings = shape.report().warnings.clone();
     warnings.extend(shape.sampling_warning().map(str::to_owned));
@@ -99,7 +86,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         counted(counts.edges, "edge"),
         counted(counts.faces, "face"),
         shape.samples().len(),
-        total.seconds
+        stages.total()
     ));
     let demanded =
         expected.map_or_else(String::new, |expected| format!(", the solid's {expected:?}"));

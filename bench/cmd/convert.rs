@@ -10,11 +10,11 @@ use medial::surface::SignedDistance;
 use medial::{complex, surface};
 use serde_json::json;
 
-use crate::args::{AxisArguments, Global, MeshArgument, ReadArguments};
+use crate::args::{Global, MeshArgument, ReadArguments};
 use crate::exit::{Exit, Failure};
-use crate::files::{check_extension, extension, is_medial, medial_mesh_for};
+use crate::files::{check_extension, extension, is_medial, medial_mesh_for, shape_of};
 use crate::output::{print_json, print_line};
-use crate::study::source::{Input, Source};
+use crate::study::external::AxisOptions;
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
@@ -132,12 +132,10 @@ impl LookArguments {
     /// When it or the surface is refused, or they cannot belong together.
     fn read(&self, from: &Path, read: &ReadArguments) -> Result<(LoadedMa, Look), Failure> {
         if let Some(surface) = &self.mesh {
-            let fitting = AxisArguments { read: read.clone(), ..AxisArguments::default() };
-            let source = Source::parse(surface).map_err(Failure::usage)?;
-            let shape = Input::load(&source)?
-                .shape(ShapeOptions::default())
-                .map_err(|error| Failure::of(&source, error))?;
-            let loaded = medial_mesh_for(from, &shape, &fitting)?.0;
+            let ReadArguments { lenient, block } = *read;
+            let fitting = AxisOptions { lenient, block, ..AxisOptions::default() };
+            let (_, shape) = shape_of(surface, ShapeOptions::default())?;
+            let loaded = medial_mesh_for(from, &shape, fitting)?.0;
             let values = Some(SphereValues::error(errors(&loaded.mesh, &shape)?));
             return Ok((loaded, Look { values, balls: self.spheres }));
         }

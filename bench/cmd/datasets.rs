@@ -10,7 +10,7 @@ use medial_datasets::published::{Published, Set};
 use medial_datasets::{BuiltIn, NoiseKind, published};
 use serde_json::{Value, json};
 
-use crate::args::Global;
+use crate::args::{Global, positive};
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
 use crate::study::library::{Library, State};
@@ -62,34 +62,29 @@ struct Make {
 /// When nothing has the name, or a file cannot be read or written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     match &arguments.action {
-        Action::List => list_all(global).map(|()| Exit::Done),
-        Action::Make(make) => write(make, global).map(|()| Exit::Done),
+        Action::List => list_all(global),
+        Action::Make(make) => write(make, global),
         Action::Fetch(fetch) => fetch_meshes(fetch, global),
     }
 }
 
-fn write(make: &Make, global: &Global) -> Result<(), Failure> {
+fn write(make: &Make, global: &Global) -> Result<Exit, Failure> {
     let source = Source::BuiltIn { id: make.id.clone(), resolution: make.resolution };
     let input = Input::load(&source).map_err(Failure::usage)?;
     let mesh = medial_datasets::noisy(&input.mesh, make.noise_kind, make.noise, make.seed);
     let mesh = mesh.map_err(|error| Failure::usage(format!("--noise: {error}")))?;
     surface::write(&make.output, &mesh).map_err(Failure::input)?;
-    let object = json!({
-        "id": make.id, "output": make.output, "vertices": mesh.vertices.len(),
-        "faces": mesh.faces.len(), "noise": make.noise, "noise_kind": make.noise_kind,
-        "seed": make.seed,
-    });
+    let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
     if global.json {
+        let object = json!({
+            "id": make.id, "output": make.output, "vertices": vertices, "faces": faces,
+            "noise": make.noise, "noise_kind": make.noise_kind, "seed": make.seed,
+        });
         print_json(&object, &[]);
     } else {
-        print_line(&format!(
-            "{}: {} vertices, {} faces",
-            make.output.display(),
-            mesh.vertices.len(),
-            mesh.faces.len()
-        ));
+        print_line(&format!("{}: {vertices} vertices, {faces} faces", make.output.display()));
     }
-    Ok(())
+    Ok(Exit::Done)
 }
 
 const SCRIPT: &str = include_str!("../../scripts/fetch_meshes.py");
@@ -104,7 +99,7 @@ struct Fetch {
     #[arg(long, value_name = "ARCHIVE")]
     from: Vec<PathBuf>,
     /// End a client (apt-get, pip, npm) after SECONDS.
-    #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 600.0)]
     timeout: f64,
 }
 
@@ -116,10 +111,6 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let library = Library::here()?;
     for word in &arguments.wanted {
         library.wanted(word)?;
-    }
-    if !(arguments.timeout.is_finite() && arguments.timeout > 0.0) {
-        let message = format!("--timeout {}: a positive number of seconds", arguments.timeout);
-        return Err(Failure::usage(message));
     }
     let failed = |error: std::io::Error| Failure::input(format!("fetch_meshes.py: {error}"));
     // The script is a part of this program: nothing has to be installed next to it.
@@ -137,11 +128,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     for archive in &arguments.from {
         command.arg("--from").arg(archive);
     }
-    if global.quiet {
-        command.stderr(Stdio::null());
-    } else {
-        command.stderr(Stdio::inherit());
-    }
+    command.stderr(if global.quiet { Stdio::null() } else { Stdio::inherit() });
     let output = command.arg("--json").output().map_err(|error| match error.kind() {
         std::io::ErrorKind::NotFound => {
             Failure::input("python3 3.11 or later is needed to fetch meshes; install it")
@@ -173,7 +160,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
 ///
 /// # Errors
 /// When the library cannot be read.
-fn list_all(global: &Global) -> Result<(), Failure> {
+fn list_all(global: &Global) -> Result<Exit, Failure> {
     let shapes = medial_datasets::catalogue();
     let library = Library::here()?;
     let states = library.catalogue.meshes.iter().map(|mesh| Ok((mesh, library.state(mesh)?)));
@@ -185,7 +172,7 @@ fn list_all(global: &Global) -> Result<(), Failure> {
             "published": published, "cache": library.folder(),
         });
         print_json(&object, &[]);
-        return Ok(());
+        return Ok(Exit::Done);
     }
     shapes.iter().for_each(print_shape);
     let in_default = shapes.iter().filter(|shape| shape.in_default).count();
@@ -193,7 +180,7 @@ fn list_all(global: &Global) -> Result<(), Failure> {
     for set in Set::ALL {
         print_set(set, &states);
     }
-    Ok(())
+    Ok(Exit::Done)
 }
 
 fn shape(shape: &BuiltIn) -> Value {

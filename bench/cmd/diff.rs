@@ -9,7 +9,7 @@ use clap::Args;
 use medial_reports::Record;
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
 
-use crate::args::Global;
+use crate::args::{Global, share};
 use crate::exec::queue::{Build, Contender, PlanError, run_items};
 use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
@@ -43,13 +43,13 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 10, requires = "run")]
     repeat: usize,
     /// From which on a larger error is a regression, as a fraction.
-    #[arg(long, value_name = "FRACTION", default_value_t = DiffOptions::default().error)]
+    #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().error)]
     error: f64,
     /// From which on more memory is a regression, as a fraction.
-    #[arg(long, value_name = "FRACTION", default_value_t = DiffOptions::default().memory)]
+    #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().memory)]
     memory: f64,
     /// From which on more CPU seconds of a method are a regression, as a fraction.
-    #[arg(long, value_name = "FRACTION", default_value_t = DiffOptions::default().seconds)]
+    #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().seconds)]
     seconds: f64,
 }
 
@@ -63,14 +63,6 @@ pub fn run(
     global: &Global,
     registry: &mut Registry,
 ) -> Result<Exit, Failure> {
-    for (name, value) in
-        [("error", arguments.error), ("memory", arguments.memory), ("seconds", arguments.seconds)]
-    {
-        if !(value >= 0.0 && value.is_finite()) {
-            let message = format!("--{name} {value}: a fraction from 0 on, such as 0.05");
-            return Err(Failure::usage(message));
-        }
-    }
     let [old, new] = match arguments.run {
         true => match alternate(arguments, global, registry)? {
             Some(sides) => sides,

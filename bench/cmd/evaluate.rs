@@ -4,20 +4,18 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use medial::complex::LoadedMa;
-use medial::metrics::{
-    Certificate, Evaluation, Judge, JudgeOptions, MetricError, Witness, WitnessSide,
-};
+use medial::metrics::{Certificate, Evaluation, Judge, MetricError, Witness, WitnessSide};
 use medial::shape::{Fit, Shape, ShapeOptions};
 use medial_reports::measured_rows;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument, judge_options};
+use crate::args::{Global, MeasureArguments, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::medial_mesh_for;
+use crate::files::{medial_mesh_for, shape_of};
 use crate::output::{counted, note, print_error, print_json, print_line};
 use crate::progress::StageLine;
-use crate::study::source::{Input, Source};
+use crate::study::external::AxisOptions;
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -29,7 +27,7 @@ pub struct Arguments {
     #[arg(required = true, value_name = "X.ma")]
     axes: Vec<PathBuf>,
     #[command(flatten)]
-    fitting: AxisArguments,
+    fitting: AxisOptions,
     /// Seed of the samples.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -47,30 +45,16 @@ pub struct Arguments {
 /// # Errors
 /// When the surface or the only medial mesh is refused.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
-    let options = judge_options(&arguments.measure, JudgeOptions::default(), arguments.seed)?;
+    let options = arguments.measure.judge_options(arguments.seed);
     let line = StageLine::new(global.stages());
     line.at("reading");
-    let input = Input::load(&source)?;
-    let shape =
-        input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
+    let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default())?;
     line.at("preparing the surface");
-    let judge =
-        shape.judge(input.axis.as_ref(), options).map_err(|error| Failure::of(&source, error))?;
-    let mut rows = Vec::new();
-    for path in &arguments.axes {
-        let row = evaluate(path, arguments, (&shape, &judge), &line);
-        rows.push(row.map_err(|error| match error {
-            Refusal::Failure(failure) => failure,
-            Refusal::Metric(error @ (MetricError::Tolerance(_) | MetricError::TooFine { .. })) => {
-                Failure::usage(format!("--certify: {error}"))
-            }
-            Refusal::Metric(error @ (MetricError::NoArea | MetricError::NoVolume(_))) => {
-                Failure::of(&source, error)
-            }
-            Refusal::Metric(error) => Failure::input(format!("{}: {error}", path.display())),
-        }));
-    }
+    let judge = shape
+        .judge(input.axis.as_ref(), options)
+        .map_err(|error| Failure::at(&arguments.mesh, error))?;
+    let rows = arguments.axes.iter().map(|path| evaluate(path, arguments, (&shape, &judge), &line));
+    let mut rows: Vec<_> = rows.collect();
     drop(line);
     let warnings = &input.report.warnings;
     if rows.len() == 1 {
@@ -103,36 +87,30 @@ struct Evaluated {
     defects: Vec<String>,
 }
 
-/// Why a medial mesh has no evaluation.
-enum Refusal {
-    Failure(Failure),
-    Metric(MetricError),
-}
-
-impl From<MetricError> for Refusal {
-    fn from(error: MetricError) -> Self {
-        Self::Metric(error)
-    }
-}
-
 fn evaluate(
     path: &Path,
     arguments: &Arguments,
     (shape, judge): (&Shape, &Judge),
     line: &StageLine,
-) -> Result<Evaluated, Refusal> {
+) -> Result<Evaluated, Failure> {
+    let failed = |error: MetricError| match error {
+        MetricError::Tolerance(_) | MetricError::TooFine { .. } => {
+            Failure::usage(format!("--certify: {error}"))
+        }
+        MetricError::NoArea | MetricError::NoVolume(_) => Failure::at(&arguments.mesh, error),
+        _ => Failure::at(path, error),
+    };
     line.at(format!("measuring {}", path.display()));
-    let (loaded, fit) =
-        medial_mesh_for(path, shape, &arguments.fitting).map_err(Refusal::Failure)?;
+    let (loaded, fit) = medial_mesh_for(path, shape, arguments.fitting)?;
     let LoadedMa { mesh, notes, warnings: defects, .. } = loaded;
     let to_normal = shape.normalisation();
     let mesh = mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
     let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
-    let mut certified = certified.transpose()?;
+    let mut certified = certified.transpose().map_err(failed)?;
     if let Some(Certificate { witness, .. }) = &mut certified {
         witness.point = to_normal.backward(witness.point);
     }
-    let evaluation = Evaluation { certified, ..judge.evaluate(&mesh)? };
+    let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(failed)? };
     Ok(Evaluated { evaluation, fit, notes, defects })
 }
 
@@ -158,9 +136,7 @@ fn print_table(
     warnings: &[String],
     global: &Global,
 ) {
-    let refused =
-        files.iter().zip(rows).filter_map(|(file, row)| Some((file, row.as_ref().err()?)));
-    for (_, failure) in refused {
+    for failure in rows.iter().filter_map(|row| row.as_ref().err()) {
         print_error(&format!("medial: {}", failure.message));
     }
     if global.json {

@@ -7,7 +7,7 @@ use medial_reports::history::{Findings, Run, read_runs};
 use medial_reports::read_records;
 use serde_json::{json, to_value};
 
-use crate::args::Global;
+use crate::args::{Global, positive};
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::{note, print_json, print_line};
@@ -31,7 +31,7 @@ pub struct Arguments {
     #[arg(long, short, value_name = "PAGE.html")]
     output: Option<PathBuf>,
     /// Least change of seconds or memory that counts, as a share.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.05)]
+    #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.05)]
     least_step: f64,
 }
 
@@ -41,10 +41,6 @@ pub struct Arguments {
 /// When the results or the history cannot be read, the run cannot be added, or the page cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { folder, output, least_step, .. } = arguments;
-    if !(*least_step > 0.0 && least_step.is_finite()) {
-        let message = format!("--least-step {least_step}: expected a positive share, such as 0.05");
-        return Err(Failure::usage(message));
-    }
     output.as_deref().map_or(Ok(()), files::check_folder)?;
     let (added, mut warnings) = add(arguments)?;
     let (runs, damaged) = read_runs(folder).map_err(Failure::input)?;

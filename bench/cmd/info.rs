@@ -20,7 +20,7 @@ pub struct Arguments {
 /// # Errors
 /// When nothing can be said of the file.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
+    let source = Source::parse(&arguments.mesh)?;
     let (report, refusal) = match source.path() {
         Some(path) => {
             let inspection = surface::inspect(path).map_err(Failure::input)?;

@@ -6,21 +6,23 @@ use clap::{Args, ValueEnum};
 use medial::complex::{
     ContourError, LoadedMa, MedialMesh, MedialUnion, UnionSurface, union_surface,
 };
-use medial::geometry::PowerCrust;
+use medial::geometry::{PowerCrust, TriangulationError};
 use medial::metrics::union_betti;
-use medial::shape::{Cost, Shape};
+use medial::shape::Shape;
 use medial::surface::{Normalisation, SurfaceReport, TriMesh};
-use medial::{complex, surface};
+use medial::{Vec3, complex, surface};
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::args::{AxisArguments, Global, MeshArgument, SubstrateArguments, shape_options};
+use crate::args::{Global, MeshArgument, SubstrateArguments, fraction};
 use crate::exit::{Exit, Failure};
-use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, medial_mesh_for};
-use crate::output::{counted, print_json, print_line};
+use crate::files::{
+    COINCIDENT, SURFACES, check_extension, check_folder, medial_mesh_for, shape_of,
+};
+use crate::output::{StageCosts, counted, print_json, print_line};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
-use crate::study::external::{FitBy, RadiiFrom, percent};
-use crate::study::source::{Input, Source};
+use crate::study::external::{AxisOptions, FitBy, RadiiFrom, percent};
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
@@ -41,16 +43,17 @@ pub struct Arguments {
     /// How far the surface may be from the boundary of the union, as a fraction of the diagonal of
     /// the mesh, or of the box around the spheres without one [default: the coarsest of 0.04, 0.02 and
     /// 0.01 that shows the union's topology, with all faces within 0.005].
-    #[arg(long, value_name = "FRACTION")]
+    #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     tolerance: Option<f64>,
     #[command(flatten)]
-    fitting: AxisArguments,
+    fitting: AxisOptions,
     #[command(flatten)]
     substrate: SubstrateArguments,
 }
 
 /// What is made of the spheres.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
 enum Method {
     /// The boundary of the union of spheres, cones and slabs.
     Union,
@@ -61,38 +64,17 @@ enum Method {
 /// A result farther from the mesh than this, in its diagonals, is taken to be of another surface.
 const ASTRAY: f64 = 0.5;
 
-/// A surface that was made, in input units.
+/// A surface that was made, in input units, and the facts about it.
 struct Made {
     mesh: TriMesh,
-    said: Said,
-    warnings: Vec<String>,
-}
-
-/// What is to be said of it.
-struct Said {
     diagonal: f64,
     /// As a fraction of the diagonal.
     tolerance: f64,
     /// Betti numbers of the union, where they are known.
     union: Option<[u64; 3]>,
     /// Keys of this method alone.
-    more: Map<String, Value>,
-}
-
-/// Seconds by stage.
-#[derive(Default)]
-struct Stages {
-    seconds: Map<String, Value>,
-    cpu_seconds: Map<String, Value>,
-    total: Cost,
-}
-
-impl Stages {
-    fn add(&mut self, stage: &str, lap: Cost) {
-        self.seconds.insert(stage.into(), lap.seconds.into());
-        self.cpu_seconds.insert(stage.into(), lap.cpu_seconds.into());
-        self.total += lap;
-    }
+    more: Value,
+    warnings: Vec<String>,
 }
 
 /// Runs the verb.
@@ -101,30 +83,42 @@ impl Stages {
 /// When an input is refused, the power crust has no mesh, the tolerance is too fine, or the output
 /// cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    check_arguments(arguments)?;
-    let mut stages = Stages::default();
+    let Arguments { axis, output, method, mesh: of, .. } = arguments;
+    check_extension(output, &SURFACES)?;
+    check_folder(output)?;
+    match method {
+        Method::Union if axis.is_none() => {
+            let why =
+                "the union is that of a medial mesh: name one, or ask for --method power-crust";
+            return Err(Failure::usage(why));
+        }
+        Method::PowerCrust if of.is_none() => {
+            let why = "the power crust takes its outer poles from a surface: name it by --mesh MESH, or ask \
+                       for --method union";
+            return Err(Failure::usage(why));
+        }
+        _ => {}
+    }
+    let mut stages = StageCosts::default();
     let line = StageLine::new(global.stages());
     line.at("reading");
-    let (read, lap) = Cost::of(|| read(arguments));
-    let (shape, axis, mut warnings) = read?;
-    stages.add("read", lap);
+    let (shape, spheres, mut warnings) = stages.timed("read", || read(arguments))?;
     line.at("making the surface");
-    let made = match arguments.method {
-        Method::Union => union_surface_of(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
-        Method::PowerCrust => power_crust_of(arguments, shape.as_ref(), axis.as_ref(), &mut stages),
+    let (surface, spheres) = (shape.as_ref(), spheres.as_ref());
+    let made = match method {
+        Method::Union => union_surface_of(arguments, surface, spheres, &mut stages),
+        Method::PowerCrust => power_crust_of(arguments, surface, spheres, &mut stages),
     }?;
     warnings.extend(made.warnings);
-    let (written, lap) = Cost::of(|| surface::write(&arguments.output, &made.mesh));
-    written.map_err(Failure::input)?;
-    stages.add("write", lap);
+    stages.timed("write", || surface::write(output, &made.mesh)).map_err(Failure::input)?;
     let peak = peak_bytes();
 
-    // Untimed: the verdict.
+    // Untimed from here.
     line.at("checking the surface");
-    let report = examine(arguments, &made.mesh, &mut warnings)?;
-    warnings.extend(made.said.union.and_then(|union| other_topology(union, &report)));
-    let deviation = shape.as_ref().map(|shape| deviation(shape, &made.mesh)).transpose()?;
-    if let (Some([max, _]), Some(axis)) = (deviation, &arguments.axis)
+    let report = examine(output, &made.mesh, &mut warnings)?;
+    warnings.extend(made.union.and_then(|union| other_topology(union, &report)));
+    let deviation = surface.map(|shape| deviation(shape, &made.mesh)).transpose()?;
+    if let (Some([max, _]), Some(axis)) = (deviation, axis)
         && max > ASTRAY
     {
         warnings.push(format!(
@@ -134,129 +128,56 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         ));
     }
     drop(line);
-    stages.seconds.insert("total".into(), stages.total.seconds.into());
-    stages.cpu_seconds.insert("total".into(), stages.total.cpu_seconds.into());
-    let verdict = Verdict { report, deviation, stages, peak, made: made.said };
     if global.json {
-        print_json(&verdict.object(arguments), &warnings);
-    } else {
-        verdict.print(arguments);
-        warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
+        let [seconds, cpu_seconds] = stages.seconds();
+        let mut object = json!({
+            "method": method, "vertices": report.vertices, "faces": report.faces,
+            "closed": report.closed, "manifold": report.manifold, "genus": report.genus,
+            "components": report.components, "intersecting_pairs": report.intersecting_pairs,
+            "tolerance": made.tolerance, "diagonal": made.diagonal,
+            "betti": report.expected_betti, "union_betti": made.union,
+            "deviation": deviation.map(|[max, mean]| json!({ "max": max, "mean": mean })),
+            "seconds": seconds, "cpu_seconds": cpu_seconds, "peak_bytes": peak, "output": output,
+        });
+        let more: Map<String, Value> = serde_json::from_value(made.more).unwrap_or_default();
+        more.into_iter().for_each(|(key, value)| object[key] = value);
+        print_json(&object, &warnings);
+        return Ok(Exit::Done);
     }
+    let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
+    let yes = |flag: bool| if flag { "" } else { "not " };
+    print_line(&format!(
+        "{}: {}, {} in {:.2} s\n  {}closed, {}manifold, {}, genus {genus}",
+        output.display(),
+        counted(report.vertices as u64, "vertex"),
+        counted(report.faces as u64, "face"),
+        stages.total(),
+        yes(report.closed),
+        yes(report.manifold),
+        counted(report.components as u64, "component")
+    ));
+    if let Some([max, mean]) = deviation.map(|deviation| deviation.map(percent)) {
+        print_line(&format!("  from the mesh: at most {max}, mean {mean}"));
+    }
+    warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
     Ok(Exit::Done)
-}
-
-/// What is told of a surface that was made.
-struct Verdict {
-    report: SurfaceReport,
-    deviation: Option<[f64; 2]>,
-    stages: Stages,
-    peak: Option<u64>,
-    made: Said,
-}
-
-impl Verdict {
-    fn object(self, arguments: &Arguments) -> Map<String, Value> {
-        let Self { report, deviation, stages, peak, made } = self;
-        let method = match arguments.method {
-            Method::Union => "union",
-            Method::PowerCrust => "power-crust",
-        };
-        let deviation = deviation.map(|[max, mean]| json!({ "max": max, "mean": mean }));
-        let known = [
-            ("method", json!(method)),
-            ("vertices", json!(report.vertices)),
-            ("faces", json!(report.faces)),
-            ("closed", json!(report.closed)),
-            ("manifold", json!(report.manifold)),
-            ("genus", json!(report.genus)),
-            ("components", json!(report.components)),
-            ("intersecting_pairs", json!(report.intersecting_pairs)),
-            ("tolerance", json!(made.tolerance)),
-            ("diagonal", json!(made.diagonal)),
-            ("betti", json!(report.expected_betti)),
-            ("union_betti", json!(made.union)),
-            ("deviation", json!(deviation)),
-            ("seconds", stages.seconds.into()),
-            ("cpu_seconds", stages.cpu_seconds.into()),
-            ("peak_bytes", json!(peak)),
-            ("output", json!(arguments.output)),
-        ];
-        known.into_iter().map(|(key, value)| (key.to_owned(), value)).chain(made.more).collect()
-    }
-
-    fn print(&self, arguments: &Arguments) {
-        let Self { report, deviation, stages, .. } = self;
-        let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
-        let yes = |flag: bool| if flag { "" } else { "not " };
-        print_line(&format!(
-            "{}: {}, {} in {:.2} s",
-            arguments.output.display(),
-            counted(report.vertices as u64, "vertex"),
-            counted(report.faces as u64, "face"),
-            stages.total.seconds
-        ));
-        print_line(&format!(
-            "  {}closed, {}manifold, {}, genus {genus}",
-            yes(report.closed),
-            yes(report.manifold),
-            counted(report.components as u64, "component")
-        ));
-        if let Some([max, mean]) = deviation {
-            let (max, mean) = (percent(*max), percent(*mean));
-            print_line(&format!("  from the mesh: at most {max}, mean {mean}"));
-        }
-    }
-}
-
-/// What can be refused before anything is read.
-fn check_arguments(arguments: &Arguments) -> Result<(), Failure> {
-    let output = &arguments.output;
-    check_extension(output, &SURFACES)?;
-    check_folder(output)?;
-    if let Some(tolerance) = arguments.tolerance
-        && !(tolerance > 0.0 && tolerance <= 1.0)
-    {
-        let message = format!("--tolerance {tolerance}: ask for more than 0 and at most 1");
-        return Err(Failure::usage(message));
-    }
-    match (arguments.method, &arguments.axis, &arguments.mesh) {
-        (Method::Union, None, _) => Err(no_axis()),
-        (Method::PowerCrust, _, None) => Err(no_mesh()),
-        _ => Ok(()),
-    }
-}
-
-fn no_axis() -> Failure {
-    Failure::usage("the union is that of a medial mesh: name one, or ask for --method power-crust")
-}
-
-fn no_mesh() -> Failure {
-    Failure::usage(
-        "the power crust takes its outer poles from a surface: name it by --mesh MESH, or ask \
-         for --method union",
-    )
 }
 
 /// The shape and the medial mesh, in its own units, where they are named, and what was repaired.
 type Read = (Option<Shape>, Option<MedialMesh>, Vec<String>);
 
 fn read(arguments: &Arguments) -> Result<Read, Failure> {
-    let options = shape_options(&arguments.substrate)?;
+    let options = arguments.substrate.shape_options()?;
     let mut warnings = Vec::new();
-    let shape = match &arguments.mesh {
-        None => None,
-        Some(mesh) => {
-            let source = Source::parse(mesh).map_err(Failure::usage)?;
-            let input = Input::load(&source)?;
-            warnings.extend(input.report.warnings.iter().cloned());
-            Some(input.shape(options).map_err(|error| Failure::of(&source, error))?)
-        }
-    };
+    let loaded = arguments.mesh.as_ref().map(|mesh| shape_of(mesh, options)).transpose()?;
+    let shape = loaded.map(|(input, shape)| {
+        warnings.extend(input.report.warnings);
+        shape
+    });
     let axis = match (&arguments.axis, &shape) {
         (None, _) => None,
-        (Some(path), Some(shape)) => Some(medial_mesh_for(path, shape, &arguments.fitting)?.0),
-        (Some(path), None) => Some(without_surface(path, &arguments.fitting)?),
+        (Some(path), Some(shape)) => Some(medial_mesh_for(path, shape, arguments.fitting)?.0),
+        (Some(path), None) => Some(without_surface(path, arguments.fitting)?),
     };
     let axis = axis.map(|loaded| {
         let (mesh, notes) = loaded.with_remarks();
@@ -267,7 +188,7 @@ fn read(arguments: &Arguments) -> Result<Read, Failure> {
 }
 
 /// A medial mesh, where there is no surface to take units and radii from.
-fn without_surface(path: &Path, fitting: &AxisArguments) -> Result<LoadedMa, Failure> {
+fn without_surface(path: &Path, fitting: AxisOptions) -> Result<LoadedMa, Failure> {
     for (is_asked, option) in
         [(fitting.fit != FitBy::None, "--fit"), (fitting.radii != RadiiFrom::File, "--radii")]
     {
@@ -275,22 +196,19 @@ fn without_surface(path: &Path, fitting: &AxisArguments) -> Result<LoadedMa, Fai
             return Err(Failure::usage(format!("{option} needs the surface: name it with --mesh")));
         }
     }
-    complex::read_with(path, fitting.read.options()).map_err(Failure::input)
+    complex::read_with(path, fitting.read_options()).map_err(Failure::input)
 }
 
-fn face_centres(mesh: &TriMesh) -> Vec<medial::Vec3> {
-    (0..mesh.faces.len())
-        .map(|f| mesh.triangle(f).into_iter().sum::<medial::Vec3>() / 3.0)
-        .collect()
+fn face_centres(mesh: &TriMesh) -> Vec<Vec3> {
+    (0..mesh.faces.len()).map(|f| mesh.triangle(f).into_iter().sum::<Vec3>() / 3.0).collect()
 }
 
 /// What `medial info` says of the file that was written; of what is no file, the mesh itself.
 fn examine(
-    arguments: &Arguments,
+    path: &Path,
     mesh: &TriMesh,
     warnings: &mut Vec<String>,
 ) -> Result<SurfaceReport, Failure> {
-    let path: &Path = &arguments.output;
     if !path.is_file() {
         return surface::validate(mesh).map_err(Failure::input);
     }
@@ -333,49 +251,37 @@ fn power_crust_of(
     arguments: &Arguments,
     shape: Option<&Shape>,
     axis: Option<&MedialMesh>,
-    stages: &mut Stages,
+    stages: &mut StageCosts,
 ) -> Result<Made, Failure> {
-    let (Some(shape), Some(mesh)) = (shape, &arguments.mesh) else {
-        return Err(no_mesh());
-    };
-    let (balls, lap) = Cost::of(|| shape.polar_balls());
-    stages.add("poles", lap);
+    let (shape, mesh) = shape.zip(arguments.mesh.as_ref()).expect("checked before reading");
+    let balls = stages.timed("poles", || shape.polar_balls());
     let balls = balls.map_err(|error| Failure::at(mesh, error))?;
     let to_normal = shape.normalisation();
     let inner = match axis {
         Some(axis) => axis.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)).spheres,
         None => balls.inner,
     };
-    let (counts, named) =
-        ([inner.len(), balls.outer.len()], arguments.axis.as_ref().unwrap_or(mesh));
-    let (crust, lap) = Cost::of(|| {
+    let named = arguments.axis.as_ref().unwrap_or(mesh);
+    let crust = stages.timed("reconstruct", || {
         let crust = PowerCrust::new(&inner, &balls.outer)?;
         Ok((crust.facet_count(), surface::crust_surface(&crust, COINCIDENT)))
     });
-    stages.add("reconstruct", lap);
     let (facets, mut crust) =
-        crust.map_err(|error: medial::geometry::TriangulationError| Failure::at(named, error))?;
+        crust.map_err(|error: TriangulationError| Failure::at(named, error))?;
     if crust.mesh.faces.is_empty() {
         return Err(Failure::at(
             named,
             "no inner ball has a power cell: is the medial mesh of this surface, and in its units?",
         ));
     }
-    for vertex in &mut crust.mesh.vertices {
-        *vertex = to_normal.backward(*vertex);
-    }
-    let more = Map::from_iter([
-        ("inner".to_owned(), Value::from(counts[0])),
-        ("outer".to_owned(), Value::from(counts[1])),
-        ("rejected".to_owned(), Value::from(balls.rejected)),
-        ("facets".to_owned(), Value::from(facets)),
-        ("merged".to_owned(), Value::from(crust.contracted)),
-        ("samples".to_owned(), Value::from(shape.samples().len())),
-        ("sampling".to_owned(), Value::from(shape.options().sampling.to_string())),
-        ("seed".to_owned(), Value::from(arguments.substrate.seed)),
-    ]);
-    let said = Said { diagonal: to_normal.diagonal, tolerance: COINCIDENT, union: None, more };
-    Ok(Made { mesh: crust.mesh, said, warnings: vec![] })
+    crust.mesh.vertices.iter_mut().for_each(|vertex| *vertex = to_normal.backward(*vertex));
+    let more = json!({
+        "inner": inner.len(), "outer": balls.outer.len(), "rejected": balls.rejected,
+        "facets": facets, "merged": crust.contracted, "samples": shape.samples().len(),
+        "sampling": shape.options().sampling.to_string(), "seed": arguments.substrate.seed,
+    });
+    let (diagonal, tolerance) = (to_normal.diagonal, COINCIDENT);
+    Ok(Made { mesh: crust.mesh, diagonal, tolerance, union: None, more, warnings: vec![] })
 }
 
 /// Balls that stand for the union where its topology is asked are so far apart, in tolerances.
@@ -395,9 +301,9 @@ fn union_surface_of(
     arguments: &Arguments,
     shape: Option<&Shape>,
     axis: Option<&MedialMesh>,
-    stages: &mut Stages,
+    stages: &mut StageCosts,
 ) -> Result<Made, Failure> {
-    let (Some(axis), Some(path)) = (axis, &arguments.axis) else { return Err(no_axis()) };
+    let (axis, path) = axis.zip(arguments.axis.as_ref()).expect("checked before reading");
     let union = MedialUnion::new(axis).map_err(|error| Failure::at(path, error))?;
     let (lo, hi) = union.bounding_box();
     let corners = TriMesh { vertices: vec![lo, hi], faces: vec![] };
@@ -407,8 +313,8 @@ fn union_surface_of(
         diagonal.or_else(|| Normalisation::of(&corners).map(|n| n.diagonal)).ok_or_else(|| {
             Failure::at(path, "its spheres have no extent, or one that is not finite")
         })?;
-    let (made, lap) = Cost::of(|| fitting_surface(axis, &union, diagonal, arguments.tolerance));
-    stages.add("reconstruct", lap);
+    let made = stages
+        .timed("reconstruct", || fitting_surface(axis, &union, diagonal, arguments.tolerance));
     let Fitting { made, tolerance, off, betti } =
         made.map_err(|error| Failure::at(path, contour_error(error, diagonal)))?;
     let mut warnings = Vec::new();
@@ -420,13 +326,10 @@ fn union_surface_of(
             made.smallest / diagonal
         ));
     }
-    let more = Map::from_iter([
-        ("tetrahedra".to_owned(), Value::from(made.tetrahedra)),
-        ("lost".to_owned(), Value::from(made.lost)),
-        ("faces_to_union".to_owned(), Value::from(off)),
-    ]);
-    let said = Said { diagonal, tolerance, union: betti, more };
-    Ok(Made { mesh: made.mesh, said, warnings })
+    let more = json!({
+        "tetrahedra": made.tetrahedra, "lost": made.lost, "faces_to_union": off,
+    });
+    Ok(Made { mesh: made.mesh, diagonal, tolerance, union: betti, more, warnings })
 }
 
 /// A surface of a union at the tolerance that was taken.

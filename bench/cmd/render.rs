@@ -13,13 +13,12 @@ use medial_reports::render::{
 };
 use serde_json::json;
 
-use crate::args::{AxisArguments, Global, MeshArgument};
+use crate::args::{Global, MeshArgument, fraction};
 use crate::exit::{Exit, Failure};
-use crate::files::{self, check_extension, check_folder, medial_mesh_for};
+use crate::files::{self, check_extension, check_folder, medial_mesh_for, shape_of};
 use crate::output::{counted, print_json, print_line};
 use crate::progress::StageLine;
-use crate::study::external::percent;
-use crate::study::source::{Input, Source};
+use crate::study::external::{AxisOptions, percent};
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]
@@ -40,28 +39,28 @@ pub struct Arguments {
     color: Colour,
     /// `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`, AZIMUTH,ELEVATION in degrees, or X,Y,Z from the shape to
     /// the eye [default: the direction that shows most of the shape].
-    #[arg(long, value_name = "VIEW", allow_hyphen_values = true)]
-    camera: Option<String>,
+    #[arg(long, value_name = "VIEW", allow_hyphen_values = true, value_parser = view)]
+    camera: Option<View>,
     /// Upward direction: `x`, `y`, `z`, `-x`, `-y`, `-z` or X,Y,Z [default: `y`, `z` for shapes that are flat along `y`].
-    #[arg(long, value_name = "DIRECTION", allow_hyphen_values = true)]
-    up: Option<String>,
+    #[arg(long, value_name = "DIRECTION", allow_hyphen_values = true, value_parser = upwards)]
+    up: Option<Vec3>,
     /// 1: the shape fills the picture; 2: twice as large.
     #[arg(long, default_value_t = 1.0)]
     zoom: f64,
     /// Pixels of the picture, of a strip's panel.
-    #[arg(long, value_name = "WxH", default_value = "800x600")]
-    size: String,
+    #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = size)]
+    size: [usize; 2],
     /// `white`, `black`, `transparent` or `#rrggbb`.
-    #[arg(long, value_name = "COLOUR", default_value = "white")]
-    background: String,
+    #[arg(long, value_name = "COLOUR", default_value = "white", value_parser = background)]
+    background: Background,
     /// The end of the scale of errors, as a fraction of the diagonal [default: 99 % of the errors are within it].
-    #[arg(long, value_name = "FRACTION")]
+    #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     max_error: Option<f64>,
     /// Largest distance of a reconstruction from the boundary of the union, as a fraction of the diagonal.
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.01)]
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.01, value_parser = fraction)]
     tolerance: f64,
     #[command(flatten)]
-    fitting: AxisArguments,
+    fitting: AxisOptions,
 }
 
 /// What is drawn.
@@ -87,19 +86,30 @@ enum Colour {
     Plain,
 }
 
+impl From<Colour> for ColourBy {
+    fn from(colour: Colour) -> Self {
+        match colour {
+            Colour::Radius => Self::Radius,
+            Colour::Plain => Self::Plain,
+        }
+    }
+}
+
 /// Runs the verb.
 ///
 /// # Errors
 /// When an input is rejected, an option is not understood, or the picture cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     // All options are checked before anything is read.
-    let wanted = Wanted::new(arguments)?;
+    check_extension(&arguments.output, &["png"])?;
+    check_folder(&arguments.output)?;
+    let show = show(arguments)?;
     let line = StageLine::new(global.stages());
     line.at("reading");
     let read = Read::new(arguments)?;
-    let camera = camera(arguments, read.shape.mesh())?;
+    let camera = camera(arguments, read.shape.mesh());
     line.at("making the reconstructions");
-    let deviations = match wanted.show {
+    let deviations = match show {
         Show::Error | Show::Reconstruction => arguments
             .axes
             .iter()
@@ -110,8 +120,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     };
     line.at("drawing");
     let (picture, drawing) = Cost::of(|| match read.axes.len() {
-        0 | 1 => single(arguments, &wanted, &read, camera, deviations.first()),
-        _ => side_by_side(arguments, &wanted, &read, camera, &deviations),
+        0 | 1 => single(arguments, show, &read, camera, deviations.first()),
+        _ => side_by_side(arguments, &read, camera, &deviations),
     });
     let picture = picture.map_err(usage)?;
     let bytes = picture.to_png().map_err(Failure::input)?;
@@ -132,34 +142,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     print_line(&format!("{}: {width} x {height} pixels", output.display()));
     read.warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
     Ok(Exit::Done)
-}
-
-/// The options after parsing.
-struct Wanted {
-    show: Show,
-    colour: ColourBy,
-    size: [usize; 2],
-    background: Background,
-}
-
-impl Wanted {
-    fn new(arguments: &Arguments) -> Result<Self, Failure> {
-        check_extension(&arguments.output, &["png"])?;
-        check_folder(&arguments.output)?;
-        let shares = [("max-error", arguments.max_error), ("tolerance", Some(arguments.tolerance))];
-        for (option, value) in shares {
-            if let Some(value) = value.filter(|value| !(*value > 0.0 && *value <= 1.0)) {
-                let message = format!("--{option} {value}: expected more than 0 and at most 1");
-                return Err(Failure::usage(message));
-            }
-        }
-        let colour = match arguments.color {
-            Colour::Radius => ColourBy::Radius,
-            Colour::Plain => ColourBy::Plain,
-        };
-        let (size, background) = (size(&arguments.size)?, background(&arguments.background)?);
-        Ok(Self { show: show(arguments)?, colour, size, background })
-    }
 }
 
 /// What is drawn, as far as there are medial meshes for it.
@@ -188,15 +170,12 @@ struct Read {
 
 impl Read {
     fn new(arguments: &Arguments) -> Result<Self, Failure> {
-        let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
-        let input = Input::load(&source)?;
-        let mut warnings = input.report.warnings.clone();
-        let shape =
-            input.shape(ShapeOptions::default()).map_err(|error| Failure::of(&source, error))?;
+        let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default())?;
+        let mut warnings = input.report.warnings;
         let to_normal = *shape.normalisation();
         let mut axes = Vec::new();
         for path in &arguments.axes {
-            let (mesh, notes) = medial_mesh_for(path, &shape, &arguments.fitting)?.0.with_remarks();
+            let (mesh, notes) = medial_mesh_for(path, &shape, arguments.fitting)?.0.with_remarks();
             warnings.extend(notes);
             axes.push(mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)));
         }
@@ -207,7 +186,6 @@ impl Read {
 /// A strip of several medial meshes.
 fn side_by_side(
     arguments: &Arguments,
-    wanted: &Wanted,
     read: &Read,
     camera: Camera,
     deviations: &[Deviation],
@@ -222,10 +200,10 @@ fn side_by_side(
         surface: read.shape.mesh(),
         diagonal: 1.0,
         camera,
-        size: wanted.size,
+        size: arguments.size,
         across: usize::MAX,
-        background: wanted.background,
-        colour: wanted.colour,
+        background: arguments.background,
+        colour: arguments.color.into(),
         max_error: arguments.max_error,
     };
     strip(&panels, &common)
@@ -234,15 +212,15 @@ fn side_by_side(
 /// A picture of at most one medial mesh, with a bar where colours mean numbers.
 fn single(
     arguments: &Arguments,
-    wanted: &Wanted,
+    show: Show,
     read: &Read,
     camera: Camera,
     made: Option<&Deviation>,
 ) -> Result<Picture, RenderError> {
     let surface = read.shape.mesh();
-    let (layers, bar) = match (wanted.show, read.axes.first(), made) {
+    let (layers, bar) = match (show, read.axes.first(), made) {
         (Show::Axis, Some(mesh), _) => {
-            let (colour, bar) = wanted.colour.of(&[mesh], 1.0);
+            let (colour, bar) = ColourBy::from(arguments.color).of(&[mesh], 1.0);
             (vec![Layer::Axis { mesh, colour }, Layer::Glass(surface)], bar)
         }
         (Show::Reconstruction, _, Some(made)) => (vec![Layer::Surface(&made.mesh)], None),
@@ -255,15 +233,15 @@ fn single(
         }
         _ => (vec![Layer::Surface(surface)], None),
     };
-    let [width, height] = wanted.size;
+    let Arguments { size, background, .. } = *arguments;
     // On a picture as small as an icon nothing would be left beside it.
-    let bar = bar.filter(|_| 2 * Bar::column(wanted.size) <= width);
-    let column = if bar.is_some() { Bar::column(wanted.size) } else { 0 };
-    let (size, background) = ([width - column, height], wanted.background);
+    let bar = bar.filter(|_| 2 * Bar::column(size) <= size[0]);
+    let column = if bar.is_some() { Bar::column(size) } else { 0 };
     let frame = Frame::fit(&camera, &surface.vertices)?;
-    let picture = Scene { layers, size, background }.picture(&frame)?;
+    let scene = Scene { layers, size: [size[0] - column, size[1]], background };
+    let picture = scene.picture(&frame)?;
     Ok(match bar {
-        Some(bar) => bar.beside(&picture, wanted.size, background),
+        Some(bar) => bar.beside(&picture, size, background),
         None => picture,
     })
 }
@@ -333,35 +311,42 @@ const VIEWS: [(&str, f64, f64); 7] = [
     ("iso", 45.0, 35.264),
 ];
 
-/// The camera of the options, or the one that shows most of the surface.
-fn camera(arguments: &Arguments, surface: &TriMesh) -> Result<Camera, Failure> {
-    let up = arguments.up.as_deref().map(upwards).transpose()?;
-    let camera = match (arguments.camera.as_deref().map(str::trim), up) {
-        (None | Some("auto"), None) => Camera::fitting(surface),
-        (None | Some("auto"), Some(up)) => Camera::around(up, 28.0, 20.0),
-        (Some(text), up) => from_words(text, up.unwrap_or_else(|| Camera::fitting_up(surface)))?,
-    };
-    Ok(Camera { zoom: arguments.zoom, ..camera })
+/// Where the camera stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum View {
+    /// Azimuth and elevation in degrees.
+    Angles(f64, f64),
+    /// From the shape to the eye.
+    Direction(Vec3),
 }
 
-fn from_words(text: &str, up: Vec3) -> Result<Camera, Failure> {
+/// The camera of the options, or the one that shows most of the surface.
+fn camera(arguments: &Arguments, surface: &TriMesh) -> Camera {
+    let up = || arguments.up.unwrap_or_else(|| Camera::fitting_up(surface));
+    let camera = match (arguments.camera, arguments.up) {
+        (None, None) => Camera::fitting(surface),
+        (None, Some(up)) => Camera::around(up, 28.0, 20.0),
+        (Some(View::Angles(azimuth, elevation)), _) => Camera::around(up(), azimuth, elevation),
+        (Some(View::Direction(direction)), _) => Camera::new(direction, up()),
+    };
+    Camera { zoom: arguments.zoom, ..camera }
+}
+
+fn view(text: &str) -> Result<View, String> {
     let lower = text.to_ascii_lowercase();
     if let Some(&(_, azimuth, elevation)) = VIEWS.iter().find(|view| view.0 == lower) {
-        return Ok(Camera::around(up, azimuth, elevation));
+        return Ok(View::Angles(azimuth, elevation));
     }
     match numbers(text).as_deref() {
         Some(&[azimuth, elevation]) if elevation.abs() < 90.0 => {
-            Ok(Camera::around(up, azimuth, elevation))
+            Ok(View::Angles(azimuth, elevation))
         }
-        Some(&[x, y, z]) => Ok(Camera::new(Vec3::new(x, y, z), up)),
-        _ => {
-            let names: Vec<_> = VIEWS.iter().map(|view| view.0).collect();
-            Err(Failure::usage(format!(
-                "--camera {text}: write one of {}, or AZIMUTH,ELEVATION in degrees with an elevation between -90 and 90, \
-                 or a direction X,Y,Z from the shape to the eye",
-                names.join(", ")
-            )))
-        }
+        Some(&[x, y, z]) => Ok(View::Direction(Vec3::new(x, y, z))),
+        _ => Err(format!(
+            "write one of {}, or AZIMUTH,ELEVATION in degrees with an elevation between -90 and 90, \
+             or a direction X,Y,Z from the shape to the eye",
+            VIEWS.map(|view| view.0).join(", ")
+        )),
     }
 }
 
@@ -370,7 +355,7 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect()
 }
 
-fn upwards(text: &str) -> Result<Vec3, Failure> {
+fn upwards(text: &str) -> Result<Vec3, &'static str> {
     let (sign, axis) = match text.strip_prefix('-') {
         Some(rest) => (-1.0, rest),
         None => (1.0, text.strip_prefix('+').unwrap_or(text)),
@@ -384,23 +369,19 @@ fn upwards(text: &str) -> Result<Vec3, Failure> {
             _ => None,
         },
     };
-    axis.ok_or_else(|| {
-        Failure::usage(format!("--up {text}: write x, y, z, -x, -y, -z or a direction X,Y,Z"))
-    })
+    axis.ok_or("write x, y, z, -x, -y, -z or a direction X,Y,Z")
 }
 
 /// Width and height from `WxH`.
-fn size(text: &str) -> Result<[usize; 2], Failure> {
+fn size(text: &str) -> Result<[usize; 2], &'static str> {
     let sides = text.split_once(['x', 'X']).and_then(|(width, height)| {
         Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
     });
-    sides.ok_or_else(|| {
-        Failure::usage(format!("--size {text}: write WIDTHxHEIGHT in pixels, such as 800x600"))
-    })
+    sides.ok_or("write WIDTHxHEIGHT in pixels, such as 800x600")
 }
 
 /// The background by name or code.
-fn background(text: &str) -> Result<Background, Failure> {
+fn background(text: &str) -> Result<Background, &'static str> {
     let found = match text {
         "white" => Some(Background::WHITE),
         "black" => Some(Background::Colour([0; 3])),
@@ -413,9 +394,7 @@ fn background(text: &str) -> Result<Background, Failure> {
             Some(Background::Colour(colour))
         }),
     };
-    found.ok_or_else(|| {
-        Failure::usage(format!("--background {text}: write white, black, transparent or #rrggbb"))
-    })
+    found.ok_or("write white, black, transparent or #rrggbb")
 }
 
 #[cfg(test)]
@@ -423,33 +402,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn options_are_parsed() {
-        assert_eq!(size("800x600").ok(), Some([800, 600]));
-        assert_eq!(background("#0a0B0c").ok(), Some(Background::Colour([10, 11, 12])));
-        assert_eq!(upwards("-z").ok(), Some(-Vec3::Z));
-        assert_eq!(upwards("0,3,0").ok(), Some(Vec3::Y));
-        let around = |text| from_words(text, Vec3::Y).ok().map(|camera| camera.direction);
-        assert!(around("right").is_some_and(|d| d.distance(Vec3::X) < 1e-12));
-        assert!(around("-90,0").is_some_and(|d| d.distance(-Vec3::X) < 1e-12));
-        assert_eq!(around("1,2,3"), Some(Vec3::new(1.0, 2.0, 3.0)));
-    }
-
-    #[test]
-    fn malformed_options_are_named() {
-        let said = |failure: Option<Failure>, word: &str| {
-            assert!(failure.is_some_and(|failure| failure.message.contains(word)), "{word}");
-        };
+    fn options_are_parsed_or_refused() {
+        assert_eq!(size("800x600"), Ok([800, 600]));
+        assert_eq!(background("#0a0B0c"), Ok(Background::Colour([10, 11, 12])));
+        assert_eq!(upwards("-z"), Ok(-Vec3::Z));
+        assert_eq!(upwards("0,3,0"), Ok(Vec3::Y));
+        assert_eq!(view("right"), Ok(View::Angles(90.0, 0.0)));
+        assert_eq!(view("-90,0"), Ok(View::Angles(-90.0, 0.0)));
+        assert_eq!(view("1,2,3"), Ok(View::Direction(Vec3::new(1.0, 2.0, 3.0))));
         for text in ["800", "800x", "x600", "-1x5", "800x600x2"] {
-            said(size(text).err(), text);
+            assert!(size(text).is_err(), "{text}");
         }
         for text in ["red", "#12345", "#1234567", "#+1+1+1", "#äöü"] {
-            said(background(text).err(), text);
+            assert!(background(text).is_err(), "{text}");
         }
         for text in ["w", "0,0,0", "1,2", "nan,0,1"] {
-            said(upwards(text).err(), text);
+            assert!(upwards(text).is_err(), "{text}");
         }
         for text in ["somewhere", "1", "0,90", "1,2,3,4", "inf,0"] {
-            said(from_words(text, Vec3::Y).err(), text);
+            assert!(view(text).is_err(), "{text}");
         }
     }
 }

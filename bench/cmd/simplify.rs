@@ -4,11 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use medial::complex::MedialMesh;
-use medial::metrics::{JudgeOptions, topology_warning};
+use medial::metrics::topology_warning;
 use medial::shape::Shape;
-use medial::simplifier::{
-    Level, MedialSimplifier, Params, RunContext, Simplification, Simplified, SimplifyError,
-};
+use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::TriMesh;
 use medial::{complex, surface};
 use medial_methods::aof::LatticeVoxels;
@@ -19,21 +17,20 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::args::{
-    AxisArguments, Global, MeasureArguments, MeshArgument, SubstrateArguments, judge_options,
-    method, params, shape_options,
+    Global, MeasureArguments, MeshArgument, SubstrateArguments, key_value, method, params,
 };
 use crate::exit::{Exit, Failure};
 use crate::files::{
-    COINCIDENT, SURFACES, check_extension, check_folder, check_output, medial_mesh_for,
+    COINCIDENT, SURFACES, check_extension, check_folder, check_output, medial_mesh_for, shape_of,
 };
-use crate::measure::answer::{Fault, LevelRun, answer};
-use crate::measure::fill_result;
-use crate::measure::search::{Probe, Search};
+use crate::measure::answer::{Bounds, Fault, LevelRun, answer, preparing};
+use crate::measure::search::Found;
+use crate::measure::{fill_costs, fill_result};
 use crate::output::{counted, note, print_json, print_line, version};
 use crate::progress::StageLine;
-use crate::study::external::percent;
+use crate::study::external::{AxisOptions, percent};
 use crate::study::registry::{Entry, Registry};
-use crate::study::source::{Input, Source};
+use crate::study::source::Input;
 
 /// Arguments of `simplify`.
 #[derive(Debug, Args)]
@@ -50,19 +47,19 @@ pub struct Arguments {
     #[arg(long, value_name = "X", conflicts_with = "max_error", allow_negative_numbers = true)]
     level: Option<f64>,
     /// As few spheres as keep the symmetric Hausdorff error within this fraction of the diagonal.
-    #[arg(long, value_name = "E")]
+    #[arg(long, value_name = "E", value_parser = error_bound)]
     max_error: Option<f64>,
     /// Hold that bound by a certificate, not by samples alone.
     #[arg(long, requires = "max_error")]
     certify: bool,
     /// Set a parameter of the method; can be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
+    set: Vec<(String, String)>,
     /// Start from this medial mesh instead of the Voronoi one.
     #[arg(long, value_name = "Y.ma")]
     initial: Option<PathBuf>,
     #[command(flatten)]
-    fitting: AxisArguments,
+    fitting: AxisOptions,
     #[command(flatten)]
     outputs: Outputs,
     #[command(flatten)]
@@ -76,28 +73,31 @@ pub struct Arguments {
 /// # Errors
 /// When the input is refused, the level is not met at all, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
-    let source = Source::parse(&arguments.mesh).map_err(Failure::usage)?;
     let entry = method(registry, &arguments.method)?;
-    let method = entry.method();
-    let options = shape_options(&arguments.substrate)?;
+    let options = arguments.substrate.shape_options()?;
     // All slips that show without the mesh are refused before it is read.
-    check_bound(arguments)?;
-    arguments.outputs.check(method)?;
+    arguments.outputs.check(entry.method())?;
     let line = StageLine::new(global.stages());
     line.at("reading");
-    let input = Input::load(&source)?;
-    let mut shape = input.shape(options).map_err(|error| Failure::of(&source, error))?;
+    let (input, mut shape) = shape_of(&arguments.mesh, options)?;
     let mut warnings = input.report.warnings.clone();
     if let Some(path) = &arguments.initial {
-        let (initial, notes) = medial_mesh_for(path, &shape, &arguments.fitting)?.0.with_remarks();
+        let (initial, notes) = medial_mesh_for(path, &shape, arguments.fitting)?.0.with_remarks();
         warnings.extend(notes);
         shape = shape.with_initial(&initial);
     }
-    let params = params(&arguments.set)?;
-    let start = Start { entry, params, shape: &shape };
-    let (run, search) = simplify(arguments, &start, &input, &line)?;
-    let mut simplify = describe(arguments, &start, &run);
-    let simplified = run.outcome.map_err(|fault| failure(&source, fault))?;
+    let params = params(&arguments.set);
+    let (run, search) = arguments.run(entry, &params, (&shape, &input), &line)?;
+    let mut simplify = Simplify {
+        params,
+        seed: arguments.substrate.seed(),
+        threads: Some(rayon::current_num_threads()),
+        version: version().to_owned(),
+        ..Simplify::asked(&arguments.method, run.level, Status::Ok)
+    };
+    fill_costs(&mut simplify, &run.times);
+    let simplified = run.outcome.map_err(|fault| arguments.failure(fault))?;
+    fill_result(&mut simplify, &simplified);
     line.at("checking the topology");
     simplify.warnings.extend(shape.sampling_warning().map(str::to_owned));
     simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
@@ -151,99 +151,69 @@ fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde
     serde_json::to_value(parts)
 }
 
-/// What a method starts from.
-struct Start<'a> {
-    entry: &'a Entry,
-    params: Params,
-    shape: &'a Shape,
-}
-
-impl<'a> Start<'a> {
-    /// Begins on a view of the shape.
-    fn begin<'v>(
+impl Arguments {
+    /// Runs the method at the level that is asked, or at the one that a search finds.
+    fn run(
         &self,
-        view: &'v Shape,
-        run: &RunContext,
-    ) -> Result<Box<dyn Simplification + 'v>, SimplifyError> {
-        self.entry.method().prepare(view, &self.params, run)
+        entry: &Entry,
+        params: &Params,
+        (shape, input): (&Shape, &Input),
+        line: &StageLine,
+    ) -> Result<(LevelRun, Option<Searched>), Failure> {
+        let seed = self.substrate.seed();
+        let context = RunContext::with_seed(seed).on_progress(line.steps());
+        let info = entry.method().info();
+        let prepare = preparing(|view| entry.method().prepare(view, params, &context));
+        line.at(format!("preparing {}", self.method));
+        let Some(bound) = self.max_error else {
+            let level = match (self.spheres, self.level) {
+                (Some(count), _) => Level::Spheres(count),
+                (_, Some(value)) => Level::Native(value),
+                _ => Level::Published,
+            };
+            let at = |level| line.at(format!("simplifying to {level} by {}", self.method));
+            let view = shape.view();
+            let run = answer(&view, info, || prepare(&view), &[level], at).pop();
+            return Ok((run.expect("one level, one run"), None));
+        };
+        let judge = shape.judge(input.axis.as_ref(), self.measure.judge_options(seed));
+        let judge = judge.map_err(|error| self.failure(SimplifyError::from(error).into()))?;
+        let measure = |mesh: &MedialMesh| -> Result<f64, String> {
+            let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
+            if !self.certify || sampled > bound {
+                return Ok(sampled);
+            }
+            // An upper end within the bound needs an interval that is narrow beside it.
+            let certified = judge.certify(mesh, CERTIFIED_SHARE * bound);
+            Ok(certified.map_err(|error| error.to_string())?.upper)
+        };
+        let search = Bounds {
+            shape,
+            info,
+            sweep: &entry.presentation().sweep,
+            prepare: &prepare,
+            measure: &measure,
+            searching: &|_| {},
+            trying: &|level| line.at(format!("searching the bound: {level}")),
+        };
+        let mut ended = None;
+        search.answer(&[bound], &mut |run, found| {
+            ended = Some((run, found));
+            Ok::<_, Failure>(())
+        })?;
+        let (run, found) = ended.expect("one bound, one run");
+        let Some(Found { within: Some(probe), tried, .. }) = found else { return Ok((run, None)) };
+        let (spheres, hausdorff) = (probe.spheres, probe.error);
+        let searched = Searched { bound, hausdorff, tried, spheres, certified: self.certify };
+        Ok((LevelRun { level: probe.level.into(), ..run }, Some(searched)))
     }
 
-    /// Number of spheres that the method starts from.
-    fn spheres(&self) -> Result<usize, SimplifyError> {
-        Ok(self.shape.initial()?.spheres.len())
-    }
-}
-
-/// Runs the method at the level that is asked, or at the one that a search finds.
-fn simplify(
-    arguments: &Arguments,
-    start: &Start<'_>,
-    input: &Input,
-    line: &StageLine,
-) -> Result<(LevelRun, Option<Searched>), Failure> {
-    let seed = arguments.substrate.seed();
-    let run = RunContext::with_seed(seed).on_progress(line.steps());
-    let (level, search) = match (arguments.spheres, arguments.level, arguments.max_error) {
-        (Some(count), ..) => (Level::Spheres(count), None),
-        (_, Some(value), _) => (Level::Native(value), None),
-        (.., Some(bound)) => {
-            // The seconds are those of the level found, asked alone.
-            let (level, search) = search_bound(arguments, start, input, (bound, line))?;
-            (level, Some(search))
+    fn failure(&self, Fault { status, reason }: Fault) -> Failure {
+        match status {
+            Status::Unsupported => Failure { code: Exit::SomeFailed, message: reason },
+            Status::Refused | Status::BoundMissed => Failure::usage(reason),
+            _ => Failure::at(&self.mesh, reason),
         }
-        _ => (Level::Published, None),
-    };
-    line.at(format!("preparing {}", arguments.method));
-    let view = start.shape.view();
-    let mut runs = answer(
-        &view,
-        start.entry.method().info(),
-        || start.begin(&view, &run),
-        &[level],
-        |level| {
-            line.at(format!("simplifying to {level} by {}", arguments.method));
-        },
-    );
-    let run = runs.pop().ok_or_else(|| Failure::input("no level was run"))?;
-    Ok((run, search))
-}
-
-fn describe(arguments: &Arguments, start: &Start<'_>, run: &LevelRun) -> Simplify {
-    let times = &run.times;
-    let mut simplify = Simplify {
-        params: start.params.clone(),
-        seed: arguments.substrate.seed(),
-        substrates: times
-            .substrates
-            .iter()
-            .map(|(substrate, cost)| (substrate.name().to_owned(), cost.seconds))
-            .collect(),
-        seconds: Some(times.seconds()),
-        cpu_seconds: Some(times.cpu_seconds()),
-        peak_bytes: Some(times.peak_bytes),
-        threads: Some(rayon::current_num_threads()),
-        version: version().to_owned(),
-        ..Simplify::asked(&arguments.method, run.level, Status::Ok)
-    };
-    if let Ok(result) = &run.outcome {
-        fill_result(&mut simplify, result);
-    }
-    simplify
-}
-
-fn failure_of(input: &Input, fault: Fault) -> Failure {
-    failure_named(&input.name, fault)
-}
-
-fn failure(source: &Source, fault: Fault) -> Failure {
-    failure_named(&source.to_string(), fault)
-}
-
-fn failure_named(name: &str, Fault { status, reason }: Fault) -> Failure {
-    match status {
-        Status::Unsupported => Failure { code: Exit::SomeFailed, message: reason },
-        Status::Refused => Failure::usage(reason),
-        _ => Failure::input(format!("{name}: {reason}")),
     }
 }
 
@@ -300,60 +270,17 @@ struct Searched {
 /// Width of the interval that certifies a bound, as a share of it.
 const CERTIFIED_SHARE: f64 = 0.05;
 
-/// Refuses a bound that is none, before anything is read.
-fn check_bound(arguments: &Arguments) -> Result<(), Failure> {
-    match arguments.max_error {
-        Some(bound) if !(bound.is_finite() && bound > 0.0) => {
-            let message = format!("--max-error {bound}: a positive fraction of the diagonal");
-            Err(Failure::usage(message))
-        }
-        // The whole solid is within one diagonal of anything inside it.
-        Some(bound) if bound >= 1.0 => Err(Failure::usage(format!(
-            "--max-error {bound}: a fraction of the diagonal is meant, and this is {} % of it; \
-             write {} for {bound} %",
+/// Reads a bound. The whole solid is within one diagonal of anything inside it, so that 1 and more are a slip.
+fn error_bound(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(bound) if bound > 0.0 && bound < 1.0 => Ok(bound),
+        Ok(bound) if bound >= 1.0 && bound.is_finite() => Err(format!(
+            "a fraction of the diagonal is meant, and this is {} % of it; write {} for {bound} %",
             100.0 * bound,
             bound / 100.0
-        ))),
-        Some(_) => judge_options(&arguments.measure, JudgeOptions::default(), 0).map(|_| ()),
-        None => Ok(()),
+        )),
+        _ => Err("expected a positive fraction of the diagonal".to_owned()),
     }
-}
-
-/// Searches the fewest spheres within an error bound.
-fn search_bound(
-    arguments: &Arguments,
-    start: &Start<'_>,
-    input: &Input,
-    (bound, line): (f64, &StageLine),
-) -> Result<(Level, Searched), Failure> {
-    let seed = arguments.substrate.seed();
-    let options = judge_options(&arguments.measure, JudgeOptions::default(), seed)?;
-    let refused = |error: SimplifyError| failure_of(input, error.into());
-    let judge = start.shape.judge(input.axis.as_ref(), options);
-    let judge = judge.map_err(|error| refused(error.into()))?;
-    let view = start.shape.view();
-    line.at(format!("preparing {}", arguments.method));
-    let run = RunContext::with_seed(seed).on_progress(line.steps());
-    let mut simplification = start.begin(&view, &run).map_err(refused)?;
-    let initial = start.spheres().map_err(refused)?;
-    let measure = |mesh: &MedialMesh| -> Result<f64, String> {
-        let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
-        if !arguments.certify || sampled > bound {
-            return Ok(sampled);
-        }
-        // An upper end within the bound needs an interval that is narrow beside it.
-        let certified = judge.certify(mesh, CERTIFIED_SHARE * bound);
-        Ok(certified.map_err(|error| error.to_string())?.upper)
-    };
-    let trying = |level: Level| line.at(format!("searching the bound: {level}"));
-    let sweep = &start.entry.presentation().sweep;
-    let mut search = Search::new(simplification.as_mut(), sweep, initial, &measure, &trying);
-    let found = search.within(bound).map_err(refused)?;
-    let Some(Probe { level, spheres, error }) = found.within else {
-        return Err(Failure::usage(found.refusal(bound)));
-    };
-    let (tried, certified) = (found.tried, arguments.certify);
-    Ok((level, Searched { bound, hausdorff: error, tried, spheres, certified }))
 }
 
 /// Files to write.

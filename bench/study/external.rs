@@ -10,11 +10,11 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use medial::complex::{LoadedMa, MedialMesh, Radii, ReadOptions, Sphere};
 use medial::shape::{Fit, Shape, ShapeError};
 use medial::simplifier::{
-    Level, Method, MethodInfo, ParamInfo, Params, RunContext, Simplification, Simplified,
+    Level, Method, MethodInfo, ParamFields, Params, RunContext, Simplification, Simplified,
     SimplifyError,
 };
 use medial::surface::Side;
@@ -158,33 +158,35 @@ fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Parameters of the pseudo-method.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GivenParams {
-    /// The medial mesh.
-    pub file: PathBuf,
-    /// See [`Claims::title`].
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub title: String,
-    /// See [`Claims::citation`].
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub citation: String,
-    /// See [`Claims::seconds`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub claimed_seconds: Option<f64>,
-    /// Names under which the same bytes are given, too.
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub same_as: String,
-    /// See [`Given::fit`].
-    pub fit: FitBy,
-    /// See [`Given::radii`].
-    pub radii: RadiiFrom,
-    /// See [`Given::lenient`].
-    pub lenient: bool,
-    /// See [`Given::block`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub block: Option<usize>,
+medial::parameters! {
+    /// Parameters of the pseudo-method.
+    #[derive(Clone, Debug)]
+    pub struct GivenParams {
+        /// The medial mesh.
+        file: PathBuf = PathBuf::new(), "path";
+        /// How units are found.
+        fit: FitBy = FitBy::None, "none, similarity or auto";
+        /// Where radii come from.
+        radii: RadiiFrom = RadiiFrom::File, "file or surface";
+        /// Counts of the header may be wrong.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        lenient: bool = false, "true or false";
+        /// Which of several medial meshes in one file, from 1.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        block: Option<usize> = None, "number";
+        /// Full name of the method, as claimed.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        title: String = String::new(), "text";
+        /// Source of the method, as claimed.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        citation: String = String::new(), "text";
+        /// Seconds as claimed.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        claimed_seconds: Option<f64> = None, "seconds";
+        /// Names under which the same bytes are given, too.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        same_as: String = String::new(), "names";
+    }
 }
 
 /// SHA-256 of the file that some parameters name; `None` where it cannot be read.
@@ -200,20 +202,7 @@ pub fn method() -> Method<GivenParams> {
             "Simplifies nothing: a medial mesh from a file, judged like the results of methods.",
         )
         .published("the file as it is")
-        .param(ParamInfo::new("file", "", "path", "the medial mesh"))
-        .param(ParamInfo::new("title", "", "text", "full name of the method, as claimed"))
-        .param(ParamInfo::new("citation", "", "text", "source of the method, as claimed"))
-        .param(ParamInfo::new("claimed_seconds", "", "seconds", "seconds as claimed"))
-        .param(ParamInfo::new("same_as", "", "names", "who gave the same bytes"))
-        .param(ParamInfo::new("fit", "none", "none, similarity or auto", "how units are found"))
-        .param(ParamInfo::new("radii", "file", "file or surface", "where radii come from"))
-        .param(ParamInfo::new(
-            "lenient",
-            false,
-            "true or false",
-            "counts of the header may be wrong",
-        ))
-        .param(ParamInfo::new("block", "", "number", "which of several in one file, from 1"));
+        .params(GivenParams::describe());
     Method::new(info, prepare)
 }
 
@@ -256,15 +245,13 @@ fn prepare<'s>(
 pub(crate) struct GivenFile {
     /// Name of the mesh in tables.
     pub mesh: String,
-    given: Given,
-    claims: Claims,
-    path: PathBuf,
+    /// Name of the method in tables.
+    name: String,
+    params: GivenParams,
     /// SHA-256 of its bytes.
     hash: String,
     /// Number of spheres.
     spheres: usize,
-    /// Names of those of the same mesh that have the same bytes.
-    same_as: Vec<String>,
 }
 
 impl Study {
@@ -287,29 +274,25 @@ impl Study {
         }
         for (given, claims) in all {
             let mesh = mesh_of(&given, meshes)?;
-            let named = self.methods.iter().filter_map(|method| method.name.as_ref());
-            let taken = named.clone().any(|name| *name == given.name);
             let file = self.look_at(given, claims, mesh)?;
-            if taken
-                || files.iter().any(|other| {
-                    (&other.mesh, &other.given.name, other.spheres)
-                        == (&file.mesh, &file.given.name, file.spheres)
-                })
-            {
-                let GivenFile { given, mesh, spheres, .. } = &file;
-                let message = format!(
-                    "two methods are named `{}` on {mesh} at {spheres} spheres",
-                    given.name
-                );
+            let GivenFile { name, mesh, spheres, .. } = &file;
+            let is_method = self.methods.iter().any(|method| method.name.as_ref() == Some(name));
+            let is_file = files
+                .iter()
+                .any(|other| (&other.mesh, &other.name, &other.spheres) == (mesh, name, spheres));
+            if is_method || is_file {
+                let message =
+                    format!("two methods are named `{name}` on {mesh} at {spheres} spheres");
                 return Err(StudyError::Value(message));
             }
             files.push(file);
         }
         for file in 0..files.len() {
-            let (mesh, hash) = (files[file].mesh.clone(), files[file].hash.clone());
+            let (mesh, hash) = (&files[file].mesh, &files[file].hash);
             let others = files.iter().enumerate().filter(|&(other, _)| other != file);
-            let same = others.filter(|(_, f)| f.mesh == mesh && f.hash == hash);
-            files[file].same_as = same.map(|(_, f)| f.given.name.clone()).collect();
+            let same = others.filter(|(_, f)| f.mesh == *mesh && f.hash == *hash);
+            let names: Vec<&str> = same.map(|(_, f)| f.name.as_str()).collect();
+            files[file].params.same_as = names.join(", ");
         }
         Ok(files)
     }
@@ -317,20 +300,31 @@ impl Study {
     fn look_at(&self, given: Given, claims: Claims, mesh: String) -> Result<GivenFile, StudyError> {
         let path = self.resolved(&given.file);
         let path = std::path::absolute(&path).unwrap_or(path);
-        let radii = match given.radii {
-            RadiiFrom::File => Radii::Needed,
-            RadiiFrom::Surface => Radii::NotNeeded,
-        };
-        let options = ReadOptions { lenient: given.lenient, block: given.block, radii };
         // One read: the hash is that of the bytes whose spheres are counted.
         let bytes = surface::content(&path).map_err(|error| given.refused(error))?;
+        let Given { fit, radii, lenient, block, .. } = given;
+        let options = AxisOptions { lenient, block, radii, fit }.read_options();
         let loaded = read_external(&path, &bytes, options).map_err(|why| given.refused(why))?;
         let spheres = loaded.mesh.spheres.len();
         if spheres == 0 {
             return Err(given.refused(format!("{}: no sphere", path.display())));
         }
-        let hash = hex_digest(&bytes);
-        Ok(GivenFile { mesh, given, claims, path, hash, spheres, same_as: vec![] })
+        let Claims { title, citation, seconds } = claims;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let claimed_seconds = seconds.get(&*stem).copied();
+        let (file, same_as) = (path.to_string_lossy().into_owned().into(), String::new());
+        let params = GivenParams {
+            file,
+            fit,
+            radii,
+            lenient,
+            block,
+            title,
+            citation,
+            claimed_seconds,
+            same_as,
+        };
+        Ok(GivenFile { mesh, name: given.name, params, hash: hex_digest(&bytes), spheres })
     }
 
     /// The numbers of spheres of the given files, from many to few.
@@ -348,52 +342,17 @@ impl Study {
 
     /// The item that judges a given file.
     pub(crate) fn given_item(&self, scene: SceneSpec, file: &GivenFile, here: &Here) -> Item {
-        let Given { name, fit, radii, lenient, block, .. } = &file.given;
-        let mut params = Params::none();
-        let mut set = |key: &str, value: serde_json::Value| {
-            params.0.insert(key.to_owned(), value);
+        let params = serde_json::to_value(&file.params).and_then(serde_json::from_value);
+        let method = MethodSpec {
+            id: GIVEN.to_owned(),
+            name: Some(file.name.clone()),
+            params: params.expect("plain data"),
+            fingerprint: Some(file.hash.clone()),
         };
-        set("file", file.path.to_string_lossy().into());
-        set("fit", serde_json::to_value(fit).expect("a word"));
-        set("radii", serde_json::to_value(radii).expect("a word"));
-        if *lenient {
-            set("lenient", true.into());
-        }
-        if let Some(block) = block {
-            set("block", (*block).into());
-        }
-        let Claims { title, citation, seconds } = &file.claims;
-        for (key, text) in [("title", title), ("citation", citation)] {
-            if !text.is_empty() {
-                set(key, text.as_str().into());
-            }
-        }
-        let stem = file.path.file_stem().unwrap_or_default().to_string_lossy();
-        if let Some(seconds) = seconds.get(stem.as_ref()) {
-            set("claimed_seconds", (*seconds).into());
-        }
-        if !file.same_as.is_empty() {
-            set("same_as", file.same_as.join(", ").into());
-        }
-        Item {
-            scene,
-            method: MethodSpec {
-                id: GIVEN.to_owned(),
-                name: Some(name.clone()),
-                params,
-                fingerprint: Some(file.hash.clone()),
-            },
-            levels: vec![Target::Spheres(file.spheres)],
-            seed: self.seed,
-            repeat: 1,
-            threads: self.threads.unwrap_or(here.threads),
-            limits: self.limits(here),
-            // The program that measures it; its own hash is the fingerprint.
-            version: hex_digest(
-                format!("{} {}", medial::SOURCE_HASH, medial::geometry::SOURCE_HASH).as_bytes(),
-            ),
-            binary: here.binary.clone(),
-        }
+        // The program that measures it; its own hash is the fingerprint.
+        let judge = format!("{} {}", medial::SOURCE_HASH, medial::geometry::SOURCE_HASH);
+        let (levels, version) = (vec![Target::Spheres(file.spheres)], hex_digest(judge.as_bytes()));
+        Item { repeat: 1, ..self.item(scene, method, levels, version, here) }
     }
 }
 
@@ -429,17 +388,33 @@ const WRONG: f64 = 0.05;
 const ON_SURFACE: f64 = 1e-9;
 
 /// How a medial mesh from a file is read and brought to its surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Args)]
 #[serde(default, deny_unknown_fields)]
 pub struct AxisOptions {
-    /// Whether lines are taken as they are where the header announces another number of them.
+    /// Take the lines of a medial mesh as they are where its header announces another number of them.
+    #[arg(long)]
     pub lenient: bool,
-    /// Which medial mesh is meant of several in one file, from 1.
+    /// Which medial mesh is meant of a file to which several were appended, from 1.
+    #[arg(long, value_name = "K")]
     pub block: Option<usize>,
-    /// Where radii come from.
+    /// Where radii come from: `surface` takes the distance of each centre to the surface, for files without radii
+    /// or with other numbers in their place.
+    #[arg(long, value_enum, default_value_t)]
     pub radii: RadiiFrom,
-    /// How units are found.
+    /// The units of the medial mesh: those of the surface, or whatever scale and shift fit it best, which are said.
+    #[arg(long, value_enum, default_value_t)]
     pub fit: FitBy,
+}
+
+impl AxisOptions {
+    /// The options of the reader of medial meshes.
+    pub fn read_options(self) -> ReadOptions {
+        let radii = match self.radii {
+            RadiiFrom::File => Radii::Needed,
+            RadiiFrom::Surface => Radii::NotNeeded,
+        };
+        ReadOptions { lenient: self.lenient, block: self.block, radii }
+    }
 }
 
 /// Where radii come from.
@@ -509,10 +484,8 @@ pub fn read_axis(
 ) -> Result<(LoadedMa, Option<Fit>), AxisError> {
     let named = |why: &dyn Display| AxisError(format!("{}: {why}", path.display()));
     let from_surface = options.radii == RadiiFrom::Surface;
-    let radii = if from_surface { Radii::NotNeeded } else { Radii::Needed };
-    let read = ReadOptions { lenient: options.lenient, block: options.block, radii };
     let bytes = surface::content(path).map_err(|error| AxisError(error.to_string()))?;
-    let mut loaded = read_external(path, &bytes, read).map_err(AxisError)?;
+    let mut loaded = read_external(path, &bytes, options.read_options()).map_err(AxisError)?;
     if loaded.mesh.spheres.is_empty() {
         return Err(named(&"no sphere"));
     }

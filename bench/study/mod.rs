@@ -31,10 +31,13 @@ use crate::study::registry::{Entry, INITIAL, Registry, RegistryError};
 use crate::study::source::{Input, InputError, Source, did_you_mean};
 
 /// Items are ended after so many seconds unless told otherwise.
-pub const TIMEOUT: f64 = 300.0;
+const TIMEOUT: f64 = 300.0;
 
 /// More repetitions than this are taken for a slip.
-pub const MOST_REPEATS: usize = 10_000;
+const MOST_REPEATS: usize = 10_000;
+
+/// More surface samples than this are taken for a slip.
+pub const MOST_SAMPLES: usize = 10_000_000;
 
 /// Surface samples of a comparison unless told otherwise: fewer than `evaluate` takes, since it
 /// measures hundreds of results.
@@ -202,44 +205,29 @@ impl Study {
     /// Refuses values that make no sense.
     ///
     /// # Errors
-    /// [`StudyError::Value`].
+    /// [`StudyError::Value`] for the first of them.
     pub fn check(&self) -> Result<(), StudyError> {
-        match self.fault() {
-            Some(fault) => Err(StudyError::Value(fault)),
-            None => Ok(()),
-        }
-    }
-
-    /// The first value that makes no sense.
-    fn fault(&self) -> Option<String> {
-        if !(1..=MOST_REPEATS).contains(&self.repeat) {
-            return Some(format!(
-                "--repeat {}: time each item 1 to {MOST_REPEATS} times",
-                self.repeat
-            ));
-        }
-        if !(self.timeout > 0.0 && self.timeout.is_finite()) {
-            return Some(format!("--timeout {}: a positive number of seconds", self.timeout));
-        }
-        if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
-            return Some(format!("--certify {width}: a fraction of the diagonal from 1e-6 on"));
-        }
-        if self.memory == Some(0) {
-            return Some("--memory 0: a positive number of megabytes".into());
-        }
-        if let Some(eta) = self.noise.iter().find(|&&eta| !(eta > 0.0 && eta <= 0.1)) {
-            return Some(format!("noise {eta}: a fraction of the diagonal of at most 0.1"));
-        }
         let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
-        if counts.chain([&self.spheres]).any(|counts| counts.contains(&0)) {
-            return Some("--spheres 0: ask for at least one sphere".into());
-        }
-        if let Some(bound) = self.max_error.iter().find(|&&bound| !(bound > 0.0 && bound < 1.0)) {
-            return Some(format!(
-                "--max-error {bound}: a fraction of the diagonal between 0 and 1 is meant"
-            ));
-        }
-        None
+        let fault = if !(1..=MOST_REPEATS).contains(&self.repeat) {
+            format!("--repeat {}: time each item 1 to {MOST_REPEATS} times", self.repeat)
+        } else if !(1..=MOST_SAMPLES).contains(&self.samples) {
+            format!("--samples {}: ask for 1 to {MOST_SAMPLES} samples", self.samples)
+        } else if !(self.timeout > 0.0 && self.timeout.is_finite()) {
+            format!("--timeout {}: a positive number of seconds", self.timeout)
+        } else if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
+            format!("--certify {width}: a fraction of the diagonal from 1e-6 on")
+        } else if self.memory == Some(0) {
+            "--memory 0: a positive number of megabytes".to_owned()
+        } else if let Some(eta) = self.noise.iter().find(|&&eta| !(eta > 0.0 && eta <= 0.1)) {
+            format!("noise {eta}: a fraction of the diagonal of at most 0.1")
+        } else if counts.chain([&self.spheres]).any(|counts| counts.contains(&0)) {
+            "--spheres 0: ask for at least one sphere".to_owned()
+        } else if let Some(bound) = self.max_error.iter().find(|&&e| !(e > 0.0 && e < 1.0)) {
+            format!("--max-error {bound}: a fraction of the diagonal between 0 and 1 is meant")
+        } else {
+            return Ok(());
+        };
+        Err(StudyError::Value(fault))
     }
 }
 
@@ -418,17 +406,26 @@ impl Study {
                 noise: None,
                 sampling: self.sampling,
                 dual: self.dual,
-                measure: self.measure(),
+                measure: Measure {
+                    samples: self.samples,
+                    volume_depth: VOLUME_DEPTH,
+                    seed: self.seed,
+                    certify: self.certify,
+                },
             };
-            for (method, entry) in &methods {
-                items.push(self.item(scene.clone(), method, entry, here));
-            }
-            for &eta in &self.noise {
+            let noisy = self.noise.iter().map(|&eta| {
                 let mesh = format!("{} noise {eta}", scene.mesh);
                 let noise = Some(Noise { eta, seed: self.seed });
-                let noisy = SceneSpec { mesh, noise, ..scene.clone() };
+                SceneSpec { mesh, noise, ..scene.clone() }
+            });
+            for scene in std::iter::once(scene.clone()).chain(noisy) {
                 for (method, entry) in &methods {
-                    items.push(self.item(noisy.clone(), method, entry, here));
+                    let StudyMethod { id, name, params, .. } = method.clone();
+                    let fingerprint = entry.fingerprint().map(str::to_owned);
+                    let spec = MethodSpec { id, name, params, fingerprint };
+                    let (levels, version) =
+                        (self.levels(method, entry), entry.version(&here.binary));
+                    items.push(self.item(scene.clone(), spec, levels, version, here));
                 }
             }
             let of_mesh = files.iter().filter(|file| file.mesh == scene.mesh);
@@ -437,30 +434,23 @@ impl Study {
         Ok(items)
     }
 
-    fn measure(&self) -> Measure {
-        Measure {
-            samples: self.samples,
-            volume_depth: VOLUME_DEPTH,
-            seed: self.seed,
-            certify: self.certify,
-        }
-    }
-
-    fn item(&self, scene: SceneSpec, method: &StudyMethod, entry: &Entry, here: &Here) -> Item {
+    fn item(
+        &self,
+        scene: SceneSpec,
+        method: MethodSpec,
+        levels: Vec<Target>,
+        version: String,
+        here: &Here,
+    ) -> Item {
         Item {
             scene,
-            method: MethodSpec {
-                id: method.id.clone(),
-                name: method.name.clone(),
-                params: method.params.clone(),
-                fingerprint: entry.fingerprint().map(str::to_owned),
-            },
-            levels: self.levels(method, entry),
+            method,
+            levels,
             seed: self.seed,
             repeat: self.repeat,
             threads: self.threads.unwrap_or(here.threads),
             limits: self.limits(here),
-            version: entry.version(&here.binary),
+            version,
             binary: here.binary.clone(),
         }
     }

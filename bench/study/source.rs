@@ -57,18 +57,6 @@ impl Source {
         }
     }
 
-    /// The same input with its file elsewhere; a built-in shape stays as it is.
-    #[must_use]
-    pub fn moved(&self, path: PathBuf) -> Self {
-        match self {
-            Self::File(_) => Self::File(path),
-            Self::Cached { name, set, .. } => {
-                Self::Cached { name: name.clone(), set: set.clone(), path }
-            }
-            Self::BuiltIn { .. } => self.clone(),
-        }
-    }
-
     /// Reads an argument: `builtin:ID` or `builtin:ID:RESOLUTION`, `dataset:NAME`, else a path.
     ///
     /// # Errors
@@ -220,11 +208,6 @@ impl Input {
         Ok(Self { name: source.name(), hash: hex_digest(&bytes), mesh, report, axis })
     }
 
-    /// SHA-256 of the surface itself, whatever the format of its file.
-    pub fn surface_hash(&self) -> String {
-        surface_hash(&self.mesh)
-    }
-
     /// The shape, normalised, with nothing built yet.
     ///
     /// # Errors
@@ -277,11 +260,7 @@ fn meant(id: &str) -> String {
     did_you_mean(id, ids)
 }
 
-/// SHA-256 of a surface: coordinates and faces in their order, after reading.
-pub(crate) fn surface_hash(mesh: &TriMesh) -> String {
-    hex_digest(&surface_bytes(mesh))
-}
-
+/// Coordinates and faces in their order, after reading.
 fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
     let coordinates = mesh.vertices.iter().flat_map(|v| v.to_array());
     let indices = mesh.faces.iter().flatten();
