@@ -7,14 +7,39 @@ use std::time::Duration;
 
 use medial::shape::Shape;
 use medial::simplifier::{
-    Level, Method, MethodInfo, NoParams, Registered, RunContext, Simplification, Simplified,
-    SimplifyError,
+    Level, MedialSimplifier, MethodInfo, Params, Registered, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
 
-type Prepared<'s> = Result<Box<dyn Simplification + 's>, SimplifyError>;
+type Outcome = Result<Simplified, SimplifyError>;
+
+/// A method by what it does before any level, and at each. It is told whether it is the first one.
+struct Faulty {
+    info: MethodInfo,
+    prepare: fn() -> Result<(), SimplifyError>,
+    at: fn(&Shape, Level, bool) -> Outcome,
+}
+
+impl MedialSimplifier for Faulty {
+    fn info(&self) -> &MethodInfo {
+        &self.info
+    }
+
+    fn prepare<'s>(
+        &self,
+        shape: &'s Shape,
+        params: &Params,
+        _: &RunContext,
+    ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+        params.typed::<medial::simplifier::NoParams>()?;
+        (self.prepare)()?;
+        let (at, mut is_first) = (self.at, true);
+        Ok(Box::new(move |level| at(shape, level, std::mem::take(&mut is_first))))
+    }
+}
 
 /// The largest balls: what the faulty methods give where they are not at fault.
-fn largest(shape: &Shape, level: Level) -> Result<Simplified, SimplifyError> {
+fn largest(shape: &Shape, level: Level, _: bool) -> Outcome {
     let initial = shape.initial()?;
     let Level::Spheres(count @ 1..) = level else {
         return Err(SimplifyError::unsupported("ask for a number of spheres, at least 1"));
@@ -29,20 +54,16 @@ fn largest(shape: &Shape, level: Level) -> Result<Simplified, SimplifyError> {
 /// The level at which the methods below that work for a while go wrong.
 const AT: Level = Level::Spheres(20);
 
-fn panics<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    Ok(Box::new(move |level| {
-        assert!(level != AT, "this method panics at 20 spheres");
-        largest(shape, level)
-    }))
+fn panics(shape: &Shape, level: Level, is_first: bool) -> Outcome {
+    assert!(level != AT, "this method panics at 20 spheres");
+    largest(shape, level, is_first)
 }
 
-fn loops<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    Ok(Box::new(move |level| {
-        if level == AT {
-            wait_for_ever();
-        }
-        largest(shape, level)
-    }))
+fn loops(shape: &Shape, level: Level, is_first: bool) -> Outcome {
+    if level == AT {
+        wait_for_ever();
+    }
+    largest(shape, level, is_first)
 }
 
 /// Reads from a pipe that nobody writes to and nobody closes.
@@ -53,39 +74,35 @@ fn wait_for_ever() {
 }
 
 /// Hangs at its published level, which a search for an error bound tries once no count is within it.
-fn hangs_late<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    Ok(Box::new(move |level| {
-        if level == Level::Published {
-            wait_for_ever();
-        }
-        largest(shape, level)
-    }))
+fn hangs_late(shape: &Shape, level: Level, is_first: bool) -> Outcome {
+    if level == Level::Published {
+        wait_for_ever();
+    }
+    largest(shape, level, is_first)
 }
 
 /// Waits until the pipe that `FAULTY_GATE` names is opened and closed by its writer.
-fn waits<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+fn waits() -> Result<(), SimplifyError> {
     if let Some(gate) = std::env::var_os("FAULTY_GATE") {
         std::fs::read(gate).map_err(|error| SimplifyError::Failed(error.to_string()))?;
     }
-    Ok(Box::new(move |level| largest(shape, level)))
+    Ok(())
 }
 
 /// Fails with words that speak of memory, of which there is plenty.
-fn complains<'s>(_: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+fn complains() -> Result<(), SimplifyError> {
     Err(SimplifyError::Failed("unable to allocate a licence: out of memory".into()))
 }
 
-fn allocates<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    Ok(Box::new(move |level| {
-        if level == AT {
-            black_box(vec![1_u8; 10_000_000_000]);
-        }
-        largest(shape, level)
-    }))
+fn allocates(shape: &Shape, level: Level, is_first: bool) -> Outcome {
+    if level == AT {
+        black_box(vec![1_u8; 10_000_000_000]);
+    }
+    largest(shape, level, is_first)
 }
 
 /// Allocates little by little, so that no single request is refused.
-fn grows<'s>(_: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+fn grows() -> Result<(), SimplifyError> {
     let mut all = Vec::new();
     loop {
         all.push(black_box(vec![1_u8; 1 << 20]));
@@ -93,7 +110,7 @@ fn grows<'s>(_: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
     }
 }
 
-fn overflows<'s>(_: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+fn overflows() -> Result<(), SimplifyError> {
     fn deeper(depth: u64) -> u64 {
         let room = black_box([depth; 64]);
         if depth == u64::MAX { 0 } else { deeper(depth + 1) + room[7] }
@@ -101,93 +118,71 @@ fn overflows<'s>(_: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
     Err(SimplifyError::Failed(format!("came back with {}", deeper(0))))
 }
 
-fn aborts<'s>(_: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    std::process::abort()
+fn invalid(shape: &Shape, level: Level, is_first: bool) -> Outcome {
+    let mut result = largest(shape, level, is_first)?;
+    result.mesh.spheres[0].radius = f64::NAN;
+    Ok(result)
 }
 
-fn exits<'s>(_: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    std::process::exit(0)
-}
-
-fn invalid<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    Ok(Box::new(move |level| {
-        let mut result = largest(shape, level)?;
-        result.mesh.spheres[0].radius = f64::NAN;
-        Ok(result)
-    }))
-}
-
-fn empty<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    Ok(Box::new(move |level| {
-        let mut result = largest(shape, level)?;
-        result.mesh = Default::default();
-        Ok(result)
-    }))
+fn empty(shape: &Shape, level: Level, is_first: bool) -> Outcome {
+    let result = largest(shape, level, is_first)?;
+    Ok(Simplified { mesh: Default::default(), ..result })
 }
 
 /// Prints on standard output without an end of line, and forges a message.
 #[allow(clippy::print_stdout)]
-fn talks<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+fn talks() -> Result<(), SimplifyError> {
     println!("\u{1e}\"Finished");
     print!("{}", "no end of line ".repeat(1 << 20));
-    Ok(Box::new(move |level| largest(shape, level)))
+    Ok(())
 }
 
 /// Leaves a process behind that leaves the process group.
-fn strays<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+fn strays() -> Result<(), SimplifyError> {
     let started = Command::new("setsid").args(["sleep", "7654"]).spawn();
-    if started.is_err() {
-        Command::new("sleep")
-            .arg("7654")
-            .spawn()
-            .map_err(|e| SimplifyError::Failed(e.to_string()))?;
-    }
-    Ok(Box::new(move |level| largest(shape, level)))
+    let started = started.or_else(|_| Command::new("sleep").arg("7654").spawn());
+    started.map(|_| ()).map_err(|error| SimplifyError::Failed(error.to_string()))
 }
 
 /// Gives another result each time.
-fn random<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
+fn random(shape: &Shape, level: Level, is_first: bool) -> Outcome {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     let nanos = now.map_or(0, |now| now.subsec_nanos());
-    Ok(Box::new(move |level| {
-        let mut result = largest(shape, level)?;
-        result.mesh.spheres[0].radius *= 1.0 + f64::from(nanos) * 1e-12;
-        Ok(result)
-    }))
+    let mut result = largest(shape, level, is_first)?;
+    result.mesh.spheres[0].radius *= 1.0 + f64::from(nanos) * 1e-12;
+    Ok(result)
 }
 
 /// Gives one ball at the first level that it is asked for, whichever that is: a level that a search found
 /// among others is not the same when it is asked alone.
-fn warms_up<'s>(shape: &'s Shape, _: NoParams, _: &RunContext) -> Prepared<'s> {
-    let mut was_asked = false;
-    Ok(Box::new(move |level| {
-        let is_first = !std::mem::replace(&mut was_asked, true);
-        largest(shape, if is_first { Level::Spheres(1) } else { level })
-    }))
+fn warms_up(shape: &Shape, level: Level, is_first: bool) -> Outcome {
+    largest(shape, if is_first { Level::Spheres(1) } else { level }, is_first)
 }
 
 fn main() -> ExitCode {
-    let method = |id: &'static str, prepare| {
-        Registered::from(Method::<NoParams>::new(MethodInfo::new(id, id), prepare))
+    let method = |id: &'static str, prepare, at| {
+        Registered::from(Faulty { info: MethodInfo::new(id, id), prepare, at })
     };
+    let late = |id, at| method(id, || Ok(()), at);
+    let early = |id, prepare| method(id, prepare, largest);
     let mut methods = medial_methods::registry();
     methods.extend([
-        method("panics", panics),
-        method("loops", loops),
-        method("allocates", allocates),
-        method("grows", grows),
-        method("overflows", overflows),
-        method("aborts", aborts),
-        method("exits", exits),
-        method("invalid", invalid),
-        method("empty", empty),
-        method("talks", talks),
-        method("strays", strays),
-        method("random", random),
-        method("warms-up", warms_up),
-        method("waits", waits),
-        method("hangs-late", hangs_late),
-        method("complains", complains),
+        late("panics", panics),
+        late("loops", loops),
+        late("allocates", allocates),
+        early("grows", grows),
+        early("overflows", overflows),
+        early("aborts", || std::process::abort()),
+        early("exits", || std::process::exit(0)),
+        late("invalid", invalid),
+        late("empty", empty),
+        early("talks", talks),
+        early("strays", strays),
+        late("random", random),
+        late("warms-up", warms_up),
+        early("waits", waits),
+        late("hangs-late", hangs_late),
+        early("complains", complains),
     ]);
     medial_bench::main_with(methods)
 }

@@ -11,9 +11,8 @@ use std::time::{Duration, Instant};
 use medial::complex;
 use medial_test_support::skip;
 
-use crate::common::records;
+use crate::command::{MEDIAL, done, records, text_path};
 
-const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
 const ADAPTERS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/adapters/adapters.toml");
 
 fn program(path: &Path, text: &str) {
@@ -24,11 +23,8 @@ fn program(path: &Path, text: &str) {
 /// A medial mesh of the built-in capsule with 20 spheres, ten times as large and elsewhere.
 fn normalised(folder: &Path) -> std::path::PathBuf {
     let file = folder.join("axis.ma");
-    let done = Command::new(MEDIAL)
-        .args(["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "--quiet", "-o"])
-        .arg(&file)
-        .status();
-    assert!(done.expect("it runs").success());
+    let words = ["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o"];
+    done(&[&words[..], &[text_path(&file)]].concat());
     let axis = complex::read(&file).expect("a medial mesh").mesh;
     let moved = axis.transformed(10.0, |p| 10.0 * p + medial::Vec3::new(5.0, -3.0, 70.0));
     complex::write(&file, &moved).expect("written");

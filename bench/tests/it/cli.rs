@@ -1,8 +1,9 @@
 //! The command as its users meet it: what it prints, what it writes, how it ends.
 
 use std::fs;
+use std::process::Command;
 
-use crate::command::{json, run, text_path, words};
+use crate::command::{MEDIAL, done, ended, folder, json, refused};
 
 /// Seconds and sizes that differ from run to run become `#`.
 fn without_timings(text: &str) -> String {
@@ -15,19 +16,16 @@ fn without_timings(text: &str) -> String {
 
 #[test]
 fn help_names_every_verb() {
-    let (code, stdout, _) = run(&["--help"]);
-    assert_eq!(code, 0);
-    insta::assert_snapshot!(stdout);
+    insta::assert_snapshot!(done(&["--help"]));
 }
 
 #[test]
 fn methods_and_their_parameters() {
-    insta::assert_snapshot!("methods", run(&["methods"]).1);
-    insta::assert_snapshot!("methods_qmat", run(&["methods", "qmat"]).1);
-    insta::assert_snapshot!("methods_pmat", run(&["methods", "pmat"]).1);
-    insta::assert_snapshot!("methods_hem", run(&["methods", "hem"]).1);
-    insta::assert_snapshot!("methods_angle", run(&["methods", "angle"]).1);
-    let (code, _, stderr) = run(&["methods", "nothing"]);
+    insta::assert_snapshot!("methods", done(&["methods"]));
+    for id in ["qmat", "pmat", "hem", "angle"] {
+        insta::assert_snapshot!(format!("methods_{id}"), done(&["methods", id]));
+    }
+    let (code, _, stderr) = crate::command::run(&["methods", "nothing"]);
     assert_eq!(code, 2);
     insta::assert_snapshot!("methods_unknown", stderr);
 }
@@ -36,9 +34,9 @@ fn methods_and_their_parameters() {
 fn datasets_are_listed() {
     // Whatever the user of this machine has fetched.
     let cache = tempfile::tempdir().expect("a folder");
-    let mut command = crate::command::medial(&["datasets", "list"]);
-    let output = command.env("MEDIAL_CACHE", cache.path()).output().expect("the command starts");
-    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    let mut command = Command::new(MEDIAL);
+    let command = command.args(["datasets", "list"]).env("MEDIAL_CACHE", cache.path());
+    let (_, text, _) = ended(command.output().expect("the command starts"));
     let (shapes, published) = text.split_once("\n\n").expect("two lists");
     insta::assert_snapshot!(shapes);
     let public = published.lines().next().expect("a line");
@@ -47,9 +45,7 @@ fn datasets_are_listed() {
 
 #[test]
 fn info_on_a_built_in_shape() {
-    let (code, stdout, _) = run(&["info", "builtin:torus"]);
-    assert_eq!(code, 0);
-    insta::assert_snapshot!(stdout);
+    insta::assert_snapshot!(done(&["info", "builtin:torus"]));
     let (_, object) = json(&["info", "builtin:torus"]);
     for key in "vertices faces components genus closed manifold oriented self_intersecting degenerate_faces diagonal repairs"
         .split(' ') {
@@ -59,36 +55,45 @@ fn info_on_a_built_in_shape() {
 
 #[test]
 fn info_describes_a_mesh_that_it_refuses() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let path = dir.path().join("open.off");
-    fs::write(&path, "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n")
-        .expect("written");
-    let (code, object) = json(&["info", text_path(&path)]);
+    let at = folder();
+    let path = at("open.off");
+    let text = "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n";
+    fs::write(&path, text).expect("written");
+    let (code, object) = json(&["info", &path]);
     assert_eq!(code, 1);
     assert_eq!(object["closed"], false);
     assert_eq!(object["boundary_edges"], 3);
-    assert!(
-        object["reason"].as_str().is_some_and(|reason| reason.contains("open.off")),
-        "{object}"
-    );
+    assert!(object["reason"].to_string().contains("open.off"), "{object}");
 }
 
 #[test]
 fn threads_change_no_byte() {
-    let dir = tempfile::tempdir().expect("a folder");
-    for method in ["qmat", "pmat", "hem", "sat-pairwise", "angle", "lambda"] {
+    let at = folder();
+    // The pictures and surfaces are made of what is written first.
+    let mesh = "builtin:blob";
+    let axis = at("qmat-1.ma");
+    let simplify = |method| ["simplify", mesh, "--spheres", "100", "-m", method].to_vec();
+    let reconstruct = |method| {
+        ["reconstruct", &axis, "--mesh", mesh, "--tolerance", "0.05", "--method", method].to_vec()
+    };
+    let render = [&["render", mesh, &axis, "--show", "error"][..], &["--size", "200x150"]].concat();
+    for (name, words) in [
+        ("qmat-%.ma", simplify("qmat")),
+        ("pmat-%.ma", simplify("pmat")),
+        ("hem-%.ma", simplify("hem")),
+        ("sat-%.ma", simplify("sat-pairwise")),
+        ("angle-%.ma", simplify("angle")),
+        ("lambda-%.ma", simplify("lambda")),
+        ("union-%.obj", reconstruct("union")),
+        ("crust-%.obj", reconstruct("power-crust")),
+        ("%.png", [&render[..], &["--tolerance", "0.03"]].concat()),
+    ] {
         let written = ["1", "2"].map(|threads| {
-            let path = dir.path().join(format!("{method}-{threads}.ma"));
-            let (code, ..) = run(&words(&format!(
-                "simplify builtin:blob --method {} --spheres 100 --threads {} -o {}",
-                method,
-                threads,
-                text_path(&path)
-            )));
-            assert_eq!(code, 0);
+            let path = at(&name.replace('%', threads));
+            done(&[&words[..], &["--threads", threads, "-o", &path]].concat());
             fs::read(path).expect("written")
         });
-        assert_eq!(written[0], written[1], "{method}");
+        assert!(written[0] == written[1], "{words:?}");
     }
 }
 
@@ -104,28 +109,20 @@ fn wrong_words_end_in_usage() {
         &["axis", "builtin:box:x"],
         &["info", "builtin:box", "--threads", "0"],
     ];
-    for arguments in cases {
-        let (code, _, stderr) = run(arguments);
-        assert_eq!(code, 2, "{arguments:?}: {stderr}");
-    }
-    let (code, _, stderr) = run(&["simplify", "no-such-file.off", "--method", "qmat"]);
-    assert_eq!(code, 1);
-    assert!(stderr.contains("no-such-file.off"), "{stderr}");
+    cases.into_iter().for_each(|arguments| refused(arguments, 2, ""));
+    refused(&["simplify", "no-such-file.off", "--method", "qmat"], 1, "no-such-file.off");
 }
 
 #[test]
 fn printed_results() {
-    let (_, stdout, _) =
-        run(&["simplify", "builtin:capsule", "--method", "qmat", "--spheres", "20"]);
-    insta::assert_snapshot!("simplify", without_timings(&stdout));
-    let (_, stdout, _) = run(&["axis", "builtin:capsule"]);
-    insta::assert_snapshot!("axis", without_timings(&stdout));
+    let simplify = ["simplify", "builtin:capsule", "--method", "qmat", "--spheres", "20"];
+    insta::assert_snapshot!("simplify", without_timings(&done(&simplify)));
+    insta::assert_snapshot!("axis", without_timings(&done(&["axis", "builtin:capsule"])));
 }
 
 #[test]
 fn absurd_requests_are_refused_at_once() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let at = folder();
     let (ball, huge, nowhere) = (at("ball.ma"), at("huge.ma"), at("no/such/folder/x.ma"));
     fs::write(&ball, "1 0 0\nv 0 0 0 1\n").expect("written");
     fs::write(&huge, "1 0 0\nv 0 0 0 1e200\n").expect("written");
@@ -141,8 +138,5 @@ fn absurd_requests_are_refused_at_once() {
         (&["simplify", mesh, "-m", "qmat", "--set", "k=x"], 2, "k = \"x\""),
         (&["simplify", "builtin:nothing", "-m", "qmat"], 2, "`nothing`"),
     ];
-    for (arguments, expected, part) in cases {
-        let (code, _, stderr) = run(arguments);
-        assert!(code == expected && stderr.contains(part), "{arguments:?}: {code}, {stderr}");
-    }
+    cases.into_iter().for_each(|(arguments, code, part)| refused(arguments, code, part));
 }

@@ -5,51 +5,45 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::command::{json, run, text_path, words};
+use crate::command::{done, folder, json, records, refused, words};
 
 #[test]
 fn compare_leaves_a_row_for_every_run() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("report");
-    let (code, stdout, stderr) = run(&words(&format!(
-        "compare builtin:box builtin:capsule --spheres 100,50 --counts-only \
-             --samples 1000 --out {}",
-        text_path(&out)
-    )));
-    assert_eq!(code, 0, "counts that are missed are results: {stderr}");
+    let at = folder();
+    let out = at("report");
+    let line = "compare builtin:box builtin:capsule --spheres 100,50 --counts-only --samples 1000";
+    // Counts that are missed are results.
+    let stdout = done(&[&words(line)[..], &["--out", &out]].concat());
     insta::assert_snapshot!("compare_summary_heads", heads(&stdout));
-    let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
-    assert_eq!(lines.lines().count(), 2 * usual_methods() * 2);
-    for line in lines.lines() {
-        let record: Value = serde_json::from_str(line).expect("a record");
+    let methods = medial_methods::registry();
+    let usual = methods.iter().filter(|entry| !entry.presentation.on_request).count();
+    let records = records(&out);
+    assert_eq!(records.len(), 2 * usual * 2);
+    for record in records {
         let asked = record["simplify"]["level"]["spheres"].as_f64().expect("a count");
         let reached = record["simplify"]["reached"].as_f64().expect("a count");
         let near = (reached - asked).abs() <= 0.02 * asked;
         assert_eq!(record["status"], if near { "ok" } else { "other_count" }, "{record}");
         assert_eq!(record["reason"].is_null(), near, "{record}");
         assert!(record["evaluate"]["hausdorff"].is_f64(), "{record}");
-        let artifact = out.join(record["artifact"].as_str().expect("an artifact"));
+        let artifact = Path::new(&out).join(record["artifact"].as_str().expect("an artifact"));
         assert!(artifact.exists(), "{}", artifact.display());
     }
     for file in ["index.html", "results.csv", "tables/summary.md", "tables/summary.tex"] {
-        assert!(out.join(file).exists(), "{file}");
+        assert!(Path::new(&out).join(file).exists(), "{file}");
     }
-    assert_eq!(run(&["report", text_path(&out)]).0, 0);
+    done(&["report", &out]);
 }
 
 #[test]
 fn own_levels_bounds_chains_and_the_start_are_rows() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("report");
-    let (code, object) = json(&words(&format!(
-        "compare builtin:capsule --methods qmat,angle --spheres 40 --max-error \
-             0.05,0.0001 --after-filters qmat --levels angle=30,60,90 --certify 0.01 --samples 500 --out {}",
-        text_path(&out)
-    )));
-    assert_eq!(code, 0, "a bound below the error of the samples is missed: {object}");
-    let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
-    let records: Vec<Value> =
-        lines.lines().map(|line| serde_json::from_str(line).expect("a record")).collect();
+    let at = folder();
+    let out = at("report");
+    let line = "compare builtin:capsule --methods qmat,angle --spheres 40 --max-error 0.05,0.0001 \
+                --after-filters qmat --levels angle=30,60,90 --certify 0.01 --samples 500 --out";
+    // A bound below the error of the samples is missed, which is a result.
+    done(&[&words(line)[..], &[&out]].concat());
+    let records = records(&out);
     let of = |method: &str, level: Value| {
         let found = records.iter().find(|record| {
             record["simplify"]["method"] == method && record["simplify"]["level"] == level
@@ -75,7 +69,7 @@ fn own_levels_bounds_chains_and_the_start_are_rows() {
     let chain = of("angle+qmat", serde_json::json!({ "spheres": 40 }));
     assert_eq!(chain["simplify"]["spheres"], 40);
     assert!(chain["simplify"]["warnings"].to_string().contains("to start from"), "{chain}");
-    let page = fs::read_to_string(out.join("index.html")).expect("a page");
+    let page = fs::read_to_string(at("report/index.html")).expect("a page");
     for text in ["Equal error", "levels of its own", "angle+qmat", "theta"] {
         assert!(page.contains(text), "{text}");
     }
@@ -83,32 +77,22 @@ fn own_levels_bounds_chains_and_the_start_are_rows() {
 
 /// The summary without its numbers.
 fn heads(stdout: &str) -> String {
-    let line = |line: &str| line.split_whitespace().next().unwrap_or_default().to_owned();
-    stdout
-        .lines()
-        .take_while(|text| !text.contains("page:"))
-        .map(line)
-        .collect::<Vec<_>>()
-        .join("\n")
+    let lines = stdout.lines().take_while(|text| !text.contains("page:"));
+    let heads = lines.map(|line| line.split_whitespace().next().unwrap_or_default());
+    heads.collect::<Vec<_>>().join("\n")
 }
 
 #[test]
 fn a_refused_mesh_and_an_unsupported_level_are_rows() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (out, bad) = (dir.path().join("report"), dir.path().join("bad.off"));
+    let at = folder();
+    let (out, bad) = (at("report"), at("bad.off"));
     fs::write(&bad, "OFF\n1 0 0\n0 0 0\n").expect("written");
-    let (code, object) = json(&words(&format!(
-        "compare {} builtin:sphere --published --counts-only --spheres 20 --samples \
-             500 --out {} --methods sat-pairwise",
-        text_path(&bad),
-        text_path(&out)
-    )));
-    assert_eq!(code, 3);
-    assert_eq!(object["status"]["refused"], 2);
-    assert_eq!(object["status"]["unsupported"], 1);
-    assert_eq!(object["status"]["ok"], 1);
-    let (code, _) = json(&["compare", text_path(&bad), "--counts-only", "--out", text_path(&out)]);
-    assert_eq!(code, 5, "nothing was measured");
+    let options = "--published --counts-only --spheres 20 --samples 500 --methods sat-pairwise";
+    let compare = ["compare", &bad, "builtin:sphere", "--out", &out];
+    let (code, object) = json(&[&compare[..], &words(options)].concat());
+    let counts = ["refused", "unsupported", "ok"].map(|status| &object["status"][status]);
+    assert_eq!((code, counts), (3, [&2.into(), &1.into(), &1.into()]));
+    refused(&["compare", &bad, "--counts-only", "--out", &out], 5, "");
 }
 
 /// A cube of 8 vertices at `x0 .. x0 + side`.
@@ -123,8 +107,7 @@ fn cube_off(x0: f64, side: f64) -> String {
 
 #[test]
 fn meshes_of_one_name_stay_apart() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let at = folder();
     for (folder, side) in [("a", 1.0), ("b", 2.0)] {
         fs::create_dir(at(folder)).expect("made");
         fs::write(at(&format!("{folder}/x.off")), cube_off(0.0, side)).expect("written");
@@ -135,15 +118,11 @@ fn meshes_of_one_name_stay_apart() {
     common.push("--counts-only");
     let (code, object) = json(&[&["compare", &a, &b, &a], &common[..]].concat());
     assert_eq!((code, &object["records"]), (0, &2.into()), "{object}");
-    let records = fs::read_to_string(at("out/results.jsonl")).expect("results");
-    let artifact = |line: &str| {
-        let record: Value = serde_json::from_str(line).expect("a record");
-        at(&format!("out/{}", record["artifact"].as_str().expect("an artifact")))
-    };
-    let artifacts: Vec<String> = records.lines().map(artifact).collect();
-    let written = artifacts.iter().map(|path| fs::read(path).expect("written"));
-    let written: Vec<Vec<u8>> = written.collect();
-    assert_ne!(written[0], written[1]);
+    let records = records(&out);
+    let artifact = |r: &Value| at(&format!("out/{}", r["artifact"].as_str().expect("a path")));
+    let artifacts: Vec<String> = records.iter().map(artifact).collect();
+    let [first, second] = [0, 1].map(|k| fs::read(&artifacts[k]).expect("written"));
+    assert_ne!(first, second);
 
     // A wrong word costs no earlier result, not even with --fresh.
     let wrong: [(&[&str], i32); 8] = [
@@ -157,9 +136,8 @@ fn meshes_of_one_name_stay_apart() {
         (&["no-such-file.off"], 1),
     ];
     for (words, code) in wrong {
-        let words = [&["compare", &a, "--out", &out, "--fresh"], words].concat();
-        assert_eq!(run(&words).0, code, "{words:?}");
-        assert_eq!(fs::read_to_string(at("out/results.jsonl")).expect("results"), records);
+        refused(&[&["compare", &a, "--out", &out, "--fresh"], words].concat(), code, "");
+        assert_eq!(crate::command::records(&out), records);
     }
     assert_eq!(json(&[&["compare", "builtin:sphere:8"], &common[..]].concat()).0, 0);
     assert!(artifacts.iter().all(|path| Path::new(path).exists()), "another run adds");
@@ -170,18 +148,15 @@ fn meshes_of_one_name_stay_apart() {
 
 #[test]
 fn nothing_is_no_success() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let at = folder();
     let (axis, empty, far) = (at("x.ma"), at("empty.ma"), at("far.off"));
     for (method, level) in [("lambda", "1"), ("angle", "180")] {
         let words = ["simplify", "builtin:sphere:8", "-m", method, "--level", level, "-o", &axis];
-        let (code, _, stderr) = run(&words);
-        assert_eq!(code, 1, "{stderr}");
-        assert!(stderr.contains("no sphere") && !Path::new(&axis).exists(), "{stderr}");
+        refused(&words, 1, "no sphere");
+        assert!(!Path::new(&axis).exists());
     }
     fs::write(&empty, "0 0 0\n").expect("written");
-    let (code, _, stderr) = run(&["simplify", "builtin:box", "-m", "angle", "--initial", &empty]);
-    assert!(code == 1 && stderr.contains("empty.ma"), "{stderr}");
+    refused(&["simplify", "builtin:box", "-m", "angle", "--initial", &empty], 1, "empty.ma");
 
     // Two cubes that are far smaller than a billionth of the distance between them.
     let pair = cube_off(0.0, 1.0).replace("8 6 0", "16 12 0");
@@ -197,35 +172,29 @@ fn nothing_is_no_success() {
     let (ours, theirs) = (lines(rest, 0, 8), lines(&second, 2, 8));
     fs::write(&far, format!("{header}{ours}{theirs}{}{moved}", lines(rest, 8, 6)))
         .expect("written");
-    let (code, _, stderr) = run(&["axis", &far]);
-    assert!(code == 1 && stderr.contains("far.off") && stderr.contains("billionth"), "{stderr}");
+    refused(&["axis", &far], 1, "far.off");
+    refused(&["axis", &far], 1, "billionth");
 }
 
 /// A medial mesh of the built-in capsule with 20 spheres.
-fn of_another_program(file: &Path) {
-    let words = ["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o"];
-    let (code, _, stderr) = run(&[&words[..], &[text_path(file)]].concat());
-    assert_eq!(code, 0, "{stderr}");
+fn of_another_program(file: &str) {
+    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", file]);
 }
 
 #[test]
 fn given_files_are_rows_without_times_beside_the_methods() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let [file, copy, out] = ["theirs.ma", "copy.ma", "report"].map(|name| dir.path().join(name));
+    let at = folder();
+    let [file, copy, out] = ["theirs.ma", "copy.ma", "report"].map(&at);
     of_another_program(&file);
     fs::copy(&file, &copy).expect("a copy");
-    let named = [("Q-MAT, theirs", &file), ("Q-MAT+", &copy)];
-    let [theirs, plus] = named.map(|(name, file)| format!("{name}={}", text_path(file)));
-    let words =
-        ["compare", "builtin:capsule", "--methods", "qmat", "--counts-only", "--given", &theirs];
-    let words =
-        [&words[..], &["--given", &plus, "--samples", "500", "--out", text_path(&out)]].concat();
+    let (theirs, plus) = (format!("Q-MAT, theirs={file}"), format!("Q-MAT+={copy}"));
+    let words = ["compare", "builtin:capsule", "--methods", "qmat", "--counts-only"];
+    let given = ["--given", &theirs, "--given", &plus, "--samples", "500", "--out", &out];
+    let words = [&words[..], &given].concat();
     let (code, object) = json(&words);
     assert_eq!(code, 0, "{object}");
     assert_eq!((&object["status"]["ok"], &object["status"]["external"]), (&1.into(), &2.into()));
-    let lines = fs::read_to_string(out.join("results.jsonl")).expect("results");
-    let records: Vec<Value> =
-        lines.lines().map(|line| serde_json::from_str(line).expect("a record")).collect();
+    let records = records(&out);
     let simplified = &records[0];
     assert_eq!(simplified["simplify"]["level"]["spheres"], 20, "the count of the files");
     for (record, (name, other)) in
@@ -250,24 +219,16 @@ fn given_files_are_rows_without_times_beside_the_methods() {
 
 #[test]
 fn given_files_that_fit_no_mesh_are_refused_before_anything_runs() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let [file, out] = ["theirs.ma", "report"].map(|name| dir.path().join(name));
+    let at = folder();
+    let [file, out] = ["theirs.ma", "report"].map(&at);
     of_another_program(&file);
-    let file = text_path(&file);
     for (given, meshes, why) in [
         (format!("a={file}"), &["builtin:capsule", "builtin:box"][..], "--given a@capsule="),
         (format!("a@sphere={file}"), &["builtin:capsule"], "no mesh is called `sphere`"),
         ("a=nowhere.ma".to_owned(), &["builtin:capsule"], "nowhere.ma"),
-        (file.to_owned(), &["builtin:capsule"], "write NAME=FILE.ma"),
+        (file.clone(), &["builtin:capsule"], "write NAME=FILE.ma"),
     ] {
-        let words = [&["compare"], meshes, &["--given", &given, "--out", text_path(&out)]].concat();
-        let (code, _, stderr) = run(&words);
-        assert!((1..=2).contains(&code) && stderr.contains(why), "{given}: {code}, {stderr}");
-        assert!(!out.exists(), "{given}");
+        refused(&[&["compare"], meshes, &["--given", &given, "--out", &out]].concat(), 2, why);
+        assert!(!Path::new(&out).exists(), "{given}");
     }
-}
-
-/// Number of methods that run when none is named.
-fn usual_methods() -> usize {
-    medial_methods::registry().iter().filter(|entry| !entry.presentation.on_request).count()
 }

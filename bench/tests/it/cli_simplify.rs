@@ -2,16 +2,14 @@
 
 use std::fs;
 
-use crate::command::{json, run, text_path, words};
+use crate::command::{done, folder, json, refused, text_path};
 
 #[test]
 fn axis_simplify_evaluate_convert() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| dir.path().join(name);
-    let (mesh, axis, simple, ply) =
-        (at("box.off"), at("axis.ma"), at("simple.ma"), at("simple.ply"));
-    let [mesh, axis, simple, ply] = [&mesh, &axis, &simple, &ply].map(|path| text_path(path));
-    assert_eq!(run(&["datasets", "make", "box", "-o", mesh]).0, 0);
+    let at = folder();
+    let paths = ["box.off", "axis.ma", "simple.ma", "simple.ply"].map(&at);
+    let [mesh, axis, simple, ply] = paths.each_ref().map(String::as_str);
+    done(&["datasets", "make", "box", "-o", mesh]);
 
     let (code, object) = json(&["axis", mesh, "-o", axis]);
     assert_eq!(code, 0);
@@ -48,10 +46,10 @@ fn axis_simplify_evaluate_convert() {
 
     let from_file = ["simplify", mesh, "--method", "qmat", "--spheres", "60", "--initial", axis];
     assert_eq!(json(&from_file).1["spheres"], 60);
-    assert_eq!(run(&["convert", simple, ply]).0, 0);
-    assert_eq!(run(&["convert", ply, axis]).0, 0);
+    done(&["convert", simple, ply]);
+    done(&["convert", ply, axis]);
     assert_eq!(fs::read(axis).expect("read"), fs::read(simple).expect("read"));
-    assert_eq!(run(&["convert", mesh, simple]).0, 2, "a surface is no medial mesh");
+    refused(&["convert", mesh, simple], 2, "a surface is not a medial mesh");
 }
 
 #[test]
@@ -63,8 +61,7 @@ fn a_wrong_topology_is_said() {
 
 #[test]
 fn voxels_are_written_as_a_table() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let at = folder();
     let aof = |more: &[&str]| {
         json(&[&["simplify", "builtin:plate", "-m", "aof", "--spheres", "200"], more].concat())
     };
@@ -90,19 +87,16 @@ fn voxels_are_written_as_a_table() {
     assert_eq!(rows, 200);
     let (code, object) = aof(&["--voxels", &at("v.txt")]);
     assert!(code == 1 && object["error"].as_str().is_some_and(|e| e.contains(".csv")), "{object}");
-    let (code, _, stderr) =
-        run(&["simplify", "builtin:box", "-m", "qmat", "--voxels", &at("v.csv")]);
-    assert!(code == 2 && stderr.contains("no voxels"), "{stderr}");
+    let wrong = ["simplify", "builtin:box", "-m", "qmat", "--voxels", &at("v.csv")];
+    refused(&wrong, 2, "no voxels");
 }
 
 #[test]
 fn several_files_give_one_table() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let at = folder();
     let (fine, coarse, bad) = (at("fine.ma"), at("coarse.ma"), at("bad.ma"));
     for (file, spheres) in [(&fine, "40"), (&coarse, "10")] {
-        let words = ["simplify", "builtin:box:8", "-m", "qmat", "--spheres", spheres, "-o", file];
-        assert_eq!(run(&words).0, 0);
+        done(&["simplify", "builtin:box:8", "-m", "qmat", "--spheres", spheres, "-o", file]);
     }
     let evaluate = ["evaluate", "builtin:box:8", "--samples", "500"];
     let alone = |file: &str| json(&[&evaluate[..], &[file]].concat()).1;
@@ -113,8 +107,7 @@ fn several_files_give_one_table() {
         assert_eq!(row["file"], file.as_str());
         assert_eq!(row["hausdorff"], alone(file)["hausdorff"], "the same as alone");
     }
-    let (code, stdout, _) = run(&[&evaluate[..], &[&fine, &coarse]].concat());
-    assert_eq!(code, 0);
+    let stdout = done(&[&evaluate[..], &[&fine, &coarse]].concat());
     let line = |name: &str| stdout.lines().find(|l| l.starts_with(name)).expect("a row").to_owned();
     assert!(line("spheres").ends_with("40         10"), "{stdout}");
     assert!(stdout.lines().next().is_some_and(|head| head.ends_with("fine.ma  coarse.ma")));
@@ -130,16 +123,12 @@ fn several_files_give_one_table() {
 
 #[test]
 fn max_error_is_met() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let path = dir.path().join("x.ma");
-    let (code, object) = json(&words(&format!(
-        "simplify builtin:capsule --method qmat --max-error 0.02 --samples 3000 -o \
-             {}",
-        text_path(&path)
-    )));
+    let at = folder();
+    let path = at("x.ma");
+    let words = ["simplify", "builtin:capsule", "-m", "qmat", "--max-error", "0.02", "-o", &path];
+    let (code, object) = json(&[&words[..], &["--samples", "3000"]].concat());
     assert_eq!(code, 0, "{object}");
-    let (_, evaluation) =
-        json(&["evaluate", "builtin:capsule", text_path(&path), "--samples", "3000"]);
+    let (_, evaluation) = json(&["evaluate", "builtin:capsule", &path, "--samples", "3000"]);
     assert!(evaluation["hausdorff"].as_f64().expect("a number") <= 0.02, "{evaluation}");
     assert!(object["spheres"].as_u64().expect("a count") < 200, "{object}");
     assert!(object["max_error"]["hausdorff"].as_f64().expect("a number") <= 0.02, "{object}");
@@ -148,17 +137,16 @@ fn max_error_is_met() {
 
 #[test]
 fn published_counts_and_errors_on_real_meshes() {
-    let Some(folder) = medial_test_support::meshes() else { return };
+    let Some(meshes) = medial_test_support::meshes() else { return };
     for (file, spheres) in [("bear.off", 34_703_i64), ("dolphin.off", 54_241)] {
-        let mesh = folder.join(file);
+        let mesh = meshes.join(file);
         let (_, object) = json(&["axis", text_path(&mesh)]);
         let counted = object["spheres"].as_i64().expect("a count");
         assert!((counted - spheres).abs() <= 5, "{file}: {counted}, published {spheres}");
         assert_eq!(object["betti"], serde_json::json!([1, 0, 0]), "{file}");
     }
-    let dir = tempfile::tempdir().expect("a folder");
-    let (mesh, axis) = (folder.join("bear.off"), dir.path().join("bear.ma"));
-    let (mesh, axis) = (text_path(&mesh), text_path(&axis));
+    let (at, mesh) = (folder(), meshes.join("bear.off"));
+    let (mesh, axis) = (text_path(&mesh), &at("bear.ma"));
     json(&["simplify", mesh, "--method", "qmat", "--spheres", "100", "-o", axis]);
     let (_, object) = json(&["evaluate", mesh, axis]);
     let hausdorff = object["hausdorff"].as_f64().expect("a number");

@@ -1,40 +1,33 @@
 //! Results of other programs in `medial compare`: folders with claims, surfaces, files that change.
 
 use std::fs;
-use std::path::Path;
 
 use medial_bench::study::source::{Input, Source};
 use serde_json::{Value, json};
 
-use crate::command::{run, text_path};
-use crate::common::records;
+use crate::command::{done, folder, records};
 
 /// The records of external results among those of `medial compare --given theirs=GIVEN`.
-fn compared_with(given: &Path, out: &Path) -> Vec<Value> {
-    let given = format!("theirs={}", text_path(given));
+fn compared_with(given: &str, out: &str) -> Vec<Value> {
+    let given = format!("theirs={given}");
     let words = ["compare", "builtin:capsule", "--methods", "qmat", "--counts-only"];
-    let more = ["--samples", "500", "--given", &given, "--out", text_path(out)];
-    let (code, _, stderr) = run(&[&words[..], &more].concat());
-    assert_eq!(code, 0, "{stderr}");
+    done(&[&words[..], &["--samples", "500", "--given", &given, "--out", out]].concat());
     records(out).into_iter().filter(|record| record["status"] == "external").collect()
 }
 
 #[test]
 fn a_folder_states_title_citation_and_seconds_and_all_else_is_measured() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let [folder, out] = ["theirs", "report"].map(|name| dir.path().join(name));
-    fs::create_dir(&folder).expect("a folder");
+    let at = folder();
+    fs::create_dir(at("theirs")).expect("a folder");
     for count in ["20", "30"] {
-        let file = folder.join(format!("capsule-{count}.ma"));
-        let words = ["simplify", "builtin:capsule", "-m", "qmat", "--spheres", count, "-o"];
-        let (code, _, stderr) = run(&[&words[..], &[text_path(&file)]].concat());
-        assert_eq!(code, 0, "{stderr}");
+        let file = at(&format!("theirs/capsule-{count}.ma"));
+        done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", count, "-o", &file]);
     }
     let claims =
         "title = \"Their method\"\ncitation = \"Them, 2026\"\nseconds = { capsule-20 = 1.5 }\n";
-    fs::write(folder.join("method.toml"), claims).expect("written");
-    fs::write(folder.join("notes.txt"), "of no mesh of the study").expect("written");
-    let theirs = compared_with(&folder, &out);
+    fs::write(at("theirs/method.toml"), claims).expect("written");
+    fs::write(at("theirs/notes.txt"), "of no mesh of the study").expect("written");
+    let theirs = compared_with(&at("theirs"), &at("report"));
     assert_eq!(theirs.len(), 2);
     for record in theirs {
         let simplify = &record["simplify"];
@@ -55,12 +48,10 @@ fn a_folder_states_title_citation_and_seconds_and_all_else_is_measured() {
 /// A decimated surface is the baseline that any medial mesh should beat.
 #[test]
 fn surfaces_are_external_results() {
-    let dir = tempfile::tempdir().expect("a folder");
+    let at = folder();
     for name in ["capsule.off", "capsule.ply"] {
-        let [file, out] = [name.to_owned(), format!("{name}-report")].map(|n| dir.path().join(n));
-        let (code, _, stderr) = run(&["datasets", "make", "capsule", "-o", text_path(&file)]);
-        assert_eq!(code, 0, "{stderr}");
-        let theirs = compared_with(&file, &out);
+        done(&["datasets", "make", "capsule", "-o", &at(name)]);
+        let theirs = compared_with(&at(name), &at(&format!("{name}-report")));
         let [record] = theirs.as_slice() else { panic!("{theirs:?}") };
         // The surface itself: the distance of its envelope is 0 but for rounding.
         let hausdorff = record["evaluate"]["hausdorff"].as_f64().expect("measured");
@@ -72,10 +63,10 @@ fn surfaces_are_external_results() {
 
 #[test]
 fn the_hash_of_an_input_is_that_of_the_bytes_that_were_parsed() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let file = dir.path().join("tetrahedron.off");
+    let at = folder();
+    let file = at("tetrahedron.off");
     let text = "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
-    let source = Source::File(file.clone());
+    let source = Source::File(file.clone().into());
     fs::write(&file, text).expect("written");
     let first = Input::load(&source).expect("a solid");
     assert_eq!(first.hash, medial_bench::provenance::hex_digest(text.as_bytes()));

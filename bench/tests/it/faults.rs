@@ -3,39 +3,40 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
 
-use crate::common::{code, example, processes_with, records, run, stderr};
 use serde_json::Value;
 
+use crate::command::{faulty, folder, processes_with, records, run_program, words};
+
+/// Runs `compare` of the faulty methods on a box, which must end in a code, and returns its records.
+#[track_caller]
+fn compare(line: &str, out: &str, expected: i32) -> Vec<Value> {
+    let common = ["compare", "builtin:box:8", "--counts-only", "--quiet", "--out", out];
+    let (code, _, stderr) = run_program(faulty(), &[&common[..], &words(line)].concat());
+    assert_eq!(code, expected, "{stderr}");
+    records(out)
+}
+
 /// Status and reason by method and number of spheres.
-fn ends(out: &Path) -> BTreeMap<(String, u64), (String, String)> {
+fn ends(records: &[Value]) -> BTreeMap<(String, u64), (String, String)> {
     let end = |record: &Value| {
         let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
         let spheres = record["simplify"]["level"]["spheres"].as_u64().expect("a count");
         let method = text(&record["simplify"]["method"]);
         ((method, spheres), (text(&record["status"]), text(&record["reason"])))
     };
-    records(out).iter().map(end).collect()
+    records.iter().map(end).collect()
 }
 
 #[test]
 fn faults_of_methods_are_contained_and_named() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("out");
+    let at = folder();
+    let common = "--spheres 30,20,10 --samples 100 --memory 1500 --methods";
     let methods =
         "panics,allocates,grows,overflows,aborts,exits,invalid,empty,talks,strays,complains,qmat";
     // What ends by itself, or by its memory, may take its time on a busy machine.
-    for (methods, timeout) in [(methods, "60"), ("loops", "10")] {
-        let arguments = [
-            &["compare", "builtin:box:8", "--methods", methods, "--spheres", "30,20,10"][..],
-            &["--samples", "100", "--counts-only", "--timeout", timeout, "--memory", "1500"],
-            &["--quiet", "--out", out.to_str().expect("UTF-8")],
-        ];
-        let output = run(example("faulty"), &arguments.concat());
-        assert_eq!(code(&output), 3, "{}", stderr(&output));
-    }
-    let ends = ends(&out);
+    compare(&format!("--timeout 60 {common} {methods}"), &at("out"), 3);
+    let ends = ends(&compare(&format!("--timeout 10 {common} loops"), &at("out"), 3));
     let end = |method: &str, spheres| &ends[&(method.to_owned(), spheres)];
     // What came before the fault is kept, what came after it says why it was not run.
     let broken_at_20 = [
@@ -72,15 +73,8 @@ fn faults_of_methods_are_contained_and_named() {
 
 #[test]
 fn a_method_that_changes_its_mind_is_called_out() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("out");
-    let arguments = [
-        &["compare", "builtin:box:8", "--methods", "random,qmat", "--spheres", "30", "--repeat"][..],
-        &["3", "--samples", "100", "--counts-only", "--quiet"],
-        &["--out", out.to_str().expect("UTF-8")],
-    ];
-    assert_eq!(code(&run(example("faulty"), &arguments.concat())), 0);
-    for record in records(&out) {
+    let line = "--methods random,qmat --spheres 30 --repeat 3 --samples 100";
+    for record in compare(line, &folder()("out"), 0) {
         assert_eq!(record["repetitions"].as_array().map(Vec::len), Some(3));
         let warnings = record["simplify"]["warnings"].to_string();
         let random = record["simplify"]["method"] == "random";
@@ -91,54 +85,42 @@ fn a_method_that_changes_its_mind_is_called_out() {
 #[test]
 fn a_bound_that_the_level_found_misses_when_it_is_asked_alone_is_missed() {
     const BOUND: f64 = 0.3;
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("out");
-    let bound = BOUND.to_string();
-    let arguments = [
-        &["compare", "builtin:box:8", "--methods", "warms-up,qmat", "--max-error", &bound][..],
-        &["--spheres", "30", "--samples", "500", "--counts-only", "--quiet"],
-        &["--out", out.to_str().expect("UTF-8")],
-    ];
-    let output = run(example("faulty"), &arguments.concat());
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let line = format!("--methods warms-up,qmat --max-error {BOUND} --spheres 30 --samples 500");
+    let records = compare(&line, &folder()("out"), 0);
     let within = |method: &str| {
-        let is_wanted = |record: &Value| {
-            record["simplify"]["method"] == method
-                && record["simplify"]["level"]["max_error"] == BOUND
-        };
-        records(&out).into_iter().find(is_wanted).unwrap_or_else(|| panic!("{method} has a record"))
+        let mut found = records.iter().filter(|record| record["simplify"]["method"] == method);
+        let found = found.find(|record| record["simplify"]["level"]["max_error"] == BOUND);
+        found.unwrap_or_else(|| panic!("{method} has a record"))
     };
     let error = |record: &Value| record["evaluate"]["hausdorff"].as_f64().expect("measured");
     let kept = within("qmat");
-    assert!(kept["status"] == "ok" && error(&kept) <= BOUND, "{kept}");
+    assert!(kept["status"] == "ok" && error(kept) <= BOUND, "{kept}");
     // The search has found a level, the result that is kept is another.
     let missed = within("warms-up");
-    assert!(error(&missed) > BOUND, "{missed}");
+    assert!(error(missed) > BOUND, "{missed}");
     assert_eq!([&missed["status"], &missed["simplify"]["status"]], ["bound_missed"; 2]);
     let reason = missed["reason"].as_str().expect("a reason");
     assert!(reason.contains("asked alone"), "{reason}");
 }
 
 /// A plug-in file with programs that go wrong, each a line for `sh`.
-fn plugins(dir: &Path, programs: &[(&str, &str)]) -> String {
+fn plugins(at: &impl Fn(&str) -> String, programs: &[(&str, &str)]) -> String {
     let mut text = String::new();
     for (id, script) in programs {
-        fs::write(dir.join(format!("{id}.sh")), script).expect("written");
+        fs::write(at(&format!("{id}.sh")), script).expect("written");
         text += &format!(
             "[[method]]\nid = \"{id}\"\ntitle = \"{id}\"\nlevels = [\"spheres\"]\n\
              command = [\"sh\", \"{id}.sh\", \"{{initial}}\", \"{{output}}\", \"{{spheres}}\"]\n"
         );
     }
-    let file = dir.join("plugins.toml");
-    fs::write(&file, text).expect("written");
-    file.to_str().expect("UTF-8").to_owned()
+    fs::write(at("plugins.toml"), text).expect("written");
+    at("plugins.toml")
 }
 
 #[test]
 #[cfg(unix)]
 fn faults_of_programs_are_contained_and_named() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("out");
+    let at = folder();
     let programs = [
         ("p-loops", "while :; do sleep 1; done"),
         ("p-garbage", "head -c 100000 /dev/urandom > \"$2\""),
@@ -153,17 +135,12 @@ fn faults_of_programs_are_contained_and_named() {
         ("p-killer", "kill -9 $PPID; sleep 5"),
         ("p-fine", "cp \"$1\" \"$2\""),
     ];
-    let file = plugins(dir.path(), &programs);
-    let methods = programs.map(|(id, _)| id).join(",");
-    let arguments = [
-        &["compare", "builtin:box:8", "--methods", &methods, "--spheres", "20", "--plugins", &file]
-            [..],
-        &["--samples", "100", "--counts-only", "--timeout", "10", "--memory", "1500", "--quiet"],
-        &["--out", out.to_str().expect("UTF-8")],
-    ];
-    let output = run(example("faulty"), &arguments.concat());
-    assert_eq!(code(&output), 3, "{}", stderr(&output));
-    let ends = ends(&out);
+    let (file, methods) = (plugins(&at, &programs), programs.map(|(id, _)| id).join(","));
+    let line = format!(
+        "--methods {methods} --spheres 20 --plugins {file} --samples 100 --timeout 10 --memory 1500"
+    );
+    let records = compare(&line, &at("out"), 3);
+    let ends = ends(&records);
     let expected = [
         ("p-loops", "timed_out", "--timeout"),
         ("p-garbage", "invalid_output", ""),
@@ -183,7 +160,7 @@ fn faults_of_programs_are_contained_and_named() {
         assert!(found == status && reason.contains(part), "{method}: {found}, {reason}");
     }
     assert!(processes_with("sleep 8765").is_empty(), "a stray is left");
-    let stray = records(&out).into_iter().find(|r| r["simplify"]["method"] == "p-stray");
+    let stray = records.iter().find(|r| r["simplify"]["method"] == "p-stray");
     let warnings = stray.expect("a record")["simplify"]["warnings"].to_string();
     assert!(warnings.contains("process"), "{warnings}");
 }
@@ -191,20 +168,17 @@ fn faults_of_programs_are_contained_and_named() {
 #[test]
 #[cfg(target_os = "linux")]
 fn only_the_tree_of_the_worker_ends_with_it() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (out, program) = (dir.path().join("out"), example("faulty"));
-    let pid = dir.path().join("pid");
+    let at = folder();
+    let (out, pid, program) = (at("out"), at("pid"), faulty());
     // The shell's other child becomes a child of the command by `exec`. It must not hold the pipes of
     // the command, whose end the test waits for.
     let script = format!(
-        "sleep 7777 > /dev/null 2>&1 & echo $! > '{}'; exec '{}' compare builtin:box:8 --methods loops --spheres 20 \
-         --counts-only --samples 100 --timeout 2 --quiet --out '{}'",
-        pid.display(),
-        program.display(),
-        out.display()
+        "sleep 7777 > /dev/null 2>&1 & echo $! > '{pid}'; exec '{}' compare builtin:box:8 --methods loops --spheres 20 \
+         --counts-only --samples 100 --timeout 2 --quiet --out '{out}'",
+        program.display()
     );
-    let output = run("bash", &["-c", &script]);
-    assert_eq!(code(&output), 5, "{}", stderr(&output));
+    let (code, _, stderr) = run_program("bash", &["-c", &script]);
+    assert_eq!(code, 5, "{stderr}");
     assert_eq!(records(&out)[0]["status"], "timed_out");
     let pid = fs::read_to_string(&pid).expect("a number").trim().to_owned();
     let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
@@ -214,22 +188,16 @@ fn only_the_tree_of_the_worker_ends_with_it() {
 
 #[test]
 fn bounds_that_were_found_survive_a_method_that_hangs_later() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("out");
-    let arguments = [
-        &["compare", "builtin:box:8", "--methods", "hangs-late", "--max-error", "0.3,0.0000001"][..],
-        &["--spheres", "30", "--samples", "500", "--counts-only", "--timeout", "10", "--quiet"],
-        &["--out", out.to_str().expect("UTF-8")],
-    ];
-    let output = run(example("faulty"), &arguments.concat());
-    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    let line =
+        "--methods hangs-late --max-error 0.3,0.0000001 --spheres 30 --samples 500 --timeout 10";
+    let records = compare(line, &folder()("out"), 3);
     let status = |bound: f64| {
-        let of = |r: &Value| r["simplify"]["level"]["max_error"] == bound;
-        let record = records(&out).into_iter().find(of).expect("a record");
+        let of = |r: &&Value| r["simplify"]["level"]["max_error"] == bound;
+        let record = records.iter().find(of).expect("a record");
         (record["status"].clone(), record["reason"].clone())
     };
     assert_eq!(status(0.3).0, "ok", "{:?}", status(0.3));
     assert_eq!(status(0.000_000_1).0, "timed_out", "{:?}", status(0.000_000_1));
     let count = |r: &Value| r["simplify"]["level"]["spheres"] == 30 && r["status"] == "ok";
-    assert!(records(&out).iter().any(count));
+    assert!(records.iter().any(count));
 }

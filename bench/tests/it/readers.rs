@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::command::{json, run, text_path};
+use crate::command::{MEDIAL, done, folder, json, refused};
 
 /// The Python that `scripts/readers.sh` sets up, or that of `$READERS_PYTHON`.
 fn python() -> Option<String> {
@@ -19,11 +19,11 @@ fn vtk_and_trimesh_agree() {
         medial_test_support::skip("no Python with vtk and trimesh (scripts/readers.sh makes one)");
         return;
     };
-    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder();
     let output = Command::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scripts/readers.sh"))
         .env("READERS_PYTHON", python)
-        .env("MEDIAL", env!("CARGO_BIN_EXE_medial"))
-        .env("CARGO_TARGET_DIR", folder.path())
+        .env("MEDIAL", MEDIAL)
+        .env("CARGO_TARGET_DIR", at("target"))
         .output()
         .expect("the script starts");
     let text = String::from_utf8_lossy(&output.stdout);
@@ -31,49 +31,34 @@ fn vtk_and_trimesh_agree() {
     assert!(text.contains("same: ") && !text.contains("DIFFERENT"), "{text}");
 }
 
-fn axis(folder: &Path) -> String {
-    let file = folder.join("x.ma");
-    let path = text_path(&file).to_owned();
-    let (code, ..) = run(&["axis", "builtin:box:8", "-o", &path]);
-    assert_eq!(code, 0);
-    path
-}
-
 /// What VTK and trimesh read of the files is compared above; here every option is written, and neither format read.
 #[test]
 fn viewer_formats_are_written_and_never_read() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let ma = axis(folder.path());
-    let at = |name: &str| text_path(&folder.path().join(name)).to_owned();
+    let at = folder();
+    let ma = at("x.ma");
+    done(&["axis", "builtin:box:8", "-o", &ma]);
     for (to, options) in [
         ("a.vtp", &["--color", "stability"][..]),
         ("b.vtp", &["--color", "error", "--mesh", "builtin:box:8"]),
         ("c.glb", &["--colour", "error", "--mesh", "builtin:box:8", "--spheres"]),
         ("d.glb", &[]),
     ] {
-        let (code, _, stderr) = run(&[&["convert", &ma, &at(to)], options].concat());
-        assert_eq!(code, 0, "{stderr}");
-        let (code, _, stderr) = run(&["convert", &at(to), &at("back.ma")]);
-        assert_ne!(code, 0);
-        assert!(stderr.contains(to) && !Path::new(&at("back.ma")).exists(), "{stderr}");
+        done(&[&["convert", &ma, &at(to)], options].concat());
+        refused(&["convert", &at(to), &at("back.ma")], 2, to);
+        assert!(!Path::new(&at("back.ma")).exists());
     }
     let (_, object) = json(&["convert", &ma, &at("e.glb")]);
-    let told = object["warnings"].to_string();
-    assert!(
-        told.contains("single precision: coordinates and radii are rounded by at most"),
-        "{told}"
-    );
+    let warning = "single precision: coordinates and radii are rounded by at most";
+    assert!(object["warnings"].to_string().contains(warning), "{object}");
 }
 
 /// A sphere of radius 0.6 in the middle of the box, whose faces are 0.5 away, and one of 0.4.
 #[test]
 fn errors_are_radii_less_depths() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&folder.path().join(name)).to_owned();
+    let at = folder();
     std::fs::write(at("x.ma"), "2 0 0\nv 0 0 0 0.6\nv 0.5 0 0 0.4\n").expect("written");
     let error = ["--color", "error", "--mesh", "builtin:box"];
-    let (code, _, stderr) = run(&[&["convert", &at("x.ma"), &at("x.glb")], &error[..]].concat());
-    assert_eq!(code, 0, "{stderr}");
+    done(&[&["convert", &at("x.ma"), &at("x.glb")], &error[..]].concat());
     let bytes = std::fs::read(at("x.glb")).expect("a file");
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("4 bytes"));
     let length = word(12) as usize;
@@ -90,24 +75,21 @@ fn errors_are_radii_less_depths() {
 
 #[test]
 fn options_that_make_no_sense_are_refused_before_anything_is_written() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let ma = axis(folder.path());
-    let out = |name: &str| text_path(&folder.path().join(name)).to_owned();
+    let at = folder();
+    let ma = at("x.ma");
+    done(&["axis", "builtin:box:8", "-o", &ma]);
     for (to, options, expected) in [
         ("x.ply", &["--color", "error"][..], "--color: "),
         ("x.vtp", &["--spheres"], "--spheres: "),
         ("x.glb", &["--color", "error"], "name the surface with --mesh"),
         ("x.glb", &["--mesh", "builtin:box"], "--mesh is for --color error only"),
     ] {
-        let (code, _, stderr) = run(&[&["convert", &ma, &out(to)], options].concat());
-        assert_eq!(code, 2, "{stderr}");
-        assert!(stderr.contains(expected), "{stderr}");
-        assert!(!Path::new(&out(to)).exists());
+        refused(&[&["convert", &ma, &at(to)], options].concat(), 2, expected);
+        assert!(!Path::new(&at(to)).exists());
     }
-    let surface = out("s.off");
-    assert_eq!(run(&["datasets", "make", "sphere", "--resolution", "8", "-o", &surface]).0, 0);
+    let surface = at("s.off");
+    done(&["datasets", "make", "sphere", "--resolution", "8", "-o", &surface]);
     for (to, options) in [("y.glb", &[][..]), ("y.vtp", &[]), ("y.off", &["--spheres"])] {
-        let (code, _, stderr) = run(&[&["convert", &surface, &out(to)], options].concat());
-        assert_eq!(code, 2, "{stderr}");
+        refused(&[&["convert", &surface, &at(to)], options].concat(), 2, "");
     }
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::command::{json, run, text_path};
+use crate::command::{done, folder, json, refused};
 
 /// Width and height in the header of a PNG file.
 fn size_of(path: &str) -> [u32; 2] {
@@ -14,11 +14,10 @@ fn size_of(path: &str) -> [u32; 2] {
 
 #[test]
 fn every_kind_of_picture_is_written() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let at = folder();
     let (mesh, coarse, fine) = ("builtin:torus", at("coarse.ma"), at("fine.ma"));
     for (spheres, path) in [("20", &coarse), ("80", &fine)] {
-        assert_eq!(run(&["simplify", mesh, "-m", "qmat", "--spheres", spheres, "-o", path]).0, 0);
+        done(&["simplify", mesh, "-m", "qmat", "--spheres", spheres, "-o", path]);
     }
     let out = at("x.png");
     let cases: [(&[&str], [u32; 2]); 7] = [
@@ -44,43 +43,25 @@ fn every_kind_of_picture_is_written() {
 }
 
 #[test]
-fn threads_change_no_byte() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
-    let (axis, mesh) = (at("x.ma"), "builtin:blob");
-    assert_eq!(run(&["simplify", mesh, "-m", "qmat", "--spheres", "50", "-o", &axis]).0, 0);
-    let written = ["1", "4"].map(|threads| {
-        let path = at(&format!("{threads}.png"));
-        let words = ["render", mesh, &axis, "--show", "error", "--tolerance", "0.03"];
-        let more = ["--size", "200x150", "--threads", threads, "-o", &path];
-        let (code, _, stderr) = run(&[&words[..], &more].concat());
-        assert_eq!(code, 0, "{stderr}");
-        fs::read(path).expect("written")
-    });
-    assert!(written[0] == written[1]);
-}
-
-#[test]
 fn wrong_words_are_named_and_nothing_is_written() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| text_path(&dir.path().join(name)).to_owned();
+    let at = folder();
     let (out, axis, points) = (at("x.png"), at("ball.ma"), at("points.ma"));
     fs::write(&axis, "1 0 0\nv 0 0 0 0.9\n").expect("written");
     fs::write(&points, "2 1 0\nv 0 0 0 0\nv 0.5 0 0 0\ne 0 1\n").expect("written");
     let cases: [(&[&str], i32, &str); 18] = [
-        (&["--size", "800"], 2, "--size 800"),
+        (&["--size", "800"], 2, "--size <WxH>': write"),
         (&["--size", "8x8"], 2, "--size: a picture of 8 by 8"),
         (&["--size", "90000x10"], 2, "--size: a picture of 90000 by 10"),
-        (&["--camera", "somewhere"], 2, "--camera somewhere"),
-        (&["--camera", "0,90"], 2, "--camera 0,90"),
+        (&["--camera", "somewhere"], 2, "--camera <VIEW>': write one of front"),
+        (&["--camera", "0,90"], 2, "between -90 and 90"),
         (&["--camera", "0,0,0"], 2, "--camera: the camera looks from 0,0,0"),
         (&["--camera", "0,1,0", "--up", "y"], 2, "--up: 0,1,0"),
-        (&["--up", "w"], 2, "--up w"),
+        (&["--up", "w"], 2, "--up <DIRECTION>': write"),
         (&["--zoom", "0"], 2, "--zoom: a zoom of 0"),
         (&["--zoom", "nan"], 2, "--zoom: a zoom of NaN"),
-        (&["--background", "mauve"], 2, "--background mauve"),
-        (&["--max-error", "0"], 2, "--max-error 0"),
-        (&["--tolerance", "2"], 2, "--tolerance 2"),
+        (&["--background", "mauve"], 2, "or #rrggbb"),
+        (&["--max-error", "0"], 2, "more than 0 and at most 1"),
+        (&["--tolerance", "2"], 2, "more than 0 and at most 1"),
         (&["--show", "error"], 2, "--show error: name a medial mesh"),
         (&[&axis, &axis, "--show", "reconstruction"], 2, "--show reconstruction"),
         (&[&axis, "--show", "error", "--tolerance", "1e-7"], 2, "is feasible"),
@@ -88,12 +69,10 @@ fn wrong_words_are_named_and_nothing_is_written() {
         (&[&points, "--show", "error"], 1, "points.ma: all spheres have radius zero"),
     ];
     for (words, expected, part) in cases {
-        let (code, _, stderr) = run(&[&["render", "builtin:sphere:8", "-o", &out], words].concat());
-        assert!(code == expected && stderr.contains(part), "{words:?}: {code}, {stderr}");
+        refused(&[&["render", "builtin:sphere:8", "-o", &out], words].concat(), expected, part);
         assert!(!Path::new(&out).exists(), "{words:?} wrote a file");
     }
-    let (code, _, stderr) = run(&["render", "builtin:sphere:8", "-o", &at("x.jpg")]);
-    assert!(code == 1 && stderr.contains("\"jpg\" is not one of .png"), "{stderr}");
-    let (code, _, stderr) = run(&["render", "builtin:sphere:8", "-o", &at("no/x.png")]);
-    assert!(code == 1 && stderr.contains("there is no folder"), "{stderr}");
+    for (name, part) in [("x.jpg", "\"jpg\" is not one of .png"), ("no/x.png", "no folder")] {
+        refused(&["render", "builtin:sphere:8", "-o", &at(name)], 1, part);
+    }
 }

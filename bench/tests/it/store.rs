@@ -6,23 +6,18 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::common::{code, example, records, run, stderr, without_timings};
 use medial_bench::process_tree;
 use serde_json::Value;
 
-const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
+use crate::command::{
+    MEDIAL, done, ended, faulty, folder, json, json_of, records, refused, run, run_program,
+    text_path as text, without_timings,
+};
 
 /// `compare` with `--json`: the exit code and the object.
 fn compare(arguments: &[&str], out: &Path) -> (i32, Value) {
-    let common = ["--samples", "200", "--counts-only", "--quiet", "--json", "--out", text(out)];
-    let output = run(MEDIAL, &[&["compare"], arguments, &common].concat());
-    let object =
-        serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", stderr(&output)));
-    (code(&output), object)
+    let common = ["--samples", "200", "--counts-only", "--quiet", "--out", text(out)];
+    json(&[&["compare"], arguments, &common].concat())
 }
 
 fn run_and_found(object: &Value) -> (u64, u64) {
@@ -68,19 +63,18 @@ fn only_what_is_missing_is_run() {
 fn failures_are_run_again_when_asked_or_when_a_limit_is_wider() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
-    let faulty = |more: &[&str]| {
+    let compare = |more: &[&str]| {
         let arguments = [
             &["compare", "builtin:box:8", "--methods", "allocates,panics", "--spheres", "20"][..],
-            &["--samples", "100", "--counts-only", "--quiet", "--json", "--out", text(&out)],
+            &["--samples", "100", "--counts-only", "--quiet", "--out", text(&out)],
             more,
         ];
-        let output = run(example("faulty"), &arguments.concat());
-        run_and_found(&serde_json::from_slice(&output.stdout).expect("JSON"))
+        run_and_found(&json_of(faulty(), &arguments.concat()).1)
     };
-    assert_eq!(faulty(&["--memory", "1500"]), (2, 0));
-    assert_eq!(faulty(&["--memory", "1500"]), (0, 2));
-    assert_eq!(faulty(&["--memory", "1501"]), (1, 1), "the one that had too little memory");
-    assert_eq!(faulty(&["--memory", "1501", "--retry-failed"]), (2, 0));
+    assert_eq!(compare(&["--memory", "1500"]), (2, 0));
+    assert_eq!(compare(&["--memory", "1500"]), (0, 2));
+    assert_eq!(compare(&["--memory", "1501"]), (1, 1), "the one that had too little memory");
+    assert_eq!(compare(&["--memory", "1501", "--retry-failed"]), (2, 0));
 }
 
 #[test]
@@ -92,7 +86,7 @@ fn two_runs_into_one_folder_lose_nothing() {
         let more = ["--samples", "100", "--counts-only", "--quiet", "--out"];
         words.into_iter().chain(more).map(str::to_owned).chain([text(&out).to_owned()])
     };
-    let program = example("faulty");
+    let program = faulty();
     let mut first = Command::new(&program);
     first.args(arguments("waits")).env("FAULTY_GATE", &gate).stdout(Stdio::null());
     let mut first = first.spawn().expect("the first run starts");
@@ -100,8 +94,8 @@ fn two_runs_into_one_folder_lose_nothing() {
     // until the pipe is closed the first run holds the store.
     let pipe = fs::OpenOptions::new().write(true).open(&gate).expect("the method waits");
     let second = Command::new(&program).args(arguments("qmat")).output().expect("it starts");
-    let message = stderr(&second);
-    assert!(code(&second) == 1 && message.contains("is adding results"), "{message}");
+    let (code, _, message) = ended(second);
+    assert!(code == 1 && message.contains("is adding results"), "{message}");
     assert!(message.contains("waits"), "it names the other run: {message}");
     drop(pipe);
     assert_eq!(first.wait().expect("it ends").code(), Some(0));
@@ -114,7 +108,7 @@ fn a_killed_run_is_continued() {
     let (whole, killed) = (dir.path().join("whole"), dir.path().join("killed"));
     let gate = gate(dir.path());
     let start = |out: &Path| {
-        let mut run = Command::new(example("faulty"));
+        let mut run = Command::new(faulty());
         run.args(["compare", "builtin:box:8", "builtin:torus:16", "--methods", "qmat,waits,pmat"])
             .args(["--spheres", "60,30", "--samples", "200", "--counts-only", "--quiet", "--out"])
             .arg(out)
@@ -191,13 +185,10 @@ fn torn_lines_and_temporary_files_are_removed() {
     let foreign = [out.join(".x.tmp"), out.join("axes/mine.txt"), out.join("plots/mine.png")];
     foreign.iter().for_each(|path| fs::write(path, "mine").expect("written"));
     let common = ["--samples", "200", "--counts-only", "--out", text(&out)];
-    let output = run(MEDIAL, &[&["compare"], &words[..], &common].concat());
-    assert_eq!(code(&output), 0);
-    assert!(stderr(&output).contains("last line was incomplete"), "{}", stderr(&output));
+    refused(&[&["compare"], &words[..], &common].concat(), 0, "last line was incomplete");
     assert!(!stray.exists());
     assert_eq!(records(&out).len(), 2);
-    let fresh = [&["compare"], &words[..], &common, &["--fresh", "--quiet"]].concat();
-    assert_eq!(code(&run(MEDIAL, &fresh)), 0);
+    done(&[&["compare"], &words[..], &common, &["--fresh", "--quiet"]].concat());
     assert!(foreign.iter().all(|path| path.exists()), "{foreign:?}");
 }
 
@@ -225,9 +216,7 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
                  [[method]]\nid = \"qmat\"\nname = \"no scale\"\nparams = { k = 0 }\nspheres = [20, 10]\n\n\
                  [[method]]\nid = \"angle\"\nlevels = [30, 60]\n";
     fs::write(&file, study).expect("written");
-    let study_of = |path: &Path| ["--study".to_owned(), text(path).to_owned()];
-    let words = study_of(&file);
-    let (status, object) = compare(&words.each_ref().map(String::as_str), &out);
+    let (status, object) = compare(&["--study", text(&file)], &out);
     assert_eq!((status, run_and_found(&object)), (0, (6, 0)), "{object}");
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
     assert!(page.contains("no scale") && page.contains("builtin:box:8"));
@@ -235,8 +224,8 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
     assert_eq!(records(&out).iter().filter_map(native).collect::<Vec<_>>(), [30.0, 60.0]);
 
     // The copy asks the same again; what the command line names wins.
-    let words = study_of(&out.join("study.toml"));
-    let again = words.each_ref().map(String::as_str);
+    let copy = out.join("study.toml");
+    let again = ["--study", text(&copy)];
     assert_eq!(run_and_found(&compare(&again, &out).1), (0, 6));
     let fewer = [&again[..], &["--methods", "qmat", "--spheres", "30,20"]].concat();
     assert_eq!(run_and_found(&compare(&fewer, &out).1), (1, 1));
@@ -251,9 +240,8 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
         ("plugins = [\"nowhere.toml\"]\n", "nowhere.toml"),
     ] {
         fs::write(&file, wrong).expect("written");
-        let output = run(MEDIAL, &["compare", "--study", text(&file), "--out", text(&out)]);
-        let message = stderr(&output);
-        assert!([1, 2].contains(&code(&output)) && message.contains(part), "{wrong}: {message}");
+        let (code, _, why) = run(&["compare", "--study", text(&file), "--out", text(&out)]);
+        assert!([1, 2].contains(&code) && why.contains(part), "{wrong}: {why}");
     }
     assert_eq!(records(&out).len(), 7, "nothing was lost");
 }
@@ -267,9 +255,9 @@ fn an_interrupted_run_says_how_to_go_on() {
     let gate = gate(dir.path());
     let more = ["--samples", "100", "--counts-only", "--out", text(&out)];
     let earlier = ["compare", "builtin:box:8", "--methods", "pmat", "--spheres", "20", "--quiet"];
-    assert_eq!(code(&run(example("faulty"), &[&earlier[..], &more].concat())), 0);
+    assert_eq!(run_program(faulty(), &[&earlier[..], &more].concat()).0, 0);
     assert!(out.join("index.html").exists());
-    let mut run = Command::new(example("faulty"));
+    let mut run = Command::new(faulty());
     run.args(words).args(more).env("FAULTY_GATE", &gate);
     let child = run.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts");
     // Opening blocks until the second item waits: the first one is recorded by then.
@@ -279,13 +267,12 @@ fn an_interrupted_run_says_how_to_go_on() {
     assert!(Command::new("kill").args(["-INT", &pid]).status().expect("kill runs").success());
     let output = child.wait_with_output().expect("it ends");
     drop(pipe);
-    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
-    assert!(stderr(&output).contains("the same command goes on"), "{}", stderr(&output));
+    let (code, _, stderr) = ended(output);
+    assert!(code == 130 && stderr.contains("the same command goes on"), "{code}: {stderr}");
     assert_eq!(records(&out).len(), 2);
     // The page of the earlier run would contradict the records; a new one names both runs.
     assert!(!out.join("index.html").exists());
-    let report = Command::new(example("faulty")).arg("report").arg(&out).output().expect("it runs");
-    assert_eq!(code(&report), 0, "{}", stderr(&report));
+    assert_eq!(run_program(faulty(), &["report", text(&out)]).0, 0);
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
     assert!(page.contains("--methods pmat") && page.contains("--methods qmat,waits"));
     assert!(!workers.iter().any(|&pid| is_worker(pid)), "a worker is left");
@@ -297,19 +284,15 @@ fn a_study_in_a_folder_with_any_name_is_read_back() {
     // A decomposed accent, a quotation mark and a backslash.
     let folder = dir.path().join("me\u{301}di\"al\\x");
     fs::create_dir(&folder).expect("made");
-    let made = run(
-        MEDIAL,
-        &["datasets", "make", "box", "--resolution", "8", "-o", text(&folder.join("b.off"))],
-    );
-    assert_eq!(code(&made), 0, "{}", stderr(&made));
+    done(&["datasets", "make", "box", "--resolution", "8", "-o", text(&folder.join("b.off"))]);
     let study = "meshes = [\"b.off\"]\nspheres = [10]\nsamples = 100\ncounts_only = true\n[[method]]\nid = \"qmat\"\n";
     fs::write(folder.join("study.toml"), study).expect("written");
     let compare = |study: &Path, folder: &Path| {
         let mut command = Command::new(MEDIAL);
         command.args(["compare", "--quiet", "--json", "--out", "out", "--study"]).arg(study);
-        let output = command.current_dir(folder).output().expect("it starts");
-        assert_eq!(code(&output), 0, "{}", stderr(&output));
-        run_and_found(&serde_json::from_slice(&output.stdout).expect("JSON"))
+        let (code, stdout, stderr) = ended(command.current_dir(folder).output().expect("starts"));
+        assert_eq!(code, 0, "{stderr}");
+        run_and_found(&serde_json::from_str(&stdout).expect("JSON"))
     };
     // A name without a folder stands for the working folder.
     assert_eq!(compare(Path::new("study.toml"), &folder), (1, 0));
@@ -327,20 +310,14 @@ fn a_folder_of_other_files_is_refused() {
     let dir = tempfile::tempdir().expect("a folder");
     fs::write(dir.path().join("thesis.tex"), "").expect("written");
     let words = ["compare", "builtin:box:8", "--methods", "qmat", "--out", text(dir.path())];
-    let output = run(MEDIAL, &words);
-    assert_eq!(code(&output), 1);
-    assert!(
-        stderr(&output).contains("neither empty nor a folder of results"),
-        "{}",
-        stderr(&output)
-    );
+    refused(&words, 1, "neither empty nor a folder of results");
     assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 1, "nothing was written");
 }
 
 #[test]
 fn shards_merge_into_what_one_run_gives() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| dir.path().join(name);
+    let path = folder();
+    let at = |name: &str| PathBuf::from(path(name));
     let words =
         ["builtin:box:8", "builtin:torus:16", "--methods", "qmat,pmat,angle", "--spheres", "30,20"];
     let (_, whole) = compare(&words, &at("whole"));
@@ -357,18 +334,14 @@ fn shards_merge_into_what_one_run_gives() {
     }
     assert_eq!(made, total, "every item is in one shard");
     let merge = |out: &str| {
-        let stores = ["3", "1", "2"].map(|name| text(&at(name)).to_owned());
-        let mut words = vec!["report", "--json"];
-        words.extend(stores.iter().map(String::as_str));
-        let out = text(&at(out)).to_owned();
-        words.extend(["--out", &out]);
-        let output = run(MEDIAL, &words);
-        assert_eq!(code(&output), 0, "{}", stderr(&output));
-        serde_json::from_slice::<Value>(&output.stdout).expect("JSON")
+        let (code, object) =
+            json(&["report", &path("3"), &path("1"), &path("2"), "--out", &path(out)]);
+        assert_eq!(code, 0, "{object}");
+        object
     };
     let object = merge("all");
     assert_eq!((&object["records"], &object["warnings"]), (&total.into(), &Value::Array(vec![])));
-    assert_eq!(without_timings(records(&at("all"))), without_timings(records(&at("whole"))));
+    assert_eq!(without_timings(records(at("all"))), without_timings(records(at("whole"))));
     // The tables are the same but for seconds.
     let table = |out: &str| -> Vec<Vec<String>> {
         let mut rows = csv::Reader::from_path(at(out).join("results.csv")).expect("a table");
@@ -385,7 +358,7 @@ fn shards_merge_into_what_one_run_gives() {
             .collect()
     };
     assert_eq!(table("all"), table("whole"));
-    for record in records(&at("all")) {
+    for record in records(at("all")) {
         let artifact = record["artifact"].as_str().expect("a medial mesh");
         assert!(at("all").join(artifact).exists());
     }
@@ -393,26 +366,18 @@ fn shards_merge_into_what_one_run_gives() {
     assert_eq!(merge("all")["records"], total);
 
     // One store has another result under a key: it is reported, and the newer store counts.
-    let path = at("2").join("results.jsonl");
-    let altered = fs::read_to_string(&path)
+    let altered = fs::read_to_string(at("2/results.jsonl"))
         .expect("results")
         .replace("\"result_hash\":\"", "\"result_hash\":\"0");
     fs::create_dir(at("4")).expect("made");
     fs::write(at("4/results.jsonl"), altered).expect("written");
-    for record in records(&at("4")) {
+    for record in records(at("4")) {
         let artifact = record["artifact"].as_str().expect("a medial mesh");
         let to = at("4").join(artifact);
         fs::create_dir_all(to.parent().expect("a folder")).expect("made");
         fs::copy(at("2").join(artifact), to).expect("copied");
     }
-    let (two, four, out) =
-        (text(&at("2")).to_owned(), text(&at("4")).to_owned(), text(&at("both")).to_owned());
-    let words = ["report", "--json", &two, &four, "--out", &out];
-    let output = run(MEDIAL, &words);
-    let object: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let told = object["warnings"].to_string();
-    assert!(told.contains("differ; the newer one"), "{object}");
-
-    let wrong = run(MEDIAL, &["compare", "builtin:box:8", "--shard", "4/3", "--out", &out]);
-    assert_eq!(code(&wrong), 2, "{}", stderr(&wrong));
+    let (_, object) = json(&["report", &path("2"), &path("4"), "--out", &path("both")]);
+    assert!(object["warnings"].to_string().contains("differ; the newer one"), "{object}");
+    refused(&["compare", "builtin:box:8", "--shard", "4/3"], 2, "--shard 4/3");
 }

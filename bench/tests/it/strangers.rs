@@ -3,28 +3,24 @@
 
 use std::fs;
 
-use crate::common::{code, records, run, stderr};
-
-const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
+use crate::command::{done, folder, records, refused};
 
 /// Compares methods on a box, and asks that each has results, a line in the CSV, a curve in a plot,
 /// and its title on the page.
 fn compares(plugins: &[&str], methods: &[(&str, &str)]) {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("out");
+    let at = folder();
+    let out = at("out");
     let ids = methods.iter().map(|(id, _)| *id).collect::<Vec<_>>().join(",") + ",qmat";
     let arguments = [
         &["compare", "builtin:box:8", "--methods", &ids, "--spheres", "30,20"][..],
-        &["--samples", "200", "--counts-only", "--quiet", "--out", out.to_str().expect("UTF-8")],
+        &["--samples", "200", "--counts-only", "--quiet", "--out", &out],
         plugins,
     ];
-    let output = run(MEDIAL, &arguments.concat());
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    done(&arguments.concat());
     let records = records(&out);
-    let page = fs::read_to_string(out.join("index.html")).expect("a page");
-    let csv = fs::read_to_string(out.join("results.csv")).expect("a table");
-    let table = fs::read_to_string(out.join("tables/summary.md")).expect("a table");
-    let plots = fs::read_dir(out.join("plots")).expect("plots").flatten();
+    let [page, csv, table] = ["index.html", "results.csv", "tables/summary.md"]
+        .map(|name| fs::read_to_string(at("out") + "/" + name).expect("a file of the report"));
+    let plots = fs::read_dir(at("out/plots")).expect("plots").flatten();
     let plots: Vec<String> =
         plots.map(|entry| fs::read_to_string(entry.path()).expect("a plot")).collect();
     for (id, title) in methods {
@@ -35,8 +31,7 @@ fn compares(plugins: &[&str], methods: &[(&str, &str)]) {
         assert!(table.contains(id), "{id} is not in the table");
         assert!(plots.iter().any(|plot| plot.contains(id)), "{id} is in no plot");
     }
-    let listed = run(MEDIAL, &[&["methods"][..], plugins].concat());
-    let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
+    let listed = done(&[&["methods"][..], plugins].concat());
     assert!(methods.iter().all(|(id, title)| listed.contains(id) && listed.contains(title)));
 }
 
@@ -53,15 +48,10 @@ fn programs() {
 
 #[test]
 fn an_id_that_is_taken_is_refused() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let file = dir.path().join("mine.toml");
+    let at = folder();
     let text = "[[method]]\nid = \"qmat\"\ntitle = \"Mine\"\nlevels = [\"spheres\"]\n\
                 command = [\"sh\", \"{output}\", \"{spheres}\"]\n";
-    fs::write(&file, text).expect("written");
-    let output = run(MEDIAL, &["methods", "--plugins", file.to_str().expect("UTF-8")]);
-    let message = stderr(&output);
-    assert!(
-        code(&output) == 2 && message.contains("mine.toml, line 2") && message.contains("`qmat`"),
-        "{message}"
-    );
+    fs::write(at("mine.toml"), text).expect("written");
+    let why = "mine.toml, line 2: there is a method called `qmat` already";
+    refused(&["methods", "--plugins", &at("mine.toml")], 2, why);
 }
