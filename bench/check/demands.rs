@@ -1,5 +1,6 @@
 //! The demands of the corpus in the order of [`super::cases`], then the shapes that they are about.
 
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -81,6 +82,7 @@ pub(super) fn sound(result: &Simplified, level: Level) -> Result<(), String> {
     if result.mesh.spheres.is_empty() {
         return Err("the medial mesh has no sphere".into());
     }
+    // Larger ones pass every test of validity, and spoil every measure.
     for (id, sphere) in result.mesh.spheres.iter().enumerate() {
         let reach = sphere.centre.abs().max_element().max(sphere.radius);
         if reach > FARTHEST {
@@ -103,6 +105,7 @@ pub(super) fn valid_on(subject: &Subject<'_>, name: &str) -> Answer {
         subject.ask(simplification.as_mut(), &shape, Level::Published)?;
         return Ok(vec!["at its published level: it is not asked for numbers".into()]);
     }
+    // Prepared again: the level above may have left a coarse state.
     let mut simplification = subject.prepare(&shape)?;
     for count in COUNTS {
         subject.ask(simplification.as_mut(), &shape, Level::Spheres(count))?;
@@ -189,6 +192,7 @@ pub(super) fn counts_above(subject: &Subject<'_>) -> Answer {
         if name == TETRAHEDRON && one.is_err() {
             continue;
         }
+        // First the absurd one: a method that allocates by the request fails here.
         for count in [HUGE, initial + 1] {
             at_count(subject, simplification.as_mut(), &shape, count)?;
         }
@@ -246,6 +250,7 @@ pub(super) fn native_level(subject: &Subject<'_>) -> Answer {
             Ok(_) => failed("it answers a level of its own, but its description has none"),
         };
     }
+    // -1 is finite, and below the range of every level that a paper has.
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0] {
         let level = Level::Native(value);
         (subject.doing)(&level.to_string());
@@ -266,8 +271,9 @@ pub(super) fn native_level(subject: &Subject<'_>) -> Answer {
     taken(subject, simplification.as_mut(), Level::Native(value))
 }
 
-/// A level that the method has named itself. It need not lead to the same result: a number of
-/// spheres can divide those that tie for a level, and a bound may be held for the whole only.
+/// A level that the method has named itself.
+// It need not lead to the same result: a number of spheres can divide those that tie for a level, and
+// a bound may be held for the whole only.
 fn taken(subject: &Subject<'_>, simplification: &mut dyn Simplification, level: Level) -> Answer {
     (subject.doing)(&level.to_string());
     match simplification.at(level) {
@@ -302,7 +308,7 @@ pub(super) fn published_level(subject: &Subject<'_>) -> Answer {
     }
 }
 
-/// A program's files hold the input's units: what it reads is rounded otherwise in others.
+// A program's files hold the input's units: what it reads is rounded otherwise in others.
 const ROUNDING: f64 = 1e-9;
 
 /// A level is the same whatever was computed before it: finer, coarser, and the same again.
@@ -310,6 +316,7 @@ pub(super) fn continuing(subject: &Subject<'_>) -> Answer {
     let shape = corpus_shape("torus");
     let view = shape.view();
     let mut simplification = subject.prepare(&view)?;
+    // Down, up and down to one that was there: caches that are not reset show.
     for count in [300, 100, 200, 100] {
         let level = Level::Spheres(count);
         let continued = subject.ask(simplification.as_mut(), &view, level)?;
@@ -333,6 +340,7 @@ pub(super) fn repeated(subject: &Subject<'_>) -> Answer {
 /// Other numbers of threads, for substrates and method alike.
 pub(super) fn threads(subject: &Subject<'_>) -> Answer {
     let mut results: Vec<MedialMesh> = Vec::new();
+    // 5 divides no power of two: chunks end elsewhere.
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|error| Miss::Skipped(error.to_string()))?;
@@ -388,6 +396,7 @@ pub(super) fn difference(
     }
     for (id, (a, b)) in first.spheres.iter().zip(&second.spheres).enumerate() {
         let [a, b] = [a, b].map(|s| [s.centre.x, s.centre.y, s.centre.z, s.radius]);
+        // By bits: 0 and -0 are equal as numbers, and differ in a file.
         if a.into_iter().zip(b).any(|(a, b)| match tolerance {
             0.0 => a.to_bits() != b.to_bits(),
             _ => (a - b).abs() > tolerance,
@@ -398,6 +407,7 @@ pub(super) fn difference(
     if (&first.edges, &first.faces) != (&second.edges, &second.faces) {
         return Some("the spheres are the same, but edges or faces differ".into());
     }
+    // Contact points are rounded with the units, and a program has none.
     let contacts = tolerance > 0.0 || first.contacts == second.contacts;
     (!contacts).then(|| "all is the same but the contact points".into())
 }
@@ -508,51 +518,22 @@ pub(super) fn corpus_shape(name: &str) -> Shape {
 
 fn mesh(name: &str) -> TriMesh {
     match name {
-        PARTS => two(&built_in("box", 12)),
+        PARTS => two(&mesh("box")),
         PLATE => {
-            let mut mesh = built_in("box", 12);
+            let mut mesh = mesh("box");
             mesh.vertices.iter_mut().for_each(|v| v.z *= 3e-4);
             mesh
         }
-        TETRAHEDRON => solid(
-            &[[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]],
-            &[[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
-        ),
+        TETRAHEDRON => solid("4 4 0 1 1 1 1 -1 -1 -1 1 -1 -1 -1 1 3 0 1 2 3 0 3 1 3 0 2 3 3 1 3 2"),
         CUBE => solid(
-            &[
-                [0, 0, 0],
-                [1, 0, 0],
-                [0, 1, 0],
-                [1, 1, 0],
-                [0, 0, 1],
-                [1, 0, 1],
-                [0, 1, 1],
-                [1, 1, 1],
-            ],
-            &[
-                [0, 2, 1],
-                [1, 2, 3],
-                [4, 5, 6],
-                [5, 7, 6],
-                [0, 1, 4],
-                [1, 5, 4],
-                [2, 6, 3],
-                [3, 6, 7],
-                [0, 4, 2],
-                [2, 4, 6],
-                [1, 3, 5],
-                [3, 7, 5],
-            ],
+            "8 6 0 0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1 \
+             4 0 2 3 1 4 4 5 7 6 4 0 1 5 4 4 2 6 7 3 4 0 4 6 2 4 1 3 7 5",
         ),
         id => {
             let shape = medial_datasets::find(id).expect("a shape of the catalogue");
             shape.mesh(shape.default_resolution)
         }
     }
-}
-
-fn built_in(id: &str, resolution: u32) -> TriMesh {
-    medial_datasets::find(id).expect("a shape of the catalogue").mesh(resolution)
 }
 
 /// A mesh and a copy of it, moved by twice its width.
@@ -568,9 +549,11 @@ fn two(one: &TriMesh) -> TriMesh {
     }
 }
 
-fn solid(vertices: &[[i32; 3]], faces: &[[u32; 3]]) -> TriMesh {
-    let vertices = vertices.iter().map(|&v| Vec3::from_array(v.map(f64::from))).collect();
-    TriMesh { vertices, faces: faces.to_vec() }
+/// A surface of the words of an OFF file behind its first.
+fn solid(words: &str) -> TriMesh {
+    let text = format!("OFF {words}");
+    let loaded = surface::read_any(Path::new("solid.off"), text.as_bytes());
+    loaded.expect("the solids of the corpus are surfaces").mesh
 }
 
 #[cfg(test)]

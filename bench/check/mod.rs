@@ -154,6 +154,7 @@ impl Subject<'_> {
     fn level(&self, simplification: &mut dyn Simplification, count: usize) -> Result<Level, Miss> {
         let level = Level::Spheres(count);
         (self.doing)(&format!("asking for {level}"));
+        // Any other error belongs to this level, and the case of this level reports it.
         let Err(SimplifyError::Unsupported { why }) = simplification.at(level) else {
             return Ok(level);
         };
@@ -167,6 +168,7 @@ impl Subject<'_> {
 
     /// The medial mesh that a method gives for a number of spheres when asked for nothing else.
     fn mesh(&self, shape: &Shape, count: usize) -> Result<MedialMesh, Miss> {
+        // Two preparations: which level it is must not change what it gives.
         let level = self.level(self.prepare(shape)?.as_mut(), count)?;
         Ok(self.ask(self.prepare(shape)?.as_mut(), shape, level)?.mesh)
     }

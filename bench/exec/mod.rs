@@ -30,10 +30,6 @@ use crate::process_tree::signal_name;
 use crate::provenance::Provenance;
 use crate::study::item::{Item, Limits, SceneSpec};
 
-/// The user interrupted the run: the current item is ended and not recorded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Interrupted;
-
 /// Why items cannot be run at all.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
@@ -43,12 +39,6 @@ pub enum RunError {
     /// A worker cannot be started.
     #[error("a worker process cannot be started: {0}")]
     Start(io::Error),
-}
-
-impl From<Interrupted> for RunError {
-    fn from(_: Interrupted) -> Self {
-        Self::Interrupted
-    }
 }
 
 /// Runs items one after another, in a worker that it replaces when an item has broken it.
@@ -64,7 +54,8 @@ pub struct Supervisor<'a> {
     worker: Option<Worker>,
     /// SHA-256 of the input that was ready last.
     input: Option<(SceneSpec, String)>,
-    /// An input that ended its worker: its other items are not tried.
+    /// An input that ended its worker.
+    // Its other items are not tried: they would end the next worker at the same place.
     lost: Option<(SceneSpec, Fault)>,
 }
 
@@ -120,11 +111,13 @@ impl<'a> Supervisor<'a> {
     /// When the user interrupts, or no worker can be started.
     pub fn run(&mut self, item: &Item) -> Result<Vec<Record>, RunError> {
         let mut kept: Vec<Record> = Vec::new();
+        // A stack: groups that are split off run before later ones, from fine to coarse.
         let mut groups = vec![item.levels.clone()];
         while let Some(levels) = groups.pop() {
             let part = Item { levels, ..item.clone() };
             let (attempt, told) = self.attempt(&part)?;
             let mut missing = part.levels.clone();
+            // What was reported before the end of the worker counts.
             missing.retain(|level| told.iter().all(|kept| kept.simplify.level != *level));
             kept.extend(told);
             let mut fail = |levels: &[Target], fault: &Fault| {
@@ -234,6 +227,7 @@ impl<'a> Supervisor<'a> {
 
     fn failed(&self, item: &Item, level: Target, fault: &Fault) -> Record {
         let mut record = failure_record(item, level, fault, &self.provenance);
+        // The hash of the bytes that the worker read, where it came that far: the planned one may be older.
         let ready = self.input.as_ref().filter(|(scene, _)| *scene == item.scene);
         record.mesh_hash = ready.map(|(_, hash)| hash.clone()).or(record.mesh_hash);
         record
@@ -306,12 +300,10 @@ impl<'a> Supervisor<'a> {
                         let mut levels = item.iter().flat_map(|item| &item.levels);
                         let place = levels.position(|&asked| asked == level);
                         stage = Stage::Asked(place.unwrap_or(0));
-                    }
-                    // A search is many runs: each bound has the time limit for itself.
-                    Event::Searching(level) => {
-                        let mut levels = item.iter().flat_map(|item| &item.levels);
-                        let place = levels.position(|&asked| asked == level);
-                        (stage, since) = (Stage::Asked(place.unwrap_or(0)), Instant::now());
+                        // A search is many runs: each bound has the time limit for itself.
+                        if matches!(level, Target::MaxError(_)) {
+                            since = Instant::now();
+                        }
                     }
                     event => {
                         if matches!(event, Event::Doing(_)) {
@@ -340,6 +332,7 @@ impl<'a> Supervisor<'a> {
     /// The worker that is there, where it fits the request, or a new one.
     fn worker_for(&mut self, request: &Request) -> Result<Worker, RunError> {
         let (threads, limits) = request.terms();
+        // The size of the pool and the limit of memory cannot be changed in a running process.
         let options = WorkerOptions {
             program: self.program.clone(),
             threads,
@@ -375,6 +368,7 @@ pub fn merge(records: &mut [Record], repetition: usize, again: Result<Vec<Repeat
                     }
                 }
             }
+            // A first run that failed keeps its reason.
             Some(Err(fault)) if record.status.has_result() => {
                 record.status = fault.status;
                 record.simplify.status = fault.status;
@@ -387,16 +381,12 @@ pub fn merge(records: &mut [Record], repetition: usize, again: Result<Vec<Repeat
 
 /// The stage that a worker had reached when it ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stage {
-    /// Reading and preparing the input.
+enum Stage {
     Loading,
-    /// The method prepared.
     Preparing,
     /// The method was asked for its levels; this many had been answered.
     Asked(usize),
-    /// The results were measured.
     Measuring,
-    /// A case of the conformance corpus ran.
     Checking,
 }
 
@@ -413,7 +403,7 @@ impl Stage {
 }
 
 /// The limit of time was reached.
-pub fn timed_out(stage: Stage, limits: &Limits) -> Fault {
+fn timed_out(stage: Stage, limits: &Limits) -> Fault {
     let seconds = limits.seconds;
     let reason = format!(
         "ended after {seconds} s {}; --timeout gives it longer, and the same command tries again then",
@@ -423,7 +413,7 @@ pub fn timed_out(stage: Stage, limits: &Limits) -> Fault {
 }
 
 /// The limit of memory was reached.
-pub fn out_of_memory(stage: Stage, limits: &Limits) -> Fault {
+fn out_of_memory(stage: Stage, limits: &Limits) -> Fault {
     let megabytes = limits.bytes / 1_000_000;
     let reason = format!(
         "it needed more than {megabytes} MB {}; --memory gives it more, and the same command tries \
@@ -435,16 +425,18 @@ pub fn out_of_memory(stage: Stage, limits: &Limits) -> Fault {
 
 /// The worker ended by itself: the fault by its exit status and its last words, or by its own signal
 /// that memory was refused.
-pub fn ended(
+fn ended(
     stage: Stage,
     status: Option<ExitStatus>,
     last_words: &str,
     memory_refused: bool,
     limits: &Limits,
 ) -> Fault {
+    // The last words of a program that gets no memory are often about something else.
     if memory_refused {
         return out_of_memory(stage, limits);
     }
+    // Rust prints this and aborts: by its signal alone it would look like any other abort.
     if last_words.contains("has overflowed its stack") {
         let reason =
             format!("its stack overflowed {}: is there a recursion without end?", stage.words());
@@ -472,8 +464,9 @@ fn how_it_ended(status: ExitStatus) -> String {
 
 fn last_line(text: &str) -> Option<String> {
     let line = text.lines().rev().map(str::trim).find(|line| !line.is_empty())?;
+    // It becomes part of a table cell.
     Some(line.chars().filter(|c| !c.is_control()).take(200).collect())
 }
 
 /// The interval at which a supervisor checks time and memory.
-pub const LOOK_AGAIN: Duration = Duration::from_millis(50);
+const LOOK_AGAIN: Duration = Duration::from_millis(50);

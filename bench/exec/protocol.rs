@@ -4,7 +4,7 @@
 //! that begins with `MARK`. Methods may print there, too: lines without the mark are ignored.
 
 use std::io;
-use std::io::{Read, Write};
+use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
 
 use medial_reports::{Record, Repetition, Target};
@@ -19,7 +19,7 @@ use crate::study::item::{Item, Limits, MethodSpec};
 const MARK: u8 = 0x1e;
 
 /// A longer line is not a message.
-const MAX_LINE_BYTES: usize = 64 << 20;
+const MAX_LINE_BYTES: u64 = 64 << 20;
 
 /// A request to a worker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -87,10 +87,8 @@ pub enum Event {
     Loading,
     /// The input is ready, its SHA-256; the method prepares.
     Preparing(String),
-    /// The method is asked for a level.
+    /// The method is asked for a level, or the search for the fewest spheres within a bound begins.
     Asked(Target),
-    /// The search for the fewest spheres within a bound begins; it is not timed as the method's work.
-    Searching(Target),
     /// The results are being measured.
     Measuring,
     /// The input is refused: why.
@@ -130,37 +128,15 @@ pub fn send_out_of_memory() {
     let _ = rustix::io::write(rustix::stdio::stdout(), b"\n\x1e\"OutOfMemory\"\n");
 }
 
-/// Reads events until the stream ends. Other lines are ignored, however long.
-pub fn receive(mut from: impl Read, mut each: impl FnMut(Event)) {
+/// Reads events until the stream ends. Other lines are ignored.
+pub fn receive(mut from: impl BufRead, mut each: impl FnMut(Event)) {
     let mut line = Vec::new();
-    let mut block = vec![0; 1 << 16];
-    loop {
-        let read = match from.read(&mut block) {
-            Ok(0) => return,
-            Ok(read) => read,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            Err(_) => return,
-        };
-        let mut rest = &block[..read];
-        while let Some(end) = rest.iter().position(|&byte| byte == b'\n') {
-            line.extend_from_slice(&rest[..end]);
-            rest = &rest[end + 1..];
-            if let Some(event) = parse(&line) {
-                each(event);
-            }
-            line.clear();
+    // A method may print without end and without a line break: memory stays bounded.
+    while from.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
+        if let Some(event) = parse(&line) {
+            each(event);
         }
-        // Memory stays bounded: neither other lines nor overlong messages are collected.
-        if line.is_empty() && rest.first() != Some(&MARK) {
-            // One blank marks the line as no message until it ends.
-            line.extend(rest.first().map(|_| b' '));
-        } else if line.first() == Some(&MARK) || line.is_empty() {
-            line.extend_from_slice(rest);
-        }
-        if line.len() > MAX_LINE_BYTES {
-            line.truncate(1);
-            line[0] = b' ';
-        }
+        line.clear();
     }
 }
 
@@ -176,18 +152,6 @@ mod tests {
     #[test]
     fn the_event_that_is_written_without_an_allocation_is_an_event() {
         assert!(matches!(parse(b"\x1e\"OutOfMemory\""), Some(Event::OutOfMemory)));
-    }
-
-    /// Gives a few bytes at a time.
-    struct Drops<'a>(&'a [u8], usize);
-
-    impl Read for Drops<'_> {
-        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-            let length = self.1.min(self.0.len()).min(buffer.len());
-            buffer[..length].copy_from_slice(&self.0[..length]);
-            self.0 = &self.0[length..];
-            Ok(length)
-        }
     }
 
     #[test]
@@ -209,7 +173,8 @@ mod tests {
         .concat();
         for size in [1, 2, 7, 1000] {
             let mut events = Vec::new();
-            receive(Drops(&stream, size), |event| events.push(event));
+            let from = io::BufReader::with_capacity(size, &stream[..]);
+            receive(from, |event| events.push(event));
             let [Event::Refused(why), Event::Finished] = &events[..] else {
                 panic!("{events:?}");
             };

@@ -52,6 +52,7 @@ pub fn refused_params(
     supervisor: &mut Supervisor<'_>,
 ) -> Result<Option<String>, RunError> {
     let mut seen: Vec<&MethodSpec> = Vec::new();
+    // Defaults are the methods' own and need no probe.
     for item in items.iter().filter(|item| !item.method.params.0.is_empty()) {
         if !seen.contains(&&item.method) {
             seen.push(&item.method);
@@ -76,6 +77,7 @@ pub fn run_items(
 ) -> Result<(), PlanError> {
     let turns = items.iter().map(|item| item.repeat.max(1)).sum();
     let mut progress = Progress::new(verbosity, turns);
+    // A worker keeps the substrates of one scene only.
     for scene in items.chunk_by(|a, b| a.scene == b.scene) {
         let mut waiting: Vec<(&Item, Vec<Vec<Record>>)> = Vec::new();
         for (place, item) in scene.iter().enumerate() {
@@ -116,7 +118,8 @@ pub fn run_items(
     Ok(())
 }
 
-/// The sides in the order of a turn: each begins as often as the others.
+/// The sides in the order of a turn.
+// Each begins as often as the others: the second one finds files in the cache of the system.
 fn order(turn: usize, sides: usize) -> impl Iterator<Item = usize> {
     (0..sides).map(move |side| (side + turn) % sides)
 }
@@ -138,6 +141,7 @@ fn keep(sides: &mut [Contender<'_>], kept: Vec<Vec<Record>>) -> Result<(), Store
 /// One remark for each failure, or a single one if all levels failed for the same reason.
 fn failures(records: &[Record]) -> Vec<String> {
     let failed: Vec<&Record> = records.iter().filter(|r| r.status.is_failure()).collect();
+    // A refused mesh fails at every level for one reason: one line is enough.
     let alike = failed.len() == records.len()
         && failed.iter().all(|r| r.status == failed[0].status && r.reason == failed[0].reason);
     let shown = if alike { 1 } else { failed.len() };
@@ -204,6 +208,7 @@ impl Build {
         // A worker is started from any folder.
         let program = fs::canonicalize(program).map_err(failed)?;
         let bytes = fs::read(&program).map_err(failed)?;
+        // Before any item: the worker of another program would fail at each of them.
         let said = Command::new(&program).arg("--version").output().map_err(failed)?;
         let answer = String::from_utf8_lossy(&said.stdout).trim().to_owned();
         let Some(version) = answer.strip_prefix("medial ") else {

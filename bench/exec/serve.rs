@@ -32,6 +32,7 @@ use crate::{check, process_tree};
 
 /// Serves requests until standard input ends. `bytes` is the memory limit of this process.
 pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
+    // Before anything is allocated for an item.
     limit(bytes);
     process_tree::become_worker();
     medial::heap::on_refusal(crate::exec::protocol::send_out_of_memory);
@@ -57,28 +58,31 @@ pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Forbids core files and limits the memory: an allocation beyond the limit fails at once, while
-/// the supervisor might notice too late. On systems without such a limit only the supervisor watches.
+/// Forbids core files and limits the memory.
+// An allocation beyond the limit fails at once, while the supervisor might notice too late. On systems
+// without such a limit only the supervisor watches.
 fn limit(bytes: u64) {
     #[cfg(unix)]
     {
-        use rlimit::Resource;
-        let _ = Resource::CORE.set(0, 0);
+        use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+        let _ = setrlimit(Resource::Core, Rlimit { current: Some(0), maximum: Some(0) });
         // The hard limit stays: programs that the worker starts are watched by the supervisor alone.
+        let Rlimit { maximum, .. } = getrlimit(Resource::Data);
+        let current = Some(bytes.min(maximum.unwrap_or(u64::MAX)));
         #[cfg(target_os = "linux")]
-        let _ =
-            Resource::DATA.get_hard().and_then(|hard| Resource::DATA.set(bytes.min(hard), hard));
+        let _ = setrlimit(Resource::Data, Rlimit { current, maximum });
     }
     let _ = bytes;
 }
 
-/// The requests, until standard input ends. It is read by a thread of its own, so that its end is
-/// noticed in the middle of an item.
+/// The requests, until standard input ends.
+// It is read by a separate thread, so that its end is noticed in the middle of an item.
 fn requests() -> Receiver<Request> {
     let (sender, receiver) = mpsc::channel();
     thread::spawn(move || {
         for line in io::stdin().lock().lines() {
             let request = line.ok().and_then(|line| serde_json::from_str(&line).ok());
+            // A line that is no request comes from another version: nothing can be served.
             let Some(request) = request else { break };
             if sender.send(request).is_err() {
                 break;
@@ -122,6 +126,7 @@ fn run(
         Err(why) => return send(&Event::Refused(why)),
     };
     send(&Event::Preparing(scene.input.hash.clone()))?;
+    // Not found is a fault of each level, so that every requested row has its reason.
     let entry = find(registry, &item.method);
     let (unknown, context) = (MethodInfo::default(), RunContext::with_seed(item.seed));
     let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
@@ -141,6 +146,7 @@ fn run(
     if bounds.is_empty() {
         return Ok(());
     }
+    // A loose bound costs few probes, from which the search for a tighter one starts.
     bounds.sort_by(|a, b| b.total_cmp(a));
     let measure = |mesh: &MedialMesh| {
         let distances = scene.judge.distances(&scene.carried(mesh));
@@ -152,7 +158,7 @@ fn run(
         sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation().sweep),
         prepare: &prepare,
         measure: &measure,
-        searching: &|bound| drop(send(&Event::Searching(bound))),
+        searching: &|bound| drop(send(&Event::Asked(bound))),
         trying: &|_| {},
     };
     // Each bound is recorded before the next, tighter one is searched: a method that ends its worker
@@ -183,7 +189,8 @@ fn send_records(
     Ok(())
 }
 
-/// Sends times and hashes alone: the supervisor compares these with those of the first run.
+/// Sends times and hashes.
+// Not the meshes: the supervisor compares hashes with those of the first run.
 fn send_repetitions(runs: Vec<LevelRun>) -> io::Result<()> {
     runs.into_iter().try_for_each(|LevelRun { level, outcome, times }| {
         let outcome = outcome.map(|result| (repetition(&times), mesh_hash(&result.mesh)));
@@ -195,6 +202,7 @@ fn send_repetitions(runs: Vec<LevelRun>) -> io::Result<()> {
 fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
     let resolution = medial_datasets::find("sphere").map(|shape| *shape.resolutions().start());
     let source = Source::BuiltIn { id: "sphere".into(), resolution };
+    // A probe that cannot be made finds nothing wrong: the run itself will.
     let Ok(input) = Input::load(&source) else { return Ok(()) };
     let Ok(shape) = input.shape(ShapeOptions::default()) else { return Ok(()) };
     send(&Event::Preparing(input.hash))?;

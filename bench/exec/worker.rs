@@ -1,24 +1,19 @@
 //! A worker from the supervisor's side: a child process, its events, its last words, its end.
 
-use std::collections::VecDeque;
-use std::io::{Read, Write};
+use std::io::{BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::sync::{Arc, Mutex, mpsc};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use std::{io, thread};
 
 use tempfile::TempDir;
 
 use crate::exec::protocol::{Event, Request, receive};
-use crate::host;
-use crate::host::Host;
-use crate::plugin::SCRATCH;
+use crate::host::{self, Host};
+use crate::plugin::{Drain, SCRATCH};
 use crate::process_tree::Tree;
 
-/// Bytes kept of a worker's standard error: its last words.
-const LAST_WORDS: usize = 16 << 10;
 /// Longest wait for the end of standard error after the worker has ended.
 const LONGEST_DRAIN: Duration = Duration::from_secs(5);
 
@@ -41,9 +36,7 @@ pub struct Worker {
     tree: Tree,
     requests: Option<ChildStdin>,
     events: Receiver<Event>,
-    last_words: Arc<Mutex<VecDeque<u8>>>,
-    /// Disconnected once standard error has ended.
-    closed: Receiver<()>,
+    last_words: Drain,
     /// Folder for the files of the programs that it starts; removed with the worker, however that
     /// ends.
     _scratch: TempDir,
@@ -76,6 +69,7 @@ impl Worker {
         for file in &options.plugins {
             command.arg("--plugins").arg(file);
         }
+        // One folder for each worker: when it is killed, the files of its programs go with it.
         let scratch = tempfile::Builder::new().prefix("medial-").tempdir()?;
         command.env(SCRATCH, scratch.path());
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -87,21 +81,14 @@ impl Worker {
         };
         let (sender, events) = mpsc::channel();
         thread::spawn(move || {
-            receive(output, |event| {
+            receive(BufReader::new(output), |event| {
                 // Nobody listens once the worker is given up.
                 let _ = sender.send(event);
             });
         });
-        let last_words = Arc::new(Mutex::new(VecDeque::new()));
-        let kept = Arc::clone(&last_words);
-        let (closing, closed) = mpsc::channel();
-        thread::spawn(move || {
-            keep_last(errors, &kept);
-            drop(closing);
-        });
-        let tree = Tree::of(&child);
+        let (last_words, tree) = (Drain::start(errors), Tree::of(&child));
         let requests = Some(requests);
-        Ok(Self { child, tree, requests, events, last_words, closed, _scratch: scratch, options })
+        Ok(Self { child, tree, requests, events, last_words, _scratch: scratch, options })
     }
 
     /// Sends a request.
@@ -138,6 +125,7 @@ impl Worker {
     /// The exit status and the last words, once its output has ended. A process that only closed its
     /// output is killed.
     pub fn collect(mut self) -> (Option<ExitStatus>, String) {
+        // Its output ends a moment before the process does.
         let deadline = Instant::now() + Duration::from_millis(500);
         let mut status = None;
         while status.is_none() && Instant::now() < deadline {
@@ -149,15 +137,7 @@ impl Worker {
         let killed = self.tree.end(&mut self.child);
         // Everything that could hold the pipe is dead, so its end comes at once; the bound is for a
         // process that waits for a disk.
-        let _ = self.closed.recv_timeout(LONGEST_DRAIN);
-        (status.or(killed), self.last_words())
-    }
-
-    /// The end of what it wrote on standard error.
-    fn last_words(&self) -> String {
-        let kept = self.last_words.lock().expect("no panic while held");
-        let bytes: Vec<u8> = kept.iter().copied().collect();
-        String::from_utf8_lossy(&bytes).into_owned()
+        (status.or(killed), self.last_words.finish(Instant::now() + LONGEST_DRAIN))
     }
 }
 
@@ -165,6 +145,7 @@ impl Drop for Worker {
     /// An idle worker ends by itself once its standard input ends; a busy one is ended.
     fn drop(&mut self) {
         drop(self.requests.take());
+        // A tenth of a second: an idle worker needs much less, a busy one never ends by itself.
         for _ in 0..100 {
             if matches!(self.child.try_wait(), Ok(Some(_))) {
                 self.tree.end_orphans();
@@ -173,19 +154,5 @@ impl Drop for Worker {
             thread::sleep(Duration::from_millis(1));
         }
         let _ = self.tree.end(&mut self.child);
-    }
-}
-
-fn keep_last(mut from: impl Read, kept: &Mutex<VecDeque<u8>>) {
-    let mut block = vec![0; 1 << 16];
-    while let Ok(read) = from.read(&mut block) {
-        if read == 0 {
-            return;
-        }
-        let mut kept = kept.lock().expect("no panic while held");
-        let new = &block[read.saturating_sub(LAST_WORDS)..read];
-        kept.extend(new);
-        let excess = kept.len().saturating_sub(LAST_WORDS);
-        kept.drain(..excess);
     }
 }

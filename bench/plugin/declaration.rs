@@ -140,6 +140,7 @@ pub(super) fn read(
 }
 
 fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declaration>, Fault> {
+    // The parser names the unknown key or the missing field, and its place.
     let document: Document =
         toml::from_str(text).map_err(|error| (error.span(), error.message().to_owned()))?;
     if document.method.is_empty() {
@@ -149,6 +150,7 @@ fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declar
     let mut declarations = Vec::new();
     for written in document.method {
         let (id, at) = (written.id.get_ref().clone(), written.id.span());
+        // A plug-in under the id of a published method would replace it in every table.
         if taken.contains(&id.as_str()) {
             return fault(at, taken_id(&id));
         }
@@ -315,6 +317,7 @@ fn find_program(name: &str, folder: &Path) -> Result<PathBuf, String> {
         return Err(absent(&format!("at {}, or it may not be executed", path.display())));
     }
     let path = std::env::var_os("PATH").unwrap_or_default();
+    // There is no shell that appends `.exe`.
     let names = [name.to_owned(), format!("{name}{}", std::env::consts::EXE_SUFFIX)];
     // A relative folder would depend on where the command runs.
     std::env::split_paths(&path)
@@ -372,6 +375,7 @@ impl Word {
         }
         text.push_str(rest);
         pieces.push(Piece::Text(text));
+        // So that equal words compare as equal, however their braces stood.
         pieces.retain(|piece| *piece != Piece::Text(String::new()));
         Ok(Self(pieces))
     }

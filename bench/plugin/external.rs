@@ -103,7 +103,9 @@ impl MedialSimplifier for External {
         params: &Params,
         run: &RunContext,
     ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
+        // Before any substrate is built: a wrong parameter must not cost the time for one.
         let mut values = self.values(params)?;
+        // Only where the command names it: the method is charged for each substrate that it uses.
         let initial = if self.asks_for("initial") { Some(shape.initial()?) } else { None };
         let scratch = scratch_folder().map_err(|error| cannot("make a temporary folder", error))?;
         let files = ["surface.off", "initial.ma"].map(|name| scratch.path().join(name));
@@ -209,6 +211,7 @@ impl PreparedProgram<'_> {
         let (mesh, notes) = self.read(output)?;
         let report = Report::of(&ended.stdout);
         let mut simplified = Simplified::new(mesh, level);
+        // A program need not report the native level that it was started with.
         simplified.native_level = match level {
             Level::Native(value) => report.native_level.or(Some(value)),
             _ => report.native_level,
@@ -240,6 +243,7 @@ impl PreparedProgram<'_> {
             Ok(metadata) => metadata,
         };
         let bytes = metadata.len();
+        // By the size that the system gives: an endless file must not be read to find out.
         if bytes > LARGEST_OUTPUT {
             return invalid(format!(
                 "the file at {{output}} has {bytes} bytes, {LARGEST_OUTPUT} at most"
@@ -266,6 +270,7 @@ impl PreparedProgram<'_> {
         }
         let normal = self.shape.normalisation();
         let mesh = loaded.mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p));
+        // The reader repairs lists, the check refuses what no repair can mean.
         mesh.check()?;
         for (id, sphere) in mesh.spheres.iter().enumerate() {
             let reach = sphere.centre.abs().max_element().max(sphere.radius);
@@ -297,6 +302,7 @@ fn scratch_folder() -> io::Result<TempDir> {
 
 /// A value as text, if it is of the same type as a default.
 fn text_like(value: &Value, default: &str) -> Result<String, &'static str> {
+    // The default decides the type, as the declaration has no other place for it.
     let default: Value = serde_json::from_str(default).unwrap_or_else(|_| default.into());
     match (value, default) {
         (Value::Array(_) | Value::Object(_) | Value::Null, _) => Err("expected a single value"),
@@ -395,8 +401,8 @@ struct Report {
 }
 
 impl Report {
-    /// The last line that is a JSON object. Programs print what they like: a report that makes no sense costs no
-    /// result, only a warning.
+    /// The last line that is a JSON object.
+    // Programs print what they like: a report that makes no sense costs no result, only a warning.
     fn of(stdout: &str) -> Self {
         let mut objects = stdout
             .lines()
@@ -431,6 +437,7 @@ fn last_line(text: &str) -> Option<String> {
 
 /// A text of a program without what would disturb a terminal or a table.
 fn clean(text: &str) -> String {
+    // Escape sequences of a program would move the cursor in a printed table.
     let printable = text.chars().map(|c| if c.is_control() { ' ' } else { c });
     printable.take(LONGEST_WARNING).collect::<String>().trim().to_owned()
 }

@@ -34,6 +34,7 @@ mod program;
 pub use declaration::PluginError;
 pub(crate) use declaration::is_id;
 pub use external::{External, OwnSeconds, ProgramPeak, SCRATCH};
+pub(crate) use program::Drain;
 
 /// Reads and checks a file of plug-ins: its methods, in its order.
 ///
@@ -99,6 +100,7 @@ pub fn load_script(
         let why = "no class is a method; put @medial_axis.simplifier before one";
         return Err(refused(path, why));
     }
+    // Classes of one file must differ from each other, too.
     let mut ids: Vec<&str> = taken.to_vec();
     for method in &methods {
         let id = &*method.method.info().id;

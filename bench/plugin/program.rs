@@ -20,7 +20,8 @@ use crate::process_tree::Tree;
 const KEPT: usize = 64 * 1024;
 /// Longest time between two looks.
 const LOOK_AGAIN: Duration = Duration::from_millis(10);
-/// First one: programs that are quick to end are not waited for.
+/// First one.
+// Short, because programs that are quick to end are not waited for.
 const FIRST_LOOK: Duration = Duration::from_micros(200);
 /// How long outputs may stay open after everything was ended.
 const LONGEST_DRAIN: Duration = Duration::from_secs(2);
@@ -54,8 +55,9 @@ impl From<io::Error> for NoEnd {
     }
 }
 
-/// Lifts the limit of memory that a program inherits from its worker. The supervisor limits both
-/// together by their resident bytes: what a program prints when an allocation fails decides nothing.
+/// Lifts the limit of memory that a program inherits from its worker.
+// The supervisor limits both together by their resident bytes: what a program prints when an
+// allocation fails decides nothing.
 fn lift_limit(child: &Child) {
     #[cfg(target_os = "linux")]
     {
@@ -74,18 +76,20 @@ pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, N
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn()?;
+    // At once: children that leave the group early are known by having been seen.
     let mut tree = Tree::of(&child);
     lift_limit(&child);
-    // From the start: a program that fills a pipe that nobody reads would wait for ever.
     let stdout = child.stdout.take().map(Drain::start);
     let stderr = child.stderr.take().map(Drain::start);
     let (status, peak) = match watch(&mut child, &mut tree, context) {
         Ok(watched) => watched,
         Err(none) => {
+            // The child would outlive the error otherwise, and hold the scratch folder.
             tree.end(&mut child);
             return Err(none);
         }
     };
+    // Before the outputs are read: a stray that holds a pipe would keep them open.
     let strays = tree.end_orphans();
     let deadline = Instant::now() + LONGEST_DRAIN;
     let [stdout, stderr] = [stdout, stderr].map(|drain| drain.map(|drain| drain.finish(deadline)));
@@ -100,6 +104,7 @@ fn watch(
 ) -> Result<(ExitStatus, u64), NoEnd> {
     let (mut peak, mut pause) = (0, FIRST_LOOK);
     loop {
+        // Before the status: of a process that has ended nothing can be read any more.
         peak = peak.max(tree.resident_bytes());
         if let Some(status) = child.try_wait()? {
             return Ok((status, peak));
@@ -108,18 +113,20 @@ fn watch(
             return Err(NoEnd::Cancelled);
         }
         thread::sleep(pause);
+        // Short programs are timed well, long ones are not disturbed.
         pause = (2 * pause).min(LOOK_AGAIN);
     }
 }
 
 /// A thread that takes an output and keeps its end.
-struct Drain {
+pub(crate) struct Drain {
     end: Arc<Mutex<Tail>>,
     thread: JoinHandle<()>,
 }
 
 impl Drain {
-    fn start(mut output: impl Read + Send + 'static) -> Self {
+    /// From the start of a process: one that fills a pipe that nobody reads would wait for ever.
+    pub fn start(mut output: impl Read + Send + 'static) -> Self {
         let end = Arc::new(Mutex::new(Tail::default()));
         let kept = Arc::clone(&end);
         let thread = thread::spawn(move || {
@@ -128,6 +135,7 @@ impl Drain {
                 match output.read(&mut buffer) {
                     Ok(0) => break,
                     Ok(count) => lock(&kept).push(&buffer[..count]),
+                    // A signal to this process is no end of the output.
                     Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                     Err(_) => break,
                 }
@@ -136,8 +144,8 @@ impl Drain {
         Self { end, thread }
     }
 
-    /// What was kept. A thread that is not done by then is left behind; it ends with its output.
-    fn finish(self, deadline: Instant) -> String {
+    /// The end of the output. A thread that is not done by then is left behind; it ends with its output.
+    pub fn finish(&self, deadline: Instant) -> String {
         while !self.thread.is_finished() && Instant::now() < deadline {
             thread::sleep(FIRST_LOOK);
         }
