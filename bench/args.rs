@@ -78,6 +78,7 @@ impl SubstrateArguments {
         let Some(text) = &self.sampling else { return Ok(Sampling::default()) };
         let sampling: Sampling =
             text.parse().map_err(|error| Failure::usage(format!("--sampling: {error}")))?;
+        // `uniform:COUNT:SEED` and `blue:COUNT:SEED` name their own.
         let seeded = text.split(':').count() > 2;
         Ok(if seeded { sampling } else { sampling.with_seed(self.seed()) })
     }
@@ -96,6 +97,7 @@ impl SubstrateArguments {
     /// # Errors
     /// When the sampling is not understood.
     pub fn apply(&self, study: &mut Study) -> Result<(), Failure> {
+        // Only what is given: a default of the command line must not win over the study file.
         study.seed = self.seed.unwrap_or(study.seed);
         study.dual = self.dual.unwrap_or(study.dual);
         if self.sampling.is_some() {
@@ -172,6 +174,7 @@ pub fn fraction(text: &str) -> Result<f64, String> {
 }
 
 fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64, String> {
+    // `f64` also reads `nan` and `inf`, with which no comparison and no search would end well.
     let number = text.parse().ok().filter(|&x: &f64| x.is_finite() && is_wanted(x));
     number.ok_or_else(|| format!("expected {expected}"))
 }

@@ -90,6 +90,7 @@ fn run_with(
     loader: Option<Box<dyn ScriptLoader>>,
     words: impl Iterator<Item = OsString>,
 ) -> Exit {
+    // First, so that a signal at any later moment removes temporary files.
     interrupt::install();
     let matches = command().try_get_matches_from(words);
     let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
@@ -106,6 +107,7 @@ fn run_with(
         }
     };
     let registry = registry(methods, loader, &cli.global);
+    // The pool before anything else: rayon starts its own at the first use, and then keeps that.
     let outcome = set_threads(cli.global.threads)
         .and(registry)
         .and_then(|mut registry| run(cli.verb, &cli.global, &mut registry));
@@ -125,6 +127,7 @@ pub fn command() -> Command {
 
 fn defaults_with_commas(argument: Arg) -> Arg {
     let defaults = argument.get_default_values();
+    // Clap joins several defaults by spaces, which is not how a list is typed.
     let (Some(delimiter), 2..) = (argument.get_value_delimiter(), defaults.len()) else {
         return argument;
     };

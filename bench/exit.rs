@@ -67,6 +67,7 @@ impl From<StudyError> for Failure {
         match error {
             StudyError::Input(error) => error.into(),
             StudyError::Library(error) => error.into(),
+            // A file is input, its values stand for options.
             StudyError::File { .. } => Self::input(error),
             _ => Self::usage(error),
         }
@@ -83,6 +84,7 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         let code = match error {
             RunError::Interrupted => Exit::Interrupted,
+            // No worker, no result: not the fault of an input.
             RunError::Start(_) => Exit::NothingMeasured,
         };
         Self { code, message: error.to_string() }
@@ -101,6 +103,7 @@ impl From<PlanError> for Failure {
 impl From<PublicError> for Failure {
     fn from(error: PublicError) -> Self {
         match error {
+            // The rest are names of the command line.
             PublicError::File { .. } => Self::input(error),
             _ => Self::usage(error),
         }

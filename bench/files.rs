@@ -45,6 +45,7 @@ const HEADER_LIMIT: u64 = 1 << 20;
 pub fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
         "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
+        // Surfaces and medial meshes share these extensions: their first lines decide.
         "ply" => any_line(path, |words| match words {
             [b"end_header"] => Some(false),
             [b"property", _, b"radius" | b"r"] => Some(true),
@@ -80,6 +81,7 @@ fn any_line(path: &Path, says: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool
 /// When the extension is none of a medial mesh, or the folder does not exist.
 pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
     let Some(path) = output else { return Ok(()) };
+    // Methods can take hours: a slip in a name must not show after them.
     check_extension(path, &MEDIAL_MESHES)?;
     check_folder(path)
 }

@@ -45,6 +45,7 @@ impl Host {
         }
         let (program, code) = (own_program()?, env::current_exe()?);
         let words = env::args_os().skip(1).collect();
+        // Another thread may have been first; both would write the same.
         Ok(HOST.get_or_init(|| Self { program, arguments: vec![], code, words }))
     }
 
@@ -73,7 +74,8 @@ pub fn named(command: Command) -> Command {
     command
 }
 
-/// The running program: on Linux by a link that stays valid when the program is rebuilt.
+/// The running program.
+// On Linux by a link that stays valid when the program is rebuilt.
 fn own_program() -> io::Result<PathBuf> {
     let link = PathBuf::from("/proc/self/exe");
     if cfg!(target_os = "linux") && link.exists() { Ok(link) } else { env::current_exe() }

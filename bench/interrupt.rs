@@ -15,6 +15,7 @@ static LISTENING: AtomicBool = AtomicBool::new(false);
 pub fn install() {
     // Without a handler the system's own way of ending is as good.
     let _ = ctrlc::set_handler(|| {
+        // A flag alone: the handler interrupts other threads and must not wait for a lock.
         let again = INTERRUPTED.swap(true, Ordering::Relaxed);
         if again || !LISTENING.load(Ordering::Relaxed) {
             medial::remove_temporaries();

@@ -12,8 +12,9 @@ use serde_json::{Map, Value, json};
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 
-/// Why standard output could not be written, the first time. Verbs print from many places, all of
-/// which would have to hand this up otherwise; `main` asks once, at the end.
+/// Why standard output could not be written, the first time.
+// Verbs print from many places, all of which would have to hand this up otherwise; `main` looks once,
+// at the end.
 static UNWRITTEN: OnceLock<io::Error> = OnceLock::new();
 
 /// The exit code of a verb that ended with `exit`: an output that could not be written is a failure.
@@ -31,6 +32,7 @@ pub fn version() -> &'static str {
 /// Prints text on standard output as it is. A closed pipe is nobody's error: who read it has enough.
 pub fn print_raw(text: &str) {
     let mut out = io::stdout().lock();
+    // Flushed at once: what is still buffered when the process exits would be lost without an error.
     if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush())
         && error.kind() != io::ErrorKind::BrokenPipe
     {
@@ -76,6 +78,7 @@ pub fn print_json(object: &impl Serialize, warnings: &[String]) {
         Some(Value::Array(list)) => list,
         _ => Vec::new(),
     };
+    // A verb and its library can have the same remark on a surface.
     for warning in warnings {
         if !all.iter().any(|known| known == warning) {
             all.push(Value::from(warning.as_str()));
@@ -88,6 +91,7 @@ pub fn print_json(object: &impl Serialize, warnings: &[String]) {
 
 /// Lines without control characters.
 fn printable_lines(text: &str) -> String {
+    // Line breaks are ours, all other control characters come from names.
     text.split('\n').map(printable).collect::<Vec<_>>().join("\n")
 }
 

@@ -25,7 +25,8 @@ enum Signal {
     STOP,
 }
 
-/// How long processes that were killed may take to vanish: one that waits for a disk ends later.
+/// How long processes that were killed may take to vanish.
+// One that waits for a disk ends later, and must not hold up the rest.
 const LONGEST_END: Duration = Duration::from_secs(5);
 
 /// Whether this process adopts the orphans among its descendants: then every child is its own.
@@ -77,7 +78,8 @@ pub fn end_descendants() -> usize {
 /// A child of this process and all that it starts, told from everything else that runs here.
 pub struct Tree {
     root: u32,
-    /// Members met so far below the root, with their times of birth, since numbers are used again.
+    /// Members met so far below the root, with their times of birth.
+    // The system uses numbers again.
     seen: BTreeMap<u32, u64>,
 }
 
@@ -89,6 +91,7 @@ impl Tree {
 
     /// Resident bytes of all members that are below the root now or were once.
     pub fn resident_bytes(&mut self) -> u64 {
+        // A descendant that changes its session and loses its parent later is known by this list alone.
         for stat in descendants(self.root).into_iter().filter_map(Stat::of) {
             self.seen.insert(stat.pid, stat.born);
         }
@@ -112,6 +115,7 @@ impl Tree {
     /// Ends by force the members that are left after the root has ended and was waited for. Returns
     /// the number that still ran.
     pub fn end_orphans(&mut self) -> usize {
+        // Without `/proc` nothing can be listed, and the group is all there is.
         if Stat::of(std::process::id()).is_none() {
             kill_group(self.root);
         }
@@ -136,8 +140,8 @@ impl Tree {
     }
 }
 
-/// Kills what a listing finds, again and again until it finds nothing new, since what is killed may
-/// have started another just before. Gives the number of those that still ran.
+/// Kills what a listing finds until it finds nothing new, and returns the number of those that still ran.
+// Again and again, since what is killed may have started another just before.
 fn end_all(list: impl Fn() -> Vec<Stat>) -> usize {
     let mut ended = BTreeSet::new();
     let mut remains = BTreeSet::new();
@@ -158,6 +162,7 @@ fn end_all(list: impl Fn() -> Vec<Stat>) -> usize {
             return ended.len();
         }
         remains = remains_now;
+        // Killed processes need a moment to vanish; a busy loop would take it from them.
         thread::sleep(Duration::from_millis(1));
     }
 }
@@ -222,6 +227,7 @@ fn children(pid: u32) -> Option<Vec<u32>> {
         children
             .extend(listed.split_ascii_whitespace().filter_map(|word| word.parse::<u32>().ok()));
     }
+    // By number, whatever order the threads are listed in.
     children.sort_unstable();
     Some(children)
 }
@@ -259,7 +265,9 @@ impl Stat {
             group: number(2)? as u32,
             session: number(3)? as u32,
             born: number(19)?,
+            // The kernel counts pages.
             resident_bytes: number(21)? * page_bytes(),
+            // Z waits for its parent, X is about to vanish: neither runs.
             is_zombie: matches!(fields.first(), Some(&("Z" | "X"))),
         })
     }

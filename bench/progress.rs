@@ -8,7 +8,8 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use medial::simplifier::Progress as Steps;
 use medial_reports::printable;
 
-/// Interval between updates of a line. A line draws itself, because most work does not report progress.
+/// Interval between updates of a line.
+// A line draws itself, because most work does not report progress.
 const INTERVAL: Duration = Duration::from_millis(250);
 
 /// Whether progress is shown.
@@ -31,6 +32,7 @@ pub struct Progress {
 impl Progress {
     /// Progress through `total` items.
     pub fn new(verbosity: Verbosity, total: usize) -> Self {
+        // In a log file a bar would be one long line of control characters.
         let is_drawn = verbosity == Verbosity::Progress && io::stderr().is_terminal();
         let bar = is_drawn.then(|| ProgressBar::new(total as u64));
         if let Some(bar) = &bar {
@@ -90,7 +92,9 @@ impl StageLine {
 
     /// Names the stage that begins.
     pub fn at(&self, what: impl Into<String>) {
+        // The time on the line is that of the stage.
         self.0.reset();
+        // A share of the stage before would stay until the first step of this one.
         self.0.unset_length();
         self.0.set_message(printable(&what.into()));
     }

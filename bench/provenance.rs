@@ -29,6 +29,7 @@ impl Provenance {
             machine: machine(),
             binary_hash: Host::here()
                 .and_then(|host| fs::read(&host.code))
+                // A program that cannot be read leaves no hash, and costs no result.
                 .map_or_else(|_| String::new(), |bytes| hex_digest(&bytes)),
             command: command_line(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -67,6 +68,7 @@ fn kibibytes(value: &str) -> Option<u64> {
 fn command_line() -> String {
     let words = Host::here().map(|host| &host.words[..]).unwrap_or_default();
     let words = words.iter().map(|word| word.to_string_lossy().into_owned());
+    // The path of the program is of no use on another machine.
     let words: Vec<String> = std::iter::once("medial".to_owned()).chain(words).collect();
     shell_line(&words)
 }

@@ -102,6 +102,7 @@ impl Store {
             return Err(StoreError::NotAFolder(dir.to_owned()));
         }
         fs::create_dir_all(dir).map_err(io_error(dir))?;
+        // A lock or a study is left by a run that ended before its first record.
         let is_store = [LOCK, journal, "study.toml"].iter().any(|name| dir.join(name).exists());
         if !is_store && fs::read_dir(dir).map_err(io_error(dir))?.next().is_some() {
             return Err(StoreError::NotAStore(dir.to_owned()));
@@ -138,6 +139,7 @@ impl Store {
         for name in [PAGE, journal, "header.json", "study.toml", "results.csv"] {
             remove(&self.dir.join(name))?;
         }
+        // The journal is gone: a stale state would skip what has to be run.
         self.known.clear();
         self.journal = Journal::open(self.dir.join(journal))?;
         Ok(())
@@ -171,6 +173,7 @@ impl Known {
     fn is_incomplete(&self, item: &Item, retry_failed: bool) -> bool {
         let limits = self.conditions.unwrap_or_default();
         match self.status {
+            // A result that came in time is the same under any limit; one that did not may come under a larger one.
             Status::TimedOut if item.limits.seconds > limits.seconds_limit => true,
             Status::OutOfMemory if item.limits.bytes > limits.bytes_limit => true,
             status if status.is_failure() => retry_failed,
@@ -190,6 +193,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
+            // Written by the other process after it took the lock: it may be empty for a moment.
             let mut holder = String::new();
             let _ = file.read_to_string(&mut holder);
             let holder = match holder.trim() {
@@ -202,6 +206,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
         Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
         Err(TryLockError::Error(error)) => return Err(io_error(&path)(error)),
     }
+    // For the message alone: the lock itself is the system's, and ends with the process.
     let holder = format!("process {} (`{command}`)", std::process::id());
     let written = file
         .set_len(0)
@@ -233,6 +238,7 @@ fn read_known(path: &Path) -> io::Result<(HashMap<String, Known>, bool)> {
         if let Ok(record) = serde_json::from_slice::<Known>(&line)
             && !record.key.is_empty()
         {
+            // Lines are only added: the last one of a key replaces the earlier.
             known.insert(record.key.clone(), record);
         }
         line.clear();
@@ -240,11 +246,12 @@ fn read_known(path: &Path) -> io::Result<(HashMap<String, Known>, bool)> {
     Ok((known, false))
 }
 
-/// Removes the medial meshes that records name. A file that cannot be removed stays: without a record
-/// it does not count as a result.
+/// Removes the medial meshes that records name.
+// A file that cannot be removed stays: without a record it does not count as a result.
 fn remove_artifacts(dir: &Path, journal: &Path) {
     let Ok(journaled) = read_records(journal) else { return };
     for artifact in journaled.records.iter().filter_map(|record| record.artifact.as_deref()) {
+        // A journal from elsewhere must not name files outside of its folder for removal.
         let inside = Path::new(artifact).components().all(|c| matches!(c, Component::Normal(_)));
         if inside && artifact.ends_with(".ma") {
             let path = dir.join(artifact);
@@ -255,10 +262,11 @@ fn remove_artifacts(dir: &Path, journal: &Path) {
     }
 }
 
-/// Removes temporary files that this program left behind, only in the folders that it writes to. The
-/// lock is held, so none is in use.
+/// Removes temporary files that this program left behind, only in the folders that it writes to.
+// The lock is held, so none is in use.
 fn remove_temporaries(dir: &Path) {
     let mut folders = vec![dir.to_owned(), dir.join("tables"), dir.join("plots")];
+    // Never the folder's other contents: these belong to the user.
     folders.push(dir.join(AXES));
     let meshes = fs::read_dir(dir.join(AXES)).into_iter().flatten().flatten();
     folders.extend(meshes.map(|entry| entry.path()).filter(|path| path.is_dir()));

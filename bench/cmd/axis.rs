@@ -45,9 +45,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
         complex::write(output, &mesh).map_err(Failure::input)?;
     }
+    // The line must be gone before the result is printed next to it.
     drop(line);
     let counts = metrics::counts(&mesh);
     for (substrate, cost) in shape.used() {
+        // The keys of the JSON are a contract: two substrates make up the extraction.
         let stage = match substrate.name() {
             "facets" | "medial_mesh" => "extract",
             "inside_test" => "inside",

@@ -44,6 +44,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let items = arguments.items(global, registry)?;
     let interrupted = interrupt::listen();
+    // No record is kept: a case has an outcome only, and no provenance.
     let mut supervisor =
         Supervisor::new(registry.files(), &Provenance::default(), None, interrupted);
     let (mut counts, mut list) = ([0; 3], Vec::new());

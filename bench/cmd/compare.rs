@@ -166,6 +166,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         None => Study::default(),
     };
     if !arguments.meshes.is_empty() {
+        // Named meshes replace those of the study, and its sets with them.
         study.meshes = arguments.meshes.iter().map(absolute).collect();
         study.dataset.clear();
     }
@@ -178,6 +179,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     }
     for text in &arguments.given {
         let mut given = Given::parse(text).map_err(Failure::usage)?;
+        // It is written into the study of the store, which lies elsewhere.
         given.file = absolute(&given.file);
         study.given.push(given);
     }
@@ -205,7 +207,8 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     Ok(study)
 }
 
-/// A path of the command line: it starts at the working folder, paths of a study file at that of the file.
+/// A path of the command line.
+// It starts at the working folder, unlike paths of a study file, which start at that of the file.
 fn absolute(path: &PathBuf) -> PathBuf {
     match Source::is_name(path) {
         true => path.clone(),
@@ -219,6 +222,7 @@ impl Arguments {
         if self.set.is_empty() && self.levels.is_empty() {
             return Ok(());
         }
+        // Chains and defaults become rows, so that an option can name any of them.
         study.methods = study.entries(registry)?.into_iter().map(|(method, _)| method).collect();
         study.after_filters.clear();
         for word in &self.set {

@@ -47,6 +47,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         return Err(Failure::usage(format!(
             "{from} is a surface: only medial meshes have colours"
         )));
+    // A medial mesh of a surface is computed, not converted.
     } else if ["ma", "vtp", "glb"].contains(&extension(&arguments.to).as_str()) {
         return Err(Failure::usage(format!(
             "a surface is not a medial mesh: `medial axis {} -o {}` computes one",
@@ -167,6 +168,7 @@ fn errors(mesh: &MedialMesh, shape: &Shape) -> Result<Vec<f64>, Failure> {
 fn diagonal(mesh: &MedialMesh) -> f64 {
     let corners = mesh.spheres.iter().flat_map(|s| [s.centre - s.radius, s.centre + s.radius]);
     let bounds = Bounds::of_points(corners);
+    // Without the surface the balls give the unit.
     let diagonal = (bounds.hi - bounds.lo).length();
     if diagonal > 0.0 && diagonal.is_finite() { diagonal } else { 1.0 }
 }

@@ -110,6 +110,7 @@ struct Fetch {
 fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let library = Library::here()?;
     for word in &arguments.wanted {
+        // Here rather than in the script: the message can name what was meant.
         library.wanted(word)?;
     }
     let failed = |error: std::io::Error| Failure::input(format!("fetch_meshes.py: {error}"));
@@ -120,6 +121,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let mut command = Command::new("python3");
     command.arg(&script).args(&arguments.wanted).arg("--cache").arg(library.folder());
     command.arg("--timeout").arg(arguments.timeout.to_string());
+    // The script reads the variable itself, and knows no embedded catalogue.
     if env::var_os("MEDIAL_CATALOGUE").is_none_or(|value| value.is_empty()) {
         let catalogue = scratch.path().join("catalogue.toml");
         fs::write(&catalogue, published::EMBEDDED).map_err(failed)?;
@@ -137,6 +139,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     })?;
     let exit = match output.status.code() {
         Some(0) => Exit::Done,
+        // Missing meshes are no error of the command: the others are stored.
         Some(3) => Exit::SomeFailed,
         _ => return Err(Failure::input(format!("fetch_meshes.py: {}", output.status))),
     };

@@ -79,6 +79,7 @@ pub fn run(
     };
     let diff = Diff::new(names, &old, &new, options);
     let markdown = diff.to_markdown();
+    // Two given folders are the user's: nothing is written there.
     if arguments.run {
         let json = serde_json::to_string_pretty(&diff).map_err(Failure::input)?;
         files::write(&arguments.out.join("diff.md"), markdown.as_bytes())?;
@@ -118,6 +119,7 @@ fn alternate(
 ) -> Result<Option<[Vec<Record>; 2]>, Failure> {
     let path = arguments.study.as_ref().expect("required by --run");
     let mut study = Study::read(path)?;
+    // Single runs differ by more than the changes that are looked for.
     study.repeat = arguments.repeat;
     // The CPU seconds of several threads that wait for each other vary too much.
     study.threads = global.threads.or(study.threads).or(Some(1));
@@ -139,6 +141,7 @@ fn alternate(
         sides.push(Contender { build: Some(build), supervisor, store });
     }
     let mut left = items.clone();
+    // Both sides again where one lacks a level: seconds compare only within one session.
     left.retain(|item| {
         sides.iter().any(|side| !side.store.missing(&side.own(item), false).is_empty())
     });
@@ -155,7 +158,8 @@ fn alternate(
     Ok(Some([old?, new?]))
 }
 
-/// The records of one side. Other studies and other builds may have left theirs in the folder.
+/// The records of one side.
+// Other studies and other builds may have left theirs in the folder.
 fn requested_records(
     contender: &Contender<'_>,
     items: &[Item],

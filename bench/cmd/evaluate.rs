@@ -57,6 +57,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let mut rows: Vec<_> = rows.collect();
     drop(line);
     let warnings = &input.report.warnings;
+    // One file keeps the exit codes and the object of a single evaluation.
     if rows.len() == 1 {
         let row = rows.remove(0)?;
         print_one(&row, warnings, global);
@@ -79,7 +80,8 @@ struct Evaluated {
     /// The change of units that came first, where `--fit` found one.
     #[serde(skip_serializing_if = "Option::is_none")]
     fit: Option<Fit>,
-    /// How the file was read: in no JSON, because no number depends on it.
+    /// How the file was read.
+    // In no JSON, because no number depends on it.
     #[serde(skip)]
     notes: Vec<String>,
     /// Defects of the file.
@@ -108,6 +110,7 @@ fn evaluate(
     let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
     let mut certified = certified.transpose().map_err(failed)?;
     if let Some(Certificate { witness, .. }) = &mut certified {
+        // The point is looked for in the surface file.
         witness.point = to_normal.backward(witness.point);
     }
     let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(failed)? };

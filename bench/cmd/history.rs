@@ -41,6 +41,7 @@ pub struct Arguments {
 /// When the results or the history cannot be read, the run cannot be added, or the page cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { folder, output, least_step, .. } = arguments;
+    // Before a run is added, which cannot be taken back.
     output.as_deref().map_or(Ok(()), files::check_folder)?;
     let (added, mut warnings) = add(arguments)?;
     let (runs, damaged) = read_runs(folder).map_err(Failure::input)?;

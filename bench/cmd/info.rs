@@ -23,6 +23,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh)?;
     let (report, refusal) = match source.path() {
         Some(path) => {
+            // Unlike a reader it goes on at a defect: a defective mesh is the usual reason for this verb.
             let inspection = surface::inspect(path).map_err(Failure::input)?;
             (inspection.report, inspection.refused)
         }

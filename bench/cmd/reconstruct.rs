@@ -111,6 +111,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }?;
     warnings.extend(made.warnings);
     stages.timed("write", || surface::write(output, &made.mesh)).map_err(Failure::input)?;
+    // Before the check, whose memory is not that of the reconstruction.
     let peak = peak_bytes();
 
     // Untimed from here.
@@ -226,6 +227,7 @@ fn betti_of(report: &SurfaceReport) -> Option<[u64; 3]> {
 
 /// What is to be said where a surface has not the Betti numbers of the union.
 fn other_topology(union: [u64; 3], report: &SurfaceReport) -> Option<String> {
+    // An open surface bounds no solid and has no such numbers.
     let found = betti_of(report)?;
     (found != union).then(|| {
         format!(
@@ -268,6 +270,7 @@ fn power_crust_of(
     });
     let (facets, mut crust) =
         crust.map_err(|error: TriangulationError| Failure::at(named, error))?;
+    // A medial mesh in other units lies outside of all cells.
     if crust.mesh.faces.is_empty() {
         return Err(Failure::at(
             named,
@@ -368,6 +371,7 @@ pub fn fitting_surface(
         fitting.off <= FACES_WITHIN && found.is_some() && found == betti
     };
     let coarse = if asked.is_none() { &COARSE[..] } else { &[] };
+    // Coarse first: each halving costs eight times the cells.
     for &tolerance in coarse {
         match at(tolerance) {
             Ok(fitting) if shows_all(&fitting) => return Ok(fitting),

@@ -120,6 +120,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     };
     line.at("drawing");
     let (picture, drawing) = Cost::of(|| match read.axes.len() {
+        // A single picture has room for a bar of colours, a strip has one scale for all.
         0 | 1 => single(arguments, show, &read, camera, deviations.first()),
         _ => side_by_side(arguments, &read, camera, &deviations),
     });
@@ -194,6 +195,7 @@ fn side_by_side(
     for (k, axis) in read.axes.iter().enumerate() {
         let name = arguments.axes[k].file_stem().unwrap_or_default().to_string_lossy();
         let caption = format!("{name}, {}", counted(axis.spheres.len() as u64, "sphere"));
+        // Panels differ by file name and count alone.
         panels.push(Panel { axis, caption, errors: deviations.get(k).map(Deviation::errors) });
     }
     let common = Strip {
@@ -299,8 +301,8 @@ impl Deviation {
     }
 }
 
-/// Named views: azimuth and elevation in degrees. The top and the bottom are a little off, since the upward direction
-/// must not lie along the line of sight.
+/// Named views: azimuth and elevation in degrees.
+// The top and the bottom are a little off, since the upward direction must not lie along the line of sight.
 const VIEWS: [(&str, f64, f64); 7] = [
     ("front", 0.0, 0.0),
     ("right", 90.0, 0.0),

@@ -52,6 +52,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { fill_holes, separate, .. } = *arguments;
     let options = MendOptions { fill_holes, separate, components };
     let mended = surface::mend(&arguments.input, options).map_err(Failure::input)?;
+    // Only a solid comes this far: a surface that is still refused is an error above.
     surface::write(&arguments.output, &mended.mesh).map_err(Failure::input)?;
     let report = mended.report;
     if global.json {

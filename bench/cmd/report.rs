@@ -73,6 +73,7 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
         let (records, mut bad) = records(dir)?;
         let written = fs::metadata(dir.join(RESULTS)).and_then(|file| file.modified());
         let written = written.map_err(|error| Failure::at(dir, error))?;
+        // With several stores a line number alone is ambiguous.
         bad.iter_mut().for_each(|line| *line = format!("{}: {line}", dir.display()));
         stores.push((dir, written, records, bad));
     }
@@ -114,11 +115,13 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
             }
         }
     }
+    // After all stores were read: a wrong folder must not leave an empty store behind.
     let store = Store::open(out, RESULTS, "medial report")?;
     for (record, dir, _) in merged.iter().filter(|(_, dir, _)| dir.as_path() != out) {
         let Some(artifact) = record.artifact.as_deref().filter(|path| is_inside(path)) else {
             continue;
         };
+        // Names hold the key, so that two stores cannot mean different results by one name.
         let (from, to) = (dir.join(artifact), out.join(artifact));
         let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
         fs::create_dir_all(to.parent().unwrap_or(out)).map_err(|error| Failure::at(&to, error))?;

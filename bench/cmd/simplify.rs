@@ -132,6 +132,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
 /// What is to be said where the result, or what it was made from, has not the solid's topology.
 fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
     let expected = shape.expected_betti();
+    // The start is only looked at where the result is wrong: its topology takes longer.
     let Some(own) = topology_warning(complex::betti(result), expected) else { return Vec::new() };
     let initial = shape.initial().ok();
     let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
@@ -180,6 +181,7 @@ impl Arguments {
         let judge = judge.map_err(|error| self.failure(SimplifyError::from(error).into()))?;
         let measure = |mesh: &MedialMesh| -> Result<f64, String> {
             let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
+            // Samples are a lower bound: what they refuse needs no certificate.
             if !self.certify || sampled > bound {
                 return Ok(sampled);
             }
@@ -211,6 +213,7 @@ impl Arguments {
     fn failure(&self, Fault { status, reason }: Fault) -> Failure {
         match status {
             Status::Unsupported => Failure { code: Exit::SomeFailed, message: reason },
+            // Another value of an option would be accepted.
             Status::Refused | Status::BoundMissed => Failure::usage(reason),
             _ => Failure::at(&self.mesh, reason),
         }
@@ -270,7 +273,8 @@ struct Searched {
 /// Width of the interval that certifies a bound, as a share of it.
 const CERTIFIED_SHARE: f64 = 0.05;
 
-/// Reads a bound. The whole solid is within one diagonal of anything inside it, so that 1 and more are a slip.
+/// Reads a bound.
+// The whole solid is within one diagonal of anything inside it, so that 1 and more are a slip.
 fn error_bound(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(bound) if bound > 0.0 && bound < 1.0 => Ok(bound),

@@ -109,6 +109,7 @@ pub fn answer<'s>(
                 goes_on
             })
             .count();
+        // All that one preparation can serve, charged as one run of growing length.
         let (together, others) = rest.split_at(count);
         runs.extend(of_one_preparation(view, info.incremental, &start, together, &on_level));
         rest = others;
@@ -171,6 +172,7 @@ fn of_one_preparation<'s>(
         on_level(level);
         let (outcome, lap) = Cost::of(|| guarded(|| simplification.at(level)));
         clock.add(lap);
+        // After the clock has stopped: checking is the harness's work.
         let outcome = outcome.and_then(checked);
         if matches!(&outcome, Err(fault) if fault.status == Status::Panicked) {
             let reason = format!("not run: the method panicked at {level}");
@@ -193,6 +195,7 @@ struct Clock<'s> {
 
 impl Clock<'_> {
     fn add(&mut self, lap: Cost) {
+        // A lap counts from the live bytes at its start, to which earlier levels have added.
         let peak = self.held + lap.usage.peak_bytes;
         self.held += lap.usage.held_bytes;
         // An incremental method reaches a coarse level through the finer ones: alone it would take them all.
@@ -239,6 +242,7 @@ fn checked(simplified: Simplified) -> Result<Simplified, Fault> {
 
 /// The result of some work, with a panic turned into a fault.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
+    // What a panic leaves behind is not used again: callers drop or abandon the simplification.
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(outcome) => Ok(outcome?),
         Err(payload) => {
@@ -301,6 +305,7 @@ impl Bounds<'_> {
             outcome: Err(fault),
             times: Times::default(),
         };
+        // A separate view: substrates of the search are not those of the timed run.
         let view = self.shape.view();
         let begun = guarded(|| Ok((view.initial()?.spheres.len(), (self.prepare)(&view)?)));
         let (most, mut simplification) = match begun {
@@ -341,6 +346,7 @@ impl Bounds<'_> {
     /// The timed run of the level that a search found.
     fn timed(&self, level: Level, bound: f64) -> LevelRun {
         let view = self.shape.view();
+        // Prepared again: the seconds must not profit from earlier probes.
         let runs = answer(&view, self.info, || (self.prepare)(&view), &[level], |_| {});
         let run = runs.into_iter().next().expect("one level, one run");
         LevelRun { level: Target::MaxError(bound), ..run }

@@ -69,6 +69,7 @@ impl Scene {
                 spec.source, input.hash
             ));
         }
+        // The name in tables, which is unique in the study, not that of the file.
         let input = Input { name: spec.mesh.clone(), ..input };
         let shape = input.shape(spec.shape_options()).map_err(|error| error.to_string())?;
         let judge = shape
@@ -169,6 +170,7 @@ pub fn judge(scene: &Scene, runs: &[LevelRun]) -> Vec<Option<Verdict>> {
     let meshes: Vec<Option<&MedialMesh>> =
         runs.iter().map(|run| run.outcome.as_ref().ok().map(|result| &result.mesh)).collect();
     // The index of the first result that is equal, which can be its own.
+    // Methods that stop early give one mesh for many counts, and measuring is the slow part.
     let firsts: Vec<usize> = (0..meshes.len())
         .map(|index| meshes.iter().position(|&mesh| mesh == meshes[index]).unwrap_or(index))
         .collect();
@@ -185,6 +187,7 @@ pub fn judge(scene: &Scene, runs: &[LevelRun]) -> Vec<Option<Verdict>> {
 fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
     let measure = scene.measure();
     let hash = mesh_hash(mesh);
+    // Hashed before: the hash is that of the method's own output.
     let mesh = scene.carried(mesh);
     let begun = Instant::now();
     let certified = measure.certify.map(|width| scene.judge.certify(&mesh, width)).transpose();
@@ -198,6 +201,7 @@ fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
 pub fn mesh_hash(mesh: &MedialMesh) -> String {
     let mut hasher = Sha256::new();
     let counts = [mesh.spheres.len(), mesh.edges.len(), mesh.faces.len()];
+    // Counts first: without them a face could pass for part of an edge list.
     counts.iter().for_each(|&count| hasher.update((count as u64).to_le_bytes()));
     for sphere in &mesh.spheres {
         let numbers = [sphere.centre.x, sphere.centre.y, sphere.centre.z, sphere.radius];
@@ -282,6 +286,7 @@ pub fn record(
         Ok(result) => count_fault(run.level, result),
         Err(fault) => fault.clone(),
     };
+    // Built from the failure of the level, so that both kinds of records have the same fields.
     let mut record = failure_record(item, run.level, &fault, provenance);
     record.mesh_hash = Some(scene.input.hash.clone());
     record.initial = scene.initial();
@@ -377,6 +382,7 @@ pub fn repetition(times: &Times) -> Repetition {
 /// The stages of the repetition with the median total; the lower one of an even number.
 pub fn median(repetitions: &[Repetition], part: fn(&Repetition) -> Stages) -> Option<Stages> {
     let mut stages: Vec<Stages> = repetitions.iter().map(part).collect();
+    // A whole repetition, not a median of each stage: the stages must add up to the total.
     stages.sort_by(|a, b| a.total.total_cmp(&b.total));
     stages.get(stages.len().saturating_sub(1) / 2).copied()
 }

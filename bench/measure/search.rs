@@ -22,8 +22,8 @@ const COUNTS: usize = 7;
 const RATIO: f64 = 4.0;
 /// Smallest count tried at first.
 const MIN_SPHERES: f64 = 4.0;
-/// Bisections per bound. With the levels of steps 1 and 2, at most 25 levels for a method with a sweep
-/// of ten.
+/// Bisections per bound.
+// With the levels of steps 1 and 2, at most 25 levels for a method with a sweep of ten.
 const BISECTIONS: usize = 7;
 /// Two counts with at most this ratio are not bisected.
 const CLOSE_COUNTS: f64 = 1.02;
@@ -92,6 +92,7 @@ impl<'a> Search<'a> {
     /// # Errors
     /// The last error of the method or the measure, if no level gave a result.
     pub fn within(&mut self, bound: f64) -> Result<Found, SimplifyError> {
+        // Taken: the next bound starts from these probes.
         for count in std::mem::take(&mut self.counts) {
             self.probe(Level::Spheres(count))?;
         }
@@ -125,6 +126,7 @@ impl<'a> Search<'a> {
                 return Ok(());
             }
             Ok(simplified) => simplified.mesh,
+            // The only error that ends a search: the user wants no more.
             Err(SimplifyError::Cancelled) => return Err(SimplifyError::Cancelled),
             Err(refusal) => {
                 self.refusal = Some(refusal);
@@ -163,7 +165,9 @@ impl<'a> Search<'a> {
             }
             _ => None,
         });
+        // Nothing beyond was tried: one sphere is the coarsest there is.
         let beyond = asked.max().unwrap_or(1);
+        // The geometric mean: errors fall by powers of the count.
         let middle = ((beyond * best.spheres) as f64).sqrt().round() as usize;
         let is_new = !self.probes.iter().any(|probe| probe.level == Level::Spheres(middle));
         let is_between = beyond < middle && middle < best.spheres;
@@ -175,6 +179,7 @@ impl<'a> Search<'a> {
         let coarser = self.probes.iter().filter(|p| p.error > bound && p.spheres < best.spheres);
         let next = coarser.max_by_key(|probe| probe.spheres)?;
         let Level::Native(beyond) = next.level else { return None };
+        // Levels that can be 0 or negative have no geometric mean.
         let middle = if value > 0.0 && beyond > 0.0 {
             (value * beyond).sqrt()
         } else {

@@ -62,6 +62,7 @@ pub fn refresh(
     added: usize,
 ) -> Result<Rebuilt, Failure> {
     let (records, warnings) = records(dir)?;
+    // Byte for byte the same page: a repeated command changes no file.
     if added == 0 && dir.join(PAGE).exists() {
         return Ok(Rebuilt { records, files: vec![], warnings, undrawn: vec![] });
     }
@@ -126,6 +127,7 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
             .iter()
             .any(|known| known.command == record.command && known.binary_hash == record.binary_hash)
         {
+            // Records can come from other machines and from runs that were interrupted before their report.
             header.runs.push(RunNote {
                 command: record.command.clone(),
                 version: record.version.clone(),
@@ -138,6 +140,7 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
     // Methods of this program are described as they are now; those of plug-ins that are not named
     // this time stay as they were.
     let ids: BTreeSet<&str> = records.iter().map(|r| r.simplify.method.as_str()).collect();
+    // A merged or cleared store can name methods that have no record any more.
     header.methods.retain(|method| ids.contains(method.id.as_str()));
     for entry in ids.into_iter().filter_map(|id| registry.entry(id)) {
         let note = MethodNote::new(entry.method().info(), entry.presentation());

@@ -19,6 +19,7 @@ const ACROSS: usize = 4;
 /// it shows.
 pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
     let mut strips = picture_strips(records);
+    // Names hold a hash of the content: a file that is there is the right one.
     strips.retain(|strip| !dir.join(&strip.file).exists() || !dir.join(strip.view_file()).exists());
     if strips.is_empty() {
         return vec![];
@@ -83,6 +84,7 @@ fn picture(
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    // The folder of the plots is made by the report, which is written later.
     let folder = path.parent().unwrap_or(path);
     let written = std::fs::create_dir_all(folder)
         .and_then(|()| write_atomically(path, |out| out.write_all(bytes)));

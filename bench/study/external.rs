@@ -66,6 +66,7 @@ impl Given {
     /// # Errors
     /// In words, where there is no name or no file.
     pub fn parse(text: &str) -> Result<Self, String> {
+        // At the first `=`: names of files may have others, names of methods none.
         let (name, file) = text.split_once('=').unwrap_or_default();
         let (name, mesh) = match name.split_once('@') {
             Some((name, mesh)) => (name, Some(mesh.trim().to_owned())),
@@ -123,6 +124,7 @@ impl Given {
             Ok(text) => {
                 toml::from_str(&text).map_err(|why| format!("{}: {why}", path.display()))?
             }
+            // Claims are optional, but a file that is there must be readable.
             Err(error) if error.kind() == io::ErrorKind::NotFound => Claims::default(),
             Err(error) => return Err(failed(error)),
         };
@@ -142,6 +144,7 @@ impl Given {
                 files.push(Self { file, mesh: Some(mesh.clone()), ..self.clone() });
             }
         }
+        // The order of a directory differs between systems.
         files.sort_by(|a, b| a.file.cmp(&b.file));
         if files.is_empty() {
             let known = meshes.join(", ");
@@ -215,6 +218,7 @@ fn prepare<'s>(
     let options = AxisOptions { lenient, block, radii, fit };
     let read = read_axis(&file, shape, &options);
     let (loaded, _) = read.map_err(|error| SimplifyError::Parameter(error.to_string()))?;
+    // How the file was read belongs to the result: it decides the numbers.
     let (mesh, mut remarks) = loaded.with_remarks();
     if !same_as.is_empty() {
         remarks.push(format!("the same bytes are given as {same_as}, too"));
@@ -231,6 +235,7 @@ fn prepare<'s>(
                 return Err(SimplifyError::unsupported(why));
             }
         }
+        // The same for every level that is accepted: a file has one.
         let mut simplified = Simplified::new(mesh.clone(), level);
         remarks.iter().for_each(|remark| simplified.diagnostics.warn(remark.clone()));
         if claimed_seconds.is_some() {
@@ -272,6 +277,7 @@ impl Study {
                 all.push((given.clone(), Claims::default()));
             }
         }
+        // By name, mesh and count: several counts of one method are one curve.
         for (given, claims) in all {
             let mesh = mesh_of(&given, meshes)?;
             let file = self.look_at(given, claims, mesh)?;
@@ -299,6 +305,7 @@ impl Study {
 
     fn look_at(&self, given: Given, claims: Claims, mesh: String) -> Result<GivenFile, StudyError> {
         let path = self.resolved(&given.file);
+        // The worker that reads it has another working folder.
         let path = std::path::absolute(&path).unwrap_or(path);
         // One read: the hash is that of the bytes whose spheres are counted.
         let bytes = surface::content(&path).map_err(|error| given.refused(error))?;
@@ -441,8 +448,8 @@ pub enum FitBy {
     Auto,
 }
 
-/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it: next to its
-/// spheres the whole surface is less than a rounding error.
+/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it.
+// Next to its spheres the whole surface is less than a rounding error.
 const LARGEST_SPHERE: f64 = 1e12;
 
 /// How far a medial mesh in the unit of a shape's input reaches from the middle of the surface, in diagonals.
@@ -454,6 +461,7 @@ pub fn reach(mesh: &MedialMesh, shape: &Shape) -> Result<f64, String> {
     let mut reach = 0.0_f64;
     for (id, sphere) in mesh.spheres.iter().enumerate() {
         let centre = to_normal.forward(sphere.centre);
+        // The maximum norm overflows later than the length, and is as good for a bound.
         let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
         reach = reach.max(size);
         // An overflow gives a size that is infinite or not a number.
@@ -494,6 +502,7 @@ pub fn read_axis(
         loaded.mesh.spheres.iter_mut().for_each(|sphere| sphere.radius = 0.0);
     }
     let reach = reach(&loaded.mesh, shape).map_err(|why| named(&why))?;
+    // Without radii there is nothing to compare distances with: only scales that tools use can be tried.
     let fit = match (options.fit, from_surface) {
         (FitBy::None, _) => None,
         (FitBy::Similarity, false) => Some(shape.fit(&loaded.mesh).map_err(|error| named(&error))?),
@@ -531,6 +540,7 @@ fn read_external(path: &Path, bytes: &[u8], options: ReadOptions) -> Result<Load
         "obj" => !lists_edges(bytes),
         _ => false,
     };
+    // First as a medial mesh, because every medial mesh with faces would pass as a surface.
     let read = complex::read_content(path, bytes, options).map_err(|error| error.to_string());
     match read {
         // Without radii it is a surface. If it is neither, the first error is the more telling one.
@@ -549,7 +559,8 @@ fn read_surface(path: &Path, bytes: &[u8]) -> Result<LoadedMa, String> {
 }
 
 /// Whether the lines `l` of an `.obj` file are the edges of a medial mesh: there is no face, or a line is
-/// the side of one. In a surface they are the edges without a face, which some modellers leave behind.
+/// the side of one.
+// In a surface they are the edges without a face, which some modellers leave behind.
 fn lists_edges(obj: &[u8]) -> bool {
     let (mut edges, mut sides) = (HashSet::new(), Vec::new());
     for line in obj.split(|&byte| byte == b'\n') {
@@ -559,6 +570,7 @@ fn lists_edges(obj: &[u8]) -> bool {
         // Behind a slash stand texture coordinates and normals.
         let corners = words.map_while(|word| word.split('/').next()?.parse().ok());
         let corners: Vec<u32> = corners.collect();
+        // Sorted pairs: a side is the same edge in both directions.
         let pairs = corners.windows(2).map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])]);
         match keyword {
             Some("l") => edges.extend(pairs),
@@ -584,6 +596,7 @@ fn take_radii(loaded: &mut LoadedMa, shape: &Shape) -> Result<(), String> {
     }
     loaded.notes.push("every radius is the distance of its centre to the surface".to_owned());
     let normal: Vec<_> = centres.iter().map(|&centre| units.forward(centre)).collect();
+    // A separate view: its substrates must not be listed as used by a method.
     let sides = shape.view().inside_test().sides(&normal);
     let outside = sides.iter().filter(|side| **side == Side::Outside).count();
     if outside > 0 {
@@ -602,6 +615,7 @@ fn doubts(
     is_fitted: bool,
     reach: f64,
 ) -> Result<Option<String>, ShapeError> {
+    // The median: a medial mesh with a few wrong spheres is still of this surface.
     let misfit = shape.misfit(mesh)?.unwrap_or_default();
     if misfit <= DOUBTFUL {
         return Ok(None);

@@ -148,10 +148,12 @@ impl Item {
             Source::File(_) | Source::Cached { .. } => None,
             built_in @ Source::BuiltIn { .. } => Some(built_in),
         };
+        // Field by field: a field that is added later must be added here, or left out, on purpose.
         let SceneSpec { mesh, hash, noise, sampling, dual, measure, .. } = &self.scene;
         let MethodSpec { id, name, fingerprint, .. } = &self.method;
         let scene = (mesh, source, hash, noise, sampling, dual, measure);
         let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.version);
+        // Once for all levels: items of long sweeps have dozens.
         let common = serde_json::to_string(&rest).expect("plain data");
         (levels.iter())
             .map(|level| {

@@ -93,6 +93,7 @@ impl Library {
     /// # Errors
     /// When there is no such folder, or the catalogue named cannot be read.
     pub fn here() -> Result<Self, PublicError> {
+        // An empty variable is how shells unset one for a single command.
         let [cache, catalogue] = ["MEDIAL_CACHE", "MEDIAL_CATALOGUE"]
             .map(|name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from));
         let folder = match cache {
@@ -163,6 +164,7 @@ impl Library {
             return Ok(vec![Source::BuiltIn { id: word.to_owned(), resolution: None }]);
         }
         let mut wanted = self.wanted(word)?;
+        // A package also holds broken meshes, which a comparison would only refuse.
         if wanted.iter().all(|mesh| mesh.package == word) {
             wanted.retain(|mesh| mesh.set == Set::Public);
         }
@@ -197,6 +199,7 @@ impl Library {
     /// # Errors
     /// As [`Library::sources`]; a word for several is unknown.
     pub fn source(&self, name: &str) -> Result<Source, PublicError> {
+        // Sets and packages are words of `--dataset`, where several meshes are welcome.
         if !self.catalogue.meshes.iter().any(|mesh| mesh.name == name) {
             return Err(self.unknown(name));
         }

@@ -39,8 +39,8 @@ const MOST_REPEATS: usize = 10_000;
 /// More surface samples than this are taken for a slip.
 pub const MOST_SAMPLES: usize = 10_000_000;
 
-/// Surface samples of a comparison unless told otherwise: fewer than `evaluate` takes, since it
-/// measures hundreds of results.
+/// Surface samples of a comparison unless told otherwise.
+// Fewer than `evaluate` takes, since it measures hundreds of results.
 const SAMPLES: usize = 10_000;
 /// Depth of the volume difference in a comparison, likewise.
 pub const VOLUME_DEPTH: u32 = 5;
@@ -179,6 +179,7 @@ impl Study {
         let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
         let mut study: Self = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
         let own = path.parent().filter(|own| !own.as_os_str().is_empty());
+        // `study.toml` alone has an empty parent, of which there is no absolute path.
         let own = own.unwrap_or(Path::new("."));
         let folder = study.folder.map_or(own.to_owned(), |folder| own.join(folder));
         study.folder = Some(std::path::absolute(&folder).unwrap_or(folder));
@@ -334,6 +335,7 @@ impl Study {
             let chains = filters.map(|filter| format!("{}+{then}", filter.id()));
             methods.extend(chains.map(|id| StudyMethod::of(&id)));
         }
+        // The start of all methods, in the first row to compare with.
         if !self.counts_only {
             methods.insert(0, StudyMethod::of(INITIAL));
         }
@@ -395,6 +397,7 @@ impl Study {
         let files = self.given_files(&names)?;
         let mut items = Vec::new();
         for (source, mesh) in sources.iter().zip(names) {
+            // Not by loading it: a refused file is a row of the results, not an error of the study.
             let hash = match source.path() {
                 Some(path) => hash_of(path)?,
                 None => Input::load(source)?.hash,
@@ -457,6 +460,7 @@ impl Study {
 
     /// The limits of each item.
     pub fn limits(&self, here: &Here) -> Limits {
+        // A quarter is left for the supervisor, the system and the judge.
         let machine = if here.memory == 0 { u64::MAX } else { here.memory / 4 * 3 };
         let bytes = self.memory.map_or(machine, |megabytes| megabytes.saturating_mul(1_000_000));
         Limits { seconds: self.timeout, bytes }
@@ -466,6 +470,7 @@ impl Study {
     /// fine to coarse.
     fn levels(&self, method: &StudyMethod, entry: &Entry) -> Vec<Target> {
         let info = entry.method().info();
+        // One result at every level: more rows would repeat it.
         if info.fixed {
             return vec![Target::Published];
         }
@@ -474,6 +479,7 @@ impl Study {
             levels.push(Target::Published);
         }
         let mut counts = method.spheres.as_ref().unwrap_or(&self.spheres).clone();
+        // Incremental methods continue from fine to coarse.
         counts.sort_unstable_by(|a, b| b.cmp(a));
         counts.dedup();
         levels.extend(counts.into_iter().map(Target::Spheres));
@@ -527,6 +533,7 @@ impl Shard {
         let mut own = Vec::new();
         let mut mesh = 0;
         for (place, item) in items.iter().enumerate() {
+            // Items of one mesh follow each other.
             if place > 0 && items[place - 1].scene != item.scene {
                 mesh += usize::from(place % self.of == 0);
             }
@@ -553,6 +560,7 @@ fn name_key(name: &str) -> String {
 /// that is not enough its name with the extension, then with its folder, then a number.
 pub(crate) fn unique_names(sources: &[Source]) -> Vec<String> {
     let mut names: Vec<String> = sources.iter().map(Source::name).collect();
+    // Only names that collide grow: the others stay short in tables.
     for depth in 1..=2 {
         let mut count: HashMap<String, usize> = HashMap::new();
         names.iter().for_each(|name| *count.entry(name_key(name)).or_default() += 1);
@@ -566,6 +574,7 @@ pub(crate) fn unique_names(sources: &[Source]) -> Vec<String> {
     for name in &mut names {
         let base = name.clone();
         let mut number = 2;
+        // The longer name of one file can be the name of another.
         while !taken.insert(name_key(name)) {
             *name = format!("{base}-{number}");
             number += 1;

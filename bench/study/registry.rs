@@ -74,6 +74,7 @@ impl Entry {
         let filter = first.presentation.filter.unwrap_or(Level::Published);
         let chain = Chain::new(Arc::clone(&first.method), filter, Arc::clone(&then.method));
         let parts = [&first.fingerprint, &then.fingerprint];
+        // A chain is as external as its parts: one edited script makes another chain.
         let fingerprint = parts
             .iter()
             .any(|part| part.is_some())
@@ -155,6 +156,7 @@ impl Registry {
     /// When the file is wrong, or an id is taken.
     pub fn add_plugins(&mut self, file: &Path) -> Result<(), RegistryError> {
         let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+        // A study file and the command line may both name it.
         if self.files.contains(&file) {
             return Ok(());
         }
@@ -177,6 +179,7 @@ impl Registry {
 
     /// Adds a method, and its chains with the methods added before.
     fn add(&mut self, new: Entry) {
+        // Both orders: which of two is the filter is decided by the user.
         for other in &self.entries {
             self.others.push(Entry::chain(other, &new));
             self.others.push(Entry::chain(&new, other));

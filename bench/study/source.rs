@@ -72,6 +72,7 @@ impl Source {
         let (id, resolution) = match spec.split_once(':') {
             None => (spec, None),
             Some((id, text)) => {
+                // Anything behind the second colon: a typing error must not become the default.
                 let resolution = text.parse().map_err(|_| InputError::Resolution(text.into()))?;
                 (id, Some(resolution))
             }
@@ -229,6 +230,7 @@ fn built_in(
         let (least, most) = (*range.start(), *range.end());
         return Err(InputError::OutOfRange { resolution, least, most });
     }
+    // Estimated, because making the mesh is what would take too long.
     let vertices = estimated_vertices(&shape, resolution);
     if vertices > MAX_VERTICES {
         return Err(InputError::TooManyVertices { resolution, vertices });
@@ -318,6 +320,7 @@ const MIN_SIMILARITY: f64 = 0.8;
 
 /// `; did you mean ...?` for the known word that is most like the given one, or nothing.
 pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    // Ids have no capitals, and titles do.
     let word = word.to_lowercase();
     let alike = known.into_iter().map(|known| (strsim::jaro_winkler(&word, known), known));
     match alike.max_by(|a, b| a.0.total_cmp(&b.0)) {
