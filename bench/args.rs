@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
-use medial::complex::{Radii, ReadOptions};
 use medial::metrics::JudgeOptions;
 use medial::shape::ShapeOptions;
 use medial::simplifier::Params;
@@ -14,7 +13,7 @@ use crate::exit::Failure;
 use crate::progress::Verbosity;
 use crate::study::item::Dual;
 use crate::study::registry::{Entry, Registry};
-use crate::study::{MOST_SAMPLES, Study, no_such_method};
+use crate::study::{MOST_SAMPLES, Study};
 
 /// More threads than this serve nobody and can exhaust the system.
 const MOST_THREADS: u64 = 1024;
@@ -128,24 +127,6 @@ impl MeasureArguments {
     }
 }
 
-/// How a file of a medial mesh is read that is not what its header says.
-#[derive(Clone, Debug, Default, Args)]
-pub struct ReadArguments {
-    /// Take the lines of a medial mesh as they are where its header announces another number of them.
-    #[arg(long)]
-    pub lenient: bool,
-    /// Which medial mesh is meant of a file to which several were appended, from 1.
-    #[arg(long, value_name = "K")]
-    pub block: Option<usize>,
-}
-
-impl ReadArguments {
-    /// The options of the reader.
-    pub fn options(&self) -> ReadOptions {
-        ReadOptions { lenient: self.lenient, block: self.block, radii: Radii::Needed }
-    }
-}
-
 /// A mesh argument: a file, `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
 pub type MeshArgument = PathBuf;
 
@@ -200,8 +181,5 @@ pub fn params(words: &[(String, String)]) -> Params {
 /// # Errors
 /// When no method has it; the message lists the ids.
 pub fn method<'r>(registry: &'r Registry, id: &str) -> Result<&'r Entry, Failure> {
-    registry.entry(id).ok_or_else(|| {
-        let known: Vec<String> = registry.entries().iter().map(|e| e.id().to_owned()).collect();
-        Failure::usage(no_such_method(id, &known))
-    })
+    registry.entry(id).ok_or_else(|| Failure::usage(registry.no_such(id)))
 }

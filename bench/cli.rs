@@ -3,11 +3,13 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
 use medial::simplifier::Registered;
 
 use crate::args::Global;
 use crate::cmd;
+use crate::exec::serve::serve;
 use crate::exit::{Exit, Failure};
 use crate::host::Host;
 use crate::interrupt;
@@ -62,10 +64,18 @@ pub enum Verb {
     History(cmd::history::Arguments),
     /// Print shell completions.
     #[command(hide = true)]
-    Completions(cmd::completions::Arguments),
+    Completions {
+        /// The shell.
+        #[arg(value_enum)]
+        shell: Shell,
+    },
     /// Serve items on standard input: what `compare` starts.
     #[command(hide = true)]
-    Worker(cmd::worker::Arguments),
+    Worker {
+        /// Limit of memory.
+        #[arg(long, default_value_t = u64::MAX)]
+        bytes: u64,
+    },
 }
 
 /// The command with these methods: parses the command line, runs the verb, and turns the outcome
@@ -92,8 +102,7 @@ fn run_with(
 ) -> Exit {
     // First, so that a signal at any later moment removes temporary files.
     interrupt::install();
-    let matches = command().try_get_matches_from(words);
-    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
+    let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
         // Help and version are asked for, and belong on standard output.
         Err(error) if !error.use_stderr() => {
@@ -116,34 +125,6 @@ fn run_with(
         failure.code
     });
     exit_after_output(exit)
-}
-
-/// The command line: as derived, but lists of defaults are shown as they would be written.
-pub fn command() -> Command {
-    Cli::command()
-        .mut_args(defaults_with_commas)
-        .mut_subcommands(|verb| verb.mut_args(defaults_with_commas))
-}
-
-fn defaults_with_commas(argument: Arg) -> Arg {
-    let defaults = argument.get_default_values();
-    // Clap joins several defaults by spaces, which is not how a list is typed.
-    let (Some(delimiter), 2..) = (argument.get_value_delimiter(), defaults.len()) else {
-        return argument;
-    };
-    let words: Vec<_> = defaults.iter().map(|word| word.to_string_lossy()).collect();
-    let list = words.join(&delimiter.to_string());
-    let [short, long] = [argument.get_help(), argument.get_long_help()]
-        .map(|help| help.map(|help| format!("{help} [default: {list}]")));
-    let argument = argument.hide_default_value(true);
-    let argument = match short {
-        Some(help) => argument.help(help),
-        None => argument,
-    };
-    match long {
-        Some(help) => argument.long_help(help),
-        None => argument,
-    }
 }
 
 fn registry(
@@ -178,8 +159,16 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Diff(arguments) => cmd::diff::run(&arguments, global, registry),
         Verb::Report(arguments) => cmd::report::run(&arguments, global, registry),
         Verb::History(arguments) => cmd::history::run(&arguments, global),
-        Verb::Completions(arguments) => cmd::completions::run(&arguments, &mut command()),
-        Verb::Worker(arguments) => cmd::worker::run(&arguments, registry),
+        Verb::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "medial", &mut script);
+            print_raw(&String::from_utf8_lossy(&script));
+            Ok(Exit::Done)
+        }
+        Verb::Worker { bytes } => {
+            serve(registry, bytes);
+            Ok(Exit::Done)
+        }
     }
 }
 

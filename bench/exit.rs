@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use crate::exec::RunError;
-use crate::exec::queue::PlanError;
 use crate::store::StoreError;
 use crate::study::StudyError;
+use crate::study::external::AxisError;
 use crate::study::library::PublicError;
 use crate::study::source::InputError;
 
@@ -80,23 +80,21 @@ impl From<StoreError> for Failure {
     }
 }
 
+impl From<AxisError> for Failure {
+    fn from(error: AxisError) -> Self {
+        Self::input(error)
+    }
+}
+
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         let code = match error {
             RunError::Interrupted => Exit::Interrupted,
             // No worker, no result: not the fault of an input.
             RunError::Start(_) => Exit::NothingMeasured,
+            RunError::Store(_) => Exit::Input,
         };
         Self { code, message: error.to_string() }
-    }
-}
-
-impl From<PlanError> for Failure {
-    fn from(error: PlanError) -> Self {
-        match error {
-            PlanError::Run(error) => error.into(),
-            PlanError::Store(error) => error.into(),
-        }
     }
 }
 

@@ -4,11 +4,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use medial::complex::LoadedMa;
-use medial::shape::{Fit, Shape, ShapeOptions};
+use medial::shape::{Shape, ShapeOptions};
 
 use crate::exit::Failure;
-use crate::study::external::{AxisOptions, read_axis};
 use crate::study::source::{Input, Source};
 
 /// Reads a surface or makes a built-in one, and the shape of it. What is wrong names the surface.
@@ -21,20 +19,7 @@ pub fn shape_of(mesh: &Path, options: ShapeOptions) -> Result<(Input, Shape), Fa
     Ok((input, shape))
 }
 
-/// Reads a medial mesh that was made for a shape, in input units, and the change of units that brought it there, if one
-/// was asked for.
-///
-/// # Errors
-/// When it cannot be read, has no sphere, or cannot belong to the shape.
-pub fn medial_mesh_for(
-    path: &Path,
-    shape: &Shape,
-    options: AxisOptions,
-) -> Result<(LoadedMa, Option<Fit>), Failure> {
-    read_axis(path, shape, &options).map_err(Failure::input)
-}
-
-/// What a file holds is told by its first bytes; no header of a PLY file is longer than so many.
+/// The content of a file shows in its first bytes: no header of a PLY file is longer than these.
 const HEADER_LIMIT: u64 = 1 << 20;
 
 /// Whether a file holds a medial mesh: `.ma`, lists of spheres, `.ply` whose vertices have a radius,

@@ -66,25 +66,18 @@ fn kibibytes(value: &str) -> Option<u64> {
 
 /// The command line with the program's bare name, quoted where a shell would need it.
 fn command_line() -> String {
-    let words = Host::here().map(|host| &host.words[..]).unwrap_or_default();
-    let words = words.iter().map(|word| word.to_string_lossy().into_owned());
-    // The path of the program is of no use on another machine.
-    let words: Vec<String> = std::iter::once("medial".to_owned()).chain(words).collect();
-    shell_line(&words)
-}
-
-/// Words as a shell command line, quoted where necessary.
-pub fn shell_line(words: &[String]) -> String {
-    let quoted = words.iter().map(|word| {
+    let mut line = "medial".to_owned();
+    for word in Host::here().map(|host| &host.words[..]).unwrap_or_default() {
+        let word = word.to_string_lossy();
         // No shell gives these characters a meaning.
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
         if !word.is_empty() && word.chars().all(is_plain) {
-            word.clone()
+            line = line + " " + &word;
         } else {
-            format!("'{}'", word.replace('\'', r"'\''"))
+            line = line + " '" + &word.replace('\'', r"'\''") + "'";
         }
-    });
-    quoted.collect::<Vec<_>>().join(" ")
+    }
+    line
 }
 
 /// SHA-256 in hexadecimal.

@@ -59,34 +59,21 @@ struct KnownLimits {
 /// Why a folder cannot be used as a store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The file system refused.
-    #[error("{}: {source}", path.display())]
-    Io {
+    /// The file or folder is wrong, in use, or the file system refused.
+    #[error("{}: {why}", path.display())]
+    File {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// It is a file.
-    #[error("{}: not a folder", .0.display())]
-    NotAFolder(PathBuf),
-    /// It holds something else than results.
-    #[error("{}: neither empty nor a folder of results; take another with --out", .0.display())]
-    NotAStore(PathBuf),
-    /// Another process adds to it.
-    #[error(
-        "{}: {holder} is adding results to this folder; wait for it, or take another with --out",
-        dir.display()
-    )]
-    Held {
-        /// The folder.
-        dir: PathBuf,
-        /// Who holds it, as it says itself.
-        holder: String,
+        /// What is wrong, and what to do.
+        why: String,
     },
     /// A record cannot be written.
     #[error(transparent)]
     Journal(#[from] JournalError),
+}
+
+fn wrong(path: &Path, why: impl ToString) -> StoreError {
+    StoreError::File { path: path.to_owned(), why: why.to_string() }
 }
 
 impl Store {
@@ -99,13 +86,14 @@ impl Store {
     /// When it is no folder, is not writable, or another process holds it.
     pub fn open(dir: &Path, journal: &str, command: &str) -> Result<Self, StoreError> {
         if dir.exists() && !dir.is_dir() {
-            return Err(StoreError::NotAFolder(dir.to_owned()));
+            return Err(wrong(dir, "not a folder"));
         }
         fs::create_dir_all(dir).map_err(io_error(dir))?;
         // A lock or a study is left by a run that ended before its first record.
         let is_store = [LOCK, journal, "study.toml"].iter().any(|name| dir.join(name).exists());
         if !is_store && fs::read_dir(dir).map_err(io_error(dir))?.next().is_some() {
-            return Err(StoreError::NotAStore(dir.to_owned()));
+            let why = "neither empty nor a folder of results; take another with --out";
+            return Err(wrong(dir, why));
         }
         // Before anything is repaired: another process may be in the middle of a line.
         let lock = lock(dir, command)?;
@@ -200,7 +188,8 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
                 "" => "another process".to_owned(),
                 holder => holder.to_owned(),
             };
-            return Err(StoreError::Held { dir: dir.to_owned(), holder });
+            let why = "is adding results to this folder; wait for it, or take another with --out";
+            return Err(wrong(dir, format!("{holder} {why}")));
         }
         // Some file systems have no locks; two runs into one folder go unnoticed there.
         Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
@@ -290,5 +279,5 @@ fn remove(path: &Path) -> Result<(), StoreError> {
 /// An error of the file system with the path that it is about.
 fn io_error(path: &Path) -> impl Fn(io::Error) -> StoreError {
     let path = path.to_owned();
-    move |source| StoreError::Io { path: path.clone(), source }
+    move |error| wrong(&path, error)
 }

@@ -131,7 +131,5 @@ criterion_group! {
 }
 
 fn main() {
-    plan::announce(&[]);
-    benches();
-    Criterion::default().configure_from_args().final_summary();
+    plan::run(&[], benches);
 }

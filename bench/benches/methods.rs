@@ -130,7 +130,5 @@ criterion_group! {
 }
 
 fn main() {
-    plan::announce(&SLOW);
-    benches();
-    Criterion::default().configure_from_args().final_summary();
+    plan::run(&SLOW, benches);
 }

@@ -63,7 +63,5 @@ fn metrics(criterion: &mut Criterion) {
 criterion_group! { name = benches; config = plan::criterion(); targets = metrics }
 
 fn main() {
-    plan::announce(&[]);
-    benches();
-    Criterion::default().configure_from_args().final_summary();
+    plan::run(&[], benches);
 }

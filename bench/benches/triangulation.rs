@@ -143,7 +143,5 @@ criterion_group! {
 }
 
 fn main() {
-    plan::announce(&[("union axis", 1.0)]);
-    benches();
-    Criterion::default().configure_from_args().final_summary();
+    plan::run(&[("union axis", 1.0)], benches);
 }

@@ -11,7 +11,7 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, RunContext, Simplification, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
 
-use super::{Answer, Miss, Subject, failed, miss};
+use super::{Answer, Outcome, Subject, failed, miss};
 use crate::plugin::is_id;
 
 /// A name that no parameter has.
@@ -132,7 +132,7 @@ pub(super) fn valid_or_refused(subject: &Subject<'_>, name: &str) -> Answer {
         (subject.doing)(&place);
         match simplification.at(level) {
             Ok(result) => {
-                sound(&result, level).map_err(|why| Miss::Failed(format!("{place}: {why}")))?;
+                sound(&result, level).map_err(|why| Outcome::Failed(format!("{place}: {why}")))?;
             }
             // One remark is enough: the others are alike.
             Err(error) if remarks.is_empty() => remarks = refusal(&place, &error)?,
@@ -220,7 +220,7 @@ fn at_count(
     simplification: &mut dyn Simplification,
     shape: &Shape,
     count: usize,
-) -> Result<Simplified, Miss> {
+) -> Result<Simplified, Outcome> {
     let result = subject.ask(simplification, shape, Level::Spheres(count))?;
     let reached = result.mesh.spheres.len();
     let near = reached.abs_diff(count) as f64 <= TOLERANCE * count as f64;
@@ -285,7 +285,7 @@ fn taken(subject: &Subject<'_>, simplification: &mut dyn Simplification, level: 
             if result.mesh.spheres.is_empty() && !result.diagnostics.warnings.is_empty() {
                 return Ok(vec![]);
             }
-            sound(&result, level).map_err(|why| Miss::Failed(format!("{level}: {why}")))?;
+            sound(&result, level).map_err(|why| Outcome::Failed(format!("{level}: {why}")))?;
             Ok(vec![])
         }
     }
@@ -343,7 +343,7 @@ pub(super) fn threads(subject: &Subject<'_>) -> Answer {
     // 5 divides no power of two: chunks end elsewhere.
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|error| Miss::Skipped(error.to_string()))?;
+        let pool = pool.map_err(|error| Outcome::Skipped(error.to_string()))?;
         // What the caller is told stays in this thread: the method runs in the pool.
         (subject.doing)(&format!("150 spheres of the bracket with {threads} threads"));
         let (method, params) = (subject.method, subject.params);
@@ -472,7 +472,7 @@ fn run_two_levels(
 /// A plain medial mesh, as a file holds it: without contact points.
 pub(super) fn given_initial(subject: &Subject<'_>) -> Answer {
     let shape = corpus_shape("capsule");
-    let initial = shape.view().initial().map_err(|error| Miss::Skipped(error.to_string()))?;
+    let initial = shape.view().initial().map_err(|error| Outcome::Skipped(error.to_string()))?;
     let plain = MedialMesh { contacts: None, ..(*initial).clone() };
     let back = *shape.normalisation();
     let plain = plain.transformed(back.diagonal, |p| back.backward(p));
@@ -485,12 +485,12 @@ pub(super) fn given_initial(subject: &Subject<'_>) -> Answer {
         .and_then(|mut simplification| simplification.at(level));
     match answer {
         Ok(result) => {
-            sound(&result, level).map_err(Miss::Failed)?;
+            sound(&result, level).map_err(Outcome::Failed)?;
             Ok(vec![])
         }
         // Exception: what a method needs beside a medial mesh, it may say.
         Err(SimplifyError::Unsupported { why }) => Ok(vec![format!("unsupported: {why}")]),
-        Err(error) => Err(Miss::Failed(format!("from a given medial mesh: {error}"))),
+        Err(error) => Err(Outcome::Failed(format!("from a given medial mesh: {error}"))),
     }
 }
 

@@ -49,14 +49,8 @@ pub enum Outcome {
     Skipped(String),
 }
 
-/// What a case gives: remarks, or why it is not passed.
-type Answer = Result<Vec<String>, Miss>;
-
-/// Why a case is not passed.
-enum Miss {
-    Failed(String),
-    Skipped(String),
-}
+/// What a case gives: remarks, or an outcome other than [`Outcome::Passed`].
+type Answer = Result<Vec<String>, Outcome>;
 
 /// All cases, in the order in which they are run: what is said first, what takes long last.
 pub fn cases() -> &'static [Case] {
@@ -113,21 +107,17 @@ pub fn find(name: &str) -> Option<&'static Case> {
 impl Case {
     /// Puts the method to the test. A panic of the method is for the caller to catch.
     pub fn run(&self, subject: &Subject<'_>) -> Outcome {
-        match (self.run)(subject) {
-            Ok(remarks) => Outcome::Passed(remarks),
-            Err(Miss::Failed(why)) => Outcome::Failed(why),
-            Err(Miss::Skipped(why)) => Outcome::Skipped(why),
-        }
+        (self.run)(subject).map_or_else(|outcome| outcome, Outcome::Passed)
     }
 }
 
-fn failed<T>(why: impl Into<String>) -> Result<T, Miss> {
-    Err(Miss::Failed(why.into()))
+fn failed<T>(why: impl Into<String>) -> Result<T, Outcome> {
+    Err(Outcome::Failed(why.into()))
 }
 
 impl Subject<'_> {
     /// The method on a shape, with nothing asked yet.
-    fn prepare<'s>(&self, shape: &'s Shape) -> Result<Box<dyn Simplification + 's>, Miss> {
+    fn prepare<'s>(&self, shape: &'s Shape) -> Result<Box<dyn Simplification + 's>, Outcome> {
         let place = format!("preparing the {}", shape.name());
         (self.doing)(&place);
         self.method
@@ -141,17 +131,21 @@ impl Subject<'_> {
         simplification: &mut dyn Simplification,
         shape: &Shape,
         level: Level,
-    ) -> Result<Simplified, Miss> {
+    ) -> Result<Simplified, Outcome> {
         let place = format!("{level} of the {}", shape.name());
         (self.doing)(&place);
         let result = simplification.at(level).map_err(|error| miss(&place, &error))?;
-        sound(&result, level).map_err(|why| Miss::Failed(format!("{place}: {why}")))?;
+        sound(&result, level).map_err(|why| Outcome::Failed(format!("{place}: {why}")))?;
         Ok(result)
     }
 
     /// The level that stands for a number of spheres: the published one for a method that cannot be
     /// asked for numbers.
-    fn level(&self, simplification: &mut dyn Simplification, count: usize) -> Result<Level, Miss> {
+    fn level(
+        &self,
+        simplification: &mut dyn Simplification,
+        count: usize,
+    ) -> Result<Level, Outcome> {
         let level = Level::Spheres(count);
         (self.doing)(&format!("asking for {level}"));
         // Any other error belongs to this level, and the case of this level reports it.
@@ -159,7 +153,7 @@ impl Subject<'_> {
             return Ok(level);
         };
         match simplification.at(Level::Published) {
-            Err(SimplifyError::Unsupported { .. }) => Err(Miss::Skipped(format!(
+            Err(SimplifyError::Unsupported { .. }) => Err(Outcome::Skipped(format!(
                 "it answers neither numbers of spheres nor the published level ({why})"
             ))),
             _ => Ok(Level::Published),
@@ -167,7 +161,7 @@ impl Subject<'_> {
     }
 
     /// The medial mesh that a method gives for a number of spheres when asked for nothing else.
-    fn mesh(&self, shape: &Shape, count: usize) -> Result<MedialMesh, Miss> {
+    fn mesh(&self, shape: &Shape, count: usize) -> Result<MedialMesh, Outcome> {
         // Two preparations: which level it is must not change what it gives.
         let level = self.level(self.prepare(shape)?.as_mut(), count)?;
         Ok(self.ask(self.prepare(shape)?.as_mut(), shape, level)?.mesh)
@@ -175,9 +169,9 @@ impl Subject<'_> {
 }
 
 /// What an error at a place means: that something is not done by a method is an answer.
-fn miss(place: &str, error: &SimplifyError) -> Miss {
+fn miss(place: &str, error: &SimplifyError) -> Outcome {
     match error {
-        SimplifyError::Unsupported { why } => Miss::Skipped(format!("{place}: {why}")),
-        error => Miss::Failed(format!("{place}: {error}")),
+        SimplifyError::Unsupported { why } => Outcome::Skipped(format!("{place}: {why}")),
+        error => Outcome::Failed(format!("{place}: {error}")),
     }
 }

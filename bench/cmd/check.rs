@@ -13,9 +13,9 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{counted, print_json, print_line};
 use crate::provenance::Provenance;
+use crate::study::Study;
 use crate::study::item::MethodSpec;
 use crate::study::registry::{Entry, Registry};
-use crate::study::{Here, Study};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -42,7 +42,7 @@ pub struct Arguments {
 /// When a method, a case or a parameter does not exist, or no worker can be started. A case that a
 /// method fails is no error here: it is a line of the output, and sets the exit code.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
-    let items = arguments.items(global, registry)?;
+    let items = arguments.items(registry)?;
     let interrupted = interrupt::listen();
     // No record is kept: a case has an outcome only, and no provenance.
     let mut supervisor =
@@ -111,17 +111,13 @@ impl Arguments {
     }
 
     /// Every case on every method.
-    fn items(
-        &self,
-        global: &Global,
-        registry: &Registry,
-    ) -> Result<Vec<(CheckItem, &'static Case)>, Failure> {
+    fn items(&self, registry: &Registry) -> Result<Vec<(CheckItem, &'static Case)>, Failure> {
         let (entries, cases) = (self.entries(registry)?, self.cases()?);
         let plain = Study::default();
         let timeout = self.timeout.unwrap_or(plain.timeout);
         let study = Study { timeout, memory: self.memory, ..plain };
         study.check()?;
-        let here = Here::of(&Provenance::here());
+        let here = Provenance::here();
         let params = args::params(&self.set);
         let mut items = Vec::new();
         for entry in entries {
@@ -139,7 +135,7 @@ impl Arguments {
                     params: params.clone(),
                     fingerprint: entry.fingerprint().map(str::to_owned),
                 };
-                let threads = global.threads.unwrap_or(here.threads);
+                let threads = rayon::current_num_threads();
                 let limits = study.limits(&here);
                 (CheckItem { method, case: case.name.to_owned(), threads, limits }, case)
             }));

@@ -8,7 +8,7 @@ use medial_reports::{Record, Status};
 use serde_json::json;
 
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
-use crate::exec::queue::{Contender, PlanError, count, missing, refused_params, run_items};
+use crate::exec::queue::{Contender, count, missing, refused_params, run_items};
 use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
@@ -20,7 +20,7 @@ use crate::study::external::Given;
 use crate::study::item::Item;
 use crate::study::registry::Registry;
 use crate::study::source::Source;
-use crate::study::{Here, Shard, Study, StudyMethod};
+use crate::study::{Shard, Study, StudyMethod};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -115,8 +115,7 @@ pub fn run(
     }
     arguments.apply_to_methods(&mut study, registry)?;
     let provenance = Provenance::here();
-    let here = Here::of(&provenance);
-    let mut items = study.items(registry, &here)?;
+    let mut items = study.items(registry, &provenance)?;
     if let Some(shard) = arguments.shard.as_deref().map(Shard::parse).transpose()? {
         items = shard.share(items);
     }
@@ -143,7 +142,7 @@ pub fn run(
     }
     let ended = run_items(&left, std::slice::from_mut(&mut side), global.progress());
     let run = side.store.added;
-    if matches!(ended, Err(PlanError::Run(RunError::Interrupted))) {
+    if matches!(ended, Err(RunError::Interrupted)) {
         let levels: usize = left.iter().map(|item| item.levels.len()).sum();
         print_error(&format!(
             "interrupted: {run} of {levels} results were made and are kept; the same command goes on from there"
@@ -170,9 +169,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         study.meshes = arguments.meshes.iter().map(absolute).collect();
         study.dataset.clear();
     }
-    if !arguments.dataset.is_empty() {
-        study.dataset.clone_from(&arguments.dataset);
-    }
+    replace(&mut study.dataset, &arguments.dataset);
     if !arguments.methods.is_empty() {
         let methods = arguments.methods.iter().map(|text| StudyMethod::parse(text));
         study.methods = methods.collect::<Result<_, _>>()?;
@@ -183,17 +180,12 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         given.file = absolute(&given.file);
         study.given.push(given);
     }
-    if !arguments.spheres.is_empty() {
-        study.spheres.clone_from(&arguments.spheres);
-    } else if arguments.study.is_none() && !study.given.is_empty() {
+    if arguments.study.is_none() && arguments.spheres.is_empty() && !study.given.is_empty() {
         study.spheres = study.given_counts()?;
     }
-    if !arguments.max_error.is_empty() {
-        study.max_error.clone_from(&arguments.max_error);
-    }
-    if !arguments.after_filters.is_empty() {
-        study.after_filters.clone_from(&arguments.after_filters);
-    }
+    replace(&mut study.spheres, &arguments.spheres);
+    replace(&mut study.max_error, &arguments.max_error);
+    replace(&mut study.after_filters, &arguments.after_filters);
     study.counts_only |= arguments.counts_only;
     study.published |= arguments.published;
     study.repeat = arguments.repeat.unwrap_or(study.repeat);
@@ -205,6 +197,13 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     arguments.substrate.apply(&mut study)?;
     study.samples = arguments.measure.samples.unwrap_or(study.samples);
     Ok(study)
+}
+
+/// Lists of the command line replace those of the study; an empty one was not given.
+fn replace<T: Clone>(own: &mut Vec<T>, given: &[T]) {
+    if !given.is_empty() {
+        *own = given.to_vec();
+    }
 }
 
 /// A path of the command line.

@@ -10,11 +10,11 @@ use medial::surface::SignedDistance;
 use medial::{complex, surface};
 use serde_json::json;
 
-use crate::args::{Global, MeshArgument, ReadArguments};
+use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::{check_extension, extension, is_medial, medial_mesh_for, shape_of};
+use crate::files::{check_extension, extension, is_medial, shape_of};
 use crate::output::{print_json, print_line};
-use crate::study::external::AxisOptions;
+use crate::study::external::{AxisOptions, read_axis};
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
@@ -24,8 +24,12 @@ pub struct Arguments {
     /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers).
     /// `.glb` has single precision, and its y is up: z here, as Blender shows it.
     to: PathBuf,
-    #[command(flatten)]
-    read: ReadArguments,
+    /// Take the lines of a medial mesh as they are where its header announces another number of them.
+    #[arg(long)]
+    lenient: bool,
+    /// Which medial mesh is meant of a file to which several were appended, from 1.
+    #[arg(long, value_name = "K")]
+    block: Option<usize>,
     #[command(flatten)]
     look: LookArguments,
 }
@@ -37,7 +41,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (notes, vertices, faces) = if is_medial(&arguments.from)? {
         arguments.look.check(&arguments.to)?;
-        let (loaded, look) = arguments.look.read(&arguments.from, &arguments.read)?;
+        let Arguments { lenient, block, .. } = *arguments;
+        let options = AxisOptions { lenient, block, ..AxisOptions::default() };
+        let (loaded, look) = arguments.look.read(&arguments.from, options)?;
         complex::write_with(&arguments.to, &loaded.mesh, &look).map_err(Failure::input)?;
         let (mesh, mut notes) = loaded.with_remarks();
         notes.extend(loss(&arguments.to, &mesh));
@@ -131,16 +137,14 @@ impl LookArguments {
     ///
     /// # Errors
     /// When it or the surface is refused, or they cannot belong together.
-    fn read(&self, from: &Path, read: &ReadArguments) -> Result<(LoadedMa, Look), Failure> {
+    fn read(&self, from: &Path, options: AxisOptions) -> Result<(LoadedMa, Look), Failure> {
         if let Some(surface) = &self.mesh {
-            let ReadArguments { lenient, block } = *read;
-            let fitting = AxisOptions { lenient, block, ..AxisOptions::default() };
             let (_, shape) = shape_of(surface, ShapeOptions::default())?;
-            let loaded = medial_mesh_for(from, &shape, fitting)?.0;
+            let loaded = read_axis(from, &shape, options)?.0;
             let values = Some(SphereValues::error(errors(&loaded.mesh, &shape)?));
             return Ok((loaded, Look { values, balls: self.spheres }));
         }
-        let loaded = complex::read_with(from, read.options()).map_err(Failure::input)?;
+        let loaded = complex::read_with(from, options.read_options()).map_err(Failure::input)?;
         let values = match self.color {
             Some(Colour::Stability) => {
                 Some(SphereValues::stability(&loaded.mesh, diagonal(&loaded.mesh)))

@@ -10,7 +10,7 @@ use medial_reports::Record;
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
 
 use crate::args::{Global, share};
-use crate::exec::queue::{Build, Contender, PlanError, run_items};
+use crate::exec::queue::{Build, Contender, run_items};
 use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::files;
@@ -19,9 +19,9 @@ use crate::output::{note, print_error, print_json, print_raw};
 use crate::provenance::Provenance;
 use crate::rebuild::records;
 use crate::store::{AXES, RESULTS, Store};
+use crate::study::Study;
 use crate::study::item::Item;
 use crate::study::registry::Registry;
-use crate::study::{Here, Study};
 
 /// Arguments of `diff`.
 #[derive(Debug, Args)]
@@ -127,7 +127,7 @@ fn alternate(
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
     let here = Provenance::here();
-    let items = study.items(registry, &Here::of(&here))?;
+    let items = study.items(registry, &here)?;
     let interrupted = interrupt::listen();
     let mut sides = Vec::new();
     for (program, side) in [(&arguments.old, "old"), (&arguments.new, "new")] {
@@ -146,7 +146,7 @@ fn alternate(
         sides.iter().any(|side| !side.store.missing(&side.own(item), false).is_empty())
     });
     match run_items(&left, &mut sides, global.progress()) {
-        Err(PlanError::Run(RunError::Interrupted)) => {
+        Err(RunError::Interrupted) => {
             print_error(
                 "interrupted: what was finished is kept; the same command goes on from there",
             );

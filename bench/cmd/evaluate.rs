@@ -12,10 +12,10 @@ use serde_json::json;
 
 use crate::args::{Global, MeasureArguments, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::{medial_mesh_for, shape_of};
+use crate::files::shape_of;
 use crate::output::{counted, note, print_error, print_json, print_line};
 use crate::progress::StageLine;
-use crate::study::external::AxisOptions;
+use crate::study::external::{AxisOptions, read_axis};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -103,7 +103,7 @@ fn evaluate(
         _ => Failure::at(path, error),
     };
     line.at(format!("measuring {}", path.display()));
-    let (loaded, fit) = medial_mesh_for(path, shape, arguments.fitting)?;
+    let (loaded, fit) = read_axis(path, shape, arguments.fitting)?;
     let LoadedMa { mesh, notes, warnings: defects, .. } = loaded;
     let to_normal = shape.normalisation();
     let mesh = mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));

@@ -3,7 +3,6 @@
 pub mod axis;
 pub mod check;
 pub mod compare;
-pub mod completions;
 pub mod convert;
 pub mod datasets;
 pub mod diff;
@@ -16,4 +15,3 @@ pub mod render;
 pub mod repair;
 pub mod report;
 pub mod simplify;
-pub mod worker;

@@ -16,13 +16,11 @@ use serde_json::{Map, Value, json};
 
 use crate::args::{Global, MeshArgument, SubstrateArguments, fraction};
 use crate::exit::{Exit, Failure};
-use crate::files::{
-    COINCIDENT, SURFACES, check_extension, check_folder, medial_mesh_for, shape_of,
-};
+use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, shape_of};
 use crate::output::{StageCosts, counted, print_json, print_line};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
-use crate::study::external::{AxisOptions, FitBy, RadiiFrom, percent};
+use crate::study::external::{AxisOptions, FitBy, RadiiFrom, percent, read_axis};
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
@@ -177,7 +175,7 @@ fn read(arguments: &Arguments) -> Result<Read, Failure> {
     });
     let axis = match (&arguments.axis, &shape) {
         (None, _) => None,
-        (Some(path), Some(shape)) => Some(medial_mesh_for(path, shape, arguments.fitting)?.0),
+        (Some(path), Some(shape)) => Some(read_axis(path, shape, arguments.fitting)?.0),
         (Some(path), None) => Some(without_surface(path, arguments.fitting)?),
     };
     let axis = axis.map(|loaded| {

@@ -15,10 +15,10 @@ use serde_json::json;
 
 use crate::args::{Global, MeshArgument, fraction};
 use crate::exit::{Exit, Failure};
-use crate::files::{self, check_extension, check_folder, medial_mesh_for, shape_of};
+use crate::files::{self, check_extension, check_folder, shape_of};
 use crate::output::{counted, print_json, print_line};
 use crate::progress::StageLine;
-use crate::study::external::{AxisOptions, percent};
+use crate::study::external::{AxisOptions, percent, read_axis};
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]
@@ -176,7 +176,7 @@ impl Read {
         let to_normal = *shape.normalisation();
         let mut axes = Vec::new();
         for path in &arguments.axes {
-            let (mesh, notes) = medial_mesh_for(path, &shape, arguments.fitting)?.0.with_remarks();
+            let (mesh, notes) = read_axis(path, &shape, arguments.fitting)?.0.with_remarks();
             warnings.extend(notes);
             axes.push(mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)));
         }

@@ -17,8 +17,8 @@ use crate::output::{print_json, print_line};
 use crate::provenance::Provenance;
 use crate::rebuild::{Rebuilt, STUDY, rebuild, records, write_study};
 use crate::store::{PAGE, RESULTS, Store};
+use crate::study::Study;
 use crate::study::registry::Registry;
-use crate::study::{Here, Study};
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
@@ -187,7 +187,7 @@ fn row_of(record: &Record) -> String {
 
 /// The place of each row of a study; `None` where its meshes or plug-ins are not at hand.
 fn order_of(study: &Study, registry: &Registry) -> Option<HashMap<String, usize>> {
-    let items = study.items(registry, &Here::of(&Provenance::here())).ok()?;
+    let items = study.items(registry, &Provenance::here()).ok()?;
     let rows = items.iter().flat_map(|item| {
         let method = &item.method;
         item.levels.iter().map(move |level| {

@@ -20,15 +20,13 @@ use crate::args::{
     Global, MeasureArguments, MeshArgument, SubstrateArguments, key_value, method, params,
 };
 use crate::exit::{Exit, Failure};
-use crate::files::{
-    COINCIDENT, SURFACES, check_extension, check_folder, check_output, medial_mesh_for, shape_of,
-};
+use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, check_output, shape_of};
 use crate::measure::answer::{Bounds, Fault, LevelRun, answer, preparing};
 use crate::measure::search::Found;
 use crate::measure::{fill_costs, fill_result};
 use crate::output::{counted, note, print_json, print_line, version};
 use crate::progress::StageLine;
-use crate::study::external::{AxisOptions, percent};
+use crate::study::external::{AxisOptions, percent, read_axis};
 use crate::study::registry::{Entry, Registry};
 use crate::study::source::Input;
 
@@ -82,7 +80,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let (input, mut shape) = shape_of(&arguments.mesh, options)?;
     let mut warnings = input.report.warnings.clone();
     if let Some(path) = &arguments.initial {
-        let (initial, notes) = medial_mesh_for(path, &shape, arguments.fitting)?.0.with_remarks();
+        let (initial, notes) = read_axis(path, &shape, arguments.fitting)?.0.with_remarks();
         warnings.extend(notes);
         shape = shape.with_initial(&initial);
     }

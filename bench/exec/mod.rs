@@ -28,9 +28,10 @@ use crate::measure::answer::Fault;
 use crate::measure::failure_record;
 use crate::process_tree::signal_name;
 use crate::provenance::Provenance;
+use crate::store::StoreError;
 use crate::study::item::{Item, Limits, SceneSpec};
 
-/// Why items cannot be run at all.
+/// Why items are not run, or no more of them.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The user interrupted the run.
@@ -39,6 +40,9 @@ pub enum RunError {
     /// A worker cannot be started.
     #[error("a worker process cannot be started: {0}")]
     Start(io::Error),
+    /// A record cannot be kept.
+    #[error(transparent)]
+    Store(#[from] StoreError),
 }
 
 /// Runs items one after another, in a worker that it replaces when an item has broken it.

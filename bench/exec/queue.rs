@@ -18,17 +18,6 @@ use crate::provenance::{Provenance, hex_digest};
 use crate::store::{Store, StoreError};
 use crate::study::item::{Item, MethodSpec};
 
-/// Why a run ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum PlanError {
-    /// No worker, or the user wants no more.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// A record cannot be kept.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-}
-
 /// The items with the levels that are missing in a store, and the number of levels that are there.
 pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>, usize) {
     let mut found = 0;
@@ -74,7 +63,7 @@ pub fn run_items(
     items: &[Item],
     sides: &mut [Contender<'_>],
     verbosity: Verbosity,
-) -> Result<(), PlanError> {
+) -> Result<(), RunError> {
     let turns = items.iter().map(|item| item.repeat.max(1)).sum();
     let mut progress = Progress::new(verbosity, turns);
     // A worker keeps the substrates of one scene only.
@@ -177,34 +166,13 @@ pub struct Build {
     pub provenance: Provenance,
 }
 
-/// Why a file is no build.
-#[derive(Debug, thiserror::Error)]
-pub enum BuildError {
-    /// It cannot be read.
-    #[error("{}: {source}", program.display())]
-    Read {
-        /// The file.
-        program: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// It does not answer as this program does.
-    #[error("{}: no build of this program: `--version` gave {answer:?}", program.display())]
-    Foreign {
-        /// The file.
-        program: PathBuf,
-        /// The beginning of what it said.
-        answer: String,
-    },
-}
-
 impl Build {
     /// The build in a file.
     ///
     /// # Errors
-    /// When it cannot be read or started, or is another program.
-    pub fn of(program: &Path) -> Result<Self, BuildError> {
-        let failed = |source| BuildError::Read { program: program.to_owned(), source };
+    /// In words, when it cannot be read or started, or is another program.
+    pub fn of(program: &Path) -> Result<Self, String> {
+        let failed = |error: io::Error| format!("{}: {error}", program.display());
         // A worker is started from any folder.
         let program = fs::canonicalize(program).map_err(failed)?;
         let bytes = fs::read(&program).map_err(failed)?;
@@ -212,8 +180,11 @@ impl Build {
         let said = Command::new(&program).arg("--version").output().map_err(failed)?;
         let answer = String::from_utf8_lossy(&said.stdout).trim().to_owned();
         let Some(version) = answer.strip_prefix("medial ") else {
-            let answer = answer.chars().take(40).collect();
-            return Err(BuildError::Foreign { program, answer });
+            let (answer, program): (String, _) =
+                (answer.chars().take(40).collect(), program.display());
+            return Err(format!(
+                "{program}: no build of this program: `--version` gave {answer:?}"
+            ));
         };
         let provenance = Provenance {
             binary_hash: hex_digest(&bytes),

@@ -26,7 +26,7 @@ use crate::plugin;
 use crate::plugin::ProgramPeak;
 use crate::provenance::{Provenance, hex};
 use crate::study::external::GIVEN;
-use crate::study::item::{Item, Measure, Noise, SceneSpec};
+use crate::study::item::{Item, Noise, SceneSpec};
 use crate::study::source::Input;
 
 /// An input, ready to be simplified and measured, with noise or without.
@@ -80,11 +80,6 @@ impl Scene {
         Ok(Self { spec, input, judge, clean, noisy: None })
     }
 
-    /// How results are measured.
-    pub fn measure(&self) -> Measure {
-        self.spec.measure
-    }
-
     /// Whether items of this spec run here, noise aside.
     pub fn serves(&self, spec: &SceneSpec) -> bool {
         self.spec == spec.without_noise()
@@ -114,11 +109,6 @@ impl Scene {
     /// The shape that methods run on.
     pub fn shape(&self) -> &Shape {
         &self.ready().shape
-    }
-
-    /// The initial medial mesh of that shape; `None` where there is none.
-    pub fn initial(&self) -> Option<Initial> {
-        self.ready().initial
     }
 
     fn ready(&self) -> &Ready {
@@ -185,12 +175,12 @@ pub fn judge(scene: &Scene, runs: &[LevelRun]) -> Vec<Option<Verdict>> {
 }
 
 fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
-    let measure = scene.measure();
     let hash = mesh_hash(mesh);
     // Hashed before: the hash is that of the method's own output.
     let mesh = scene.carried(mesh);
     let begun = Instant::now();
-    let certified = measure.certify.map(|width| scene.judge.certify(&mesh, width)).transpose();
+    let certified =
+        scene.spec.measure.certify.map(|width| scene.judge.certify(&mesh, width)).transpose();
     let evaluation = certified
         .and_then(|certified| Ok(Evaluation { certified, ..scene.judge.evaluate(&mesh)? }));
     let seconds = begun.elapsed().as_secs_f64();
@@ -245,7 +235,14 @@ pub fn failure_record(
         evaluate: None,
         evaluate_seconds: None,
         initial: None,
-        conditions: Some(conditions(item)),
+        conditions: Some(Conditions {
+            sampling: scene.sampling.to_string(),
+            dual: scene.dual.to_string(),
+            samples: scene.measure.samples,
+            seconds_limit: item.limits.seconds,
+            bytes_limit: item.limits.bytes,
+            fingerprint: item.method.fingerprint.clone(),
+        }),
         result_hash: None,
         seeds: seeds.map(|(purpose, seed)| (purpose.to_owned(), seed)).into(),
         repetitions: vec![],
@@ -255,18 +252,6 @@ pub fn failure_record(
         command: provenance.command.clone(),
         version: provenance.version.clone(),
         artifact: None,
-    }
-}
-
-fn conditions(item: &Item) -> Conditions {
-    let scene = &item.scene;
-    Conditions {
-        sampling: scene.sampling.to_string(),
-        dual: scene.dual.to_string(),
-        samples: scene.measure.samples,
-        seconds_limit: item.limits.seconds,
-        bytes_limit: item.limits.bytes,
-        fingerprint: item.method.fingerprint.clone(),
     }
 }
 
@@ -289,7 +274,7 @@ pub fn record(
     // Built from the failure of the level, so that both kinds of records have the same fields.
     let mut record = failure_record(item, run.level, &fault, provenance);
     record.mesh_hash = Some(scene.input.hash.clone());
-    record.initial = scene.initial();
+    record.initial = scene.ready().initial;
     // To read a file says nothing of the time that its program took.
     if !is_given {
         record.repetitions = vec![repetition(&run.times)];

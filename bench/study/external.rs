@@ -23,9 +23,9 @@ use medial_reports::Target;
 use serde::{Deserialize, Serialize};
 
 use crate::plugin::OwnSeconds;
-use crate::provenance::hex_digest;
+use crate::provenance::{Provenance, hex_digest};
 use crate::study::item::{Item, MethodSpec, SceneSpec};
-use crate::study::{Here, Study, StudyError};
+use crate::study::{Study, StudyError};
 
 /// Id of the pseudo-method.
 pub const GIVEN: &str = "given";
@@ -216,7 +216,7 @@ fn prepare<'s>(
 ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
     let GivenParams { file, same_as, fit, radii, lenient, block, claimed_seconds, .. } = params;
     let options = AxisOptions { lenient, block, radii, fit };
-    let read = read_axis(&file, shape, &options);
+    let read = read_axis(&file, shape, options);
     let (loaded, _) = read.map_err(|error| SimplifyError::Parameter(error.to_string()))?;
     // How the file was read belongs to the result: it decides the numbers.
     let (mesh, mut remarks) = loaded.with_remarks();
@@ -348,7 +348,7 @@ impl Study {
     }
 
     /// The item that judges a given file.
-    pub(crate) fn given_item(&self, scene: SceneSpec, file: &GivenFile, here: &Here) -> Item {
+    pub(crate) fn given_item(&self, scene: SceneSpec, file: &GivenFile, here: &Provenance) -> Item {
         let params = serde_json::to_value(&file.params).and_then(serde_json::from_value);
         let method = MethodSpec {
             id: GIVEN.to_owned(),
@@ -488,7 +488,7 @@ pub struct AxisError(String);
 pub fn read_axis(
     path: &Path,
     shape: &Shape,
-    options: &AxisOptions,
+    options: AxisOptions,
 ) -> Result<(LoadedMa, Option<Fit>), AxisError> {
     let named = |why: &dyn Display| AxisError(format!("{}: {why}", path.display()));
     let from_surface = options.radii == RadiiFrom::Surface;

@@ -27,7 +27,7 @@ use crate::provenance::{Provenance, hex_digest};
 use crate::study::external::Given;
 use crate::study::item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
 use crate::study::library::{Library, PublicError};
-use crate::study::registry::{Entry, INITIAL, Registry, RegistryError};
+use crate::study::registry::{Entry, INITIAL, Registry};
 use crate::study::source::{Input, InputError, Source, did_you_mean};
 
 /// Items are ended after so many seconds unless told otherwise.
@@ -269,23 +269,12 @@ pub enum StudyError {
     /// A value makes no sense.
     #[error("{0}")]
     Value(String),
-    /// No such method.
-    #[error("{}", no_such_method(id, known))]
-    Method {
-        /// What was asked.
-        id: String,
-        /// What there is.
-        known: Vec<String>,
-    },
     /// An input is wrong.
     #[error(transparent)]
     Input(#[from] InputError),
     /// A set is unknown, or not here.
     #[error(transparent)]
     Library(#[from] PublicError),
-    /// A plug-in file is wrong.
-    #[error(transparent)]
-    Registry(#[from] RegistryError),
 }
 
 /// The message for an id that no method has, naming those that exist.
@@ -294,34 +283,11 @@ pub fn no_such_method(id: &str, known: &[String]) -> String {
     format!("no method is called `{id}`{meant}; there are: {}", known.join(", "))
 }
 
-/// What is the same for all items of this process.
-#[derive(Clone, Debug)]
-pub struct Here {
-    /// SHA-256 of the program.
-    pub binary: String,
-    /// Threads where a study says nothing.
-    pub threads: usize,
-    /// Memory of the machine, in bytes; 0 where it is not known.
-    pub memory: u64,
-}
-
-impl Here {
-    /// What this process is.
-    pub fn of(provenance: &Provenance) -> Self {
-        Self {
-            binary: provenance.binary_hash.clone(),
-            threads: rayon::current_num_threads(),
-            memory: provenance.machine.memory,
-        }
-    }
-}
-
 impl Study {
     /// The methods of the study: those named, or all there are.
     ///
     /// # Errors
-    /// [`StudyError::Method`] for an id that no method has; [`StudyError::Value`] for two rows of
-    /// one name.
+    /// [`StudyError::Value`] for an id that no method has, and for two rows of one name.
     pub fn entries<'r>(
         &self,
         registry: &'r Registry,
@@ -341,10 +307,8 @@ impl Study {
         }
         let mut found: Vec<(StudyMethod, &Entry)> = Vec::new();
         for method in &methods {
-            let entry = registry.entry(&method.id).ok_or_else(|| StudyError::Method {
-                id: method.id.clone(),
-                known: registry.entries().iter().map(|entry| entry.id().to_owned()).collect(),
-            })?;
+            let entry = registry.entry(&method.id);
+            let entry = entry.ok_or_else(|| StudyError::Value(registry.no_such(&method.id)))?;
             // The same row twice would be one row with twice the weight.
             if found.iter().any(|(other, _)| other == method) {
                 continue;
@@ -389,7 +353,7 @@ impl Study {
     ///
     /// # Errors
     /// As [`Study::check`], [`Study::entries`] and [`Study::sources`].
-    pub fn items(&self, registry: &Registry, here: &Here) -> Result<Vec<Item>, StudyError> {
+    pub fn items(&self, registry: &Registry, here: &Provenance) -> Result<Vec<Item>, StudyError> {
         self.check()?;
         let methods = self.entries(registry)?;
         let sources = self.sources()?;
@@ -427,7 +391,7 @@ impl Study {
                     let fingerprint = entry.fingerprint().map(str::to_owned);
                     let spec = MethodSpec { id, name, params, fingerprint };
                     let (levels, version) =
-                        (self.levels(method, entry), entry.version(&here.binary));
+                        (self.levels(method, entry), entry.version(&here.binary_hash));
                     items.push(self.item(scene.clone(), spec, levels, version, here));
                 }
             }
@@ -443,7 +407,7 @@ impl Study {
         method: MethodSpec,
         levels: Vec<Target>,
         version: String,
-        here: &Here,
+        here: &Provenance,
     ) -> Item {
         Item {
             scene,
@@ -451,17 +415,20 @@ impl Study {
             levels,
             seed: self.seed,
             repeat: self.repeat,
-            threads: self.threads.unwrap_or(here.threads),
+            threads: self.threads.unwrap_or_else(rayon::current_num_threads),
             limits: self.limits(here),
             version,
-            binary: here.binary.clone(),
+            binary: here.binary_hash.clone(),
         }
     }
 
     /// The limits of each item.
-    pub fn limits(&self, here: &Here) -> Limits {
+    pub fn limits(&self, here: &Provenance) -> Limits {
         // A quarter is left for the supervisor, the system and the judge.
-        let machine = if here.memory == 0 { u64::MAX } else { here.memory / 4 * 3 };
+        let machine = match here.machine.memory {
+            0 => u64::MAX,
+            memory => memory / 4 * 3,
+        };
         let bytes = self.memory.map_or(machine, |megabytes| megabytes.saturating_mul(1_000_000));
         Limits { seconds: self.timeout, bytes }
     }

@@ -112,23 +112,12 @@ impl Entry {
     }
 }
 
-/// Why a registry cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum RegistryError {
-    /// Two methods of the program have one id.
-    #[error("two methods are called `{0}`; give one of them another id")]
-    Duplicate(String),
-    /// A plug-in file is wrong.
-    #[error(transparent)]
-    Plugin(#[from] PluginError),
-}
-
 impl Registry {
     /// The methods of a program.
     ///
     /// # Errors
-    /// [`RegistryError::Duplicate`] when two have one id.
-    pub fn new(methods: Vec<Registered>) -> Result<Self, RegistryError> {
+    /// In words, when two have one id.
+    pub fn new(methods: Vec<Registered>) -> Result<Self, String> {
         let mut initial = Entry::new(initial::method().into(), None);
         initial.version = medial_methods::version(INITIAL);
         let given = Entry::new(crate::study::external::method().into(), None);
@@ -137,7 +126,7 @@ impl Registry {
         for registered in methods {
             let id = &registered.method.info().id;
             if registry.entry(id).is_some() {
-                return Err(RegistryError::Duplicate(id.clone().into_owned()));
+                return Err(format!("two methods are called `{id}`; give one of them another id"));
             }
             registry.add(Entry::new(registered, None));
         }
@@ -154,7 +143,7 @@ impl Registry {
     ///
     /// # Errors
     /// When the file is wrong, or an id is taken.
-    pub fn add_plugins(&mut self, file: &Path) -> Result<(), RegistryError> {
+    pub fn add_plugins(&mut self, file: &Path) -> Result<(), PluginError> {
         let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
         // A study file and the command line may both name it.
         if self.files.contains(&file) {
@@ -190,6 +179,12 @@ impl Registry {
     /// The method with an id, the chain of two (`FIRST+THEN`), [`INITIAL`] or [`GIVEN`](super::external::GIVEN).
     pub fn entry(&self, id: &str) -> Option<&Entry> {
         self.entries.iter().chain(&self.others).find(|entry| entry.id() == id)
+    }
+
+    /// The message for an id that no method has.
+    pub fn no_such(&self, id: &str) -> String {
+        let known: Vec<String> = self.entries.iter().map(|entry| entry.id().to_owned()).collect();
+        super::no_such_method(id, &known)
     }
 
     /// All methods, without chains and the initial medial mesh.

@@ -60,7 +60,7 @@ impl Source {
     /// Reads an argument: `builtin:ID` or `builtin:ID:RESOLUTION`, `dataset:NAME`, else a path.
     ///
     /// # Errors
-    /// [`InputError::Resolution`] when the resolution is not a number; [`InputError::Library`] when the library has no
+    /// [`InputError::BuiltIn`] when the resolution is not a number; [`InputError::Library`] when the library has no
     /// such mesh.
     pub fn parse(argument: &Path) -> Result<Self, InputError> {
         if let Some(name) = argument.to_str().and_then(|text| text.strip_prefix(DATASET)) {
@@ -73,7 +73,11 @@ impl Source {
             None => (spec, None),
             Some((id, text)) => {
                 // Anything behind the second colon: a typing error must not become the default.
-                let resolution = text.parse().map_err(|_| InputError::Resolution(text.into()))?;
+                let resolution = text.parse().map_err(|_| {
+                    InputError::BuiltIn(format!(
+                        "`{text}` is not a resolution: write builtin:ID:NUMBER"
+                    ))
+                })?;
                 (id, Some(resolution))
             }
         };
@@ -223,17 +227,28 @@ fn built_in(
     id: &str,
     resolution: Option<u32>,
 ) -> Result<(medial_datasets::BuiltIn, u32), InputError> {
-    let shape = medial_datasets::find(id).ok_or_else(|| InputError::NoSuchShape(id.to_owned()))?;
+    let shape = medial_datasets::find(id).ok_or_else(|| {
+        let ids = medial_datasets::catalogue().into_iter().map(|shape| shape.id);
+        let meant = did_you_mean(id, ids.collect::<Vec<_>>());
+        InputError::BuiltIn(format!(
+            "no built-in shape is called `{id}`{meant}; `medial datasets list` names them all"
+        ))
+    })?;
     let resolution = resolution.unwrap_or(shape.default_resolution);
     let range = shape.resolutions();
     if !range.contains(&resolution) {
-        let (least, most) = (*range.start(), *range.end());
-        return Err(InputError::OutOfRange { resolution, least, most });
+        let (least, most) = (range.start(), range.end());
+        return Err(InputError::BuiltIn(format!(
+            "resolution {resolution} is out of range: this shape takes {least} to {most}"
+        )));
     }
     // Estimated, because making the mesh is what would take too long.
     let vertices = estimated_vertices(&shape, resolution);
     if vertices > MAX_VERTICES {
-        return Err(InputError::TooManyVertices { resolution, vertices });
+        return Err(InputError::BuiltIn(format!(
+            "resolution {resolution} would make about {vertices:.1e} vertices, above the most of \
+             {MAX_VERTICES:.0e}: ask for a coarser one"
+        )));
     }
     Ok((shape, resolution))
 }
@@ -254,12 +269,6 @@ fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
 fn meant_shape(path: &Path) -> String {
     let id = path.file_name().and_then(|name| medial_datasets::find(name.to_str()?));
     id.map_or(String::new(), |shape| format!("; the built-in shape is `builtin:{}`", shape.id))
-}
-
-/// The shape that may have been meant by an id that none has.
-fn meant(id: &str) -> String {
-    let ids: Vec<_> = medial_datasets::catalogue().into_iter().map(|shape| shape.id).collect();
-    did_you_mean(id, ids)
 }
 
 /// Coordinates and faces in their order, after reading.
@@ -286,33 +295,9 @@ pub enum InputError {
     /// The library has no such mesh.
     #[error(transparent)]
     Library(#[from] PublicError),
-    /// The catalogue has no such shape.
-    #[error("no built-in shape is called `{0}`{meant}; `medial datasets list` names them all", meant = meant(.0))]
-    NoSuchShape(String),
-    /// A built-in shape would be too large at this resolution.
-    #[error(
-        "resolution {resolution} would make about {vertices:.1e} vertices, above the most of \
-         {MAX_VERTICES:.0e}: ask for a coarser one"
-    )]
-    TooManyVertices {
-        /// What was asked.
-        resolution: u32,
-        /// Estimated number of vertices.
-        vertices: f64,
-    },
-    /// The resolution of a built-in shape is not a number.
-    #[error("`{0}` is not a resolution: write builtin:ID:NUMBER")]
-    Resolution(String),
-    /// The resolution of a built-in shape is out of its range.
-    #[error("resolution {resolution} is out of range: this shape takes {least} to {most}")]
-    OutOfRange {
-        /// What was asked.
-        resolution: u32,
-        /// Coarsest resolution that shows every feature.
-        least: u32,
-        /// Finest resolution.
-        most: u32,
-    },
+    /// There is no such built-in shape, or not at this resolution.
+    #[error("{0}")]
+    BuiltIn(String),
 }
 
 /// Smallest Jaro-Winkler similarity (1 for equal words) of a suggestion.

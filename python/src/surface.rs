@@ -194,7 +194,7 @@ impl Surface {
         long(py, &call, move |_, monitor| {
             monitor.at("reading");
             let shape = model.shape(&ShapeOptions::default())?;
-            let (loaded, _) = read_axis(&path, &shape, &options).map_err(Failure::input)?;
+            let (loaded, _) = read_axis(&path, &shape, options).map_err(Failure::input)?;
             let (mesh, remarks) = loaded.with_remarks();
             Ok((Axis::new(mesh, Some(shape)), remarks))
         })

@@ -25,9 +25,16 @@ pub fn criterion() -> Criterion {
         .nresamples(RESAMPLES)
 }
 
+/// Runs the groups of a program, after saying how long that takes.
+pub fn run(slow: &[(&str, f64)], groups: fn()) {
+    announce(slow);
+    groups();
+    Criterion::default().configure_from_args().final_summary();
+}
+
 /// Says how many benchmarks the words of the command line select, and about how long they take. `slow` says for parts of
 /// names how many seconds more each takes whose runs are longer than the samples have time.
-pub fn announce(slow: &[(&str, f64)]) {
+fn announce(slow: &[(&str, f64)]) {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let has = |word: &str| arguments.iter().any(|argument| argument == word);
     // `cargo test --benches` and `--list` measure nothing.
