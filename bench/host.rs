@@ -53,13 +53,8 @@ impl Host {
     pub fn command(&self) -> Command {
         let mut command = Command::new(&self.program);
         command.args(&self.arguments);
-        // An interpreter finds its library by its own name.
-        if self.is_foreign() { command } else { named(command) }
-    }
-
-    /// Whether the command is a part of another program.
-    pub fn is_foreign(&self) -> bool {
-        !self.arguments.is_empty()
+        // An interpreter, which needs arguments, finds its library by its own name.
+        if self.arguments.is_empty() { named(command) } else { command }
     }
 }
 

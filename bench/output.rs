@@ -89,6 +89,22 @@ pub fn print_json(object: &impl Serialize, warnings: &[String]) {
     print_raw(&format!("{}\n", Value::Object(object)));
 }
 
+/// Prints the result of a verb: the object with `--json`, else the text and the warnings.
+pub fn print_result(
+    global: &Global,
+    object: &impl Serialize,
+    text: &str,
+    warnings: &[String],
+) -> Exit {
+    if global.json {
+        print_json(object, warnings);
+    } else {
+        print_line(text);
+        warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
+    }
+    Exit::Done
+}
+
 /// Lines without control characters.
 fn printable_lines(text: &str) -> String {
     // Line breaks are ours, all other control characters come from names.

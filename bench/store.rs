@@ -235,14 +235,18 @@ fn read_known(path: &Path) -> io::Result<(HashMap<String, Known>, bool)> {
     Ok((known, false))
 }
 
+/// Whether a path of a record stays in its store.
+pub fn is_inside(path: &str) -> bool {
+    Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
+}
+
 /// Removes the medial meshes that records name.
 // A file that cannot be removed stays: without a record it does not count as a result.
 fn remove_artifacts(dir: &Path, journal: &Path) {
     let Ok(journaled) = read_records(journal) else { return };
     for artifact in journaled.records.iter().filter_map(|record| record.artifact.as_deref()) {
         // A journal from elsewhere must not name files outside of its folder for removal.
-        let inside = Path::new(artifact).components().all(|c| matches!(c, Component::Normal(_)));
-        if inside && artifact.ends_with(".ma") {
+        if is_inside(artifact) && artifact.ends_with(".ma") {
             let path = dir.join(artifact);
             let _ = fs::remove_file(&path);
             // Succeeds for a folder that is empty now.

@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::args::{Global, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_output, shape_of};
-use crate::output::{StageCosts, counted, print_json, print_line};
+use crate::output::{StageCosts, counted, print_result};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
 
@@ -68,36 +68,27 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             (4 * shape.samples().len()).min(1_000_000)
         ));
     }
-    if global.json {
-        let object = json!({
-            "spheres": counts.spheres, "edges": counts.edges, "faces": counts.faces,
-            "isolated": counts.isolated, "euler": complex::euler(&mesh), "betti": betti,
-            "expected_betti": expected, "samples": shape.samples().len(),
-            "sampling": shape.options().sampling.to_string(), "seed": arguments.substrate.seed,
-            "in_guard_band": shape.cells().map_or(0, |cells| cells.in_guard_band),
-            "seconds": seconds, "cpu_seconds": cpu_seconds, "peak_bytes": peak_bytes(),
-            "output": arguments.output,
-        });
-        print_json(&object, &warnings);
-        return Ok(Exit::Done);
-    }
-    print_line(&format!(
-        "{}: {}, {}, {} from {} samples in {:.2} s",
+    let object = json!({
+        "spheres": counts.spheres, "edges": counts.edges, "faces": counts.faces,
+        "isolated": counts.isolated, "euler": complex::euler(&mesh), "betti": betti,
+        "expected_betti": expected, "samples": shape.samples().len(),
+        "sampling": shape.options().sampling.to_string(), "seed": arguments.substrate.seed,
+        "in_guard_band": shape.cells().map_or(0, |cells| cells.in_guard_band),
+        "seconds": seconds, "cpu_seconds": cpu_seconds, "peak_bytes": peak_bytes(),
+        "output": arguments.output,
+    });
+    let demanded =
+        expected.map_or_else(String::new, |expected| format!(", the solid's {expected:?}"));
+    let written = arguments.output.as_ref();
+    let written = written.map_or_else(String::new, |o| format!("\n  written: {}", o.display()));
+    let text = format!(
+        "{}: {}, {}, {} from {} samples in {:.2} s\n  Betti numbers {betti:?}{demanded}{written}",
         input.name,
         counted(counts.spheres, "sphere"),
         counted(counts.edges, "edge"),
         counted(counts.faces, "face"),
         shape.samples().len(),
         stages.total()
-    ));
-    let demanded =
-        expected.map_or_else(String::new, |expected| format!(", the solid's {expected:?}"));
-    print_line(&format!("  Betti numbers {betti:?}{demanded}"));
-    for warning in warnings {
-        print_line(&format!("  warning: {warning}"));
-    }
-    if let Some(output) = &arguments.output {
-        print_line(&format!("  written: {}", output.display()));
-    }
-    Ok(Exit::Done)
+    );
+    Ok(print_result(global, &object, &text, &warnings))
 }

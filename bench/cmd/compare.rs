@@ -20,7 +20,7 @@ use crate::study::external::Given;
 use crate::study::item::Item;
 use crate::study::registry::Registry;
 use crate::study::source::Source;
-use crate::study::{Shard, Study, StudyMethod};
+use crate::study::{Study, StudyMethod, shard};
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
@@ -116,8 +116,8 @@ pub fn run(
     arguments.apply_to_methods(&mut study, registry)?;
     let provenance = Provenance::here();
     let mut items = study.items(registry, &provenance)?;
-    if let Some(shard) = arguments.shard.as_deref().map(Shard::parse).transpose()? {
-        items = shard.share(items);
+    if let Some(text) = &arguments.shard {
+        items = shard(text, &items)?;
     }
     let interrupted = interrupt::listen();
     let axes = Some(arguments.out.join(AXES));

@@ -7,7 +7,7 @@ use std::{env, fs};
 use clap::{Args, Subcommand};
 use medial::surface;
 use medial_datasets::published::{Published, Set};
-use medial_datasets::{BuiltIn, NoiseKind, published};
+use medial_datasets::{NoiseKind, published};
 use serde_json::{Value, json};
 
 use crate::args::{Global, positive};
@@ -170,32 +170,33 @@ fn list_all(global: &Global) -> Result<Exit, Failure> {
     let states = states.collect::<Result<Vec<_>, Failure>>()?;
     if global.json {
         let published: Vec<_> = states.iter().map(|&(m, s)| published(&library, m, s)).collect();
+        let datasets = shapes.iter().map(|shape| {
+            json!({
+                "id": shape.id, "title": shape.title, "summary": shape.summary,
+                "betti": shape.expected_betti, "default_resolution": shape.default_resolution,
+                "known_axis": shape.axis().is_some(), "in_default": shape.in_default,
+            })
+        });
         let object = json!({
-            "datasets": shapes.iter().map(shape).collect::<Vec<_>>(),
+            "datasets": datasets.collect::<Vec<_>>(),
             "published": published, "cache": library.folder(),
         });
         print_json(&object, &[]);
         return Ok(Exit::Done);
     }
-    shapes.iter().for_each(print_shape);
+    for shape in &shapes {
+        let axis = if shape.axis().is_some() { "axis known" } else { "" };
+        print_line(&format!(
+            "{:<14} betti {:?}  {axis:<10}  {}",
+            shape.id, shape.expected_betti, shape.summary
+        ));
+    }
     let in_default = shapes.iter().filter(|shape| shape.in_default).count();
     print_line(&format!("compare takes the first {in_default} where no mesh is named"));
     for set in Set::ALL {
         print_set(set, &states);
     }
     Ok(Exit::Done)
-}
-
-fn shape(shape: &BuiltIn) -> Value {
-    json!({
-        "id": shape.id,
-        "title": shape.title,
-        "summary": shape.summary,
-        "betti": shape.expected_betti,
-        "default_resolution": shape.default_resolution,
-        "known_axis": shape.axis().is_some(),
-        "in_default": shape.in_default,
-    })
 }
 
 fn published(library: &Library, mesh: &Published, state: State) -> Value {
@@ -206,14 +207,6 @@ fn published(library: &Library, mesh: &Published, state: State) -> Value {
     object["state"] = state.key().into();
     object["file"] = json!((state == State::Here).then(|| library.path(mesh)));
     object
-}
-
-fn print_shape(shape: &BuiltIn) {
-    let axis = if shape.axis().is_some() { "axis known" } else { "" };
-    print_line(&format!(
-        "{:<14} betti {:?}  {axis:<10}  {}",
-        shape.id, shape.expected_betti, shape.summary
-    ));
 }
 
 fn print_set(set: Set, states: &[(&Published, State)]) {

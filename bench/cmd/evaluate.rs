@@ -60,7 +60,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     // One file keeps the exit codes and the object of a single evaluation.
     if rows.len() == 1 {
         let row = rows.remove(0)?;
-        print_one(&row, warnings, global);
+        row.notes.iter().for_each(|line| note(global, line));
+        let warnings = [&row.defects[..], warnings].concat();
+        if global.json {
+            print_json(&row, &warnings);
+        } else {
+            print_evaluation(&row.evaluation);
+            let all = row.evaluation.warnings.iter().chain(&warnings);
+            all.for_each(|warning| print_line(&format!("  warning: {warning}")));
+        }
         return Ok(Exit::Done);
     }
     let refused = rows.iter().filter(|row| row.is_err()).count();
@@ -115,21 +123,6 @@ fn evaluate(
     }
     let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(failed)? };
     Ok(Evaluated { evaluation, fit, notes, defects })
-}
-
-fn print_one(row: &Evaluated, warnings: &[String], global: &Global) {
-    for line in &row.notes {
-        note(global, line);
-    }
-    let warnings = [&row.defects[..], warnings].concat();
-    if global.json {
-        print_json(row, &warnings);
-        return;
-    }
-    print_evaluation(&row.evaluation);
-    for warning in row.evaluation.warnings.iter().chain(&warnings) {
-        print_line(&format!("  warning: {warning}"));
-    }
 }
 
 /// The evaluations next to each other: a row for each metric, a column for each file.

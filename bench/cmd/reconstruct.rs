@@ -17,7 +17,7 @@ use serde_json::{Map, Value, json};
 use crate::args::{Global, MeshArgument, SubstrateArguments, fraction};
 use crate::exit::{Exit, Failure};
 use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, shape_of};
-use crate::output::{StageCosts, counted, print_json, print_line};
+use crate::output::{StageCosts, counted, print_result};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
 use crate::study::external::{AxisOptions, FitBy, RadiiFrom, percent, read_axis};
@@ -127,25 +127,21 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         ));
     }
     drop(line);
-    if global.json {
-        let [seconds, cpu_seconds] = stages.seconds();
-        let mut object = json!({
-            "method": method, "vertices": report.vertices, "faces": report.faces,
-            "closed": report.closed, "manifold": report.manifold, "genus": report.genus,
-            "components": report.components, "intersecting_pairs": report.intersecting_pairs,
-            "tolerance": made.tolerance, "diagonal": made.diagonal,
-            "betti": report.expected_betti, "union_betti": made.union,
-            "deviation": deviation.map(|[max, mean]| json!({ "max": max, "mean": mean })),
-            "seconds": seconds, "cpu_seconds": cpu_seconds, "peak_bytes": peak, "output": output,
-        });
-        let more: Map<String, Value> = serde_json::from_value(made.more).unwrap_or_default();
-        more.into_iter().for_each(|(key, value)| object[key] = value);
-        print_json(&object, &warnings);
-        return Ok(Exit::Done);
-    }
+    let [seconds, cpu_seconds] = stages.seconds();
+    let mut object = json!({
+        "method": method, "vertices": report.vertices, "faces": report.faces,
+        "closed": report.closed, "manifold": report.manifold, "genus": report.genus,
+        "components": report.components, "intersecting_pairs": report.intersecting_pairs,
+        "tolerance": made.tolerance, "diagonal": made.diagonal,
+        "betti": report.expected_betti, "union_betti": made.union,
+        "deviation": deviation.map(|[max, mean]| json!({ "max": max, "mean": mean })),
+        "seconds": seconds, "cpu_seconds": cpu_seconds, "peak_bytes": peak, "output": output,
+    });
+    let more: Map<String, Value> = serde_json::from_value(made.more).unwrap_or_default();
+    more.into_iter().for_each(|(key, value)| object[key] = value);
     let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
     let yes = |flag: bool| if flag { "" } else { "not " };
-    print_line(&format!(
+    let mut text = format!(
         "{}: {}, {} in {:.2} s\n  {}closed, {}manifold, {}, genus {genus}",
         output.display(),
         counted(report.vertices as u64, "vertex"),
@@ -154,12 +150,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         yes(report.closed),
         yes(report.manifold),
         counted(report.components as u64, "component")
-    ));
+    );
     if let Some([max, mean]) = deviation.map(|deviation| deviation.map(percent)) {
-        print_line(&format!("  from the mesh: at most {max}, mean {mean}"));
+        text += &format!("\n  from the mesh: at most {max}, mean {mean}");
     }
-    warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
-    Ok(Exit::Done)
+    Ok(print_result(global, &object, &text, &warnings))
 }
 
 /// The shape and the medial mesh, in its own units, where they are named, and what was repaired.

@@ -16,7 +16,7 @@ use serde_json::json;
 use crate::args::{Global, MeshArgument, fraction};
 use crate::exit::{Exit, Failure};
 use crate::files::{self, check_extension, check_folder, shape_of};
-use crate::output::{counted, print_json, print_line};
+use crate::output::{counted, print_result};
 use crate::progress::StageLine;
 use crate::study::external::{AxisOptions, percent, read_axis};
 
@@ -130,19 +130,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     files::write(output, &bytes)?;
     drop(line);
     let (width, height) = (picture.width(), picture.height());
-    if global.json {
-        let errors = deviations.iter().map(|d| json!({ "max": d.max(), "mean": d.mean() }));
-        let object = json!({
-            "output": output, "width": width, "height": height,
-            "direction": camera.direction.to_array(), "up": camera.up.to_array(),
-            "errors": errors.collect::<Vec<_>>(), "seconds": drawing.seconds,
-        });
-        print_json(&object, &read.warnings);
-        return Ok(Exit::Done);
-    }
-    print_line(&format!("{}: {width} x {height} pixels", output.display()));
-    read.warnings.iter().for_each(|warning| print_line(&format!("  warning: {warning}")));
-    Ok(Exit::Done)
+    let errors = deviations.iter().map(|d| json!({ "max": d.max(), "mean": d.mean() }));
+    let object = json!({
+        "output": output, "width": width, "height": height,
+        "direction": camera.direction.to_array(), "up": camera.up.to_array(),
+        "errors": errors.collect::<Vec<_>>(), "seconds": drawing.seconds,
+    });
+    let text = format!("{}: {width} x {height} pixels", output.display());
+    Ok(print_result(global, &object, &text, &read.warnings))
 }
 
 /// What is drawn, as far as there are medial meshes for it.

@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files::check_folder;
-use crate::output::{print_json, print_line};
+use crate::output::print_result;
 
 /// Arguments of `repair`.
 #[derive(Debug, Args)]
@@ -55,25 +55,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     // Only a solid comes this far: a surface that is still refused is an error above.
     surface::write(&arguments.output, &mended.mesh).map_err(Failure::input)?;
     let report = mended.report;
-    if global.json {
-        let object = json!({
-            "output": arguments.output, "vertices": report.vertices, "faces": report.faces,
-            "components": report.components, "genus": report.genus, "repairs": report.repairs,
-        });
-        print_json(&object, &report.warnings);
-        return Ok(Exit::Done);
-    }
-    print_line(&format!(
-        "{}: {} vertices, {} faces",
-        arguments.output.display(),
-        report.vertices,
-        report.faces
-    ));
-    for repair in &report.repairs {
-        print_line(&format!("  repaired: {repair}"));
-    }
-    for warning in &report.warnings {
-        print_line(&format!("  warning: {warning}"));
-    }
-    Ok(Exit::Done)
+    let object = json!({
+        "output": arguments.output, "vertices": report.vertices, "faces": report.faces,
+        "components": report.components, "genus": report.genus, "repairs": report.repairs,
+    });
+    let (output, vertices, faces) = (arguments.output.display(), report.vertices, report.faces);
+    let mut text = format!("{output}: {vertices} vertices, {faces} faces");
+    report.repairs.iter().for_each(|repair| text += &format!("\n  repaired: {repair}"));
+    Ok(print_result(global, &object, &text, &report.warnings))
 }

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
@@ -16,7 +16,7 @@ use crate::files;
 use crate::output::{print_json, print_line};
 use crate::provenance::Provenance;
 use crate::rebuild::{Rebuilt, STUDY, rebuild, records, write_study};
-use crate::store::{PAGE, RESULTS, Store};
+use crate::store::{PAGE, RESULTS, Store, is_inside};
 use crate::study::Study;
 use crate::study::registry::Registry;
 
@@ -172,11 +172,6 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
 fn is_same(a: &Record, b: &Record) -> bool {
     (a.status, &a.result_hash, &a.evaluate, &a.mesh_hash)
         == (b.status, &b.result_hash, &b.evaluate, &b.mesh_hash)
-}
-
-/// Whether a path of a record stays in its store.
-fn is_inside(path: &str) -> bool {
-    Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
 /// What tells the place of a record in its study: mesh, method with parameters, level.

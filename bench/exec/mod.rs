@@ -17,13 +17,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use medial_reports::{Record, Repetition, Status, Target};
 
 use crate::check::Outcome;
 use crate::exec::protocol::{CheckItem, Event, Request};
-use crate::exec::worker::{Said, Worker, WorkerOptions};
+use crate::exec::worker::{Worker, WorkerOptions};
 use crate::measure::answer::Fault;
 use crate::measure::failure_record;
 use crate::process_tree::signal_name;
@@ -286,7 +287,7 @@ impl<'a> Supervisor<'a> {
                 return Ok(Attempt::Ended(stage, timed_out(stage, &limits)));
             }
             match worker.listen(LOOK_AGAIN) {
-                Said::Event(event) => match *event {
+                Ok(event) => match event {
                     Event::Finished => {
                         self.worker = Some(worker);
                         return Ok(refused.map_or(Attempt::Finished, Attempt::Refused));
@@ -316,7 +317,7 @@ impl<'a> Supervisor<'a> {
                         each(event);
                     }
                 },
-                Said::Gone => {
+                Err(RecvTimeoutError::Disconnected) => {
                     let (status, last_words) = worker.collect();
                     // A refused allocation that the worker survived did not end it.
                     let memory_refused = memory_refused && !status.is_some_and(|s| s.success());
@@ -324,11 +325,11 @@ impl<'a> Supervisor<'a> {
                     return Ok(Attempt::Ended(stage, fault));
                 }
                 // Programs that the worker started are outside of its own limit.
-                Said::Nothing if worker.resident_bytes() > limits.bytes => {
+                Err(RecvTimeoutError::Timeout) if worker.resident_bytes() > limits.bytes => {
                     worker.end();
                     return Ok(Attempt::Ended(stage, out_of_memory(stage, &limits)));
                 }
-                Said::Nothing => {}
+                Err(RecvTimeoutError::Timeout) => {}
             }
         }
     }

@@ -44,16 +44,6 @@ pub struct Worker {
     pub options: WorkerOptions,
 }
 
-/// The next message of a worker.
-pub enum Said {
-    /// An event.
-    Event(Box<Event>),
-    /// Nothing yet.
-    Nothing,
-    /// Nothing any more: the process has ended, or closed its output.
-    Gone,
-}
-
 impl Worker {
     /// Starts a worker: the running program, with the verb `worker`.
     ///
@@ -104,12 +94,11 @@ impl Worker {
     }
 
     /// The next event, if it comes within `patience`.
-    pub fn listen(&self, patience: Duration) -> Said {
-        match self.events.recv_timeout(patience) {
-            Ok(event) => Said::Event(Box::new(event)),
-            Err(RecvTimeoutError::Timeout) => Said::Nothing,
-            Err(RecvTimeoutError::Disconnected) => Said::Gone,
-        }
+    ///
+    /// # Errors
+    /// [`RecvTimeoutError::Disconnected`] when the process has ended, or closed its output.
+    pub fn listen(&self, patience: Duration) -> Result<Event, RecvTimeoutError> {
+        self.events.recv_timeout(patience)
     }
 
     /// Resident bytes of the worker and of all processes that it started.

@@ -5,7 +5,7 @@
 //! | `mod` | [`Study`], what a study file can say; its items and shards |
 //! | `item` | [`Item`], all that decides a record, and its keys |
 //! | `source` | where meshes come from |
-//! | `library` | published meshes and those of the user, by name |
+//! | `library` | published meshes by name |
 //! | `external` | results computed elsewhere |
 //! | `registry` | the methods by id |
 
@@ -469,47 +469,33 @@ impl Study {
     }
 }
 
-/// One of N shares of a study's items.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    /// From 1 to `of`.
-    pub number: usize,
-    /// Number of shares.
-    pub of: usize,
-}
-
-impl Shard {
-    /// Reads `I/N`.
-    ///
-    /// # Errors
-    /// [`StudyError::Value`] where it is not two numbers, the first from 1 to the second.
-    pub fn parse(text: &str) -> Result<Self, StudyError> {
-        text.split_once('/')
-            .and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)))
-            .filter(|(number, of)| (1..=*of).contains(number))
-            .map(|(number, of)| Self { number, of })
-            .ok_or_else(|| {
-                StudyError::Value(format!("--shard {text}: write I/N with I from 1 to N"))
-            })
-    }
-
-    /// Every Nth item. The place in the whole study decides, not what a store lacks: a shard that is
-    /// run again continues with its own items. The start moves by one from mesh to mesh, so that no
-    /// shard gets one method on all meshes where N divides the number of methods.
-    pub fn share(self, items: Vec<Item>) -> Vec<Item> {
-        let mut own = Vec::new();
-        let mut mesh = 0;
-        for (place, item) in items.iter().enumerate() {
-            // Items of one mesh follow each other.
-            if place > 0 && items[place - 1].scene != item.scene {
-                mesh += usize::from(place % self.of == 0);
-            }
-            if (place + mesh) % self.of == self.number - 1 {
-                own.push(item.clone());
-            }
+/// The share `I/N` of a study's items: every Nth one, beginning with the Ith.
+///
+/// The place in the whole study decides, not what a store lacks: a shard that is
+/// run again continues with its own items. The start moves by one from mesh to mesh, so that no
+/// shard gets one method on all meshes where N divides the number of methods.
+///
+/// # Errors
+/// [`StudyError::Value`] where the text is not two numbers, the first from 1 to the second.
+pub fn shard(text: &str, items: &[Item]) -> Result<Vec<Item>, StudyError> {
+    let parsed = text.split_once('/').and_then(|(number, of)| {
+        let (number, of): (usize, usize) = (number.parse().ok()?, of.parse().ok()?);
+        (1..=of).contains(&number).then_some((number, of))
+    });
+    let (number, of) = parsed.ok_or_else(|| {
+        StudyError::Value(format!("--shard {text}: write I/N with I from 1 to N"))
+    })?;
+    let (mut own, mut mesh) = (Vec::new(), 0);
+    for (place, item) in items.iter().enumerate() {
+        // Items of one mesh follow each other.
+        if place > 0 && items[place - 1].scene != item.scene {
+            mesh += usize::from(place % of == 0);
         }
-        own
+        if (place + mesh) % of == number - 1 {
+            own.push(item.clone());
+        }
     }
+    Ok(own)
 }
 
 pub(crate) fn hash_of(path: &Path) -> Result<String, StudyError> {

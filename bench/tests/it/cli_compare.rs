@@ -95,14 +95,21 @@ fn a_refused_mesh_and_an_unsupported_level_are_rows() {
     refused(&["compare", &bad, "--counts-only", "--out", &out], 5, "");
 }
 
-/// A cube of 8 vertices at `x0 .. x0 + side`.
-fn cube_off(x0: f64, side: f64) -> String {
-    let corner = |i: u32| {
-        let c = |bit: u32| side * f64::from(i >> bit & 1);
-        format!("{} {} {}\n", x0 + c(0), c(1), c(2))
-    };
-    let quads = "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n";
-    format!("OFF\n8 6 0\n{}{quads}", (0..8).map(corner).collect::<String>())
+/// Cubes of 8 vertices, each at `x0 .. x0 + side`.
+fn cubes_off(cubes: &[(f64, f64)]) -> String {
+    const QUADS: [[usize; 4]; 6] =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let (mut vertices, mut faces) = (String::new(), String::new());
+    for (k, (x0, side)) in cubes.iter().enumerate() {
+        for i in 0..8 {
+            let [x, y, z] = [0, 1, 2].map(|bit| side * f64::from(i >> bit & 1));
+            vertices += &format!("{} {y} {z}\n", x0 + x);
+        }
+        for [a, b, c, d] in QUADS.map(|quad| quad.map(|corner| 8 * k + corner)) {
+            faces += &format!("4 {a} {b} {c} {d}\n");
+        }
+    }
+    format!("OFF\n{} {} 0\n{vertices}{faces}", 8 * cubes.len(), 6 * cubes.len())
 }
 
 #[test]
@@ -110,7 +117,7 @@ fn meshes_of_one_name_stay_apart() {
     let at = folder();
     for (folder, side) in [("a", 1.0), ("b", 2.0)] {
         fs::create_dir(at(folder)).expect("made");
-        fs::write(at(&format!("{folder}/x.off")), cube_off(0.0, side)).expect("written");
+        fs::write(at(&format!("{folder}/x.off")), cubes_off(&[(0.0, side)])).expect("written");
     }
     let (a, b, out) = (at("a/x.off"), at("b/x.off"), at("out"));
     let mut common =
@@ -159,19 +166,7 @@ fn nothing_is_no_success() {
     refused(&["simplify", "builtin:box", "-m", "angle", "--initial", &empty], 1, "empty.ma");
 
     // Two cubes that are far smaller than a billionth of the distance between them.
-    let pair = cube_off(0.0, 1.0).replace("8 6 0", "16 12 0");
-    let (header, rest) = pair.split_at("OFF\n16 12 0\n".len());
-    let second = cube_off(1e12, 1.0);
-    let lines = |text: &str, skip: usize, take: usize| {
-        text.lines().skip(skip).take(take).map(|line| format!("{line}\n")).collect::<String>()
-    };
-    let moved = lines(&second, 10, 6).lines().fold(String::new(), |text, line| {
-        let corners = line.split(' ').skip(1).map(|i| i.parse::<u32>().expect("an index") + 8);
-        text + "4 " + &corners.map(|i| i.to_string()).collect::<Vec<_>>().join(" ") + "\n"
-    });
-    let (ours, theirs) = (lines(rest, 0, 8), lines(&second, 2, 8));
-    fs::write(&far, format!("{header}{ours}{theirs}{}{moved}", lines(rest, 8, 6)))
-        .expect("written");
+    fs::write(&far, cubes_off(&[(0.0, 1.0), (1e12, 1.0)])).expect("written");
     refused(&["axis", &far], 1, "far.off");
     refused(&["axis", &far], 1, "billionth");
 }
