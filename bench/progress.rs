@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
@@ -11,6 +12,9 @@ use medial_reports::printable;
 /// Interval between updates of a line.
 // A line draws itself, because most work does not report progress.
 const INTERVAL: Duration = Duration::from_millis(250);
+
+/// Shorter stages are not shown.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Whether progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +40,9 @@ impl Progress {
         let is_drawn = verbosity == Verbosity::Progress && io::stderr().is_terminal();
         let bar = is_drawn.then(|| ProgressBar::new(total as u64));
         if let Some(bar) = &bar {
-            draw(bar, "{bar:30} {pos}/{len}  {elapsed}  {msg}");
+            let style = ProgressStyle::with_template("{bar:30} {pos}/{len}  {elapsed}  {msg}");
+            bar.set_style(style.unwrap_or(ProgressStyle::default_bar()));
+            bar.enable_steady_tick(INTERVAL);
         }
         Self { bar, verbosity, done: 0, total }
     }
@@ -77,7 +83,10 @@ impl Drop for Progress {
 }
 
 /// A line on standard error with the current stage, if that is a terminal; removed when dropped.
-pub struct StageLine(ProgressBar);
+pub struct StageLine {
+    bar: ProgressBar,
+    stage: Arc<Mutex<String>>,
+}
 
 impl StageLine {
     /// A line; none without a terminal or with [`Verbosity::Quiet`].
@@ -86,23 +95,31 @@ impl StageLine {
             Verbosity::Quiet => ProgressBar::hidden(),
             Verbosity::Progress => ProgressBar::new_spinner(),
         };
-        draw(&bar, "{msg}{share}, {elapsed}");
-        Self(bar)
+        let stage = Arc::new(Mutex::new(String::new()));
+        let shown = Arc::clone(&stage);
+        let line = move |state: &ProgressState, out: &mut dyn fmt::Write| {
+            let stage = shown.lock().unwrap_or_else(PoisonError::into_inner);
+            // A line that could not be drawn is no reason to fail.
+            let _ = out.write_str(&text(&stage, state.elapsed(), state.pos(), state.len()));
+        };
+        let style = ProgressStyle::with_template("{line}").unwrap_or(ProgressStyle::default_bar());
+        bar.set_style(style.with_key("line", line));
+        bar.enable_steady_tick(INTERVAL);
+        Self { bar, stage }
     }
 
     /// Names the stage that begins.
     pub fn at(&self, what: impl Into<String>) {
-        // The time on the line is that of the stage.
-        self.0.reset();
-        // A share of the stage before would stay until the first step of this one.
-        self.0.unset_length();
-        self.0.set_message(printable(&what.into()));
+        // The lock first and alone: drawing takes it, too.
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = what.into();
+        self.bar.reset();
+        self.bar.unset_length();
     }
 
     /// Takes the steps of a method, such as for
     /// [`RunContext::on_progress`](medial::simplifier::RunContext::on_progress).
     pub fn steps(&self) -> impl Fn(Steps) + Send + Sync + 'static {
-        let bar = self.0.clone();
+        let bar = self.bar.clone();
         move |Steps { done, total }| {
             // Some stages do not know how many steps there will be.
             if total > 0 && total < usize::MAX {
@@ -115,18 +132,31 @@ impl StageLine {
 
 impl Drop for StageLine {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
     }
 }
 
-fn draw(bar: &ProgressBar, template: &str) {
-    let share = |state: &ProgressState, out: &mut dyn fmt::Write| {
-        if state.len().is_some() {
-            // A line that could not be drawn is no reason to fail.
-            let _ = write!(out, ", {:.0} %", 100.0 * state.fraction());
-        }
-    };
-    let style = ProgressStyle::with_template(template).unwrap_or(ProgressStyle::default_bar());
-    bar.set_style(style.with_key("share", share));
-    bar.enable_steady_tick(INTERVAL);
+/// The line of a stage after some time: nothing at first, since short stages would only flicker.
+fn text(stage: &str, elapsed: Duration, done: u64, total: Option<u64>) -> String {
+    if elapsed < PATIENCE {
+        return String::new();
+    }
+    let share = total.map_or_else(String::new, |total| {
+        format!(", {:.0} %", 100.0 * done as f64 / total.max(1) as f64)
+    });
+    format!("{}{share}, {} s", printable(stage), elapsed.as_secs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_stages_that_last_are_shown() {
+        let at =
+            |seconds, total| text("measuring \u{1b}[2J", Duration::from_secs(seconds), 30, total);
+        assert_eq!(at(0, None), "");
+        assert_eq!(at(2, None), "measuring \u{fffd}[2J, 2 s");
+        assert_eq!(at(9, Some(120)), "measuring \u{fffd}[2J, 25 %, 9 s");
+    }
 }
