@@ -116,10 +116,9 @@ fn hierarchy(criterion: &mut Criterion) {
     let mut levels = pmat.prepare(&shape, &Params::none(), &run).expect("prepared");
     let end = levels.at(Level::Spheres(1)).expect("the end");
     let hierarchy = end.extras.get_shared::<Hierarchy>().expect("PMAT has a hierarchy");
-    let last = hierarchy.last_stage();
+    let half = hierarchy.steps().len() / 2;
     let mut group = criterion.benchmark_group("hierarchy");
-    let half = hierarchy.stage(last / 2);
-    group.bench_function("half as a mesh", |b| b.iter_with_large_drop(|| half.to_mesh()));
+    group.bench_function("half as a mesh", |b| b.iter_with_large_drop(|| hierarchy.mesh(half)));
     group.finish();
 }
 

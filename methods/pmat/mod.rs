@@ -44,9 +44,9 @@
 //! - Algorithm 1 queues all edges of the survivor again at each collapse. The costs of its old edges
 //!   have not changed, so here only the edges that it takes over are added. The collapses are the
 //!   same; a test compares the two.
-//! - The paper updates one mesh step by step along the record. Here each simplex is stored with the
-//!   interval of stages in which it exists ([`medial::complex::collapse::Hierarchy`]), which gives
-//!   the same meshes without replaying the record.
+//! - The paper updates one mesh step by step along the record. Here a level is the image of the initial
+//!   mesh under all collapses of its prefix ([`medial::complex::collapse::Hierarchy`]), which gives
+//!   the same meshes in any order of levels.
 
 #[cfg(test)]
 mod tests;
@@ -71,7 +71,7 @@ const PUBLISHED: f64 = 1.18;
 /// Progressive medial axis filtration as a method.
 ///
 /// Builds the whole hierarchy once, in `O(n log n)` for an initial mesh of bounded degree; then
-/// each level costs in proportion to its own size.
+/// each level costs a pass over the initial mesh.
 pub fn method() -> Method<NoParams> {
     let info = MethodInfo::new("pmat", "PMAT")
         .citation(
@@ -129,7 +129,7 @@ impl Levels {
             Level::Spheres(count) => {
                 let excess = self.hierarchy.initial().spheres.len().saturating_sub(count);
                 // Each collapse removes one sphere; components without edges remain.
-                return Ok(excess.min(self.hierarchy.last_stage()));
+                return Ok(excess.min(self.hierarchy.steps().len()));
             }
             Level::Native(scale) => level_within("s", scale, 1.0..f64::INFINITY)?,
             Level::Published => PUBLISHED,
@@ -171,7 +171,7 @@ impl Simplification for Levels {
         let mut extras = Extras::default();
         extras.insert_shared(Arc::clone(&self.hierarchy));
         Ok(Simplified {
-            mesh: self.hierarchy.stage(stage).to_mesh(),
+            mesh: self.hierarchy.mesh(stage),
             asked: level,
             native_level: scale.is_finite().then_some(scale),
             diagnostics: self.diagnose(level, stage),

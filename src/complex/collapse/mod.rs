@@ -27,7 +27,7 @@
 //! Every vertex has a stamp, which grows with each collapse at the vertex itself. A queued candidate
 //! remembers the stamps of its edge; if they differ when it is popped, it is out of date and dropped.
 
-pub use hierarchy::{Hierarchy, HierarchyError, Stage, Step};
+pub use hierarchy::{Hierarchy, HierarchyError, Step};
 pub use link::CollapseError;
 pub use queue::{Candidate, CollapseQueue, LazyHeap, Prioritised};
 use queue::{List, Pool};
@@ -443,25 +443,24 @@ pub fn replay(initial: &MedialMesh, collapses: &[Collapse]) -> MedialMesh {
     for (new, old) in (0..left.len()).filter(|&v| left[v]).enumerate() {
         renumbered[old] = new as u32;
     }
-    let map = |v: u32| renumbered[image[v as usize] as usize];
-    let mut edges: Vec<[u32; 2]> = initial.edges.iter().map(|e| e.map(map)).collect();
-    let mut faces: Vec<[u32; 3]> = initial.faces.iter().map(|f| f.map(map)).collect();
-    for edge in &mut edges {
-        edge.sort_unstable();
-    }
-    for face in &mut faces {
-        face.sort_unstable();
-    }
-    // Simplices whose vertices merged are degenerate; their lower-dimensional images are listed
-    // anyway.
-    edges.retain(|e| e[0] < e[1]);
-    faces.retain(|f| f[0] < f[1] && f[1] < f[2]);
-    edges.sort_unstable();
-    edges.dedup();
-    faces.sort_unstable();
-    faces.dedup();
+    let edges = mapped(&initial.edges, |v| renumbered[image[v as usize] as usize]);
+    let faces = mapped(&initial.faces, |v| renumbered[image[v as usize] as usize]);
     let spheres = spheres.iter().zip(&left).filter(|&(_, &l)| l).map(|(&s, _)| s).collect();
     MedialMesh { spheres, edges, faces, contacts: None }
+}
+
+/// The images of simplices with all their vertices, each once, in order. Of a simplex whose vertices
+/// merged, the image of lower dimension is among those of its own edges.
+fn mapped<const K: usize>(simplices: &[[u32; K]], image: impl Fn(u32) -> u32) -> Vec<[u32; K]> {
+    let images = simplices.iter().map(|simplex| {
+        let mut simplex = simplex.map(&image);
+        simplex.sort_unstable();
+        simplex
+    });
+    let mut mapped: Vec<[u32; K]> = images.filter(|s| s.is_sorted_by(|a, b| a < b)).collect();
+    mapped.sort_unstable();
+    mapped.dedup();
+    mapped
 }
 
 // The inversion test: whether a collapse folds a face over.
