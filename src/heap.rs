@@ -52,32 +52,30 @@ pub fn on_refusal(hook: fn()) {
     let _ = ON_REFUSAL.set(hook);
 }
 
-fn refused() {
-    if let Some(hook) = ON_REFUSAL.get() {
+/// A pointer as the system returned it, its bytes counted.
+fn counted(pointer: *mut u8, bytes: i64) -> *mut u8 {
+    if !pointer.is_null() {
+        count(bytes);
+    } else if let Some(hook) = ON_REFUSAL.get() {
         hook();
     }
+    pointer
 }
 
 fn count(bytes: i64) {
     // While a thread ends its cell may be gone: what it allocates then is not counted.
     let _ = PENDING.try_with(|pending| {
-        let sum = pending.get() + bytes;
-        if sum.abs() < HAND_OVER {
-            pending.set(sum);
-        } else {
-            pending.set(0);
-            let live = LIVE.fetch_add(sum, Ordering::Relaxed) + sum;
-            HIGHEST.fetch_max(live, Ordering::Relaxed);
+        pending.set(pending.get() + bytes);
+        if pending.get().abs() >= HAND_OVER {
+            hand_over(pending);
         }
     });
 }
 
-fn hand_over() {
-    let _ = PENDING.try_with(|pending| {
-        let sum = pending.replace(0);
-        let live = LIVE.fetch_add(sum, Ordering::Relaxed) + sum;
-        HIGHEST.fetch_max(live, Ordering::Relaxed);
-    });
+fn hand_over(pending: &Cell<i64>) {
+    let sum = pending.replace(0);
+    let live = LIVE.fetch_add(sum, Ordering::Relaxed) + sum;
+    HIGHEST.fetch_max(live, Ordering::Relaxed);
 }
 
 // SAFETY: every call goes to the system's allocator as it is; counting allocates nothing, since the
@@ -86,24 +84,12 @@ fn hand_over() {
 unsafe impl GlobalAlloc for Heap {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller's promise is passed on.
-        let pointer = unsafe { System.alloc(layout) };
-        if pointer.is_null() {
-            refused();
-        } else {
-            count(layout.size() as i64);
-        }
-        pointer
+        counted(unsafe { System.alloc(layout) }, layout.size() as i64)
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as above.
-        let pointer = unsafe { System.alloc_zeroed(layout) };
-        if pointer.is_null() {
-            refused();
-        } else {
-            count(layout.size() as i64);
-        }
-        pointer
+        counted(unsafe { System.alloc_zeroed(layout) }, layout.size() as i64)
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
@@ -115,12 +101,7 @@ unsafe impl GlobalAlloc for Heap {
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         // SAFETY: as above.
         let moved = unsafe { System.realloc(pointer, layout, size) };
-        if moved.is_null() {
-            refused();
-        } else {
-            count(size as i64 - layout.size() as i64);
-        }
-        moved
+        counted(moved, size as i64 - layout.size() as i64)
     }
 }
 
@@ -149,13 +130,13 @@ pub fn usage_apart<T>(work: impl FnOnce() -> T) -> (T, Usage) {
 /// Measures `work`; `told` is what a surrounding call learns, from the highest number of live bytes
 /// that it had seen before and the highest during the work.
 fn measured<T>(work: impl FnOnce() -> T, told: impl FnOnce(i64, i64) -> i64) -> (T, Usage) {
-    hand_over();
+    PENDING.with(hand_over);
     let before = LIVE.load(Ordering::Relaxed);
     // What the surrounding work has seen so far is put aside, and given back at the end.
     let seen = HIGHEST.swap(before, Ordering::Relaxed);
     let surrounding = SURROUNDING.swap(before, Ordering::Relaxed).max(seen);
     let value = work();
-    hand_over();
+    PENDING.with(hand_over);
     let after = LIVE.load(Ordering::Relaxed);
     let inner = SURROUNDING.load(Ordering::Relaxed);
     let highest = HIGHEST.swap(after, Ordering::Relaxed).max(inner);

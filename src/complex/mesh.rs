@@ -118,6 +118,20 @@ impl MedialMesh {
         simplex.map(|v| self.spheres[v as usize])
     }
 
+    /// Edges without a face, in their order: where a face stands for its sides, too.
+    pub(crate) fn lone_edges(&self) -> Vec<[u32; 2]> {
+        let incidence = Incidence::of(self);
+        let lone = self.edges.iter().zip(incidence.faces_at()).filter(|&(_, &faces)| faces == 0);
+        lone.map(|(&edge, _)| edge).collect()
+    }
+
+    /// Spheres without an edge, ascending.
+    pub(crate) fn isolated(&self) -> Vec<u32> {
+        let mut has_edge = vec![false; self.spheres.len()];
+        self.edges.iter().flatten().for_each(|&v| has_edge[v as usize] = true);
+        (0..).zip(has_edge).filter(|&(_, has)| !has).map(|(v, _)| v).collect()
+    }
+
     /// Verifies the canonical form and the validity of every sphere.
     ///
     /// # Errors

@@ -123,45 +123,6 @@ impl PlanarFrame {
         height * height + self.planar_distance_squared(x, y)
     }
 
-    /// Distance of `p` to the triangle, and the unit vector from its nearest point to `p`; zero
-    /// where `p` is on the triangle.
-    #[inline]
-    pub fn distance_and_direction(&self, p: Vec3) -> (f64, Vec3) {
-        let [x, y, height] = self.local(p);
-        let [left, right] = self.sides(x, y);
-        let flat = self.is_flat();
-        if y >= 0.0 && left >= 0.0 && right >= 0.0 && !flat {
-            // `signum` of zero is one: a point on the triangle has no direction.
-            let sign = if height == 0.0 { 0.0 } else { height.signum() };
-            return (height.abs(), self.normal * sign);
-        }
-        let (mut best, mut off) = (f64::INFINITY, [0.0; 2]);
-        if y < 0.0 || flat {
-            off = [x - x.clamp(0.0, self.length), y];
-            best = off[0] * off[0] + off[1] * off[1];
-        }
-        for (side, outside) in [(0, left < 0.0), (1, right < 0.0)] {
-            if outside && !flat {
-                let (t, squared) = self.along(side, x, y);
-                if squared < best {
-                    let (start, run) = self.start_and_run(side);
-                    best = squared;
-                    off = [x - start - t * run, y - t * self.apex[1]];
-                }
-            }
-        }
-        let distance = (height * height + best).sqrt();
-        let away = self.x * off[0] + self.y * off[1] + self.normal * height;
-        (distance, if distance > 0.0 { away / distance } else { Vec3::ZERO })
-    }
-
-    /// Where the side `ac` (or `bc`) starts along the base, and how far it runs along it.
-    #[inline]
-    fn start_and_run(&self, side: usize) -> (f64, f64) {
-        let cx = self.apex[0];
-        if side == 0 { (0.0, cx) } else { (self.length, cx - self.length) }
-    }
-
     /// The nearest point lies on a side whose line separates it from the query, so only those
     /// sides (one or two) are measured.
     #[inline]
@@ -188,8 +149,9 @@ impl PlanarFrame {
     /// Parameter from `a` (or `b`) to `c` of the nearest point on the side, and squared distance.
     #[inline]
     fn along(&self, side: usize, x: f64, y: f64) -> (f64, f64) {
-        let cy = self.apex[1];
-        let (start, run) = self.start_and_run(side);
+        let [cx, cy] = self.apex;
+        // Where the side starts along the base, and how far it runs along it.
+        let (start, run) = if side == 0 { (0.0, cx) } else { (self.length, cx - self.length) };
         let t = (((x - start) * run + y * cy) * self.reciprocal[side]).clamp(0.0, 1.0);
         let (dx, dy) = (x - start - t * run, y - t * cy);
         (t, dx * dx + dy * dy)

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use super::samples::{Placed, place_on_triangles};
 use super::{AxisDistances, AxisSpan, MetricError, SheetCoverage};
 use crate::Vec3;
-use crate::complex::{MedialMesh, Sphere, UnionError};
+use crate::complex::{Incidence, MedialMesh, Sphere, UnionError};
 use crate::geometry::DisjointSets;
 use crate::geometry::trees::{Bounds, Node, Plan, Search, Tree};
 use crate::surface::TriangleBvh;
@@ -87,23 +87,14 @@ fn span(there: Extent, back: Extent) -> AxisSpan {
 
 /// For each triangle the smallest triangle of its sheet.
 fn sheets(mesh: &MedialMesh) -> Vec<u32> {
-    let mut faces_of_edge = vec![(0_u32, [0_u32; 2]); mesh.edges.len()];
-    for (face, &[a, b, c]) in (0..).zip(&mesh.faces) {
-        for side in [[a, b], [a, c], [b, c]] {
-            if let Ok(edge) = mesh.edges.binary_search(&side) {
-                let (count, faces) = &mut faces_of_edge[edge];
-                if let Some(slot) = faces.get_mut(*count as usize) {
-                    *slot = face;
-                }
-                *count += 1;
-            }
-        }
-    }
+    let incidence = Incidence::of(mesh);
+    // Three triangles at an edge are a seam, where sheets end.
+    let joins = |edge: u32| incidence.faces_at()[edge as usize] == 2;
+    let mut first_at = vec![None; mesh.edges.len()];
     let mut sheets = DisjointSets::singletons(mesh.faces.len());
-    for (count, [first, second]) in faces_of_edge {
-        // Three triangles at an edge are a seam, where sheets end.
-        if count == 2 {
-            sheets.join(first, second);
+    for (face, edges) in (0..).zip(incidence.face_edges()) {
+        for &edge in edges.iter().filter(|&&edge| joins(edge)) {
+            sheets.join(face, *first_at[edge as usize].get_or_insert(face));
         }
     }
     (0..mesh.faces.len() as u32).map(|face| sheets.find(face)).collect()
@@ -150,30 +141,13 @@ impl AxisParts {
         if mesh.spheres.is_empty() {
             return Err(UnionError::Empty.into());
         }
-        let mut with_face = vec![false; mesh.edges.len()];
-        for &[a, b, c] in &mesh.faces {
-            for side in [[a, b], [a, c], [b, c]] {
-                if let Ok(edge) = mesh.edges.binary_search(&side) {
-                    with_face[edge] = true;
-                }
-            }
-        }
-        let mut with_edge = vec![false; mesh.spheres.len()];
-        for &v in mesh.edges.as_flattened() {
-            with_edge[v as usize] = true;
-        }
-        let lone = mesh.edges.iter().zip(with_face).filter(|&(_, with)| !with);
+        let spheres: Vec<DVec4> = mesh.spheres.iter().copied().map(lifted).collect();
+        let segments = mesh.lone_edges().into_iter();
         Ok(Self {
-            triangles: mesh.faces.iter().map(|&f| mesh.spheres_of(f).map(lifted)).collect(),
-            segments: lone.map(|(&e, _)| mesh.spheres_of(e).map(lifted)).collect(),
-            spheres: mesh.spheres.iter().copied().map(lifted).collect(),
-            isolated: mesh
-                .spheres
-                .iter()
-                .zip(&with_edge)
-                .filter(|&(_, &with)| !with)
-                .map(|(&sphere, _)| lifted(sphere))
-                .collect(),
+            triangles: mesh.faces.iter().map(|f| f.map(|v| spheres[v as usize])).collect(),
+            segments: segments.map(|e| e.map(|v| spheres[v as usize])).collect(),
+            isolated: mesh.isolated().into_iter().map(|v| spheres[v as usize]).collect(),
+            spheres,
         })
     }
 

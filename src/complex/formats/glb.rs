@@ -20,7 +20,7 @@ use std::collections::HashMap;
 
 use serde_json::{Map, Value, json};
 
-use super::{Look, SphereValues, isolated, lone_edges};
+use super::{Look, SphereValues};
 use crate::Vec3;
 use crate::complex::MedialMesh;
 
@@ -147,8 +147,8 @@ fn axis(out: &mut Arrays, mesh: &MedialMesh, values: &SphereValues) -> Value {
     }
     let primitives = [
         (TRIANGLES, mesh.faces.as_flattened().to_vec()),
-        (LINES, lone_edges(mesh).as_flattened().to_vec()),
-        (POINTS, isolated(mesh)),
+        (LINES, mesh.lone_edges().as_flattened().to_vec()),
+        (POINTS, mesh.isolated()),
     ];
     let primitives: Vec<Value> = primitives
         .into_iter()

@@ -255,25 +255,5 @@ fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
-/// Edges without a face, in the order of the mesh: for formats in which a face brings its sides along.
-fn lone_edges(mesh: &MedialMesh) -> Vec<[u32; 2]> {
-    let mut has_face = vec![false; mesh.edges.len()];
-    for &[a, b, c] in &mesh.faces {
-        for side in [[a, b], [a, c], [b, c]] {
-            if let Ok(edge) = mesh.edges.binary_search(&side) {
-                has_face[edge] = true;
-            }
-        }
-    }
-    mesh.edges.iter().zip(has_face).filter(|&(_, has)| !has).map(|(&edge, _)| edge).collect()
-}
-
-/// Spheres without an edge.
-fn isolated(mesh: &MedialMesh) -> Vec<u32> {
-    let mut has_edge = vec![false; mesh.spheres.len()];
-    mesh.edges.iter().flatten().for_each(|&v| has_edge[v as usize] = true);
-    (0..).zip(has_edge).filter(|&(_, has)| !has).map(|(v, _)| v).collect()
-}
-
 #[cfg(test)]
 mod tests;

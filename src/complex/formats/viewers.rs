@@ -12,7 +12,7 @@ use std::io::{self, Write};
 use base64::prelude::{BASE64_STANDARD, Engine};
 
 use super::ma::canonical;
-use super::{LoadedMa, MaError, MaErrorKind, Radii, ReadOptions, isolated, lone_edges};
+use super::{LoadedMa, MaError, MaErrorKind, Radii, ReadOptions};
 use crate::complex::{MedialMesh, Sphere, stability_ratio};
 use crate::surface::{Fault, Place, ply};
 use crate::{ColourMap, Vec3};
@@ -228,7 +228,7 @@ pub(super) fn write_obj(out: &mut dyn Write, mesh: &MedialMesh) -> io::Result<()
 
 /// Writes a medial mesh as VTK PolyData.
 pub(super) fn write_vtp(out: &mut dyn Write, mesh: &MedialMesh, look: &Look) -> io::Result<()> {
-    let (points, lines) = (isolated(mesh), lone_edges(mesh));
+    let (points, lines) = (mesh.isolated(), mesh.lone_edges());
     let shown = look.values.as_ref().filter(|values| values.name != RADIUS);
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     writeln!(
