@@ -23,7 +23,7 @@ mod solids;
 
 pub use axes::KnownAxis;
 pub use catalogue::{BuiltIn, MAX_RESOLUTION, catalogue, find};
-pub use noise::{NoiseError, NoiseKind, add_noise, noisy};
+pub use noise::add_noise;
 
 #[cfg(test)]
 mod tests;

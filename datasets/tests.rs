@@ -10,9 +10,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::implicit::{Blend, Field};
-use crate::noise::mean_edge;
 use crate::shapes::{blob_field, double_torus_field, frame_field};
-use crate::{BuiltIn, NoiseError, NoiseKind, add_noise, catalogue, find, noisy};
+use crate::{BuiltIn, add_noise, catalogue, find};
 
 /// Distance from a point to the surface, positive inside.
 ///
@@ -168,6 +167,14 @@ fn in_ellipsoid(p: Vec3) -> f64 {
     best
 }
 
+fn mean_edge(mesh: &TriMesh) -> f64 {
+    let perimeters = (0..mesh.faces.len()).map(|face| {
+        let [a, b, c]: [Vec3; 3] = mesh.triangle(face);
+        a.distance(b) + b.distance(c) + c.distance(a)
+    });
+    perimeters.sum::<f64>() / (3 * mesh.faces.len()) as f64
+}
+
 fn smallest_angle(mesh: &TriMesh) -> f64 {
     let angles = (0..mesh.faces.len()).flat_map(|face| {
         let [a, b, c] = mesh.triangle(face);
@@ -293,85 +300,28 @@ fn the_exact_axis_of_a_box_shows_no_spike() {
     assert_eq!(triangle_quality(&axis).zero_area, 0);
 }
 
-/// Displacements of the vertices of a sphere of radius 1, in magnitudes of the noise.
-fn displacements(mesh: &TriMesh, kind: NoiseKind, magnitude: f64, seed: u64) -> Vec<Vec3> {
-    let unit = magnitude * Normalisation::of(mesh).unwrap().diagonal;
-    let noisy = noisy(mesh, kind, magnitude, seed).unwrap();
-    assert_eq!(noisy.faces, mesh.faces);
-    noisy.vertices.iter().zip(&mesh.vertices).map(|(n, v)| (n - v) / unit).collect()
-}
-
 #[test]
-fn displacements_are_repeatable_in_proportion_and_distributed_as_announced() {
+fn displacements_are_repeatable_in_proportion_and_uniform_in_a_ball() {
     let mesh = find("sphere").unwrap().mesh(60);
     let n = mesh.vertices.len() as f64;
-    let [uniform, along] = [NoiseKind::Isotropic, NoiseKind::Normal].map(|kind| {
-        let first = displacements(&mesh, kind, 0.02, 5);
-        assert_eq!(first, displacements(&mesh, kind, 0.02, 5));
-        assert_ne!(first, displacements(&mesh, kind, 0.02, 6));
-        let half = displacements(&mesh, kind, 0.01, 5);
-        assert!(first.iter().zip(half).all(|(a, b)| a.distance(b) < 1e-9), "{kind}");
-        assert!(first.iter().all(|by| by.length() <= 1.0 + 1e-12), "{kind}");
-        assert_eq!(noisy(&mesh, kind, 0.0, 5).unwrap(), mesh);
-        assert_eq!(noisy(&TriMesh::default(), kind, 0.1, 5).unwrap(), TriMesh::default());
-        first
-    });
+    let displacements = |eta: f64, seed: u64| -> Vec<Vec3> {
+        let noisy = add_noise(&mesh, eta, seed);
+        assert_eq!(noisy.faces, mesh.faces);
+        let unit = eta * Normalisation::of(&mesh).unwrap().diagonal;
+        noisy.vertices.iter().zip(&mesh.vertices).map(|(n, v)| (n - v) / unit).collect()
+    };
+    let uniform = displacements(0.02, 5);
+    assert_eq!(uniform, displacements(0.02, 5));
+    assert_ne!(uniform, displacements(0.02, 6));
+    assert!(uniform.iter().zip(displacements(0.01, 5)).all(|(a, b)| a.distance(b) < 1e-9));
+    assert!(uniform.iter().all(|by| by.length() <= 1.0 + 1e-12));
+    assert_eq!(add_noise(&mesh, 0.0, 5), mesh);
+    assert_eq!(add_noise(&TriMesh::default(), 0.1, 5), TriMesh::default());
     // In a ball the cube of the radius is uniform in 0..1: mean 1/2, deviation 1/sqrt(12 n).
     let mean_cube = uniform.iter().map(|d| d.length().powi(3)).sum::<f64>() / n;
     assert!((mean_cube - 0.5).abs() < 4.0 / (12.0 * n).sqrt(), "{mean_cube}");
     let mean: Vec3 = uniform.iter().copied().sum::<Vec3>() / n;
     assert!(mean.abs().max_element() < 4.0 * (0.2 / n).sqrt(), "{mean}");
-    // The normal of a mesh is nearly that of the sphere.
-    assert!(along.iter().zip(&mesh.vertices).all(|(by, v)| by.reject_from(*v).length() < 0.02));
-    // Uniform from -1 to 1: mean 0, mean square 1/3 of variance 4/45.
-    let along: Vec<f64> = along.iter().zip(&mesh.vertices).map(|(by, &v)| by.dot(v)).collect();
-    let mean = along.iter().sum::<f64>() / n;
-    let square = along.iter().map(|x| x * x).sum::<f64>() / n;
-    assert!(mean.abs() < 4.0 / (3.0 * n).sqrt(), "{mean}");
-    assert!((square - 1.0 / 3.0).abs() < 4.0 * (4.0 / 45.0 / n).sqrt() + 1e-3, "{square}");
-}
-
-#[test]
-fn dropped_samples_leave_a_closed_embedded_surface_of_the_same_topology() {
-    for shape in catalogue() {
-        let mesh = shape.mesh(shape.default_resolution);
-        let dropped = |seed: u64| noisy(&mesh, NoiseKind::Dropped, 0.3, seed).unwrap();
-        let left = dropped(1);
-        let id = shape.id;
-        assert_eq!(left, dropped(1), "{id}");
-        assert_ne!(left, dropped(2), "{id}");
-        let gone = (0.3 * mesh.vertices.len() as f64).round() as usize;
-        assert_eq!(left.vertices.len() + gone, mesh.vertices.len(), "{id}");
-        let [before, report] = [&mesh, &left].map(|mesh| validate(mesh).unwrap());
-        assert_eq!(report.expected_betti, before.expected_betti, "{id}");
-        assert!(!report.self_intersecting, "{id}");
-        assert!((report.volume.unwrap() / before.volume.unwrap() - 1.0).abs() < 0.05, "{id}");
-        // Those left are vertices of before, in their order.
-        let mut before = mesh.vertices.iter();
-        assert!(left.vertices.iter().all(|v| before.any(|b| b == v)), "{id}");
-    }
-}
-
-#[test]
-fn noise_that_cannot_be_is_refused() {
-    let mesh = find("sphere").unwrap().mesh(0);
-    let refused = |kind, magnitude| noisy(&mesh, kind, magnitude, 0).unwrap_err();
-    for kind in NoiseKind::ALL {
-        assert_eq!(kind.to_string().parse(), Ok(kind));
-        assert_eq!(refused(kind, 1.5), NoiseError::Magnitude { kind, magnitude: 1.5 });
-        assert!(refused(kind, f64::NAN).to_string().contains("from 0 to 1"));
-    }
-    assert!("loud".parse::<NoiseKind>().unwrap_err().to_string().contains("isotropic, normal"));
-    // A sphere needs four vertices at least.
-    let all = refused(NoiseKind::Dropped, 1.0);
-    assert!(matches!(all, NoiseError::TooFew { asked, dropped, .. } if dropped < asked), "{all}");
-    let mut open = mesh.clone();
-    open.faces.pop();
-    let open = noisy(&open, NoiseKind::Dropped, 0.1, 0).unwrap_err();
-    assert!(
-        matches!(&open, NoiseError::NotManifold(why) if why.contains("3 edges with one face only")),
-        "{open}"
-    );
 }
 
 /// The union of the axis's balls and the solid are one set, and as deep everywhere: an axis that lacks a part

@@ -7,7 +7,7 @@ use std::{env, fs};
 use clap::{Args, Subcommand};
 use medial::surface;
 use medial_datasets::published::{Published, Set};
-use medial_datasets::{NoiseKind, published};
+use medial_datasets::published;
 use serde_json::{Value, json};
 
 use crate::args::{Global, positive};
@@ -43,14 +43,9 @@ struct Make {
     /// Resolution, in the shape's own meaning [default: that of `compare`].
     #[arg(long)]
     resolution: Option<u32>,
-    /// Noise of this magnitude, at most 1: the largest displacement of a vertex as a fraction of the diagonal; for
-    /// `dropped` the share of vertices.
+    /// Displace each vertex uniformly in a ball of this radius, a fraction of the diagonal from 0 to 1.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     noise: f64,
-    /// Kind of the noise: `isotropic` displaces vertices uniformly in a ball, `normal` along their normals; `dropped`
-    /// removes vertices, the surface staying closed and embedded.
-    #[arg(long, value_name = "KIND", default_value_t)]
-    noise_kind: NoiseKind,
     /// Seed of the noise.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -71,14 +66,16 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 fn write(make: &Make, global: &Global) -> Result<Exit, Failure> {
     let source = Source::BuiltIn { id: make.id.clone(), resolution: make.resolution };
     let input = Input::load(&source).map_err(Failure::usage)?;
-    let mesh = medial_datasets::noisy(&input.mesh, make.noise_kind, make.noise, make.seed);
-    let mesh = mesh.map_err(|error| Failure::usage(format!("--noise: {error}")))?;
+    if !(0.0..=1.0).contains(&make.noise) {
+        return Err(Failure::usage(format!("--noise {}: give a fraction from 0 to 1", make.noise)));
+    }
+    let mesh = medial_datasets::add_noise(&input.mesh, make.noise, make.seed);
     surface::write(&make.output, &mesh).map_err(Failure::input)?;
     let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
     if global.json {
         let object = json!({
             "id": make.id, "output": make.output, "vertices": vertices, "faces": faces,
-            "noise": make.noise, "noise_kind": make.noise_kind, "seed": make.seed,
+            "noise": make.noise, "seed": make.seed,
         });
         print_json(&object, &[]);
     } else {
