@@ -44,6 +44,17 @@ pub struct SamplePoles {
     pub second: Option<CellId>,
 }
 
+impl SamplePoles {
+    /// The cells of the poles that are not at infinity.
+    pub fn cells(self) -> impl Iterator<Item = CellId> {
+        let first = match self.first {
+            Some(Pole::Vertex(cell)) => Some(cell),
+            _ => None,
+        };
+        first.into_iter().chain(self.second)
+    }
+}
+
 /// The ball around a pole through the samples of its cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PolarBall {
@@ -175,13 +186,8 @@ fn polar_balls(
     samples: &[SamplePoles],
 ) -> Vec<PolarBall> {
     let mut is_pole = vec![false; spheres.len()];
-    for poles in samples {
-        if let Some(Pole::Vertex(cell)) = poles.first {
-            is_pole[cell.index()] = true;
-        }
-        if let Some(cell) = poles.second {
-            is_pole[cell.index()] = true;
-        }
+    for cell in samples.iter().flat_map(|poles| poles.cells()) {
+        is_pole[cell.index()] = true;
     }
     let cells = delaunay.finite_cells().filter(|c| is_pole[c.index()]);
     cells

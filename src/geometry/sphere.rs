@@ -112,14 +112,18 @@ impl<const N: usize> HullFoot<N> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
-    start: Vec3,
-    axis: Vec3,
-    length: f64,
+    /// Centre of the first ball.
+    pub(crate) start: Vec3,
+    /// `u`; zero when one ball holds the other.
+    pub(crate) axis: Vec3,
+    /// `l`; zero when one ball holds the other.
+    pub(crate) length: f64,
     /// Radius at `start`.
-    radius: f64,
-    slope: f64,
+    pub(crate) radius: f64,
+    /// `s`.
+    pub(crate) slope: f64,
     /// `s / sqrt(1 - s^2)`: the shift of the best centre along the axis, per unit of `y`.
-    lead: f64,
+    pub(crate) lead: f64,
     /// The ball (0 or 1) that holds the other, if one does.
     larger: Option<usize>,
 }
@@ -157,36 +161,6 @@ impl Cone {
             lead: 0.0,
             larger: Some(larger),
         }
-    }
-
-    /// Centre of the first ball.
-    pub(crate) fn start(&self) -> Vec3 {
-        self.start
-    }
-
-    /// `u`; zero when one ball holds the other.
-    pub(crate) fn axis(&self) -> Vec3 {
-        self.axis
-    }
-
-    /// `l`; zero when one ball holds the other.
-    pub(crate) fn length(&self) -> f64 {
-        self.length
-    }
-
-    /// Radius of the first ball.
-    pub(crate) fn radius(&self) -> f64 {
-        self.radius
-    }
-
-    /// `s`.
-    pub(crate) fn slope(&self) -> f64 {
-        self.slope
-    }
-
-    /// `s / sqrt(1 - s^2)`.
-    pub(crate) fn lead(&self) -> f64 {
-        self.lead
     }
 
     /// The ball (0 or 1) that holds the other, if one does.
@@ -367,13 +341,14 @@ impl Slab {
 /// to the three cones and to this part, where it has one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlabFace {
-    frame: PlanarFrame,
+    /// The plane of the centres.
+    pub(crate) frame: PlanarFrame,
     /// Radius at the origin of the frame.
-    radius: f64,
+    pub(crate) radius: f64,
     /// `g` in the frame.
-    gradient: [f64; 2],
+    pub(crate) gradient: [f64; 2],
     /// `1 / k`.
-    lead: f64,
+    pub(crate) lead: f64,
     /// The corner that is the origin of the frame.
     first: u8,
 }
@@ -401,53 +376,30 @@ impl SlabFace {
         })
     }
 
-    /// The plane of the centres.
-    pub(crate) fn frame(&self) -> &PlanarFrame {
-        &self.frame
-    }
-
-    /// Radius at the origin of the frame.
-    pub(crate) fn radius(&self) -> f64 {
-        self.radius
-    }
-
-    /// `g` in the frame.
-    pub(crate) fn gradient(&self) -> [f64; 2] {
-        self.gradient
-    }
-
-    /// `1 / k`.
-    pub(crate) fn lead(&self) -> f64 {
-        self.lead
-    }
-
     /// Signed distance to the slab where its nearest sphere is inside the triangle; `None` where
     /// that sphere is on a side.
     #[inline]
     pub fn signed_distance(&self, p: Vec3) -> Option<f64> {
-        let [x, y, height] = self.frame.local(p);
-        let ahead = height.abs() * self.lead;
-        let [dx, dy] = [ahead * self.gradient[0], ahead * self.gradient[1]];
-        let (x, y) = (x + dx, y + dy);
-        if !self.frame.contains(x, y) {
-            return None;
-        }
-        let distance = (dx * dx + dy * dy + height * height).sqrt();
+        let [x, y, distance] = self.best_centre(p)?;
         Some(distance - self.radius_at(x, y))
     }
 
     /// As [`SlabFace::signed_distance`], with the centre of the sphere that attains it.
     #[inline]
     pub fn nearest_centre(&self, p: Vec3) -> Option<(f64, Vec3)> {
+        let [x, y, distance] = self.best_centre(p)?;
+        Some((distance - self.radius_at(x, y), self.frame.point(x, y)))
+    }
+
+    /// Step 2: the best centre in the plane, and its distance from `p`, if inside the triangle.
+    #[inline]
+    fn best_centre(&self, p: Vec3) -> Option<[f64; 3]> {
         let [x, y, height] = self.frame.local(p);
         let ahead = height.abs() * self.lead;
         let [dx, dy] = [ahead * self.gradient[0], ahead * self.gradient[1]];
         let (x, y) = (x + dx, y + dy);
-        if !self.frame.contains(x, y) {
-            return None;
-        }
-        let distance = (dx * dx + dy * dy + height * height).sqrt();
-        Some((distance - self.radius_at(x, y), self.frame.point(x, y)))
+        let inside = self.frame.contains(x, y);
+        inside.then(|| [x, y, (dx * dx + dy * dy + height * height).sqrt()])
     }
 
     #[inline]
@@ -457,12 +409,7 @@ impl SlabFace {
 
     /// The sphere that attains the distance, with its weights, if inside the triangle.
     fn best_sphere(&self, p: Vec3) -> Option<(Sphere, [f64; 3])> {
-        let [x, y, height] = self.frame.local(p);
-        let ahead = height.abs() * self.lead;
-        let (x, y) = (x + ahead * self.gradient[0], y + ahead * self.gradient[1]);
-        if !self.frame.contains(x, y) {
-            return None;
-        }
+        let [x, y, _] = self.best_centre(p)?;
         let [cx, cy] = self.frame.apex;
         let third = (y / cy).min(1.0);
         let second = ((x - cx * third) / self.frame.length).clamp(0.0, 1.0 - third);

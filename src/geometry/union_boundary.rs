@@ -15,10 +15,10 @@
 //!    meet; the arc joins the points of the two triangles that bound the gap. The arc has length
 //!    zero if and only if both points are one, on four spheres: the orthocentre of the four balls, if
 //!    its power is zero and it is on the gap's side of both planes. Exact.
-//! 3. Points are merged along arcs of length zero, and by a key of the caller's choice.
+//! 3. Points are merged along arcs of length zero.
 //!
 //! Points on two sheets of the boundary that touch in a single point are not joined by arcs and
-//! stay apart, unless the key joins them.
+//! stay apart.
 
 use rayon::prelude::*;
 
@@ -53,7 +53,7 @@ pub struct UnionVertex {
 /// let boundary = UnionBoundary::new(&complex);
 /// // Two triangles fill the rectangle, each has a point above and one below: four spheres meet there.
 /// assert_eq!(boundary.vertices().len(), 4);
-/// let merged = boundary.merge(|_| None);
+/// let merged = boundary.merge();
 /// assert_eq!(merged.points().len(), 2);
 /// assert_eq!(merged.balls(0), [0, 1, 2, 3]);
 /// assert!(merged.points().iter().all(|p| p.distance(Vec3::new(3.0, 4.0, 12.0 * p.z.signum())) < 1e-14));
@@ -300,28 +300,12 @@ impl MergedVertices {
 }
 
 impl UnionBoundary {
-    /// Merges vertices that are one point exactly, see [`UnionBoundary::coincident`], and those
-    /// with the same key, if `key` gives one.
-    ///
-    /// The balls of a power crust meet in the samples by construction but, being rounded, not
-    /// exactly: there the sample is the key.
-    pub fn merge(&self, key: impl Fn(&UnionVertex) -> Option<u32>) -> MergedVertices {
+    /// Merges vertices that are one point exactly, see [`UnionBoundary::coincident`].
+    pub fn merge(&self) -> MergedVertices {
         let mut groups = DisjointSets::singletons(self.vertices.len());
         for &[a, b] in &self.coincident {
             groups.join(a, b);
         }
-        let keyed = self.vertices.iter().enumerate();
-        let mut keyed: Vec<(u32, u32)> =
-            keyed.filter_map(|(i, v)| Some((key(v)?, i as u32))).collect();
-        keyed.sort_unstable();
-        // Neighbours are enough: joining is transitive.
-        for pair in keyed.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-            groups.join(pair[0].1, pair[1].1);
-        }
-        self.gather(&mut groups)
-    }
-
-    fn gather(&self, groups: &mut DisjointSets) -> MergedVertices {
         let count = self.vertices.len();
         let mut point_of = vec![0; count];
         // The representative of a group is its smallest member, so it is numbered first.

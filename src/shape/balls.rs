@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::Vec3;
 use crate::complex::{CellSpheres, Contacts, MedialMesh};
 use crate::geometry::trees::PointTree;
-use crate::geometry::{Delaunay, Pole, Poles, Sphere};
+use crate::geometry::{Delaunay, Poles, Sphere};
 use crate::shape::{Shape, ShapeError};
 use crate::surface::Side;
 
@@ -169,13 +169,8 @@ impl Shape {
         let delaunay = Delaunay::new(&points)?;
         let poles = Poles::new(&delaunay);
         let mut is_pole = vec![false; delaunay.finite_cell_count()];
-        for poles in &poles.samples()[..samples.len()] {
-            if let Some(Pole::Vertex(cell)) = poles.first {
-                is_pole[cell.index()] = true;
-            }
-            if let Some(cell) = poles.second {
-                is_pole[cell.index()] = true;
-            }
+        for cell in poles.samples()[..samples.len()].iter().flat_map(|poles| poles.cells()) {
+            is_pole[cell.index()] = true;
         }
         let balls: Vec<Sphere> =
             poles.balls().iter().filter(|b| is_pole[b.cell.index()]).map(|b| b.sphere).collect();

@@ -33,7 +33,7 @@ impl Corners {
         balls: &[Sphere],
     ) -> Result<Self, TriangulationError> {
         let boundary = UnionBoundary::new(complex);
-        let merged = boundary.merge(|_| None);
+        let merged = boundary.merge();
         let points = merged.points().to_vec();
         // Points are numbered in the order of their first vertices.
         let mut vertices: Vec<UnionVertex> = Vec::with_capacity(points.len());

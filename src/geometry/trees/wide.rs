@@ -459,12 +459,12 @@ impl ConeBlock {
     pub fn new(cones: &[Cone], frame: &Frame) -> Self {
         let s = frame.scale;
         Self {
-            start: [0, 1, 2].map(|k| lanes(cones, 0.0, |c| frame.forward(c.start())[k])),
-            axis: [0, 1, 2].map(|k| lanes(cones, 0.0, |c| c.axis()[k])),
-            length: lanes(cones, 0.0, |c| c.length() * s),
-            radius: lanes(cones, f32::NEG_INFINITY, |c| c.radius() * s),
-            slope: lanes(cones, 0.0, Cone::slope),
-            lead: lanes(cones, 0.0, Cone::lead),
+            start: [0, 1, 2].map(|k| lanes(cones, 0.0, |c| frame.forward(c.start)[k])),
+            axis: [0, 1, 2].map(|k| lanes(cones, 0.0, |c| c.axis[k])),
+            length: lanes(cones, 0.0, |c| c.length * s),
+            radius: lanes(cones, f32::NEG_INFINITY, |c| c.radius * s),
+            slope: lanes(cones, 0.0, |c| c.slope),
+            lead: lanes(cones, 0.0, |c| c.lead),
         }
     }
 
@@ -506,27 +506,27 @@ impl FaceBlock {
         let s = frame.scale;
         let inward = |run: fn(&SlabFace) -> f64, turn: f64| {
             let unit = move |f: &SlabFace| {
-                let (run, height) = (run(f), f.frame().apex[1]);
+                let (run, height) = (run(f), f.frame.apex[1]);
                 let length = run.hypot(height);
                 [turn * height / length, -turn * run / length]
             };
             [0, 1].map(|k| lanes(faces, 0.0, |f| unit(f)[k]))
         };
-        let left = inward(|f| f.frame().apex[0], 1.0);
-        let right = inward(|f| f.frame().apex[0] - f.frame().length, -1.0);
+        let left = inward(|f| f.frame.apex[0], 1.0);
+        let right = inward(|f| f.frame.apex[0] - f.frame.length, -1.0);
         Self {
-            origin: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| frame.forward(f.frame().origin)[k])),
-            x: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame().x[k])),
-            y: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame().y[k])),
-            normal: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame().normal[k])),
-            radius: lanes(faces, f32::NEG_INFINITY, |f| f.radius() * s),
-            gradient: [0, 1].map(|k| lanes(faces, 0.0, |f| f.gradient()[k])),
-            lead: lanes(faces, 0.0, SlabFace::lead),
-            rise: lanes(faces, 0.0, |f| 1.0 / f.lead()),
+            origin: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| frame.forward(f.frame.origin)[k])),
+            x: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame.x[k])),
+            y: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame.y[k])),
+            normal: [0, 1, 2].map(|k| lanes(faces, 0.0, |f| f.frame.normal[k])),
+            radius: lanes(faces, f32::NEG_INFINITY, |f| f.radius * s),
+            gradient: [0, 1].map(|k| lanes(faces, 0.0, |f| f.gradient[k])),
+            lead: lanes(faces, 0.0, |f| f.lead),
+            rise: lanes(faces, 0.0, |f| 1.0 / f.lead),
             sides: [left, right],
             offset: lanes(faces, 0.0, |f| {
-                let [cx, cy] = f.frame().apex;
-                f.frame().length * s * (cy / (cx - f.frame().length).hypot(cy))
+                let [cx, cy] = f.frame.apex;
+                f.frame.length * s * (cy / (cx - f.frame.length).hypot(cy))
             }),
         }
     }

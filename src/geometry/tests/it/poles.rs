@@ -2,7 +2,7 @@
 
 use medial_geometry::Vec3;
 use medial_geometry::predicates::{Sign, circumsphere, in_sphere, orient3d};
-use medial_geometry::{Delaunay, Pole, Poles, Sphere, UnionBoundary};
+use medial_geometry::{Delaunay, Pole, Poles, Sphere};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -197,7 +197,7 @@ fn inner_polar_balls_of_a_torus_are_a_torus() {
 }
 
 #[test]
-fn polar_balls_of_an_ellipsoid_meet_in_samples() {
+fn inner_polar_balls_of_an_ellipsoid_fill_it() {
     let axes = Vec3::new(1.0, 0.8, 0.5);
     let mut rng = Pcg64::seed_from_u64(26);
     let samples: Vec<Vec3> = (0..3_000).map(|_| in_cube(&mut rng).normalize() * axes).collect();
@@ -205,16 +205,6 @@ fn polar_balls_of_an_ellipsoid_meet_in_samples() {
     let inner = Poles::new(&delaunay).inner_balls(|cell| {
         delaunay.circumsphere(cell).is_some_and(|(c, _)| (c / axes).length() < 1.0)
     });
-    let balls: Vec<_> = inner.iter().map(|b| b.sphere).collect();
-    let complex = dual_complex(&balls);
-    let boundary = UnionBoundary::new(&complex);
-    let near = |p: Vec3| samples.iter().position(|s| s.distance(p) < 1e-7);
-    let merged = boundary.merge(|v| near(v.position).map(|sample| sample as u32));
-    let keyed = merged.points().iter().filter(|p: &&Vec3| near(**p).is_some()).count();
-    // Three polar balls and more meet in most of the samples, and nearly all groups are there.
-    assert!(keyed > samples.len() * 2 / 3, "{keyed}");
-    let merged_away = boundary.vertices().len() - merged.points().len();
-    assert!(merged_away > samples.len(), "{merged_away}");
     for grow in [1.002, 1.1] {
         let grown = inner.iter().map(|b| Sphere::new(b.sphere.centre, grow * b.sphere.radius));
         assert_eq!(dual_complex(&grown.collect::<Vec<_>>()).betti(), [1, 0, 0], "grown by {grow}");
